@@ -1192,7 +1192,7 @@ def mesh(scene: str | Path | Scene | Model, out: str | Path, /, **sets: Any) -> 
     if model.patch is None:
         raise PatchfemError("only a scene with [contact] has a mesh", "contact")
     out = _require_path(out, "mesh")
-    lower, upper = patch_result.make_bodies(model)
+    lower, upper = patch_result.make_piece_meshes_of_run(model)
     mesh_files.write_mesh(lower, out, upper)
     return out
 

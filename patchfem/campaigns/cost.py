@@ -24,8 +24,8 @@ from ..core import NotConverged, PatchfemError, compute_allowed_error
 from ..formatting import format_number
 from ..model.model import Model
 from ..model.source import locate_errors
-from ..runs.patch.ladder import solve_on_split_mesh
 from ..runs.patch.measures import estimate_static_measures
+from ..runs.patch.mesh_levels import solve_on_split_mesh
 from ..runs.plan import plan
 from ..runs.run import run as run_plan
 from .numerical_settings import (

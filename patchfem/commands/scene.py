@@ -233,7 +233,7 @@ def mesh(
             f"{scene}: missing [contact]: only a scene with a patch has a mesh; write the patch of an "
             "interface as the [contact] of a separate scene"
         )
-    low, high = result.make_bodies(scene_model)
+    low, high = result.make_piece_meshes_of_run(scene_model)
     mesh_files.write_mesh(low, out, high)
     for name, body in (("lower", low), ("upper", high or low)):
         print(

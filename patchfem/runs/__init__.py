@@ -56,14 +56,14 @@ PUBLIC = {
         "elements",
         "strip_elements",
     ),
-    "patch.ladder": (
+    "patch.mesh_levels": (
         "solve_with_coarser",
         "solve_on_split_mesh",
     ),
     "patch.measures": ("estimate_static_measures",),
     "patch.sweep_meshes": ("geometry_key",),
     "patch.press": ("nodal_areas",),
-    "patch.result": ("make_bodies",),
+    "patch.result": ("make_piece_meshes_of_run",),
     "patch.strength": (
         "Strength",
         "YIELDING_NEGLECTED",

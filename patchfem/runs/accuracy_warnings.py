@@ -16,7 +16,7 @@ from ..effects import law_has_trait
 from ..formatting import format_number
 from ..model.gap import longest_loaded_cell
 from ..response import rows
-from .patch import faces, ladder, press
+from .patch import faces, mesh_levels, press
 from .results import notes, patch_rows
 from .rig import costs, engines
 
@@ -254,8 +254,8 @@ def _mesh_remedy(
     if tolerances:
         return f"{cause}; set accuracy.tolerance = {min(tolerances):.3g} for a finer mesh"
     patches = [finding.patch for finding, _ in places if isinstance(finding.patch, press.Patch)]
-    seconds = max(map(ladder.predict_next_mesh_seconds, patches), default=0.0)
-    limit = ladder.max_condensing_seconds(patch_models[0])
+    seconds = max(map(mesh_levels.predict_next_mesh_seconds, patches), default=0.0)
+    limit = mesh_levels.max_condensing_seconds(patch_models[0])
     if seconds > limit:
         cause += (
             f"; the next mesh would take about {format_number(seconds, 2)} CPU s, and at most {limit:g} CPU s are spent "
@@ -273,13 +273,13 @@ def _refining_tolerance(finding: Finding, coarse) -> float | None:
     patch_model = finding.model.patch
     tolerance = finding.model.accuracy.tolerance
     if patch_model.mesh.shared is not None and isinstance(finding.patch, press.Patch):
-        if ladder.predict_next_mesh_seconds(finding.patch) > ladder.max_condensing_seconds(
-            patch_model
-        ):
+        if mesh_levels.predict_next_mesh_seconds(
+            finding.patch
+        ) > mesh_levels.max_condensing_seconds(patch_model):
             return None
     if not any(coarse) or patch_model.mesh.shared is not None:
         return PROPOSED_TOLERANCE_RATIO * tolerance
-    return ladder.tolerance_of_next_mesh(
+    return mesh_levels.tolerance_for_finer_mesh(
         patch_model,
         finding.climbed or [finding.patch, *coarse],
         patch_model.mesh.tolerance or tolerance,
@@ -326,7 +326,7 @@ def _motion_remedy(finding: Finding, excess: dict, coarse) -> str:
         return "more drive cycles make this value more accurate; raise drive.cycles"
     if extra.get("harmonics") is None or name.startswith(SAMPLED_MEASURES):
         return NO_REMEDY
-    return notes.propose_harmonics(extra["harmonics"], _count_friction_harmonics(finding))
+    return notes.advise_harmonics(extra["harmonics"], _count_friction_harmonics(finding))
 
 
 def _find_main_error_kind(finding: Finding, name: str) -> str:

@@ -205,14 +205,16 @@ def _make_plan(model: Model) -> Plan:
     if model.patch is not None:
         chain |= patch_plan.stiffness_chain(model.patch)
         groups |= patch_plan.compute_groups(model)
-        on_patch += patch_plan.write_verdict(groups, model.patch)
+        on_patch += patch_plan.describe_patch_plan(groups, model.patch)
     interfaces = model.rig.friction.interfaces if model.rig is not None else ()
     for number, interface in enumerate(interfaces):
         if interface.patch is not None:
             for name, link in patch_plan.stiffness_chain(interface.patch).items():
                 if link != "rigid":
                     chain[rows.add_interface_number(name, number)] = link
-            on_patch += patch_plan.describe_patch(model.rig.friction.names[number], interface)
+            on_patch += patch_plan.describe_interface_patch(
+                model.rig.friction.names[number], interface
+            )
     cost = _predict_cost(model)
     on_law += cost.words
     if model.kind == "bench":

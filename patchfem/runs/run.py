@@ -175,7 +175,7 @@ def _press_patch(model: Model, *, estimate: bool, fresh: bool) -> PatchMeshes:
     patch, *coarse = patch_result.solve_with_coarser(model.patch, tolerance, estimate, fresh)
     static = ()
     if model.kind == "bench" and not _is_open(patch):
-        static = patch_result.solve_static_ladder(model.patch, tolerance, estimate, fresh)
+        static = patch_result.solve_on_static_meshes(model.patch, tolerance, estimate, fresh)
     return PatchMeshes(patch, tuple(coarse), tuple(static))
 
 
@@ -187,7 +187,7 @@ def _is_open(patch) -> bool:
 def _warn_of_patch(model: Model, meshes: PatchMeshes, *, estimate: bool) -> list:
     """Return the warnings on large strains and on an unknown mesh error of a patch."""
     patch = meshes.patch
-    warnings = list(patch_result.warn_of_strains(model.patch, patch))
+    warnings = list(patch_result.patch_warnings(model.patch, patch))
     if estimate and meshes.coarse[0] is None:
         remedy = "leave out contact.element_size"
         if model.patch.mesh.file:
@@ -227,7 +227,7 @@ def _worn_inputs(inputs: RunInputs, evolved) -> RunInputs:
     """Return the inputs of a run with worn surfaces."""
     plan_of_run = inputs.plan
     if evolved.state is not None:
-        worn = evolve.worn_model(plan_of_run.model, evolved.patch, evolved.state.depth)
+        worn = evolve.make_worn_model(plan_of_run.model, evolved.patch, evolved.state.depth)
         plan_of_run = replace(plan_of_run, model=worn)
     return replace(
         inputs, plan=plan_of_run, patch=evolved.patch, coarse=tuple(evolved.coarse), progress=None
@@ -300,7 +300,7 @@ def _yielding_faces(result: Result) -> dict:
     patch_model = result.plan.model.patch
     if patch_model is None or result.patch is None or peak is None or peak.value is None:
         return {}
-    return strength.yielding_faces(patch_model, peak.value - (peak.error or 0.0))
+    return strength.note_on_yielding_faces(patch_model, peak.value - (peak.error or 0.0))
 
 
 def _saving_context(kept: StateFile | None, what: Plan, patch):
@@ -320,7 +320,7 @@ def _saving_context(kept: StateFile | None, what: Plan, patch):
         return kept.path.parent / f"march_{number}.npz"
 
     if kept.resume and model.wear is None and not path_of_march(1).is_file():
-        raise evolve.no_saved_state_error(kept.path)
+        raise evolve.make_missing_state_error(kept.path)
     return checkpoint.store_checkpoints(
         checkpoint.CheckpointFiles(
             path_of_march, state_key(model, patch, kept.version), kept.resume

@@ -8,7 +8,7 @@ from scene_texts import PIECE
 
 from patchfem import build
 from patchfem.runs import estimate_static_measures, solve_with_coarser
-from patchfem.runs.patch import ladder
+from patchfem.runs.patch import mesh_levels
 from patchfem.runs.patch.condensed import condense
 from patchfem.runs.patch.limits import extrapolate_to_zero_cell_length
 from patchfem.runs.patch.press import solve_patch_contact
@@ -74,7 +74,7 @@ def exceeds_error(value, error, reference) -> bool:
 @pytest.fixture
 def limit_mesh_cost(monkeypatch):
     """Limit the cost of the meshes so that two refinements remain affordable."""
-    monkeypatch.setattr(ladder, "MAX_CONDENSING_SECONDS", MAX_SECONDS)
+    monkeypatch.setattr(mesh_levels, "MAX_CONDENSING_SECONDS", MAX_SECONDS)
 
 
 @pytest.mark.share(0, 3, 6)
@@ -106,6 +106,6 @@ def test_exact_cost_limit_of_static_patch_is_larger():
     for is_static in (False, True):
         patch_model = SimpleNamespace(mesh=SimpleNamespace(slip=None, is_static=is_static))
         for tolerance in (None, 1e-2, 1e-6):
-            limit = ladder.max_condensing_seconds(patch_model, tolerance)
-            assert limit == ladder.MAX_CONDENSING_SECONDS[is_static]
-    assert ladder.MAX_CONDENSING_SECONDS[True] > ladder.MAX_CONDENSING_SECONDS[False]
+            limit = mesh_levels.max_condensing_seconds(patch_model, tolerance)
+            assert limit == mesh_levels.MAX_CONDENSING_SECONDS[is_static]
+    assert mesh_levels.MAX_CONDENSING_SECONDS[True] > mesh_levels.MAX_CONDENSING_SECONDS[False]

@@ -8,7 +8,7 @@ from scene_texts import SMALL_PATCH
 from patchfem import build
 from patchfem.runs import solve_with_coarser
 from patchfem.runs.patch import grids, store
-from patchfem.runs.patch.plan import expected_grids
+from patchfem.runs.patch.plan import predict_grid_sizes
 from patchfem.scene import loads
 
 PIECES = """[contact]
@@ -54,7 +54,7 @@ def test_exact_plan_predicts_grids_of_run(text, tolerance, sets):
     """A plan predicts the finest grid, the number of levels and the number of interface nodes of the run."""
     patch = build_patch(text, *sets)
     expected, (finest, levels) = (
-        expected_grids(patch, tolerance),
+        predict_grid_sizes(patch, tolerance),
         count_nodes_of_run(patch, tolerance),
     )
     assert expected.finest == finest
@@ -77,7 +77,7 @@ def test_always_plan_predicts_grid_of_limited_contact(text):
     the same grid."""
     patch = build_patch(text)
     (expected,), ((actual,), _) = (
-        expected_grids(patch, 1e-2).finest,
+        predict_grid_sizes(patch, 1e-2).finest,
         count_nodes_of_run(patch, 1e-2),
     )
     assert np.array_equal(expected, actual)

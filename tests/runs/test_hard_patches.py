@@ -11,7 +11,7 @@ from scene_texts import PIECE
 from patchfem import run
 from patchfem.closed_forms.contact import hertz_half_width, hertz_peak
 from patchfem.core import Outcome, PatchfemError
-from patchfem.runs.patch import ladder
+from patchfem.runs.patch import mesh_levels
 from patchfem.runs.patch.grids import predict_condensing_seconds
 from patchfem.scene import loads
 
@@ -71,7 +71,7 @@ def error_covers(result, name, reference) -> bool:
 @pytest.fixture
 def coarse_meshes(monkeypatch):
     """Limit automatic meshes to a hundredth of the usual cost."""
-    monkeypatch.setattr(ladder, "MAX_CONDENSING_SECONDS", {True: 0.1, False: 0.1})
+    monkeypatch.setattr(mesh_levels, "MAX_CONDENSING_SECONDS", {True: 0.1, False: 0.1})
 
 
 @pytest.mark.share(0)

@@ -9,7 +9,7 @@ from scene_texts import COATING, PIECE
 import patchfem as pf
 from patchfem import build
 from patchfem.closed_forms import contact as closed_forms
-from patchfem.runs.patch import fine as trace
+from patchfem.runs.patch import profile_points as trace
 from patchfem.scene import loads
 
 SKIN = (

@@ -81,7 +81,7 @@ def test_always_different_patches_have_different_keys(changes):
 def test_always_patch_with_file_is_not_shared(tmp_path):
     """A patch with a profile is not shared, because its file may change."""
     model = pf.build(TEXT)
-    assert not store.may_be_shared(model.patch) and store.may_be_shared(
+    assert not store.can_share_results(model.patch) and store.can_share_results(
         with_shared_meshes([model, model])[0].patch
     )
     (tmp_path / "heights.csv").write_text(
@@ -91,4 +91,4 @@ def test_always_patch_with_file_is_not_shared(tmp_path):
         TEXT.replace(SHEAR, SHEAR + '[contact.profile]\nfile = "heights.csv"\n')
     )
     profiled = with_shared_meshes([pf.build(tmp_path / "a.toml")] * 2)[0].patch
-    assert profiled.mesh.shared is not None and not store.may_be_shared(profiled)
+    assert profiled.mesh.shared is not None and not store.can_share_results(profiled)

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from patchfem.runs.wear.slip import Frames, compute_frame_slip, count_frames
+from patchfem.runs.wear.slip import Frames, choose_frame_count, compute_frame_slip
 
 PHASES = np.linspace(0, 1, 41)
 
@@ -50,7 +50,7 @@ def test_always_error_of_slip_path_covers_hidden_reversals(slip, path, energy):
 
 def test_order_of_frame_count_in_tolerance():
     """The number of frames grows with the inverse square root of the tolerance."""
-    assert count_frames(1e-2) == 223 and count_frames(1e-3) / count_frames(1e-2) == pytest.approx(
-        10**0.5, rel=0.01
-    )
-    assert count_frames(1e-9) == 800
+    assert choose_frame_count(1e-2) == 223 and choose_frame_count(1e-3) / choose_frame_count(
+        1e-2
+    ) == pytest.approx(10**0.5, rel=0.01)
+    assert choose_frame_count(1e-9) == 800

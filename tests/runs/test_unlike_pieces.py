@@ -19,7 +19,7 @@ from patchfem.mesh.tensor import graded_depth, graded_rows
 from patchfem.model import extend_grid, find_file_faults, find_rounded_edges, make_piece_meshes
 from patchfem.runs import estimate_static_measures, solve_with_coarser
 from patchfem.runs.patch.press import solve
-from patchfem.runs.patch.result import warn_of_strains
+from patchfem.runs.patch.result import patch_warnings
 from patchfem.runs.patch.values import compute_static_values
 from patchfem.scene import loads
 
@@ -132,7 +132,7 @@ def test_order_of_rounded_punch_error_is_one():
     assert errors[1] < 4e-3 and errors[0] / errors[1] > 1.8
     assert patch.pressure.sigma_n.max() == pytest.approx(expected.max(), rel=4e-3)
     assert compute_static_values(patch)["contact_half_width"] == pytest.approx(half, rel=1e-3)
-    assert "steep" not in " ".join(warn_of_strains(model, patch))
+    assert "steep" not in " ".join(patch_warnings(model, patch))
 
 
 def test_exact_stiff_sharp_block_agrees_with_flat_punch():

@@ -5,7 +5,7 @@ import pytest
 import patchfem as pf
 from patchfem.runs import compute_wear
 from patchfem.runs.patch.result import solve_with_coarser
-from patchfem.runs.wear.plan import N_SMOOTH_JUMPS, estimate_jumps
+from patchfem.runs.wear.plan import N_SMOOTH_JUMPS, estimate_jump_count
 
 SCENE = """
 [contact]
@@ -50,14 +50,15 @@ def test_always_plan_estimates_number_of_wear_steps(shape, cycles):
     model = build_wear_model(shape, f"cycles = {cycles:g}\n")
     patch = solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0]
     actual = len(compute_wear(model, patch, (None, None)).moments) - 1
-    assert 1 / 1.5 < estimate_jumps(model) / actual < 1.5
+    assert 1 / 1.5 < estimate_jump_count(model) / actual < 1.5
 
 
 def test_exact_wear_steps_if_prescribed_or_in_full_contact():
     """The plan takes the prescribed number of wear steps, and a fixed number for asperities in full
     contact."""
     assert (
-        estimate_jumps(build_wear_model(TILT.format("0.1 mrad"), "cycles = 1e8\njumps = 7\n")) == 7
+        estimate_jump_count(build_wear_model(TILT.format("0.1 mrad"), "cycles = 1e8\njumps = 7\n"))
+        == 7
     )
     rough = '[contact.asperities]\nlaw = "exponential"\nnormal_stiffness = "1e13 Pa/m"\ndecay_length = "2.5 um"\n'
-    assert estimate_jumps(build_wear_model(rough, "cycles = 1e8\n")) == N_SMOOTH_JUMPS
+    assert estimate_jump_count(build_wear_model(rough, "cycles = 1e8\n")) == N_SMOOTH_JUMPS

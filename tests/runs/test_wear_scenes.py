@@ -335,14 +335,14 @@ def test_exact_resumed_wear_run_writes_identical_files(tmp_path, monkeypatch, te
     states = []
     scene.write_text(text)
 
-    save = evolve.save_state
+    save = evolve.save_wear_state
 
     def save_and_record(path, *arguments):
         save(path, *arguments)
         states.append(path.read_bytes())
 
     with monkeypatch.context() as patched:
-        patched.setattr(evolve, "save_state", save_and_record)
+        patched.setattr(evolve, "save_wear_state", save_and_record)
         assert run_cli("run", scene, "-o", tmp_path / "whole", "-q", "--no-page").code == 0
     assert len(states) >= 2
     for state in states:
@@ -398,7 +398,7 @@ def test_exact_worn_through_coating_ends_run(wear_keys):
 def test_refuses_to_resume_run_of_other_scene(tmp_path, monkeypatch):
     """An interrupted wear run is resumed only by the same scene."""
     scene = tmp_path / "worn.toml"
-    save = evolve.save_state
+    save = evolve.save_wear_state
     scene.write_text(TILTED + COULOMB + SINE + WEAR)
 
     def save_and_interrupt(*arguments):
@@ -406,7 +406,7 @@ def test_refuses_to_resume_run_of_other_scene(tmp_path, monkeypatch):
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patched:
-        patched.setattr(evolve, "save_state", save_and_interrupt)
+        patched.setattr(evolve, "save_wear_state", save_and_interrupt)
         answer = run_cli("run", scene, "-o", tmp_path / "out", "--no-page")
     assert answer.code == 130 and "--resume" in answer.err
     assert [path.name for path in (tmp_path / "out.partial").iterdir()] == ["wear.npz"]

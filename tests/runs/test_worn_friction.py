@@ -9,7 +9,7 @@ import patchfem as pf
 from patchfem import SceneError
 from patchfem.runs import compute_wear
 from patchfem.runs.patch.result import solve_with_coarser
-from patchfem.runs.wear.plan import estimate_jumps
+from patchfem.runs.wear.plan import estimate_jump_count
 from patchfem.scene import loads
 
 LOAD, AREA, PATH = 26 * 4.4482216152605, 12.7e-3**2, 40e-6
@@ -100,7 +100,7 @@ def test_always_wear_steps_resolve_rows_of_friction_table():
     patch = solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0]
     moments = compute_wear(model, patch, (None, None)).moments
     assert max(item.values["static_coefficient"] for item in moments) > 1.4 * MU
-    assert 1 / 1.5 < estimate_jumps(model) / (len(moments) - 1) < 1.5
+    assert 1 / 1.5 < estimate_jump_count(model) / (len(moments) - 1) < 1.5
     two_steps = run_scene(*TABLE, "wear.cycles=2e6", "wear.jumps=2")
     assert [
         item

@@ -24,7 +24,7 @@ from campaigns import measure_rows
 import patchfem as pf
 from patchfem.model import build
 from patchfem.runs import run as runs
-from patchfem.runs.patch import ladder as patches
+from patchfem.runs.patch import mesh_levels as patches
 from patchfem.scene import loads
 
 # Maximum age of the bonds that are kept, and half-width of the initial bonds [bond lengths].

@@ -18,7 +18,7 @@ from synthetic import self_affine
 import patchfem as pf
 from patchfem.model import build
 from patchfem.runs import estimate_static_measures, solve_with_coarser
-from patchfem.runs.patch import fine
+from patchfem.runs.patch import profile_points
 from patchfem.scene import loads
 
 LENGTH, CELLS = 12.7e-3, 1588  # Length of the interface [m]; cells of the uniform reference mesh.
@@ -130,12 +130,12 @@ def _solve_on_cells(kind: str, patch_model, tolerance: float) -> dict:
         return estimate_static_measures(
             *solve_with_coarser(patch_model.with_mesh(element_size=LENGTH / CELLS), tolerance)
         )
-    can_use_points = fine.can_use_points
-    fine.can_use_points = lambda patch_model: False
+    can_use_points = profile_points.can_use_points
+    profile_points.can_use_points = lambda patch_model: False
     try:
         patches = [
             patch for patch in solve_with_coarser(patch_model, tolerance) if patch is not None
         ]
         return estimate_static_measures(*patches, tolerance=tolerance)
     finally:
-        fine.can_use_points = can_use_points
+        profile_points.can_use_points = can_use_points

@@ -18,7 +18,7 @@ from ...friction.record import make_law
 from ...model.model import Model, build
 from ...model.source import locate_errors
 from ...runs.joint import stuck_patch_stiffness
-from ...runs.patch import jenkins_elements, ladder
+from ...runs.patch import jenkins_elements, mesh_levels
 from ...scene.scene import Scene
 from .patch_laws import FITTED_LAWS, MIN_LOSS, LawProblem, LoopCurves
 
@@ -191,7 +191,7 @@ def _solve_with_refined_mesh(model: Model, requested_amplitudes) -> _LoopsOnMesh
     """Solve the contact on a sequence of refined meshes until the energy loss converges."""
     tolerance = model.accuracy.tolerance
     while True:
-        patch, *coarser = ladder.solve_with_coarser(model.patch, tolerance)
+        patch, *coarser = mesh_levels.solve_with_coarser(model.patch, tolerance)
         if not patch.pressure.load > 0:
             raise PatchfemError("the normal load is 0 or less; raise the load", "contact.load")
         elements = _make_elements(model, patch)

@@ -15,7 +15,7 @@ from ...identify.least_squares import Fit, Problem
 from ...identify.words import describe_fit
 from ...model.model import Model, build
 from ...runs import joint
-from ...runs.patch import ladder
+from ...runs.patch import mesh_levels
 from ...scene.lines import split_key
 from ...scene.overrides import BaseScene
 from ...scene.ranges import Range, read_ranges
@@ -164,7 +164,7 @@ def solve_contact(model: Model):
 
     Raises PatchfemError if the surfaces do not touch.
     """
-    patch = ladder.solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0]
+    patch = mesh_levels.solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0]
     if patch.pressure.outcome is Outcome.NO_CONTACT:
         raise PatchfemError(patch.pressure.outcome.sentence, "")
     return patch

@@ -17,7 +17,7 @@ from scipy.interpolate import PchipInterpolator
 
 from ...core import Missing, NotConverged, PatchfemError
 from ...model.model import Model
-from ...runs.patch import ladder
+from ...runs.patch import mesh_levels
 from ...runs.patch.press import nodal_areas
 from ...runs.wear import evolve
 from ...scene.keys.quantities import parse_quantity
@@ -195,7 +195,7 @@ def fit_wear(model: Model, to: str, free, progress=None) -> FittedCoefficient:
             "wear.start",
         )
     # The contact of the unworn pieces does not depend on the coefficient.
-    patch = ladder.solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0]
+    patch = mesh_levels.solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0]
 
     def compute(coefficient: float) -> WearCurve:
         """Compute the worn depth over the cycles for a wear coefficient [m2/N]."""

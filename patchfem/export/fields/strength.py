@@ -9,7 +9,7 @@ from ...formatting import format_length
 from ...runs.patch.strength import (
     YIELDING_NEGLECTED,
     Strength,
-    min_stress_ratio,
+    min_von_mises_ratio,
     yield_strength,
 )
 
@@ -32,7 +32,7 @@ def find_yielding(patch_model, bodies: dict, min_peak: float = 0.0) -> dict:
         coating, "mises" (f, c) [Pa]}.
     min_peak : float
         Lower limit of the peak pressure [Pa]. A material of a face is left out if this pressure
-        causes a larger stress than the mesh shows (`yielding_faces` has its note).
+        causes a larger stress than the mesh shows (`note_on_yielding_faces` writes its note).
 
     Returns
     -------
@@ -59,7 +59,7 @@ def find_yielding(patch_model, bodies: dict, min_peak: float = 0.0) -> dict:
             stress_at_face = 0.0
             if min_peak and (coated or piece.coating is None):
                 plane = patch_model.pieces.plane
-                stress_at_face = min_stress_ratio(kind.poisson, plane) * min_peak
+                stress_at_face = min_von_mises_ratio(kind.poisson, plane) * min_peak
             if highest.max() > max(strength.pressure, stress_at_face):
                 places_by_strength.setdefault(strength, []).append(
                     (float(highest.max()), side, middle[cell])

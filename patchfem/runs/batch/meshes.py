@@ -37,7 +37,7 @@ class SharedMeshes:
                 continue
 
             try:
-                self.meshes[key] = sweep_meshes.shared_meshes(patches, key[1], all_)
+                self.meshes[key] = sweep_meshes.choose_shared_meshes(patches, key[1], all_)
             except PatchfemError:  # the single run of each case reports its error
                 continue
 

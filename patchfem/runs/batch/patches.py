@@ -19,10 +19,10 @@ from ...model.similar_models import SimilarModels, select_models
 from ..accuracy_warnings import Finding, tolerance_warnings
 from ..patch import result as of_patch
 from ..patch import static_batch, store
-from ..patch.strength import yielding_faces
+from ..patch.strength import note_on_yielding_faces
 from ..patch.sweep_meshes import geometry_key
 from ..results.patch_rows import POSITIVE_MESH_MEASURES, TABLE
-from ..results.result import file_name_shortener, shorten_file_names
+from ..results.result import make_file_name_shortener, shorten_file_names
 from . import one_by_one
 from .case_results import CaseResults
 
@@ -70,11 +70,11 @@ def attach_solved_patches(models: Sequence[Model]) -> list[Model]:
     groups = {}
     for case, model in enumerate(models):
         if not static_batch.reason_not_batched(model.patch):
-            key = store.content_key(model.patch) if store.may_be_shared(model.patch) else case
+            key = store.content_key(model.patch) if store.can_share_results(model.patch) else case
             groups.setdefault(group_key(model), {}).setdefault(key, []).append(case)
     for cases_by_content in groups.values():
         first = [models[cases[0]] for cases in cases_by_content.values()]
-        solutions = static_batch.solve_alike_patches(
+        solutions = static_batch.solve_similar_patches(
             [model.patch for model in first], first[0].accuracy.tolerance
         )
         for cases, solved in zip(cases_by_content.values(), solutions):
@@ -122,11 +122,11 @@ def _solve_cases(models: Sequence[Model], report: Callable | None) -> CaseResult
     first = models[0]
     is_columns = isinstance(models, SimilarModels)
     loads = (
-        static_batch.loads_from_columns(models.columns().patch, len(models))
+        static_batch.patch_loads_from_arrays(models.columns().patch, len(models))
         if is_columns
-        else static_batch.collect_loads([model.patch for model in models])
+        else static_batch.collect_patch_loads([model.patch for model in models])
     )
-    solution = static_batch.solve_batch(loads, first.accuracy.tolerance)
+    solution = static_batch.solve_patch_batch(loads, first.accuracy.tolerance)
     results = CaseResults.blank(len(models))
     is_solved = solution.is_solved
     is_wide = ~is_solved
@@ -165,7 +165,7 @@ def _solve_cases(models: Sequence[Model], report: Callable | None) -> CaseResult
     peak = solution.estimates["pressure_peak"]
     min_peak = peak.value - peak.error
     has_remarks = bool(first.source.remarks) or not is_columns
-    shorten = file_name_shortener(first.source.path)
+    shorten = make_file_name_shortener(first.source.path)
     for case in np.flatnonzero(is_solved & (is_wide | is_strained | has_remarks)).tolist():
         model = models[case]
         measures = solution.measures(case, floors)
@@ -182,7 +182,7 @@ def _solve_cases(models: Sequence[Model], report: Callable | None) -> CaseResult
         notes = [
             *of_patch.notes_on_tall_pieces(first.patch, mean_pressure[case]),
             *solution.plane_sentences(first.patch, case),
-            *yielding_faces(first.patch, min_peak[case]).values(),
+            *note_on_yielding_faces(first.patch, min_peak[case]).values(),
         ]
         if notes:
             results.notes[case] = shorten(notes)

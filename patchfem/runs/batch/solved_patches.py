@@ -20,7 +20,7 @@ from ...model.source import locate_errors
 from ..accuracy_warnings import Finding, tolerance_warnings
 from ..patch import result as patch_result
 from ..results.result import shorten_file_names
-from ..results.travel import judge_outcome_on_piece, warn_of_large_slide
+from ..results.travel import check_pieces_overlap, warn_of_large_slide
 from ..rig.engines import describe_unused_settings
 from ..rig.motion_warnings import law_warnings
 from ..rig.numerics import choose_numerics
@@ -119,7 +119,7 @@ def _solve_patch_of_case(model: Model, batch: PatchBatch) -> SolvedCase | None:
             warnings = [
                 *model.source.remarks,
                 *describe_unused_settings(model, batch.engine),
-                *patch_result.warn_of_strains(model.patch, patch),
+                *patch_result.patch_warnings(model.patch, patch),
             ]
             return SolvedCase(
                 *contacts,
@@ -164,7 +164,7 @@ def add_patch_results(
         name: replace(measure, causes=causes.get(name))
         for name, measure in results.measures_with_errors(case).items()
     }
-    outcome = judge_outcome_on_piece(
+    outcome = check_pieces_overlap(
         Outcome(results.outcome[case]), model.patch, pressed.patch, slides
     )
     results.outcome[case] = str(outcome)

@@ -26,14 +26,14 @@ from ..results.result import (
     Result,
     RunInputs,
     SlipRule,
-    has_known_mesh_error,
+    can_estimate_mesh_error,
     make_interface_frames,
     remove_unknown_errors,
 )
 from ..results.travel import (
     MAX_SLIDE_FRACTION,
-    find_largest_slide,
-    judge_outcome_on_piece,
+    check_pieces_overlap,
+    find_max_displacement,
     warn_of_large_slide,
 )
 from . import bench, shear
@@ -83,7 +83,7 @@ def run_prescribed(inputs: RunInputs) -> Result:
             SlipRule(shear.element_limit(model, patch), starts_at_rest=True),
         )
     measures = remove_unknown_errors(
-        measures, inputs.estimate and has_known_mesh_error(model, patch, inputs.coarse)
+        measures, inputs.estimate and can_estimate_mesh_error(model, patch, inputs.coarse)
     )
     extra = {
         "engine": fine.engine.name,
@@ -95,7 +95,7 @@ def run_prescribed(inputs: RunInputs) -> Result:
         extra["shear_modes"] = count
     return Result(
         inputs.plan,
-        judge_outcome_on_piece(Outcome.DONE, model.patch, patch, fine.slide, fine.lateral),
+        check_pieces_overlap(Outcome.DONE, model.patch, patch, fine.slide, fine.lateral),
         set_final_floors(measures, model.accuracy.tolerance),
         fine,
         fine,
@@ -208,7 +208,7 @@ def _warn_of_overhang(patch_model, patch, fine) -> list:
     warnings = []
     lateral = 0.0
     if fine.lateral is not None:
-        lateral = find_largest_slide(fine.lateral) / patch_model.pieces.width
+        lateral = find_max_displacement(fine.lateral) / patch_model.pieces.width
     if lateral > MAX_SLIDE_FRACTION:
         warnings.append(
             f"the slide across the sliding direction is {lateral:.2g} of the width of the pieces, but the "

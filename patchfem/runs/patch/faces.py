@@ -104,7 +104,7 @@ def recondense_interface_pieces(model) -> None:
     store.clear_cache()
     for interface in model.rig.friction.interfaces if model.rig is not None else ():
         if interface.patch is not None:
-            result.solve_with_coarser(interface.patch, model.accuracy.tolerance, fresh=True)
+            result.solve_with_coarser(interface.patch, model.accuracy.tolerance, ignore_cache=True)
 
 
 def make_patch_elements(interface, tolerance: float, coarser: bool = False) -> tuple:
@@ -223,7 +223,7 @@ def collect_warnings(model) -> list:
     return merge_interface_sentences(
         model,
         lambda face: [
-            *result.warn_of_strains(face.model.patch, face.patch),
+            *result.patch_warnings(face.model.patch, face.patch),
             *([NO_ERROR_ESTIMATE] if face.patches[1] is None else []),
         ],
     )

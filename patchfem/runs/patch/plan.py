@@ -1,7 +1,7 @@
 """Predicted mesh size, cost, stiffness and dimensionless groups of a patch.
 
-In: a `PatchModel` or a Model. Out: `GridSizes`, `Cost`, the stiffness chain, and sentences for the
-plan.
+In: a `PatchModel` or a Model. Out: `GridSizes`, `Cost`, stiffnesses in series, and sentences for
+the plan.
 """
 
 from dataclasses import replace
@@ -20,11 +20,11 @@ from .grids import (
     MIN_LEVELS,
     UNSTRUCTURED_COST_FACTOR,
     count_nodes,
-    is_mirrored,
+    is_mirror_symmetric,
     make_base_grids,
     predict_condensing_seconds,
 )
-from .ladder import make_comparison_meshes
+from .mesh_levels import make_comparison_meshes
 
 PACKAGE_BYTES = 2e7  # Memory of the packages that a run with elastic pieces imports [bytes].
 CONDENSING_BYTES_RATIO = 0.8  # Ratio of measured to predicted memory of condensing.
@@ -32,21 +32,22 @@ CONDENSING_BYTES_RATIO = 0.8  # Ratio of measured to predicted memory of condens
 BYTES_PER_OVERHANG_NODE = 4.6e3
 FRAME_BYTES_PER_NODE = 3.5e3  # Memory of the frames of a motion per node [bytes].
 BYTES_PER_STRIP_NODE = 3000.0  # Memory per strip and interface node [bytes].
-# Tolerance below which a contact that ends inside the interface or over a jump needs another level.
+# Tolerance below which a contact that ends inside the interface or at a step needs another
+# refinement level.
 TIGHT_TOL = 2e-3
-# Largest ratio of the tilt to the opening tilt of bars at which full contact is certain. Elastic pieces with
-# height/length 0.08 to 4 open from 0.77.
+# Largest ratio of tilt to the opening tilt of bars at which full contact is certain. Elastic pieces
+# with height/length 0.08 to 4 open at 0.77 and above.
 MAX_FULL_CONTACT_TILT = 0.7
 
 
 class GridSizes(NamedTuple):
-    """Predicted numbers of nodes and CPU time of the nested grids of a patch.
+    """Predicted number of nodes and CPU time of the nested grids of a patch.
 
     - points: nodes of the interface.
-    - finest: (columns, rows) of nodes of the finest grid of each piece, a single entry if they are
-      alike.
+    - finest: (columns, rows) of nodes of the finest grid of each piece; a single entry for alike
+      pieces.
     - levels: number of nested grids.
-    - seconds, bytes: predicted cost of condensing all of them.
+    - seconds, bytes: predicted CPU time [s] and memory [bytes] of condensing all grids.
     - outlined: whether the pieces extend beyond the interface.
     """
 
@@ -63,12 +64,13 @@ class GridSizes(NamedTuple):
         return float(sum(columns * rows for columns, rows in self.finest))
 
 
-def expected_grids(patch_model, tolerance: float) -> GridSizes:
-    """Predict the grids on which a patch will be solved at a given tolerance.
+def predict_grid_sizes(patch_model, tolerance: float) -> GridSizes:
+    """Predict the sizes of the grids on which a patch will be solved at a given tolerance.
 
-    The coarsest grid is that of the run. A mesh file is not read and counts as an automatic grid.
+    The coarsest grid is that of the run. A mesh file is not read; an automatic grid takes its
+    place.
     """
-    levels = _expected_levels(patch_model, tolerance)
+    levels = _predict_mesh_levels(patch_model, tolerance)
     bodies = [body for body in levels[0] if body is not None]
     finest = tuple(map(count_nodes, bodies))
     return GridSizes(
@@ -77,12 +79,14 @@ def expected_grids(patch_model, tolerance: float) -> GridSizes:
         len(levels),
         sum(map(predict_condensing_seconds, levels))
         * (UNSTRUCTURED_COST_FACTOR if patch_model.mesh.file is not None else 1.0),
-        sum(predict_bytes(*nodes, is_mirrored(body)) for nodes, body in zip(finest, bodies)),
+        sum(
+            predict_bytes(*nodes, is_mirror_symmetric(body)) for nodes, body in zip(finest, bodies)
+        ),
         patch_model.pieces.has_overhang or patch_model.mesh.file is not None,
     )
 
 
-def _expected_levels(patch_model, tolerance: float) -> list:
+def _predict_mesh_levels(patch_model, tolerance: float) -> list:
     """Return the meshes of the pieces on each expected level, from fine to coarse."""
     if patch_model.mesh.shared is not None:
         return list(patch_model.mesh.shared.levels)
@@ -107,19 +111,19 @@ def _expected_levels(patch_model, tolerance: float) -> list:
 def predict_cost(model: Model) -> Cost:
     """Predict the cost of solving the contact of all patches of a model.
 
-    Equal patches of interfaces are pressed once.
+    Equal patches of several interfaces are solved once.
     """
     tolerance = model.accuracy.tolerance
     total_cost = Cost()
     if model.patch is not None:
-        total_cost = pressing_cost(model.patch, model.patch.mesh.tolerance or tolerance)
+        total_cost = predict_contact_cost(model.patch, model.patch.mesh.tolerance or tolerance)
     interface_patches = {}
     if model.rig is not None:
         for interface in model.rig.friction.interfaces:
             if interface.patch is not None:
                 interface_patches[store.content_key(interface.patch)] = interface.patch
     for patch in interface_patches.values():
-        total_cost += pressing_cost(patch, tolerance)
+        total_cost += predict_contact_cost(patch, tolerance)
     patches = [*interface_patches.values()] if model.patch is None else [model.patch]
     if not patches:
         return total_cost
@@ -138,13 +142,13 @@ def predict_cost(model: Model) -> Cost:
     return replace(total_cost, parts=parts)
 
 
-def pressing_cost(patch_model, tolerance: float) -> Cost:
-    """Predict the cost of solving the contact of a patch and computing its fields.
+def predict_contact_cost(patch_model, tolerance: float) -> Cost:
+    """Predict the cost of solving a patch and computing its fields.
 
-    The work of condensing follows from the sizes of its grids; the time per unit of work, and that
-    of the fields and files of the finest grid, was measured over random patches.
+    The work of condensing follows from the sizes of the grids. The CPU time per unit of work, and
+    that of the fields and files of the finest grid, were measured for random patches.
     """
-    grids = expected_grids(patch_model, tolerance)
+    grids = predict_grid_sizes(patch_model, tolerance)
     condensing_factor = (
         cost_model.OUTLINE_CONDENSING_FACTOR if grids.outlined else cost_model.CONDENSING_FACTOR
     )
@@ -166,9 +170,9 @@ def pressing_cost(patch_model, tolerance: float) -> Cost:
 
 
 def stiffness_chain(patch_model) -> dict:
-    """Return the stiffnesses [N/m] of the elements of a patch that act in series, as a dict.
+    """Return the stiffnesses [N/m] in series between holder and interface of a patch, by name.
 
-    An element that the scene does not give is "rigid".
+    An element that is not in the scene is "rigid".
     """
     stiffnesses = {
         "holder": patch_model.loading.tangential_stiffness or "rigid",
@@ -191,10 +195,10 @@ def stiffness_chain(patch_model) -> dict:
 
 
 def compute_groups(model: Model) -> dict:
-    """Return dimensionless groups of a patch as a dict, and with friction its slip length [m].
+    """Compute the dimensionless groups of a patch, and with friction its slip length [m].
 
-    tilt_over_first_opening is the tilt over the tilt at which the edge of flat pieces opens, with
-    the pieces as bars.
+    tilt_over_first_opening is the tilt divided by the tilt at which flat pieces, modelled as bars,
+    start to open at an edge.
     """
     dimensionless_groups = {}
     patch_model = model.patch
@@ -213,7 +217,7 @@ def compute_groups(model: Model) -> dict:
     return dimensionless_groups
 
 
-def describe_patch(name: str, interface) -> list:
+def describe_interface_patch(name: str, interface) -> list:
     """Return the sentences of a plan on the patch of an interface.
 
     name: nodes of the interface.
@@ -232,8 +236,8 @@ def describe_patch(name: str, interface) -> list:
     return [f"interface {name} has a patch of its own: {sentence}"]
 
 
-def assembly_sentence(patch_model) -> str:
-    """Return the sentence on how the stiffness matrices of the pieces are assembled."""
+def describe_assembly(patch_model) -> str:
+    """Describe how the stiffness matrices of the pieces are assembled."""
     if patch_model.mesh.file is not None:
         return (
             "scikit-fem assembles the stiffness of a piece in contact.mesh cell by cell, or, if the mesh of the "
@@ -244,10 +248,10 @@ def assembly_sentence(patch_model) -> str:
     return "the stiffness of the tensor grids is assembled from scikit-fem's matrices of three reference cells"
 
 
-def write_verdict(dimensionless_groups: dict, patch_model) -> list:
+def describe_patch_plan(dimensionless_groups: dict, patch_model) -> list:
     """Return the sentences of a plan on tilt, asperity layer and assembly of a patch.
 
-    The tilt group determines the extent of the contact of flat pieces only.
+    The tilt is compared with the opening tilt for flat pieces only.
     """
     rough = []
     if patch_model.interface.skin is not None:
@@ -255,14 +259,14 @@ def write_verdict(dimensionless_groups: dict, patch_model) -> list:
         mean_pressure = patch_model.nominal_load / (pieces.length * pieces.width * pieces.pairs)
         rough = skin.note_on_asperity_stiffness(patch_model, mean_pressure)
     return [
-        *_tilt_sentence(dimensionless_groups, patch_model),
+        *_describe_tilt(dimensionless_groups, patch_model),
         *rough,
-        assembly_sentence(patch_model),
+        describe_assembly(patch_model),
     ]
 
 
-def _tilt_sentence(dimensionless_groups: dict, patch_model) -> list:
-    """Compare the tilt of a patch with the tilt at which the contact opens, as a list."""
+def _describe_tilt(dimensionless_groups: dict, patch_model) -> list:
+    """Return a sentence, as a list, on the tilt relative to the tilt at which the contact opens."""
     tilt = dimensionless_groups.get("tilt_over_first_opening")
     gap = patch_model.gap
     if tilt is None:

@@ -1,8 +1,8 @@
-"""Result of a static patch, its warnings, and notes on what its model neglects.
+"""Result of a static patch, its warnings, and notes on neglected effects.
 
-In: a model with a patch, and the pressed `Patch`es. Out: measures with their floors, the
-`Result` of a run without motion, warnings, and notes (plane state, lever arms, couplings,
-incomplete clamping).
+In: a model with a patch, and the solved `Patch`es. Out: measures with their floors, the `Result` of
+a run without motion, warnings, and notes on plane state, lever arms, couplings and incomplete
+clamping.
 """
 
 from dataclasses import replace
@@ -19,48 +19,46 @@ from ...surface import nodes
 from ..results.patch_rows import TABLE
 from ..results.result import Result, RunInputs, collect_rest_frame
 from . import skin, store
-from .ladder import solve_static_ladder, solve_with_coarser
 from .measures import add_strip_count_errors, estimate_static_measures, note_on_plane_state
+from .mesh_levels import solve_on_static_meshes, solve_with_coarser
 from .values import compute_static_values, contact_reaches_steep_end
 
-# Poisson's ratio up to which the errors of volumetrically locking elements are reliable.
+# Largest Poisson's ratio at which the error estimates are reliable despite volumetric locking.
 MAX_POISSON = 0.499
-# Largest strain that counts as small; effects of its second order are neglected.
+# Largest strain at which second-order effects may be neglected.
 MAX_SMALL_STRAIN = 0.02
 
 __all__ = [
-    "make_bodies",
+    "make_piece_meshes_of_run",
     "make_static_result",
     "notes_on_neglected_effects",
-    "solve_static_ladder",
+    "patch_warnings",
+    "solve_on_static_meshes",
     "solve_with_coarser",
     "static_measures",
     "static_measures_without_errors",
-    "warn_of_strains",
 ]
-# Smallest ratio of normal to tangential displacement under shear that a note states.
+# Smallest ratio of normal to tangential displacement under a shear force that a note reports.
 MIN_COUPLING_RATIO = 0.02
-# Smallest ratio of load to buckling load of a tall piece that a note states; its sideways motion lacks
-# about this fraction.
+# Smallest ratio of load to buckling load that a note reports; it is about the relative error of the
+# sideways motion of a tall piece.
 MIN_BUCKLING_RATIO = 0.02
-# Fraction of a far face that counts as the complete face, because a mesh file has few digits.
+# Smallest clamped fraction of a far face that counts as complete; mesh files have few digits.
 MIN_COMPLETE_FRACTION = 1 - 1e-6
 
 
 def static_measures_without_errors(model) -> dict:
-    """Solve the contact patch of a model and return its static measures without their errors."""
+    """Solve the patch of a model and return its static measures by name, without error estimates."""
     with locate_errors(model.source):
         return compute_static_values(
             solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0]
         )
 
 
-def make_bodies(model) -> tuple:
-    """Return the meshes of the lower and the upper piece of a model.
+def make_piece_meshes_of_run(model) -> tuple:
+    """Return the meshes of the lower and the upper piece of a model, as in a run.
 
     The upper one is None if the pieces are alike.
-
-    If the tolerance chooses the mesh, it is the one of a run.
     """
     with locate_errors(model.source):
         if not model.patch.mesh.is_automatic:
@@ -72,14 +70,14 @@ def make_bodies(model) -> tuple:
 def static_measures(model, patch, coarse) -> dict:
     """Return the static measures of the patch of a model, with error estimates.
 
-    If the tolerance chose the mesh, measures whose error exceeds it are extrapolated.
+    If the mesh was chosen from the tolerance, measures that miss the tolerance are extrapolated.
 
     Parameters
     ----------
     model : Model
     patch : Patch
     coarse : sequence of Patch or None
-        The patch on coarser meshes, fine to coarse.
+        The patch on coarser meshes, from fine to coarse; None for a missing one.
 
     Returns
     -------
@@ -112,11 +110,11 @@ def static_measures(model, patch, coarse) -> dict:
 
 
 def measure_floors(patch_model, tolerance: float, values: dict) -> dict:
-    """Return the error floor of each static measure as a dict, for one or for q patches.
+    """Return the error floors of the static measures by name, for one patch or for q patches.
 
-    The floor of a measure that is a difference of larger terms is the tolerance times these: for
-    the approach the rotation times half the length, for the centre of pressure half the length,
-    for the moment the load times half the length.
+    The floor of a measure that is a difference of larger terms is the tolerance times these terms:
+    rotation times half the length for the approach, half the length for the centre of pressure, and
+    load times half the length for the moment.
 
     Parameters
     ----------
@@ -162,8 +160,8 @@ def make_static_result(inputs: RunInputs) -> Result:
     )
 
 
-def warn_of_strains(patch_model, patch) -> list:
-    """Return warnings on large strains, locking elements and an excessive gap."""
+def patch_warnings(patch_model, patch) -> list:
+    """Return warnings on large strains, locking elements, the gap and the ends of the pieces."""
     steep_end = []
     if contact_reaches_steep_end(patch):
         steep_end = [
@@ -190,7 +188,7 @@ def strain_warnings(
     approach : float
         Approach [m].
     other_warnings : sequence of str
-        Warnings that are inserted before the one on locking.
+        Warnings to insert before the one on locking.
 
     Returns
     -------
@@ -225,7 +223,7 @@ def strain_warnings(
 
 
 def exceeds_small_strains(patch_model, largest_pressure, approach):
-    """Return whether the strains of one patch, or of any of many, may cause a warning.
+    """Return whether the strains of one patch, or of each of q patches, may cause a warning.
 
     Parameters
     ----------
@@ -262,14 +260,15 @@ def _list_materials(patch_model) -> list:
 
 
 def notes_on_neglected_effects(model, patch, coarse) -> list:
-    """Return notes on the effects that the model of a pressed patch neglects in any motion.
+    """Return notes on the effects that the model of a patch neglects in any motion.
 
     Parameters
     ----------
     model : Model
     patch : Patch
     coarse : sequence of Patch or None
-        Patches of the error estimate; if the first one is None, the plane state is not discussed.
+        The patch on the meshes of the error estimate. If the first one is None, there is no note on
+        the plane state.
     """
     patch_model = model.patch
     bodies_by_side = {"lower": patch.pair.grid, "upper": patch.pair.upper_grid}
@@ -287,7 +286,7 @@ def notes_on_neglected_effects(model, patch, coarse) -> list:
         out.append(
             f"each static measure is computed on the mesh and on points {format_length(patch.averaging, 3)} apart, and "
             "the more accurate value is given; on these points short waves are treated as in infinite "
-            f"layers; {_mesh_clause(model, patch)}"
+            f"layers; {_describe_results_on_mesh(model, patch)}"
         )
     elif patch.averaging is not None and not patch_model.gap.is_rough:
         out.append(
@@ -302,7 +301,7 @@ def notes_on_neglected_effects(model, patch, coarse) -> list:
     if patch.strips is not None:
         out.append(patch.strips.note)
     if model.kind == "patch":
-        out += note_on_perfect_stick(patch_model, patch)
+        out += note_on_normal_shear_coupling(patch_model, patch)
     elif patch.pair.coupling > MIN_COUPLING_RATIO:
         out.append(
             "the pieces have different elasticity, which couples shear and normal motion; this coupling is "
@@ -310,7 +309,7 @@ def notes_on_neglected_effects(model, patch, coarse) -> list:
             "the largest slide"
         )
     if coarse[0] is not None and patch.pressure.outcome is not Outcome.NO_CONTACT:
-        # An unstructured mesh has no coarser one: its second patch is finer than its first.
+        # An unstructured mesh has no coarser one: its second mesh is finer than its first.
         other = patch if coarse[-1] is None else coarse[0]
         if patch_model.solved is not None:
             out += patch_model.solved.plane_sentences
@@ -323,8 +322,8 @@ def notes_on_neglected_effects(model, patch, coarse) -> list:
     return out
 
 
-def _mesh_clause(model, patch) -> str:
-    """Return a clause on results that come from the mesh instead of the points of a profile."""
+def _describe_results_on_mesh(model, patch) -> str:
+    """Return a clause on which results come from the mesh and not from the points of a profile."""
     largest = format_quantity(float(patch.pressure.sigma_n.max()), "Pa", 3)
     where = f"the mesh of {patch.x.size} interface points, whose largest pressure is {largest}"
     if model.kind == "patch":
@@ -335,11 +334,11 @@ def _mesh_clause(model, patch) -> str:
     return f"fields and motion are computed on {where}"
 
 
-def note_on_perfect_stick(patch_model, patch) -> list:
-    """Return a note, as a list, on the normal-shear coupling of dissimilar pieces.
+def note_on_normal_shear_coupling(patch_model, patch) -> list:
+    """Return a note, as a list, on the coupling of normal and shear displacement of unlike pieces.
 
-    Faces of unlike pieces slide on each other under pressure. Stick prevents this by shear
-    stresses, which stiffen the contact.
+    The surfaces of unlike pieces slide on each other under pressure. If they stick, shear stresses
+    prevent this sliding and stiffen the contact.
     """
     pair = patch.pair
     loaded = np.flatnonzero(patch.active)
@@ -349,8 +348,10 @@ def note_on_perfect_stick(patch_model, patch) -> list:
     unit = np.ones(loaded.size)
     normal = patch.pieces.normal[rows]
     closing = pair.closing[rows]
-    stuck = normal - closing @ np.linalg.solve(patch.pieces.tangential[rows], closing.T)
-    increase = unit @ np.linalg.solve(stuck, unit) / (unit @ np.linalg.solve(normal, unit)) - 1
+    stuck_normal = normal - closing @ np.linalg.solve(patch.pieces.tangential[rows], closing.T)
+    increase = (
+        unit @ np.linalg.solve(stuck_normal, unit) / (unit @ np.linalg.solve(normal, unit)) - 1
+    )
     beta = abs(_compute_dundurs_beta(patch_model))
     return [
         f"the pieces have different elasticity (Dundurs' beta {beta:.2g} at the interface), and the pressure is "
@@ -360,7 +361,7 @@ def note_on_perfect_stick(patch_model, patch) -> list:
 
 
 def _compute_dundurs_beta(patch_model) -> float:
-    """Compute Dundurs' beta of the materials at the two surfaces."""
+    """Return Dundurs' parameter beta of the materials at the two surfaces."""
     is_plane_strain = patch_model.pieces.plane == "strain"
     shear = []
     kappa = []
@@ -375,10 +376,11 @@ def _compute_dundurs_beta(patch_model) -> float:
 
 
 def notes_on_mesh_file(pair) -> list:
-    """Return notes on pieces of a mesh file that have holes or a partly clamped far face."""
+    """Return notes on holes and on partly clamped far faces of the pieces of a mesh file."""
     out = []
     for side, body in (("lower", pair.grid), ("upper", pair.upper_grid)):
-        if body.base_grid is not None:  # A grid has no holes, and its complete last row is clamped.
+        # A tensor grid has no holes, and its last row is clamped over the whole length.
+        if body.base_grid is not None:
             continue
 
         count, area = recognise.find_holes(body)
@@ -387,22 +389,22 @@ def notes_on_mesh_file(pair) -> list:
                 f"contact.mesh: the {side} piece has {count} hole{'s' * (count > 1)} inside, {area:.3g} m2 in "
                 "all; if a hole is not intended, close it in the mesh"
             )
-        fixed, length = recognise.measure_fixed_length(body)
-        if fixed < MIN_COMPLETE_FRACTION * length:
+        fixed_length, face_length = recognise.measure_fixed_length(body)
+        if fixed_length < MIN_COMPLETE_FRACTION * face_length:
             out.append(
-                f"contact.mesh: the held nodes `{side}_far` cover {fixed:.6g} m of a face of {length:.6g} m, "
-                f"{fixed / length:.3g} of the length of this face; the rest of the face is free"
+                f"contact.mesh: the held nodes `{side}_far` cover {fixed_length:.6g} m of a face of {face_length:.6g} m, "
+                f"{fixed_length / face_length:.3g} of the length of this face; the rest of the face is free"
             )
     return out
 
 
-def notes_on_tall_pieces(patch_model, mean: float) -> list:
-    """Return a note, as a list, on each tall piece whose bending moves the load sideways.
+def notes_on_tall_pieces(patch_model, mean_pressure: float) -> list:
+    """Return notes on tall pieces whose bending moves the load sideways.
 
-    The model neglects that the lever arm increases. The measure is the load over the buckling load
-    of the piece, clamped at the holder and free at the patch (Euler, pi^2 E' L^2/48 H^2 as a mean
-    pressure); the motion lacks about this fraction. A piece that is not taller than long bends too
-    little. mean: pressure over the whole interface [Pa].
+    The model neglects that bending increases the lever arm of the load. The relative error of the
+    sideways motion is about the ratio of load to buckling load; the latter, for a piece clamped at
+    the holder and free at the patch, is Euler's pi^2 E' L^2/48 H^2 as a mean pressure. There is no
+    note on pieces that are not taller than long. mean_pressure: pressure averaged over the interface [Pa].
     """
     pieces = patch_model.pieces
     out = []
@@ -411,7 +413,7 @@ def notes_on_tall_pieces(patch_model, mean: float) -> list:
         if pieces.plane == "strain":
             young = young / (1 - piece.substrate.poisson**2)
         buckling_pressure = np.pi**2 * young * pieces.length**2 / (48 * piece.height**2)
-        ratio = mean / buckling_pressure
+        ratio = mean_pressure / buckling_pressure
         if piece.height > pieces.length and ratio > MIN_BUCKLING_RATIO:
             out.append(
                 f"the {side} piece is {piece.height / pieces.length:.3g} times as tall as it is long and carries "

@@ -1,7 +1,7 @@
-"""Slip zones of a patch under a prescribed displacement, and the errors of their work.
+"""Slip zones of a patch under a prescribed displacement, and the error of the friction work.
 
-In: pressed patches and the `PrescribedSlip`. Out: slip zones for the grading of the mesh, and
-the error of work and force of the slip over the tolerance.
+In: solved patches and the `PrescribedSlip`. Out: slip zones for the grading of the mesh, and the
+errors of friction work and friction force relative to the tolerance.
 """
 
 import numpy as np
@@ -13,88 +13,91 @@ from ...slip.shear_modes import JenkinsSet
 from .jenkins_elements import elements
 
 
-def slip_zones(patch, slip, ends: list) -> tuple:
+def find_slip_zones(patch, slip, ends: list) -> tuple:
     """Return the zones (start, end) [m] that slip at a given displacement amplitude.
 
-    The displacement at which points yield is interpolated linearly between nodes. At an end of the
-    contact
-    between two nodes the pressure vanishes, so that Coulomb points yield at once.
+    The yield displacement is interpolated linearly between nodes. At a contact edge between two
+    nodes the pressure vanishes, so that points there yield at once under Coulomb's law.
 
     Parameters
     ----------
     patch : Patch
-        The pressed patch.
+        Solved patch.
     slip : PrescribedSlip
-        Prescribed slide.
+        Prescribed displacement.
     ends : list of contact.edges.ContactEdge
-        Ends of its contact inside the interface.
+        Contact edges inside the interface.
     """
     if patch.strips is not None or not patch.active.any():
         return ()
-    zones = elements(patch, slip.static, slip.bond_length)
-    yields = dict(zip(zones.points.tolist(), zones.point_yields.tolist()))
-    beyond = {(end.node, end.side): end.position for end in ends}
+    jenkins_set = elements(patch, slip.static, slip.bond_length)
+    yield_by_node = dict(zip(jenkins_set.points.tolist(), jenkins_set.point_yields.tolist()))
+    edge_by_node = {(end.node, end.side): end.position for end in ends}
     out = []
-    for stretch in np.split(zones.points, 1 + np.flatnonzero(np.diff(zones.points) > 1)):
-        places = patch.x[stretch].tolist()
-        slides = [yields[node] for node in stretch.tolist()]
+    for nodes in np.split(jenkins_set.points, 1 + np.flatnonzero(np.diff(jenkins_set.points) > 1)):
+        positions = patch.x[nodes].tolist()
+        yield_displacements = [yield_by_node[node] for node in nodes.tolist()]
         if slip.bond_length == 0:
-            first = beyond.get((int(stretch[0]), -1))
-            last = beyond.get((int(stretch[-1]), 1))
-            if first is not None and first < places[0]:
-                places = [first, *places]
-                slides = [0.0, *slides]
-            if last is not None and last > places[-1]:
-                places = [*places, last]
-                slides = [*slides, 0.0]
-        out += _intervals_below(np.array(places), np.array(slides), slip.amplitude)
+            first = edge_by_node.get((int(nodes[0]), -1))
+            last = edge_by_node.get((int(nodes[-1]), 1))
+            if first is not None and first < positions[0]:
+                positions = [first, *positions]
+                yield_displacements = [0.0, *yield_displacements]
+            if last is not None and last > positions[-1]:
+                positions = [*positions, last]
+                yield_displacements = [*yield_displacements, 0.0]
+        out += _yielding_intervals(
+            np.array(positions), np.array(yield_displacements), slip.amplitude
+        )
     return tuple(out)
 
 
-def _intervals_below(x, slides, amplitude: float) -> list:
+def _yielding_intervals(x, yield_displacement, amplitude: float) -> list:
     """Return the intervals of x [m] in which the yield displacement is below an amplitude."""
-    yields = slides < amplitude
-    starts = np.flatnonzero(yields & ~np.append(False, yields[:-1]))
-    stops = np.flatnonzero(yields & ~np.append(yields[1:], False))
+    is_yielding = yield_displacement < amplitude
+    starts = np.flatnonzero(is_yielding & ~np.append(False, is_yielding[:-1]))
+    stops = np.flatnonzero(is_yielding & ~np.append(is_yielding[1:], False))
     out = []
     for first, last in zip(starts.tolist(), stops.tolist()):
         low = float(x[first])
         high = float(x[last])
         if first > 0:
             low = _interpolate_zone_end(
-                x[first - 1 : first + 1], slides[first - 1 : first + 1], amplitude
+                x[first - 1 : first + 1], yield_displacement[first - 1 : first + 1], amplitude
             )
         if last < x.size - 1:
-            high = _interpolate_zone_end(x[last : last + 2], slides[last : last + 2], amplitude)
+            high = _interpolate_zone_end(
+                x[last : last + 2], yield_displacement[last : last + 2], amplitude
+            )
         if high > low:
             out.append((low, high))
     return out
 
 
-def _interpolate_zone_end(x, slides, amplitude: float) -> float:
+def _interpolate_zone_end(x, yield_displacement, amplitude: float) -> float:
     """Interpolate the position [m] at which the yield displacement equals the amplitude."""
-    fraction = (amplitude - slides[0]) / (slides[1] - slides[0])
+    fraction = (amplitude - yield_displacement[0]) / (yield_displacement[1] - yield_displacement[0])
     return float(x[0] + fraction * (x[1] - x[0]))
 
 
-def cycle_work(jenkins_set: JenkinsSet, amplitude: float) -> float:
+def friction_work_per_cycle(jenkins_set: JenkinsSet, amplitude: float) -> float:
     """Return the friction work [J] of parallel elements in a cycle of given amplitude [m]."""
-    beyond = np.maximum(amplitude - jenkins_set.yield_displacement, 0.0)
-    return float(4 * (jenkins_set.stiffness * jenkins_set.yield_displacement) @ beyond)
+    slip = np.maximum(amplitude - jenkins_set.yield_displacement, 0.0)
+    return float(4 * (jenkins_set.stiffness * jenkins_set.yield_displacement) @ slip)
 
 
-def peak_force(jenkins_set: JenkinsSet, amplitude: float) -> float:
-    """Return the force [N] of parallel elements on initial loading to `amplitude` [m]."""
+def peak_friction_force(jenkins_set: JenkinsSet, amplitude: float) -> float:
+    """Return the force [N] of parallel elements at an amplitude [m] on first loading."""
     return float(jenkins_set.stiffness @ np.minimum(jenkins_set.yield_displacement, amplitude))
 
 
 def max_slip_error_ratio(patches, slip, tolerance: float) -> float:
-    """Return the largest ratio of error to allowed error of friction work and friction force.
+    """Return the larger ratio of error to allowed error of friction work and peak force.
 
     Parameters
     ----------
     patches : sequence of Patch
-        The patch on two or more nested meshes, fine to coarse.
+        The patch on two or more nested meshes, from fine to coarse.
     slip : PrescribedSlip
     tolerance : float
     """
@@ -103,8 +106,8 @@ def max_slip_error_ratio(patches, slip, tolerance: float) -> float:
         jenkins_set = elements(patch, slip.static, slip.bond_length)
         values.append(
             {
-                "loop_area": cycle_work(jenkins_set, slip.amplitude),
-                "friction_force_peak": peak_force(jenkins_set, slip.amplitude),
+                "loop_area": friction_work_per_cycle(jenkins_set, slip.amplitude),
+                "friction_force_peak": peak_friction_force(jenkins_set, slip.amplitude),
             }
         )
     errors = convergence_errors(*values)

@@ -1,8 +1,9 @@
-"""Static measures of many patches solved in one batch on shared condensed pieces.
+"""Static measures of many patches, solved in one batch on the same condensed pieces.
 
-In: `PatchModel`s with shared meshes. Out: measures with errors, (q,) for q patches. This module
-treats bare pieces, or pieces with a linear asperity layer, under a load, whose contact is a single
-interval (`contact.batch`). Other patches are left to single runs.
+In: `PatchModel`s with shared meshes. Out: measures with error estimates, (q,) for q patches. The
+batch solver is limited to patches under a load that are in contact on a single interval
+(`contact.batch`), without asperity layer or with a linear one. All other patches are solved one by
+one.
 """
 
 from collections.abc import Mapping, Sequence
@@ -33,16 +34,16 @@ from .measures import (
 from .press import SolvedContact, add_linear_skin_compliance, make_patch
 from .values import assemble_static_values, estimate_peak_pressures
 
-# Number of cells beyond the contact end on the coarser mesh within which the end is searched for.
+# Number of cells beyond the contact edge on the coarser mesh within which the edge is searched for.
 MAX_END_CELLS = 2
 
 
 class SolvedPatch(NamedTuple):
-    """Solution of a patch that was computed in a batch with others.
+    """Solution of a patch that was computed in a batch with other patches.
 
     - measures: static measures by name.
-    - plane_sentences: sentences on the plane state (`measures.note_on_plane_state`).
-    - patches: the solved Patch on all meshes, fine to coarse.
+    - plane_sentences: notes on the plane state (`measures.note_on_plane_state`).
+    - patches: the solved Patch on all meshes, from fine to coarse.
     """
 
     measures: dict
@@ -53,12 +54,12 @@ class SolvedPatch(NamedTuple):
 class PatchLoads(NamedTuple):
     """Loads and surface shapes of q patches that are solved in one batch.
 
-    - first: PatchModel of the first one.
-    - load (q,): [N].
-    - moment (q,): [N m]; None if the rotation is fixed.
-    - spring (q,): rotational stiffness of the holder [N m/rad].
-    - angle (q,): initial rotation of the upper piece [rad].
-    - shapes: Gap of each patch, or a single one whose numbers are columns.
+    - first: PatchModel of the first patch.
+    - load (q,): loads [N].
+    - moment (q,): moments [N m]; None if the rotation is fixed.
+    - spring (q,): rotational stiffnesses of the holders [N m/rad].
+    - angle (q,): initial rotations of the upper pieces [rad].
+    - shapes: Gap of each patch, or a single Gap whose parameters are arrays (q,).
     """
 
     first: object
@@ -78,11 +79,11 @@ class PatchLoads(NamedTuple):
 class BatchLevel(NamedTuple):
     """Contact solutions of q patches on one mesh.
 
-    - values: static measures by name, (q,) each.
-    - pressure: ContactState whose fields have a row or a number for each patch.
-    - contacts: intervals in contact.
+    - values: static measures (q,) by name.
+    - pressure: ContactState whose fields have one row or one number per patch.
+    - contacts: contact intervals.
     - gap_range (q,): range of the gap [m].
-    - x (m,): nodes [m].
+    - x (m,): nodal positions [m].
     """
 
     values: dict
@@ -93,7 +94,7 @@ class BatchLevel(NamedTuple):
 
     @property
     def is_solved(self) -> np.ndarray:
-        """Mask (q,) of the patches that are solved and in contact along a single interval."""
+        """Whether each patch (q,) is solved with contact on a single interval."""
         return self.contacts.residual <= RESIDUAL_TOL
 
 
@@ -101,10 +102,10 @@ class BatchSolution(NamedTuple):
     """Static measures of q patches that were solved in one batch.
 
     - estimates: Estimate (q,) by name.
-    - is_solved (q,): whether the patch was solved together with the others.
-    - plane_values: values (q,) by name on the second mesh, in the plane state of the model and in
-      the other one; () if not needed.
-    - levels: the patches on all meshes, fine to coarse.
+    - is_solved (q,): whether the batch solved each patch.
+    - plane_values: static measures (q,) by name on the second mesh, in the assumed plane state
+      and in the opposite one; () if no note needs them.
+    - levels: solutions on all meshes, from fine to coarse.
     """
 
     estimates: dict
@@ -123,7 +124,7 @@ class BatchSolution(NamedTuple):
         return self.levels[0].pressure.sigma_n.max(axis=1)
 
     def plane_sentences(self, patch_model, case: int) -> list:
-        """Return a sentence, as a list, on plane stress or plane strain of one patch of the batch."""
+        """Return a note, as a list, on the plane state of one patch of the batch."""
         if not self.plane_values:
             return []
         own_values, other_values = (
@@ -133,9 +134,9 @@ class BatchSolution(NamedTuple):
         return note_on_plane_state_changes(patch_model, own_values, other_values)
 
     def measures(self, case: int, floors: Mapping | None = None) -> dict:
-        """Return the measures of one patch of the batch as a dict.
+        """Return the static measures of one patch of the batch by name.
 
-        floors: floors (q,) by name that replace those of the table.
+        floors: error floors (q,) by name that replace those of the measure table.
         """
         return {
             name: estimate.select(case).to_measure(
@@ -146,10 +147,7 @@ class BatchSolution(NamedTuple):
 
 
 def reason_not_batched(patch_model) -> str:
-    """Return the reason why a patch cannot be solved in a batch with others, or "".
-
-    It is "" if it can.
-    """
+    """Return why a patch cannot be solved in a batch, or "" if it can."""
     if patch_model.mesh.shared is None:
         return "the case has a mesh of its own"
     if not all(
@@ -167,10 +165,7 @@ def reason_not_batched(patch_model) -> str:
 
 
 def _reason_for_several_intervals(patch_model) -> str:
-    """Return the reason why a patch may touch along more than one interval, or "".
-
-    It is "" if it is one.
-    """
+    """Return why a patch may be in contact on more than one interval, or "" if it cannot."""
     skin = patch_model.interface.skin
     if patch_model.interface.strips is not None or (skin is not None and skin.law != "linear"):
         return "strips or a smooth skin lie between the pieces"
@@ -181,19 +176,19 @@ def _reason_for_several_intervals(patch_model) -> str:
 
 
 def batch_key(patch_model) -> tuple:
-    """Return a hashable key that is equal for patches that can be solved in one batch."""
-    return patch_model.mesh.shared.name, *_layer_and_rotation(patch_model)
+    """Return a hashable key that is equal for patches that one batch can solve."""
+    return patch_model.mesh.shared.name, *_layer_and_rotation_key(patch_model)
 
 
-def _layer_and_rotation(patch_model) -> tuple:
+def _layer_and_rotation_key(patch_model) -> tuple:
     """Return the parameters of the linear asperity layer, and whether the rotation is fixed."""
     skin = patch_model.interface.skin
     numbers = None if skin is None else (skin.normal_stiffness, skin.tangential_ratio)
     return numbers, patch_model.loading.moment is None
 
 
-def collect_loads(patches: Sequence) -> PatchLoads:
-    """Collect the loads and shapes of several patches in a record of arrays."""
+def collect_patch_loads(patches: Sequence) -> PatchLoads:
+    """Collect the loads and shapes of several patches in arrays."""
     loadings = [patch.loading for patch in patches]
     moment = None
     if loadings[0].moment is not None:
@@ -208,11 +203,11 @@ def collect_loads(patches: Sequence) -> PatchLoads:
     )
 
 
-def loads_from_columns(patch_model, count: int) -> PatchLoads:
-    """Return the loads of q patches from one PatchModel whose numbers are columns."""
+def patch_loads_from_arrays(patch_model, count: int) -> PatchLoads:
+    """Return the loads of q patches from one PatchModel whose parameters are arrays (q,)."""
 
     def column(number) -> np.ndarray:
-        """Return a number as a column (q,)."""
+        """Return a parameter as an array (q,)."""
         return np.broadcast_to(np.asarray(number, float), count)
 
     loading = patch_model.loading
@@ -227,7 +222,7 @@ def loads_from_columns(patch_model, count: int) -> PatchLoads:
 
 
 def solve_patches_on_pair(patch_models, pair: CondensedPair) -> list:
-    """Solve the contacts of several patches of equal geometry on the same condensed pieces.
+    """Solve several patches of equal geometry in batches on the same condensed pieces.
 
     Parameters
     ----------
@@ -237,43 +232,44 @@ def solve_patches_on_pair(patch_models, pair: CondensedPair) -> list:
     Returns
     -------
     list of Patch
-        None for each patch that cannot be solved in a batch.
+        None for each patch that the batch solver cannot treat.
     """
     out = [None] * len(patch_models)
     if not _has_plain_grids(pair) or pair.closing.any():
         return out
     for cases in _group_batches(patch_models):
-        alike = [patch_models[case] for case in cases]
+        batch = [patch_models[case] for case in cases]
         with one_thread():
-            level = solve_on_pair(collect_loads(alike), pair)
+            level = solve_batch_on_pair(collect_patch_loads(batch), pair)
         for row, case in enumerate(cases):
             if level.is_solved[row] and level.contacts.n_nodes[row] > MAX_UNRESOLVED_NODES:
-                out[case] = _make_patch(patch_models[case], pair, level, row)
+                out[case] = _extract_patch(patch_models[case], pair, level, row)
     return out
 
 
 def _has_plain_grids(pair: CondensedPair) -> bool:
-    """Return whether the meshes of both pieces are plain tensor grids."""
+    """Return whether the meshes of both pieces are tensor grids."""
     return isinstance(pair.grid, TensorGrid) and isinstance(pair.upper_grid, TensorGrid)
 
 
 def _group_batches(patch_models) -> list:
-    """Group the indices of patches of equal geometry that can be solved in one batch."""
+    """Group the indices of patches of equal geometry into batches."""
     groups = {}
     for case, patch_model in enumerate(patch_models):
         if not _reason_for_several_intervals(patch_model):
-            key = (patch_model.mesh.tolerance, *_layer_and_rotation(patch_model))
+            key = (patch_model.mesh.tolerance, *_layer_and_rotation_key(patch_model))
             groups.setdefault(key, []).append(case)
     return list(groups.values())
 
 
-def solve_alike_patches(patch_models, tolerance: float) -> list:
-    """Solve similar patches in one batch; None for each patch that the batch cannot solve.
+def solve_similar_patches(patch_models, tolerance: float) -> list:
+    """Solve similar patches in one batch, and return a SolvedPatch or None for each.
 
-    They share their pieces and `batch_key`. tolerance: see `solve_batch`.
+    All patches have the same `batch_key`. None: the batch solver cannot treat this patch.
+    tolerance: see `solve_patch_batch`.
     """
     pairs = condense_on_shared_meshes(patch_models[0])
-    solution = solve_batch(collect_loads(patch_models), tolerance)
+    solution = solve_patch_batch(collect_patch_loads(patch_models), tolerance)
     out = [None] * len(patch_models)
     for case in np.flatnonzero(solution.is_solved).tolist():
         patch_model = patch_models[case]
@@ -281,22 +277,22 @@ def solve_alike_patches(patch_models, tolerance: float) -> list:
             solution.measures(case),
             solution.plane_sentences(patch_model, case),
             tuple(
-                _make_patch(patch_model, pair, level, case)
+                _extract_patch(patch_model, pair, level, case)
                 for pair, level in zip(pairs, solution.levels)
             ),
         )
     return out
 
 
-def max_error_ratios(patch_models, pairs: list, tolerance: float) -> list:
-    """Return the ratio of the largest error to the tolerance for each patch; None if not solved.
+def max_mesh_error_ratios(patch_models, pairs: list, tolerance: float) -> list:
+    """Return the largest ratio of error to allowed error for each patch; None if not solved.
 
     Parameters
     ----------
     patch_models : sequence of PatchModel
-        Of one geometry.
-    pairs : list of CondensedPair
-        Condensed pieces, fine to coarse.
+        Patches of equal geometry.
+    list of CondensedPair
+        From fine to coarse.
     tolerance : float
 
     Returns
@@ -307,27 +303,29 @@ def max_error_ratios(patch_models, pairs: list, tolerance: float) -> list:
     if len(pairs) < 3 or not all(map(_has_plain_grids, pairs)):
         return out
     for cases in _group_batches(patch_models):
-        # Whether the grids are plain is equal for all patches of a geometry.
+        # A profile has its own averaging length, so that the batch solver does not treat it.
         if patch_models[cases[0]].gap.profile is not None:
             continue
-        alike = [patch_models[case] for case in cases]
-        solution = solve_batch(collect_loads(alike), tolerance, pairs)
+        batch = [patch_models[case] for case in cases]
+        solution = solve_patch_batch(collect_patch_loads(batch), tolerance, pairs)
         for row in np.flatnonzero(solution.is_solved).tolist():
             out[cases[row]] = max_mesh_error_ratio(solution.measures(row), tolerance)
     return out
 
 
-def solve_batch(loads: PatchLoads, tolerance: float, pairs: list | None = None) -> BatchSolution:
-    """Solve the contacts of q patches in one batch on shared meshes, with error estimates.
+def solve_patch_batch(
+    loads: PatchLoads, tolerance: float, pairs: list | None = None
+) -> BatchSolution:
+    """Solve q patches in one batch on their shared meshes, with error estimates.
 
     Parameters
     ----------
     loads : PatchLoads
     tolerance : float
-        Relative error above which values are extrapolated.
-    pairs : list of CondensedPair, optional
-        Pieces, fine to coarse, that replace the shared ones; the other plane state is then not
-        solved.
+        Values with a larger relative error are extrapolated.
+    list of CondensedPair, optional
+        Condensed pieces, from fine to coarse, that replace those of the shared meshes; the opposite
+        plane state is then not solved.
 
     Returns
     -------
@@ -340,10 +338,10 @@ def solve_batch(loads: PatchLoads, tolerance: float, pairs: list | None = None) 
     other_level = None
     with one_thread():
         for pair in reversed(pairs):
-            levels.insert(0, solve_on_pair(loads, pair, levels[0] if levels else None))
+            levels.insert(0, solve_batch_on_pair(loads, pair, levels[0] if levels else None))
         if other_model is not None:
             other_loads = loads._replace(first=other_model)
-            other_level = solve_on_pair(
+            other_level = solve_batch_on_pair(
                 other_loads, condense_on_shared_level(other_model, 1), levels[1]
             )
     fine = levels[0]
@@ -370,7 +368,7 @@ def solve_batch(loads: PatchLoads, tolerance: float, pairs: list | None = None) 
     return BatchSolution(estimates, is_solved, plane_values, levels)
 
 
-def _make_patch(patch_model, pair: CondensedPair, level: BatchLevel, case: int):
+def _extract_patch(patch_model, pair: CondensedPair, level: BatchLevel, case: int):
     """Convert the solution of one patch of a batch to a Patch."""
     gap, notes, seconds = patch_model.gap.evaluate(level.x)
     rows = level.pressure
@@ -390,21 +388,22 @@ def _make_patch(patch_model, pair: CondensedPair, level: BatchLevel, case: int):
     return make_patch(patch_model, pair, gap + pair.end_gap, contact, notes, seconds)
 
 
-def solve_on_pair(
+def solve_batch_on_pair(
     loads: PatchLoads, pair: CondensedPair, coarse: BatchLevel | None = None
 ) -> BatchLevel:
-    """Solve the contacts of q patches in one batch on one pair of condensed pieces.
+    """Solve the contact problems of q patches in one batch on the same condensed pieces.
 
     Parameters
     ----------
     loads : PatchLoads
     pair : CondensedPair
     coarse : BatchLevel, optional
-        The same patches on coarser cells, near whose ends of contact the search starts.
+        Solution on the next coarser mesh, near whose contact edges the search starts.
 
     Returns
     -------
     Level
+        BatchLevel
     """
     bare = pair.compliance
     skin = loads.first.interface.skin
@@ -414,7 +413,7 @@ def solve_on_pair(
     gap = loads.gaps(x) + pair.end_gap
     gap_range = np.ptp(gap, axis=1)
     angle = np.zeros(loads.load.size) if has_fixed_rotation else loads.angle
-    # The rotation of a free piece is measured from zero, so that it keeps its digits.
+    # The rotation of a free piece is measured from zero, which avoids cancellation.
     gap = gap - angle[:, None] * x
     min_gap = gap.min(axis=1)
     normal = Intervals(pieces.normal, x)
@@ -457,16 +456,16 @@ def solve_on_pair(
 
 
 def _contact_node_range(x, coarse: BatchLevel) -> tuple:
-    """Return the range of nodes that can be in contact, from the contact on a coarser mesh.
+    """Return the range of nodes that may be in contact, from the contact on a coarser mesh.
 
-    The range is the first node (q,) and the node (q,) after the last one.
+    The range is given by its first node (q,) and the node (q,) after its last one.
     """
-    known = coarse.contacts
-    solved = coarse.is_solved
-    before = coarse.x[np.maximum(known.first - 1, 0)]
-    after = coarse.x[np.minimum(known.stop, coarse.x.size - 1)]
-    first = np.searchsorted(x, before) - np.where(known.first > 0, 0, 1)
+    contacts = coarse.contacts
+    is_solved = coarse.is_solved
+    before = coarse.x[np.maximum(contacts.first - 1, 0)]
+    after = coarse.x[np.minimum(contacts.stop, coarse.x.size - 1)]
+    first = np.searchsorted(x, before) - np.where(contacts.first > 0, 0, 1)
     stop = np.searchsorted(x, after) + 1 + MAX_END_CELLS
-    return np.where(solved, np.maximum(first, 0), 0), np.where(
-        solved, np.minimum(stop, x.size), x.size
+    return np.where(is_solved, np.maximum(first, 0), 0), np.where(
+        is_solved, np.minimum(stop, x.size), x.size
     )

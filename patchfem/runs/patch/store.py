@@ -1,29 +1,29 @@
-"""Cache of results that the runs of a process share: condensed pieces, patches, measures.
+"""Cache of results that several runs of a process use: condensed pieces, patches, measures.
 
-In: a key of plain values, equal for equal patches of different models, and a function that
-computes the result. Out: the result, computed once. For example, all levels and frequencies of
-a sweep use the same patch. A result is discarded after MAX_ENTRIES other results were used.
+In: a key of plain values, equal for equal patches of different models, and a function that computes
+the result. Out: the result, computed once. For example, all levels and frequencies of a sweep use
+the same patch. The least recently used result is discarded beyond MAX_ENTRIES.
 """
 
 from collections.abc import Callable
 from dataclasses import replace
 
-# Largest number of cached results. A patch with its measures and elements has about seven, its
-# meshes have four to nine.
+# Largest number of cached results. A patch has about seven of them with its measures and elements,
+# and its meshes have four to nine.
 MAX_ENTRIES = 64
 
-_RESULTS: dict = {}  # The dict is ordered from the least to the most recently used result.
+_RESULTS: dict = {}  # Results from the least to the most recently used one.
 
 
 def get_or_compute(key: tuple, make: Callable):
-    """Return the cached value of a key; compute and store it on the first call."""
+    """Return the cached result of a key; compute and cache it on the first call."""
     result = _RESULTS[key] if key in _RESULTS else make()
     store_result(key, result)
     return result
 
 
 def get_or_compute_in_sweep(patch_model, key: tuple, make: Callable):
-    """Return the value of a key, which is cached only if other cases of a sweep may need it.
+    """Return the result of a key, cached only if other cases of a sweep may use it.
 
     Parameters
     ----------
@@ -33,13 +33,13 @@ def get_or_compute_in_sweep(patch_model, key: tuple, make: Callable):
     make : callable
         Function without parameters that computes the result.
     """
-    return get_or_compute(key, make) if may_be_shared(patch_model) else make()
+    return get_or_compute(key, make) if can_share_results(patch_model) else make()
 
 
 def store_result(key: tuple, result) -> None:
-    """Store a value under a key as the most recently used entry of the cache.
+    """Cache a result as the most recently used one.
 
-    Beyond MAX_ENTRIES, the least recently used result is discarded.
+    Beyond MAX_ENTRIES the least recently used result is discarded.
     """
     _RESULTS.pop(key, None)
     _RESULTS[key] = result
@@ -48,7 +48,7 @@ def store_result(key: tuple, result) -> None:
 
 
 def clear_cache() -> None:
-    """Discard all cached values of this process."""
+    """Discard all cached results of this process."""
     _RESULTS.clear()
 
 
@@ -72,10 +72,10 @@ def content_key(patch_model) -> tuple:
     )
 
 
-def may_be_shared(patch_model) -> bool:
-    """Return whether other cases of a sweep may reuse the results of a patch model.
+def can_share_results(patch_model) -> bool:
+    """Return whether other cases of a sweep may use the results of a patch model.
 
-    This requires shared meshes, and neither a mesh nor a profile from a file.
+    This requires shared meshes, and neither mesh nor profile from a file.
     """
     return (
         patch_model.mesh.shared is not None

@@ -1,6 +1,6 @@
-"""Yield strength of the pieces, and a lower bound of the von Mises stress from the pressure.
+"""Yield strength of the pieces, and a lower bound of their von Mises stress.
 
-In: a `PatchModel` and a pressure. Out: notes on the faces that yield.
+In: a `PatchModel` and a pressure. Out: notes on the surfaces that yield.
 """
 
 from math import sqrt
@@ -14,8 +14,8 @@ YIELDING_NEGLECTED = "the run is elastic and neglects yielding"
 class Strength(NamedTuple):
     """Yield strength of a material, with the source of the number.
 
-    - material: its name; "material" without a name.
-    - pressure: strength [Pa].
+    - material: name of the material; "material" if it has none.
+    - pressure: yield strength [Pa].
     - source: source of the number.
     """
 
@@ -25,14 +25,14 @@ class Strength(NamedTuple):
 
     @property
     def words(self) -> str:
-        """Return the strength and its source as text."""
+        """Sentence on the yield strength and its source."""
         return f"the yield strength is {self.pressure / 1e6:.4g} MPa ({self.source})"
 
 
 def yield_strength(material) -> Strength | None:
-    """Return the yield strength of a Material from the scene, else from the material table.
+    """Return the yield strength of a Material from the scene or else from the material table.
 
-    None if neither has it.
+    It is None if neither has it.
     """
     if material is None:
         return None
@@ -42,29 +42,30 @@ def yield_strength(material) -> Strength | None:
     if known is None or known.strength is None:
         return None
     if (material.young, material.poisson) != (known.young, known.poisson):
-        return None  # A known name with other elastic constants is a different material.
+        return None  # A known name with other elastic constants denotes another material.
     return Strength(material.name, known.strength.strength, known.strength.source[:-1])
 
 
-def min_stress_ratio(poisson: float, plane: str) -> float:
-    """Return the smallest von Mises stress per normal stress at a frictionless surface [1].
+def min_von_mises_ratio(poisson: float, plane: str) -> float:
+    """Return the smallest ratio of von Mises stress to pressure at a frictionless surface.
 
-    The stress along the face is not known from the pressure alone; the value is the minimum over it. In plane strain
-    sqrt(3)/2 (1 - 2 nu)/sqrt(1 - nu + nu^2), in plane stress sqrt(3)/2.
+    The minimum over the stress along the surface is taken, because the pressure alone does not
+    determine this stress. It is sqrt(3)/2 (1 - 2 nu)/sqrt(1 - nu + nu^2) in plane strain and
+    sqrt(3)/2 in plane stress.
     """
     if plane == "stress":
         return sqrt(3) / 2
     return sqrt(3) / 2 * (1 - 2 * poisson) / sqrt(1 - poisson + poisson**2)
 
 
-def yielding_faces(patch_model, peak: float) -> dict:
+def note_on_yielding_faces(patch_model, peak: float) -> dict:
     """Return notes on the surface materials that yield under a given pressure.
 
     Parameters
     ----------
     patch_model : PatchModel
     peak : float
-        Pressure [Pa] that acts at least somewhere on the interface.
+        Pressure [Pa] that is reached somewhere on the interface.
 
     Returns
     -------
@@ -77,7 +78,7 @@ def yielding_faces(patch_model, peak: float) -> dict:
         known = yield_strength(face)
         if known is None or known in notes:
             continue
-        stress = min_stress_ratio(face.poisson, patch_model.pieces.plane) * peak
+        stress = min_von_mises_ratio(face.poisson, patch_model.pieces.plane) * peak
         if stress > known.pressure:
             notes[known] = (
                 f"under the largest pressure the von Mises stress is at least {stress / 1e6:.4g} MPa at the face of "

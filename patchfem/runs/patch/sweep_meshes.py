@@ -1,9 +1,9 @@
-"""Meshes shared by all cases of a sweep, fine wherever the contact of any case ends.
+"""Meshes for all cases of a sweep, with short cells wherever the contact of any case ends.
 
-In: the `PatchModel`s of the cases. Out: `SharedMeshes`. The mesh of a single case is graded to
-its own contact. The shared mesh has at each position the cells of the case that needs the
-shortest ones there, and is refined until the hardest case meets the tolerance. Pieces with
-prescribed elements, or from a file, have the same meshes in every case anyway.
+In: the `PatchModel`s of the cases. Out: `SharedMeshes`. The mesh of a single case is graded to its
+own contact. At each position the shared mesh has the cells of the case that needs the shortest ones
+there. It is refined until all cases meet the tolerance. Pieces with prescribed elements or with a
+mesh file have equal meshes in all cases anyway.
 """
 
 from dataclasses import replace
@@ -16,45 +16,48 @@ from ...core import PatchfemError
 from ...mesh.grading import Layout
 from ...mesh.tensor import TensorGrid
 from ...model.patch import SharedMeshes
-from . import grids, ladder
+from . import grids, mesh_levels
 from .condensed import cache_condensed_pairs, condense
 from .measures import estimate_static_measures, max_mesh_error_ratio
 from .press import solve_patch_contact
-from .static_batch import max_error_ratios, solve_patches_on_pair
+from .static_batch import max_mesh_error_ratios, solve_patches_on_pair
 
-# Largest number of cases that determine the mesh; of more, the most different ones are taken.
+# Largest number of cases that determine the mesh; of more cases, the most different ones are
+# selected.
 MAX_CASES = 48
 # Number of cases that are solved on meshes of their own if a patch slips partially.
-N_LADDER_CASES = 5
-# Largest number of searches; the columns of each are graded to the contacts of the previous one.
+N_SINGLE_CASES = 5
+# Largest number of contact searches; each search uses columns graded to the contacts of the
+# previous one.
 MAX_SEARCHES = 4
-# Largest number of nodes of the finest interface, because a finer mesh slows down every case.
+# Largest number of interface nodes of the finest mesh; a finer mesh slows down every case.
 MAX_INTERFACE_NODES = 400
-# Highest convergence order of static measures; meshes too coarse even at this order are not tried.
+# Highest convergence order of static measures; meshes that would be too coarse even at this order
+# are not tried.
 MAX_ORDER = 3.0
-# Ratio of the coarsest cell to the cell that a case needs, in the order of trial: the longest cells
-# cost least. Factors that the last trial shows to be too large are skipped.
+# Factors on the cell lengths that the cases need, in the order of trial: the longest cells are the
+# cheapest. Factors that the last trial shows to be too large are skipped.
 CELL_FACTORS = (4.0, 2.8, 2.0, 1.5, 1.0)
-# Largest cell ratio of neighbouring cases that are joined by a single band.
+# Largest ratio of the cell lengths of neighbouring cases that are joined by a single band.
 MAX_CELL_RATIO = 2.0
 
 
 def geometry_key(patch_model) -> tuple:
-    """Return a hashable key of all that determines the meshes and the stiffness of two pieces.
+    """Return a hashable key of everything on which the meshes and the compliance depend.
 
-    It does not contain load and surface shapes, and is equal for patches that may share meshes.
+    Patches that may share meshes have equal keys; load and surface shapes do not matter.
     """
     mesh = patch_model.mesh
     gap = patch_model.gap
     file = mesh.file
-    changed = file.stat().st_mtime_ns if file is not None and file.exists() else 0
+    modification_time = file.stat().st_mtime_ns if file is not None and file.exists() else 0
     return (
         patch_model.pieces,
         mesh.element_size,
         mesh.is_static,
         mesh.edge_motion,
         file,
-        changed,
+        modification_time,
         mesh.tolerance,
         gap.jumps,
         gap.profile,
@@ -62,16 +65,18 @@ def geometry_key(patch_model) -> tuple:
     )
 
 
-def shared_meshes(patches, tolerance: float, is_complete: bool = True) -> SharedMeshes | None:
-    """Choose meshes for all patches of equal geometry, independent of the order of the patches.
+def choose_shared_meshes(
+    patches, tolerance: float, is_complete: bool = True
+) -> SharedMeshes | None:
+    """Choose meshes that suit all patches of equal geometry, independently of their order.
 
     Parameters
     ----------
     patches : sequence of PatchModel
     tolerance : float
-        Relative error of the static measures that all of them have to meet.
+        Relative error that the static measures of all patches have to meet.
     is_complete : bool
-        Whether there are no further cases that the meshes have to serve.
+        Whether the sweep has no further cases.
 
     Returns
     -------
@@ -80,7 +85,7 @@ def shared_meshes(patches, tolerance: float, is_complete: bool = True) -> Shared
     """
     patch_model = patches[0]
     if not patch_model.mesh.is_automatic:
-        return name_shared_meshes(ladder.make_file_meshes(patch_model))
+        return name_shared_meshes(mesh_levels.make_file_meshes(patch_model))
     cases, are_all_patches = select_distinct_patches(patches)
     load_variants = [
         case.with_loading(load=cell_factor * case.loading.load)
@@ -88,18 +93,20 @@ def shared_meshes(patches, tolerance: float, is_complete: bool = True) -> Shared
         if case.mesh.edge_motion == "load" and case.loading.load is not None
         for cell_factor in grids.LOAD_RANGE_FACTORS
     ]
-    slips = any(patch.interface.partial_slip for patch in patches)
-    halvings = _count_halvings(cases, tolerance) if slips else {}
-    # The halvings that all cases have in common are levels of the ladder.
-    common = min(halvings.values(), default=0)
-    layout = _common_layout(
+    has_partial_slip = any(patch.interface.partial_slip for patch in patches)
+    halvings = _count_extra_halvings(cases, tolerance) if has_partial_slip else {}
+    # Halvings that all cases need become refinement levels.
+    common_halvings = min(halvings.values(), default=0)
+    layout = _make_common_layout(
         [*cases, *load_variants],
         not (are_all_patches and is_complete),
-        {key: one - common for key, one in halvings.items()},
+        {key: one - common_halvings for key, one in halvings.items()},
     )
-    # The initial contact of a case that later moves or slips partially does not determine its
-    # measures.
-    cell_factors = CELL_FACTORS[-1:] if patch_model.mesh.edge_motion or slips else CELL_FACTORS
+    # If the contact edges move or the patch slips partially, the initial contact does not determine
+    # the measures, so that only the shortest cells are used.
+    cell_factors = (
+        CELL_FACTORS[-1:] if patch_model.mesh.edge_motion or has_partial_slip else CELL_FACTORS
+    )
     unscaled_bodies = None
     if layout is None:
         return None
@@ -109,13 +116,13 @@ def shared_meshes(patches, tolerance: float, is_complete: bool = True) -> Shared
         bodies = grids.make_grids(patch_model, layout.scale_cells(cell_factor))
         if cell_factors:
             unscaled_bodies = unscaled_bodies or grids.make_grids(patch_model, layout)
-            # Both layouts already have the largest number of columns.
+            # Both layouts have the largest number of columns.
             if bodies[0].x.size >= unscaled_bodies[0].x.size:
                 continue
-        pairs, missed_by = _refine_until_met(
-            cases, bodies, tolerance, bool(cell_factors), grids.MIN_LEVELS + common
+        pairs, error_ratio = _refine_until_tolerance_is_met(
+            cases, bodies, tolerance, bool(cell_factors), grids.MIN_LEVELS + common_halvings
         )
-        if missed_by <= 1 or not cell_factors:
+        if error_ratio <= 1 or not cell_factors:
             meshes = name_shared_meshes(
                 [
                     (pair.grid, None if pair.upper is pair.piece else pair.upper_grid)
@@ -124,13 +131,15 @@ def shared_meshes(patches, tolerance: float, is_complete: bool = True) -> Shared
             )
             cache_condensed_pairs(cases[0], meshes, pairs)
             return meshes
-        # Factor on the cells above which no mesh meets the tolerance.
-        enough = cell_factor * missed_by ** (-1 / MAX_ORDER)
-        cell_factors = tuple(one for one in cell_factors if one <= max(enough, CELL_FACTORS[-1]))
+        # Largest factor on the cell lengths at which a mesh can meet the tolerance.
+        max_factor = cell_factor * error_ratio ** (-1 / MAX_ORDER)
+        cell_factors = tuple(
+            one for one in cell_factors if one <= max(max_factor, CELL_FACTORS[-1])
+        )
 
 
 def name_shared_meshes(levels) -> SharedMeshes:
-    """Return shared meshes whose name is the hash of their contents."""
+    """Return SharedMeshes whose name is the hash of their contents."""
     digest = sha256()
     for body in chain.from_iterable(levels):
         if body is None:
@@ -147,11 +156,10 @@ def name_shared_meshes(levels) -> SharedMeshes:
 
 
 def select_distinct_patches(patches, max_patches: int = MAX_CASES) -> tuple:
-    """Select the patches that differ most from each other in load and surface shape.
+    """Select the patches that differ most from each other, by farthest-point selection.
 
-    The second result tells whether these are all patches.
-
-    Farthest-point selection; the result does not depend on their order.
+    The patches are compared by load and surface shape. The result does not depend on their order.
+    The second result is True if all patches are selected.
 
     Parameters
     ----------
@@ -159,7 +167,7 @@ def select_distinct_patches(patches, max_patches: int = MAX_CASES) -> tuple:
     max_patches : int
         Largest number of patches.
     """
-    rows = {_contact_numbers(patch): patch for patch in patches}
+    rows = {_load_and_shape_parameters(patch): patch for patch in patches}
     keys = sorted(rows)
     if len(keys) <= max_patches:
         return [rows[key] for key in keys], True
@@ -179,8 +187,8 @@ def select_distinct_patches(patches, max_patches: int = MAX_CASES) -> tuple:
     return [rows[keys[k]] for k in sorted(selected)], False
 
 
-def _contact_numbers(patch_model) -> tuple:
-    """Return the loads and shape parameters in which patches of equal geometry differ."""
+def _load_and_shape_parameters(patch_model) -> tuple:
+    """Return the parameters of load and shape in which patches of equal geometry differ."""
     shapes = [
         float(value)
         for _, part in patch_model.gap.shapes
@@ -205,36 +213,35 @@ def _contact_numbers(patch_model) -> tuple:
     return (*(float(value or 0.0) for value in loading_numbers), *shapes, *skin)
 
 
-def _count_halvings(cases: list, tolerance: float) -> dict:
-    """Solve each patch alone, and return how often its mesh is halved beyond the minimum.
+def _count_extra_halvings(cases: list, tolerance: float) -> dict:
+    """Solve single patches, and return by how many halvings their meshes exceed the minimum.
 
-    The keys are `_contact_numbers`. N_LADDER_CASES cases are tried.
+    The keys are those of `_load_and_shape_parameters`. N_SINGLE_CASES patches are solved.
     """
     halvings = {}
-    for case in select_distinct_patches(cases, N_LADDER_CASES)[0]:
+    for case in select_distinct_patches(cases, N_SINGLE_CASES)[0]:
         try:
-            halvings[_contact_numbers(case)] = (
-                len(ladder.solve_on_ladder(case, case.mesh.tolerance or tolerance))
+            halvings[_load_and_shape_parameters(case)] = (
+                len(mesh_levels.solve_on_refined_meshes(case, case.mesh.tolerance or tolerance))
                 - grids.MIN_LEVELS
             )
-        except PatchfemError:  # the single run of this case reports the error
+        except PatchfemError:  # The single run of this case reports the error.
             continue
     return halvings
 
 
-def _common_layout(
+def _make_common_layout(
     cases: list, has_intermediate_cases: bool, halvings_by_case: dict
 ) -> Layout | None:
-    """Return a column layout of the coarsest grids that suits all patches; None on failure.
+    """Return column layouts of the coarsest grids merged for all patches, or None on failure.
 
     Parameters
     ----------
     cases : list of PatchModel
     has_intermediate_cases : bool
-        Whether there are more cases, whose contacts end between those of neighbouring ones.
+        Whether there are more cases, whose contacts end between those of neighbouring cases.
     halvings_by_case : dict
-        `_count_halvings` beyond those of all cases; the cells of a case are shorter by these from the
-        first level.
+        Halvings of the cells by case, from `_count_extra_halvings`, beyond those that all cases need.
     """
     first = cases[0]
     max_cell_ratio = 1 / (grids.EDGE_CELLS[first.mesh.is_static] - 1)
@@ -249,8 +256,8 @@ def _common_layout(
         for case, patch in zip(cases, solve_patches_on_pair(cases, pair)):
             extent = _find_contact_extent(case, pair, patch)
             if extent is not None:
-                n_halvings = halvings_by_case.get(_contact_numbers(case), 0)
-                case_layout = grids.make_layout(case, [extent])
+                n_halvings = halvings_by_case.get(_load_and_shape_parameters(case), 0)
+                case_layout = grids.make_column_layout(case, [extent])
                 layouts.append(case_layout.scale_cells(0.5**n_halvings))
                 largest_ratio = max(largest_ratio, extent.cell / extent.width)
         if not layouts:
@@ -262,12 +269,12 @@ def _common_layout(
 
 
 def _find_contact_extent(patch_model, pair, patch):
-    """Return the contact region of a patch, if needed from a new solution; None if that fails.
+    """Return the contact region of a patch, which is solved first if needed; None on failure.
 
-    The single run of the case then reports the error.
+    In that case the single run reports the error.
     """
     try:
-        return grids.contact_extent(
+        return grids.find_contact_extent(
             patch or solve_patch_contact(patch_model, pair), patch_model.mesh.slip
         )
     except PatchfemError:
@@ -275,7 +282,7 @@ def _find_contact_extent(patch_model, pair, patch):
 
 
 def _merge_layouts(layouts: list, has_intermediate_cases: bool) -> Layout:
-    """Merge column layouts, with the shortest cell of all layouts at each position."""
+    """Merge column layouts, taking the shortest cell of all layouts at each position."""
     bands = {
         band
         for layout in layouts
@@ -295,7 +302,7 @@ def _merge_layouts(layouts: list, has_intermediate_cases: bool) -> Layout:
     )
     low, high, _ = np.array(bands).T
     positions = np.linspace(low, high, 5, axis=1)
-    # Only the bands that shorten some cell are kept, because most are redundant.
+    # Bands that do not shorten any cell are dropped, because most bands are redundant.
     cell_lengths = merged.cell_lengths(positions)
     needed_bands = []
     for k, band in enumerate(bands):
@@ -308,7 +315,7 @@ def _merge_layouts(layouts: list, has_intermediate_cases: bool) -> Layout:
 
 
 def _interpolate_bands(layouts: list) -> list:
-    """Return bands of fine columns between the contact edges of neighbouring cases."""
+    """Return bands of short columns between the contact edges of neighbouring cases."""
     bands = []
     half_length = max(layout.stop for layout in layouts)
     for side in (-1, 1):
@@ -333,27 +340,28 @@ def _interpolate_bands(layouts: list) -> list:
     return bands
 
 
-def _refine_until_met(
+def _refine_until_tolerance_is_met(
     cases: list, bodies, tolerance: float, is_level_count_fixed: bool, min_levels: int
 ) -> tuple:
-    """Refine nested meshes until every patch meets its tolerance or the mesh is too expensive.
+    """Refine nested meshes until all patches meet the tolerance or the mesh is too expensive.
 
     Parameters
     ----------
     cases : list of PatchModel
     bodies : list
-        Coarsest meshes.
+        Meshes of the pieces on the coarsest level.
     tolerance : float
     is_level_count_fixed : bool
-        Whether to take no more than `least` levels.
+        Whether to use exactly `min_levels` levels.
     min_levels : int
         Smallest number of levels.
 
     Returns
     -------
     tuple
-        Pairs, fine to coarse, and the largest error over the tolerance: that of the cases that are
-        solved together; if all of them meet it, that of the first other one that does not.
+        Condensed pieces, from fine to coarse, and the largest ratio of error to allowed error. If
+        all patches of the batches meet the tolerance, it is the ratio of the first other patch that
+        does not.
     """
     pairs = []
     tolerance = cases[0].mesh.tolerance or tolerance
@@ -362,7 +370,7 @@ def _refine_until_met(
         bodies = [body.refine() for body in bodies]
         if len(pairs) < min_levels:
             continue
-        batch_ratios = max_error_ratios(cases, pairs, tolerance)
+        batch_ratios = max_mesh_error_ratios(cases, pairs, tolerance)
         largest_ratio = max((ratio for ratio in batch_ratios if ratio is not None), default=0.0)
         if largest_ratio <= 1:
             largest_ratio = next(
@@ -370,24 +378,24 @@ def _refine_until_met(
                     ratio
                     for case, batch_ratio in zip(cases, batch_ratios)
                     if batch_ratio is None
-                    and (ratio := _max_error_ratio(case, pairs, tolerance)) > 1
+                    and (ratio := _max_mesh_error_ratio(case, pairs, tolerance)) > 1
                 ),
                 largest_ratio,
             )
         n_nodes = bodies[0].x.size
         seconds = grids.predict_condensing_seconds(bodies)
-        max_seconds = ladder.max_condensing_seconds(cases[0], tolerance)
+        max_seconds = mesh_levels.max_condensing_seconds(cases[0], tolerance)
         is_too_expensive = n_nodes > MAX_INTERFACE_NODES or seconds > max_seconds
         if largest_ratio <= 1 or is_level_count_fixed or is_too_expensive:
             return pairs, largest_ratio
 
 
-def _max_error_ratio(patch_model, pairs: list, tolerance: float) -> float:
-    """Return the ratio of the largest error of a patch to the tolerance; 0 if it is not solved."""
+def _max_mesh_error_ratio(patch_model, pairs: list, tolerance: float) -> float:
+    """Return the largest ratio of error to allowed error of a patch; 0 if it is not solved."""
     try:
         return max_mesh_error_ratio(
             estimate_static_measures(
-                *ladder.solve_on_pairs(patch_model, pairs), tolerance=tolerance
+                *mesh_levels.solve_on_pairs(patch_model, pairs), tolerance=tolerance
             ),
             tolerance,
         )

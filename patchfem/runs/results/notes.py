@@ -1,6 +1,6 @@
-"""Sentences of a run on its friction law and on frictional heating.
+"""Warnings and notes of a run on its friction law and on frictional heating.
 
-In: a model, its histories and measures. Out: warnings and notes as lists.
+In: a model, its histories and measures. Out: lists of sentences.
 """
 
 from math import ceil, log2
@@ -12,39 +12,41 @@ from ...formatting import format_length
 from ...friction.bonds import parameters, temperature
 from ...scene.keys.materials import MATERIALS
 
-# relative difference [1] of the friction work from samples and from energies, above which a run warns
+# Largest relative difference of the friction works from samples and from energies without a
+# warning.
 MAX_WORK_CHECK = 1e-3
-# Ratio of slip while a bond forms to the bond length, above which a run warns.
+# Largest ratio of the slip during the formation of a bond to the bond length without a warning.
 MAX_FORMING_RATIO = 0.3
-# Excess of the friction force over mu_s N, relative to it, above which a run notes it.
+# Smallest excess of the friction force over mu_s N, relative to it, that a note reports.
 MIN_EXCESS_RATIO = 1e-3
-MAX_PROPOSED_HALVINGS = 8  # largest number of halvings of the steps that a warning proposes
-HARMONICS_FACTOR = 4  # ratio of proposed to present harmonics of a balance
-MIN_PROPOSED_HARMONICS = 31  # smallest number of harmonics that is proposed
-# Largest number of harmonics that is proposed for a sharp friction law.
+MAX_PROPOSED_HALVINGS = 8  # Largest number of halvings of the time step that a warning proposes.
+HARMONICS_FACTOR = 4  # Ratio of the proposed to the present number of harmonics.
+MIN_PROPOSED_HARMONICS = 31  # Smallest number of harmonics that a warning proposes.
+# Largest number of harmonics that a warning proposes for a steep friction law.
 MAX_PROPOSED_HARMONICS = 500
 
 
 def note_on_groove_slope(model, patch) -> list:
-    """Return the note on steep grooves under pieces that are compliant in shear.
+    """Return a note, as a list, on grooves under pieces that are compliant in shear.
 
-    The note says how far a point may be from the position at which the slope is taken.
+    All points take the slope of the grooves at the displacement of the holders. The note reports
+    how far a point may be from this displacement.
     """
     if model.grooves is None or not model.partial_slip:
         return []
     limit = model.friction.static * patch.pressure.sigma_n * patch.pieces.interface.weight
-    apart = float((patch.slip_compliance @ limit).max())
+    max_lag = float((patch.slip_compliance @ limit).max())
     return [
         f"{model.partial_slip} with grooves: the height and the slope of the grooves are taken at the slide of the holders "
         "and are the same for all points; a point at its friction limit slides by up to "
-        f"{format_length(apart, 3)} less than "
-        f"the holders, which is {apart / model.grooves.wavelength:.2g} of the wavelength; the normal force at each "
+        f"{format_length(max_lag, 3)} less than "
+        f"the holders, which is {max_lag / model.grooves.wavelength:.2g} of the wavelength; the normal force at each "
         "point is in proportion to the total load"
     ]
 
 
 def note_on_heating(model, patch, response, work: float | None = None) -> list:
-    """Return the note on the rise of the surface temperature in a run.
+    """Return a note, as a list, on the rise of the surface temperature in a run.
 
     The list is empty if the scene does not ask for the note.
 
@@ -55,7 +57,7 @@ def note_on_heating(model, patch, response, work: float | None = None) -> list:
     response
         Histories.
     work : float, optional
-        Friction work [J]; None: from the samples.
+        Friction work [J]; None: computed from the histories.
     """
     if model.heat is None:
         return []
@@ -63,31 +65,33 @@ def note_on_heating(model, patch, response, work: float | None = None) -> list:
         work = float(np.trapezoid(response.force, response.slide))
         if response.lateral is not None:
             work += float(np.trapezoid(response.lateral_force, response.lateral))
-    return describe_heating(model, patch, work, float(response.time[-1]))
+    return note_on_surface_temperature(model, patch, work, float(response.time[-1]))
 
 
 def warn_of_unformed_bonds(law, speed: float) -> list:
-    """Return a warning if bonds of the printed law break before they have formed.
+    """Return a warning, as a list, if bonds of the printed law break before they have formed.
 
     speed: peak speed [m/s].
     """
-    a = parameters.growth_path_ratio(law, speed) if law.reading == "report" else 0.0
-    if a <= MAX_FORMING_RATIO:
+    forming_ratio = parameters.growth_path_ratio(law, speed) if law.reading == "report" else 0.0
+    if forming_ratio <= MAX_FORMING_RATIO:
         return []
-    # at this growth path growth_path_ratio(law, speed) equals MAX_FORMING_RATIO
-    least = law.ratio / (1 / (MAX_FORMING_RATIO * law.length) - law.rest_growth / speed**2)
+    # At this growth path, growth_path_ratio(law, speed) equals MAX_FORMING_RATIO.
+    max_growth_path = law.ratio / (
+        1 / (MAX_FORMING_RATIO * law.length) - law.rest_growth / speed**2
+    )
     return [
-        f"at the peak speed of {speed:.3g} m/s a bond slides by {a:.2g} of its length while it forms (limit "
+        f"at the peak speed of {speed:.3g} m/s a bond slides by {forming_ratio:.2g} of its length while it forms (limit "
         f"{MAX_FORMING_RATIO:g}), so the law as printed in the report gives less friction than eqs. 2.18-2.21; set "
         "friction.slip_growth = "
-        f'"{0.95e6 * least:.2g} um", or friction.reading = "stretch"'
+        f'"{0.95e6 * max_growth_path:.2g} um", or friction.reading = "stretch"'
     ]
 
 
 def warn_of_creep(law, outcome, measures: dict) -> list:
-    """Return a warning if the mean position of a bounded motion drifts (Dahl's creep).
+    """Return a warning, as a list, if the mean position of a bounded motion drifts.
 
-    This creep is a property of the law, not of the joint.
+    The drift (Dahl's creep) is a property of the law, not of the joint.
 
     Parameters
     ----------
@@ -95,7 +99,7 @@ def warn_of_creep(law, outcome, measures: dict) -> list:
         Bond parameters.
     outcome : Outcome
     measures : dict
-        By name.
+        Measures by name.
     """
     drift = measures.get("drift_per_cycle")
     if drift is None or drift.error is None or outcome not in (Outcome.STEADY, Outcome.STUCK):
@@ -109,10 +113,10 @@ def warn_of_creep(law, outcome, measures: dict) -> list:
 
 
 def warn_of_unbounded_bonds(law) -> list:
-    """Return a warning if initial bonds of negative order exert an infinite traction.
+    """Return a warning, as a list, if initial bonds of negative order have an infinite traction.
 
-    Their traction is infinite at the first instant. Bonds that form later are bounded: theirs is at
-    most the fraction P(p + 1, R/eps_0) of mu_s N, grown or not.
+    Their traction is infinite at the first instant. Bonds that form later carry at most the
+    fraction P(p + 1, R/eps_0) of mu_s N, with or without growth.
     """
     if law.order >= 0 or law.initial == 0:
         return []
@@ -123,9 +127,9 @@ def warn_of_unbounded_bonds(law) -> list:
 
 
 def note_on_growth(law, peak: float | None) -> list:
-    """Return the notes on the effects of growing bonds.
+    """Return notes on the effects of growing bonds.
 
-    peak: largest friction force of the run over mu_s N [1]; None if the load changes.
+    peak: largest ratio of friction force to mu_s N in the run; None if the load varies.
     """
     if not law.has_growth:
         return []
@@ -153,27 +157,27 @@ def note_on_growth(law, peak: float | None) -> list:
 
 
 def warn_of_work_check(values: dict, steps: int | None, harmonics: int | None = None) -> list:
-    """Return a warning if the friction works from samples and from the energy balance differ.
+    """Return a warning, as a list, if the friction works from samples and from energies differ.
 
-    The trapezoidal rule for the samples is of second order; a difference that is smaller than its error
-    may be small by chance.
+    The trapezoidal rule for the samples is of second order. A difference below the error of the
+    rule may be small by chance, so that the larger of both is used.
 
     Parameters
     ----------
     values : dict
         Measures by name.
     steps, harmonics : int or None
-        Steps per cycle, and harmonics, of the run; None for an engine without them.
+        Steps per cycle and number of harmonics of the run; None for an engine without them.
     """
     check = values.get("work_check")
     if check is None or check.value is None or check.value <= MAX_WORK_CHECK:
         return []
     ratio = max(check.value, check.error or 0.0) / MAX_WORK_CHECK
-    # one more halving is proposed, because in a motion with stops the difference is of second order
-    # only on average
+    # One more halving is proposed, because in a motion with stops the difference is of second order
+    # only on average.
     halvings = 1 + ceil(log2(ratio) / 2)
     if harmonics:
-        remedy = propose_harmonics(harmonics)
+        remedy = advise_harmonics(harmonics)
     elif steps and halvings > MAX_PROPOSED_HALVINGS:
         remedy = f"with this method {steps} steps per cycle are too few for this motion"
     elif steps:
@@ -186,23 +190,22 @@ def warn_of_work_check(values: dict, steps: int | None, harmonics: int | None = 
     ]
 
 
-def propose_harmonics(n_harmonics: int, sharp: float = 0.0) -> str:
+def advise_harmonics(n_harmonics: int, n_law_harmonics: float = 0.0) -> str:
     """Return the advice to use more harmonics in the harmonic balance.
 
-    A balance with few harmonics says little about its convergence, so that at least MIN_PROPOSED_HARMONICS are
-    proposed. sharp: number of harmonics that the friction law itself needs.
+    At least MIN_PROPOSED_HARMONICS are proposed, because the convergence of a balance with few
+    harmonics is not known. n_law_harmonics: number of harmonics that the friction law needs.
     """
-    n_needed = min(ceil(sharp), MAX_PROPOSED_HARMONICS)
+    n_needed = min(ceil(n_law_harmonics), MAX_PROPOSED_HARMONICS)
     n_proposed = max(HARMONICS_FACTOR * n_harmonics, MIN_PROPOSED_HARMONICS, n_needed)
     return f"set accuracy.harmonics = {n_proposed}"
 
 
-def describe_heating(model, patch, work: float, duration: float) -> list:
-    """Return the note on the rise of the surface temperature due to frictional heating.
+def note_on_surface_temperature(model, patch, work: float, duration: float) -> list:
+    """Return a note, as a list, on the rise of the surface temperature due to frictional heating.
 
-    The list is empty if nothing is loaded or nothing moves. All heat is assumed to flow into one
-    half-space of the substrate through the loaded area: two alike pieces share it, and warm by half
-    as much.
+    All heat is assumed to flow through the loaded area into a single half-space of the substrate;
+    two alike pieces would warm by half as much. The list is empty without loaded area or motion.
 
     Parameters
     ----------
@@ -211,14 +214,14 @@ def describe_heating(model, patch, work: float, duration: float) -> list:
     work : float
         Friction work [J].
     duration : float
-        Time in which it is done [s].
+        Time in which the work is done [s].
     """
     if patch is None:
         return ["frictional heating is not estimated: a contact given by [normal] has no area"]
-    kind = model.patch.pieces.substrate
-    record = MATERIALS.get(kind.name)
-    known = None if record is None else record.heat
-    if known is None:
+    substrate = model.patch.pieces.substrate
+    record = MATERIALS.get(substrate.name)
+    thermal = None if record is None else record.heat
+    if thermal is None:
         names = [name for name, record in MATERIALS.items() if record.heat is not None]
         return [
             "frictional heating is not estimated: the conductivity of contact.substrate is not "
@@ -230,13 +233,14 @@ def describe_heating(model, patch, work: float, duration: float) -> list:
         return []
     period = _motion_period(model)
     flux = work / duration / area
-    stuff = (known.conductivity, known.heat_capacity * kind.density)
+    material_constants = (thermal.conductivity, thermal.heat_capacity * substrate.density)
     rises = [
-        f"{temperature.surface_temperature_rise(flux, duration, *stuff):.2g} K after {duration:.3g} s"
+        f"{temperature.surface_temperature_rise(flux, duration, *material_constants):.2g} K after {duration:.3g} s"
     ]
     if period is not None:
         rises.insert(
-            0, f"{temperature.surface_temperature_rise(flux, period, *stuff):.2g} K after one cycle"
+            0,
+            f"{temperature.surface_temperature_rise(flux, period, *material_constants):.2g} K after one cycle",
         )
     return [
         f"friction dissipates {work / duration:.2g} W on {1e6 * area:.3g} mm2; if one half-space took all this "
@@ -246,7 +250,7 @@ def describe_heating(model, patch, work: float, duration: float) -> list:
 
 
 def _motion_period(model) -> float | None:
-    """Return the period [s] of the prescribed motion, or None if it does not repeat."""
+    """Return the period [s] of the prescribed motion; None for a path that does not repeat."""
     if model.rig is not None:
         return 1 / model.rig.drive.frequency if model.rig.drive.frequency else None
     return model.slide.period

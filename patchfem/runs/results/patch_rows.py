@@ -1,6 +1,7 @@
-"""Table of the static measures of a pressed patch and of wear.
+"""Table of the static measures of a patch and of the measures of wear.
 
-In: a name. Out: its unit, floor and meaning; and the text that names what computed it.
+In: a name. Out: its unit, floor and definition; and the names of the methods that compute the
+measures.
 """
 
 from math import inf
@@ -164,13 +165,14 @@ ROWS = (
         group="patch",
     ),
 )
-# The following texts name the method that computed a static measure, in `numerics.measures` of summary.json.
+# The following texts name the method that computed a static measure, in `numerics.measures` of
+# summary.json.
 FINEST_MESH_SOURCE = "finite elements, finest mesh"
-# The extrapolated value may be that of a coarser mesh, if its error is smaller.
+# The value may also be that of a coarser mesh, if its error is smaller.
 EXTRAPOLATED_SOURCE = "finite elements, extrapolated over nested meshes"
 HALF_SPACE_SOURCE = "points on layered half-spaces"
 WORN_SOURCE = "wear in jumps of cycles"
-# names of the measures whose errors choose the mesh of a patch
+# Measures whose errors control the refinement of the mesh.
 MESH_MEASURES = (
     "pressure_peak",
     "contact_fraction",
@@ -184,16 +186,16 @@ POSITIVE_MESH_MEASURES = tuple(name for name in MESH_MEASURES if TABLE[name].min
 
 
 def minimum_value(name: str) -> float:
-    """Return the smallest value [SI] that a static measure can have; -inf if unbounded.
+    """Return the smallest value [SI] that a static measure can have; -inf if there is none.
 
-    The name may have the number of an interface.
+    The name may end with the number of an interface.
     """
     row = TABLE.get(sub(r"_\d+$", "", name))
     return -inf if row is None else row.minimum
 
 
 def find_unknown_measures(measures: dict) -> list:
-    """Return the positive measures that choose the mesh and whose error exceeds their value."""
+    """Return the positive measures that control the mesh and whose error exceeds their value."""
     names = []
     for name in POSITIVE_MESH_MEASURES:
         measure = measures.get(name)

@@ -1,7 +1,7 @@
-"""Result of a run, with the parts that every kind of run has.
+"""Result of a run, with the parts that all kinds of runs have in common.
 
-In: the output of an engine. Out: `Result`, frames of the interface, meanings of measures, and
-the numerical settings of the run as a dict.
+In: the output of an engine. Out: `Result`, frames of the interface, definitions of measures, and
+the numerical settings of the run.
 """
 
 import re
@@ -17,7 +17,7 @@ from ...formatting import rewrite_powers_of_ten
 from ...response import rows
 from . import patch_rows
 
-N_FRAMES = 16  # number of frames of the interface fields in the last cycle
+N_FRAMES = 16  # Number of frames of the interface fields in the last cycle.
 MIN_SLIP_FRACTION = (
     1e-2  # change of slip / largest change; above it, a node without friction limit slips
 )
@@ -25,20 +25,20 @@ ROUND_OFF = 1e-9  # relative rounding error of the tractions and slips of elemen
 COUNT_SETTINGS = ("steps_per_cycle", "harmonics", "shear_modes", "elements")
 _FOLDER_OF_PATH = re.compile(
     r"/[^:]*/(?=[^/:]+: )"
-)  # pattern of the folder of an absolute path at the start of a remark
+)  # Folder of an absolute path at the start of a remark.
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RunInputs:
-    """Inputs of a run: plan, pressed patch, callbacks and whether to estimate errors.
+    """Inputs of a run: plan, solved patch, callbacks and whether to estimate errors.
 
-    - plan: Plan that is run.
-    - patch: pressed patch of [contact], or None.
+    - plan: Plan to run.
+    - patch: solved patch of [contact], or None.
     - coarse: the patch on coarser meshes; None for a missing one.
-    - seconds: CPU seconds by part, to which the run adds its own.
+    - seconds: CPU seconds by step of the run; the run adds its own.
     - warnings: sentences on the scene and the patch.
     - say, progress: callbacks for a line of text and for the completed fraction, or None.
-    - estimate: whether coarser runs estimate the errors.
+    - estimate: whether to estimate the errors from coarser runs.
     """
 
     plan: object
@@ -58,12 +58,12 @@ class Result:
     - plan: Plan that was run.
     - outcome: how the run ended.
     - measures: Measure by name.
-    - response, window: kept histories, and those of the last cycles; None without motion.
+    - response, window: stored histories, and those of the last cycles; None without motion.
     - patch: solved patch, or None.
     - fields: arrays (frame, x) by name, with `time`.
-    - seconds: CPU seconds by part.
+    - seconds: CPU seconds by step of the run.
     - warnings: sentences.
-    - extra: engine, steps, notes and other data of the report.
+    - extra: engine, steps, notes and other data for the report.
     """
 
     plan: object
@@ -78,43 +78,46 @@ class Result:
     extra: dict
 
     def __repr__(self) -> str:
-        measures = _count_words(len(self.measures), "measure")
-        warnings = _count_words(len(self.warnings), "warning")
+        measures = _format_count(len(self.measures), "measure")
+        warnings = _format_count(len(self.warnings), "warning")
         return (
             f"Result of {self.plan.model.source.path.name}, {self.outcome}: {self.outcome.sentence}\n"
             f"  {measures} and {warnings}, {self.seconds.get('total', 0.0):.2f} s"
         )
 
 
-def _count_words(count: int, word: str) -> str:
-    """Return a number with its noun, such as "no warnings" or "2 warnings"."""
+def _format_count(count: int, word: str) -> str:
+    """Return a count with its noun, such as "no warnings" or "2 warnings"."""
     return f"{count or 'no'} {word}{'s' * (count != 1)}"
 
 
-def describe_measure(name: str, apart: str = "interface") -> str:
-    """Return the meaning of a measure in one sentence without full stop.
+def describe_measure(name: str, numbered_kind: str = "interface") -> str:
+    """Return the definition of a measure in one sentence without full stop.
 
-    slip_amplitude_2 is the measure of the second interface, or of what `apart` names.
+    A numbered name such as slip_amplitude_2 belongs to the second interface, or to the second of
+    the objects that `numbered_kind` names.
     """
     if name in patch_rows.TABLE:
         return patch_rows.TABLE[name].text
 
     first = rows.remove_interface_number(name)
     row = patch_rows.TABLE.get(first) or rows.find_definition(name)
-    return row.text + ("" if first == name else f"; of {apart} {name.removeprefix(first + '_')}")
+    return row.text + (
+        "" if first == name else f"; of {numbered_kind} {name.removeprefix(first + '_')}"
+    )
 
 
 def collect_rest_frame(patch) -> dict:
     """Return the fields of a solved patch without motion as a single frame (1, n).
 
-    The fields are normal_stress [Pa], gap [m] and status of the finest solution, on the points of its
-    profile if there is one.
+    The fields are normal_stress [Pa], gap [m] and status of the finest solution, which is on the
+    points of a profile if there is one.
     """
-    return _pressed_frame(patch.finest_surface)
+    return _make_surface_frame(patch.finest_surface)
 
 
-def _pressed_frame(surface) -> dict:
-    """Return pressure, gap and contact status (1, n) on the surface of a solved patch."""
+def _make_surface_frame(surface) -> dict:
+    """Return pressure, gap and contact status (1, n) at the points of a surface."""
     return {
         "time": np.zeros(1),
         "normal_stress": surface.sigma_n[None],
@@ -124,10 +127,9 @@ def _pressed_frame(surface) -> dict:
 
 
 def patch_surface(patch, fields: dict):
-    """Return the surface at whose points the fields of a patch are given.
+    """Return the surface at whose points the fields of a patch are given; None without a patch.
 
-    After a motion the points are the nodes of the mesh, otherwise those of `collect_rest_frame`. The result is None
-    without a patch.
+    After a motion these are the nodes of the mesh, otherwise the points of `collect_rest_frame`.
     """
     if patch is None:
         return None
@@ -150,8 +152,8 @@ class SlipRule(NamedTuple):
 GRADUAL_SLIP = SlipRule()  # rule of a law without friction limit, after earlier cycles
 
 
-def make_interface_frames(patch, time, tau, local, slide, rule=GRADUAL_SLIP) -> dict:
-    """Return the fields of an interface in each frame, from tractions and slips.
+def make_interface_frames(patch, time, tau, node_slip, slide, rule=GRADUAL_SLIP) -> dict:
+    """Return the fields of an interface in all frames of a motion, after the pressed state.
 
     Parameters
     ----------
@@ -169,10 +171,10 @@ def make_interface_frames(patch, time, tau, local, slide, rule=GRADUAL_SLIP) -> 
     dict
         Arrays (f + 1, m); status as in `compute_status`.
     """
-    first = _pressed_frame(patch.surface)
+    first = _make_surface_frame(patch.surface)
     count = len(time) + 1
     tau = np.concatenate([np.zeros((1, tau.shape[1])), tau])
-    slip = np.concatenate([np.zeros((1, local.shape[1])), local])
+    slip = np.concatenate([np.zeros((1, node_slip.shape[1])), node_slip])
     return {
         "time": np.concatenate([[0.0], time]),
         "normal_stress": np.repeat(first["normal_stress"], count, axis=0),
@@ -208,7 +210,7 @@ def compute_status(active, tau, slip, rule=GRADUAL_SLIP) -> np.ndarray:
     return np.where(active, np.where(slips, 2, 1), 0).astype(np.int8)
 
 
-def has_known_mesh_error(model, patch, coarse) -> bool:
+def can_estimate_mesh_error(model, patch, coarse) -> bool:
     """Return whether the mesh error of a motion can be estimated.
 
     This requires the patch on a coarser mesh, unless the motion does not depend on the mesh.
@@ -229,18 +231,18 @@ def has_known_mesh_error(model, patch, coarse) -> bool:
     )
 
 
-def remove_unknown_errors(found: dict, estimate: bool) -> dict:
-    """Return measures without errors if a run did not estimate them."""
-    return found if estimate else {k: replace(m, error=None) for k, m in found.items()}
+def remove_unknown_errors(measures: dict, estimate: bool) -> dict:
+    """Return the measures, without errors if the run did not estimate them."""
+    return measures if estimate else {k: replace(m, error=None) for k, m in measures.items()}
 
 
 def collect_used_settings(result) -> dict:
-    """Return the numerical settings with which a run was computed.
+    """Return the numerical settings that a run used, by name.
 
-    Settings that the run did not use are left out. The others are engine, steps per cycle or those that a
-    tolerance chose, cycles and window, shear modes or elements of the pieces, the method of the sum
-    over bonds, nodes and strips of the patch, and the length [m] over which its profile is averaged.
-    map: "events" or "yields", the map that found a steady motion.
+    These are the engine, the steps per cycle or the step tolerance, cycles and window, shear modes
+    or elements of the pieces, the summation method for bonds, nodes and strips of the patch, and
+    the averaging length [m] of its profile. map: "events" or "yields", the map by which the steady
+    motion was found.
     """
     extra = result.extra
     patch = result.patch
@@ -271,10 +273,10 @@ def collect_used_settings(result) -> dict:
 
 
 def measure_engines(result) -> dict:
-    """Return the engine or method that computed each measure of a run.
+    """Return the engine or method that computed each measure of a run, by measure name.
 
-    A static measure of a patch names how it was computed on the meshes of the patch (`patch_rows`);
-    another measure has the engine of the run.
+    For static measures of a patch it is the method on its meshes (`patch_rows`), for all others the
+    engine of the run.
     """
     engines = {}
     for name, measure in result.measures.items():
@@ -285,20 +287,20 @@ def measure_engines(result) -> dict:
 
 
 def shorten_file_names(texts, path: Path) -> list:
-    """Shorten absolute file names and round numbers in remarks.
+    """Shorten absolute file names and rewrite powers of ten in remarks.
 
-    path: of the scene, in whose folder the files are.
+    path: path of the scene; file names become relative to its folder.
     """
-    return file_name_shortener(path)(texts)
+    return make_file_name_shortener(path)(texts)
 
 
-def file_name_shortener(path: Path) -> Callable[[Iterable[str]], list]:
-    """Return a function that shortens the file names in remarks on the scenes of one folder."""
+def make_file_name_shortener(path: Path) -> Callable[[Iterable[str]], list]:
+    """Return a function that shortens file names in remarks on the scenes of one folder."""
     folders = (path.parent, path.parent.absolute())
     prefixes = [f"{folder}/" for folder in folders if folder.is_absolute()]
 
     def shorten(texts) -> list:
-        """Shorten absolute file names and round numbers in remarks."""
+        """Shorten absolute file names and rewrite powers of ten in remarks."""
         short_texts = []
         for text in texts:
             for prefix in prefixes:

@@ -1,7 +1,7 @@
-"""Slide of the pieces compared with the length in contact and the length of the piece.
+"""Relative displacement of the pieces compared with the lengths of contact and pieces.
 
-In: kept samples of the slide and the pressed patch. Out: a warning, or the outcome of a run
-that leaves the contact.
+In: stored samples of the displacement and the solved patch. Out: a warning, or the outcome of a run
+in which the pieces leave the contact.
 """
 
 import numpy as np
@@ -9,30 +9,33 @@ import numpy as np
 from ...formatting import format_length
 from ...response.outcome import check_piece_length
 
-# Fraction of the contact length above which an unchanged pressure is inaccurate.
+# Largest ratio of displacement to contact length at which the unchanged pressure is accurate.
 MAX_SLIDE_FRACTION = 0.1
 
 
-def find_largest_slide(slide) -> float:
-    """Return the largest |slide| [m] of samples (k,); inf if the motion overflowed."""
+def find_max_displacement(slide) -> float:
+    """Return the largest |displacement| [m] of samples (k,); inf if the motion overflowed."""
     largest = float(np.abs(slide).max(initial=0.0))
     return largest if np.isfinite(largest) else np.inf
 
 
-def contact_length(patch) -> float:
-    """Return the distance [m] between the ends of the contact of a patch."""
-    touching = np.flatnonzero(patch.active)
-    if not touching.size:
+def measure_contact_length(patch) -> float:
+    """Return the distance [m] between the outermost contact edges of a patch."""
+    loaded_nodes = np.flatnonzero(patch.active)
+    if not loaded_nodes.size:
         return 0.0
     middle = (patch.x[1:] + patch.x[:-1]) / 2
     ends = np.concatenate([patch.x[:1], middle, patch.x[-1:]])
-    return float(ends[touching[-1] + 1] - ends[touching[0]])
+    return float(ends[loaded_nodes[-1] + 1] - ends[loaded_nodes[0]])
 
 
 def warn_of_large_slide(patch, slide) -> list:
-    """Return a warning if the slide (k,) [m] is large compared with the contact length."""
-    largest = find_largest_slide(slide)
-    contact = contact_length(patch)
+    """Return a warning, as a list, if the displacement is large compared with the contact length.
+
+    slide: relative displacement (k,) [m].
+    """
+    largest = find_max_displacement(slide)
+    contact = measure_contact_length(patch)
     if not contact > 0 or largest < MAX_SLIDE_FRACTION * contact:
         return []
     return [
@@ -44,8 +47,8 @@ def warn_of_large_slide(patch, slide) -> list:
     ]
 
 
-def judge_outcome_on_piece(outcome, patch_model, patch, slide, lateral=None):
-    """Return the outcome of a run, or LEAVES_CONTACT if a piece slides off the other.
+def check_pieces_overlap(outcome, patch_model, patch, slide, lateral=None):
+    """Return LEAVES_CONTACT if one piece slides off the other, else the given outcome.
 
     See `response.outcome.check_piece_length`.
 
@@ -56,15 +59,15 @@ def judge_outcome_on_piece(outcome, patch_model, patch, slide, lateral=None):
     patch : Patch or None
         None for [normal], which has no length.
     slide : (k,)
-        [m].
+        Relative displacement [m].
     lateral : (k,), optional
-        Slide in the lateral direction [m].
+        Lateral displacement [m].
     """
     if patch is None:
         return outcome
     pieces = patch_model.pieces
     mean_length = (pieces.lower.length + pieces.upper.length) / 2
-    outcome = check_piece_length(outcome, find_largest_slide(slide), mean_length)
+    outcome = check_piece_length(outcome, find_max_displacement(slide), mean_length)
     if lateral is None:
         return outcome
-    return check_piece_length(outcome, find_largest_slide(lateral), pieces.width)
+    return check_piece_length(outcome, find_max_displacement(lateral), pieces.width)

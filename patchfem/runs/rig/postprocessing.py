@@ -17,8 +17,8 @@ from ...response.errors import add_stated_errors
 from ...response.outcome import judge_outcome, remove_errors
 from ...structure.drive_sizes import find_decay_rate
 from ..patch import faces
-from ..results.result import RunInputs, has_known_mesh_error
-from ..results.travel import judge_outcome_on_piece
+from ..results.result import RunInputs, can_estimate_mesh_error
+from ..results.travel import check_pieces_overlap
 from . import decays, flutter, levels, motion_warnings
 from .engines import ENGINES, describe_balance_error
 from .numerics import Numerics
@@ -72,7 +72,7 @@ class CoupledRun:
         return (
             self.inputs.estimate
             and self.solution.outcome is not Outcome.NOT_CONVERGED
-            and has_known_mesh_error(model, self.patch, self.inputs.coarse)
+            and can_estimate_mesh_error(model, self.patch, self.inputs.coarse)
             and (not model.rig.friction.has_partial_slip or faces.has_error_meshes(model))
         )
 
@@ -221,10 +221,10 @@ def judge_outcome_on_pieces(run: CoupledRun) -> Outcome:
     """Return the outcome of a run, or LEAVES_CONTACT if a piece slides off the other."""
     model = run.model
     response = run.solution.response
-    outcome = judge_outcome_on_piece(run.outcome, model.patch, run.patch, response.slide)
+    outcome = check_pieces_overlap(run.outcome, model.patch, run.patch, response.slide)
     if model.has_interface_patches:
         for face in faces.solve_interface_patches(model):
-            outcome = judge_outcome_on_piece(
+            outcome = check_pieces_overlap(
                 outcome, face.model.patch, face.patch, face.slide(response)
             )
     return outcome

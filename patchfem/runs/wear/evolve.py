@@ -1,8 +1,8 @@
-"""Wear of a patch over many cycles: contact, motion and worn depth advance in jumps.
+"""Wear of a patch over many cycles, computed in jumps of many cycles each.
 
-In: a model with [wear], its pressed patch and the same on coarser meshes. Out: `WornPatch`. The
-state is saved after every jump, and an interrupted run that continues from it gives the same
-bits.
+In: a model with [wear], its solved patch and the same patch on coarser meshes. Out: `WornPatch`.
+The state is saved after every jump. A run that continues from a saved state gives bitwise the same
+results as an uninterrupted run.
 """
 
 import json
@@ -28,8 +28,8 @@ from ..patch.values import compute_static_values
 from ..rig import numerics
 from .slip import (
     CycleSlip,
+    choose_frame_count,
     compute_cycle_slip,
-    count_frames,
     slips_uniformly,
     strips_slide_independently,
 )
@@ -43,12 +43,13 @@ MOMENT_FIELDS = (
     "gap",
     "miss",
 )  # Arrays of a saved WearMoment.
-# Fraction of the thickness of a coating that may remain where it counts as worn through.
+# Largest remaining fraction of the coating thickness at which the coating counts as worn through.
 THIN_FRACTION = 1e-6
-# Largest number of jumps of the search for the cycle at which a coating is worn through.
+# Largest number of jumps in the search for the cycle in which a coating is worn through.
 MAX_SEARCH_JUMPS = 60
-# Distance to the next row of the friction table, relative to the row spacing; a nearer row is passed.
-MIN_ROW_DISTANCE = 0.1
+# Smallest distance to the next row of the friction table, relative to the row spacing, at which a
+# jump ends at this row.
+MIN_RELATIVE_ROW_DISTANCE = 0.1
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -56,12 +57,12 @@ class WearMoment:
     """Contact, slip path and measures of a worn patch after a number of cycles.
 
     - cycle: number of cycles.
-    - depth: worn depth (m,), of strips (s, m) [m].
-    - used: slip path per cycle in the last jump (m,), of strips (s, m) [m].
-    - pressure, gap (m,): pressure [Pa] and remaining gap [m]; for strips the mean pressure and the
-      smallest gap over the width.
-    - miss: relative error of the slip path due to the number of frames.
-    - values: measures of patch and motion by name.
+    - depth: worn depth (m,) [m], (s, m) for strips.
+    - used: slip path per cycle (m,) [m] in the last jump, (s, m) for strips.
+    - pressure, gap (m,): pressure [Pa] and gap under load [m]; for strips the mean pressure and
+      the smallest gap over the width.
+    - miss: relative error of the slip path due to the finite number of frames.
+    - values: measures of the patch and of the motion by name.
     """
 
     cycle: float
@@ -78,14 +79,14 @@ class WornPatch:
     """Worn patch with the history of its wear, also on coarser meshes.
 
     - patch, coarse: worn patch, and those on coarser meshes (None for a missing one).
-    - state: at the end; None if nothing was worn.
-    - moments: after every jump; the first one is before any wear.
-    - depths: worn depths (k,), of strips (s, k) [m], on the nodes of each coarser mesh.
-    - stripped: (patch, depth (t, m) [m]) in another number of strips, by the same jumps
+    - state: final state; None if nothing was worn.
+    - moments: WearMoment before any wear and after each jump.
+    - depths: worn depths (k,) [m] on the nodes of each coarser mesh, (s, k) for strips.
+    - stripped: (patch, depth (t, m) [m]) after the same jumps with another number of strips
       (`measures.with_other_strip_count`); None without strips.
-    - frame_error: relative error of the slip path due to the number of frames.
+    - frame_error: relative error of the slip path due to the finite number of frames.
     - seconds: CPU seconds.
-    - stopped: reason of an early end, else "".
+    - stopped: reason why the computation ended early; "" if it did not.
     """
 
     patch: object
@@ -100,20 +101,20 @@ class WornPatch:
 
 
 class _UnboundedMotion(Exception):
-    """Exception that is raised if the motion of a worn model has no periodic cycle."""
+    """Raised if the motion of a worn model has no periodic cycle."""
 
 
-class _Motion:
-    """Function that computes the slip path per cycle on a worn patch.
+class _SlipPathFunction:
+    """Callable that returns the slip path per cycle on a worn patch.
 
-    A motion that does not depend on wear is computed once, on the unworn patch, so that a run that
-    continues from a saved state gives the same bits.
+    A motion that does not depend on the wear is computed once, on the unworn patch. A run that
+    continues from a saved state then gives bitwise the same results.
     """
 
     def __init__(self, model, patch):
         self.model = model
         self.pair = patch.pair
-        self.frames = count_frames(model.accuracy.tolerance)
+        self.frames = choose_frame_count(model.accuracy.tolerance)
         self.same = (
             model.grooves is None
             and model.wear.friction is None
@@ -125,28 +126,28 @@ class _Motion:
         self.last: CycleSlip | None = None
 
     def __call__(self, worn) -> np.ndarray:
-        """Return the slip path [m] per cycle, (m,) or (s, m) for strips, at a worn depth [m]."""
+        """Return the slip path (m,) [m] per cycle at a worn depth [m]; (s, m) for strips."""
         if self.last is None or not self.same:
             worn = np.zeros_like(worn) if self.same else worn
             patch = solve_patch_contact(self.model.patch, self.pair, worn)
-            slip = compute_cycle_slip(worn_model(self.model, patch, worn), patch, self.frames)
+            slip = compute_cycle_slip(make_worn_model(self.model, patch, worn), patch, self.frames)
             if slip.outcome is not None:
                 raise _UnboundedMotion(slip.outcome.sentence)
             self.last = slip
         return self.last.path
 
 
-def mean_worn_depth(patch, depth) -> float:
-    """Return the mean worn depth [m] of a patch, which is worn volume divided by area.
+def compute_mean_worn_depth(patch, depth) -> float:
+    """Return the mean worn depth [m] of a patch, i.e. worn volume divided by area.
 
-    depth: (m,), of strips (s, m) [m].
+    depth: worn depth (m,) [m], (s, m) for strips.
     """
     area = patch.pieces.interface.weight
     return float(np.atleast_2d(depth).mean(axis=0) @ area / area.sum())
 
 
-def worn_model(model, patch, depth):
-    """Return the model with grooves and friction law at the mean worn depth of its patch.
+def make_worn_model(model, patch, depth):
+    """Return the model with the grooves and the friction law of its mean worn depth.
 
     It is unchanged if neither depends on wear.
 
@@ -158,18 +159,20 @@ def worn_model(model, patch, depth):
         Worn depth [m].
     """
     wear = model.wear
-    new = {}
+    changes = {}
     if model.grooves is not None:
-        new["grooves"] = model.grooves.after_wear(mean_worn_depth(patch, depth), wear.upper_share)
+        changes["grooves"] = model.grooves.after_wear(
+            compute_mean_worn_depth(patch, depth), wear.upper_share
+        )
     if wear.friction is not None:
-        law = new["friction"] = wear.friction.compute_worn_law(
-            model.friction, mean_worn_depth(patch, depth)
+        law = changes["friction"] = wear.friction.compute_worn_law(
+            model.friction, compute_mean_worn_depth(patch, depth)
         )
         if model.rig is not None:
             friction = model.rig.friction
             interfaces = tuple(replace(interface, numbers=law) for interface in friction.interfaces)
-            new["rig"] = replace(model.rig, friction=replace(friction, interfaces=interfaces))
-    return replace(model, **new) if new else model
+            changes["rig"] = replace(model.rig, friction=replace(friction, interfaces=interfaces))
+    return replace(model, **changes) if changes else model
 
 
 def compute_wear(
@@ -181,15 +184,15 @@ def compute_wear(
     ----------
     model : Model
     patch : Patch
-        Unworn pressed patch.
+        Unworn patch.
     coarse : sequence of Patch or None
-        The same on coarser meshes.
+        The unworn patch on coarser meshes; None for a missing one.
     progress : callable, optional
         Called with the completed fraction of the cycles.
     initial : tuple, optional
-        (state, moments) of an interrupted run.
+        State and moments of an interrupted run.
     store : callable, optional
-        Called with state and moments after every jump to store them.
+        Called with state and moments after each jump.
 
     Returns
     -------
@@ -198,7 +201,7 @@ def compute_wear(
     Raises
     ------
     PatchfemError
-        For a slide in two directions.
+        For a prescribed displacement in two directions.
     """
     if model.slide is not None and model.slide.across is not None:
         text = describe_unsupported(
@@ -207,7 +210,7 @@ def compute_wear(
         )
         raise PatchfemError(text, "wear")
     clock = perf_counter()
-    motion = _Motion(model, patch)
+    motion = _SlipPathFunction(model, patch)
     problem = WearProblem(
         make_contact_force_function(model.patch, patch.pair),
         motion,
@@ -215,24 +218,24 @@ def compute_wear(
         model.wear.coefficient,
         model.wear.cycles,
     )
-    stopped = ""
+    stop_reason = ""
     try:
         if initial is None:
-            patch = _with_earlier_wear(model, patch)
-            state, moments = _start_state(model, patch, problem, motion)
+            patch = _add_earlier_wear(model, patch)
+            state, moments = _make_initial_state(model, patch, problem, motion)
         else:
             state, moments = initial
             patch = solve_patch_contact(model.patch, patch.pair, frozen_array(state.depth))
     except _UnboundedMotion as reason:
-        worn = tuple(mesh and _with_earlier_wear(model, mesh) for mesh in coarse)
-        stopped = f"nothing was worn: {reason}"
+        worn = tuple(mesh and _add_earlier_wear(model, mesh) for mesh in coarse)
+        stop_reason = f"nothing was worn: {reason}"
         seconds = perf_counter() - clock
-        return WornPatch(patch, worn, None, (), (), None, 0.0, seconds, stopped)
+        return WornPatch(patch, worn, None, (), (), None, 0.0, seconds, stop_reason)
     while state.cycle < model.wear.cycles and find_worn_through_coating(model, state.depth) is None:
         try:
             state = _take_next_jump(model, problem, state)
         except _UnboundedMotion as reason:
-            stopped = (
+            stop_reason = (
                 f"wear was computed only up to cycle {state.cycle:.6g} of {model.wear.cycles:.6g}: "
                 f"{reason}"
             )
@@ -244,14 +247,14 @@ def compute_wear(
         if progress is not None:
             progress(state.cycle / model.wear.cycles)
     replayed = [
-        _repeat_on_mesh(model.patch, model, patch, mesh, moments)
+        _replay_wear(model.patch, model, patch, mesh, moments)
         for mesh in coarse
         if mesh is not None
     ]
     strips_model, _ = with_other_strip_count(model.patch)
     stripped = None
     if replayed and strips_model is not model.patch:
-        stripped = _repeat_on_mesh(strips_model, model, patch, patch, moments)
+        stripped = _replay_wear(strips_model, model, patch, patch, moments)
     return WornPatch(
         patch,
         (*(worn for worn, _ in replayed), *(None for mesh in coarse if mesh is None)),
@@ -261,16 +264,16 @@ def compute_wear(
         stripped,
         moments[-1].miss,
         perf_counter() - clock,
-        stopped,
+        stop_reason,
     )
 
 
 class WornCoating(NamedTuple):
     """Coating of a piece, with the fraction of its thickness that is worn off.
 
-    - fraction: worn fraction at the deepest point.
+    - fraction: worn fraction of the thickness at the deepest point.
     - piece: "upper" or "lower".
-    - thickness: [m].
+    - thickness: thickness of the coating [m].
     """
 
     fraction: float
@@ -281,7 +284,7 @@ class WornCoating(NamedTuple):
 def find_worn_through_coating(model, depth) -> WornCoating | None:
     """Return the coating that is worn through at a worn depth; None if there is none.
 
-    depth: depth worn off both pieces, (m,) or (s, m) [m].
+    depth: worn depth of both pieces together (m,) [m], (s, m) for strips.
     """
     coating = _most_worn_coating(model, depth)
     return coating if coating.fraction >= 1 - THIN_FRACTION else None
@@ -290,7 +293,7 @@ def find_worn_through_coating(model, depth) -> WornCoating | None:
 def _most_worn_coating(model, depth) -> WornCoating:
     """Return the coating with the largest worn fraction of its thickness.
 
-    Its fraction is 0 without coatings.
+    The fraction is 0 if there are no coatings.
     """
     max_depth = float(depth.max(initial=0.0))
     upper_share = model.wear.upper_share
@@ -307,58 +310,61 @@ def _most_worn_coating(model, depth) -> WornCoating:
 
 
 def _take_next_jump(model, problem: WearProblem, state: WearState) -> WearState:
-    """Compute the wear after the next jump over cycles, or when a coating is worn through.
+    """Compute the state after the next jump, which ends early if a coating is worn through.
 
-    The latter is found by the Illinois variant of regula falsi.
+    The cycle in which the coating is worn through is found by the Illinois variant of regula falsi.
     """
 
     def excess(state: WearState) -> float:
-        """Return the largest worn fraction of a coating thickness minus 1."""
+        """Return the largest worn fraction of a coating thickness, minus 1."""
         return _most_worn_coating(model, state.depth).fraction - 1
 
     def jump_to(cycle: float) -> WearState:
-        """Compute the wear after a jump over cycles that ends at a given cycle or earlier."""
+        """Compute the state after a jump that ends at a given cycle or earlier."""
         return take_jump(problem, state, model.accuracy.tolerance, model.wear.jumps, until=cycle)
 
     if model.patch.interface.strips is not None:
         problem.press.start_from_forces(state.force)
-    after = jump_to(next_row_cycle(model.wear, problem, state))
+    next_state = jump_to(find_cycle_of_next_table_row(model.wear, problem, state))
     low = state.cycle
     high = np.inf
     previous = 0.0
     low_value = excess(state)
-    high_value = excess(after)
-    end = after.cycle
+    high_value = excess(next_state)
+    end = next_state.cycle
     for _ in range(MAX_SEARCH_JUMPS):
-        value = excess(after)
-        if abs(value) <= THIN_FRACTION or (value < 0 and (after.cycle < end or high == np.inf)):
-            return after
+        value = excess(next_state)
+        if abs(value) <= THIN_FRACTION or (
+            value < 0 and (next_state.cycle < end or high == np.inf)
+        ):
+            return next_state
         if value > 0:
             if high < np.inf and previous > 0:
                 low_value = low_value / 2
-            high = after.cycle
+            high = next_state.cycle
             high_value = value
         else:
             if previous < 0:
                 high_value = high_value / 2
-            low = after.cycle
+            low = next_state.cycle
             low_value = value
         previous = value
         end = low - low_value * (high - low) / (high_value - low_value)
-        after = jump_to(end)
-    return after
+        next_state = jump_to(end)
+    return next_state
 
 
-def next_row_cycle(wear, problem: WearProblem, state: WearState) -> float:
-    """Return the last cycle to which a jump can go before the next row of the friction table.
+def find_cycle_of_next_table_row(wear, problem: WearProblem, state: WearState) -> float:
+    """Return the last cycle to which a jump may go because of the friction table.
 
-    At this cycle the current wear rate reaches the next row of the table, or the row after it if
-    the next one is nearer than a tenth of their distance. A jump past a row would miss its values.
+    At this cycle, with the present wear rate, the mean worn depth reaches the next row of the
+    table; or the row after it, if the next row is nearer than a tenth of their distance. A longer
+    jump would skip the values of a row.
 
     Parameters
     ----------
     wear
-        Wear of the model.
+        Wear parameters of the model.
     problem : WearProblem
     state : WearState
 
@@ -374,7 +380,7 @@ def next_row_cycle(wear, problem: WearProblem, state: WearState) -> float:
     rows = [row for row in wear.friction.depth if row > depth]
     if not rows:
         return np.inf
-    is_near = len(rows) > 1 and rows[0] - depth < MIN_ROW_DISTANCE * (rows[1] - rows[0])
+    is_near = len(rows) > 1 and rows[0] - depth < MIN_RELATIVE_ROW_DISTANCE * (rows[1] - rows[0])
     rates = wear_rates(problem.coefficient, state.path, problem.area) * state.force
     rate = float(np.vdot(rates, weight))
     if rate <= 0:
@@ -382,45 +388,45 @@ def next_row_cycle(wear, problem: WearProblem, state: WearState) -> float:
     return state.cycle + (rows[is_near] - depth) / rate
 
 
-def _with_earlier_wear(model, patch):
-    """Return the patch with the worn depth of earlier runs included in its gap.
+def _add_earlier_wear(model, patch):
+    """Return the patch with the worn depth of an earlier run added to its gap.
 
-    It is unchanged if there is no earlier wear.
+    It is unchanged without an earlier run.
 
     Raises
     ------
     PatchfemError
-        If this depth was worn on other surfaces, or through a coating.
+        If the earlier run had other surfaces, or wore through a coating.
     """
-    start = model.wear.start
-    if start is None:
+    earlier_run = model.wear.start
+    if earlier_run is None:
         return patch
-    start.require_same_surfaces(patch.x, patch.unloaded_gap)
+    earlier_run.require_same_surfaces(patch.x, patch.unloaded_gap)
     area = nodal_areas(model.patch, patch.pieces.interface)
     depth = frozen_array(model.wear.compute_earlier_depth(patch.x, area))
     if (coating := find_worn_through_coating(model, depth)) is not None:
         raise PatchfemError(
-            f"{start.path}: in that run the coating of the {coating.piece} piece was worn through; choose a "
+            f"{earlier_run.path}: in that run the coating of the {coating.piece} piece was worn through; choose a "
             "run in which this coating was not worn through",
             "wear.start",
         )
     return solve_patch_contact(model.patch, patch.pair, depth)
 
 
-def _start_state(model, patch, problem: WearProblem, motion: _Motion) -> tuple:
+def _make_initial_state(model, patch, problem: WearProblem, motion: _SlipPathFunction) -> tuple:
     """Return the initial wear state and the initial history of a patch.
 
-    It includes earlier wear only.
+    They contain the wear of an earlier run only.
     """
     state = start_wear(problem, model.wear.compute_earlier_depth(patch.x, problem.area))
     return state, (_record_moment(patch, state, motion),)
 
 
-def _record_moment(patch, state: WearState, motion: _Motion) -> WearMoment:
-    """Return the contact, slip path and measures of a worn patch as a WearMoment."""
+def _record_moment(patch, state: WearState, motion: _SlipPathFunction) -> WearMoment:
+    """Return contact, slip path and measures of a worn patch as a WearMoment."""
     model = motion.model
     area = nodal_areas(model.patch, patch.pieces.interface)
-    worn = worn_model(model, patch, state.depth)
+    worn = make_worn_model(model, patch, state.depth)
     measures = compute_static_values(patch) | motion.last.values
     measures["worn_volume"] = float(np.vdot(state.depth, area))
     measures["worn_depth_max"] = float(state.depth.max(initial=0.0))
@@ -441,25 +447,24 @@ def _record_moment(patch, state: WearState, motion: _Motion) -> WearMoment:
     )
 
 
-def _repeat_on_mesh(patch_model, model, patch, other_patch, moments) -> tuple:
-    """Repeat on another mesh the wear of a run, with its jumps and slip paths.
+def _replay_wear(patch_model, model, patch, other_patch, moments) -> tuple:
+    """Repeat the jumps of a run on another mesh or with another number of strips.
 
-    The other patch may also have another number of strips. Return its worn patch and its worn depth
-    [m].
+    The slip paths are interpolated. Returns the worn patch and its worn depth [m].
 
     Parameters
     ----------
     patch_model : PatchModel
-        With the strips of the other patch.
+        Model of the other patch, which has its number of strips.
     model : Model
     patch, other_patch : Patch
-        Patch of the moments, and the unworn patch that is worn.
+        Patch of the moments, and the unworn patch on the other mesh.
     moments : sequence of WearMoment
     """
     area = nodal_areas(patch_model, other_patch.pieces.interface)
 
     def interpolate(path) -> np.ndarray:
-        """Interpolate a slip path to the nodes and strips of another patch."""
+        """Interpolate a slip path to the nodes and strips of the other patch."""
         if patch_model.interface.strips is None:
             return np.interp(other_patch.x, patch.x, path)
         rows = np.array([np.interp(other_patch.x, patch.x, row) for row in path])
@@ -482,33 +487,33 @@ def _repeat_on_mesh(patch_model, model, patch, other_patch, moments) -> tuple:
 
 
 def compute_and_save_wear(storage, key: str, model, patch, coarse, progress=None) -> WornPatch:
-    """Compute the wear of a patch, saving its state after every jump over cycles.
+    """Compute the wear of a patch and save its state after each jump.
 
     Parameters
     ----------
     storage
-        Storage of the state; None: the state is not saved.
+        File of the state, as `run.StateFile`; None: the state is not saved.
     key : str
-        Identifies what the state belongs to.
+        Hash of scene and version, which a saved state must match.
     model, patch, coarse, progress
         See `compute_wear`.
     """
     if storage is None:
         return compute_wear(model, patch, coarse, progress)
-    begin = load_state(storage.path, key) if storage.resume else None
+    initial = load_wear_state(storage.path, key) if storage.resume else None
     return compute_wear(
-        model, patch, coarse, progress, begin, partial(save_state, storage.path, key)
+        model, patch, coarse, progress, initial, partial(save_wear_state, storage.path, key)
     )
 
 
-def save_state(path: Path, key: str, state: WearState, moments: tuple) -> None:
-    """Write a wear state with its history to a file, which is replaced atomically.
+def save_wear_state(path: Path, key: str, state: WearState, moments: tuple) -> None:
+    """Write a wear state and its history to a file, which is replaced atomically.
 
     Parameters
     ----------
     path : Path
     key : str
-        Identifies what the state belongs to.
+        Hash of scene and version.
     state : WearState
     moments : tuple of WearMoment
     """
@@ -522,10 +527,10 @@ def save_state(path: Path, key: str, state: WearState, moments: tuple) -> None:
         os.fsync(file.fileno())
 
 
-def no_saved_state_error(path: Path) -> PatchfemError:
-    """Return the exception for a run folder without a saved wear state.
+def make_missing_state_error(path: Path) -> PatchfemError:
+    """Return the exception for a run folder that has no saved state.
 
-    path: file of the state.
+    path: path of the missing file.
     """
     return PatchfemError(
         f"{path.parent.name.removesuffix('.partial')}: this folder contains no interrupted run; run "
@@ -533,13 +538,13 @@ def no_saved_state_error(path: Path) -> PatchfemError:
     )
 
 
-def load_state(path: Path, key: str) -> tuple:
-    """Read a wear state with its history from a file.
+def load_wear_state(path: Path, key: str) -> tuple:
+    """Read a wear state and its history from a file.
 
     Raises
     ------
     PatchfemError
-        If it belongs to another scene or cannot be read.
+        If the state belongs to another scene or cannot be read.
     """
     try:
         with np.load(path, allow_pickle=False) as file:
@@ -560,10 +565,10 @@ def load_state(path: Path, key: str) -> tuple:
             for *row, values in zip(*columns, json.loads(str(arrays["values"])), strict=True)
         )
     except FileNotFoundError:
-        raise no_saved_state_error(path) from None
+        raise make_missing_state_error(path) from None
     except PatchfemError:
         raise
-    except Exception as error:  # A damaged archive can fail in many ways.
+    except Exception as error:  # A damaged archive may raise any exception.
         raise PatchfemError(
             f"{path.parent.name}: the state saved there cannot be read ({error}); run without "
             "--resume"

@@ -1,4 +1,4 @@
-"""Measures of wear with their errors, and the history of wear over the cycles.
+"""Measures of wear with their errors, and the history of the wear over the cycles.
 
 In: the Result of a run on the worn patch, and its `WornPatch`. Out: the Result with the measures,
 fields, warnings and notes of wear.
@@ -16,14 +16,14 @@ from ..patch.measures import with_other_strip_count
 from ..patch.press import nodal_areas, solve_patch_contact
 from ..patch.values import compute_static_values
 from ..results.patch_rows import TABLE, WORN_SOURCE
-from .evolve import THIN_FRACTION, find_worn_through_coating, mean_worn_depth
-from .slip import UNBOUNDED_OUTCOMES, slip_path_of_point
+from .evolve import THIN_FRACTION, compute_mean_worn_depth, find_worn_through_coating
+from .slip import UNBOUNDED_OUTCOMES, compute_point_slip_path
 
 N_FRAMES = 24  # Number of frames of the interface during the wear.
 EDGE_PEAK = "pressure_peak_at_edge"  # Name of the pressure peak at a contact edge in the history.
 N_EDGE_NODES = 2  # Number of nodes next to a contact edge that count as the edge.
-# Ratio of worn depth to the thickness of a coating, or to the height of a piece, above which the
-# stiffness of the unworn piece is not valid.
+# Largest ratio of the worn depth to the thickness of a coating, or to the height of a piece, at
+# which the stiffness of the unworn piece is valid.
 MAX_WORN_FRACTION = 0.2
 ROUND_OFF = 1e-12  # Relative error of a worn volume or depth due to round-off.
 HOLDER_MEASURES = {"closing": "approach", "rotation": "rotation"}
@@ -36,9 +36,9 @@ def add_wear_measures(result, evolved, estimate: bool = True):
     ----------
     result : Result
     evolved : WornPatch or None
-        None for a single point.
+        None for a single contact point.
     estimate : bool
-        Whether errors are computed.
+        Whether to estimate the errors.
     """
     model = result.plan.model
     if evolved is None:
@@ -56,11 +56,11 @@ def add_wear_measures(result, evolved, estimate: bool = True):
         worn |= _measure_worn_friction(model, evolved, result.measures, worn["worn_volume"].error)
     worn |= _measure_worn_through_cycle(model, evolved, worn["worn_depth_max"].error)
     if estimate:
-        result = _widen_by_jumps(result, evolved)
+        result = _widen_errors_by_jumps(result, evolved)
     result = _add_wear_frames(replace(result, measures=result.measures | worn), evolved)
-    notes = [*result.extra.get("notes", []), *_note_on_start(model)]
+    notes = [*result.extra.get("notes", []), *_note_on_earlier_run(model)]
     if "worn_through_cycle" in worn:
-        notes += _note_on_coating(model, evolved)
+        notes += _note_on_worn_through_coating(model, evolved)
         if result.outcome not in UNBOUNDED_OUTCOMES:
             result = replace(result, outcome=Outcome.WORN_THROUGH)
     return replace(
@@ -70,12 +70,12 @@ def add_wear_measures(result, evolved, estimate: bool = True):
             *_warn_of_worn_depth(model, evolved),
             *_warn_of_friction_table(model, evolved),
         ],
-        extra=result.extra | {"wear": _list_wear_history(evolved), "notes": notes},
+        extra=result.extra | {"wear": _collect_wear_history(evolved), "notes": notes},
     )
 
 
-def _make_measure(name: str, value: float, error: float | None, engine: str = "") -> Measure:
-    """Return a measure of wear, with its unit from the table of measures.
+def _make_wear_measure(name: str, value: float, error: float | None, engine: str = "") -> Measure:
+    """Return a measure of wear with the unit and the floor of the measure table.
 
     Parameters
     ----------
@@ -83,16 +83,16 @@ def _make_measure(name: str, value: float, error: float | None, engine: str = ""
     value : float
     error : float or None
     engine : str
-        Source of the value.
+        Method that computed the value.
     """
     row = TABLE[name]
     return Measure(value, row.unit, error, row.floor, engine=engine)
 
 
 def _measure_worn_through_cycle(model, evolved, error: float | None) -> dict:
-    """Return a measure, if any, of the cycle in which a coating is worn through.
+    """Return the measure worn_through_cycle, as a dict, if a coating is worn through.
 
-    error: of the largest depth [m].
+    error: error of the largest worn depth [m].
     """
     if find_worn_through_coating(model, evolved.state.depth) is None:
         return {}
@@ -102,16 +102,16 @@ def _measure_worn_through_cycle(model, evolved, error: float | None) -> dict:
     rate = (depth - float(before.depth.flat[deepest])) / (last.cycle - before.cycle)
     cycle_error = None if error is None else (error + THIN_FRACTION * depth) / rate
     name = "worn_through_cycle"
-    return {name: _make_measure(name, last.cycle, cycle_error)}
+    return {name: _make_wear_measure(name, last.cycle, cycle_error)}
 
 
-def _note_on_start(model) -> list:
-    """Return a note on the earlier run from whose worn state the wear continues."""
+def _note_on_earlier_run(model) -> list:
+    """Return a note, as a list, on the earlier run whose wear is continued."""
     return [] if model.wear.start is None else [model.wear.start.sentence]
 
 
-def _note_on_coating(model, evolved) -> list:
-    """Return a note on the coating that is worn through, and in which cycle."""
+def _note_on_worn_through_coating(model, evolved) -> list:
+    """Return a note, as a list, on the coating that is worn through."""
     depth = evolved.state.depth
     coating = find_worn_through_coating(model, depth)
     strip, node = divmod(int(np.argmax(depth)), evolved.patch.x.size)
@@ -127,12 +127,12 @@ def _note_on_coating(model, evolved) -> list:
     ]
 
 
-def _widen_by_jumps(result, evolved):
-    """Widen the errors of a Result by those of jumping over cycles.
+def _widen_errors_by_jumps(result, evolved):
+    """Increase the errors of a Result by those of the jumps over cycles.
 
-    They follow at first order from the change if the same jumps are computed without subdivision,
-    and from the change to another number of strips: an edge of contact that moves during a jump
-    leaves nodes too high that just came into contact.
+    A contact edge that moves during a jump leaves the nodes that just came into contact too high.
+    The errors follow, at first order, from the change if the same jumps are not subdivided, and
+    from the change to another number of strips.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ def _widen_by_jumps(result, evolved):
     return replace(result, measures=measures)
 
 
-def find_period(model, result) -> float:
+def find_wear_period(model, result) -> float:
     """Return the duration [s] of a wear cycle.
 
     It is the period of the drive or of the prescribed displacement, or the duration of a path that
@@ -188,10 +188,7 @@ def _warn_of_worn_depth(model, evolved) -> list:
 
 
 def _relative_slip_error(measures: dict) -> float:
-    """Return the relative error of the slip amplitude of a run.
-
-    It is that of the measured slip amplitude, or else of the displacement.
-    """
+    """Return the relative error of the slip amplitude, or else of the displacement amplitude."""
     for name in ("slip_amplitude", "relative_displacement_amplitude"):
         measure = measures.get(name)
         if measure is not None and measure.value and measure.error is not None:
@@ -200,7 +197,9 @@ def _relative_slip_error(measures: dict) -> float:
 
 
 def _measure_patch_wear(model, evolved, motion: dict, *, estimate: bool = True) -> dict:
-    """Return the measures worn_volume and worn_depth_max, including the errors of earlier runs.
+    """Return the measures of worn volume, worn depth and groove amplitude.
+
+    Their errors include those of the earlier run.
 
     Parameters
     ----------
@@ -209,22 +208,22 @@ def _measure_patch_wear(model, evolved, motion: dict, *, estimate: bool = True) 
     motion : dict
         Measures of the run on the worn patch by name.
     estimate : bool
-        Whether errors are computed.
+        Whether to estimate the errors.
     """
     state = evolved.state
     area = nodal_areas(model.patch, evolved.patch.pieces.interface)
     slip_error = (
-        evolved.frame_error + _relative_slip_error(motion) + _slip_difference(evolved, motion)
+        evolved.frame_error + _relative_slip_error(motion) + _relative_slip_change(evolved, motion)
     )
-    fine_values = _measure_depths(model.patch, evolved.patch, state.depth)
+    fine_values = _compute_worn_volume_and_depth(model.patch, evolved.patch, state.depth)
     coarse = [
-        _measure_depths(model.patch, patch, depth)
+        _compute_worn_volume_and_depth(model.patch, patch, depth)
         for patch, depth in zip(evolved.coarse, evolved.depths)
     ]
     other_model, ratio = with_other_strip_count(model.patch)
     strips = fine_values
     if evolved.stripped:
-        strips = _measure_depths(other_model, *evolved.stripped)
+        strips = _compute_worn_volume_and_depth(other_model, *evolved.stripped)
     jump_errors = {
         "worn_volume": float(np.vdot(np.abs(state.depth - state.coarse_depth), area))
         + state.path_error * float(area.sum()),
@@ -246,22 +245,22 @@ def _measure_patch_wear(model, evolved, motion: dict, *, estimate: bool = True) 
                 + start_error
                 + float(error_of_change(strips[name] - value, ratio))
             )
-        measures[name] = _make_measure(name, value, error, WORN_SOURCE)
+        measures[name] = _make_wear_measure(name, value, error, WORN_SOURCE)
     amplitude = evolved.moments[-1].values.get("groove_amplitude")
     if amplitude is not None:
         error = measures["worn_volume"].error
         error = None if error is None else error / float(area.sum())
-        measures["groove_amplitude"] = _make_measure(
+        measures["groove_amplitude"] = _make_wear_measure(
             "groove_amplitude", amplitude, error, WORN_SOURCE
         )
     return measures
 
 
 def _measure_worn_friction(model, evolved, motion: dict, error: float | None) -> dict:
-    """Return the friction parameters after wear, and widen errors by that of the worn depth.
+    """Return the friction parameters after wear, and the measures of the motion with wider errors.
 
-    The error of the mean depth changes the measures of the motion, at the rate of the last two
-    jumps.
+    The error of the mean worn depth changes the measures of the motion, at the rate observed in the
+    last two jumps.
 
     Parameters
     ----------
@@ -275,7 +274,7 @@ def _measure_worn_friction(model, evolved, motion: dict, error: float | None) ->
     table = model.wear.friction
     area = float(evolved.patch.pieces.interface.weight.sum())
     last_moments = evolved.moments[-3:]
-    depths = [mean_worn_depth(evolved.patch, moment.depth) for moment in last_moments]
+    depths = [compute_mean_worn_depth(evolved.patch, moment.depth) for moment in last_moments]
     depth = depths[-1]
     depth_error = None if error is None else error / area
     bounds = [] if error is None else [depth - depth_error, depth + depth_error]
@@ -286,7 +285,7 @@ def _measure_worn_friction(model, evolved, motion: dict, error: float | None) ->
         value = getattr(law, key)
         if value is not None:
             changes = [abs(getattr(bound_law, key) - value) for bound_law in bound_laws]
-            measures[name] = _make_measure(name, value, max(changes, default=None))
+            measures[name] = _make_wear_measure(name, value, max(changes, default=None))
     if depth_error is None:
         return measures
     jumps = []
@@ -307,11 +306,11 @@ def _measure_worn_friction(model, evolved, motion: dict, error: float | None) ->
 
 
 def _warn_of_friction_table(model, evolved) -> list:
-    """Return warnings on wear beyond the friction table, and on jumps over its rows."""
+    """Return warnings on wear beyond the friction table and on jumps over several of its rows."""
     table = model.wear.friction
     if table is None:
         return []
-    depths = [mean_worn_depth(evolved.patch, moment.depth) for moment in evolved.moments]
+    depths = [compute_mean_worn_depth(evolved.patch, moment.depth) for moment in evolved.moments]
     warnings = []
     if depths[-1] > table.depth[-1]:
         warnings.append(
@@ -331,57 +330,57 @@ def _warn_of_friction_table(model, evolved) -> list:
     return warnings
 
 
-def _measure_depths(patch_model, patch, depth) -> dict:
-    """Return the worn volume [m3] and the largest worn depth [m] of a patch as a dict."""
+def _compute_worn_volume_and_depth(patch_model, patch, depth) -> dict:
+    """Return the worn volume [m3] and the largest worn depth [m] of a patch by name."""
     return {
         "worn_volume": float(np.vdot(depth, nodal_areas(patch_model, patch.pieces.interface))),
         "worn_depth_max": float(depth.max(initial=0.0)),
     }
 
 
-def _slip_difference(evolved, motion: dict) -> float:
-    """Return the relative difference in slip between the last wear cycle and the final run.
+def _relative_slip_change(evolved, motion: dict) -> float:
+    """Return the relative difference of the slip amplitude in the last wear cycle and the final run.
 
-    The run on the worn patch may have used smaller steps for its tolerance.
+    The final run, on the worn patch, may have used smaller time steps.
     """
-    used = evolved.moments[-1].values.get("slip_amplitude")
-    last = motion.get("slip_amplitude")
-    if used is None or last is None or not last.value:
+    wear_amplitude = evolved.moments[-1].values.get("slip_amplitude")
+    final_amplitude = motion.get("slip_amplitude")
+    if wear_amplitude is None or final_amplitude is None or not final_amplitude.value:
         return 0.0
-    return abs(used / last.value - 1)
+    return abs(wear_amplitude / final_amplitude.value - 1)
 
 
 def _measure_point_volume(model, result, *, estimate: bool = True) -> dict:
-    """Return the worn volume of a single contact point under [normal] as a dict.
+    """Return the worn volume of a single contact point under [normal], as a dict.
 
-    It is coefficient times load times slip path, over all cycles of wear.
+    It is the wear coefficient times load times slip path, over all cycles.
 
     Parameters
     ----------
     model : Model
     result : Result
     estimate : bool
-        Whether the error is computed.
+        Whether to estimate the error.
     """
     motion = {name: measure.value for name, measure in result.measures.items()}
-    path, path_error = slip_path_of_point(model, result.window, motion)
+    path, path_error = compute_point_slip_path(model, result.window, motion)
     volume = model.wear.coefficient * model.point.load * path * model.wear.cycles
     error = None
     if estimate:
         error = (path_error + _relative_slip_error(result.measures) + ROUND_OFF) * volume
-    return {"worn_volume": _make_measure("worn_volume", volume, error, WORN_SOURCE)}
+    return {"worn_volume": _make_wear_measure("worn_volume", volume, error, WORN_SOURCE)}
 
 
 def _add_wear_frames(result, evolved):
-    """Put the fields of the wear history before the fields of the last cycle in a Result.
+    """Insert frames of the wear history before the frames of the last cycle in a Result.
 
-    The states after some of the jumps come first, then the motion. The time of a state is its cycle
-    times the period, and the last cycle follows. The worn depth of strips is (frame, strip, x).
+    The time of a wear frame is its cycle number times the period; the last cycle follows. The worn
+    depth of strips is (frame, strip, x).
     """
-    period = find_period(result.plan.model, result)
+    period = find_wear_period(result.plan.model, result)
     motion = result.fields
     n_motion = len(motion["time"])
-    states = [evolved.moments[number] for number in _choose_moments(evolved.moments)[:-1]]
+    states = [evolved.moments[number] for number in _select_stored_moments(evolved.moments)[:-1]]
     n_states = len(states)
     depth = evolved.state.depth
     pressure = np.array([state.pressure for state in states])
@@ -409,8 +408,8 @@ def _add_wear_frames(result, evolved):
     return replace(result, fields=fields, extra=result.extra | {"wear_shown": shown})
 
 
-def _choose_moments(moments) -> np.ndarray:
-    """Choose the moments that are stored: half of them evenly by jump, and half by cycle.
+def _select_stored_moments(moments) -> np.ndarray:
+    """Select the wear moments to store: half of them evenly by jump, half evenly by cycle.
 
     The last jumps are much longer than the first ones, and the worn depth changes most in them.
     """
@@ -422,8 +421,8 @@ def _choose_moments(moments) -> np.ndarray:
     return np.unique([*by_jump, *by_cycle])
 
 
-def _list_wear_history(evolved) -> dict:
-    """Return the recorded wear measures over the cycles (j,) as a dict.
+def _collect_wear_history(evolved) -> dict:
+    """Return the history of the wear measures over the cycles (j,) by name.
 
     The entries `cycle` and `EDGE_PEAK` are included.
     """
@@ -432,16 +431,19 @@ def _list_wear_history(evolved) -> dict:
     for name in moments[-1].values:
         if all(name in moment.values for moment in moments):
             history[name] = np.array([moment.values[name] for moment in moments], float)
-    history[EDGE_PEAK] = np.array([edge_pressure_excess(moment.pressure) for moment in moments])
+    history[EDGE_PEAK] = np.array(
+        [compute_edge_pressure_excess(moment.pressure) for moment in moments]
+    )
     return history
 
 
-def edge_pressure_excess(pressure) -> float:
-    """Return by how much [Pa] the pressure at a contact edge exceeds that inside.
+def compute_edge_pressure_excess(pressure) -> float:
+    """Return the pressure [Pa] at a contact edge in excess of the pressure inside.
 
-    It is 0 if the largest pressure is inside, or if the contact ends with the piece. A contact edge
-    between two nodes moves as the pieces wear, and the element at the edge carries part of the load
-    of its neighbours: the error of such a peak is this excess. pressure: (m,) [Pa].
+    A contact edge between two nodes moves as the pieces wear, and the element at the edge carries
+    part of the load of its neighbours. The excess is the error of such a pressure peak. It is 0 if
+    the largest pressure is inside, or if the contact ends with the piece. pressure: nodal pressures
+    (m,) [Pa].
     """
     pressure = np.asarray(pressure)
     is_loaded = pressure > 0

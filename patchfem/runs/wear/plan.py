@@ -1,7 +1,7 @@
 """Predicted number of jumps and cost of the cycles of wear.
 
-In: a model with [wear] and the cost of its motion. Out: `Cost`. Automatic jumps are counted on
-a row of independent springs that wears like the patch.
+In: a model with [wear] and the cost of its motion. Out: `Cost`. Automatic jumps are counted on a
+row of independent springs that wears like the patch.
 """
 
 import numpy as np
@@ -10,35 +10,38 @@ from ...core import PatchfemError
 from ...structure.drive_sizes import find_drive_omega, find_max_acceleration
 from ...wear.jumps import WearProblem, start_wear, take_jump
 from ..cost import Cost
-from .evolve import next_row_cycle
+from .evolve import find_cycle_of_next_table_row
 
 SOLVES_PER_JUMP = 20  # Number of contact solutions per jump, with its corrections.
-# Number of contact solutions per jump and strip, fewer because each starts from the previous one.
+# Number of contact solutions per jump and strip; it is smaller because each solution starts from
+# the previous one.
 SOLVES_PER_STRIP = 7
-# Ratio of the cost of the fine run to that of a motion with its coarse runs. It includes the larger number of
-# active nodes due to wear.
+# Ratio of the cost of the fine run to that of the motion with its coarse runs. It includes the
+# increase of the number of nodes in contact due to wear.
 FINE_RUN_FRACTION = 0.7
-# CPU time [s] of a contact solution over the squared number of interface points, including
-# measures.
+# CPU time [s] of a contact solution with its measures, divided by the squared number of interface
+# nodes.
 SOLVE_SECONDS = 1.2e-8
 JUMP_SECONDS = 5e-3  # CPU time [s] of a jump besides its contact solutions.
 N_SPRINGS = 192  # Number of springs of the spring row with which jumps are counted.
 MAX_SPRINGS = 1000  # Largest number of springs of this row for a prescribed mesh.
-# Ratio of the spring thickness inside a patch to the length in contact.
+# Ratio of the spring thickness to the contact length, for a contact inside the patch.
 INNER_THICKNESS_RATIO = 0.3
-# Ratio of the spring thickness at an end of a patch to the root of contact length times piece height.
+# Ratio of the spring thickness to sqrt(contact length times piece height), for a contact at an end
+# of the patch.
 END_THICKNESS_RATIO = 0.44
-N_SMOOTH_JUMPS = 8  # Number of wear jumps for an asperity layer with pressure everywhere.
+N_SMOOTH_JUMPS = 8  # Number of jumps for an asperity layer with pressure everywhere.
 MAX_COUNTED_JUMPS = 1500  # Largest number of jumps that are counted.
 
 
-def estimate_jumps(model) -> int:
-    """Return the number of jumps over cycles, prescribed or estimated in advance.
+def estimate_jump_count(model) -> int:
+    """Return the number of jumps over cycles, either prescribed or estimated.
 
-    The estimate was within a factor of 1.5 in 54 of 56 cases, and of 2 in all. Automatic jumps are those of a
-    row of springs as stiff as the pieces, with the path of the slide, or of a mass that moves
-    freely with the drive; multiplied by 0.6 tolerance^-0.18, because the edges of a contact of
-    pieces need more (193 nodes, tilts and crowns, 1e4 to 1e8 cycles, tolerances of 1e-2 and 1e-3).
+    Automatic jumps are counted on a row of springs as stiff as the pieces, with the path of the
+    prescribed displacement or of a mass that moves freely with the drive. The number is multiplied
+    by 0.6 tolerance^-0.18, because the contact edges of the pieces need more jumps (193 nodes,
+    tilts and crowns, 1e4 to 1e8 cycles, tolerances of 1e-2 and 1e-3). The estimate was within a
+    factor of 1.5 in 54 of 56 cases, and within a factor of 2 in all.
     """
     patch = model.patch
     wear = model.wear
@@ -59,7 +62,7 @@ def estimate_jumps(model) -> int:
         path = path * law.static
 
     def slip_path(depth):
-        """Return the slip path (m,) [m] with the friction coefficient at the mean worn depth."""
+        """Return the slip path (m,) [m] with the coefficient of friction at the mean worn depth."""
         if not wear.uses_friction_work or wear.friction is None or not law.static:
             return path
         mean = float(depth @ area / area.sum())
@@ -70,7 +73,10 @@ def estimate_jumps(model) -> int:
     jumps = 0
     while state.cycle < wear.cycles and jumps < MAX_COUNTED_JUMPS:
         state = take_jump(
-            row, state, model.accuracy.tolerance, until=next_row_cycle(wear, row, state)
+            row,
+            state,
+            model.accuracy.tolerance,
+            until=find_cycle_of_next_table_row(wear, row, state),
         )
         jumps = jumps + 1
     first_jumps = min(jumps, 6)
@@ -78,7 +84,7 @@ def estimate_jumps(model) -> int:
 
 
 def _estimate_slip_path(model) -> float:
-    """Return the slip path [m] per cycle, without friction on the mass of a rig."""
+    """Return the slip path [m] per cycle; for a rig it is that without friction."""
     if model.rig is None:
         return (4.0 if model.slide.period else 1.0) * model.slide.amplitude
     signal = model.rig.drive.signal
@@ -98,7 +104,7 @@ class _SpringRow:
     def __init__(self, patch, x, area):
         self.area = area
         self.load = patch.loading.load
-        self.gap = _row_gap(patch, x)
+        self.gap = _spring_row_gap(patch, x)
         pieces = patch.pieces
         skin = patch.interface.skin
         skin_compliance = 0.0 if skin is None else 1 / skin.normal_stiffness
@@ -106,7 +112,7 @@ class _SpringRow:
             lambda m: (1 + m.poisson) * (1 - 2 * m.poisson) / (1 - m.poisson) / m.young
         )
         height = max(pieces.lower.height, pieces.upper.height)
-        # The depth of material that deforms is proportional to the contact length.
+        # The depth of the deformed material is proportional to the contact length.
         fraction = 1.0
         unworn = np.zeros_like(x)
         for _ in range(12):
@@ -134,18 +140,18 @@ class _SpringRow:
         return stiffness * np.maximum(depth[ends[0] if ends.size else -1] - level, 0.0)
 
 
-def _row_gap(patch, x) -> np.ndarray:
-    """Return the gap (m,) [m] of a row of springs, without tilt if the piece is free to rotate."""
+def _spring_row_gap(patch, x) -> np.ndarray:
+    """Return the gap (m,) [m] of the row of springs, without tilt if the piece is free to rotate."""
     try:
         gap = patch.gap.evaluate(x).heights
-    except PatchfemError:  # The profile is too fine for the row of springs.
+    except PatchfemError:  # The springs do not resolve the profile.
         return np.zeros_like(x)
     if patch.loading.can_rotate:
         gap = gap - np.polyval(np.polyfit(x, gap, 1), x)
     return gap
 
 
-def _changes_motion(model) -> bool:
+def _wear_changes_motion(model) -> bool:
     """Return whether wear changes the motion of a model."""
     return (
         bool(model.partial_slip)
@@ -164,17 +170,16 @@ def predict_cost(model, points: int, motion: float) -> Cost:
     points : int
         Nodes of the interface.
     motion : float
-        CPU seconds of the march or of the bench with its coarse runs, of which a jump needs one
-        run.
+        CPU seconds of the motion with its coarse runs; a jump needs the fine run only.
     """
-    jumps = estimate_jumps(model)
+    jumps = estimate_jump_count(model)
     strips = model.patch.interface.strips
     solves = SOLVES_PER_JUMP
     if strips is not None:
         solves = max(solves, SOLVES_PER_STRIP * strips.count)
     jump_seconds = solves * SOLVE_SECONDS * points**2 + JUMP_SECONDS
     repetition = "with the motion computed only once, because wear does not change it"
-    if _changes_motion(model):
+    if _wear_changes_motion(model):
         jump_seconds += FINE_RUN_FRACTION * motion
         repetition = "with the motion computed again after each jump"
     number = f"{jumps} jumps"

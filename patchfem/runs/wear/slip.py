@@ -1,6 +1,7 @@
-"""Slip path of every interface node in a converged cycle of a bench or a rig.
+"""Slip path of each interface node in one periodic cycle of a bench or a rig.
 
-In: a model and its worn patch. Out: `CycleSlip` with the path, its error and the outcome.
+In: a model and its worn patch. Out: `CycleSlip` with the path, its error and the outcome of the
+motion.
 """
 
 from math import ceil, sqrt
@@ -14,7 +15,7 @@ from ..bench import bench
 from ..bench.closed_form import integrate_steps
 from ..bench.engine import steps_per_cycle
 from ..patch.press import nodal_areas
-from ..results.travel import judge_outcome_on_piece
+from ..results.travel import check_pieces_overlap
 from ..rig import fields, numerics, solve
 
 UNBOUNDED_OUTCOMES = (
@@ -25,19 +26,20 @@ UNBOUNDED_OUTCOMES = (
 )
 MIN_FRAMES = 64  # Smallest number of interface frames per cycle.
 MAX_FRAMES = 800  # Largest number of interface frames per cycle.
-# Ratio of the error due to reversals between samples to the mean change without two of three samples.
-THINNING_FACTOR = 1.5
+# Ratio of the error due to reversals between samples to the mean change of the path if only every
+# third sample is used.
+REVERSAL_ERROR_FACTOR = 1.5
 
 
 class CycleSlip(NamedTuple):
     """Slip path of the interface nodes in one cycle of a motion.
 
-    - path: slip path of each node (m,), of strips (s, m) [m]. With form 'energy' it is friction
-      work per area over pressure, and over grooves it is along their flanks.
-    - error: relative error due to the number of frames and to differences between the cycles of the
-      window.
+    - path: slip path [m] of each node (m,), (s, m) for strips. With form 'energy' it is the
+      friction work per area divided by the pressure; over grooves it is the path along their
+      flanks.
+    - error: relative error due to the finite number of frames and to differences between cycles.
     - values: measures of the motion by name.
-    - outcome: reason why no cycle is periodic, else None.
+    - outcome: outcome of a motion without periodic cycle, else None.
     """
 
     path: np.ndarray
@@ -46,8 +48,8 @@ class CycleSlip(NamedTuple):
     outcome: Outcome | None = None
 
 
-def count_frames(tolerance: float) -> int:
-    """Return the frames per cycle with which a slip path is accurate to tolerance/100.
+def choose_frame_count(tolerance: float) -> int:
+    """Return the number of frames per cycle for a slip path accurate to tolerance/100.
 
     A reversal between two of k frames of a sinusoid hides up to (pi/k)^2/2 of the amplitude.
     """
@@ -55,7 +57,7 @@ def count_frames(tolerance: float) -> int:
 
 
 def slips_uniformly(model, per_point: bool = False) -> bool:
-    """Return whether all points of a patch, or of each of its strips, slip equally."""
+    """Return whether all points of a patch, or all points of each of its strips, slip equally."""
     return (
         not model.partial_slip
         and model.side == "upper"
@@ -64,7 +66,7 @@ def slips_uniformly(model, per_point: bool = False) -> bool:
 
 
 def strips_slide_independently(model) -> bool:
-    """Return whether strips slide independently, so that wear changes their motion."""
+    """Return whether the strips slide independently, so that their motion depends on the wear."""
     return model.rig is not None and model.rig.friction.strips_slide_apart
 
 
@@ -76,7 +78,7 @@ def compute_cycle_slip(model, patch, frames: int) -> CycleSlip:
     model : Model
     patch : Patch
     frames : int
-        Number of frames of the interface from which the path is computed.
+        Number of frames per cycle from which the path is computed.
     """
     if model.rig is None:
         return _compute_bench_slip(model, patch, frames)
@@ -84,10 +86,10 @@ def compute_cycle_slip(model, patch, frames: int) -> CycleSlip:
 
 
 class _CycleHistories(NamedTuple):
-    """Displacement, slip, forces and load of one cycle at k samples.
+    """Displacement, slip, forces and load at the k samples of one cycle.
 
-    - slide, slip: [m].
-    - force, load: [N].
+    - slide, slip: relative displacement and slip [m].
+    - force, load: friction force and normal load [N].
     """
 
     slide: np.ndarray
@@ -99,8 +101,8 @@ class _CycleHistories(NamedTuple):
 class Frames(NamedTuple):
     """Slip and shear stress of the interface nodes in f frames of a cycle.
 
-    - slip, tau (f, m): local slip [m] and shear stress [Pa].
-    - is_closed: whether the last frame is followed by the first one.
+    - slip, tau (f, m): slip [m] and shear stress [Pa] at the nodes.
+    - is_closed: whether the first frame follows the last one.
     """
 
     slip: np.ndarray
@@ -109,16 +111,16 @@ class Frames(NamedTuple):
 
 
 def _compute_bench_slip(model, patch, frames: int) -> CycleSlip:
-    """Return the slip path of the nodes in the last cycle of a bench."""
+    """Compute the slip path of the interface nodes in the last cycle of a bench."""
     cycles = max(1, round(model.slide.cycles or 1))
     is_uniform = slips_uniformly(model)
     run = bench.run_bench(
         model, patch, steps_per_cycle(model), 0 if is_uniform else frames * cycles
     )
-    outcome = judge_outcome_on_piece(None, model.patch, patch, run.slide)
+    outcome = check_pieces_overlap(None, model.patch, patch, run.slide)
     if is_uniform:
-        cycle = _last_bench_cycle(run)
-        slip = _uniform_slip(model, patch, cycle, cycle.load[0])
+        cycle = _select_last_bench_cycle(run)
+        slip = _compute_uniform_slip(model, patch, cycle, cycle.load[0])
         return slip._replace(values=run.values, outcome=outcome)
     is_last = run.frames >= run.first
     local = run.local[is_last]
@@ -133,16 +135,16 @@ def _compute_bench_slip(model, patch, frames: int) -> CycleSlip:
             tau[0] = model.grooves.slope(0.0) * patch.pressure.sigma_n
     if model.grooves is not None:
         load = np.full(slide.size, patch.pressure.load)
-        local, tau = flank_slip_path(model, patch, slide, load, local, tau)
+        local, tau = compute_flank_slip(model, patch, slide, load, local, tau)
     slip = compute_frame_slip(model, patch, Frames(local, tau, is_closed=False))
     return slip._replace(values=run.values, outcome=outcome)
 
 
 def _compute_rig_slip(model, patch, frames: int) -> CycleSlip:
-    """Return the slip path of the nodes in the last cycle of a rig."""
-    chosen = numerics.choose_numerics(model)
-    is_uniform = slips_uniformly(model, chosen.per_point and model.grooves is None)
-    solution = solve.solve(model, chosen, patch, 0 if is_uniform else frames)
+    """Compute the slip path of the interface nodes in the last cycle of a rig."""
+    settings = numerics.choose_numerics(model)
+    is_uniform = slips_uniformly(model, settings.per_point and model.grooves is None)
+    solution = solve.solve(model, settings, patch, 0 if is_uniform else frames)
     amplitude = Measure(solution.values["relative_displacement_amplitude"], "m", 0.0)
     outcome, _ = judge_outcome(
         solution,
@@ -150,19 +152,19 @@ def _compute_rig_slip(model, patch, frames: int) -> CycleSlip:
         model.accuracy.tolerance,
         model.rig.drive.signal,
     )
-    outcome = judge_outcome_on_piece(
+    outcome = check_pieces_overlap(
         outcome if outcome in UNBOUNDED_OUTCOMES else None,
         model.patch,
         patch,
         solution.response.slide,
     )
-    cycle = _last_rig_cycle(model, solution.window, patch.pressure.load)
+    cycle = _select_last_rig_cycle(model, solution.window, patch.pressure.load)
     if strips_slide_independently(model) and is_uniform:
         slip = _compute_strip_slip(model, patch, solution.window)
     elif is_uniform:
-        slip = _uniform_slip(model, patch, cycle, patch.pressure.load)
+        slip = _compute_uniform_slip(model, patch, cycle, patch.pressure.load)
     else:
-        frame_fields = fields.collect_frames(model, chosen, patch, solution)
+        frame_fields = fields.collect_frames(model, settings, patch, solution)
         frame_fields = {name: values[1:] for name, values in frame_fields.items()}
         local = frame_fields["slip"]
         tau = frame_fields["shear_stress"]
@@ -174,16 +176,16 @@ def _compute_rig_slip(model, patch, frames: int) -> CycleSlip:
                 response.time,
                 response.extra.get("normal_load", constant),
             )
-            local, tau = flank_slip_path(
+            local, tau = compute_flank_slip(
                 model, patch, frame_fields["holder_slide"], load, local, tau
             )
         slip = compute_frame_slip(model, patch, Frames(local, tau, is_closed=True))
-    error = slip.error + _beat_error(solution.values, cycle)
+    error = slip.error + _slip_amplitude_change(solution.values, cycle)
     return slip._replace(error=error, values=solution.values, outcome=outcome)
 
 
-def _beat_error(values: dict, cycle: _CycleHistories) -> float:
-    """Return the relative difference of the slip amplitudes in the last cycle and in the window.
+def _slip_amplitude_change(values: dict, cycle: _CycleHistories) -> float:
+    """Return the relative difference of the slip amplitudes of the last cycle and of the window.
 
     A mode that still beats causes this difference.
     """
@@ -194,11 +196,10 @@ def _beat_error(values: dict, cycle: _CycleHistories) -> float:
     return abs(window_amplitude / amplitude - 1)
 
 
-def slip_path_of_point(model, window, values: dict) -> tuple[float, float]:
-    """Return the slip path [m] per cycle of a single point under [normal], and its error.
+def compute_point_slip_path(model, window, values: dict) -> tuple[float, float]:
+    """Return the slip path [m] per cycle of a single point under [normal], and its relative error.
 
-    It is weighted with the load if that changes. The error comes from differences between the
-    cycles.
+    The path is weighted with the load. The error comes from differences between cycles.
 
     Parameters
     ----------
@@ -210,24 +211,24 @@ def slip_path_of_point(model, window, values: dict) -> tuple[float, float]:
     """
     beat_error = 0.0
     if model.rig is None:
-        cycle = _last_bench_cycle(window)
+        cycle = _select_last_bench_cycle(window)
     else:
-        cycle = _last_rig_cycle(model, window, model.point.load)
-        beat_error = _beat_error(values, cycle)
-    slip = _uniform_slip(model, None, cycle, cycle.load[0])
+        cycle = _select_last_rig_cycle(model, window, model.point.load)
+        beat_error = _slip_amplitude_change(values, cycle)
+    slip = _compute_uniform_slip(model, None, cycle, cycle.load[0])
     return float(slip.path[0]), slip.error + beat_error
 
 
-def _last_bench_cycle(run) -> _CycleHistories:
-    """Return displacement, slip and forces of the last cycle of a bench."""
+def _select_last_bench_cycle(run) -> _CycleHistories:
+    """Return the histories of the last cycle of a bench."""
     histories = (run.slide, run.slip, run.force, run.load)
     return _CycleHistories(*(history[run.first :] for history in histories))
 
 
-def _last_rig_cycle(model, window, load: float) -> _CycleHistories:
-    """Return displacement, slip and forces of the last cycle of a rig.
+def _select_last_rig_cycle(model, window, load: float) -> _CycleHistories:
+    """Return the histories of the last cycle of a rig.
 
-    load: constant load [N]; over grooves it is the vertical force.
+    load: constant load [N]; over grooves the vertical force.
     """
     is_last = _is_in_last_cycle(model, window)
     loads = window.extra.get("normal_load", np.full(window.time.size, load))
@@ -236,13 +237,13 @@ def _last_rig_cycle(model, window, load: float) -> _CycleHistories:
 
 
 def _is_in_last_cycle(model, window) -> np.ndarray:
-    """Return a mask of the samples in the last cycle of a window."""
+    """Return whether each sample of a window is in its last cycle."""
     period = model.rig.drive.signal.period
     return window.time >= window.time[-1] - period * (1 + 1e-9)
 
 
 def _compute_strip_slip(model, patch, window) -> CycleSlip:
-    """Return the slip path in the drive direction of each strip of a rig with yaw.
+    """Return the slip path of each strip of a rig with yaw, in the direction of the drive.
 
     An open strip has the slip of the nearest strip in contact.
     """
@@ -255,7 +256,7 @@ def _compute_strip_slip(model, patch, window) -> CycleSlip:
         weight = np.abs(forces) / np.where(loads > 0, loads, 1.0)
 
     def path(samples) -> np.ndarray:
-        """Return the slip path (s,) [m] of the strips from selected samples."""
+        """Return the slip paths (s,) [m] of the strips from selected samples."""
         columns = zip(slips[samples].T, weight[samples].T)
         return np.array(
             [_integrate_over_path(slip, strip_weight) for slip, strip_weight in columns]
@@ -263,29 +264,30 @@ def _compute_strip_slip(model, patch, window) -> CycleSlip:
 
     paths = path(np.arange(len(slips)))
     error = _estimate_reversal_error(path, len(slips), paths, loads)
-    nearest = _nearest_contact_nodes(patch.strips.offsets, loads > 0)
+    nearest = _find_nearest_contact_nodes(patch.strips.offsets, loads > 0)
     return CycleSlip(np.repeat(paths[nearest, None], patch.x.size, axis=1), error)
 
 
 def _estimate_reversal_error(
     compute_path, count: int, fine_path, weight, is_closed: bool = False
 ) -> float:
-    """Estimate the relative error of a slip path whose reversals lie between samples.
+    """Estimate the relative error of a slip path due to reversals between samples.
 
-    A reversal between two samples hides f(d) of the path, d <= 1/2 of their distance. Every third
-    sample hides f(d), f(1 - d) or f(1 + d), for the first, second or third choice: 3/2 of the mean
-    excess contains f(d) for any d, for a corner f = c d as well as for a smooth reversal f = c d^2.
+    A reversal at the distance d <= 1/2 from the nearest sample hides a part f(d) of the path. With
+    every third sample it hides f(d), f(1 - d) or f(1 + d), depending on which samples are used. 3/2
+    of the mean increase is at least f(d) for any d, both for a sharp reversal, f = c d, and for a
+    smooth one, f = c d^2.
 
     Parameters
     ----------
     compute_path : callable
-        Function from indices of samples to the slip paths (m,) [m].
+        Function from sample indices to the slip paths (m,) [m].
     count : int
         Number of samples.
     fine_path, weight : (m,)
-        Slip paths from all samples [m], and their weights.
+        Slip paths from all samples [m], and their weights in the mean.
     is_closed : bool
-        Whether the last sample is followed by the first one.
+        Whether the first sample follows the last one.
     """
     total = float(fine_path @ weight)
     if total <= 0:
@@ -295,17 +297,17 @@ def _estimate_reversal_error(
     for first in range(3):
         samples = np.unique([*ends, *range(first, count, 3)]).astype(int)
         changes.append(abs(float((fine_path - compute_path(samples)) @ weight)))
-    return THINNING_FACTOR * float(np.mean(changes)) / total
+    return REVERSAL_ERROR_FACTOR * float(np.mean(changes)) / total
 
 
-def _uniform_slip(model, patch, cycle: _CycleHistories, load: float) -> CycleSlip:
-    """Return the slip path of a cycle in which all points slip by the same distance."""
+def _compute_uniform_slip(model, patch, cycle: _CycleHistories, load: float) -> CycleSlip:
+    """Return the slip path of a cycle with uniform slip at all points."""
     slip = cycle.slip
     # Friction opposes the slip, also in a step with a reversal.
     weight = np.abs(cycle.force) if model.wear.uses_friction_work else cycle.load
     error = 0.0
     if model.grooves is not None:
-        weight = wearing_force_on_flanks(model, cycle.slide, cycle.force, cycle.load)
+        weight = wear_force_on_flanks(model, cycle.slide, cycle.force, cycle.load)
     path = _integrate_over_path(slip, weight) / load if load > 0 else 0.0
     if model.grooves is not None and path > 0:
         error = abs(path - _integrate_over_path(slip[::2], weight[::2]) / load) / path
@@ -318,19 +320,19 @@ def _integrate_over_path(slip, weight) -> float:
     return float(np.sum(np.abs(np.diff(slip)) * (weight[1:] + weight[:-1]) / 2))
 
 
-def wearing_force_on_flanks(model, slide, force, load) -> np.ndarray:
-    """Return the force (k,) [N] that wears the flanks of grooves per unit of displacement.
+def wear_force_on_flanks(model, slide, force, load) -> np.ndarray:
+    """Return the force (k,) [N] that wears groove flanks, per unit of relative displacement.
 
-    It is R ds/dq = V + F t of the normal force R, or with form 'energy' |f| ds/dq = |F - V t| of
-    the friction force f along the flank, with the slope t.
+    With the slope t of the flank, it is R ds/dq = V + F t of the normal force R on the flank; with
+    form 'energy' it is |f| ds/dq = |F - V t| of the friction force f along the flank.
 
     Parameters
     ----------
     model : Model
     slide : (k,)
-        [m].
+        Relative displacement [m].
     force, load : (k,)
-        Force F against the slide and vertical force V [N].
+        Horizontal force F and vertical force V [N].
     """
     t = model.grooves.slope(slide)
     if model.wear.uses_friction_work:
@@ -338,12 +340,12 @@ def wearing_force_on_flanks(model, slide, force, load) -> np.ndarray:
     return np.maximum(load + force * t, 0.0)
 
 
-def flank_slip_path(model, patch, slide, vertical, local, tau) -> tuple:
+def compute_flank_slip(model, patch, slide, vertical, local, tau) -> tuple:
     """Return the slip along groove flanks [m] and the stress that wears them [Pa], (f, m) each.
 
-    The slip is s - e, with the path s along the flank and its elastic part e. A point of pressure
-    sigma carries V sigma/N, so that its normal stress on the flank is R = (V sigma/N + tau
-    t)/sqrt(1 + t^2), and its friction along the flank, used with form 'energy', is |tau - t V
+    The slip is s - e with the path s along the flank and its elastic part e. A point with pressure
+    sigma carries the vertical stress V sigma/N. Its normal stress on the flank is R = (V sigma/N +
+    tau t)/sqrt(1 + t^2); its friction along the flank, which form 'energy' uses, is |tau - t V
     sigma/N|/sqrt(1 + t^2).
 
     Parameters
@@ -351,29 +353,29 @@ def flank_slip_path(model, patch, slide, vertical, local, tau) -> tuple:
     model : Model
     patch : Patch
     slide : (f,)
-        Slide of the holder in each frame [m].
+        Displacement of the holder [m] in each frame.
     vertical : (f,)
         Vertical force V [N].
     local, tau : (f, m)
-        Slip [m] and resultant traction [Pa].
+        Slip [m] and traction parallel to the interface [Pa].
     """
     grooves = model.grooves
     sigma = patch.pressure.sigma_n
     slope = grooves.slope(slide)[:, None]
-    # The factor is the ratio of the flank length to the relative displacement.
-    stretch = np.sqrt(1 + slope**2)
-    carried = (vertical / patch.pressure.load)[:, None] * sigma
+    # Ratio of the path along the flank to the relative displacement.
+    path_ratio = np.sqrt(1 + slope**2)
+    vertical_stress = (vertical / patch.pressure.load)[:, None] * sigma
     steps = integrate_steps(slide, lambda places: np.hypot(1, grooves.slope(places)))
     path = np.append(0.0, np.cumsum(steps))
     if model.wear.uses_friction_work:
-        stress = np.abs(tau - slope * carried)
+        stress = np.abs(tau - slope * vertical_stress)
     else:
-        stress = np.maximum(carried + tau * slope, 0.0)
-    return path[:, None] - (slide[:, None] - local) * stretch, stress / stretch
+        stress = np.maximum(vertical_stress + tau * slope, 0.0)
+    return path[:, None] - (slide[:, None] - local) * path_ratio, stress / path_ratio
 
 
 def compute_frame_slip(model, patch, frames: Frames) -> CycleSlip:
-    """Return the slip path of each node from frames of slip and shear stress.
+    """Compute the slip path of each node from frames of slip and shear stress.
 
     Parameters
     ----------
@@ -384,16 +386,16 @@ def compute_frame_slip(model, patch, frames: Frames) -> CycleSlip:
     count = len(frames.slip)
 
     def path(indices) -> np.ndarray:
-        """Return the slip path (m,) [m] of the nodes from selected frames."""
-        return _integrate_path(model, patch, frames, indices)
+        """Return the slip paths (m,) [m] of the nodes from selected frames."""
+        return _integrate_node_paths(model, patch, frames, indices)
 
     paths = path(np.arange(count))
     force = patch.pressure.sigma_n * patch.pieces.interface.weight
     return CycleSlip(paths, _estimate_reversal_error(path, count, paths, force, frames.is_closed))
 
 
-def _integrate_path(model, patch, frames: Frames, indices) -> np.ndarray:
-    """Integrate the slip path (m,) [m] of the nodes over selected frames."""
+def _integrate_node_paths(model, patch, frames: Frames, indices) -> np.ndarray:
+    """Integrate the slip paths (m,) [m] of the nodes over selected frames."""
     if frames.is_closed:
         indices = np.append(indices[-1:], indices)
     steps = np.abs(np.diff(frames.slip[indices], axis=0))
@@ -403,13 +405,13 @@ def _integrate_path(model, patch, frames: Frames, indices) -> np.ndarray:
         tau = np.abs(frames.tau[indices])
         work = np.sum(steps * (tau[1:] + tau[:-1]) / 2, axis=0)
         path = np.divide(work, sigma, out=np.zeros_like(work), where=sigma > 0)
-    return path[_nearest_contact_nodes(patch.x, sigma > 0)]
+    return path[_find_nearest_contact_nodes(patch.x, sigma > 0)]
 
 
-def _nearest_contact_nodes(x, active) -> np.ndarray:
-    """Return the index (m,) of the nearest node in contact for every node.
+def _find_nearest_contact_nodes(x, active) -> np.ndarray:
+    """Return for each node the index (m,) of the nearest node in contact.
 
-    A node that comes into contact during a jump has the slip of this neighbour.
+    A node that comes into contact during a jump has the slip of this node.
     """
     touching = np.flatnonzero(active)
     if not touching.size:

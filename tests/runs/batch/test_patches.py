@@ -13,7 +13,7 @@ from patchfem.campaigns.sweeps.executors import LocalExecutor
 from patchfem.export import compute_in_memory
 from patchfem.runs import solve_with_coarser, with_shared_meshes
 from patchfem.runs.batch import batches, one_by_one, patches
-from patchfem.runs.patch.grids import contact_extent
+from patchfem.runs.patch.grids import find_contact_extent
 from patchfem.scene import make_axis, scene
 
 TEXT = (
@@ -92,7 +92,7 @@ def test_exact_patches_pressed_together_agree_with_single_runs(tables, values):
     assert all(patches.refusal_reason(model) == "" for model in models)
     assert all(
         patch is not None
-        for patch in patches.static_batch.solve_alike_patches(
+        for patch in patches.static_batch.solve_similar_patches(
             [model.patch for model in models], 1e-2
         )
     )
@@ -169,8 +169,8 @@ def test_exact_pressed_patches_agree_with_separate_solutions(tables):
                 assert getattr(together.pressure, name) == pytest.approx(
                     getattr(separate.pressure, name), rel=1e-11
                 )
-            assert contact_extent(together).places == pytest.approx(
-                contact_extent(separate).places, rel=1e-9
+            assert find_contact_extent(together).places == pytest.approx(
+                find_contact_extent(separate).places, rel=1e-9
             )
 
 

@@ -1,8 +1,8 @@
 """Solution of a patch on nested meshes, from which its errors are estimated.
 
-In: a `PatchModel` and a tolerance. Out: pressed patches from fine to coarse. A mesh that the
-scene does not prescribe is refined until the static measures meet the tolerance or the next
-mesh is too expensive (`solve_on_ladder`).
+In: a `PatchModel` and a tolerance. Out: solved patches from fine to coarse. A mesh that the scene
+does not prescribe is refined until the static measures meet the tolerance or the next mesh is too
+expensive (`solve_on_refined_meshes`).
 """
 
 from dataclasses import replace
@@ -10,23 +10,24 @@ from functools import partial
 
 from ...core import NotConverged, Outcome
 from ...model.pieces import make_piece_meshes
-from . import fine, slip_zones, store
+from . import profile_points, slip_zones, store
 from .condensed import condense, condense_on_shared_meshes
 from .grids import MAX_CONDENSING_SECONDS, MIN_LEVELS, make_base_grids, predict_condensing_seconds
 from .measures import estimate_static_measures, max_mesh_error_ratio
 from .press import solve, solve_patch_contact
 
-# Tolerance [1] at which a patch under prescribed partial slip may take the CPU time of a patch in a rig. The
-# allowed time is proportional to tolerance^-0.5: a tenth of the tolerance allows 3.2 times as much time.
+# Tolerance at which a patch with prescribed partial slip may take as much CPU time as a patch in a
+# rig. The allowed time is proportional to tolerance^-0.5: a tenth of the tolerance allows 3.2 times
+# as much.
 SLIP_REFERENCE_TOL = 1e-3
-# Largest number of columns of a mesh for which no coarser mesh is made.
+# Largest number of columns of a mesh that has no coarser mesh.
 MAX_COLUMNS_WITHOUT_COARSER = 8
-# Largest number of decades over which the tolerance is lowered to find one that needs a finer mesh.
+# Largest number of decades by which the tolerance is lowered in the search for a finer mesh.
 MAX_DECADES = 6
 
 
 def solve_on_split_mesh(patch_model, level: int, estimate: bool) -> tuple:
-    """Solve the contact on a mesh file whose edges are halved a given number of times.
+    """Solve a patch on a mesh file whose edges are halved a given number of times.
 
     Parameters
     ----------
@@ -34,7 +35,7 @@ def solve_on_split_mesh(patch_model, level: int, estimate: bool) -> tuple:
     level : int
         Number of halvings.
     estimate : bool
-        Whether the coarser meshes are solved as well.
+        Whether to solve the meshes of the error estimate as well.
 
     Returns
     -------
@@ -48,38 +49,40 @@ def solve_on_split_mesh(patch_model, level: int, estimate: bool) -> tuple:
 
 
 def solve_with_coarser(
-    patch_model, tolerance: float, estimate: bool = True, fresh: bool = False
+    patch_model, tolerance: float, estimate: bool = True, ignore_cache: bool = False
 ) -> tuple:
-    """Solve the contact of a patch on its mesh and on the coarser meshes of its error estimate.
+    """Solve a patch on its mesh and on the coarser meshes of its error estimate.
 
-    A patch without a prescribed element size is solved on a ladder of nested meshes until it meets
-    its tolerance. An unstructured mesh has no coarser one: its second patch is on the mesh with
-    every edge halved. Shared meshes are used as they are, except that a patch with a profile that
-    these do not resolve to its tolerance is solved on its own ladder, as in a single run.
+    If the element size is not prescribed, nested meshes are refined until the patch meets the
+    tolerance. An unstructured mesh has no coarser one; its second solution is on the mesh with all
+    edges halved. Shared meshes are used as they are, unless they do not resolve a profile to the
+    tolerance: then the patch gets its own meshes, as in a single run.
 
     Parameters
     ----------
     patch_model : PatchModel
     tolerance : float
     estimate : bool
-        Whether the coarser meshes are solved as well.
-    fresh : bool
-        Whether to ignore condensed operators kept on disk.
+        Whether to solve the coarser meshes as well.
+    ignore_cache : bool
+        Whether to ignore compliance matrices cached on disk.
 
     Returns
     -------
     tuple
-        Patches, fine to coarse, at least two; None for each that is not solved.
+        Patches from fine to coarse, at least two; None for each mesh that is not solved.
     """
-    if patch_model.solved is not None and not fresh:
+    if patch_model.solved is not None and not ignore_cache:
         return patch_model.solved.patches
     mesh = patch_model.mesh
     tolerance = mesh.tolerance or tolerance
     if mesh.shared is None:
         if mesh.is_automatic:
-            return solve_on_ladder(patch_model, tolerance, estimate, fresh)
-        return _solve_with_coarser(patch_model, make_piece_meshes(patch_model), estimate, fresh)
-    if fresh:
+            return solve_on_refined_meshes(patch_model, tolerance, estimate, ignore_cache)
+        return _solve_with_coarser(
+            patch_model, make_piece_meshes(patch_model), estimate, ignore_cache
+        )
+    if ignore_cache:
         pairs = [condense(patch_model, *level, ignore_cache=True) for level in mesh.shared.levels]
         return solve_on_pairs(patch_model, pairs, estimate)
     patches = store.get_or_compute_in_sweep(
@@ -88,7 +91,7 @@ def solve_with_coarser(
         lambda: solve_on_pairs(patch_model, condense_on_shared_meshes(patch_model), estimate),
     )
     if estimate and _misses_tolerance_with_profile(patch_model, patches, tolerance):
-        return solve_on_ladder(patch_model.with_mesh(shared=None), tolerance)
+        return solve_on_refined_meshes(patch_model.with_mesh(shared=None), tolerance)
     return patches
 
 
@@ -103,74 +106,74 @@ def _misses_tolerance_with_profile(patch_model, patches: tuple, tolerance: float
 
 
 def solve_on_pairs(patch_model, pairs, estimate: bool = True) -> tuple:
-    """Solve the contact of a patch on given condensed pieces.
+    """Solve a patch on given condensed pieces.
 
     Parameters
     ----------
     patch_model : PatchModel
-    pairs : sequence of CondensedPair
-        Fine to coarse.
+    sequence of CondensedPair
+        From fine to coarse.
     estimate : bool
-        Whether the coarser pieces are used as well.
+        Whether to use the coarser pieces as well.
 
     Returns
     -------
     tuple
         Patches as in `solve_with_coarser`.
     """
-    return _pad_to_three(
+    return _pad_with_none(
         solve_patch_contact(patch_model, pair) for pair in (pairs if estimate else pairs[:1])
     )
 
 
-def _pad_to_three(patches) -> tuple:
-    """Append None to a list of solved patches until it has at least three entries."""
+def _pad_with_none(patches) -> tuple:
+    """Append None to a sequence of patches until it has at least three entries."""
     out = tuple(patches)
     return out + (None,) * (3 - len(out))
 
 
-def _solve_with_coarser(patch_model, bodies: tuple, estimate: bool, fresh: bool) -> tuple:
-    """Solve the contact of a patch on given meshes and on coarser ones."""
+def _solve_with_coarser(patch_model, bodies: tuple, estimate: bool, ignore_cache: bool) -> tuple:
+    """Solve a patch on given meshes and on the meshes of its error estimate."""
     levels = [bodies, *(make_comparison_meshes(*bodies) if estimate else ())]
-    return _pad_to_three(solve(patch_model, *level, fresh) for level in levels)
+    return _pad_with_none(solve(patch_model, *level, ignore_cache) for level in levels)
 
 
 def make_file_meshes(patch_model) -> list:
     """Return the meshes of a patch with prescribed element size or mesh file.
 
-    The order is that of `solve_with_coarser`.
+    Their order is that of `solve_with_coarser`.
     """
     bodies = make_piece_meshes(patch_model)
     return [bodies, *make_comparison_meshes(*bodies)]
 
 
-def make_comparison_meshes(low, high) -> list:
-    """Return the coarser meshes with which the error of given meshes is estimated.
+def make_comparison_meshes(lower, upper) -> list:
+    """Return the meshes with which the error on given meshes is estimated.
 
-    They are coarser grids, or the unstructured mesh with every edge halved. The list is empty for
-    meshes with few columns.
+    These are two coarser grids, or the unstructured mesh with all edges halved. The list is empty
+    for meshes with few columns.
     """
-    if low.x.size <= MAX_COLUMNS_WITHOUT_COARSER:
+    if lower.x.size <= MAX_COLUMNS_WITHOUT_COARSER:
         return []
-    if low.base_grid is None:
-        return [tuple(None if body is None else body.refine() for body in (low, high))]
+    if lower.base_grid is None:
+        return [tuple(None if body is None else body.refine() for body in (lower, upper))]
     out = []
-    while len(out) < 2 and low.x.size > MAX_COLUMNS_WITHOUT_COARSER:
-        low = low.coarsen()
-        high = None if high is None else high.coarsen()
-        out.append((low, high))
+    while len(out) < 2 and lower.x.size > MAX_COLUMNS_WITHOUT_COARSER:
+        lower = lower.coarsen()
+        upper = None if upper is None else upper.coarsen()
+        out.append((lower, upper))
     return out
 
 
-def solve_on_ladder(
-    patch_model, tolerance: float, estimate: bool = True, fresh: bool = False
+def solve_on_refined_meshes(
+    patch_model, tolerance: float, estimate: bool = True, ignore_cache: bool = False
 ) -> tuple:
-    """Solve the contact of a patch on successively finer meshes until it meets its tolerance.
+    """Solve a patch on successively finer meshes until it meets the tolerance.
 
-    If the next mesh is expensive, points as fine as the profile give more accurate measures, and
-    the mesh serves fields and motion. The refinement ends if the next mesh would exceed the work
-    that is allowed for a patch. With a prescribed slip, the meshes also have to resolve the work of
-    the slip.
+    The refinement ends if the next mesh would exceed the CPU time that is allowed for a patch. If
+    the next mesh of a patch with a profile is expensive, the measures are computed on points as
+    dense as the profile, and the mesh only serves fields and motion. Under a prescribed
+    displacement, the meshes must resolve the friction work as well.
 
     Parameters
     ----------
@@ -178,13 +181,13 @@ def solve_on_ladder(
     tolerance : float
     estimate : bool
         If False, only the third mesh is solved.
-    fresh : bool
-        Whether to ignore condensed operators kept on disk.
+    ignore_cache : bool
+        Whether to ignore compliance matrices cached on disk.
 
     Returns
     -------
     tuple
-        Patches on all meshes, fine to coarse.
+        Patches on all meshes, from fine to coarse.
     """
     grids = make_base_grids(patch_model).bodies
     patches = []
@@ -194,9 +197,9 @@ def solve_on_ladder(
         if estimate or len(patches) == MIN_LEVELS - 1:
             try:
                 patch = solve_patch_contact(
-                    patch_model, condense(patch_model, *grids, ignore_cache=fresh)
+                    patch_model, condense(patch_model, *grids, ignore_cache=ignore_cache)
                 )
-            # The cells are too short for double precision, so that the coarser meshes are kept.
+            # The cells are too short for double precision, so that the finest mesh is left out.
             except NotConverged:
                 if not patches or patches[0] is None:
                     raise
@@ -208,20 +211,21 @@ def solve_on_ladder(
         if not estimate or patch.pressure.outcome is Outcome.NO_CONTACT:
             return tuple(patches)
         seconds = predict_condensing_seconds(grids)
-        if points is not None:  # The solution on points of the profile is kept for finer meshes.
+        # The solution on the points of the profile is used with all finer meshes.
+        if points is not None:
             patches[0] = _attach_point_solution(patch, points)
         is_within = (
             max_mesh_error_ratio(estimate_static_measures(*patches, tolerance=tolerance), tolerance)
             <= 1
         )
-        shows_slip = _resolves_slip_work(patch_model, patches, tolerance)
+        resolves_slip = _resolves_slip_work(patch_model, patches, tolerance)
         if (
             seconds > MAX_CONDENSING_SECONDS[False]
             and not is_within
-            and fine.can_use_points(patch_model)
+            and profile_points.can_use_points(patch_model)
         ):
             meets_tolerance = partial(_meets_tolerance, patches, tolerance)
-            points = fine.solve_on_points(patch_model, meets_tolerance)
+            points = profile_points.solve_on_points(patch_model, meets_tolerance)
             patches[0] = _attach_point_solution(patch, points)
             is_within = (
                 max_mesh_error_ratio(
@@ -229,20 +233,20 @@ def solve_on_ladder(
                 )
                 <= 1
             )
-        is_done = shows_slip and (patches[0].points is not None or is_within)
+        is_done = resolves_slip and (patches[0].points is not None or is_within)
         if is_done or seconds > max_condensing_seconds(patch_model, tolerance):
             return tuple(patches)
 
 
 def _attach_point_solution(patch, points):
-    """Add the solution on the points of a profile to a solved patch, if there is one."""
+    """Add a solution on the points of a profile, if any, to a patch."""
     if points is None:
         return patch
     return replace(patch, points=points, averaging=points.spacing)
 
 
 def _meets_tolerance(patches: list, tolerance: float, points) -> bool:
-    """Return whether every measure of a solved patch has an estimated error within the tolerance."""
+    """Return whether all measures that control the mesh meet the tolerance."""
     patch_measures = estimate_static_measures(
         _attach_point_solution(patches[0], points), *patches[1:], tolerance=tolerance
     )
@@ -252,8 +256,9 @@ def _meets_tolerance(patches: list, tolerance: float, points) -> bool:
 def max_condensing_seconds(patch_model, tolerance: float | None = None) -> float:
     """Return the CPU time [s] that condensing the finest mesh of a patch may take.
 
-    The motion of a prescribed slip is cheap, so that a tight tolerance allows a finer mesh, up to
-    the limit of a static patch. With tolerance None it is the limit at any tolerance.
+    The motion under a prescribed displacement is cheap, so that a small tolerance allows a finer
+    mesh, up to the limit of a static patch. With tolerance None, the result is the largest limit at
+    any tolerance.
     """
     if patch_model.mesh.slip is None:
         return MAX_CONDENSING_SECONDS[patch_model.mesh.is_static]
@@ -265,21 +270,21 @@ def max_condensing_seconds(patch_model, tolerance: float | None = None) -> float
     )
 
 
-def solve_static_ladder(
-    patch_model, tolerance: float, estimate: bool = True, fresh: bool = False
+def solve_on_static_meshes(
+    patch_model, tolerance: float, estimate: bool = True, ignore_cache: bool = False
 ) -> tuple:
-    """Solve the patch of a bench with partial slip on the meshes of a static run.
+    """Solve a bench patch with partial slip on the meshes of a static run.
 
     Parameters
     ----------
     patch_model, tolerance, estimate, fresh
-        See `solve_on_ladder`.
+        See `solve_on_refined_meshes`.
 
     Returns
     -------
     tuple
-        Patches, fine to coarse; () if the mesh is prescribed or shared with other cases, or if the
-        patch is solved already.
+        Patches from fine to coarse; () if the mesh is prescribed or shared with other cases, or if
+        the patch is solved already.
     """
     if (
         not patch_model.interface.partial_slip
@@ -289,44 +294,45 @@ def solve_static_ladder(
     ):
         return ()
     static = patch_model.with_mesh(is_static=True, slip=None)
-    return solve_on_ladder(static, patch_model.mesh.tolerance or tolerance, estimate, fresh)
+    return solve_on_refined_meshes(
+        static, patch_model.mesh.tolerance or tolerance, estimate, ignore_cache
+    )
 
 
 def _resolves_slip_work(patch_model, patches: list, tolerance: float) -> bool:
-    """Return whether the meshes of a patch resolve the friction work of a prescribed slip."""
+    """Return whether the meshes of a patch resolve the friction work of a prescribed displacement."""
     if patch_model.mesh.slip is None:
         return True
     return slip_zones.max_slip_error_ratio(patches, patch_model.mesh.slip, tolerance) <= 1
 
 
-def tolerance_of_next_mesh(patch_model, patches, tolerance: float) -> float | None:
-    """Return the largest tolerance/10^k at which a patch would be solved on a finer mesh.
+def tolerance_for_finer_mesh(patch_model, patches, tolerance: float) -> float | None:
+    """Return the largest tolerance/10^k at which the patch would get a finer mesh.
 
     Parameters
     ----------
     patch_model : PatchModel
     patches : sequence of Patch
-        As `solve_on_ladder` returns them at that tolerance.
+        Result of `solve_on_refined_meshes` at the present tolerance.
     tolerance : float
 
     Returns
     -------
     float or None
-        None if the next mesh is too expensive or no tolerance needs it: then the ladder is
-        complete.
+        None if the next mesh is too expensive or no tolerance needs it.
     """
     seconds = predict_next_mesh_seconds(patches[0])
     if seconds > max_condensing_seconds(patch_model):
         return None
-    known = [patch for patch in patches if patch is not None]
+    solved = [patch for patch in patches if patch is not None]
     if patches[0].points is not None:
-        found = estimate_static_measures(*known, tolerance=tolerance)
-        return tolerance / 10 if max_mesh_error_ratio(found, tolerance) <= 1 else None
+        measures = estimate_static_measures(*solved, tolerance=tolerance)
+        return tolerance / 10 if max_mesh_error_ratio(measures, tolerance) <= 1 else None
     for decade in range(1, MAX_DECADES + 1):
         tighter = tolerance * 10.0**-decade
-        found = estimate_static_measures(*known, tolerance=tighter)
-        is_done = max_mesh_error_ratio(found, tighter) <= 1 and _resolves_slip_work(
-            patch_model, known, tighter
+        measures = estimate_static_measures(*solved, tolerance=tighter)
+        is_done = max_mesh_error_ratio(measures, tighter) <= 1 and _resolves_slip_work(
+            patch_model, solved, tighter
         )
         if not is_done and seconds <= max_condensing_seconds(patch_model, tighter):
             return tighter

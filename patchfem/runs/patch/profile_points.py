@@ -1,10 +1,10 @@
-"""Contact under a measured profile, solved on successively more equally spaced points.
+"""Contact under a measured profile, solved on equally spaced points.
 
-In: a `PatchModel` with a profile. Out: static measures with errors, and the pressure on the
-points. The compliance of waves along the interface is known in closed form; finite elements
-only compute the smooth change due to the free ends of the pieces. Errors come from the changes from
-level to level, as for meshes: with cells half as long at the ends, and with twice as many
-points.
+In: a `PatchModel` with a profile. Out: static measures with error estimates, and the pressure at
+the points. The compliance of infinite elastic layers is known in closed form for waves along the
+interface; finite elements compute only its smooth change due to the free ends of the pieces. The
+number of points is doubled from level to level. Errors follow from the changes when the points are
+doubled and when the cells at the ends are halved.
 """
 
 from typing import NamedTuple
@@ -39,22 +39,23 @@ from .measures import (
 from .press import PointSolution, Surface
 from .values import assemble_static_values, estimate_peak_pressures
 
-MIN_LEVELS = 3  # Smallest number of refinement levels from which an order of convergence is seen.
-# Largest number of points of a level, because more would exceed the CPU time of a patch.
+MIN_LEVELS = 3  # Smallest number of refinement levels at which the order of convergence is known.
+# Largest number of points of a level; more would exceed the CPU time of a patch.
 MAX_POINTS = 60_000
-MAX_WORK = 2.5e7  # Largest iterations times points of a level, limited for the same reason.
+# Largest product of iterations and points of a level, limited for the same reason.
+MAX_WORK = 2.5e7
 MIN_POINTS = 500  # Smallest number of points of the coarsest level.
-END_CELL_RATIO = 1e-4  # Cell length at the ends over the length of the interface, on level 0.
-MIDDLE_CELL_RATIO = (
-    1 / 30
-)  # Cell length in the middle over the length of the interface, on level 0.
+# Ratio of the cell length at the ends to the length of the interface, on level 0.
+END_CELL_RATIO = 1e-4
+MIDDLE_CELL_RATIO = 1 / 30  # The same ratio in the middle of the interface.
 CELL_GROWTH = 0.8  # Increase of the cell length per distance from the end [1].
-CONTACT_TOL = 3e-8  # Relative residual at which the contact counts as solved.
+CONTACT_TOL = 3e-8  # Largest relative residual at which the contact problem counts as solved.
 MAX_ITERATIONS = 4000  # Largest number of iterations of a contact solution.
-CORNER_LENGTH_RATIO = 1e-3  # Length of the corner region over the length of the interface.
-# Pressure at a corner over the largest pressure; above this ratio the peak may be at the corner.
+# Ratio of the length of the corner region to the length of the interface.
+CORNER_LENGTH_RATIO = 1e-3
+# Smallest ratio of corner pressure to largest pressure at which the peak may be at the corner.
 MIN_CORNER_PRESSURE_RATIO = 0.2
-# Largest overlap of the surfaces of a solved contact over the displacement due to the pressure.
+# Largest ratio of overlap to elastic displacement of a solved contact.
 MAX_OVERLAP_RATIO = 1e-6
 
 
@@ -62,13 +63,13 @@ class PointLevel(NamedTuple):
     """Contact solution on the equally spaced points of one refinement level.
 
     - force (n,): nodal forces [N].
-    - surface: pressure and gap on the points.
-    - intervals (k, 2): parts in contact [m].
+    - surface: pressure and gap at the points.
+    - intervals (k, 2): contact intervals [m].
     - values: static measures by name.
-    - resolution: errors that the levels may share.
+    - resolution: Resolution of the contact by the points.
     - n_iterations: iterations of the solver.
-    - has_corner_peak: whether the pressure at a free corner may be the largest; a few cells at the
-      ends do not resolve it.
+    - has_corner_peak: whether the peak pressure may be at a free corner, which the few cells at
+      the ends do not resolve.
     """
 
     force: np.ndarray
@@ -84,7 +85,7 @@ class FreeEnds(NamedTuple):
     """Change of the compliance of infinite elastic layers due to the free ends of the pieces.
 
     - x (k,): positions [m].
-    - normal, tangential (k, k): changes [m2/N] for pressure and for shear.
+    - normal, tangential (k, k): changes [m2/N] of the normal and of the tangential compliance.
     """
 
     x: np.ndarray
@@ -93,7 +94,7 @@ class FreeEnds(NamedTuple):
 
 
 class PointForces(NamedTuple):
-    """Contact forces at equally spaced points, with approach and rotation of the holder.
+    """Nodal forces at equally spaced points, with approach and rotation of the holder.
 
     - force (n,): nodal forces [N].
     - approach, rotation: [m] and [rad]; the rotation adds to that of the gap.
@@ -118,8 +119,8 @@ class HolderState(NamedTuple):
 def can_use_points(patch_model) -> bool:
     """Return whether a `PatchModel` can be solved on equally spaced points.
 
-    These are bare pieces of equal length with a profile, under a load, or under an approach without
-    rotation.
+    This holds for pieces of equal length with a profile and without asperity layer, under a load,
+    or under an approach without rotation.
     """
     loading = patch_model.loading
     can_rotate = loading.can_rotate or loading.rotational_stiffness > 0
@@ -135,69 +136,74 @@ def can_use_points(patch_model) -> bool:
 
 
 def solve_on_points(patch_model, meets_tolerance) -> PointSolution | None:
-    """Solve the contact of a `PatchModel` on successively more equally spaced points.
+    """Solve a `PatchModel` on equally spaced points, doubling them until the tolerance is met.
 
     Parameters
     ----------
     patch_model : PatchModel
     meets_tolerance : callable
-        Function of a PointSolution that ends the refinement; MAX_POINTS and MAX_WORK end it too.
+        Function of a PointSolution that ends the refinement. MAX_POINTS and MAX_WORK end it as
+        well.
 
     Returns
     -------
     PointSolution or None
         None if fewer than MIN_LEVELS levels are solved.
     """
-    count = _first_level_points(patch_model)
+    count = _count_first_level_points(patch_model)
     solution = None
     with one_thread():
         try:
-            ends = [_compute_free_ends(patch_model, level) for level in range(MIN_LEVELS)]
-            coarse = [_solve_level(patch_model, free_ends, count) for free_ends in ends]
-            levels = coarse[-1:]
+            ends = [_compute_free_end_compliance(patch_model, level) for level in range(MIN_LEVELS)]
+            end_levels = [_solve_level(patch_model, free_ends, count) for free_ends in ends]
+            point_levels = end_levels[-1:]
             while solution is None or not (
-                meets_tolerance(solution) or _is_next_level_expensive(levels[-1])
+                meets_tolerance(solution) or _is_next_level_expensive(point_levels[-1])
             ):
-                force = levels[-1].force
-                levels.append(_solve_level(patch_model, ends[-1], 2 * force.size, force))
-                if len(levels) >= MIN_LEVELS:
-                    estimates = _combine_series(coarse, levels)
-                    solution = PointSolution(estimates, levels[-1].surface, levels[-1].intervals)
+                force = point_levels[-1].force
+                point_levels.append(_solve_level(patch_model, ends[-1], 2 * force.size, force))
+                if len(point_levels) >= MIN_LEVELS:
+                    estimates = _combine_refinement_series(end_levels, point_levels)
+                    solution = PointSolution(
+                        estimates, point_levels[-1].surface, point_levels[-1].intervals
+                    )
         except (NotConverged, np.linalg.LinAlgError):
             pass
     return solution
 
 
-def _first_level_points(patch_model) -> int:
-    """Return the number of points of the coarsest refinement level of a patch."""
+def _count_first_level_points(patch_model) -> int:
+    """Return the number of points of the coarsest refinement level."""
     n_samples = patch_model.pieces.length / profile.find_sample_spacing(patch_model.gap.profile)
     return max(MIN_POINTS, min(round(n_samples / 4), MAX_POINTS // 4))
 
 
 def _is_next_level_expensive(level: PointLevel) -> bool:
-    """Return whether a finer level would exceed the limit of points or of work."""
+    """Return whether the next level would exceed the largest number of points or the largest work."""
     count = level.force.size
     return 2 * count > MAX_POINTS or 3 * level.n_iterations * count > MAX_WORK
 
 
-def _combine_series(coarse: list, levels: list) -> dict:
-    """Combine two refinement series to one estimate of each measure.
+def _combine_refinement_series(end_levels: list, point_levels: list) -> dict:
+    """Combine two series of refinements into one estimate of each measure.
 
-    The first series refines the cells at the ends; the second increases the number of points with
-    the finest of these cells. The extrapolation and the error of the first are added to the second.
+    The first series halves the cells at the ends. The second doubles the points, with the shortest
+    of these cells. The extrapolation of the first series and its error are added to the second.
     """
-    finest = levels[-1]
-    shared = estimate_hidden_errors(finest.resolution, finest.values)
-    by_points = extrapolate_static_measures([level.values for level in levels], shared, 0.0)
-    by_ends = extrapolate_static_measures([level.values for level in coarse], {}, 0.0)
+    finest = point_levels[-1]
+    hidden_errors = estimate_hidden_errors(finest.resolution, finest.values)
+    by_points = extrapolate_static_measures(
+        [level.values for level in point_levels], hidden_errors, 0.0
+    )
+    by_ends = extrapolate_static_measures([level.values for level in end_levels], {}, 0.0)
     out = {}
     for name, estimate in by_points.items():
         if name not in PEAK_MEASURES or not finest.has_corner_peak:
-            value = estimate.value + by_ends[name].value - coarse[-1].values[name]
+            value = estimate.value + by_ends[name].value - end_levels[-1].values[name]
             out[name] = Estimate(float(value), float(estimate.error + by_ends[name].error))
     peak = out.get("pressure_peak")
     if peak is not None and peak.value > 0:
-        # The loaded fraction is the mean pressure divided by this peak.
+        # The loaded fraction is the mean pressure divided by the peak.
         mean = finest.values["loaded_fraction"] * finest.values["pressure_peak"]
         fraction = mean / peak.value
         error = widen_error_by_peak_error(fraction, 0.0, peak.error / peak.value)
@@ -205,8 +211,8 @@ def _combine_series(coarse: list, levels: list) -> dict:
     return out
 
 
-def _compute_free_ends(patch_model, level: int) -> FreeEnds:
-    """Compute the change of compliance due to the free ends, with cells of a refinement level."""
+def _compute_free_end_compliance(patch_model, level: int) -> FreeEnds:
+    """Compute the change of compliance due to the free ends, with the cells of a given level."""
     half = patch_model.pieces.length / 2
     cell = END_CELL_RATIO * patch_model.pieces.length
     middle_cell = MIDDLE_CELL_RATIO * patch_model.pieces.length
@@ -236,7 +242,7 @@ def _distinct_pieces(patch_model) -> list:
 
 
 def make_point_compliances(patch_model, ends: FreeEnds, count: int) -> tuple:
-    """Return the compliance of equally spaced points for pressure and for shear.
+    """Return the normal and the tangential compliance of equally spaced points.
 
     Parameters
     ----------
@@ -266,7 +272,7 @@ def make_point_compliances(patch_model, ends: FreeEnds, count: int) -> tuple:
 
 
 def _row_depths(piece, layout: Layout) -> tuple:
-    """Return the depths [m] of the element rows of a piece and the number of coating rows."""
+    """Return the depths [m] of the element rows of a piece and the number of rows in the coating."""
     height = piece.height
     coating = piece.thickness
     end_cell = layout.bands[0][2]
@@ -282,16 +288,16 @@ def _row_depths(piece, layout: Layout) -> tuple:
 
 
 def _solve_level(patch_model, ends: FreeEnds, count: int, start=None) -> PointLevel:
-    """Solve the contact of a patch on a given number of equally spaced points.
+    """Solve the contact problem of a patch on a given number of equally spaced points.
 
-    start: forces (n,) [N] of the level with half as many points, or None.
+    start: forces (n,) [N] on the level with half as many points, or None.
     """
     length = patch_model.pieces.length
     normal, shear = make_point_compliances(patch_model, ends, count)
     x = normal.x
-    between = np.linspace(-length / 2, length / 2, 2 * count + 1)
-    gap = patch_model.gap.evaluate(between).heights[1::2]
-    solution = _solve_forces(patch_model, normal, gap, start)
+    half_points = np.linspace(-length / 2, length / 2, 2 * count + 1)
+    gap = patch_model.gap.evaluate(half_points).heights[1::2]
+    solution = _solve_nodal_forces(patch_model, normal, gap, start)
     force = solution.force
     deflection = normal.product(force)
     opening = gap + solution.rotation * x - solution.approach + deflection
@@ -314,7 +320,8 @@ def _solve_level(patch_model, ends: FreeEnds, count: int, start=None) -> PointLe
         solution.approach,
         patch_model.gap.angle + solution.rotation,
     )
-    # For unlike pieces the stiffness depends on the normal closing that shear causes.
+    # For unlike pieces, the tangential stiffness also depends on the coupling of shear and normal
+    # displacement, which is not computed here.
     tangential = np.nan
     if patch_model.pieces.are_alike:
         tangential = set_stiffness(shear, active, unit, contact_edges)
@@ -325,7 +332,7 @@ def _solve_level(patch_model, ends: FreeEnds, count: int, start=None) -> PointLe
         tangential=tangential,
         rotational=set_stiffness(normal, active, x, contact_edges),
     )
-    # The pressure at an end of the interface is taken from the point there.
+    # At an end of the interface the pressure is that of the point there.
     peak = float(estimate_peak_pressures(x, sigma[None], node_fraction=unit)[0])
     values = assemble_static_values(length, normal.area * count, state, peak, edge_values)
     if np.isnan(tangential):
@@ -354,24 +361,24 @@ def _solve_level(patch_model, ends: FreeEnds, count: int, start=None) -> PointLe
 
 
 def _contact_intervals(active, contact_edges: list, length: float) -> np.ndarray:
-    """Return the intervals in contact (k, 2) [m] for a contact set (n,) of bool.
+    """Return the contact intervals (k, 2) [m] of a contact set (n,) of bool.
 
-    An interval ends at an edge between two points, or at an end of the interface.
+    An interval ends at a contact edge between two points, or at an end of the interface.
     """
     is_active = np.concatenate([[False], active, [False]])
     edges = iter(contact_edges)
-    places = []
+    ends = []
     for point in np.flatnonzero(is_active[1:] != is_active[:-1]):
         is_inside = 0 < point < active.size
-        places.append(next(edges).position if is_inside else (point / active.size - 0.5) * length)
-    return np.array(places).reshape(-1, 2)
+        ends.append(next(edges).position if is_inside else (point / active.size - 0.5) * length)
+    return np.array(ends).reshape(-1, 2)
 
 
-def _solve_forces(patch_model, normal: PointCompliance, gap, start) -> PointForces:
+def _solve_nodal_forces(patch_model, normal: PointCompliance, gap, start) -> PointForces:
     """Solve for the nodal forces of a refinement level under the prescribed load or approach."""
     x = normal.x
     loading = patch_model.loading
-    begin = None if start is None else np.repeat(start, 2) / 2
+    initial_force = None if start is None else np.repeat(start, 2) / 2
     has_approach = loading.approach is not None
     offset = loading.approach if has_approach else gap.min()
     moment = None if has_approach else loading.moment
@@ -382,14 +389,16 @@ def _solve_forces(patch_model, normal: PointCompliance, gap, start) -> PointForc
         moment,
         loading.rotational_stiffness,
     )
-    force, n_iterations = solve_by_gradients(normal, problem, CONTACT_TOL, MAX_ITERATIONS, begin)
+    force, n_iterations = solve_by_gradients(
+        normal, problem, CONTACT_TOL, MAX_ITERATIONS, initial_force
+    )
     active = force > 0
     if has_approach or not active.any():
         return PointForces(force, float(offset), 0.0, n_iterations)
-    depth = (gap + normal.product(force))[active]
+    displacement = (gap + normal.product(force))[active]
     if moment is None:
-        return PointForces(force, float(depth.mean()), 0.0, n_iterations)
+        return PointForces(force, float(displacement.mean()), 0.0, n_iterations)
     middle = x[active].mean()
     arms = x[active] - middle
-    slope = float(arms @ depth) / max(float(arms @ arms), 1e-300)
-    return PointForces(force, float(depth.mean() - slope * middle), -slope, n_iterations)
+    slope = float(arms @ displacement) / max(float(arms @ arms), 1e-300)
+    return PointForces(force, float(displacement.mean() - slope * middle), -slope, n_iterations)
