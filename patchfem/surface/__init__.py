@@ -5,7 +5,7 @@ interface nodes (`nodes`), roughness with intervals (`roughness`), and what chan
 traces (`compare`) or two scans (`scans`). Read `profile` first, then `nodes`.
 """
 
-# names that other folders use, by module
+# Names that other folders use, by module.
 PUBLIC = {
     "areal": ("level_plane",),
     "compare.compare": (

@@ -7,9 +7,13 @@ import numpy as np
 from ..core import PatchfemError, frozen_array
 from .profile import Profile
 
-N_SWEEPS = 20  # relaxation sweeps by each operator; the heights of single holes have converged then
-DAMPING = 0.6  # fraction of each correction; relaxation by the bi-Laplacian diverges from 5/8 on
-RANK_TOL = 1e-12  # smaller singular values of the normal equations / count are round-off
+# Number of relaxation sweeps with each operator; the heights of
+# single holes have converged by then.
+N_SWEEPS = 20
+# Fraction of each correction that is applied; relaxation of the bi-Laplacian diverges from 5/8 on.
+DAMPING = 0.6
+# Singular value of the normal equations per height, at or below which it counts as round-off.
+RANK_TOL = 1e-12
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -92,7 +96,8 @@ def level(scan: Areal, degree: int) -> Areal:
         np.polynomial.legendre.legvander(_reduce_axis(axis), degree) for axis in (scan.x, scan.y)
     )
     powers = np.arange(degree + 1)
-    is_term = np.add.outer(powers, powers) <= degree  # powers of y, powers of x
+    # Exponents of y along the rows, of x along the columns.
+    is_term = np.add.outer(powers, powers) <= degree
     products = (along_x[:, :, None] * along_x[:, None, :]).reshape(scan.x.size, -1)
     sums = (known.astype(float) @ products).reshape(-1, degree + 1, degree + 1)
     normal = np.einsum("mik,mj,ml->jilk", sums, along_y, along_y, optimize=True)[is_term][

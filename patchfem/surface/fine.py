@@ -8,9 +8,11 @@ from ..core import PatchfemError
 from ..formatting import format_length
 from .profile import Profile, level, resample_evenly
 
-ELEMENTS_PER_WAVE = 2  # elements; nodes cannot represent a shorter wave
-MAX_LOST = 0.1  # fraction of the rms height in such waves above which a warning is given
-NEGLIGIBLE_LOST = MAX_LOST / 10  # same fraction; below it elements represent a trace
+ELEMENTS_PER_WAVE = 2  # number of elements per wave; nodes cannot represent a shorter wave
+# Fraction of the rms height in waves that are too short for the elements,
+# above which a warning is given.
+MAX_LOST = 0.1
+NEGLIGIBLE_LOST = MAX_LOST / 10  # same fraction, below which the elements represent a trace
 
 
 class WaveSpectrum(NamedTuple):

@@ -16,10 +16,11 @@ NOTES = (
     CENTRED_NOTE,
     MEANS_OVER_WAVES,
     "is rounded to",
-)  # parts of sentences that cast no doubt on a result
-ROUND_OFF = 1e-3  # fraction of the step; shorter lengths are round-off of x in the file
-MAX_MISSING_ELEMENTS = 0.5000001  # elements that a trace may lack at either end, with round-off
-MAX_STEP_ELEMENTS = 1.5  # elements; a larger sample spacing gets a note
+)  # parts of the notes that cast no doubt on a result
+ROUND_OFF = 1e-3  # digit to which notes state x, relative to its step; smaller digits are round-off
+# Largest number of elements that a trace may lack at either end, with round-off.
+MAX_MISSING_ELEMENTS = 0.5000001
+MAX_STEP_ELEMENTS = 1.5  # largest sample spacing in elements without a note
 
 
 def is_note(text: str) -> bool:

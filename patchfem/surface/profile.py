@@ -8,14 +8,18 @@ import numpy as np
 from ..core import PatchfemError, frozen_array
 from ..formatting import format_length
 
-WINDOW = 7  # samples of the running median; groups of up to three samples can be spikes
-SPECK_WINDOWS = (15, 31)  # samples of the running medians that find wider specks of dust
-SPIKE_DEVIATIONS = 8.0  # robust standard deviations; heights of rough surfaces stay within 6
-FOOT_DEVIATIONS = 3.0  # robust standard deviations, to which a speck is removed with its foot
-MAD_TO_DEVIATION = 1.4826  # standard deviation / median absolute deviation of normal values
-CHUNK = 131_072  # medians computed at a time, which limits the memory
-MAX_SAMPLES = 2_097_152  # samples of a resampled trace, which limits the memory
-EVEN_TOL = 1e-6  # relative range of the steps below which a trace counts as even
+WINDOW = 7  # number of samples in the running median; groups of up to three samples can be spikes
+SPECK_WINDOWS = (15, 31)  # numbers of samples in the running medians that find wider specks of dust
+# Smallest height of a spike in robust standard deviations; heights of rough surfaces stay within 6.
+SPIKE_DEVIATIONS = 8.0
+# Height in robust standard deviations down to which a speck is removed,
+# so that its foot goes with it.
+FOOT_DEVIATIONS = 3.0
+# Ratio of the standard deviation to the median absolute deviation of normal values.
+MAD_TO_DEVIATION = 1.4826
+CHUNK = 131_072  # number of medians that are computed at a time, which limits the memory
+MAX_SAMPLES = 2_097_152  # largest number of samples in a resampled trace, which limits the memory
+EVEN_TOL = 1e-6  # largest relative range of the steps of an evenly sampled trace
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -10,8 +10,8 @@ import numpy as np
 
 from ..formatting import format_length
 
-LEVEL = 0.95  # probability of the interval of a comparison
-SIDE = 1.959964  # standard deviations to either side that a normal interval of LEVEL extends
+LEVEL = 0.95  # probability that the interval of a comparison contains the true value
+SIDE = 1.959964  # half-width of a normal interval of LEVEL, in standard deviations
 
 
 class Quantity(NamedTuple):

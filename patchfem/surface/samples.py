@@ -8,13 +8,15 @@ from ..core import PatchfemError, frozen_array
 from ..formatting import format_length
 from .profile import Profile
 
-MAX_LENGTH = 10.0  # [m] a longer trace, or a larger coordinate, has a wrong unit
-MIN_LENGTH = 1e-9  # [m] a shorter trace has a wrong unit
-ATOM_WIDTH = 1e-10  # [m] heights that span less have a wrong unit
-OUTLIER_FRACTION = 0.01  # fraction of the heights at either end, which may be measurement faults
-MIN_ROUNDED = 10  # positions; fewer do not show whether they are even apart from rounding
-MAX_ROUNDING = 0.75  # printed digits between a position and the fitted line, half of it by rounding
-DIGIT_TOL = 1e-4  # relative to the last printed digit; a smaller deviation from it is round-off
+MAX_LENGTH = 10.0  # length [m] above which a trace or a coordinate has a wrong unit
+MIN_LENGTH = 1e-9  # length [m] below which a trace has a wrong unit
+ATOM_WIDTH = 1e-10  # span of heights [m] below which they have a wrong unit
+OUTLIER_FRACTION = 0.01  # fraction of the heights at either end that may be measurement faults
+# Smallest number of positions that shows whether they are even apart from rounding.
+MIN_ROUNDED = 10
+# Largest distance of a position from the fitted line in printed digits, half of which is rounding.
+MAX_ROUNDING = 0.75
+DIGIT_TOL = 1e-4  # largest deviation from a multiple of a digit, relative to it, that is round-off
 METRES_NOTE = "in the file, heights and length are in metres"  # sentence on the origin of the units
 GIVEN_UNITS_NOTE = "heights and length were read in the given units"
 

@@ -5,10 +5,13 @@ import numpy as np
 from .areal import Areal, fill_missing
 from .profile import CHUNK, robust_deviation
 
-THRESHOLDS = (10.0, 40.0, 160.0)  # standard deviations; a high one parts a spike from a slope
-MAX_SPIKE_POINTS = 12  # larger groups of points are features of the surface
-N_SAMPLED_HEIGHTS = 100_000  # heights from which the scatter about the medians is estimated
-WINDOW = 5  # points along each side of a median
+# Thresholds in standard deviations; a high one separates a spike from a slope.
+THRESHOLDS = (10.0, 40.0, 160.0)
+# Largest number of points in a spike; larger groups are features of the surface.
+MAX_SPIKE_POINTS = 12
+# Number of heights from which the scatter about the medians is estimated.
+N_SAMPLED_HEIGHTS = 100_000
+WINDOW = 5  # number of points along each side of the window of a median
 
 
 def find_scan_spikes(scan: Areal) -> np.ndarray:

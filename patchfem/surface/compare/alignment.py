@@ -21,29 +21,35 @@ from .model import (
 from .robust import MAX_NOISE, MAX_UNWORN, MIN_UNWORN, find_floors, fit_biweight, solve_weighted
 from .section import find_flank_ends, noise_threshold
 
-MAX_SCALE_RATIO = 1.5  # scale of a floor / that of the quietest floor; rougher floors are dropped
-BEND_GAIN = 0.8  # scale with / without a bend of the datum; below it, the bend is subtracted
-MIN_UNWORN_FRACTION = 0.7  # fraction of the heights of an unworn end that must lie on the floor
-# Length of a flank / length of the trace; from this ratio on, a scar is distinguished from a bent
-# datum.
+# Largest scale of a floor relative to that of the quietest floor; rougher floors are dropped.
+MAX_SCALE_RATIO = 1.5
+# Largest scale of a fit with a bend of the datum relative to one without it,
+# for which the bend is subtracted.
+BEND_GAIN = 0.8
+# Smallest fraction of unworn heights at an end of the trace that counts as unworn.
+MIN_UNWORN_FRACTION = 0.7
+# Length of a flank relative to the trace, from which on a scar is distinguished from a bent datum.
 LONG_FLANK = 0.05
-SHORT_FLANK = 0.02  # length of a flank / length of the trace; below this ratio, a scar is excluded
-MAX_CHI2 = 30.0  # chi-squared of a flank's bow, with two or three degrees of freedom
-FLANK_PARTS = 6  # parts of the trace (of N_PARTS) that remain on either side of a shallow track
+SHORT_FLANK = 0.02  # length of a flank relative to the trace, below which a scar is excluded
+MAX_CHI2 = 30.0  # largest chi-squared of the bow of a flank, with two or three degrees of freedom
+# Number of parts of the trace, out of N_PARTS, that remain on either side of a shallow track.
+FLANK_PARTS = 6
 MIN_PARTS = 3  # smallest number of parts in a shallow track
 DATUM_DEGREE = 3  # degree of the polynomial that a datum may add to shallow depths
-# Depth / standard deviation from which a box is a shallow track; 2 % of random walks have more.
+# Smallest depth of a shallow track in standard deviations; 2 % of random walks have a deeper one.
 MIN_STEP = 8.0
-# number of samples in the subset with which the starting points of a fit are refined
+# Number of samples in the subset that refines the starting points of a fit.
 N_THINNED = 2000
-# samples in the running means that detect wear below the noise of a single height
+# Numbers of samples in the running means that detect wear below the noise of a single height.
 MEAN_WINDOWS = (4, 16)
-MIN_WIDE_RUN = 64  # samples of a worn run from which its flanks may leave the floor gradually
-# width beside a worn run / width of the run; slight wear there would be taken for a drift
+# Smallest number of samples of a worn run whose flanks may leave the floor gradually.
+MIN_WIDE_RUN = 64
+# Width of the margin beside a worn run relative to the run; slight wear
+# there would be taken for a drift.
 MARGIN_FRACTION = 0.2
-MARGIN_SAMPLES = 8  # smallest width of the margin beside a worn run, in samples
-# Largest number of alternating fits and detections of wear; fewer if the worn heights stay the
-# same.
+MARGIN_SAMPLES = 8  # smallest number of samples in the margin beside a worn run
+# Largest number of alternating fits and detections of wear; they end earlier if the
+# worn heights no longer change.
 MAX_ROUNDS = 4
 
 
@@ -283,7 +289,7 @@ def find_worn_samples(depth, scale: float) -> np.ndarray:
     track, _ = find_shallow_track(depth, scale)
     if track is not None:
         worn[track[0] : track[1] + 1] = True
-    return np.convolve(worn, np.ones(3), "same") > 0.5  # wear runs out in the neighbouring samples
+    return np.convolve(worn, np.ones(3), "same") > 0.5  # wear fades out in the neighbouring samples
 
 
 def widen_to_flank_ends(depth, scale: float, worn) -> np.ndarray:

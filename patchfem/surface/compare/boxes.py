@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-# Number of parts of a trace, whose means show wear and drift below the noise of a single height.
+# Number of parts of a trace; their means show wear and drift below the noise of a single height.
 N_PARTS = 60
 
 

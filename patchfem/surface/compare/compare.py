@@ -50,7 +50,7 @@ from .worn import (
     split_at_tracks,
 )
 
-# definitions of the quantities, which the user reads
+# Definitions of the quantities, as the user reads them.
 SHIFT = "shift: the point at x in the first trace (before wear) is at x + shift in the second trace (after wear)"
 STRETCH = (
     "length of the second trace (after wear) divided by the length of the first trace for the same stretch of "
@@ -65,11 +65,14 @@ SLOPE = (
     "root mean square slope between neighbouring samples: value after wear divided by value before"
 )
 
-# relative length difference below which no note reports it, even if it is significant
+# Smallest relative length difference that a note reports; smaller ones are
+# not reported even if significant.
 MIN_STRETCH = 1e-4
-# noise / surface in mean squares; above this ratio, the measured ratio is that of the noise
+# Largest ratio of the mean squares of noise and surface; above it, a
+# measured ratio is that of the noise.
 MAX_NOISE_FRACTION = 1.0
-# number of alignments after specks were removed; the second one shows specks next to the first ones
+# Number of alignments after the removal of specks; the second one reveals
+# specks next to the first ones.
 N_SPECK_ROUNDS = 2
 
 
@@ -270,7 +273,7 @@ def _compare_aligned(place: Place, heights, direction: str) -> Comparison:
     before = place.before
     after = place.after
     alignment = place.alignment
-    if are_identical(before, after):  # except for rounding the fit finds no shift and no tilt
+    if are_identical(before, after):  # apart from rounding, the fit finds no shift and no tilt
         alignment = replace(alignment, state=frozen_array(np.zeros(5)))
     section = make_section(alignment)
     left_out = limit_left_out_wear(alignment, section, before, after, heights)

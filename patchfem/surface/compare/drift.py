@@ -13,20 +13,24 @@ import numpy as np
 
 from .boxes import N_PARTS, part_edges
 
-RANGES = np.geomspace(0.03, 1.0, 6)  # correlation lengths of a drift / length of the trace
-RATIOS = np.geomspace(0.1, 1e5, 13)  # variances of a drift / variance of the mean of a part
-# twice the smoothness nu of the Matern covariances; these three have a closed form
+# Correlation lengths of a drift relative to the length of the trace.
+RANGES = np.geomspace(0.03, 1.0, 6)
+# Variances of a drift relative to the variance of the mean of a part.
+RATIOS = np.geomspace(0.1, 1e5, 13)
+# Twice the smoothness nu of the Matern covariances; these three have a closed form.
 TWICE_SMOOTHNESS = (
     1.0,
     3.0,
     5.0,
 )
-MIN_HEIGHTS = 4  # mean number of heights of a part; shorter traces have fewer parts
-MIN_KNOWN = 0.5  # fraction of the heights of a part that must be unworn for the part to be used
-# number of parts that are used; if there are fewer, every part with an unworn height is used
+# Smallest mean number of heights in a part; short traces are split into fewer parts.
+MIN_HEIGHTS = 4
+MIN_KNOWN = 0.5  # smallest fraction of unworn heights in a part that is used
+# Smallest number of parts with enough unworn heights; with fewer, all parts
+# with an unworn height are used.
 MIN_PARTS = 8
-MIN_WEIGHT = 1e-4  # posterior weight; covariances with less are left out of the prediction
-# fraction of the variance that is added to the diagonal before the Cholesky factorization
+MIN_WEIGHT = 1e-4  # smallest posterior weight of a covariance that enters the prediction
+# Fraction of the variance that is added to the diagonal before the Cholesky factorization.
 JITTER = 1e-8
 
 

@@ -15,8 +15,9 @@ from ..quantity import LEVEL, SIDE
 from .drift import model_drift
 from .robust import BIWEIGHT, MAX_UNWORN
 
-N_DRAWS = 200  # number of bootstrap draws, which gives a standard deviation to 5 %
-TRUNCATED_VARIANCE = 0.911  # variance of normal noise that is cut off at REACH
+N_DRAWS = 200  # number of bootstrap draws, which determine a standard deviation to 5 %
+# Variance of normal noise of unit variance that is truncated at MAX_UNWORN.
+TRUNCATED_VARIANCE = 0.911
 SEED = 1989
 
 

@@ -16,12 +16,15 @@ from .search import MIN_SAMPLES
 
 PARTS = 40  # number of parts of the trace; the ends of a track are known to within one part
 FLANK_PARTS = 4  # number of parts in the shortest flank
-PART_SAMPLES = 8  # samples in a part of the second trace; the mean of fewer is too uncertain
-N_DRAWS = 100  # number of random traces into which the track is cut for the intervals
-# Widens the intervals, because the spectrum of the noise is estimated; without this factor only 85 of
-# 100 intervals contain the true value.
+# Smallest number of samples in a part of the second trace; the mean of fewer is too uncertain.
+PART_SAMPLES = 8
+N_DRAWS = 100  # number of random traces into which the track is cut to estimate the intervals
+# Factor that widens the intervals because the spectrum of the noise is itself an estimate; without
+# it, only 85 of 100 intervals contain the true value.
 SPECTRUM_ERROR_FACTOR = 1.4
-MIN_CLEARANCE = 1.2  # depth or roughness / the largest one of random traces without a track
+# Depth of a track, or roughness beside it, relative to the largest of random traces without a
+# track, above which it is not due to chance.
+MIN_CLEARANCE = 1.2
 
 
 class Interval(NamedTuple):
@@ -161,7 +164,7 @@ def _find_span(depth, box: tuple) -> slice:
     """Find the samples of the track: from its deepest point to where the running mean is zero."""
     edges = part_edges(depth.size, PARTS)
     smooth = _smooth(depth)
-    # a running mean this small is zero to within rounding
+    # A running mean this small is zero apart from rounding.
     outside = np.flatnonzero(smooth <= 1e-9 * smooth.max())
     deepest = edges[box[0]] + int(np.argmax(smooth[edges[box[0]] : edges[box[1]]]))
     before = outside[outside < deepest]
@@ -192,7 +195,7 @@ def _measure_flanks(second: Profile, box: tuple, traces) -> Flanks:
         area_interval = Interval(
             area, float(np.clip(area - high, 0.0, area)), float(max(area - low, area))
         )
-        # the highest or lowest point of the roughness may lie anywhere in the track
+        # The highest or lowest point of the roughness may lie anywhere in the track.
         error = float(np.quantile(np.abs(traces[:, track.span]).max(axis=1), 1 - tail))
         largest = Interval(peak, max(peak - error, 0.0), peak + error)
     start = float(x[track.span.start])

@@ -4,7 +4,9 @@ import numpy as np
 
 from .alignment import Alignment
 
-MAX_SCATTER_RATIO = 0.8  # scatter without / with the effect of the gain; wear leaves a larger ratio
+# Largest scatter with the gain subtracted relative to the scatter without
+# it; wear leaves a larger ratio.
+MAX_SCATTER_RATIO = 0.8
 
 
 def find_gain(alignment: Alignment) -> float | None:

@@ -13,13 +13,13 @@ from .section import Section
 
 MIN_WINDOW = 5  # number of samples in the shortest window
 MAX_WINDOW = 1025  # number of samples in the longest window
-N_PARTS = 8  # number of parts of a window, whose means the parabola must also fit
-# Standard deviations of a misfit; with this limit the parabola fits 97 % of the windows of pure
-# noise.
+N_PARTS = 8  # number of parts of a window; the parabola must also fit the mean of each part
+# Largest misfit in standard deviations, for which the parabola fits
+# 97 % of the windows of pure noise.
 MAX_MISFIT = 2.5
-# standard deviations that are subtracted from a depth when the largest depth is chosen
+# Number of standard deviations subtracted from each depth when the largest depth is selected.
 PENALTY = 3.0
-# samples; for longer windows, a quarter of the window on either side shows the slopes
+# Number of samples from which on the slopes are fitted to a quarter of the window on either side.
 LONG_WINDOW = 64
 
 
@@ -134,7 +134,7 @@ def _limit_corner(depth, window: slice, noise: float) -> float:
     slope = (before - after) / 2
     curvature = -2 * float(np.polyfit(np.arange(length), depth[window], 2)[0])
     expected = curvature * ((length + count) / 2)
-    # 27 is the factor of the variance of both slopes for white noise
+    # For white noise, the variances of both slopes contribute a factor of 27.
     min_difference = 3 * 27 * noise / length**1.5 if length >= LONG_WINDOW else 0.0
     if slope <= 0 or expected - slope <= min_difference:
         return 0.0
@@ -181,7 +181,7 @@ def _fit_windows(depth, noise, correlation: float) -> _Windows:
         pair = fitting[np.clip(np.stack([after - 1, after]), 0, fitting.size - 1)]
         distance = np.abs(pair + length // 2 - here)
         nearest = np.where(distance[0] <= distance[1], pair[0], pair[1])
-        # a corner next to the window would lift its outer heights
+        # A corner next to the window would raise its outer heights.
         is_inside = distance.min(axis=0) <= length // 4
         start[is_inside] = nearest[is_inside]
         size[is_inside] = length

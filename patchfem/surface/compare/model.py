@@ -14,12 +14,12 @@ import numpy as np
 from ...core import PatchfemError
 from ..profile import Profile, level, resample_evenly
 
-MIN_HEIGHTS = 12  # number of common heights; fewer do not determine the parameters
+MIN_HEIGHTS = 12  # smallest number of common heights; fewer do not determine the parameters
 N_BLOCKS = 20  # number of blocks of a trace, whose modes give the starting points of a fit
-ROUNDING = 1e-5  # fraction of the rms height; a smaller scale is round-off of the file
-MAX_WINDOW = 51  # number of samples of the longest parabola from which a slope is taken
-SLOPE_NOISE = 0.05  # noise / rms slope that the smoothed slopes should reach
-MAX_STEP = 4.0  # samples or pixels; largest displacement in one step of the fit
+ROUNDING = 1e-5  # scale of a fit relative to the rms height, below which it is rounding of the file
+MAX_WINDOW = 51  # largest number of samples in a parabola from which a slope is taken
+SLOPE_NOISE = 0.05  # target ratio of the noise of the smoothed slopes to the rms slope
+MAX_STEP = 4.0  # largest displacement in one step of the fit, in samples or pixels
 
 
 class Parameter(IntEnum):

@@ -9,7 +9,7 @@ from ...inputs.cells import TableFormat, parse_header, read_text, split_cells
 from ..quantity import Quantity, average_quantities
 
 COLUMNS = ("before", "after")  # columns that every table has
-# basis of the answer for a pair, as printed; means are taken only over pairs of the same kind
+# Basis of the answer for a pair, as printed; means are taken only over pairs with the same basis.
 KINDS = {
     "scans": "areal scans",
     "run": "results folders",
@@ -17,7 +17,7 @@ KINDS = {
     "flanks": "traces compared by the unworn flanks of a track",
     "nothing": "traces that cannot be registered to each other",
 }
-# quantities that have a mean; positions have none, because they depend on where a trace begins
+# Quantities that are averaged; positions are not, because they depend on where a trace begins.
 AVERAGED_QUANTITIES = (
     "worn_volume",
     "grown_volume",
@@ -155,7 +155,7 @@ def compare_pairs(
         cells = {"line": line.line, "before": before, "after": after, "labels": dict(line.labels)}
         try:
             row = {**answer(line.paths, line.direction), **cells, "outcome": "done", "message": ""}
-        except Exception as error:  # a defect of one pair must not cost the answers of the others
+        except Exception as error:  # a defect of one pair must not lose the answers of the others
             reason = str(error)
             if not isinstance(error, PatchfemError):
                 reason = f"internal fault, please report it: {type(error).__name__}: {error}"

@@ -23,16 +23,21 @@ from .search import (
 )
 from .worn import wear_balance
 
-MAX_NOISE = 0.1  # noise / rms height; a larger noise may be due to wear of the valleys
-MAX_LOW_NOISE = 0.02  # same ratio; below it, a smaller clearance suffices
+# Largest ratio of noise to rms height at a match; a larger one may be due to wear of the valleys.
+MAX_NOISE = 0.1
+MAX_LOW_NOISE = 0.02  # largest ratio of noise to rms height for which a smaller clearance suffices
 MIN_LOW_CLEARANCE = 2.5  # this smaller clearance, in standard deviations of random traces
-MAX_WHITE_NOISE = 0.3  # noise / rms height of white noise, which only instruments cause
-MAX_WHITE_NOISE_AT_MARK = 0.5  # noise / rms height of white noise at a shift that the user gave
-MAX_WHITE_LENGTH = 1.5  # correlation length in samples; noise with a longer one is not white
-# (lost - grown) / (lost + grown) area; above it, wear alone explains the change
+# Largest ratio of white noise to rms height at a match; only instruments cause white noise.
+MAX_WHITE_NOISE = 0.3
+# Largest ratio of white noise to rms height at a shift that the user gave.
+MAX_WHITE_NOISE_AT_MARK = 0.5
+MAX_WHITE_LENGTH = 1.5  # largest correlation length of white noise, in samples
+# Smallest ratio (lost - grown) / (lost + grown) of areas for which wear alone explains the change.
 MIN_WEAR_BALANCE = 0.9
-MIN_AGREED = 0.6  # fraction of the heights that agree; most traces of different surfaces have fewer
-# noise / rms height where so many heights agree; pairs at one position reach 0.19, saw teeth at two positions 0.29
+# Smallest fraction of agreeing heights at a match; most traces of different surfaces have fewer.
+MIN_AGREED = 0.6
+# Largest ratio of noise to rms height where that many heights agree; pairs at one position reach
+# 0.19, saw teeth at two positions 0.29.
 MAX_AGREED_NOISE = 0.2
 USE_SAME_MARK = "if both traces were measured from the same mark, use --shift '0 mm'"
 

@@ -23,34 +23,38 @@ from .errors import correlation_length, student_factor
 from .sentences import is_significant
 from .worn import make_section
 
-# Number of bins along the patch, whose means are compared: the noise of single heights averages out.
+# Number of bins along the patch; their means are compared because the noise
+# of single heights averages out.
 N_BINS = 100
-# Number of trial coefficients of the search.
+# Number of trial coefficients in the search.
 N_RATIOS = 90
-# Smallest fraction of the patch that the traces must show, so that the place of the patch is known.
+# Smallest fraction of the patch that the traces must show for its position to be known.
 MIN_OVERLAP = 0.25
-# Measured depths up to this fraction of half the patch length beyond each of its ends take part in the
-# fit, because unworn depths show where the wear ends.
+# Margin beyond each end of the patch relative to half its length; measured depths there take part
+# in the fit, because unworn depths show where the wear ends.
 END_MARGIN_RATIO = 0.1
-# Largest ratio of the fitted coefficient to that of the run; beyond it the computed shape is a guess.
+# Largest ratio of the fitted wear coefficient to that of the run; above it,
+# the computed shape is a guess.
 MAX_RATIO = 2.0
-# Largest ratio that the search tries, to find the coefficient that a refused run should have.
+# Largest ratio in the search, so that a message can propose a coefficient for the next run.
 SEARCHED_RATIO = 1e4
-# Largest ratio of measured to computed width of the wear; above it the run is not of the measured contact.
+# Largest ratio of measured to computed width of the wear; above it, the run does not
+# describe the measured contact.
 MAX_WIDTH_RATIO = 1.5
-# Depth at the ends of the computed wear, as a fraction of the largest depth.
+# Depth at the ends of the computed wear relative to the largest depth.
 WORN_FRACTION = 0.05
-# Largest increase of the sum of squares, in variances, of a place that explains the wear as well as the best one.
+# Largest increase of the sum of squares, in variances, of a position that explains
+# the wear as well as the best one.
 ACCEPTED_DEVIANCE = 4.0
-# Number of places that are tried in addition to the best one.
+# Largest number of positions that are tried in addition to the best one.
 MAX_PLACES = 24
-# Smallest distance [bins] of two places that count as different.
+# Smallest distance between two different positions, in bins.
 MIN_PLACE_DISTANCE = 1.5
-# Smallest fraction of a variance that the fit leaves; smaller ones are too uncertain to divide by.
+# Smallest fraction of a variance left after the fit; smaller ones are too uncertain to divide by.
 MIN_REMAINDER = 0.5
-# Smallest number of independent terms of Student's t; fewer give no useful interval.
+# Smallest number of degrees of freedom of Student's t; fewer give no useful interval.
 MIN_BLOCKS = 3.0
-# Smallest relative difference of the coefficient in proportion that a note reports.
+# Smallest relative difference of the proportionally scaled coefficient that a note reports.
 MIN_DEPARTURE = 0.01
 
 

@@ -16,8 +16,9 @@ from .boxes import average_parts, part_edges
 
 # Standard deviation of a ratio due to tip, interpolation and datum, in addition to the noise.
 RATIO_ERROR = 0.004
-MAX_MISSING = 1 / 3  # fraction of the heights of a line of a scan that may be missing
-# Largest number of lines of a scan that are evaluated; more lines would nearly repeat their neighbours.
+MAX_MISSING = 1 / 3  # largest fraction of missing heights in a line of a scan
+# Largest number of lines of a scan that are evaluated; more lines would
+# nearly repeat their neighbours.
 MAX_LINES = 256
 N_PARTS = 6  # number of parts of a trace whose mean squares show the scatter along the trace
 

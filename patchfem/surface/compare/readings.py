@@ -17,21 +17,25 @@ from .flanks import Flanks
 from .robust import MAX_NOISE
 from .section import median_of_five
 
-# headlines of traces that have two interpretations
+# Headlines of traces that have two interpretations.
 BENT_DATUM_HEADLINE = "a scar or a bent datum, both are possible"
 GROWN_ENDS_HEADLINE = "a scar or material that grew at the ends, both are possible"
 NOISE = "a scar or noise, both are possible"
 DRIFT = "a scar or a datum that drifts, both are possible"
-# depth of a scar / standard deviation of the drift: three times the width of an interval of +-2 deviations
+# Smallest depth of a scar in standard deviations of the drift: three times the width of
+# an interval of +-2 deviations.
 MIN_DEPTH_OVER_DRIFT = 12.0
-# covariance of neighbouring unworn parts / their variance, which is near 1 for a drift and 0 for noise
+# Smallest covariance of neighbouring unworn parts relative to their variance that shows a drift; it
+# is near 1 for a drift and 0 for noise.
 MIN_SLOW_FRACTION = 0.5
-# long-wave difference of the traces on the flanks / depth of the track; above it, the flanks are worn
+# Largest long-wave difference of the traces on the flanks relative to the depth of the track;
+# above it, the flanks are worn.
 MAX_FLANK_ERROR = 0.1
-N_WAVES = 8  # largest number of half waves of the cosines that describe a drift along the trace
-# residual of these cosines / noise; below it, a drift explains the whole difference of the traces
+N_WAVES = 8  # largest number of half waves in the cosines that describe a drift along the trace
+# Residual of these cosines relative to the noise, below which a drift explains the
+# whole difference of the traces.
 MAX_SCATTER_RATIO = 1.3
-# number of independent unworn heights; fewer do not show how large their error is
+# Smallest number of independent unworn heights; fewer do not show how large their error is.
 MIN_BLOCKS = 12.0
 
 

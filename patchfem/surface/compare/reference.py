@@ -14,15 +14,17 @@ from .model import Parameter
 from .robust import MAX_UNWORN, MIN_UNWORN
 from .section import Section, median_of_five
 
-MIN_SAMPLES = 40  # samples of the shortest unworn part
-# standard deviations; the deepest height of a worn part is at least this deep
+MIN_SAMPLES = 40  # smallest number of samples in an unworn part
+# Smallest depth of the deepest height of a worn part, in standard deviations.
 MIN_WORN_DEPTH = 2 * MAX_UNWORN
-# samples at half depth; a narrower valley may be an interpolation error
+# Smallest number of samples of a worn valley at half its depth; a narrower one
+# may be an interpolation error.
 SPECK_SAMPLES = 16
-NARROW_SAMPLES = 5  # samples of a scratch at half depth
-MIN_SCRATCH = 20.0  # standard deviations; smallest depth of a scratch
-MIN_TOPS = 8  # number of worn tops from which the valleys between them are a reference
-# mean fraction of unworn heights that were lower than a worn one before wear; it is 1 if only tops wore off
+NARROW_SAMPLES = 5  # smallest number of samples of a scratch at half its depth
+MIN_SCRATCH = 20.0  # smallest depth of a scratch, in standard deviations
+MIN_TOPS = 8  # smallest number of worn tops for which the valleys between them are a reference
+# Smallest mean fraction of unworn heights that were lower than a worn one before wear; the
+# fraction is 1 if only tops wore off.
 MIN_HIGHER = 0.65
 HIDDEN_TEXT = (
     "largest mean depth of wedge-shaped wear that is possible if the tilt between the traces (upper end of its "
@@ -120,7 +122,7 @@ def _is_flank(alignment: Alignment, first: int, last: int) -> bool:
     min_length = (SHORT_FLANK if alignment.is_straight else LONG_FLANK) * (x[-1] - x[0])
     if x[last] - x[first] < min_length or last - first < MIN_SAMPLES:
         return False
-    # wear may begin in the tenth of the run that is next to the track
+    # Wear may begin in the tenth of the run that is next to the track.
     margin = (last - first) // 10
     start = first + margin if first else 0
     stop = last + 1 - margin if last < x.size - 1 else last + 1

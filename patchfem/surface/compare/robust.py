@@ -15,20 +15,23 @@ import numpy as np
 
 from ..profile import robust_deviation
 
-# fraction of the heights that least trimmed squares fits; it is small because only few may be unworn
+# Fraction of the heights that least trimmed squares fits; it is small because
+# only few heights may be unworn.
 TRIMMED_FRACTION = 0.2
 MIN_UNWORN = 0.08  # smallest fraction of unworn heights that can serve as a reference surface
-# distance from the floor in scales; farther heights have no weight, with 95 % efficiency for normal noise
+# Distance from the floor, in scales, from which on Tukey's biweight is zero; its
+# efficiency for normal noise is 95 %.
 BIWEIGHT = 4.685
 MAX_UNWORN = 2.5  # largest distance of an unworn height from the floor, in scales
-MAX_NOISE = 4.0  # standard deviations to which noise is clipped; a height farther away is not noise
-MAX_OUTLIER = 8.0  # standard deviations that noise never reaches
-# fraction of the heights of a block in the interval that gives the mode of the block
+MAX_NOISE = 4.0  # largest height of noise in standard deviations; noise is clipped to it
+MAX_OUTLIER = 8.0  # height in standard deviations that noise never reaches
+# Fraction of the heights of a block in the shortest interval that gives its mode.
 SHORTH_FRACTION = 0.3
 MAX_SUBSETS = 1200  # largest number of subsets of blocks that are tried, which limits the time
-# largest number of floors, each sought in the blocks that lie on none of the floors before
+# Largest number of floors; each is sought in the blocks that lie on none of the previous floors.
 MAX_FLOORS = 3
-# determinant of a subset; below it, the blocks of the subset lie too close together
+# Smallest determinant of the equations of a subset of blocks; below it, the blocks lie too
+# close together to define a floor.
 MIN_DETERMINANT = 1e-3
 N_RANKING_HEIGHTS = 1000  # number of heights whose trimmed squares rank the subsets
 SEED = 1985  # seed of the random subsets and of the random traces

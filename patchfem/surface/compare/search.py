@@ -17,19 +17,24 @@ from .boxes import running_mean
 from .robust import SEED
 
 MAX_SAMPLES = 8192  # largest number of samples in the search; longer traces are averaged
-# number of samples of a trace, or of a part of it; fewer give no useful correlation
+# Smallest number of samples of a trace, or of a part of it, for a useful correlation.
 MIN_SAMPLES = 16
-MIN_OVERLAP = 0.5  # fraction of the shorter trace that must lie on the other one
-MAX_WAVE = 0.25  # fraction of the shorter trace; longer waves and the tilt are filtered out
+MIN_OVERLAP = 0.5  # smallest fraction of the shorter trace that must overlap the other one
+# Longest wave in the search as a fraction of the shorter trace; longer waves
+# and the tilt are filtered out.
+MAX_WAVE = 0.25
 N_RANDOM = 100  # number of random traces, whose correlations are due to chance
-# standard deviations above the correlations of random traces; 1 of 1000 unrelated pairs has more
+# Smallest clearance above the correlations of random traces, in standard deviations; 1 of 1000
+# unrelated pairs has a larger one.
 MIN_CLEARANCE = 5.0
-# Difference of Fisher's z of the best and second-best shift; 150 related pairs had 0.64 or more.
+# Smallest difference of Fisher's z between the best and the second-best shift; 150
+# related pairs had 0.64 or more.
 MIN_LEAD = 0.3
-MAX_SECOND = 0.97  # correlation of the second-best shift; only periodic surfaces have a larger one
+# Largest correlation of the second-best shift; only periodic surfaces have a larger one.
+MAX_SECOND = 0.97
 N_PARTS = 12  # number of parts of the first trace that are correlated one by one
-N_BEST_PARTS = 4  # number of parts whose correlations, the largest ones, give the score of a shift
-# largest correlation that is counted for a part, because no single part proves a match
+N_BEST_PARTS = 4  # number of parts with the largest correlations, which give the score of a shift
+# Largest correlation that is credited to a part, because no single part proves a match.
 MAX_CORRELATION = 0.999
 
 

@@ -14,30 +14,36 @@ from ..quantity import SIDE, Quantity, make_quantity, make_unknown
 from .errors import block_length, correlation_length, draw_blocks, student_factor
 from .robust import MAX_NOISE, MAX_OUTLIER, MAX_UNWORN
 
-# fraction of unworn traces in which noise alone is reported as wear
+# Fraction of unworn traces in which noise alone is reported as wear.
 FALSE_POSITIVE_RATE = 1e-3
-N_TESTS = 4  # number of tests of each height: by itself, and by means of 4, 16 and 64 samples
-# standard deviations of the depth to which a flank is fitted; up to 10 of them, a straight flank
-# cannot be told from one that runs out flat; above half of the depth, the floor begins
+N_TESTS = 4  # number of tests of each height: the height itself, and means of 4, 16 and 64 samples
+# Depth to which a flank is fitted, in standard deviations; below 10, a straight flank cannot be
+# told from one that fades out; above half of the depth, the floor begins.
 FLANK_HEIGHT = 25.0
-# standard deviations of the depth that a cliff reaches at least, and to which all flanks are fitted
+# Smallest height of a cliff, and smallest depth to which any flank is
+# fitted, in standard deviations.
 MIN_CLIFF = 10.0
-MIN_FLANK_SAMPLES = 12  # samples of a flank, and of the unworn heights beside it
-# largest number of samples that are tried as the first worn one, which limits the time
+MIN_FLANK_SAMPLES = 12  # smallest number of samples of a flank, and of the unworn heights beside it
+# Largest number of samples that are tried as the first worn one, which limits the time.
 MAX_CANDIDATES = 160
-MIN_PILE_UP = 3.0  # standard deviations above the first trace from which a height is pile-up
-# samples between the point where a smooth flank leaves zero and its first worn sample
+MIN_PILE_UP = 3.0  # smallest height of a pile-up above the first trace, in standard deviations
+# Distances, in samples, from the point where a smooth flank leaves zero to its first worn sample.
 OFFSETS = (1 / 3, 2 / 3, 1.0)
-MIN_STEP_DEVIANCE = 12.0  # decrease of the deviance from which a flank begins with a step
-# largest number of bootstrap blocks of a mean section; more would not show its long-wave errors
+# Smallest decrease of the deviance for which a flank is modelled with a step.
+MIN_STEP_DEVIANCE = 12.0
+# Largest number of bootstrap blocks of a mean section; more would not show its long-wave errors.
 MAX_BLOCKS = 8
 N_FIFTHS = 5  # number of parts of a track; the deepest part is the floor
-MAX_CUT_SAMPLES = 5  # samples between a track and the end of the section, where it may be cut off
-# fraction of worn heights in a track; worn tops between valleys have a smaller one
+# Largest number of samples between a track and the end of the section at
+# which the track may be cut off.
+MAX_CUT_SAMPLES = 5
+# Smallest fraction of worn heights in a track; worn tops between valleys have a smaller one.
 MIN_WORN_FRACTION = 0.85
-MAX_GAP_FRACTION = 0.05  # unworn gap / width of the track, up to which both sides are one track
-MIN_WAVES_PER_TRACK = 3.0  # length of the shortest track / longest wave of the band
-# distance of two neighbours / median distance; above it, heights are missing between them
+# Largest unworn gap relative to the width of the track for which both sides belong to one track.
+MAX_GAP_FRACTION = 0.05
+MIN_WAVES_PER_TRACK = 3.0  # smallest length of a track relative to the longest wave of the band
+# Largest distance of two neighbouring heights relative to the median distance; above it,
+# heights are missing between them.
 MISSING_DISTANCE = 1.5
 
 _ONE_SIDE = "area above the first trace (before wear) within one track width"
@@ -172,7 +178,7 @@ def find_worn_heights(section: Section) -> np.ndarray:
     for window in (4, 16, 64):
         if window > relative.size // 4:
             break
-        # deep heights would lift the means next to them
+        # Deep heights would raise the means next to them.
         shallow = np.clip(np.where(worn, 0.0, relative), -MAX_OUTLIER, MAX_OUTLIER)
         mean = np.convolve(shallow, np.full(window, 1 / window), "valid")
         for k in np.flatnonzero(mean > threshold * np.sqrt(section.correlation / window)):
@@ -294,7 +300,7 @@ def _outside_deviances(depth, noise) -> np.ndarray:
     squares = np.where(depth < -MIN_PILE_UP * noise, 1.0, (depth / noise) ** 2)
     terms = np.minimum(squares, MAX_NOISE**2) + 2 * np.log(noise)
     sums = np.concatenate([[0.0], np.cumsum(terms)])
-    # the last unworn height counts in full, because a speck would not be next to a flank
+    # The last unworn height counts in full, because a speck would not be next to a flank.
     sums[1:] += np.maximum(squares - MAX_NOISE**2, 0.0)
     return sums
 
@@ -312,7 +318,7 @@ def _flank_deviances(depth, noise) -> np.ndarray:
         t = (samples + offset) / depth.size
         base = np.column_stack([t**power, t ** (power + 1)]) / noise[:, None]
         shape = np.linalg.solve(base.T @ base, base.T @ weighted)
-        if shape[0] < 0:  # the flank would rise above the surface first
+        if shape[0] < 0:  # the flank would rise above the surface at first
             curved = base[:, 1]
             shape = np.array([0.0, max(float(curved @ weighted) / float(curved @ curved), 0.0)])
         residuals.append(float(((weighted - base @ shape) ** 2).sum()))
@@ -574,7 +580,8 @@ def _measure_floor(section: Section, start: float, width: float) -> Quantity:
     error = float(np.var(np.mean(drawn, axis=0)))
     scatter = float(np.mean([floor.scatter for floor in floors]))
     roughness = max(scatter**2 - noise**2, 0.0)
-    # a parabola through n independent values has at most 9 / n times their variance, which occurs at its ends
+    # A parabola through n independent values has at most 9 / n times their
+    # variance, which occurs at its ends.
     correlated = min(9.0 * section.correlation / deepest[0].size, 1.0)
     value = float(np.mean([floor.depth for floor in floors]))
     return make_quantity(value, float(np.sqrt(error + roughness * correlated)), "m", text, 0.0)

@@ -11,9 +11,9 @@ from .compare import Comparison, are_identical
 from .readings import describe_other
 from .reference import describe_bow_area, describe_hidden_wear, describe_reference
 
-# deposited / worn area; from this ratio on, material above the first trace is reported
+# Smallest ratio of deposited to worn area from which on material above the first trace is reported.
 MIN_DEPOSITED = 0.05
-ROUNDING = 1e-6  # distance of a ratio from 1 that is round-off
+ROUNDING = 1e-6  # largest difference of a ratio from 1 that is round-off
 SQUARE_UM = 1e12  # um^2 in a m^2
 
 

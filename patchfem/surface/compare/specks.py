@@ -14,14 +14,17 @@ from ..profile import MAD_TO_DEVIATION, Profile, find_runs, robust_deviation
 from .alignment import Alignment
 from .section import Section, noise_threshold
 
-N_AROUND = 101  # samples whose height differences give the roughness around a speck
-N_MEDIAN = 41  # samples of the running median from which specks deviate
-MAX_WIDTH = 12  # width of a speck at half height in samples; wider ones are features of the surface
-# height difference at both walls / robust deviation of these differences along the surface
+N_AROUND = 101  # number of samples whose height differences give the roughness around a speck
+N_MEDIAN = 41  # number of samples in the running median from which specks deviate
+# Largest width of a speck at half its height, in samples; wider ones are features of the surface.
+MAX_WIDTH = 12
+# Smallest jump at both edges of a speck relative to the robust deviation
+# of the jumps along the surface.
 MIN_WALL = 5.0
-MIN_OUTSIDE_WALL = 1.5  # same ratio at heights that wear cannot explain, so smaller walls suffice
-MAX_DUST_STEPS = 9.0  # height of a dust particle / height difference at its wall
-MAX_DROPOUT_STEPS = 2.0  # depth of a dropout / height difference at its wall
+# Smallest such ratio at heights that wear cannot explain, where smaller edges suffice.
+MIN_OUTSIDE_WALL = 1.5
+MAX_DUST_STEPS = 9.0  # largest height of a dust particle relative to the jump at its edge
+MAX_DROPOUT_STEPS = 2.0  # largest depth of a dropout relative to the jump at its edge
 
 
 def remove_specks(alignment: Alignment, before: Profile, after: Profile) -> tuple:
@@ -48,10 +51,10 @@ def remove_specks(alignment: Alignment, before: Profile, after: Profile) -> tupl
     if depth.size < 2 * N_MEDIAN:
         return before, after
     deviation = depth - _running_median(depth)
-    # each height may be above or below, so there are two tests per height
+    # Each height may be above or below, so there are two tests per height.
     sure = noise_threshold(2 * depth.size, 1)
     step = robust_deviation(np.diff(first)) + 1.5 * alignment.noise
-    # a jump is roughness if most of its neighbours jump too, as on a rough floor
+    # A jump is roughness if most of its neighbours jump too, as on a rough floor.
     jumps = np.abs(np.diff(depth, append=depth[-1]))
     steps = np.maximum(step, MAD_TO_DEVIATION * median_filter(jumps, N_AROUND, mode="nearest"))
     surfaces = (first, first - depth)

@@ -23,7 +23,7 @@ from .ratios import resample
 from .worn import split_at_flanks, split_at_tracks
 
 REGIONS = ("inside", "outside")
-# Smallest ratio of the length of a piece to the cut-off; half a cut-off is trimmed at each end.
+# Smallest length of a piece relative to the cut-off; half a cut-off is trimmed at each end.
 MIN_CUTOFFS = 2.0
 # Ratio of the relative variance of Ra to that of Rq, for Gaussian heights.
 RA_VARIANCE_RATIO = np.pi - 2

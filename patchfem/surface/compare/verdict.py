@@ -113,7 +113,8 @@ def _has_no_place(facts: _Facts) -> bool:
     return facts.scan_headline == ELSEWHERE or any(is_elsewhere(part) for part in facts.parts)
 
 
-# (condition, headline from the facts and the headline of wear and waves); the first that holds is taken
+# Pairs (condition, headline from the facts and the headline of wear and waves); the first pair
+# whose condition holds applies.
 PLACE_RULES = (
     (_has_grown, lambda facts, change: f"{GREW}; as given: {change}"),
     (

@@ -29,7 +29,7 @@ from .section import (
     measure_track,
 )
 
-# definitions of the quantities, which the user reads
+# Definitions of the quantities, as the user reads them.
 LARGEST_TEXT = "largest worn depth, corrected for noise"
 MEAN_TEXT = "mean worn depth over the common length"
 AREA_TEXT = "worn area of the section, which is the worn volume per unit of width"
@@ -39,12 +39,13 @@ WITHIN_TEXT = (
 )
 END_TEXTS = ("x of the first worn place", "x of the last worn place")
 
-# fraction of the total lost area; the ends of worn runs with less are not ends of the wear
+# Smallest fraction of the total lost area in a worn run whose ends count as ends of the wear.
 MIN_AREA_FRACTION = 0.01
-# cut-off / longest wave of the band; longer waves of the depth are the form of a track
+# Cut-off relative to the longest wave of the band; longer waves of the
+# depth are the form of a track.
 FORM_WAVES = 2.5
-MIN_VALLEY = 10.0  # standard deviations; smallest depth of a new valley below the first trace
-N_BESIDE = 5  # samples next to a track, where the running median may still show the track
+MIN_VALLEY = 10.0  # smallest depth of a new valley below the first trace, in standard deviations
+N_BESIDE = 5  # number of samples next to a track where the running median may still show the track
 
 
 class Extent(NamedTuple):
@@ -144,7 +145,7 @@ def measure_worn(
     area, error = section.integrate(~is_deposit)
     width = section.widths
     length = float(width.sum())
-    # identical heights show no noise; then the rounding of the printed digits bounds the error
+    # Identical heights show no noise, so the rounding of the printed digits bounds the error.
     rounding = 0.1 * alignment.noise * float(np.sqrt((width**2).sum()))
     error = max(error, rounding)
     area = area if abs(area) > 1e-6 * alignment.noise * length else 0.0
@@ -176,7 +177,7 @@ def limit_slight_wear(alignment: Alignment, section: Section) -> float:
     relative = section.depth / section.noise
     distance = np.abs(relative)
     is_slight = (distance > MAX_UNWORN) & (distance < 2 * MAX_UNWORN)
-    # noise alone is as often above the reference level as below it
+    # Noise alone is as often above the reference level as below it.
     n_slight = max(float(np.sign(relative[is_slight]).sum()), 0.0)
     deepest = MAX_UNWORN * float(np.median(section.noise))
     return n_slight * deepest / max(int(alignment.unworn.sum()), 1)

@@ -19,8 +19,9 @@ from .raster import make_scan_of_matrix, make_scan_of_points
 from .raw import MAX_POINTS, RawFile, shorten
 from .units import GIVE_PIXEL_SIZE, GIVE_UNITS, UNIT_LIST, parse_length_unit, parse_pixel_size
 
-MAX_HEADER = 10_000  # bytes of the header of an .npy file; usual ones have fewer than 200
-MIN_ROWS = 8  # rows of an unnamed matrix that may be a table of columns
+# Largest size of the header of an .npy file, in bytes; usual headers have fewer than 200.
+MAX_HEADER = 10_000
+MIN_ROWS = 8  # smallest number of rows in an unnamed matrix that may be a table of columns
 ARRAY_EXAMPLE = 'np.save("scan.npy", np.column_stack([x, z]))'
 HEIGHT_NAMES = ("z", "gap", "height", "heights")
 _HEADER_READERS = {
@@ -151,7 +152,7 @@ def _load_npy(raw: RawFile) -> np.ndarray:
             raise ValueError
     except PatchfemError:
         raise
-    except Exception:  # NumPy passes on any exception of Python for a damaged header
+    except Exception:  # NumPy raises any kind of exception for a damaged header
         raise PatchfemError(
             f"{path}: the header of the .npy file is damaged or holds an unsupported array; save "
             f"it anew: {ARRAY_EXAMPLE}"

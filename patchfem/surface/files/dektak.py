@@ -20,9 +20,11 @@ from .rows import read_columns
 from .text import decode_text
 from .units import parse_length_unit
 
-FIRST_WORDS = b"Scan Parameters"  # every export begins with these
+FIRST_WORDS = b"Scan Parameters"  # words with which every export begins
 MIN_DIGIT = 1e-5  # smallest printed digit of x, in the unit of the file
-MAX_STEP_ERROR = 0.6  # printed digits between a rounded and a true position: half, and round-off
+# Largest distance of a rounded position from the true one, in printed
+# digits: a half, and round-off.
+MAX_STEP_ERROR = 0.6
 _LENGTH = re.compile(
     r"^Length,\s*([+-]?[0-9]*\.?[0-9]+(?:[eE][+-]?[0-9]+)?)\s*([^\W\d_]*)\s*$", re.MULTILINE
 )
@@ -54,7 +56,7 @@ def read_dektak(raw: RawFile) -> Profile:
         body = body.replace(",,\n", "\n")  # two empty columns end each row
     head = Head([], [], [], ",", number, 0)
     values, lines = read_columns(path, body, head, {"x": 0, "z": 1}, 2)
-    settings, _, _ = text[: header.start()].partition("\nFunction,")  # results come after it
+    settings, _, _ = text[: header.start()].partition("\nFunction,")  # the results follow this line
     length = _LENGTH.search(settings)
     factor = length and _parse_unit(length[2])
     x = values["x"]

@@ -14,10 +14,11 @@ from ...inputs.cells import NUMBER_PATTERN
 from .raw import shorten
 from .units import parse_length_unit
 
-MAX_LINE = 1000  # characters; a longer line is not one of two to four columns
-MAX_LINES = 500  # lines of a head; instruments write fewer than 200
-MAX_NAME = 80  # characters of the name of a column and its unit
-MAX_COLUMNS = 4  # x, y, z and a column of validity or of numbers
+# Largest number of characters in a line; a longer one cannot be a row of two to four columns.
+MAX_LINE = 1000
+MAX_LINES = 500  # largest number of lines in a head; instruments write fewer than 200
+MAX_NAME = 80  # largest number of characters in the name of a column with its unit
+MAX_COLUMNS = 4  # largest number of columns: x, y, z, and one with row numbers or flags of validity
 HEADER_EXAMPLE = "write the header as `x [um],z [um]`"
 DELIMITERS = (";", ",", "\t", "|")
 COMMENT = ("#", "%", "//")
@@ -31,14 +32,15 @@ NAMES = {
     "valid": "valid, gültig",
 }
 ROLES = {name: role for role, names in NAMES.items() for name in names.split(", ")}
-NO_UNIT = ("", "-", "[-]", "1", "[1/0]")  # cells of an index in a line of units
+# Cells that stand for a column without a unit in a line of units.
+NO_UNIT = ("", "-", "[-]", "1", "[1/0]")
 _COLUMN = re.compile(r"(\w[\w .-]*?)\s*(?:\[([^\[\]]*)\]|\(([^()]*)\)|[_/]\s*(\w+)|\s+in\s+(\w+))")
 _CELL = re.compile(r"[^\s\[\](]+\s*(?:\[[^\]]*\]|\([^)]*\))|[^\W\d_]+\s+in\s+[^\W\d_]+|\S+")
 _NUMERIC = re.compile(r"(?=[^0-9]*[0-9])[0-9+\-.,;|eE \t*naNbdBAD]+")
 _VALUE = re.compile(
     r"\s*([+-]?(?:[0-9]+[.,]?[0-9]*|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?(?![0-9.,]))?\s*[\[(]?\s*([^\W\d_]*)"
 )
-_KEYS = {  # facts about a matrix and how heads write them before a colon or an equals sign
+_KEYS = {  # facts about a matrix, and the words for each of them before a colon or an equals sign
     "width": "width|breite|x[- ]length|x[- ]länge",
     "height": "height|höhe|y[- ]length|y[- ]länge",
     "columns": "x-pixels|nx|w",
@@ -61,7 +63,8 @@ _FACTS = {
     )
     for name, words in _KEYS.items()
 }
-_THOUSANDS = re.compile("[1-9][0-9]{0,2},[0-9]{3}")  # ambiguous unless the words are German
+# Number such as 1,234, which is ambiguous unless the words of the head are German.
+_THOUSANDS = re.compile("[1-9][0-9]{0,2},[0-9]{3}")
 _GERMAN = re.compile("breite|höhe|länge|größe|schritt", re.IGNORECASE)
 
 

@@ -24,8 +24,10 @@ from .raw import MAX_POINTS, UNPACK_ERRORS, RawFile, shorten, shorten_reason
 from .units import UNITS_IGNORED
 
 PYTHON = sys.executable
-MAX_CPU_SECONDS = 60.0  # CPU time for a file, independent of the load of the machine
-MAX_SECONDS = 600.0  # elapsed time for a file; ten times the CPU time allows for other processes
+# CPU time to read a file, in seconds, which does not depend on the load of the machine.
+MAX_CPU_SECONDS = 60.0
+# Elapsed time to read a file, in seconds; ten times the CPU time leaves room for other processes.
+MAX_SECONDS = 600.0
 EXIT_NO_LIBRARY = 3  # exit code of the script if SurfaceTopography is not installed
 CPU_LIMIT_SIGNAL = -24  # exit code of a process that exceeded its CPU time (SIGXCPU)
 

@@ -20,7 +20,8 @@ SIZE_REMEDY = (
     f"write the scan's {SIZE_LINES} and `# Value units: um` above its rows, or {GIVE_PIXEL_SIZE}"
 )
 UNKNOWN = Fact()
-MAX_UNEVEN = 1e-6  # relative range of the steps of coordinates; those of heights vary more
+# Largest relative range of the steps of coordinates; the steps of heights vary more.
+MAX_UNEVEN = 1e-6
 
 
 class Scale(NamedTuple):
@@ -160,7 +161,7 @@ def _find_step(path, axis: str, count: int, facts: dict, units: tuple | None) ->
         )
         return Scale(pixel, (note,) if size in facts or step in facts else ())
     if axis == "y" and step not in facts and size not in facts:
-        step = "step_x"  # a single pixel size holds for both axes, as for square pixels
+        step = "step_x"  # a single pixel size holds for both axes, because the pixels are square
     number, word = facts.get(step, facts.get(size, UNKNOWN))
     if number is None or not 0 < number < math.inf:
         name = "width" if axis == "x" else "height"

@@ -11,8 +11,9 @@ from ..profile import Profile
 from ..samples import check_span, make_trace, require_finite, undo_rounding
 from .raw import MAX_POINTS
 
-MAX_CELLS_PER_POINT = 4  # cells of the raster / points; scattered points have more
-ROUND_OFF = 1e-9  # relative to the length of an axis; nearer positions are the same
+MAX_CELLS_PER_POINT = 4  # largest number of raster cells per point; scattered points need more
+# Largest distance of positions that count as equal, relative to the length of the axis.
+ROUND_OFF = 1e-9
 
 
 class Axis(NamedTuple):

@@ -10,14 +10,15 @@ from typing import NamedTuple
 
 from ...core import Missing, PatchfemError
 
-MIB = 2**20  # bytes
-MAX_BYTES = 512 * MIB  # bytes of a file, or of its unpacked content
-MAX_TEXT_BYTES = 64 * MIB  # bytes of text: four million samples
-MAX_POINTS = 50_000_000  # heights
-MAX_UNPACK_RATIO = 200  # unpacked / packed size above 1 MiB; only a zip bomb packs better
-HEAD_BYTES = 4096  # bytes at the start of a file that decide its format
-BLOCK_BYTES = 65_536  # bytes read at a time, which limits the memory
-FIRST_BYTES = {  # first bytes of a file and its kind
+MIB = 2**20  # number of bytes in a mebibyte
+MAX_BYTES = 512 * MIB  # largest size of a file, or of its unpacked content, in bytes
+MAX_TEXT_BYTES = 64 * MIB  # largest size of a text file, in bytes: four million samples
+MAX_POINTS = 50_000_000  # largest number of heights
+# Largest ratio of unpacked to packed size above 1 MiB; only a zip bomb packs better.
+MAX_UNPACK_RATIO = 200
+HEAD_BYTES = 4096  # number of bytes at the start of a file that determine its format
+BLOCK_BYTES = 65_536  # number of bytes read at a time, which limits the memory
+FIRST_BYTES = {  # format of a file by its first bytes
     b"\x1f\x8b": "gzip",
     b"PK\x03\x04": "zip",
     b"PK\x05\x06": "zip",
@@ -75,7 +76,7 @@ def fetch(path) -> RawFile:
             kind = _find_kind(head)
             suffix = file_path.suffix.lower()
             if kind == "binary" and suffix in TEXT_SUFFIXES:
-                kind = "text"  # its reader names the line that is not text
+                kind = "text"  # the reader of text files names the line that is not text
             if kind == "binary":
                 return RawFile(file_path, kind, suffix, b"")
             data = _read_limited(file, head, _max_bytes(kind) + 1)

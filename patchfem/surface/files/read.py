@@ -15,8 +15,10 @@ from .units import UNITS_IGNORED
 from .x3p import read_x3p
 
 READERS = {"npy": read_npy, "mat": read_mat, "binary": read_instrument, "text": read_text}
-READERS_WITH_UNITS = {"x3p": read_x3p, "dektak": read_dektak}  # formats that state their units
-WYKO = b"Wyko ASCII"  # start of a text file with heights in wavelengths; SurfaceTopography reads it
+# Readers of the formats that state their units.
+READERS_WITH_UNITS = {"x3p": read_x3p, "dektak": read_dektak}
+# Start of a text file with heights in wavelengths, which SurfaceTopography reads.
+WYKO = b"Wyko ASCII"
 
 
 def read_surface(path, units: tuple | None = None) -> Profile | Areal:

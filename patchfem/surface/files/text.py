@@ -153,7 +153,8 @@ def _find_places(line: str, names: list, *, has_units: bool) -> Places:
     known = ("x", "z") if len(data) == 2 else ("x", "y", "z")
     notes = ()
     if sorted(data.values()) == ["x", "y"]:
-        data = {k: role.replace("y", "z") for k, role in data.items()}  # heights y over x
+        # Columns x and y are a trace whose heights are named y.
+        data = {k: role.replace("y", "z") for k, role in data.items()}
     strange = next((names[k] for k, role in data.items() if role not in known), None)
     if strange is not None and not has_units:
         wanted = "x and z" if len(data) == 2 else "x, y and z"

@@ -13,7 +13,8 @@ import math
 import os
 import sys
 
-MAX_MEMORY = 1 << 32  # bytes of address space; the largest scan allowed takes a quarter of it
+# Address space of the script in bytes; the largest permitted scan takes a quarter of it.
+MAX_MEMORY = 1 << 32
 
 
 def main(path: str, max_points: int, max_seconds: float) -> int:

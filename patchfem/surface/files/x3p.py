@@ -23,8 +23,9 @@ from ..samples import METRES_NOTE
 from .raster import make_scan_of_matrix, make_scan_of_points
 from .raw import MAX_POINTS, MIB, RawFile, open_zip, read_member, shorten, shorten_reason
 
-MAX_XML_BYTES = 16 * MIB  # bytes of main.xml; with its heights as a list it has 30 for each
-MAX_ELEMENTS = 500_000  # elements of main.xml; more take over 100 MB
+# Largest size of main.xml in bytes; heights stored there take 30 bytes each.
+MAX_XML_BYTES = 16 * MIB
+MAX_ELEMENTS = 500_000  # largest number of elements in main.xml; more take over 100 MB
 TYPES = {"I": "<i2", "L": "<i4", "F": "<f4", "D": "<f8"}
 _AXIS_NAMES = ("CX", "CY", "CZ")
 _MD5 = re.compile(r"[0-9a-fA-F]{32}")

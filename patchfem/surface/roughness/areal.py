@@ -13,7 +13,8 @@ from ...formatting import format_length
 from .parameters import Heights
 
 DECAY_LEVEL = 0.2  # autocorrelation at the autocorrelation length Sal (ISO 25178-3)
-MIN_LENGTH_STEPS = 2.0  # steps; the raster does not resolve a shorter autocorrelation length
+# Smallest autocorrelation length in raster steps; the raster does not resolve a shorter one.
+MIN_LENGTH_STEPS = 2.0
 
 
 class Lobe(NamedTuple):
@@ -108,7 +109,7 @@ def _measure_lobe(rho, steps: tuple) -> Lobe:
         position = np.clip(-(start * along).sum(1) / np.maximum((along**2).sum(1), 1e-300), 0, 1)
         shortest.append(float(np.hypot(*(start + position[:, None] * along).T).min()))
         angle = np.unwrap(np.arctan2(line[:, 1], line[:, 0]))
-        if abs(angle[-1] - angle[0]) > 6:  # the contour runs once round the middle, by 2 pi
+        if abs(angle[-1] - angle[0]) > 6:  # the contour encircles the origin, by an angle of 2 pi
             closed.append((shortest[-1], float(np.hypot(*line.T).max())))
     return Lobe(min(shortest, default=None), min(closed)[1] if closed else None)
 

@@ -9,9 +9,11 @@ from ...formatting import format_length
 from ..areal import Areal
 from ..profile import Profile, level, resample_evenly
 
-ALPHA = np.sqrt(np.log(2) / np.pi)  # width / cut-off; a wave of the cut-off keeps half its height
-REACH_FACTOR = 1.25  # half-length of the weights / cut-off; 1.5e-10 of their sum lies beyond
-MIN_CUTOFF_STEPS = 4  # steps; the samples do not resolve a shorter cut-off
+# Width of the weights relative to the cut-off; a wave of the cut-off keeps half its height.
+ALPHA = np.sqrt(np.log(2) / np.pi)
+# Half-length of the weights relative to the cut-off; 1.5e-10 of their sum lies beyond.
+REACH_FACTOR = 1.25
+MIN_CUTOFF_STEPS = 4  # smallest cut-off in steps; the samples do not resolve a shorter one
 
 
 def filter_trace(profile: Profile, cutoff: float) -> tuple[Profile, Profile]:

@@ -11,13 +11,13 @@ from ..areal import Areal
 from ..areal import level as level_scan
 from ..profile import Profile, level
 
-MAX_DEGREE = 9  # higher polynomials follow the waves of the surface
+MAX_DEGREE = 9  # largest degree of a polynomial; higher ones follow the waves of the surface
 CYLINDER = "cylinder"
-# Heights of the fit of a cylinder; more take seconds and do not change it.
+# Largest number of heights in the fit of a cylinder; more take seconds and do not change it.
 MAX_FITTED_HEIGHTS = 65_536
-MAX_JACKKNIFE_HEIGHTS = 8_192  # heights of each fit of the jackknife
-N_PARTS = 10  # parts of the surface, each of which the jackknife leaves out once
-STUDENT_T = 1.833  # Student's t of 90 % with N_PARTS - 1 degrees of freedom
+MAX_JACKKNIFE_HEIGHTS = 8_192  # largest number of heights in each fit of the jackknife
+N_PARTS = 10  # number of parts of the surface, each of which the jackknife leaves out once
+STUDENT_T = 1.833  # Student's t for 90 % with N_PARTS - 1 degrees of freedom
 
 
 class Cylinder(NamedTuple):

@@ -30,15 +30,19 @@ from .spectrum import BAND, Spectrum, chi_square_factor, estimate_spectrum
 
 P_LOWER = 0.05  # probability of the lower bound
 P_UPPER = 0.95  # probability of the upper bound
-N_SIMULATED_TRACES = 200  # simulated traces; the probability of a bound is then known to 1.5 %
-MAX_SAMPLES = 2048  # samples of a simulated trace, which keeps all of them below 10 MB
+# Number of simulated traces, which determine the probability of a bound to 1.5 %.
+N_SIMULATED_TRACES = 200
+# Largest number of samples in a simulated trace, which keeps all of them below 10 MB.
+MAX_SAMPLES = 2048
 # Number of degrees of freedom that estimating the spectrum uses up, from coverage tests.
 SPECTRUM_FREEDOM = 2.5
-MAX_DEVIATIONS = 1.96  # standard deviations of skewness and kurtosis of Gaussian heights
-PEAK_FACTOR = 1.3  # scatter of the dominant wavelength / that of simulated traces
-MIN_WAVES = 4  # dominant waves in a trace; self-affine traces have 2.7 to 3.5
-MIN_FREEDOM = 12.0  # degrees of freedom of a trace; self-affine traces have 6 to 11, others 16
-LATERAL = ("wave", "band")  # kinds whose intervals need no Gaussian heights
+MAX_DEVIATIONS = 1.96  # largest skewness and kurtosis of Gaussian heights, in standard deviations
+PEAK_FACTOR = 1.3  # scatter of the dominant wavelength relative to that of simulated traces
+# Smallest number of dominant waves in a long trace; self-affine traces have 2.7 to 3.5.
+MIN_WAVES = 4
+# Smallest number of degrees of freedom of a long trace; self-affine traces have 6 to 11, others 16.
+MIN_FREEDOM = 12.0
+LATERAL = ("wave", "band")  # kinds of parameters whose intervals need no Gaussian heights
 SIZES = (
     "power",
     "ratio",
@@ -132,7 +136,8 @@ class Intervals:
             density = density * np.sin(np.pi * spectrum.frequency * self.heights.step) ** 2
         if not density.any():
             return 1.0
-        squares = float(density @ density) / (1 + 1 / spectrum.tapers)  # minus the scatter
+        # Corrected for the scatter of the estimated density.
+        squares = float(density @ density) / (1 + 1 / spectrum.tapers)
         total = 2 * spectrum.length * float(density.sum()) ** 2 * spectrum.step / squares
         widening = self._slope_widening if kind == "slope" else self._height_widening
         return max((total - SPECTRUM_FREEDOM) / widening**2, 1.0)
@@ -201,7 +206,7 @@ def simulate_traces(spectrum: Spectrum, heights: Heights, degree: int | None) ->
     if section:
         every = min(every, max(1, int(section) // 8))
     size = max(min(heights.z.size // every, MAX_SAMPLES), 8, round(section / every))
-    if size == MAX_SAMPLES:  # the spectrum of each wants a length with a fast transform
+    if size == MAX_SAMPLES:  # the spectrum of each trace needs a length with a fast transform
         size = prev_fast_len(size + 1, real=True) - 1
     step = every * heights.step
     period = next_fast_len(2 * size, real=True)

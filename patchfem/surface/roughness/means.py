@@ -6,7 +6,8 @@ from typing import NamedTuple
 from ..quantity import Quantity, average_quantities
 from .report import RoughnessReport
 
-MAX_SIZE_RATIO = 1.001  # longest / shortest; files with a larger ratio get a caution
+# Ratio of the largest to the smallest size above which the files get a caution.
+MAX_SIZE_RATIO = 1.001
 KINDS = {"profile": "traces", "areal": "scans"}
 
 

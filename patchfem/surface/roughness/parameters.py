@@ -11,10 +11,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-MIN_SAMPLES = 16  # samples of a trace; fewer give neither a spectrum nor a curvature
-ROUND_OFF = 1e-12  # fraction of the heights that levelling leaves of a straight line
-MIN_HEIGHT_FRACTION = 0.10  # lower hills and dales, as a fraction of Rz, do not count (ISO 21920-2)
-MIN_WIDTH_FRACTION = 0.01  # narrower ones, as a fraction of the section, do not count either
+# Smallest number of samples in a trace; fewer give neither a spectrum nor a curvature.
+MIN_SAMPLES = 16
+# Largest heights of a straight line after levelling, relative to its heights before.
+ROUND_OFF = 1e-12
+# Smallest height of hills and dales that count, as a fraction of Rz (ISO 21920-2).
+MIN_HEIGHT_FRACTION = 0.10
+# Smallest width of hills and dales that count, as a fraction of the section.
+MIN_WIDTH_FRACTION = 0.01
 CORE_FRACTION = 0.40  # fraction of the length under the secant of the core (ISO 13565-2)
 
 

@@ -21,12 +21,18 @@ from .parameters import MIN_SAMPLES, ROUND_OFF
 
 SUMMIT_FACTOR = 0.8968  # coefficient of 1/alpha in the variance of summit heights (Bush 1976)
 MIN_ALPHA = 1.5  # alpha of an isotropic surface whose waves all have the same length
-PERSSON = (0.4, 0.5)  # u_0 / rms height by Persson 2007, and by simulation (Pastewka 2013)
-SHARPEST_FRACTION = 0.005  # fraction of the heights; in a Gaussian trace it has 5 % of m_4
-MAX_SHARPEST_POWER = 0.5  # fraction of the mean square curvature; more may be due to dust
-MAX_SPIKE_FRACTION = 0.1  # fraction of the samples; more apparent spikes belong to the surface
-MAX_SKEWNESS = 0.5  # skewness above this changes the stiffness by more than the theory is uncertain
-MAX_EXCESS = 1.0  # kurtosis minus 3, for the same reason
+# Ratio of u_0 to rms height by Persson 2007, and by simulation (Pastewka 2013).
+PERSSON = (0.4, 0.5)
+# Fraction of the heights that are examined as the sharpest; in a
+# Gaussian trace they have 5 % of m_4.
+SHARPEST_FRACTION = 0.005
+# Largest fraction of the mean square curvature in the sharpest heights; more may be due to dust.
+MAX_SHARPEST_POWER = 0.5
+# Largest fraction of the samples in spikes; more apparent spikes belong to the surface.
+MAX_SPIKE_FRACTION = 0.1
+# Largest skewness whose effect on the stiffness is below the uncertainty of the theory.
+MAX_SKEWNESS = 0.5
+MAX_EXCESS = 1.0  # largest kurtosis minus 3, for the same reason
 MAX_DEVIATIONS = 3  # standard deviations that skewness and kurtosis of Gaussian traces reach
 
 

@@ -21,9 +21,10 @@ from .rows import Parameter
 from .scan_intervals import scan_intervals
 from .spectrum import BAND, Spectrum, band_amplitude, refuse_band
 
-STANDARD_CUTOFFS = (25e-6, 80e-6, 250e-6, 800e-6, 2.5e-3, 8e-3, 25e-3)  # [m]
-# the cut-offs are those of ISO 21920-3 and one more at each end
-SECTIONS_PER_TRACE = 6  # cut-offs: five are evaluated, and the filter trims one in total
+# Standard cut-offs [m]: those of ISO 21920-3 and one more at each end.
+STANDARD_CUTOFFS = (25e-6, 80e-6, 250e-6, 800e-6, 2.5e-3, 8e-3, 25e-3)
+# Smallest length of a trace in cut-offs: five are evaluated, and the filter trims one in total.
+SECTIONS_PER_TRACE = 6
 NO_INTERVAL = "a single trace gives no interval for this parameter"
 NOT_GAUSSIAN = (
     "an interval from a single trace assumes Gaussian heights, but these heights are not Gaussian; "
@@ -134,7 +135,7 @@ def _report_trace(
     trace = _require_samples(resample_evenly(_require_samples(part)))
     primary, form_name = subtract_form(trace, form)
     if short is not None:
-        # the filter keeps the degree of a polynomial, so the form is subtracted before and after
+        # The filter keeps the degree of a polynomial, so the form is subtracted again after it.
         primary = subtract_form(filter_trace(primary, short)[0], form)[0]
     if np.ptp(primary.z) <= ROUND_OFF * np.abs(trace.z).max():
         primary = replace(primary, z=frozen_array(np.zeros(primary.z.size)))

@@ -28,8 +28,8 @@ from .parameters import (
 )
 from .spectrum import estimate_spectrum
 
-PEAK_RATIO = 0.1  # material ratio above which the material is that of the peaks (ISO 25178-3)
-VALLEY_RATIO = 0.8  # material ratio below which the void is that of the valleys (ISO 25178-3)
+PEAK_RATIO = 0.1  # material ratio above which the material belongs to the peaks (ISO 25178-3)
+VALLEY_RATIO = 0.8  # material ratio below which the void belongs to the valleys (ISO 25178-3)
 
 
 class Parameter(NamedTuple):
@@ -64,7 +64,7 @@ def _mean_of_five_parts(heights: Heights) -> float:
     return float(np.mean([np.ptp(heights.z[low:high]) for low, high in pairwise(edges)]))
 
 
-_BASE = (  # names without their letter
+_BASE = (  # names without the letter of their profile
     Parameter("a", "m", "mean of the absolute heights about the mean line", mean_absolute, "ratio"),
     Parameter(
         "q", "m", "root mean square of the heights about the mean line", root_mean_square, "power"

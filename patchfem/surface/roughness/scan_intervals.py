@@ -7,9 +7,11 @@ import numpy as np
 from .intervals import MAX_DEVIATIONS, P_LOWER, P_UPPER
 from .spectrum import chi_square_factor
 
-SPENT_FRACTION = 0.85  # degrees of freedom left after estimating the spectrum, from 240 scans
+# Fraction of the degrees of freedom that is left after estimating the spectrum, from 240 scans.
+SPENT_FRACTION = 0.85
 NORMAL_QUANTILE_95 = 1.6449  # standard deviations at the 95 % quantile of a normal distribution
-# Pairs of heights / those at lag zero; lags with fewer pairs are not used for the correlation.
+# Smallest number of pairs of heights at a lag relative to lag zero; lags with fewer
+# are not used for the correlation.
 MIN_PAIRS = 0.1
 
 

@@ -8,10 +8,12 @@ import numpy as np
 from ...core import PatchfemError, frozen_array
 from ...formatting import format_length
 
-MIN_TAPERS = 3  # averaged spectra; fewer are too noisy to show the dominant wave
-MAX_TAPERS = 16  # averaged spectra; more blur the dominant wave and do not narrow the intervals
-MAX_UNTRIMMED = 65_536  # samples; longer traces are trimmed to a length with a fast transform
-BLUR_FRACTION = 0.15  # half-width of the smoothing / frequency of the dominant wave
+MIN_TAPERS = 3  # smallest number of averaged spectra; fewer are too noisy to show the dominant wave
+# Largest number of averaged spectra; more blur the dominant wave and do not narrow the intervals.
+MAX_TAPERS = 16
+# Largest number of samples that are not trimmed to a length with a fast transform.
+MAX_UNTRIMMED = 65_536
+BLUR_FRACTION = 0.15  # half-width of the smoothing relative to the frequency of the dominant wave
 BAND = (
     60e-6,
     110e-6,

@@ -28,13 +28,15 @@ from .search import (
 )
 from .wear import find_change, widen
 
-N_IMAGE_POINTS = 20_000  # heights of a fit to images
-N_SUBSAMPLE_HEIGHTS = 8_000  # heights of the subsample with which starting planes are refined
-LONG_WAVES = 8.0  # pixels; Gaussian filter whose mean is subtracted from an image
-MAX_SIDE = 1000  # pixels along a side of the finest image, which limits the time
-MIN_RIVAL = 0.5  # score of a second plane / fraction on the first, above which both may be unworn
-MIN_DISTANCE = 3.0  # standard deviations between two planes that count as different
-MARGIN = 0.1  # fraction of the shorter side within which wear may run out undetected
+N_IMAGE_POINTS = 20_000  # number of heights in a fit to images
+N_SUBSAMPLE_HEIGHTS = 8_000  # number of heights in the subsample that refines starting planes
+LONG_WAVES = 8.0  # width in pixels of the Gaussian filter whose mean is subtracted from an image
+MAX_SIDE = 1000  # largest number of pixels along a side of the finest image, which limits the time
+# Smallest score of a second plane relative to the unworn fraction on the first, for
+# which either may be the unworn one.
+MIN_RIVAL = 0.5
+MIN_DISTANCE = 3.0  # smallest distance of two different planes, in standard deviations
+MARGIN = 0.1  # fraction of the shorter side within which wear may fade out undetected
 
 
 @dataclass(frozen=True, eq=False)

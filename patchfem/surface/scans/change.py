@@ -15,7 +15,7 @@ from .search import MIN_SIGNIFICANCE, transform_scan
 from .track import ScanTrack, measure_scan_track
 from .volumes import Volumes, measure_volumes, refuse_measures
 
-PLACEMENT = {  # name: (unit, definition)
+PLACEMENT = {  # unit and definition of each quantity
     "shift_x": (
         "m",
         "shift along x: position of a point in the second scan (after wear) minus its position in "
@@ -32,11 +32,11 @@ PLACEMENT = {  # name: (unit, definition)
     ),
 }
 HIDDEN_WEAR_MEANING = "mean depth of uniform or wedge-shaped wear that may have remained hidden"
-MIN_CORRELATION = 0.95  # correlation of the unworn heights of scans of the same area
-MIN_CORRELATION_UNSURE = 0.98  # the same if the search found no significant position
-MIN_UNMEASURED = 0.1  # fraction of the worn part without heights that a sentence reports
-HALF_TURN_TOL = 0.2  # [rad] difference from pi below which a scan counts as turned by 180 degrees
-N_DIGITS = 4  # significant digits of volumes in sentences
+MIN_CORRELATION = 0.95  # smallest correlation of the unworn heights of scans of the same area
+MIN_CORRELATION_UNSURE = 0.98  # smallest correlation if the search found no significant position
+MIN_UNMEASURED = 0.1  # smallest fraction of the worn part without heights that a sentence reports
+HALF_TURN_TOL = 0.2  # largest difference of a rotation from pi [rad] that counts as 180 degrees
+N_DIGITS = 4  # number of significant digits of volumes in sentences
 WORN_HEADLINE = "worn"
 NONE = "no wear shown"
 GREW = "material grew, or the files are in the wrong order"
@@ -99,7 +99,8 @@ def compare_scans(before: Areal, after: Areal, keep_spikes: bool = False) -> Cha
         values = volumes.values
         placement = alignment.placement
         if placement.is_inverted and values["grown_volume"].value > values["worn_volume"].value:
-            # more grew than wore off, so the heights of the first scan point into the material
+            # More material grew than wore off, so the heights of the
+            # first scan point into the material.
             before = transform_scan(before, "", True)
             inverted = transform_scan(after, "", True)
             alignment, volumes, n_specks = _align_and_measure(before, inverted, keep_spikes)

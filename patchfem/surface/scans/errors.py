@@ -15,15 +15,23 @@ from ..compare.errors import N_DRAWS, block_length, correlation_length, student_
 from ..compare.robust import BIWEIGHT
 from .model import PLACE_PARAMETERS, Parameter, ScanModel
 
-N_TILES = 40  # tiles along the shorter side of the depth map
-MIN_TILE_SIDE = 4  # heights along the side of a tile; smaller maps have fewer tiles
-MIN_UNWORN_FRACTION = 0.3  # fraction of unworn heights that a tile needs to enter the bootstrap
-MIN_BLOCK_FRACTION = 1 / 8  # same ratio: shorter blocks would not show long-wave errors
-MAX_BLOCK_FRACTION = 1 / 3  # side of a block / shorter side of the map: leaves nine blocks
-N_PARTS = 6  # parts along each side whose summed scores give the covariance of the alignment
-N_LINES = 200  # lines of the map from which the correlation of neighbouring heights is estimated
-MIN_EIGENVALUE = 1e-5  # relative to the largest; below it the surface does not fix that direction
-MAX_CORRELATION_AREA = 100.0  # heights; upper limit of the estimated area
+N_TILES = 40  # number of tiles along the shorter side of the depth map
+# Smallest number of heights along the side of a tile; small maps have fewer tiles.
+MIN_TILE_SIDE = 4
+MIN_UNWORN_FRACTION = 0.3  # smallest fraction of unworn heights in a tile that enters the bootstrap
+# Smallest side of a block relative to the shorter side of the map; shorter blocks
+# would not show long-wave errors.
+MIN_BLOCK_FRACTION = 1 / 8
+# Largest side of a block relative to the shorter side of the map, which leaves nine blocks.
+MAX_BLOCK_FRACTION = 1 / 3
+# Number of parts along each side whose summed scores give the covariance of the alignment.
+N_PARTS = 6
+# Number of lines of the map from which the correlation of neighbouring heights is estimated.
+N_LINES = 200
+# Smallest eigenvalue relative to the largest; the surface does not determine
+# directions with a smaller one.
+MIN_EIGENVALUE = 1e-5
+MAX_CORRELATION_AREA = 100.0  # upper limit of the estimated correlation area, in heights
 
 
 class ScanErrors(NamedTuple):
@@ -137,7 +145,7 @@ def _draw_fields(means, valid, block: int) -> np.ndarray:
     signs = random.choice([-1.0, 1.0], (N_DRAWS, rows, columns))
     along = np.arange(block)
     blocks = whole[chosen[..., 0, None, None] + along[:, None], chosen[..., 1, None, None] + along]
-    # draw, row, row in block, column, ...
+    # The order of the axes is draw, row, row in the block, column, column in the block.
     blocks = (blocks * signs[..., None, None]).swapaxes(2, 3)
     fields = blocks.reshape(N_DRAWS, rows * block, columns * block)
     return fields[:, : means.shape[0], : means.shape[1]].copy()

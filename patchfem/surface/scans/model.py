@@ -18,17 +18,20 @@ from ...core import PatchfemError
 from ..areal import Areal, fill_missing
 from ..compare.model import MAX_STEP, SLOPE_NOISE
 
-MIN_HEIGHTS = 400  # heights; fewer in common do not determine the alignment
-# heights used in a fit; enough to determine a shift to a few thousandths of a pixel
+MIN_HEIGHTS = 400  # smallest number of common heights; fewer do not determine the alignment
+# Number of heights in a fit, enough to determine a shift to a few thousandths of a pixel.
 N_POINTS = 60_000
-N_TILES = 8  # tiles along each side, whose modes are the starting points of a robust fit
-MIN_TILE_HEIGHTS = 12  # heights; the mode of fewer is too uncertain
+N_TILES = 8  # number of tiles along each side, whose modes are the starting points of a robust fit
+MIN_TILE_HEIGHTS = 12  # smallest number of heights in a tile; the mode of fewer is too uncertain
 ROUND_OFF = 1e-9  # fraction of the scatter of the heights; smaller differences are round-off
-MIN_SMOOTHING = 0.7  # pixels; standard deviation of the narrowest Gaussian that gives slopes
-MAX_SMOOTHING = 8.0  # pixels; standard deviation of the widest one
-LONG_WAVES = 0.05  # fraction of the shorter side; Gaussian filter whose mean contributes no slope
-BORDER = 2  # pixels; cubic interpolation is inaccurate this close to the border of a scan
-BLOCK = 1 << 20  # heights of a depth map that are computed at a time, which limits the memory
+# Standard deviation in pixels of the narrowest Gaussian filter that gives slopes.
+MIN_SMOOTHING = 0.7
+MAX_SMOOTHING = 8.0  # standard deviation in pixels of the widest Gaussian filter that gives slopes
+# Width, as a fraction of the shorter side, of the Gaussian filter whose mean contributes no slope.
+LONG_WAVES = 0.05
+BORDER = 2  # width in pixels of the border of a scan, where cubic interpolation is inaccurate
+# Number of heights of a depth map that are computed at a time, which limits the memory.
+BLOCK = 1 << 20
 
 
 class Parameter(IntEnum):
@@ -101,7 +104,8 @@ class ScanModel:
         Size of the sample.
     """
 
-    shifts = ()  # the robust fit of the plane keeps the position, which the fit to images determined
+    # The robust fit of the plane keeps the position, which the fit to images determined.
+    shifts = ()
 
     def __init__(self, before: Raster, after: Raster, n_points: int = N_POINTS):
         from scipy.ndimage import binary_erosion, gaussian_filter, spline_filter

@@ -16,20 +16,24 @@ from ..areal import Areal
 from ..profile import robust_deviation
 from .model import make_raster, rotation
 
-SIZE = 224  # pixels along the longer side of the images
-ANGLES = np.radians(np.arange(-12, 13) / 2)  # [rad] -6 to 6 degrees; half a degree is one pixel
-FINE_ANGLES = np.radians(np.arange(-3, 4) / 8)  # [rad] added to the best angle
-MIN_OVERLAP = 0.35  # fraction of the smaller image that must lie on the other one
-LONG_WAVES = 0.03  # fraction of the shorter side; Gaussian filter whose mean is subtracted
-MAX_VALLEY_DEPTH = 3.0  # standard deviations; deeper grooves and scratches mark no position
+SIZE = 224  # number of pixels along the longer side of the images
+ANGLES = np.radians(np.arange(-12, 13) / 2)  # -6 to 6 degrees [rad]; half a degree is one pixel
+FINE_ANGLES = np.radians(np.arange(-3, 4) / 8)  # angles [rad] that are added to the best one
+MIN_OVERLAP = 0.35  # smallest fraction of the smaller image that must overlap the other one
+# Width, as a fraction of the shorter side, of the Gaussian filter whose mean is subtracted.
+LONG_WAVES = 0.03
+# Largest depth in standard deviations; deeper grooves and scratches do not identify a position.
+MAX_VALLEY_DEPTH = 3.0
 WHITENING_FLOOR = 0.3  # fraction of the rms of a spectrum; weaker waves are not amplified
-WHITENING_WIDTH = 1.5  # pixels of the spectrum over which its power is averaged
-TAPER = 0.25  # exponent of the Hann window, whose tapered rim stays narrow
-MIN_SIGNIFICANCE = 10.0  # standard deviations; false positions on a periodic lay reach 9
-MAX_PLACEMENTS = 8  # placements that are fitted to images, which limits the time
-MAX_PER_VARIANT = 3  # placements of one mirrored or inverted variant
-MIN_ANGLE_DISTANCE = 0.02  # [rad] two placements nearer than this are one
-MIN_PIXEL_DISTANCE = 4  # pixels; the same for their shifts
+WHITENING_WIDTH = 1.5  # width in pixels of the spectrum over which its power is averaged
+TAPER = 0.25  # exponent of the Hann window, which keeps its tapered rim narrow
+# Smallest significance of a position in standard deviations; false
+# positions on a periodic lay reach 9.
+MIN_SIGNIFICANCE = 10.0
+MAX_PLACEMENTS = 8  # largest number of placements that are fitted to images, which limits the time
+MAX_PER_VARIANT = 3  # largest number of placements of one mirrored or inverted variant
+MIN_ANGLE_DISTANCE = 0.02  # smallest angle [rad] between two different placements
+MIN_PIXEL_DISTANCE = 4  # smallest shift in pixels between two different placements
 
 
 class Placement(NamedTuple):

@@ -10,20 +10,24 @@ from ..profile import find_runs
 from ..quantity import SIDE, Quantity, average_quantities, make_quantity, make_unknown
 from .alignment import ScanAlignment
 
-SMOOTHING = 0.025  # fraction of the shorter side; Gaussian filter before the gradient is taken
-N_DIRECTION = 400  # heights along the shorter side from which the direction is found
-MIN_COHERENCE = 0.5  # coherence of the gradients: 1 for a straight track, 0 for a round pit
-MIN_DEVIATIONS = 5.0  # standard deviations of the mean section that a deep position exceeds
-MIN_DEPTH = 0.2  # fraction of the largest depth of the mean section that a deep position exceeds
-MIN_MEASURED = 0.3  # fraction of the sections that must be measured at each of its positions
-MIN_MARGIN = 0.1  # fraction of the width of the track that must be measured beside it
-MIN_AREA = 0.6  # fraction of the lost area of the mean section that a single track holds
-MAX_SECTIONS = 1000  # sections of the rotated map, which limits the memory
-MAX_PLACES = 4000  # positions of a section, which limits the memory
-END_FRACTION = 0.1  # fraction of the length of a track whose sections at each end are left out
-N_GROUPS = 16  # groups of neighbouring sections, each of which is measured once
-MIN_GROUPS = 6  # fewer groups give no interval by their scatter
-TEXTS = {  # name: (unit, definition)
+# Width, as a fraction of the shorter side, of the Gaussian filter that is
+# applied before the gradient is taken.
+SMOOTHING = 0.025
+N_DIRECTION = 400  # number of heights along the shorter side from which the direction is estimated
+# Smallest coherence of the gradients of a track: 1 for a straight track, 0 for a round pit.
+MIN_COHERENCE = 0.5
+MIN_DEVIATIONS = 5.0  # smallest depth of the track in the mean section, in standard deviations
+MIN_DEPTH = 0.2  # smallest depth of the track relative to the largest depth of the mean section
+# Smallest fraction of the sections that must be measured at each position of the mean section.
+MIN_MEASURED = 0.3
+MIN_MARGIN = 0.1  # smallest measured margin on either side of a track, as a fraction of its width
+MIN_AREA = 0.6  # smallest fraction of the lost area of the mean section that lies in a single track
+MAX_SECTIONS = 1000  # largest number of sections of the rotated map, which limits the memory
+MAX_PLACES = 4000  # largest number of positions in a section, which limits the memory
+END_FRACTION = 0.1  # fraction of the length of a track at each end whose sections are left out
+N_GROUPS = 16  # number of groups of neighbouring sections, each of which is measured once
+MIN_GROUPS = 6  # smallest number of groups whose scatter gives an interval
+TEXTS = {  # unit and definition of each size
     "direction": (
         "rad",
         "direction of the track, measured anticlockwise from x, found from the gradients of the depth",

@@ -10,8 +10,9 @@ from ..quantity import SIDE, Quantity, make_quantity, make_unknown
 from .alignment import MARGIN, ScanAlignment
 from .wear import detection_limit, mean_of_square, widen
 
-RIM = 3  # heights around a changed part that belong to its volume, because its edges are shallow
-MEASURES = {  # name: (unit, definition)
+# Number of heights around a changed part that belong to its volume, because its edges are shallow.
+RIM = 3
+MEASURES = {  # unit and definition of each volume or depth
     "worn_volume": ("m3", "volume of material lost in the region that both scans show"),
     "grown_volume": (
         "m3",
@@ -135,7 +136,8 @@ def _measure_volume(alignment: ScanAlignment, cell, depth, changed, opposite, wa
     if not weight.any():
         return 0.0, 0.0, 0.0
     beside = widen(changed, int(MARGIN * min(changed.shape))) & (weight == 0.0) & ~opposite
-    # wear that runs out beside the part is half as deep on average as that which is just detected
+    # Wear that fades out beside the part is on average half as deep
+    # as the smallest detectable wear.
     undetected = detection_limit(alignment.depth, alignment.unworn) / 2 * float(cell[beside].sum())
     volume = float((weight * depth).sum())
     deviation = float(np.std(alignment.errors.error_of_sum(weight, alignment.noise)))

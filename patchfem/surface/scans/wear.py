@@ -6,9 +6,10 @@ from ..compare.robust import MAX_OUTLIER
 from ..compare.section import noise_threshold
 from ..profile import robust_deviation
 
-SQUARE_SIDES = (3, 9, 25, 63)  # heights; small squares show narrow deep wear, large ones wide wear
-MIN_MEASURED = 0.25  # fraction of the heights of a square; with fewer its mean is not tested
-MIN_UNWORN_SQUARES = 50  # fewer squares do not determine the scatter of a mean
+# Sides of the squares in heights; small squares show narrow deep wear, large ones wide wear.
+SQUARE_SIDES = (3, 9, 25, 63)
+MIN_MEASURED = 0.25  # smallest fraction of measured heights in a square whose mean is tested
+MIN_UNWORN_SQUARES = 50  # smallest number of squares that determines the scatter of a mean
 
 
 def find_change(depth, unworn, noise: float) -> tuple:
@@ -28,7 +29,7 @@ def find_change(depth, unworn, noise: float) -> tuple:
     worn, grown : (m, n) bool array
         Missing heights are included where the squares around them changed.
     """
-    # without a limit a single outlier would pass for wear
+    # Without a limit, a single outlier would pass for wear.
     relative = np.clip(depth / noise, -MAX_OUTLIER, MAX_OUTLIER).astype(np.float32)
     worn = _find_deep_squares(relative, unworn)
     grown = _find_deep_squares(-relative, unworn)
