@@ -1,10 +1,10 @@
-"""The command line. Nothing scientific is imported until a verb needs it."""
+"""Command line of patchfem, which imports scientific packages only when a verb needs them."""
 
 # ruff: noqa: E402
 import sys
 
 if __name__ == "__main__" and not sys.flags.safe_path:
-    # the current folder, in which a file of the user may have the name of any module
+    # The current folder is removed, because a file of the user may have the name of any module.
     del sys.path[0]
 
 import gc
@@ -14,28 +14,28 @@ import re
 import signal
 from types import ModuleType
 
-# Signals that end the process: from a user, a batch queue or a closed terminal, unless nohup ignores the last.
+# Signals from a user, a batch queue or a closed terminal that end the process, except those that nohup ignores.
 END_SIGNALS = [
     number
     for number in (getattr(signal, name, None) for name in ("SIGINT", "SIGTERM", "SIGHUP"))
     if number is not None and signal.getsignal(number) is not signal.SIG_IGN
 ]
 for end_signal in END_SIGNALS:
-    signal.signal(end_signal, lambda *_: os._exit(130))  # ends the process until main() runs
+    signal.signal(end_signal, lambda *_: os._exit(130))  # used until main() handles interrupts
 
-os.environ["PYTHONSAFEPATH"] = "1"  # child processes do not import from the current folder either
-# The search for plugins costs every command 30 ms.
+os.environ["PYTHONSAFEPATH"] = "1"  # child processes do not import from the current folder, either
+# The search for pydantic plugins would add 30 ms to every command.
 os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
-# All large computations limit BLAS to one thread; more threads would only cost a small run 0.1 CPU seconds.
+# Large computations limit BLAS to one thread anyway; more threads would add 0.1 CPU seconds to small runs.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-# Garbage collections take a tenth of the time of a short command. A run of the rig ends with 110,000 objects, nearly
-# all from imports.
-FIRST_GC_THRESHOLD = 200_000  # new objects before the first garbage collection
-LATER_GC_THRESHOLD = 50_000  # new objects before each later collection
+# Garbage collection would take a tenth of the time of a short command. A run of the rig creates 110,000 objects,
+# nearly all in imports.
+FIRST_GC_THRESHOLD = 200_000  # number of new objects before the first garbage collection
+LATER_GC_THRESHOLD = 50_000  # number of new objects before each later collection
 
 
 def _lower_gc_threshold(phase: str, _) -> None:
-    """Lower the threshold of the garbage collector once its first collection starts."""
+    """Lower the threshold of the garbage collector when its first collection starts."""
     gc.set_threshold(LATER_GC_THRESHOLD, *gc.get_threshold()[1:])
     if phase == "stop":
         gc.callbacks.remove(_lower_gc_threshold)
@@ -46,10 +46,10 @@ gc.callbacks.append(_lower_gc_threshold)
 
 
 class _LazyMetadata(ModuleType):
-    """Stand-in for importlib.metadata that imports it when an attribute is used.
+    """Placeholder for importlib.metadata, which is imported when an attribute is used.
 
-    pydantic only uses its `entry_points` to search for plugins, and its imports of `email`, `socket` and `calendar`
-    would cost every command a tenth of the time that an answer may take.
+    pydantic uses only `entry_points` to search for plugins. The modules `email`, `socket` and `calendar`, which the
+    import would load, would add a tenth to the response time of every command.
     """
 
     def __getattr__(self, name: str):
@@ -83,7 +83,7 @@ from .commands.shared import CommandExit, UsageError, print_message
 from .commands.streams import make_printable, prepare_streams
 from .formatting import rewrite_powers_of_ten
 
-# group -> verb -> (module of its function, which is loaded when the verb is used; what it does; arguments of an example)
+# verbs by group: lazily imported module of the function, description, and arguments of an example
 VERB_GROUPS = {
     "Start": {
         "demo": (start, "run the bundled example rig", ""),
@@ -119,9 +119,11 @@ VERB_GROUPS = {
         "cite": (start, "BibTeX of a scene's sources", "joint.toml"),
     },
 }
-# verb -> module of its function
+# module of the function of each verb
 VERBS = {verb: row[0] for verbs in VERB_GROUPS.values() for verb, row in verbs.items()}
-MAX_EXAMPLE_WIDTH = 45  # characters of an example on the line of its description
+MAX_EXAMPLE_WIDTH = (
+    45  # largest number of characters of an example on the same line as its description
+)
 
 OUT_OF_MEMORY = (
     "out of memory; if a key of the scene sets the size of the largest part of the "
@@ -137,7 +139,7 @@ app = App(
 )
 
 
-def format_first_screen() -> str:
+def format_verb_overview() -> str:
     """Return the list of verbs in groups, each with an example and a description."""
     lines = [f"patchfem {__version__}: {app.help}"]
     for group, verbs in VERB_GROUPS.items():
@@ -156,7 +158,7 @@ def format_first_screen() -> str:
 
 
 def _describe_unexpected_arguments(verb: str, unused: list) -> str:
-    """Return the message on arguments that a verb does not take, or on an unknown verb."""
+    """Return the error message for an unknown verb or for arguments that a verb does not accept."""
     if verb in VERBS or verb in app:
         return f"unexpected '{' '.join(unused)}'; see `patchfem {verb} --help`"
     similar = get_close_matches(verb, VERBS, 1)
@@ -166,7 +168,7 @@ def _describe_unexpected_arguments(verb: str, unused: list) -> str:
 
 
 def _describe_removed_option(arguments: list) -> str:
-    """Return what replaces the first removed option among the arguments; "" if there is none."""
+    """Return advice for the first removed option among the arguments; "" if there is none."""
     from .scene.keys.removed import describe_removed_option
 
     for argument in arguments[1:]:
@@ -178,7 +180,7 @@ def _describe_removed_option(arguments: list) -> str:
 
 
 def register_verbs(arguments: list) -> None:
-    """Register the requested verb with the command line, or all verbs if it names none."""
+    """Register the requested verb with the command-line parser, or all verbs if there is none."""
     names_verb = bool(arguments) and arguments[0] in VERBS
     for verb in arguments[:1] if names_verb else VERBS:
         if verb not in app:
@@ -201,16 +203,17 @@ def install_completion(
         File for the completions; default: the usual file of the shell.
     """
     from cyclopts.completion.install import (
-        create_install_completion_command,  # 10 ms of every command otherwise
+        create_install_completion_command,  # imported here to save 10 ms in other commands
     )
 
     create_install_completion_command(app.install_completion, True)(shell=shell, output=output)
 
 
 def main(argv: list | None = None) -> None:
-    """Run the command line and end the process with its exit code.
+    """Run the command line, and end the process with an exit code.
 
-    The codes are 0 done, 2 bad input, 3 not converged, 4 missing or out of a resource, and 130 interrupted.
+    The codes are 0 for success, 2 for invalid input, 3 for missing convergence, 4 for a missing file or an exhausted
+    resource, and 130 for an interrupt.
     """
     if argv is not None:
         sys.exit(run_command(argv))
@@ -220,19 +223,21 @@ def main(argv: list | None = None) -> None:
 
 
 def _exit_quickly(code: int) -> None:
-    """End the process without the clean-up of its modules, which takes 50 ms.
+    """End the process without the clean-up of modules, which takes 50 ms.
 
-    The function returns, so the process ends as usual, if other threads run, if a profiler or a debugger is active, or
-    if the output cannot be flushed.
+    The function returns without effect if other threads run, if a profiler or a debugger is active, or if the output
+    cannot be flushed.
     """
     gc.freeze()
-    if threading.active_count() > 1 or _is_watched() or sys.flags.inspect:
+    if threading.active_count() > 1 or _is_traced() or sys.flags.inspect:
         return
     try:
         sys.stdout.flush()
         sys.stderr.flush()
         for end_signal in END_SIGNALS:
-            signal.signal(end_signal, signal.SIG_IGN)  # a signal must not change the exit code now
+            signal.signal(
+                end_signal, signal.SIG_IGN
+            )  # a signal must no longer change the exit code
     except (OSError, ValueError, AttributeError):
         return
     except KeyboardInterrupt:
@@ -241,10 +246,10 @@ def _exit_quickly(code: int) -> None:
     os._exit(code)
 
 
-def _is_watched() -> bool:
-    """Return whether a profiler, a debugger or a coverage tool watches this process.
+def _is_traced() -> bool:
+    """Return whether a profiler, a debugger or a coverage tool monitors this process.
 
-    From Python 3.12 on, most of them use sys.monitoring, which has six tool numbers.
+    Since Python 3.12, most of these tools use sys.monitoring, which has six tool identifiers.
     """
     monitoring = getattr(sys, "monitoring", None)
     has_tool = monitoring is not None and any(map(monitoring.get_tool, range(6)))
@@ -259,7 +264,7 @@ def run_command(arguments: list, before=lambda: None) -> int:
     arguments : list
         Arguments of the command line after `patchfem`.
     before : callable
-        Called first; its errors are printed in the same way.
+        Function that is called first; its errors are printed as well.
     """
     if atomic_write := sys.modules.get(f"{__package__}.disk.atomic_write"):
         atomic_write.forget_placed_paths()
@@ -272,14 +277,14 @@ def run_command(arguments: list, before=lambda: None) -> int:
     try:
         before()
         if arguments in ([], ["--help"], ["-h"]):
-            print(format_first_screen(), flush=True)
+            print(format_verb_overview(), flush=True)
             return 0
         if removed := _describe_removed_option(arguments):
             raise UsageError(removed)
         register_verbs(arguments)
         try:
             app(arguments, exit_on_error=False, print_error=False)
-        except SystemExit as end:  # cyclopts ends a verb and its help by SystemExit
+        except SystemExit as end:  # cyclopts raises SystemExit at the end of a verb and of its help
             if end.code or isinstance(end.__context__, BrokenPipeError):
                 raise
         sys.stdout.flush()
@@ -299,7 +304,7 @@ def run_command(arguments: list, before=lambda: None) -> int:
     except MemoryError:
         print_message(OUT_OF_MEMORY)
         return 4
-    except SystemExit as end:  # the help ends in this way if its reader closes the pipe
+    except SystemExit as end:  # raised by the help if the reader closes the pipe
         if isinstance(end.__context__, BrokenPipeError):
             return 0
         raise
@@ -317,8 +322,8 @@ def run_command(arguments: list, before=lambda: None) -> int:
 
 
 def _describe_os_error(error: OSError) -> str:
-    """Return the message on an error of the operating system."""
-    # the error comes from a query of the working folder, which names no file
+    """Return the message for an error of the operating system."""
+    # A query of a deleted working folder raises an error without a file name.
     if isinstance(error, FileNotFoundError) and not error.filename:
         return "patchfem: the working folder no longer exists; change to an existing one"
     advice = "; use a shorter name" if error.errno == ENAMETOOLONG else ""
@@ -326,19 +331,21 @@ def _describe_os_error(error: OSError) -> str:
 
 
 def _report_error(error: Exception) -> int:
-    """Print the message of an error to stderr and return the exit code; 1 for an internal fault."""
-    # a shared library does not fit into memory
+    """Print the message of an error to stderr, and return the exit code."""
+    # A shared library does not fit into memory.
     if isinstance(error, ImportError) and "failed to map" in str(error):
         print_message(OUT_OF_MEMORY)
         return 4
-    # this is a SceneError; importing the class would import pydantic, which takes 20 ms
+    # Only a SceneError has this attribute; an import of the class would load pydantic, which takes 20 ms.
     if hasattr(error, "mistakes"):
         for line in error.mistakes:
             print_message(make_printable(rewrite_powers_of_ten(line)))
         return 2
     code = getattr(error, "code", None)
     if isinstance(code, int) and type(error).__module__.startswith("patchfem"):
-        for line in str(error).split("\n"):  # tables to paste follow some messages
+        for line in str(error).split(
+            "\n"
+        ):  # some messages are followed by tables for the scene file
             print_message(make_printable(rewrite_powers_of_ten(line)))
         return code
     message = " ".join(f"{type(error).__name__}: {error}".split())
@@ -351,9 +358,10 @@ def _report_error(error: Exception) -> int:
 
 
 def _locate_fault(error: Exception) -> str:
-    """Return " in FILE:LINE (FUNCTION)" of the innermost frame of this package; "" if there is none.
+    """Return the code location of an error as " in FILE:LINE (FUNCTION)"; "" if it is unknown.
 
-    An error of another process carries the frames of that process as the string of its cause.
+    The location is that of the innermost frame in this package. An error from another process contains the frames of
+    that process in the string of its cause.
     """
     root = Path(__file__).resolve().parent
     location = ""
@@ -370,7 +378,7 @@ def _locate_fault(error: Exception) -> str:
 
 
 def _describe_interrupt() -> str:
-    """Return the message on an interrupt, with the files that are complete."""
+    """Return the message for an interrupted command, with the files that are complete."""
     atomic_write = sys.modules.get(f"{__package__}.disk.atomic_write")
     placed = atomic_write.list_placed_paths() if atomic_write else []
     text = "interrupted; no file was replaced"
@@ -386,15 +394,15 @@ def _describe_interrupt() -> str:
 
 
 def _repeat_interrupt(unraisable) -> None:
-    """Repeat an interrupt that was lost where Python drops exceptions.
+    """Raise an interrupt again that Python has discarded.
 
-    An example is a callback that LLVM calls during a compilation.
+    Python discards exceptions in callbacks, such as those of LLVM during a compilation.
     """
     if unraisable.exc_type is not KeyboardInterrupt:
         sys.__unraisablehook__(unraisable)
         return
     while True:
-        # on a busy machine the interrupt may come before the timer thread has started, and would be lost again
+        # On a busy machine, the interrupt may arrive before the timer thread has started, and would be lost again.
         try:
             timer = threading.Timer(0.05, _thread.interrupt_main, END_SIGNALS[:1])
             timer.daemon = True
@@ -405,9 +413,7 @@ def _repeat_interrupt(unraisable) -> None:
 
 
 sys.unraisablehook = _repeat_interrupt
-for (
-    end_signal
-) in END_SIGNALS:  # the last statement before main(), whose `try` handles the interrupt
+for end_signal in END_SIGNALS:  # must be the last statement before main(), which handles interrupts
     signal.signal(end_signal, signal.default_int_handler)
 
 if __name__ == "__main__":

@@ -1,8 +1,9 @@
-"""Records that travel between the folders of the package: frozen, with read-only arrays, in SI units.
+"""Immutable records that the folders of the package exchange, with read-only arrays in SI units.
 
-A static contact problem joins an `Interface` and its `Compliance` into a `ContactState`. A rig is a `ModalBasis` with a
-drive (`SineDrive`) and an `InitialState`; an engine computes its `Response`. A `MeasureDefinition` says how a number is
-read from the response, and a `Measure` is that number with its numerical error. An `Outcome` says how the run ended.
+A static contact problem is defined by an `Interface` and its `Compliance`; its solution is a `ContactState`. A rig is
+defined by a `ModalBasis`, a drive such as `SineDrive`, and an `InitialState`; an engine computes its `Response`. A
+`MeasureDefinition` describes how a quantity is computed from the response, and a `Measure` is its value with a numerical
+error. An `Outcome` describes how the run ended.
 
 Letters of array shapes: m interface nodes, n modes, i interfaces, k times, p masses or modes of the scene.
 
@@ -44,19 +45,19 @@ __all__ = [
     "frozen_array",
 ]
 
-# slip speed / its peak in the cycle; below it a law with memory counts as sticking
+# largest slip speed, relative to its peak in the cycle, at which a law with memory counts as sticking
 STICK_SPEED_RATIO = 1e-2
 G_N = 9.80665  # standard gravity [m s-2]
-# relative round-off of squared frequencies, by which a spring may seem to lower them
+# relative round-off of squared frequencies, allowed for in the rule that a spring lowers no frequency
 _STIFFENING_ROUND_OFF = 1e-9
-# smallest overlap of two mode shapes, so that the logarithm of no overlap is infinite
+# lower limit of the overlap of two mode shapes, which keeps its logarithm finite
 _ZERO_OVERLAP = 1e-30
-# cost of a pair of modes that is not allowed; larger than that of any allowed assignment
+# assignment cost of a forbidden pair of modes, larger than that of any allowed assignment
 _FORBIDDEN_PAIR_COST = 1e6
 
 
 class Outcome(StrEnum):
-    """State in which a run ended, such as steady, stuck or not converged."""
+    """Outcome of a run, such as steady, stuck or not converged."""
 
     DONE = "done"
     STEADY = "steady"
@@ -72,7 +73,7 @@ class Outcome(StrEnum):
 
     @property
     def sentence(self) -> str:
-        """Meaning of the outcome for the user, with the remedy if there is one."""
+        """Description of the outcome for the user, with advice where it exists."""
         return _SENTENCES[self]
 
 
@@ -98,7 +99,7 @@ _SENTENCES = {
 
 
 def frozen_array(values, dtype=np.float64) -> np.ndarray:
-    """Copy values into a C-ordered, read-only array."""
+    """Return a read-only, C-ordered copy of values."""
     out = np.array(values, dtype=dtype, order="C")
     out.setflags(write=False)
     return out
@@ -106,7 +107,7 @@ def frozen_array(values, dtype=np.float64) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Interface:
-    """Interface of a patch as nodes along the sliding direction.
+    """Nodes of the interface of a patch along the sliding direction.
 
     - x (m,): coordinate along the sliding direction, 0 in the middle of the patch [m].
     - weight (m,): area of each node, summed over the pairs of pieces [m2].
@@ -125,10 +126,10 @@ class Interface:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Compliance:
-    """Elastic compliance of both pieces, condensed to the nodes of their interface.
+    """Elastic compliance matrices of both pieces, condensed to the interface nodes.
 
-    Both matrices are symmetric and positive definite: the far faces of the pieces are fixed, so that the pieces cannot
-    move as rigid bodies.
+    Both matrices are symmetric and positive definite, because the far faces of the pieces are fixed and rigid-body
+    motion is impossible.
 
     - interface: nodes to which the matrices belong.
     - normal (m, m): approach of the surfaces at a node per normal force at another [m/N].
@@ -145,13 +146,13 @@ class ContactState:
     """Solution of a static normal contact problem.
 
     - sigma_n (m,): normal stress at the nodes, at least 0 [Pa].
-    - gap (m,): gap that remains, at least 0 [m].
+    - gap (m,): remaining gap, at least 0 [m].
     - approach: displacement of the upper holder towards the lower one [m].
     - rotation: rotation of the upper holder [rad].
     - load: normal force [N].
     - moment: moment of the normal stress about x = 0 [N m].
-    - outcome: how the solution ended.
-    - iterations: number of contact sets that were tried.
+    - outcome: outcome of the solution.
+    - iterations: number of iterations of the active-set solver.
     - residuals: relative residuals by name, from a check that is independent of the solver.
     """
 
@@ -168,11 +169,11 @@ class ContactState:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ModalBasis:
-    """Natural modes of a rig, or its masses, as n coordinates of equal mass.
+    """Modal coordinates of a rig (natural modes or masses) with a common modal mass.
 
     The coordinates z obey equation (3.4) of the report,
     z_i'' + (D z')_i + omega_i^2 z_i = -base_i a(t) - (slide_i F + ...)/mass.
-    The participation of a place is its motion per unit of each coordinate.
+    The participation of a point is its displacement per unit of each coordinate.
 
     - names: names of the modes or masses in the scene.
     - omega (n,): circular frequencies [rad/s].
@@ -180,18 +181,18 @@ class ModalBasis:
     - slide (n,): participation of the relative displacement of the first interface.
     - base (n,): participation of the drive: of the acceleration a(t) of the base, or of a force, a(t) = F/mass, with
       its sign reversed.
-    - output (n,): participation of the place at which the motion is measured.
+    - output (n,): participation of the point whose motion is the output.
     - mass: modal mass of every coordinate [kg].
     - damping (n, n): damping matrix D that couples the coordinates [1/s]; None for D = diag(2 zeta omega).
     - faces (i, n): participation of the relative displacement of every interface; None for the single interface
       `slide`.
-    - normal (n,): participation of the motion that opens the contact; None if no mode has such motion, likewise below.
+    - normal (n,): participation of the motion that opens the contact, or None.
     - pitch (n,): participation of the pitch of the patch [rad/m], or None.
     - lateral (n,): participation of the motion of the patch across the sliding direction, or None.
     - yaw (n,): participation of the yaw of the patch [rad/m], or None.
     - shapes (p, n): shapes of the coordinates at the modes or masses in `names`; None for the identity.
-    - gauge (n,): participation of the place whose displacement is measured; None if it is `output`, at which the
-      acceleration is measured.
+    - gauge (n,): participation of the point whose displacement is measured; None if it is the same point as `output`,
+      whose acceleration is measured.
     - lateral_faces (i, n): participation of the second direction of every interface, 0 for an interface without one;
       None if no interface has a second direction.
     """
@@ -215,35 +216,35 @@ class ModalBasis:
 
     @property
     def interfaces(self) -> np.ndarray:
-        """Participation of the relative displacement of every interface (i, n)."""
+        """Participation (i, n) of the relative displacement of each interface."""
         return self.slide[None, :] if self.faces is None else self.faces
 
     @property
     def damping_matrix(self) -> np.ndarray:
-        """Damping matrix D (n, n) [1/s], also if it is diagonal."""
+        """Damping matrix D (n, n) [1/s]."""
         return np.diag(2 * self.zeta * self.omega) if self.damping is None else self.damping
 
     def compute_stuck_mode(self, rows, stiffness, number: int) -> tuple:
-        """Return the natural mode that a modal coordinate becomes if the interfaces stick.
+        """Return the natural mode with stuck interfaces that corresponds to a modal coordinate.
 
-        The modes with springs are assigned to the coordinates one to one, so that their shapes overlap most and none is
-        slower than its coordinate, because a spring lowers no frequency.
+        Stuck interfaces act as springs. The modes with springs are assigned to the coordinates one to one by the overlap
+        of their shapes. None has a lower frequency than its coordinate, because a spring lowers no frequency.
 
         Parameters
         ----------
         rows : (i, n) array
-            Participations of the interfaces that stick.
+            Participations of the stuck interfaces.
         stiffness : (i,) array
-            Their tangential stiffness [N/m].
+            Tangential stiffness of the stuck interfaces [N/m].
         number : int
-            Index of the coordinate.
+            Index of the modal coordinate.
 
         Returns
         -------
         omega : float or None
             Circular frequency [rad/s]; None if a stiffness is infinite.
         shape : (n,) array
-            Shape of the mode, 1 at the coordinate.
+            Mode shape, normalised to 1 at the coordinate.
         """
         if not np.isfinite(stiffness).all():
             return None, np.eye(self.omega.size)[number]
@@ -256,10 +257,10 @@ class ModalBasis:
 
 
 def _assign_modes(lower, values, overlap) -> np.ndarray:
-    """Assign the modes with springs to the coordinates so that the product of the overlaps is largest.
+    """Assign the modes with springs to coordinates by the maximum overlap of their shapes.
 
-    `values` (n,) are the squared frequencies of the modes, `lower` (n,) lower bounds for each coordinate, and `overlap`
-    (n, n) the overlaps of the shapes. Returns the index (n,) of the mode of each coordinate.
+    `values` (n,) are the squared frequencies of the modes, `lower` (n,) their lower bounds for each coordinate, and
+    `overlap` (n, n) the overlaps of the mode shapes. Returns the index (n,) of the mode of each coordinate.
     """
     if values.size == 1:
         return np.zeros(1, int)
@@ -273,10 +274,10 @@ def _assign_modes(lower, values, overlap) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class InitialState:
-    """State of a rig at t = 0.
+    """State of a rig at time t = 0.
 
     - z (n,): modal coordinates [m].
-    - v (n,): their rates [m/s].
+    - v (n,): modal velocities [m/s].
     """
 
     z: np.ndarray
@@ -285,9 +286,9 @@ class InitialState:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class DriveSegment:
-    """Segment of a drive in closed form: a constant plus a sinusoid.
+    """Segment of a drive signal in closed form: a constant plus a sinusoid.
 
-    From `start` until the next segment starts, the drive is constant + amplitude sin(omega (t - start) + phase).
+    Between `start` and the start of the next segment, the drive is constant + amplitude sin(omega (t - start) + phase).
 
     - start: start of the segment [s].
     - constant: constant part [m s-2].
@@ -305,14 +306,15 @@ class DriveSegment:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SineDrive:
-    """Sinusoidal drive a sin(omega t) that starts at t = 0.
+    """Sinusoidal drive a sin(omega t) for t >= 0.
 
-    Every class of drives has the attributes `period`, `moving` and `segments` (empty without a closed form) and the
-    method `values`.
+    All drive classes have the attributes `period`, `moving` and `segments` (empty without a closed form) and the method
+    `values`.
 
     - acceleration: amplitude a [m s-2].
     - omega: circular frequency [rad/s].
-    - moving: whether the base accelerates. Otherwise the base is at rest and the drive is a force over the modal mass.
+    - moving: whether the drive is a base acceleration; otherwise it is a force over the modal mass, with the base at
+      rest.
     """
 
     acceleration: float
@@ -321,7 +323,7 @@ class SineDrive:
 
     @property
     def period(self) -> float:
-        """Drive period [s]."""
+        """Period of the drive [s]."""
         return 2 * np.pi / self.omega
 
     @property
@@ -335,10 +337,10 @@ class SineDrive:
 
 
 class ErrorCauses(NamedTuple):
-    """Parts of the error of a measure, and how fast it falls with the time step.
+    """Contributions to the error of a measure, and its order of convergence.
 
-    - parts: error by what is coarser in a comparison run, such as "steps" or "mesh" (`response.coarser`).
-    - order: observed order of convergence in the time step; None if it is not known.
+    - parts: contribution of each discretisation, such as "steps" or "mesh", from coarser runs (`response.coarser`).
+    - order: observed order of convergence with the time step; None if it is unknown.
     """
 
     parts: dict
@@ -347,18 +349,18 @@ class ErrorCauses(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Measure:
-    """Number that a run computes, with its unit and its numerical error.
+    """Computed quantity of a run with its unit and its numerical error.
 
     `str` gives the value and its error in a readable unit: ``14.808 ± 0.044 um``.
 
     - value: value in SI units; None if there is none.
     - unit: SI unit of the value.
-    - error: numerical error (half-width); None if it is not estimated.
+    - error: numerical error (half-width); None without an estimate.
     - floor: absolute error that is allowed at any tolerance.
     - text: definition of the measure.
     - reason: reason why the value is None.
     - engine: method that computed the value; "" for the engine of the run.
-    - causes: parts of the error; None if they are not known.
+    - causes: contributions to the error; None if they are unknown.
     """
 
     value: float | None
@@ -389,7 +391,7 @@ class Measure:
 
 
 def compute_allowed_error(tolerance, value, floor):
-    """Return the error that a tolerance allows: tolerance |value| + floor.
+    """Return the error that a tolerance allows: tolerance x |value| + floor.
 
     Parameters
     ----------
@@ -414,14 +416,14 @@ class MeasureDefinition(NamedTuple):
     - text: meaning in one sentence.
     - function: function of the solution that returns the value; None if only an engine or another kind of run computes
       it.
-    - sample_error: error of reading the measure from samples, in samples of a cycle.
-    - group: measures that a reader looks at together: motion, friction, energy, patch or wear.
-    - larger_term: None unless the measure is a difference of larger terms. Otherwise the name of these terms, and a
-      function that returns their size from the values of the same interface by name. The tolerance times this size is
-      added to the floor.
-    - order: order at which the error falls with the spacing of the samples of an exact motion.
-    - needs_run: whether the function reads the histories of the whole run, so that the coarse runs keep them as well.
-    - minimum: smallest value that the measure can have.
+    - sample_error: error due to sampling, multiplied by the number of samples per cycle.
+    - group: group of related measures: motion, friction, energy, patch or wear.
+    - larger_term: for a measure that is a small difference of larger terms, the name of these terms and a function that
+      returns their size from the measures of the same interface; otherwise None. The tolerance times this size is added
+      to the floor.
+    - order: order of the sampling error of an exact motion in the sample spacing.
+    - needs_run: whether the function uses the histories of the whole run, which the coarse runs then store as well.
+    - minimum: smallest possible value.
     """
 
     name: str
@@ -442,16 +444,16 @@ class Response:
     """Time histories of a run at its stored samples.
 
     - time (k,): time from the start of the run [s].
-    - modal, modal_rate (k, n): modal coordinates [m] and their rates [m/s].
-    - slide, slide_rate (k,): relative displacement of the first interface [m] and its rate [m/s].
-    - output, output_rate (k,): motion of the output relative to the base [m] and its rate [m/s].
+    - modal, modal_rate (k, n): modal coordinates [m] and velocities [m/s].
+    - slide, slide_rate (k,): relative displacement [m] and velocity [m/s] of the first interface.
+    - output, output_rate (k,): displacement [m] and velocity [m/s] of the output relative to the base.
     - acceleration (k,): absolute acceleration at the accelerometer [m s-2].
     - base_acceleration (k,): acceleration of the base [m s-2].
     - force (k,): friction force [N].
     - slip (k,): irreversible part of `slide` [m].
-    - extra: further histories, among them "ledger" (4, k): friction work, energy stored in the interface, dissipated
-      and created energy [J]; "sensor", "sensor_rate" (k,): motion [m] and rate [m/s] of an accelerometer that does not
-      move with the output.
+    - extra: further histories, such as "ledger" (4, k): friction work, energy stored in the interface, dissipated and
+      created energy [J]; "sensor", "sensor_rate" (k,): displacement [m] and velocity [m/s] of an accelerometer that is
+      not mounted at the output.
     """
 
     time: np.ndarray
@@ -468,9 +470,9 @@ class Response:
     extra: dict = field(default_factory=dict)
 
     def select(self, samples) -> "Response":
-        """Return the response at some of its samples.
+        """Return the response at selected samples.
 
-        `samples` is a slice, indices or booleans (k,). Further histories of other lengths are left out.
+        `samples` is a slice, an array of indices or a mask (k,). Histories of other lengths in `extra` are omitted.
         """
         names = [name for name in self.__dataclass_fields__ if name != "extra"]
         columns = {name: getattr(self, name)[samples] for name in names}
@@ -483,13 +485,13 @@ class Response:
 
 
 class InterfaceLoop(NamedTuple):
-    """Friction loop of one interface over the last cycles, as an engine integrated it.
+    """Integrals over the friction loop of an interface in the last cycles.
 
     - displacement_harmonic: first harmonic of the relative displacement [m].
     - force_harmonic: first harmonic of the friction force [N].
     - work: friction work [J].
     - slip_range: range of the slip [m].
-    - stuck_time: time without slip [s]; None if it is read from samples.
+    - stuck_time: time without slip [s]; None if it must be computed from samples.
     - max_force: largest friction force [N].
     """
 
@@ -503,19 +505,18 @@ class InterfaceLoop(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class IntegratedMeasures:
-    """Quantities of the last cycles that an engine computed without samples of the motion.
+    """Quantities of the last cycles that an engine computes without sampling the motion.
 
-    An engine that has its motion in closed form, or as polynomials, knows peaks, times without slip and work better
-    than samples of the motion show them. A quantity that is missing here is read from samples instead
-    (`response.rows`).
+    If the motion of an engine is in closed form or piecewise polynomial, its peaks, times without slip and work are more
+    accurate than those from samples. A quantity that is missing here is computed from samples (`response.rows`).
 
-    - values: measures by name; None for a measure of which the run has no value.
-    - acceleration_harmonics: sizes of the first and third harmonic of the absolute acceleration [m s-2], or None.
-    - loops: friction loop of each interface.
+    - values: values of measures by name; None if the run has no value.
+    - acceleration_harmonics: amplitudes of the first and third harmonic of the absolute acceleration [m s-2], or None.
+    - loops: InterfaceLoop of each interface.
     - slip_start_phases (s,): phases of the drive [rad], modulo pi, at which the first interface begins to slip, or
       None.
     - reversals: (relative displacement [m], friction force [N]) of the first interface at the smallest and at the
-      largest relative displacement, a pair for every cycle.
+      largest relative displacement of each cycle.
     """
 
     values: dict = field(default_factory=dict)

@@ -1,17 +1,17 @@
-"""Effects that a scene can name, with the module and the equation of each.
+"""Registry of the physical effects and methods that a scene can request.
 
-An effect is a table of a scene, such as `contact.crown`, or the value of a key, such as `friction.law=iwan`. `plan`
-imports only the modules of the effects that a scene names.
+An effect is a table of a scene, such as `contact.crown`, or the value of a key, such as `friction.law=iwan`. EFFECTS
+gives the module and the equation of each effect. Only the modules of the effects in a scene are imported.
 
-Friction laws, gap shapes and waveforms are effects with more columns. The columns of a law are its keys besides
-`static`, what it supports and its traits, as words separated by blanks. A bench, and a rig of one interface under a
-constant load, run every law. A law supports further:
+Friction laws, gap shapes and waveforms have further fields. Those of a law are its keys in addition to `static`, its
+supported features and its traits, as words separated by blanks. Every law can be used in a bench, and in a rig with one
+interface under a constant load. Optional features are:
 
 - `shear`: elastic pieces ([contact.shear]);
 - `joints`: several interfaces, stiffening springs and strips that yaw;
 - `varying-load`: a normal load that changes with the motion;
-- `exact`: the event-driven engine, with the whole interface as one element;
-- `pieces`: the same engine with several elements that stick or slip;
+- `exact`: the event-driven engine with the whole interface as one element;
+- `pieces`: the event-driven engine with several elements that stick or slip;
 - `harmonic`: harmonic balance;
 - `grooves`: grooves whose flanks the surfaces climb;
 - `plane`: an interface of a rig that slides in two directions;
@@ -20,18 +20,18 @@ constant load, run every law. A law supports further:
 Traits of laws:
 
 - `set-valued`: the interface sticks rigidly below the friction limit;
-- `bonds`: the sum over bonds (2.17) with its readings and orders;
-- `averaged`: averaged over the pressure behind a point;
-- `timeless`: the force does not depend on the speed of the slide;
-- `memoryless`: the force depends on the present motion alone;
+- `bonds`: the law is the sum over bonds (2.17) with its readings and orders;
+- `averaged`: the friction stress is an average over the pressure behind a point;
+- `timeless`: the force does not depend on the sliding speed;
+- `memoryless`: the force depends only on the current motion;
 - `creeps`: the interface never sticks;
-- `cells`: a density of elements that is cut into cells;
-- `overshoots`: after a reversal the force exceeds that of steady sliding for less than a time step of a march.
+- `cells`: a continuous distribution of elements is discretised into cells;
+- `overshoots`: after a reversal, the force exceeds that of steady sliding for less than one time step.
 
-`runs.rig.varying_load` and `runs.batch.lumped.lane_numbers` name the laws that they serve themselves.
+`runs.rig.varying_load` and `runs.batch.lumped.lane_numbers` have their own lists of supported laws.
 
 A gap shape has a table in `scene.keys.contact` and a function in `contact.gaps`. A waveform has a function in the table
-`DRIVE_BUILDERS` of its module; its traits are listed at `Waveform`.
+`DRIVE_BUILDERS` of its module; the class `Waveform` describes its traits.
 """
 
 from importlib import import_module
@@ -39,19 +39,20 @@ from typing import NamedTuple
 
 from .exceptions import PatchfemError
 
-# masses or modes of a rig; their matrices are full. The limit is here because reading a scene must not load numpy
+# largest number of masses or modes of a rig, whose matrices are dense; defined here because parsing a scene must not
+# import numpy
 MAX_COORDINATES = 2000
 
 
 class Effect(NamedTuple):
-    """Part of a model that a scene can ask for.
+    """Physical effect or method that a scene can request.
 
-    - module: module that computes the effect; "" if the values of the scene are enough.
-    - equations: equations of the effect, as the page shows them.
-    - keys: keys that a law or a waveform requires, "a|b" for one of two, and keys that it takes besides.
-    - supports: engines and features that run the law.
+    - module: module that computes the effect; "" if the effect requires no module.
+    - equations: equations of the effect for the report page.
+    - keys: required keys of a law or a waveform ("a|b" means one of two), and its optional keys.
+    - supports: engines and features that support the law.
     - traits: traits of the law or the waveform.
-    - phrase: description of the waveform on the page (see `Waveform`).
+    - phrase: description of the waveform for the report page (see `Waveform`).
     """
 
     module: str
@@ -63,14 +64,16 @@ class Effect(NamedTuple):
 
 
 class Waveform(NamedTuple):
-    """Waveform of the drive. Other modules ask its properties and never compare its name.
+    """Waveform of the drive.
 
-    - name: value of `drive.waveform`; "" of a release, which has none.
-    - keys: keys of [drive] that it requires, and those that it takes besides, separated by blanks.
-    - traits: words that turn the properties below on: "sine levels swept step random base-only endless".
-    - phrase: description of the drive on the page. `{what}` is the driven quantity ("base acceleration"), `{level}` its
-      size, `{place}` the driven mass; a key such as `{frequency}` is its value in the scene. "" for a general
-      description.
+    Other modules use the properties of a waveform and never compare its name.
+
+    - name: value of `drive.waveform`; "" for a release, which has no waveform.
+    - keys: required and optional keys of the table [drive], each separated by blanks.
+    - traits: words that set the properties below: "sine levels swept step random base-only endless".
+    - phrase: description of the drive for the report page. `{what}` is the driven quantity ("base acceleration"),
+      `{level}` its amplitude, `{place}` the driven mass; a key such as `{frequency}` is its value in the scene. "" for a
+      general description.
     """
 
     name: str = ""
@@ -78,8 +81,8 @@ class Waveform(NamedTuple):
     traits: str = ""
     phrase: str = ""
 
-    def takes(self, key: str) -> bool:
-        """Return whether the waveform requires or takes a key of [drive]."""
+    def accepts_key(self, key: str) -> bool:
+        """Return whether the waveform accepts a key of the table [drive]."""
         return key in " ".join(self.keys).split()
 
     def _has(self, trait: str) -> bool:
@@ -87,7 +90,7 @@ class Waveform(NamedTuple):
 
     @property
     def required_keys(self) -> list:
-        """Keys of [drive] that the waveform requires."""
+        """Keys of the table [drive] that the waveform requires."""
         return self.keys[0].split()
 
     @property
@@ -97,51 +100,51 @@ class Waveform(NamedTuple):
 
     @property
     def has_levels(self) -> bool:
-        """Whether the drive is a sine whose amplitude changes from level to level of `drive.levels`."""
+        """Whether the drive is a sine whose amplitude takes the values of `drive.levels` in turn."""
         return self._has("levels")
 
     @property
     def is_swept(self) -> bool:
-        """Whether the drive is a sine whose frequency runs from `drive.from` to `drive.to`."""
+        """Whether the drive is a sine whose frequency varies from `drive.from` to `drive.to`."""
         return self._has("swept")
 
     @property
     def is_step(self) -> bool:
-        """Whether the drive jumps at t = 0 and stays constant, so that the motion decays."""
+        """Whether the drive is a step at t = 0, after which the motion decays."""
         return self._has("step")
 
     @property
     def is_random(self) -> bool:
-        """Whether the drive is a random record, whose spectral density is in `drive.file`."""
+        """Whether the drive is a random signal with a given spectral density."""
         return self._has("random")
 
     @property
     def is_for_base_only(self) -> bool:
-        """Whether the drive can only shake the base and is refused as a force."""
+        """Whether the drive can only be a motion of the base, not a force."""
         return self._has("base-only")
 
     @property
-    def needs_length(self) -> bool:
-        """Whether the scene must say when the run ends, by `drive.cycles` or `drive.duration`."""
+    def needs_duration(self) -> bool:
+        """Whether the scene must set the duration by `drive.cycles` or `drive.duration`."""
         return self._has("endless")
 
     @property
     def has_steady_motion(self) -> bool:
-        """Whether a harmonic balance finds the steady motion, or the curve of steady motions."""
+        """Whether harmonic balance can compute the steady-state motion, or a curve of such motions."""
         return self.is_sine or self.has_levels or self.is_swept
 
 
-# Has a function of the coordinates x and the table for each gap shape.
+# Module with a function of the coordinates x and the scene table for each gap shape.
 GAP_MODULE = "patchfem.contact.gaps"
 GROOVE_EQUATION = (
     "F = V (t + phi)/(1 - phi t), V = N + m (t q'' + t' q'^2), t = A k sin(k q - phase)"
 )
-# keys of [drive] that give the size of a drive
+# keys of the table [drive] for the amplitude of a drive
 _DRIVE_SIZE_KEYS = "acceleration displacement force"
 
 
 def _make_law(module: str, equations: str, keys: tuple, supports: str, traits: str = "") -> Effect:
-    """Return the effect of a friction law; its module is below patchfem.friction."""
+    """Return the effect of a friction law, whose module is in patchfem.friction."""
     return Effect(f"patchfem.friction.{module}", equations, keys, supports, traits)
 
 
@@ -152,7 +155,7 @@ def _make_waveform(
     phrase: str = "",
     module: str = "patchfem.structure.drives",
 ) -> Effect:
-    """Return the effect of a waveform; each takes the keys `cycles` and `duration`."""
+    """Return the effect of a waveform, which also accepts the keys `cycles` and `duration`."""
     required, optional = keys
     all_keys = (required, f"{optional} cycles duration".strip())
     return Effect(module, equations, all_keys, traits=traits, phrase=phrase)
@@ -372,7 +375,7 @@ EFFECTS = {
     ),
 }
 
-# a table [[structure.interface]] has the keys of [friction]
+# tables [[structure.interface]] have the same laws and readings as [friction]
 EFFECTS |= {
     f"structure.interface.{name.removeprefix('friction.')}": effect
     for name, effect in EFFECTS.items()
@@ -381,12 +384,12 @@ EFFECTS |= {
 
 
 def import_effect(name: str):
-    """Import the module that computes an effect and return it."""
+    """Import and return the module that computes an effect."""
     return import_module(EFFECTS[name].module)
 
 
 def list_absent_effects(names) -> list:
-    """Return the effects that are not among `names`, in the order of EFFECTS.
+    """Return all effects except those in `names`, in the order of EFFECTS.
 
     Raises
     ------
@@ -403,7 +406,7 @@ def list_absent_effects(names) -> list:
 
 
 def list_displayed_absent_effects(names, engine: str | None) -> list:
-    """Return the absent effects for display, without the engine that the program chose itself."""
+    """Return the absent effects without the method that the program selected automatically."""
     return [name for name in names if name != f"accuracy.method={engine}"]
 
 
@@ -424,16 +427,16 @@ WAVEFORMS = {
     for name, effect in EFFECTS.items()
     if name.startswith("drive.waveform=")
 }
-NO_WAVEFORM = Waveform()  # for a release, and for an unknown name
-SINE_WAVEFORM = WAVEFORMS["sine"]  # default of a scene
-# support of the readings and orders of the law `nonlocal` that need the sum over all bonds
+NO_WAVEFORM = Waveform()  # waveform of a release and of an unknown name
+SINE_WAVEFORM = WAVEFORMS["sine"]  # default waveform of a scene
+# features of the law `nonlocal` with a reading or an order that requires the sum over all bonds
 BOND_LIST_SUPPORT = "two-directions"
 
 
 def find_waveform(drive) -> Waveform:
     """Return the waveform of a [drive] table.
 
-    It is NO_WAVEFORM if there is no drive, for free motion, and if the name is unknown.
+    Returns NO_WAVEFORM without a drive, for free motion, and for an unknown name.
     """
     if drive is None or drive.kind == "free":
         return NO_WAVEFORM
@@ -441,22 +444,22 @@ def find_waveform(drive) -> Waveform:
 
 
 def law_has_trait(law: str | None, trait: str) -> bool:
-    """Return whether a law has a trait; an unknown law has none."""
+    """Return whether a friction law has a trait; False for an unknown law."""
     return law in LAWS and trait in LAWS[law].traits.split()
 
 
 def law_takes_key(law: str | None, key: str) -> bool:
-    """Return whether a law takes a key; an unknown law takes every key."""
+    """Return whether a friction law accepts a key; True for an unknown law."""
     return law not in LAWS or key in " ".join(LAWS[law].keys).replace("|", " ").split()
 
 
-def takes_stiffness_or_length(law: str | None) -> bool:
-    """Return whether a law takes either a stiffness or the bond length that determines it."""
+def law_takes_stiffness_or_length(law: str | None) -> bool:
+    """Return whether a law accepts either a stiffness or a bond length, which determines it."""
     return law in LAWS and "bond_length|stiffness" in LAWS[law].keys[0].split()
 
 
-def is_bond_list(friction) -> bool:
-    """Return whether a law sums over all bonds instead of using the recursion of order 1."""
+def needs_bond_list(friction) -> bool:
+    """Return whether a [friction] table requires the sum over all bonds instead of a recursion."""
     return law_has_trait(friction.law, "bonds") and (
         friction.reading == "report" or friction.order not in (1, None)
     )
@@ -464,16 +467,16 @@ def is_bond_list(friction) -> bool:
 
 def law_supports(friction, feature: str) -> bool:
     """Return whether the law of a [friction] table supports an engine or a feature."""
-    words = BOND_LIST_SUPPORT if is_bond_list(friction) else LAWS[friction.law].supports
+    words = BOND_LIST_SUPPORT if needs_bond_list(friction) else LAWS[friction.law].supports
     return feature in words.split()
 
 
 def describe_law(friction) -> str:
-    """Name the law of a [friction] table.
+    """Return the name of the law of a [friction] table for use in a message.
 
-    The name includes the reading or the order that needs the sum over all bonds.
+    The name includes the reading or the order if it requires the sum over all bonds.
     """
-    if not is_bond_list(friction):
+    if not needs_bond_list(friction):
         return f"law '{friction.law}'"
     if friction.reading == "report":
         return f"law '{friction.law}' of reading 'report'"
@@ -481,21 +484,21 @@ def describe_law(friction) -> str:
 
 
 def name_laws_with_key(key: str) -> str:
-    """Name the laws that take a key: "coulomb and nonlocal"."""
+    """Return the names of the laws that accept a key, such as "coulomb and nonlocal"."""
     return join_words((name for name in LAWS if law_takes_key(name, key)), "and")
 
 
 def suggest_laws(feature: str, other_features: str = "", friction=None) -> str:
-    """Suggest laws that support a feature: "use law 'coulomb' or 'tanh'".
+    """Return advice to use a law that supports a feature, such as "use law 'coulomb' or 'tanh'".
 
     Parameters
     ----------
     feature : str
-        Feature that the present law does not support.
+        Feature that the current law does not support.
     other_features : str
-        Features that the suggested laws must support besides, separated by blanks.
+        Further features that the suggested laws must support, separated by blanks.
     friction : table or None
-        Present [friction] table. If only its reading or its order is not supported, those are suggested first.
+        Current [friction] table. If only its reading or its order is unsupported, a change of these is suggested first.
 
     Returns
     -------
@@ -504,14 +507,14 @@ def suggest_laws(feature: str, other_features: str = "", friction=None) -> str:
     required = {feature, *other_features.split()}
     laws = [name for name, law in LAWS.items() if required <= set(law.supports.split())]
     instead = ""
-    if friction is not None and is_bond_list(friction) and friction.law in laws:
+    if friction is not None and needs_bond_list(friction) and friction.law in laws:
         instead = 'reading = "stretch" with order = 1, or '
         laws.remove(friction.law)
     quoted = [f"'{name}'" for name in laws]
     return f"use {instead}law {join_words(quoted, 'or')}"
 
 
-REMEDIES = {  # word -> remedy for two effects that cannot be combined yet
+REMEDIES = {  # advice by name, for two effects that cannot be combined
     "order": "use order = 1",
     "recursion": 'use reading = "stretch" with order = 1 and without breakaway',
     "elastic range": "set breakaway = 0",
@@ -527,9 +530,9 @@ REMEDIES = {  # word -> remedy for two effects that cannot be combined yet
 
 
 def describe_unsupported(combination: str, alternative: str) -> str:
-    """Return the message for a combination of effects that is not supported yet.
+    """Return the message for a combination of effects that is not supported.
 
-    `alternative` is a key of REMEDIES or the remedy itself.
+    `alternative` is a key of REMEDIES, or the advice itself.
     """
     remedy = REMEDIES.get(alternative, alternative)
     if combination.startswith(("beside ", "with ", "in ")):

@@ -1,18 +1,18 @@
-"""Exceptions that tell the user what went wrong, with the exit codes of the command line."""
+"""Exceptions with messages for the user, and their exit codes on the command line."""
 
 
 class PatchfemError(Exception):
-    """Error that the user can act on.
+    """Error that the user can correct.
 
     The class attribute `code` is the exit code of the command line.
 
     Parameters
     ----------
     text : str
-        Message: what is wrong, why, and what to change.
+        Message that describes the problem, its cause and a solution.
     key : str or None
-        Key of the scene at fault; `model.source.locate_errors` adds its file and line to the text. "" stands for the
-        scene as a whole, None for a text that needs no place.
+        Scene key that causes the error; `model.source.locate_errors` adds its file and line to the message. "" denotes
+        the whole scene, and None a message without a location.
     """
 
     code = 2
@@ -23,13 +23,13 @@ class PatchfemError(Exception):
 
 
 class UnresolvedTrace(PatchfemError):
-    """Error of a trace with waves that are too short for the elements."""
+    """Error for a surface trace with wavelengths too short for the elements."""
 
 
 class NotConverged(PatchfemError):
-    """Error of a numerical method that misses its residual, also with every fallback.
+    """Error for a numerical method that does not converge, including all fallbacks.
 
-    The attribute `partial_result` is what the run computed before, with the outcome `not_converged`, or None.
+    The attribute `partial_result` is the result up to this point, with the outcome `not_converged`, or None.
     """
 
     code = 3
@@ -37,6 +37,6 @@ class NotConverged(PatchfemError):
 
 
 class Missing(PatchfemError):
-    """Error of a file or package that is missing, or of a resource that is used up."""
+    """Error for a missing file or package, or an exhausted resource."""
 
     code = 4

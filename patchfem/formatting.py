@@ -1,7 +1,8 @@
-"""Formatting of numbers with a unit that suits the value and digits that suit its error.
+"""Formatting of numbers with readable units and with digits that match their errors.
 
-This is the only place where a value and its error become text. A number ends at the second digit of its error. A
-number whose first MAX_SIGNIFICANT_DIGITS digits are exact is shown without an error. A value within its floor is shown as 0.
+All values with errors are formatted by this module. The last digit of a value is the second significant digit of its
+error. A value whose first MAX_SIGNIFICANT_DIGITS digits are exact is displayed without an error, and a value below its
+floor as 0.
 """
 
 import math
@@ -9,16 +10,20 @@ import re
 from itertools import pairwise
 from math import isfinite, log10
 
-MAX_SIGNIFICANT_DIGITS = 7  # significant digits of a value; nobody reads an error below the seventh
-DIGITS_WITHOUT_ERROR = 6  # significant digits of a value whose error is unknown
-MAX_ROUND_OFF_FRACTION = 1e-6  # number with a unit / its floor; a smaller one is round-off
-MAX_RATIO_ROUND_OFF = 0.1  # number without a unit / its floor; a smaller one is round-off
-MAX_RELATIVE_ERROR = 0.1  # error / value; a value below its floor with a larger one is shown as 0
-MIN_PLAIN_POWER = -4  # smallest power of ten of a number that is written without an exponent
-FIRST_EXPONENT_POWER = 7  # numbers from this power of ten on are written with an exponent
-ZERO_ERROR_POWER = -400  # power of ten that stands for an error of 0; below that of any float
+MAX_SIGNIFICANT_DIGITS = 7  # largest number of significant digits of a value
+DIGITS_WITHOUT_ERROR = 6  # number of significant digits of a value without a known error
+MAX_ROUND_OFF_FRACTION = (
+    1e-6  # largest round-off of a value with a unit, as a fraction of its floor
+)
+MAX_RATIO_ROUND_OFF = 0.1  # largest round-off of a dimensionless value, as a fraction of its floor
+MAX_RELATIVE_ERROR = (
+    0.1  # largest relative error of a value below its floor that is not displayed as 0
+)
+MIN_PLAIN_POWER = -4  # smallest power of ten of a number without an exponent
+FIRST_EXPONENT_POWER = 7  # smallest power of ten of a large number with an exponent
+ZERO_ERROR_POWER = -400  # power of ten of a vanishing error, smaller than that of any float
 
-UNIT_LADDERS = {  # SI unit: (unit shown, number of these in one SI unit), from small to large
+UNIT_LADDERS = {  # display units (name, number of these in one SI unit) for each SI unit, in ascending order
     "m": (("nm", 1e9), ("um", 1e6), ("mm", 1e3), ("m", 1.0)),
     "s": (("us", 1e6), ("ms", 1e3), ("s", 1.0)),
     "rad": (("urad", 1e6), ("mrad", 1e3), ("rad", 1.0)),
@@ -34,7 +39,7 @@ UNIT_LADDERS = {  # SI unit: (unit shown, number of these in one SI unit), from 
     "m s-2": (("g", 1 / 9.80665),),
     "W": (("uW", 1e6), ("mW", 1e3), ("W", 1.0), ("kW", 1e-3)),
 }
-# unit in a sentence: key of UNIT_LADDERS
+# keys of UNIT_LADDERS by the name of the unit in a sentence
 SENTENCE_UNITS = {unit: unit for unit in UNIT_LADDERS if "-" not in unit} | {"N/m": "N m-1"}
 _UNIT_PATTERN = "|".join(sorted(SENTENCE_UNITS, key=len, reverse=True))
 _POWER_PATTERN = re.compile(
@@ -43,20 +48,20 @@ _POWER_PATTERN = re.compile(
 
 
 def choose_unit(ladder: tuple, size: float) -> tuple:
-    """Choose the unit in which a number has few digits before and after the point.
+    """Choose the unit in which a number has few digits before and after the decimal point.
 
     Parameters
     ----------
     ladder : tuple
-        Units and scales, a value of UNIT_LADDERS.
+        Names and scales of units, an element of UNIT_LADDERS.
     size : float
-        Size to show [SI].
+        Magnitude of the number [SI].
 
     Returns
     -------
     tuple
-        Name and scale of the smallest unit in which the size is below 1000, or in whose next unit it would be below
-        0.001.
+        Name and scale of the smallest unit in which the number is less than 1000, or less than 0.001 in the next larger
+        unit.
     """
     for (name, scale), (_, next_scale) in pairwise(ladder):
         if abs(size) * scale < 1000 or abs(size) * next_scale < 1e-3:
@@ -65,20 +70,20 @@ def choose_unit(ladder: tuple, size: float) -> tuple:
 
 
 def choose_axis_unit(values, unit: str) -> tuple:
-    """Return the unit (name, scale) of an axis that shows given values [SI].
+    """Return the unit (name, scale) of an axis with given values [SI].
 
     `unit` is the SI unit of the values, a key of UNIT_LADDERS.
     """
-    import numpy as np  # imported here because the messages of `check` need no arrays
+    import numpy as np  # imported here because the verb `check` must not load numpy
 
     values = np.asarray(values)
     return choose_unit(UNIT_LADDERS[unit], np.abs(values[np.isfinite(values)]).max(initial=0.0))
 
 
 def needs_log_scale(values) -> bool:
-    """Return whether an axis of given values should be logarithmic.
+    """Return whether an axis with given values should be logarithmic.
 
-    It should if no value is negative and the positive values span more than three decades.
+    This is the case if no value is negative and the positive values span more than three decades.
     """
     import numpy as np
 
@@ -95,24 +100,24 @@ def round_to_error(
     Parameters
     ----------
     value : float or None
-        A dash stands for None.
+        Value to format; None is formatted as a dash.
     error : float or None
         Numerical error (half-width); None if it is unknown.
     floor : float
-        Absolute floor of the measure. A value below it is shown as 0 if its error is large or if it is round-off.
+        Absolute floor of the measure. A smaller value is displayed as 0 if its error is large or if it is round-off.
     is_ratio : bool
-        Whether the value has no unit, so that its floor does not depend on the size of the rig.
+        Whether the value is dimensionless, so that its floor does not depend on the size of the rig.
 
     Returns
     -------
     tuple of str
-        Value and error. The error is "" if it is unknown, or if all digits shown are exact to one unit of the last.
+        Value and error. The error is "" if it is unknown, or less than one unit of the last displayed digit.
     """
     if value is None:
         return "-", ""
     if not isfinite(value):
         return f"{value:g}", ""
-    if _is_zero(value, error, floor, is_ratio):
+    if _is_displayed_as_zero(value, error, floor, is_ratio):
         return "0", format_number(error, 2) if error is not None and 0 < floor <= error else ""
     if error is None or not isfinite(error):
         return format_number(value, DIGITS_WITHOUT_ERROR), "" if error is None else f"{error:g}"
@@ -120,13 +125,13 @@ def round_to_error(
         return "0", format_number(error, 2) if error else ""
     value_power = math.floor(log10(abs(value)))
     last_power = _find_second_digit_power(error)
-    if last_power < value_power - MAX_SIGNIFICANT_DIGITS + 1:  # every digit shown is exact
+    if last_power < value_power - MAX_SIGNIFICANT_DIGITS + 1:  # all displayed digits are exact
         first_exact_power = max(
             value_power - MAX_SIGNIFICANT_DIGITS + 1,
             math.ceil(log10(error)) if error else ZERO_ERROR_POWER,
         )
         return format_number(round(value, -first_exact_power), MAX_SIGNIFICANT_DIGITS), ""
-    if _is_plain_power(value_power) or _is_plain_power(last_power + 1):
+    if _is_written_without_exponent(value_power) or _is_written_without_exponent(last_power + 1):
         return _format_to_digit(value, error, last_power)
     power = max(value_power, last_power + 1)
     mantissas = _format_to_digit(value / 10.0**power, error / 10.0**power, last_power - power)
@@ -134,12 +139,12 @@ def round_to_error(
 
 
 def format_number(value: float, digits: int) -> str:
-    """Format a number with significant digits, without trailing zeros or a needless exponent."""
+    """Format a number with a number of significant digits, without trailing zeros."""
     if value == 0 or not isfinite(value):
         return "0" if value == 0 else f"{value:g}"
     rounded_value = float(f"{value:.{digits}g}")
     value_power = math.floor(log10(abs(rounded_value)))
-    if not _is_plain_power(value_power):
+    if not _is_written_without_exponent(value_power):
         mantissa, power = f"{rounded_value:.{digits - 1}e}".split("e")
         return f"{float(mantissa):g}e{int(power)}"
     text = f"{rounded_value:.{max(digits - 1 - value_power, 0)}f}"
@@ -147,7 +152,7 @@ def format_number(value: float, digits: int) -> str:
 
 
 def choose_display_unit(value: float, unit: str, error: float | None = None) -> tuple:
-    """Return the unit (name, scale) in which a value [SI] and its error are shown.
+    """Return the unit (name, scale) for the display of a value [SI] with its error.
 
     The name is "" for a value without a unit.
     """
@@ -184,9 +189,9 @@ def format_value(
 
 
 def format_with_error(value: str, error: str, unit: str) -> str:
-    """Join the strings of a value, its error and a unit, such as `(0.5 ± 1.0)e-8`.
+    """Combine the strings of a value, its error and a unit, such as `(0.5 ± 1.0)e-8`.
 
-    The strings are those of `round_to_error`. A common power of ten is written once.
+    The strings come from `round_to_error`. A common power of ten is written only once.
     """
     if not error:
         return f"{value} {unit}".strip()
@@ -208,9 +213,9 @@ def format_quantity(value: float, unit: str, digits: int, floor: float = 0.0) ->
     unit : str
         SI unit.
     digits : int
-        Significant digits.
+        Number of significant digits.
     floor : float
-        A value of at most this size is shown as 0.
+        Largest magnitude of a value that is displayed as 0.
 
     Returns
     -------
@@ -231,7 +236,7 @@ def format_length(length: float, digits: int = 4) -> str:
 
 
 def rewrite_powers_of_ten(text: str) -> str:
-    """Rewrite the numbers of a sentence in readable units, such as 3.02e-07 J as 302 nJ."""
+    """Rewrite the numbers of a sentence with readable units, such as 302 nJ for 3.02e-07 J."""
 
     def rewrite(match) -> str:
         number, unit = match.groups()
@@ -243,16 +248,16 @@ def rewrite_powers_of_ten(text: str) -> str:
     return _POWER_PATTERN.sub(rewrite, text)
 
 
-def _is_zero(value: float, error: float | None, floor: float, is_ratio: bool) -> bool:
-    """Return whether a value is to be shown as 0, given its error and the floor of the measure."""
+def _is_displayed_as_zero(value: float, error: float | None, floor: float, is_ratio: bool) -> bool:
+    """Return whether a value is displayed as 0, given its error and the floor of the measure."""
     if abs(value) > floor or (error or 0.0) > floor:
         return False
     round_off = (MAX_RATIO_ROUND_OFF if is_ratio else MAX_ROUND_OFF_FRACTION) * floor
     return error is None or error > MAX_RELATIVE_ERROR * abs(value) or abs(value) <= round_off
 
 
-def _is_plain_power(power: int) -> bool:
-    """Return whether a number of this power of ten is written without an exponent."""
+def _is_written_without_exponent(power: int) -> bool:
+    """Return whether a number with this power of ten is written without an exponent."""
     return MIN_PLAIN_POWER <= power < FIRST_EXPONENT_POWER
 
 
@@ -262,9 +267,9 @@ def _find_second_digit_power(error: float) -> int:
 
 
 def _format_to_digit(value: float, error: float, last_power: int) -> tuple:
-    """Format a value and its error to the same last digit.
+    """Format a value and its error to a common last digit.
 
-    `last_power` is the power of ten of this digit. A value that is rounded to 0 has no sign.
+    `last_power` is the power of ten of the last digit. A value that is rounded to 0 has no sign.
     """
     n_decimals = max(-last_power, 0)
     formatted = [f"{round(number, -last_power) + 0.0:.{n_decimals}f}" for number in (value, error)]

@@ -1,12 +1,12 @@
-"""Modules that are loaded at their first use, so that a command loads only what its scene names.
+"""Lazy imports: a module of the package is loaded when one of its attributes is first used.
 
-Every folder of the package imports its modules in this way: after ``from ..contact import half_space`` the module is
-loaded when one of its attributes is read. A name that is imported from a module (``from ..contact.half_space import
-pressure``) loads the module at once, and so does the import of a kernel module, whose source numba reads.
+A command therefore loads only the code that its scene requires. After ``from ..contact import half_space``, the module
+is loaded when one of its attributes is read. The import of a name from a module (``from ..contact.half_space import
+pressure``) loads the module immediately, as does the import of a kernel module, whose source is compiled by numba.
 
-The `__init__` of a folder lists in PUBLIC the names that the folder offers to other folders. Tests and scripts import
-these names from the folder (``from patchfem.contact import pressure``), so that a function can move between the
-modules of a folder. The package itself imports from the module, which shows the reader where a function is.
+The table PUBLIC in the `__init__` of a folder lists the names for other folders. Tests and scripts import these names
+from the folder (``from patchfem.contact import pressure``), so that functions can move between its modules. The package
+itself imports from the modules, which shows where a function is defined.
 """
 
 import sys
@@ -16,14 +16,14 @@ from types import ModuleType
 
 
 class LazyModule(ModuleType):
-    """Stand-in that loads its module when an attribute is read, set or deleted."""
+    """Placeholder that loads its module when an attribute is read, set or deleted."""
 
     __dict__ = property(lambda self: vars(import_module(self.__name__)))
 
     def __getattr__(self, name: str):
-        # `import_module` takes 20 us even if the module is loaded
+        # This avoids `import_module`, which takes 20 us even if the module is loaded.
         module = sys.modules.get(self.__name__)
-        # `import_module` waits for another thread that is loading the module
+        # `import_module` waits if another thread is loading the module.
         if module is None or module.__spec__._initializing:
             module = import_module(self.__name__)
         return getattr(module, name)
@@ -36,19 +36,19 @@ class LazyModule(ModuleType):
 
 
 def make_getattr(folder: str, path: list):
-    """Return the function `__getattr__` of a folder, which Python calls for a module that is not loaded.
+    """Return a module-level `__getattr__` for a folder, which makes the imports of its modules lazy.
 
     Parameters
     ----------
     folder : str
         Dotted name of the folder.
     path : list
-        Its `__path__`.
+        Attribute `__path__` of the folder.
 
     Returns
     -------
     callable
-        Function from the name of a module to a LazyModule.
+        Function that returns a LazyModule for the name of a module.
     """
 
     def get_module(name: str) -> LazyModule:
@@ -65,14 +65,14 @@ def make_getattr(folder: str, path: list):
 
 
 class LazyFolderLoader(SourceFileLoader):
-    """Loader of the `__init__` of a folder whose modules are lazy."""
+    """Loader of the `__init__` of a folder whose modules are imported lazily."""
 
     def exec_module(self, module: ModuleType) -> None:
         get_module = make_getattr(module.__name__, module.__path__)
         module_by_name = {}
 
         def get_attribute(name: str):
-            """Return a name that the folder lists in PUBLIC, or a module of the folder."""
+            """Return a name from PUBLIC of the folder, or a module of the folder."""
             if name in module_by_name:
                 owner = import_module(f"{module.__name__}.{module_by_name[name]}")
                 return getattr(owner, name)
@@ -85,7 +85,7 @@ class LazyFolderLoader(SourceFileLoader):
 
 
 class LazyFolderFinder:
-    """Finder of the folders of this package; Python's own finders find the modules."""
+    """Finder of the folders of this package; the finders of Python find the modules."""
 
     @staticmethod
     def find_spec(name: str, path=None, target=None):

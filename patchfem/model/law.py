@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..core import PatchfemError
-from ..effects import import_effect, takes_stiffness_or_length
+from ..effects import import_effect, law_takes_stiffness_or_length
 from ..friction.bonds import parameters, spread
 from . import patch as patch_models
 
@@ -126,7 +126,7 @@ def complete_bond_length(law: Friction, load) -> Friction:
 
     Numbers of the law and the load [N] may be columns.
     """
-    if law.stiffness is None or not takes_stiffness_or_length(law.law):
+    if law.stiffness is None or not law_takes_stiffness_or_length(law.law):
         return law
     if np.ndim(load) == 0:
         load = load or DEFAULT_LOAD

@@ -22,7 +22,7 @@ import numpy as np
 from ...core import STICK_SPEED_RATIO
 from ...dynamics.march import lanes
 from ...dynamics.march.lane_rows import LANES, N_PIECE_MODES, N_POINTS
-from ...effects import is_bond_list, law_has_trait
+from ...effects import law_has_trait, needs_bond_list
 from ...model.model import Model
 from ...response import run_events
 from ...response.errors import (
@@ -70,7 +70,7 @@ def refusal_reason(model: Model) -> str:
         or not model.partial_slip
         or model.friction is None
         or not law_has_trait(model.friction.law, "bonds")
-        or is_bond_list(model.friction)
+        or needs_bond_list(model.friction)
     ):
         return "the case is not an elastic patch with a law of bonds"
     if (

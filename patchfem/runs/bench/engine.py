@@ -14,7 +14,7 @@ import numpy as np
 from ... import cost_model
 from ...core import Missing
 from ...dynamics.march import capacity
-from ...effects import is_bond_list, law_has_trait
+from ...effects import law_has_trait, needs_bond_list
 from ...friction.bonds import engines as bond_engines
 from ...friction.bonds import parameters
 from ...slip import shear_modes
@@ -104,7 +104,7 @@ def choose_bench_engine(
         modes = model.accuracy.shear_modes or shear_modes.N_SHEAR_MODES
         varies = model.grooves is not None or has_changing_pressure(model)
         if model.grooves is None and (
-            is_bond_list(f) or find_requested_engine(model) not in ("auto", "recursion")
+            needs_bond_list(f) or find_requested_engine(model) not in ("auto", "recursion")
         ):
             choice = choice or choose_bond_summation(model, slide)
             return _make_bond_sum_engine(model, slide, n_points, choice, n_points)
@@ -175,8 +175,8 @@ def find_requested_engine(model) -> str:
     f = model.friction
     rig = model.rig is not None
     has_separate_lists = (
-        model.side == "lower" and (model.partial_slip or (rig and is_bond_list(f)))
-    ) or (rig and model.load_varies and is_bond_list(f))
+        model.side == "lower" and (model.partial_slip or (rig and needs_bond_list(f)))
+    ) or (rig and model.load_varies and needs_bond_list(f))
     return (
         "merged" if has_separate_lists and scene_engine in ("auto", "recursion") else scene_engine
     )
@@ -248,7 +248,7 @@ def _predict_step_seconds(model, slide, n_points: int) -> float:
     the number of strips.
     """
     f = model.friction
-    if not is_bond_list(f):
+    if not needs_bond_list(f):
         return cost_model.LAW_STEP_SECONDS
     mean_step = max(float(np.abs(np.diff(slide)).mean()), 1e-300)
     strips = min(slide.size / 2, 40 * f.bond_length / mean_step + 64)

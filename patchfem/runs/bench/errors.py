@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...effects import is_bond_list, law_has_trait
+from ...effects import law_has_trait, needs_bond_list
 from ...response.coarser import (
     CoarserRuns,
     StepRun,
@@ -164,7 +164,7 @@ def find_bond_sum_error(model, engine) -> float:
     """Return the error bound of the bond summation relative to the friction limit, or 0 without one."""
     if engine.method in LIST_METHODS:
         return engine.choice.error
-    if engine.method in (Method.STEPPED, Method.PLANE) and is_bond_list(model.friction):
+    if engine.method in (Method.STEPPED, Method.PLANE) and needs_bond_list(model.friction):
         return estimate_tail_loss(model)
     return 0.0
 

@@ -7,7 +7,7 @@ stress and slip at the nodes of the interface by name.
 import numpy as np
 
 from ...dynamics.march import varying_load
-from ...effects import is_bond_list, law_has_trait
+from ...effects import law_has_trait, needs_bond_list
 from ...friction import record
 from ...slip import fields
 from ..bench import averaged_law
@@ -69,7 +69,7 @@ def collect_frames(model, numerics, patch, raw) -> dict:
     time = np.array([s["time"] for s in shots])
     shear = bool(model.partial_slip)
     rule = SlipRule()
-    pointed = numerics.per_point and model.grooves is None and not is_bond_list(f)
+    pointed = numerics.per_point and model.grooves is None and not needs_bond_list(f)
     if law_has_trait(f.law, "bonds") and (shear or pointed):
         moments = [(s["slide"], s["bonds"]) for s in shots]
         tau, local = fields.point_fields(patch, model.bonds, raw.contact.reduction, moments)

@@ -5,7 +5,7 @@ In: a Model, its Numerics and its pressed patch. Out: a VaryingLoadModel of
 """
 
 from ...dynamics.march import varying_load as march
-from ...effects import is_bond_list
+from ...effects import needs_bond_list
 from ...model.model import Model
 from .bond_lists import choose_bond_summation
 from .numerics import Numerics
@@ -20,7 +20,7 @@ def make_varying_load_law(model: Model, numerics: Numerics):
         return march.make_tanh_law(f.static, f.reference_speed)
     if f.law == "elastic-plastic":
         return march.make_elastic_plastic_law(f.static, f.bond_length)
-    if not is_bond_list(f):
+    if not needs_bond_list(f):
         return march.make_bonds_law(model.bonds)
     choice = choose_bond_summation(model, numerics)
     return march.make_bond_lists_law(model.bonds, choice.reach(f.order), choice.merge)

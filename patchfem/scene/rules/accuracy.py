@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from ...effects import LAWS, is_bond_list, law_has_trait
+from ...effects import LAWS, law_has_trait, needs_bond_list
 from ..keys.accuracy import Accuracy
 from ..keys.tables import Tables
 from .methods import MotionFeatures, find_motion_features
@@ -152,7 +152,7 @@ def _find_reason_without_effect(setting: str, accuracy: Any, motion: MotionFeatu
         engine = accuracy.quadrature
         if engine in ("direct", "recursion") or (engine, setting) == ("truncated", "merge"):
             return f"for quadrature '{engine}'"
-        is_summed = engine != "auto" or any(map(is_bond_list, laws))
+        is_summed = engine != "auto" or any(map(needs_bond_list, laws))
         return "" if is_summed else "for a law that is summed by recursion"
     if setting != "shear_modes":
         return ""

@@ -41,12 +41,12 @@ class DriveFacts(TableFacts):
     @property
     def is_accelerated(self) -> bool:
         """Whether the base moves with an acceleration of constant amplitude."""
-        return self.kind == "base" and self.wave.takes("acceleration")
+        return self.kind == "base" and self.wave.accepts_key("acceleration")
 
     @property
     def can_be_given_as_displacement(self) -> bool:
         """Whether a displacement may be given instead of this acceleration."""
-        return self.is_accelerated and self.wave.takes("displacement")
+        return self.is_accelerated and self.wave.accepts_key("displacement")
 
     @property
     def has_start(self) -> bool:
@@ -71,7 +71,7 @@ SIZE_RULES = (
         "`cycles` and `duration` exclude each other: keep one",
     ),
     MissingKeyRule(
-        lambda d: not d.has_length and (d.kind == "free" or d.wave.needs_length),
+        lambda d: not d.has_length and (d.kind == "free" or d.wave.needs_duration),
         "drive.cycles",
         "or drive.duration instead",
     ),
@@ -93,7 +93,7 @@ SIZE_RULES = (
         "waveform '{waveform}' needs this key",
     ),
     MissingKeyRule(
-        lambda d: d.kind == "force" and d.wave.takes("force") and not d.has("force"),
+        lambda d: d.kind == "force" and d.wave.accepts_key("force") and not d.has("force"),
         "drive.force",
         "kind 'force' needs this key",
     ),
@@ -142,7 +142,9 @@ WAVEFORM_RULES = (
         "has no meaning for onset '{onset}' and is not used",
     ),
     MistakeRule(
-        lambda d: d.wave.takes("accelerations") and d.accelerations and not any(d.accelerations),
+        lambda d: (
+            d.wave.accepts_key("accelerations") and d.accelerations and not any(d.accelerations)
+        ),
         "drive.accelerations",
         "all accelerations are 0, so nothing moves",
     ),
@@ -214,7 +216,7 @@ def _check_tones(drive: DriveFacts) -> None:
     """Report drive lists whose length differs from the number of frequencies."""
     for key in ("accelerations", "phases"):
         values = drive[key]
-        if not (drive.wave.takes("frequencies") and drive.wave.takes(key)):
+        if not (drive.wave.accepts_key("frequencies") and drive.wave.accepts_key(key)):
             continue
         if values and drive.frequencies and len(values) != len(drive.frequencies):
             drive.draft.add_mistake(

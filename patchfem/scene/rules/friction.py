@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-from ...effects import law_has_trait, law_takes_key, name_laws_with_key, takes_stiffness_or_length
+from ...effects import (
+    law_has_trait,
+    law_takes_key,
+    law_takes_stiffness_or_length,
+    name_laws_with_key,
+)
 from ..keys.contact import Contact
 from ..keys.tables import Friction
 from .methods import find_climbed_grooves
@@ -64,7 +69,7 @@ class LawFacts(TableFacts):
     @property
     def has_unknown_springs(self) -> bool:
         """Whether `stiffness` is given for a law whose number of springs depends on the load."""
-        return takes_stiffness_or_length(self.table.law) and bool(self.stiffness)
+        return law_takes_stiffness_or_length(self.table.law) and bool(self.stiffness)
 
     @property
     def load_change_description(self) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import pi
 from typing import Any
 
-from ...effects import describe_law, is_bond_list, law_has_trait, law_supports, suggest_laws
+from ...effects import describe_law, law_has_trait, law_supports, needs_bond_list, suggest_laws
 from ..keys import removed
 from .methods import find_yaw_key, list_lower_shapes
 from .rule_table import MistakeRule, TableFacts, apply_rules, make_unsupported_rule
@@ -39,7 +39,7 @@ class GrooveFacts(TableFacts):
     def key_preventing_recursion(self) -> str:
         """Key of [friction] that rules out a recursive computation of the sum over bonds; "" if none does."""
         law = self.scene.friction
-        if not self.has_bonds or not (is_bond_list(self.law_table) or law.breakaway):
+        if not self.has_bonds or not (needs_bond_list(self.law_table) or law.breakaway):
             return ""
         if law.reading == "report":
             return "reading"

@@ -13,10 +13,10 @@ from ...effects import (
     REMEDIES,
     describe_law,
     describe_unsupported,
-    is_bond_list,
     law_has_trait,
     law_supports,
     law_takes_key,
+    needs_bond_list,
     suggest_laws,
 )
 from ..keys.contact import Contact
@@ -72,9 +72,9 @@ class JointFacts(TableFacts):
         return describe_law(self.table)
 
     @property
-    def is_bond_list(self) -> bool:
+    def needs_bond_list(self) -> bool:
         """Whether the law is a sum over all bonds."""
-        return is_bond_list(self.table)
+        return needs_bond_list(self.table)
 
     @property
     def load_change_description(self) -> str:
@@ -161,7 +161,9 @@ class JointFacts(TableFacts):
 
 MOTION_RULES = (
     make_unsupported_rule(
-        lambda j: j.kind == "rig" and j.quadrature and j.recursion_feature and not j.is_bond_list,
+        lambda j: (
+            j.kind == "rig" and j.quadrature and j.recursion_feature and not j.needs_bond_list
+        ),
         "accuracy.quadrature",
         "'{quadrature}' with {recursion_feature} in a rig",
         "use 'recursion' or 'auto'",
@@ -227,7 +229,7 @@ CHANGING_LOAD_RULES = (
     ),
     make_unsupported_rule(
         lambda j: (
-            j.has_trait("bonds") and (j.breakaway or (j.is_bond_list and j.reading != "report"))
+            j.has_trait("bonds") and (j.breakaway or (j.needs_bond_list and j.reading != "report"))
         ),
         "friction.{key_preventing_recursion}",
         "with {load_change_description}",

@@ -23,7 +23,7 @@ from functools import partial
 
 import numpy as np
 
-from ....effects import is_bond_list, law_has_trait
+from ....effects import law_has_trait, needs_bond_list
 from ....model.model import Model
 from ....model.similar_models import SimilarModels, collect_columns, select_models
 from ....scene.rules.accuracy import list_fixed_settings
@@ -60,7 +60,7 @@ def reason_not_in_lanes(model: Model) -> str:
     if friction.law not in LANE_LAWS:
         return "its law cannot be computed for many cases at once"
     if law_has_trait(friction.law, "bonds") and (
-        is_bond_list(friction) or friction.slip_growth is not None
+        needs_bond_list(friction) or friction.slip_growth is not None
     ):
         return "its bonds grow, or are computed as a list of bonds"
     return reason_in_accuracy_settings(model)
