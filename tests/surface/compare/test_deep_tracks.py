@@ -4,6 +4,8 @@ Traces have 500 samples over 10 mm and a roughness of 0.8 um; a floor 4 um deep 
 the length. The rules were set on seeds 0 to 39; the seeds of these tests are others.
 """
 
+from functools import cache
+
 import numpy as np
 import pytest
 from pairs import UM, make_worn_pair
@@ -58,12 +60,19 @@ def make_milled_pair(
     )
 
 
+@cache
+def compare_milled_pair(seed: int) -> tuple:
+    """Return the comparison of a milled pair, its second trace and the worn depth [m]; they are stored for several tests."""
+    before, after, worn, _ = make_milled_pair(seed)
+    return compare_traces(before, after), after, worn
+
+
 def score_pairs(count: int, **parameters) -> tuple:
     """Return the fraction of pairs that are aligned, and of intervals that cover mean depth and shift."""
     covers = []
     for seed in range(HELD_OUT, HELD_OUT + count):
         before, after, worn, shift = make_milled_pair(seed, **parameters)
-        found = compare_traces(before, after)
+        found = compare_traces(before, after) if parameters else compare_milled_pair(seed)[0]
         assert not found.is_exchanged
         if found.basis == "place":
             mean = np.interp(found.alignment.x, after.x, worn).mean()
@@ -81,7 +90,7 @@ def score_pairs(count: int, **parameters) -> tuple:
     [
         pytest.param({}, id="waves"),
         pytest.param({"waves": 0.0}, id="none", marks=pytest.mark.slow),
-        pytest.param({"noise": 0.2, "moved": 20}, id="noise", marks=pytest.mark.slow),
+        pytest.param({"noise": 0.2, "n_shifted_samples": 20}, id="noise", marks=pytest.mark.slow),
     ],
 )
 @pytest.mark.parametrize("count", [4, pytest.param(60, marks=pytest.mark.slow)])
@@ -107,14 +116,14 @@ def test_always_unworn_noisy_traces_are_aligned():
     assert found.basis == "place" and found.worn.mean.value is None and found.hidden.high is None
 
 
-@pytest.mark.parametrize("count", [2, pytest.param(6, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [1, pytest.param(6, marks=pytest.mark.slow)])
 def test_always_shallow_wear_is_not_called_exchanged(count):
     """Wear of 3.5 times the noise is not called exchanged, although the exchanged traces have more heights near a fit."""
     for seed in range(HELD_OUT, HELD_OUT + count):
         assert not compare_traces(*make_milled_pair(seed, depth=0.5)[:2]).is_exchanged
 
 
-@pytest.mark.parametrize("count", [2, pytest.param(60, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [1, pytest.param(60, marks=pytest.mark.slow)])
 def test_refuses_traces_of_different_places(count):
     """Traces of two different places are refused, also with a given shift."""
     for seed in range(HELD_OUT, HELD_OUT + count):
@@ -169,9 +178,8 @@ def test_always_track_edges_and_depth_are_covered(count):
     Of six intervals, two or more misses have a chance of 3 %.
     """
     covers = []
-    for seed in range(HELD_OUT + 100, HELD_OUT + 100 + count):
-        before, after, worn, _ = make_milled_pair(seed)
-        found = compare_traces(before, after)
+    for seed in range(HELD_OUT, HELD_OUT + count):
+        found, after, worn = compare_milled_pair(seed)
         if found.basis == "place":
             values = found.values
             ends = [after.x[k] for k in worn_range(worn)]
@@ -240,8 +248,8 @@ def test_always_track_edges_do_not_count_as_roughness(count):
     Earlier walls one sample wide gave "increased" with 99.9 % confidence.
     """
     headlines = []
-    for seed in range(HELD_OUT + 200, HELD_OUT + 200 + count):
-        found = compare_traces(*make_milled_pair(seed)[:2])
+    for seed in range(HELD_OUT, HELD_OUT + count):
+        found = compare_milled_pair(seed)[0]
         headlines.append(compose_verdict([found])[0])
         assert any("edges of the track" in sentence for sentence in compose_verdict([found])[1])
     assert (

@@ -64,10 +64,6 @@ def test_always_flat_floor_is_not_called_exchanged():
 
     In the wrong order only the floor would fit, with 21 of 100 heights against 76, but with less
     noise.
-
-    Exchanged, 21 of 100 heights agree, against 76 in the right order.
-
-    Then 21 of 100 heights would agree, against 76 in the right order.
     """
     p = make_track_pair("band", 95000, 2001)
     found = compare_traces(p.before, p.after)

@@ -205,6 +205,7 @@ def test_exact_wide_dust_and_dropouts_are_removed(shape):
     assert comparison.worn.largest.low <= pair.worn.max() <= comparison.worn.largest.high
 
 
+@pytest.mark.share(0, 2)
 @pytest.mark.parametrize("kind, seed", [("edge", 60), ("edge", 61), ("groove", 60)])
 def test_always_track_sizes_are_consistent(kind, seed):
     """Width, mean depth and areas of a track belong to one range of x, and their intervals cover the truth."""

@@ -10,7 +10,7 @@ from rubbing import rub
 from synthetic import report_area
 
 from patchfem.core import PatchfemError, frozen_array
-from patchfem.surface import Profile, level
+from patchfem.surface import Profile
 from patchfem.surface.compare.alignment import align
 from patchfem.surface.compare.compare import compare_traces
 from patchfem.surface.compare.model import Parameter
@@ -45,13 +45,13 @@ def score_pairs(count: int) -> tuple:
 
 
 def test_always_pair_is_aligned_within_targets():
-    """The rms errors of four pairs are within the targets of 0.01 um for the shift and 0.06 um for the depth.
+    """The rms errors of two pairs are within the targets of 0.01 um for the shift and 0.06 um for the depth.
 
-    Of four 95 % intervals, two or more misses have a chance of 1.4 %.
+    The 95 % intervals of both cover the truth.
     """
-    rms, coverage = score_pairs(4)
+    rms, coverage = score_pairs(2)
     assert rms[0] < 0.01 * UM and rms[1] < 0.003 * UM and rms[2] < 0.06 * UM, rms
-    assert (coverage >= 3 / 4).all(), coverage
+    assert (coverage == 1).all(), coverage
 
 
 @pytest.mark.slow
@@ -97,20 +97,7 @@ def test_exact_identical_traces_show_no_change():
     )
 
 
-def test_always_levelling_both_traces_hides_wear():
-    """The difference of two levelled traces has zero mean whatever the wear is.
-
-    The alignment on unworn valleys finds a depth within 5 nm.
-    """
-    p = make_worn_pair(30001, shift=0.0)
-    levelled = float((level(p.before).z - level(p.after).z).mean())
-    mean_depth = compare_traces(p.before, p.after).worn.mean.value
-    assert p.worn.mean() > 1 * UM
-    assert abs(levelled) < 1e-12
-    assert mean_depth == pytest.approx(p.worn.mean(), abs=0.005 * UM)
-
-
-@pytest.mark.parametrize("count", [2, pytest.param(24, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [1, pytest.param(24, marks=pytest.mark.slow)])
 def test_always_traces_of_different_places_have_no_depth(count):
     """Traces of two different places have no shift and no depth, and the reason states why."""
     for seed in range(count):
@@ -125,14 +112,15 @@ def test_always_traces_of_different_places_have_no_depth(count):
         assert [part.unit for part in (worn.largest, worn.mean, worn.area)] == ["m", "m", "m2"]
 
 
-@pytest.mark.parametrize("count", [3, pytest.param(8, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [2, pytest.param(8, marks=pytest.mark.slow)])
 def test_always_unworn_traces_show_no_wear(count):
-    """Unworn traces of one place are aligned with a mean difference below 4 nm, and no wear is reported."""
+    """Unworn traces of one place are aligned with a mean difference below 4 nm, and no wear or range is reported."""
     for seed in range(30050, 30050 + count):
         p = make_worn_pair(seed, worn_fraction=0.0)
         found = compare_traces(p.before, p.after)
         assert found.basis == "place"
         assert found.worn.mean.value is None and abs(found.alignment.depth.mean()) < 0.004 * UM
+        assert found.worn.extent is None
         assert "no wear detected" in compose_verdict([found])[1][0]
         assert "at most" not in compose_verdict([found])[1][0]
 
@@ -180,36 +168,38 @@ def test_always_periodic_surface_is_not_aligned():
     assert found.basis != "place" and "surface is periodic" in found.motion.shift.reason
 
 
-def test_always_stretch_along_x_is_corrected():
-    """A stretch of x by 0.4 % is estimated within 3e-5 and corrected."""
+@pytest.fixture(scope="module")
+def pair_and_mean_depth():
+    """Return a pair of traces with worn tops, and its mean worn depth [m] by the comparison."""
     p = make_worn_pair(5)
+    return p, compare_traces(p.before, p.after).worn.mean.value
+
+
+def test_always_stretch_along_x_is_corrected(pair_and_mean_depth):
+    """A stretch of x by 0.4 % is estimated within 3e-5 and corrected."""
+    p, mean_depth = pair_and_mean_depth
     stretched = Profile(frozen_array(p.after.x * 1.004), p.after.z, "after")
     found = compare_traces(p.before, stretched)
     assert found.motion.stretch.value == pytest.approx(1.004, abs=3e-5)
     assert found.motion.stretch.low < 1.004 < found.motion.stretch.high
-    assert found.worn.mean.value == pytest.approx(
-        compare_traces(p.before, p.after).worn.mean.value, abs=0.005 * UM
-    )
+    assert found.worn.mean.value == pytest.approx(mean_depth, abs=0.005 * UM)
     assert any("this difference in length is corrected" in text for text in found.notes)
 
 
-def test_always_deposits_do_not_reduce_wear():
+def test_always_deposits_do_not_reduce_wear(pair_and_mean_depth):
     """Deposits are reported with their area and do not reduce the mean worn depth."""
-    p = make_worn_pair(5)
+    p, mean_depth = pair_and_mean_depth
     z = np.array(p.after.z)
-    is_unworn = np.interp(p.after.x, p.after.x, p.worn) == 0
-    indices = np.flatnonzero(is_unworn)[100:140]
+    indices = np.flatnonzero(p.worn == 0)[100:140]
     z[indices] += 3 * UM
     found = compare_traces(p.before, Profile(p.after.x, frozen_array(z), "after")).worn
     assert found.deposited == pytest.approx(3 * UM * indices.size * UM, rel=0.01)
-    assert found.mean.value == pytest.approx(
-        compare_traces(p.before, p.after).worn.mean.value, abs=0.005 * UM
-    )
+    assert found.mean.value == pytest.approx(mean_depth, abs=0.005 * UM)
 
 
-def test_always_traces_with_gaps_are_aligned():
+def test_always_traces_with_gaps_are_aligned(pair_and_mean_depth):
     """Traces with gaps are aligned with the same shift within 20 nm."""
-    p = make_worn_pair(5)
+    p = pair_and_mean_depth[0]
     before = np.array(p.before.z)
     after = np.array(p.after.z)
     before[700:720] = np.nan

@@ -53,6 +53,7 @@ def scar_profile(width: float, power: int, depth: float = 0.6 * UM):
     return lambda x: depth * np.clip(1 - np.abs((x - 2 * MM) / (width / 2)) ** power, 0, None)
 
 
+@pytest.mark.share(0, 2)
 @pytest.mark.parametrize("width, power", [(3.3, 2), (3.5, 2), (3.5, 20)])
 def test_always_flanks_distinguish_scar_from_bent_datum(width, power):
     """With flanks of sufficient length a wide scar is evaluated within 3 % of its area, and the other reading is named."""
@@ -82,6 +83,7 @@ def test_always_short_flanks_give_both_readings():
     assert float(match[2]) == pytest.approx(truth * 1e12, rel=0.05)
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("bow", [0.3 * UM, -0.3 * UM])
 def test_always_scar_on_bent_datum_gives_both_readings(bow):
     """A scar on a bent datum is not evaluated as wear of its ends: both readings are given.

@@ -11,7 +11,7 @@ from patchfem.surface.compare.place import find_place
 from patchfem.surface.compare.verdict import compose_verdict
 from patchfem.surface.profile import remove_spikes
 
-COUNTS = pytest.mark.parametrize("count", [2, pytest.param(20, marks=pytest.mark.slow)])
+COUNTS = pytest.mark.parametrize("count", [1, pytest.param(20, marks=pytest.mark.slow)])
 
 
 @COUNTS
@@ -39,7 +39,7 @@ def test_always_intervals_of_scars_cover_truth(kind, count):
 
 def test_always_intervals_of_standard_scar_are_narrow():
     """The half widths of the intervals of a standard scar are below 2 nm for the mean and 12 nm for the largest depth."""
-    intervals = score_comparisons("standard", range(HELD_OUT, HELD_OUT + 2))[1]
+    intervals = score_comparisons("standard", [HELD_OUT])[1]
     assert intervals["worn_depth_mean"][2] < 2e-9 and intervals["worn_depth_max"][2] < 12e-9
 
 

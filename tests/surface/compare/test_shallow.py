@@ -33,6 +33,7 @@ def make_track_pair(seed: int, depth: float) -> tuple:
     )
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("seed", [2000, 2001])
 def test_exact_shallow_track_is_measured(seed):
     """A track of 30 nm with noise of 5 nm is measured: depth within 1.5 nm, edges within 4 um."""
@@ -47,7 +48,7 @@ def test_exact_shallow_track_is_measured(seed):
     assert found.worn.mean.value == pytest.approx(10e-9, abs=1e-9) and found.hidden.value is None
 
 
-@pytest.mark.parametrize("count", [3, pytest.param(20, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [2, pytest.param(20, marks=pytest.mark.slow)])
 def test_always_depth_above_detection_limit_is_detected(count):
     """A track of 1.5 times the stated detection limit is detected in at least 19 of 20 pairs.
 
@@ -68,10 +69,11 @@ def test_always_depth_above_detection_limit_is_detected(count):
     assert hits >= count - count // 20
 
 
-@pytest.mark.parametrize("count", [1, pytest.param(20, marks=pytest.mark.slow)])
-def test_always_pairs_without_track_show_no_wear(count):
+@pytest.mark.slow
+def test_always_pairs_without_track_show_no_wear():
     """At most 5 % of the pairs without a track show wear; uniform and wedge-shaped wear have no unworn flanks either."""
     alarms = 0
+    count = 20
     for seed in range(93000, 93000 + count):
         for kind in ("unworn", "scale", "even", "wedge"):
             found = compare_traces(*known_pairs.make_profiles(known_pairs.draw_pair(kind, seed)))

@@ -42,12 +42,12 @@ def score_tracks(kind: str, count: int) -> tuple:
 @pytest.mark.share(1)
 @pytest.mark.parametrize("kind", KINDS)
 def test_always_largest_depth_and_ends_are_covered(kind):
-    """For 8 tracks of each kind the intervals cover the largest depth and the ends; the mean error is below 12 nm.
+    """For 4 tracks of each kind the intervals cover the largest depth and the ends; the mean error is below 12 nm.
 
-    Three or more misses of 8 have a chance of 0.6 %; the noise of a depth is 28 nm.
+    Two or more misses of 4 have a chance of 1.4 %; the noise of a depth is 28 nm.
     """
-    errors, coverage, ends = score_tracks(kind, 8)
-    assert coverage >= 6 / 8 and ends >= 26 / 32
+    errors, coverage, ends = score_tracks(kind, 4)
+    assert coverage >= 3 / 4 and ends >= 13 / 16
     assert abs(errors.mean()) < 0.012 * UM and abs(errors).max() < 0.06 * UM
 
 
@@ -93,14 +93,11 @@ def test_exact_rounded_digits_are_not_wear(seed):
         assert [end.value for end in ends] == pytest.approx([800 * UM, 1200 * UM], abs=1 * UM)
 
 
-@pytest.mark.share(0, 2)
-@pytest.mark.parametrize(
-    "traces",
-    [*(make_track_pair(kind, 90300) for kind in KINDS), make_worn_pair(90300)],
-    ids=[*KINDS, "peaks"],
-)
-def test_always_wrong_file_order_is_reported(traces):
+@pytest.mark.share(2)
+@pytest.mark.parametrize("kind", [*KINDS, "peaks"])
+def test_always_wrong_file_order_is_reported(kind):
     """Headline and sentences report files in the wrong order, and only those."""
+    traces = make_worn_pair(90300) if kind == "peaks" else make_track_pair(kind, 90300)
     for first, second, is_exchanged in (
         (traces.before, traces.after, 0),
         (traces.after, traces.before, 1),
@@ -123,12 +120,6 @@ def test_always_rougher_flanks_are_not_unworn():
     assert find_flanks(before, replace(other, z=frozen_array(4 * (other.z - box)))) is None
 
 
-def test_always_unworn_traces_have_no_worn_range():
-    """Unworn traces have no worn range."""
-    p = make_worn_pair(90302, worn_fraction=0.0)
-    assert compare_traces(p.before, p.after, shift=p.shift).worn.extent is None
-
-
 @pytest.mark.parametrize(("step", "rise", "scatter"), [(12, 100, 0), (15, 60, 5)])
 def test_always_steep_flank_ends_between_samples(step, rise, scatter):
     """A track with a steep first step ends half way between two samples, and 90 % of the intervals cover its end."""
@@ -144,9 +135,10 @@ def test_always_steep_flank_ends_between_samples(step, rise, scatter):
     assert np.median(value) == 0 and np.median(high - low) == 2
 
 
-@pytest.mark.parametrize("power", [1, 2])
-def test_always_end_of_flat_flank_covers_datum_drift(power):
-    """The interval of the end of a flank covers the truth in at least 36 of 40 traces with a slow error of their level.
+@pytest.mark.share(0)
+@pytest.mark.parametrize(("power", "count"), [(2, 20), (1, 40), (2, 40)])
+def test_always_end_of_flat_flank_covers_datum_drift(power, count):
+    """The interval of the end of a flank covers the truth in 90 % of the traces with a slow error of their level.
 
     A straight flank is less sensitive than one that ends flat.
     """
@@ -154,7 +146,7 @@ def test_always_end_of_flat_flank_covers_datum_drift(power):
     lengths = []
     t = np.clip(np.arange(1600) - 799.5, 0, None)
     flank = 200 * np.minimum(t / 400, 1) ** power
-    for seed in range(40):
+    for seed in range(count):
         random = np.random.default_rng(seed)
         draws = 0.5 * random.normal(size=(200, 1)) + random.normal(size=(200, 1600))
         depth = flank + 0.5 * random.normal() + random.normal(size=1600)
