@@ -174,7 +174,7 @@ def runaway_data(result: Result) -> dict:
     friction alone does not limit the amplitude at resonance.
     """
     drive_and_knee = (
-        rig_plan.drive_and_knee(result.plan.model)
+        rig_plan.find_drive_and_knee(result.plan.model)
         if result.outcome in (Outcome.TRANSIENT, Outcome.GROWS)
         else {}
     )

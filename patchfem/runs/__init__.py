@@ -106,15 +106,15 @@ PUBLIC = {
         "ENGINES",
         "PIECES",
         "SMOOTH",
-        "find_motion_properties",
+        "collect_motion_features",
     ),
     "rig.numerics": ("choose_numerics",),
     "rig.event_driven": ("YieldingElements",),
     "rig.plan": (
-        "drive_and_knee",
+        "find_drive_and_knee",
         "stuck_stiffnesses",
     ),
-    "rig.solve": ("solve",),
+    "rig.solve": ("solve_rig",),
     "run": (
         "StateFile",
         "is_march",

@@ -199,8 +199,8 @@ def _make_plan(model: Model) -> Plan:
     on_patch = []
     on_law = []
     if model.rig is not None:
-        chain = of_rig.chain(model.rig) | chain
-        groups |= of_rig.compute_groups(model) if model.kind == "rig" else {}
+        chain = of_rig.structure_stiffnesses(model.rig) | chain
+        groups |= of_rig.compute_dimensionless_groups(model) if model.kind == "rig" else {}
         on_motion += engines.describe_unused_settings(model, engines.choose_engine(model).name)
     if model.patch is not None:
         chain |= patch_plan.stiffness_chain(model.patch)

@@ -150,7 +150,7 @@ def _run_plan(
                 elif what.kind == "bench":
                     result = bench_result.run_prescribed(inputs)
                 else:
-                    result = rig.run_coupled(inputs)
+                    result = rig.run_rig(inputs)
         except NotConverged as error:
             if meshes.patch is not None and what.kind != "patch":
                 at_rest = patch_result.make_static_result(

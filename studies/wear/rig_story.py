@@ -81,7 +81,7 @@ def onset(worn, cycles: int, pair=None) -> float:
     )
     model = build(scene.loads(text, SCENE))
     patch = solve_patch_contact(model.patch, pair, worn)
-    found = solve.solve(model, choose_numerics(model), patch)
+    found = solve.solve_rig(model, choose_numerics(model), patch)
     return levels.find_onset(found.levels, found.probe, 3e-3)[0] / G_N
 
 

@@ -28,7 +28,7 @@ from scene_texts import (
 from patchfem.core import Missing, PatchfemError
 from patchfem.effects import EFFECTS, import_effect
 from patchfem.model import build
-from patchfem.runs import drive_and_knee
+from patchfem.runs import find_drive_and_knee
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene import loads
@@ -358,4 +358,4 @@ def test_exact_longer_piece_overhangs_interface(length, overhangs):
 def test_exact_only_base_sine_at_resonance_of_single_mode_has_knee(text, sets, has_knee):
     """Only a sine of the base at resonance of a single mode has a drive that friction can bound."""
     model = build(loads(POINT + COULOMB + text, sets=sets))
-    assert set(drive_and_knee(model)) == ({"drive", "knee"} if has_knee else set())
+    assert set(find_drive_and_knee(model)) == ({"drive", "knee"} if has_knee else set())

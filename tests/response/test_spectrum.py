@@ -8,7 +8,7 @@ import pytest
 from patchfem import build
 from patchfem.core import Response, SineDrive
 from patchfem.response import spectrum
-from patchfem.runs import choose_numerics, solve
+from patchfem.runs import choose_numerics, solve_rig
 
 OMEGA, PERIOD = 2.0, pi
 
@@ -107,7 +107,7 @@ def test_exact_friction_harmonic_from_motion_and_force_agree(kind, size, kinetic
     """The equivalent stiffness from the motion alone agrees with that from the friction force within 1e-8."""
     text = SCENE.format(kinetic=kinetic, kind=kind, size=size)
     model = build(text)
-    found = solve(model, choose_numerics(model), None)
+    found = solve_rig(model, choose_numerics(model), None)
     w = found.window
     drive = model.rig.drive.signal
     slide = spectrum.motion_harmonic(w.time, w.slide, w.slide_rate, drive.omega)

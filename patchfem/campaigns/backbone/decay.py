@@ -186,7 +186,7 @@ class _ReleaseVariants:
         """Return frequency and damping of a coarser run; NaN at amplitudes it does not reach."""
         if settings not in self.computed:
             patch = self.joint.coarse if settings.coarse_patch else self.joint.patch
-            solution = solve.solve(self.release.model, replace(settings, whole=True), patch)
+            solution = solve.solve_rig(self.release.model, replace(settings, whole=True), patch)
             decay = read_decay(self.joint, solution.response).interpolate(self.amplitudes)
             self.computed[settings] = np.array([decay.frequency, decay.damping])
         return self.computed[settings]

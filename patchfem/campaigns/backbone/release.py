@@ -75,7 +75,7 @@ def run_release(joint: Joint, model: Model, choice) -> Release:
     -------
     Release
     """
-    return Release(model, choice, solve.solve(model, choice, joint.patch))
+    return Release(model, choice, solve.solve_rig(model, choice, joint.patch))
 
 
 def release_from_largest_decaying(joint: Joint, amplitudes, progress=None) -> DecayingRelease:

@@ -178,7 +178,7 @@ def _is_speed_only(rig) -> bool:
 def _refuse_unsupported(model: Model) -> None:
     """Raise PatchfemError for features that neither matrices nor friction elements have."""
     rig = model.rig
-    motion = engines.find_motion_properties(model, steady=True)
+    motion = engines.collect_motion_features(model, steady=True)
     if _is_speed_only(rig):
         reason = methods.find_first_unsupported(SPEED_LAW_SUPPORT, motion)
     else:

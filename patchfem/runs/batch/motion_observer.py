@@ -238,7 +238,7 @@ class MotionObserver:
         # histories before the evaluated window are not needed
         numerics = replace(self.numerics, whole=False)
         if ENGINES[self.numerics.engine] is not MARCH:
-            return _observe_solution(solve.solve(model, numerics, self.patch, 0, self.report))
+            return _observe_solution(solve.solve_rig(model, numerics, self.patch, 0, self.report))
 
         contact, run, *_ = march.march_without_evaluation(
             model, numerics, self.patch, 0, self.report

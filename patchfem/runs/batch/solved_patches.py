@@ -22,7 +22,7 @@ from ..patch import result as patch_result
 from ..results.result import shorten_file_names
 from ..results.travel import check_pieces_overlap, warn_of_large_slide
 from ..rig.engines import describe_unused_settings
-from ..rig.motion_warnings import law_warnings
+from ..rig.motion_warnings import warn_of_law
 from ..rig.numerics import choose_numerics
 from . import one_by_one, patches
 from .case_results import CaseResults
@@ -175,7 +175,7 @@ def add_patch_results(
     warnings = [
         *pressed.warnings,
         *model.rig.structure.notes,
-        *law_warnings(model, outcome, drift, 0.0),
+        *warn_of_law(model, outcome, drift, 0.0),
         *warn_of_large_slide(pressed.patch, slides),
         *tolerance_warnings(finding),
     ]

@@ -1,14 +1,17 @@
-"""Coupled run of modes, drive and contact.
+"""Motion of a rig: modes, drive and contact.
 
-In: a Model with a rig, and its pressed patch. Out: a Result. Read `rig` first: the run at the first
-numerical settings whose displacement is known to the tolerance, then the passes over it (`postprocessing`).
-`runner` makes the run and its coarser ones, each once, and `solve` calls the engine. `engines` has a
-record per engine with its coarser runs; `scene.rules.methods.ENGINE_SUPPORT` says what each one can
-compute, and `runs.memory` what its compiled code needs. The module of an engine (`march`, `event_driven`,
-`smooth`, the folder `steady`) prepares the folder of `dynamics` that integrates (`march`, `events`,
-`smooth`, `harmonic`), and states which measures of the last cycles the engine knows itself. `evaluation`
-turns this into a Solution, and `levels` goes from level to level. `interface` turns the friction of a
-patch into the contact that an engine moves. `numerics` has the numerical settings and `costs` the
-predicted cost, on which the choice of an engine, plans and refusals are based; `bond_lists` has the same
-for a list of bonds.
+In: a Model with a rig, and its Patch. Out: a Result.
+
+Start reading at `rig`. It runs the model with finer and finer numerical settings until the error of
+the displacement meets the tolerance, and then completes the result by `postprocessing`. `runner`
+solves the run and its coarse runs, each only once, and `solve` calls the engine. `engines` has a
+record for each engine with its comparison runs. `scene.rules.methods.ENGINE_SUPPORT` lists what
+each engine can compute, and `runs.memory` the memory of its compiled code.
+
+Each engine has a module (`march`, `event_driven`, `smooth`, and the folder `steady`), which
+prepares the integration in `dynamics` and contains the measures that the engine computes itself.
+`evaluation` converts a run to a Solution, and `levels` continues a run from drive level to drive
+level. `interface` makes the contact model of an engine from the friction of a patch. `numerics` has
+the numerical settings. `costs` has the predicted cost, on which the choice of an engine, plans and
+refusals are based; `bond_lists` has the same for a bond list.
 """

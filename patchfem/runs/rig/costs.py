@@ -1,10 +1,12 @@
-"""Predicted cost of the engines of a rig, for the choice of an engine, a plan and a refusal.
+"""Predicted cost of the engines of a rig, for the choice of an engine, for plans and for refusals.
 
-In: a Model. Out: CPU seconds, steps, memory (`Cost`), and reasons to march instead of solving
-exactly. A run from event to event counts its pieces (intervals of one power series), a run of
-high order and a march count their steps; `cost_model` has the seconds of each. The free
-vibration of a mode on a stuck element costs pieces only during stick: all the time if the
-friction limit exceeds the force of the drive, hardly any if it is half of it.
+In: a Model. Out: CPU times, numbers of steps, memory (`Cost`), and reasons to march instead of
+solving exactly.
+
+An event-driven run is counted in time intervals of one power series, a march and a smooth run in
+steps; `cost_model` has the time of each. The free vibration of the modes on a stuck element needs
+intervals only during stick. The fraction of time in stick is about 1 if the friction limit exceeds
+the force of the drive, and nearly 0 if it is half of it.
 """
 
 from dataclasses import replace
@@ -37,45 +39,49 @@ from ..cost import EVENT_CODE, LINEAR_CODE, SMOOTH_CODE, Cost, MemoryPart
 if TYPE_CHECKING:
     from ...friction.protocol import Element
 
-# CPU seconds that an exact solution may take if a march, which has errors, takes less.
+# Largest CPU time [s] of an exact solution if a march, which has discretization errors, takes less.
 MAX_EXACT_SECONDS_OVER_MARCH = 5.0
-# CPU seconds of an exact solution if no march resolves the modes.
+# Largest CPU time [s] of an exact solution if a march cannot resolve the modes.
 MAX_EXACT_SECONDS_UNRESOLVED = 60.0
-MAX_EXACT_SECONDS = 600.0  # CPU seconds of an exact solution above which it is refused
-MAX_MARCH_STEPS = 6400  # largest number of steps per cycle that a march chooses by itself
-# Exponent of (friction limit / drive force), which gives the expected fraction of the time in stick: a
-# limit of half the force was measured to stick for 0.01 of the time.
+MAX_EXACT_SECONDS = 600.0  # Largest CPU time [s] of an exact solution; a longer one is refused.
+MAX_MARCH_STEPS = 6400  # Largest number of automatically chosen steps per cycle of a march.
+# Exponent of the ratio of friction limit to drive force, which estimates the fraction of time in
+# stick. At a ratio of 1/2, a fraction of 0.01 was measured.
 STICKING_EXPONENT = 6
-# Cells are merged in pairs at most this many times: 49 of 769 cells remain, with an error of 2e-4 of
-# the motion of a slipping joint.
+# Largest number of times that neighbouring cells are merged in pairs: 49 of 769 cells remain, with
+# an error of 2e-4 of the motion of a slipping joint.
 MAX_MERGES = 4
-MERGE_TOLERANCE = 1e-3  # cells are merged MAX_MERGES times at this or a larger tolerance
-# Phase [rad] of the fastest vibration in a time interval, as in `dynamics.events.series_kernels`.
+MERGE_TOLERANCE = 1e-3  # Smallest tolerance at which cells are merged MAX_MERGES times.
+# Largest phase [rad] of the fastest vibration in a time interval, as in
+# `dynamics.events.series_kernels`.
 MAX_INTERVAL_PHASE = 2.0
+# Keys of [accuracy] that select a march instead of the smooth engine.
 MARCH_SETTINGS = (
     "steps_per_cycle",
     "tail",
     "merge",
     "shear_modes",
-)  # keys of [accuracy] that ask for a march instead of the smooth engine
-# number of decay times of the slowest mode after which a motion repeats to round-off (e^-30)
+)
+# Number of decay times of the slowest mode after which a motion is periodic up to round-off
+# (e^-30).
 N_DECAY_TIMES_TO_REPEAT = 30.0
-# Largest ratio of the steps of the smooth engine to those of a march: with a larger ratio a march is
-# preferred although each of its steps costs more.
+# Largest ratio of the steps of the smooth engine to those of a march at which the smooth engine is
+# used.
 MAX_STEP_RATIO = 3.5
-# A speed-dependent law is stiff for the fraction exp(STIFF_TIME_EXPONENT (1 - r)) of the time, where r is the drive
-# force over the friction limit: measured 0.5 at r = 1.07 and 0.1 at r = 1.26.
+# A speed-dependent law is stiff for the fraction exp(STIFF_TIME_EXPONENT (1 - r)) of the time,
+# where r is the ratio of drive force to friction limit. Fractions of 0.5 at r = 1.07 and 0.1 at r =
+# 1.26 were measured.
 STIFF_TIME_EXPONENT = 9.0
-# Largest stable step, in relaxation lengths of a state of the friction law.
+# Largest stable step in relaxation lengths of a state variable of the friction law.
 MAX_STEP_RELAXATION_LENGTHS = 3.0
-# engines that keep a fixed number of samples of each of the last cycles, independent of their steps
+# Engines whose number of stored samples per cycle does not depend on their steps.
 RESAMPLING_ENGINES = (
     "exact",
     "piecewise",
     "smooth",
 )
-SAMPLES_PER_CYCLE = 400  # number of samples of a kept cycle, as in `dynamics.cycles`
-# Expected reversals per cycle, which are kept from before the last cycles.
+SAMPLES_PER_CYCLE = 400  # Number of samples of a stored cycle, as in `dynamics.cycles`.
+# Expected number of reversals per cycle, which are also stored for the cycles before the window.
 REVERSALS_PER_CYCLE = 4.0
 
 
@@ -85,14 +91,14 @@ class HistoryBytes(NamedTuple):
     Attributes
     ----------
     sample : float
-        Bytes per number of a kept sample: window, response and derived arrays. Random records of
-        4e5 to 2e6 samples took 0.8 to 1.2 of this.
+        Bytes per value of a stored sample, including derived arrays. Measured: 0.8 to 1.2 times
+        this for random records of 4e5 to 2e6 samples.
     cycle : float
-        Bytes per cycle of a run: extremes, phasors and positions of all cycles, of the run and of
-        its coarse runs. Single modes over 1e6 to 1e7 cycles took 0.8 to 1.3 of this.
+        Bytes per cycle of a run and its coarse runs, for extremes, Fourier coefficients and
+        positions. Measured: 0.8 to 1.3 times this for single modes over 1e6 to 1e7 cycles.
     turn : float
-        Bytes per number of a reversal that is kept from before the last cycles. Runs of 1e5 to 1e6
-        cycles took 0.8 to 1.5 of this.
+        Bytes per value of a reversal that is stored for the cycles before the window. Measured: 0.8
+        to 1.5 times this for runs of 1e5 to 1e6 cycles.
     """
 
     sample: float
@@ -106,23 +112,26 @@ MARCH_HISTORY = HistoryBytes(45.0, 50.0, 18.0)
 
 
 def required_steps_per_cycle(model: Model) -> int:
-    """Return the time steps per cycle that meet the tolerance, without an upper bound."""
+    """Return the number of steps per cycle that meets the tolerance, without an upper bound."""
     accuracy = model.accuracy
     rig = model.rig
-    quickest = max(
+    max_frequency_ratio = max(
         find_max_frequency_ratio(rig.drive.signal),
         float(rig.structure.frequencies.max()) * rig.drive.signal.period,
     )
     if model.load_varies:
-        quickest = max(quickest, model.point.frequency * rig.drive.signal.period)
-    # the error falls with the square of the step; 400 steps per cycle of the fastest motion give 1e-3
-    return 2 * round(200 * sqrt(1e-3 / accuracy.tolerance) * quickest)
+        max_frequency_ratio = max(
+            max_frequency_ratio, model.point.frequency * rig.drive.signal.period
+        )
+    # The error is proportional to the square of the step; 400 steps per cycle of the fastest motion
+    # give 1e-3.
+    return 2 * round(200 * sqrt(1e-3 / accuracy.tolerance) * max_frequency_ratio)
 
 
 def steps_per_cycle(model: Model) -> int:
-    """Return the time steps per cycle of a march, from the scene or else from the tolerance.
+    """Return the number of steps per cycle of a march, from the scene or else from the tolerance.
 
-    The tolerance chooses between 100 and MAX_MARCH_STEPS steps.
+    The tolerance selects between 100 and MAX_MARCH_STEPS steps.
     """
     return model.accuracy.steps_per_cycle or min(
         max(required_steps_per_cycle(model), 100), MAX_MARCH_STEPS
@@ -130,10 +139,10 @@ def steps_per_cycle(model: Model) -> int:
 
 
 def count_merges(model: Model) -> int:
-    """Return how often neighbouring slider cells are merged in pairs for the first run.
+    """Return how many times neighbouring slider cells are merged in pairs for the first run.
 
-    The error of cells falls with the square of their width. If the error of the run is too large,
-    the run is repeated with more cells (`Numerics.finer`).
+    The error is proportional to the square of the cell width. If it exceeds the tolerance, the run
+    is repeated with more cells (`Numerics.finer`).
     """
     laws = [interface.numbers.law for interface in model.rig.friction.interfaces]
     if (
@@ -146,21 +155,21 @@ def count_merges(model: Model) -> int:
     return int(min(max(n_merges, 0), MAX_MERGES))
 
 
-def interface_load(model: Model, interface) -> float:
-    """Return the normal load [N] on an interface, by default that of the whole model."""
+def find_interface_load(model: Model, interface) -> float:
+    """Return the normal load [N] on an interface; default: that of the whole model."""
     return model.nominal_load if interface.load is None else interface.load
 
 
 @lru_cache(8)
-def expected_elements(model: Model) -> tuple:
-    """Return the expected number of friction elements and the largest stick stiffness [N/m].
+def estimate_elements(model: Model) -> tuple:
+    """Estimate the number of friction elements and the largest stiffness in stick [N/m].
 
-    A rigid element has no spring, and counts as stiffness 0.
+    A rigid element has no spring and counts with stiffness 0.
     """
     count = 0
     stiff = 0.0
     for interface in model.rig.friction.interfaces:
-        load = interface_load(model, interface)
+        load = find_interface_load(model, interface)
         if law_has_trait(interface.numbers.law, "set-valued"):
             stiffness = inf
             n_elements = 1
@@ -180,107 +189,110 @@ def expected_elements(model: Model) -> tuple:
 
 
 def intervals_per_cycle(model: Model) -> float:
-    """Return the largest number of time intervals per drive cycle of the event-driven solution."""
+    """Return the largest number of time intervals per drive cycle of an event-driven run."""
     return sum(count_intervals_by_cause(model))
 
 
 def count_intervals_by_cause(model: Model) -> tuple:
-    """Return the intervals per cycle of the event-driven solution, from ringing and from events.
+    """Return the numbers of time intervals per cycle due to vibration and due to events.
 
-    The intervals due to events include the rows of a recorded drive.
+    The rows of a recorded drive count as events.
     """
     modes = model.rig.modes
     drive = model.rig.drive.signal
-    count, stiff = expected_elements(model)
-    made = modal_system.make_modal_system(modes)
-    faces = len(made.interfaces)
-    damping = made.damping_norm
+    count, stiff = estimate_elements(model)
+    modal = modal_system.make_modal_system(modes)
+    n_interfaces = len(modal.interfaces)
+    damping = modal.damping_norm
     rate = damping / 2 + sqrt(
-        damping**2 / 4 + made.max_omega_squared + stiff * max(made.inverse_mass, default=0.0)
+        damping**2 / 4 + modal.max_omega_squared + stiff * max(modal.inverse_mass, default=0.0)
     )
     rows = 0 if drive.segments else len(drive.breaks) / model.rig.drive.cycles
     ringing = (
         max(rate * drive.period, 2 * pi * find_max_frequency_ratio(drive)) / MAX_INTERVAL_PHASE
     )
     quick = find_max_frequency_ratio(drive)
-    events = 2 * max(count, faces) * quick + 2 + rows
+    events = 2 * max(count, n_interfaces) * quick + 2 + rows
     return ringing, events
 
 
-def max_exact_seconds(model: Model) -> float:
+def estimate_max_exact_seconds(model: Model) -> float:
     """Return an upper estimate of the CPU time [s] of an event-driven run.
 
-    The elements are assumed to stick all the time. The choice of an engine is based on this time.
+    All elements are assumed to stick all the time. The choice of an engine is based on this
+    estimate.
     """
     cycles = model.rig.drive.cycles
-    each = cost_model.MAX_PIECE_SECONDS + _extra_interval_seconds(model)
+    each = cost_model.MAX_PIECE_SECONDS + _estimate_extra_interval_seconds(model)
     return (
         each * cycles + cost_model.READ_PIECE_SECONDS * min(cycles, 10.0)
     ) * intervals_per_cycle(model)
 
 
-def _extra_interval_seconds(model: Model) -> float:
-    """Return the CPU time [s] per time interval for modes and interfaces beyond the first."""
+def _estimate_extra_interval_seconds(model: Model) -> float:
+    """Return the CPU time [s] per time interval for further modes and interfaces."""
     modes = model.rig.modes
     return cost_model.PIECE_MODE_SECONDS * (
         modes.omega.size - 1
     ) + cost_model.PIECE_INTERFACE_SECONDS * max(0, len(modes.interfaces) - 1)
 
 
-def expected_exact_seconds(model: Model) -> float:
+def estimate_exact_seconds(model: Model) -> float:
     """Estimate the CPU time [s] of an event-driven run.
 
-    Intervals due to ringing count only for the expected fraction of the time in stick.
+    The intervals due to vibration count only for the expected fraction of time in stick.
     """
     rig = model.rig
-    count, stiff = expected_elements(model)
+    count, stiff = estimate_elements(model)
     laws = rig.friction.interfaces
-    limit = sum(law.numbers.static * interface_load(model, law) for law in laws)
-    push = rig.drive.force or rig.first_mode.mass * find_max_acceleration(rig.drive.signal)
+    limit = sum(law.numbers.static * find_interface_load(model, law) for law in laws)
+    drive_force = rig.drive.force or rig.first_mode.mass * find_max_acceleration(rig.drive.signal)
     ringing, events = count_intervals_by_cause(model)
-    share = min(1.0, limit / push) ** STICKING_EXPONENT if stiff and push else 1.0
+    stick_fraction = (
+        min(1.0, limit / drive_force) ** STICKING_EXPONENT if stiff and drive_force else 1.0
+    )
     return (
         (
             cost_model.PIECE_SECONDS
-            + _extra_interval_seconds(model)
+            + _estimate_extra_interval_seconds(model)
             + cost_model.PIECE_ELEMENT_SECONDS * count
         )
-        * (ringing * share + events)
+        * (ringing * stick_fraction + events)
         * rig.drive.cycles
     )
 
 
-def expected_march_seconds(model: Model) -> float:
-    """Estimate the CPU time [s] of a march with the coarse runs of its error estimate."""
-    count = expected_elements(model)[0]
-    many = len(model.rig.friction.interfaces)
+def estimate_march_seconds(model: Model) -> float:
+    """Estimate the CPU time [s] of a march and the coarse runs of its error estimate."""
+    count = estimate_elements(model)[0]
+    n_interfaces = len(model.rig.friction.interfaces)
     step = cost_model.STEP_SECONDS + cost_model.STEP_ELEMENT_SECONDS * count
     return (
         1.75
         * model.rig.drive.cycles
-        * (cost_model.CYCLE_SECONDS + steps_per_cycle(model) * many * step)
+        * (cost_model.CYCLE_SECONDS + steps_per_cycle(model) * n_interfaces * step)
     )
 
 
 def reason_to_march_events(model: Model) -> str:
-    """Return the reason why a model is integrated in time steps instead of event by event.
+    """Return the reason to march instead of solving from event to event, or "".
 
-    The events cost more than time steps, and more than an exact solution is worth. The reason is ""
-    if the model is better solved from event to event.
+    The reason is that the events cost more CPU time than a march, and more than an exact solution
+    is worth.
     """
     if required_steps_per_cycle(model) > MAX_MARCH_STEPS:
         max_seconds = MAX_EXACT_SECONDS_UNRESOLVED
     else:
-        max_seconds = max(MAX_EXACT_SECONDS_OVER_MARCH, expected_march_seconds(model))
-    if max_exact_seconds(model) <= max_seconds:
+        max_seconds = max(MAX_EXACT_SECONDS_OVER_MARCH, estimate_march_seconds(model))
+    if estimate_max_exact_seconds(model) <= max_seconds:
         return ""
     return "time steps are faster than the exact solution"
 
 
 def reason_to_march_elements(model: Model) -> str:
-    """Return the reason why a model with friction elements needs time steps, or "".
+    """Return the reason to march with friction elements instead of solving exactly, or "".
 
-    The scene prescribes the steps, or the reason is that of `reason_to_march_events`.
+    The reason is a fixed number of steps in the scene, or that of `reason_to_march_events`.
     """
     if model.accuracy.steps_per_cycle is not None:
         return "accuracy.steps_per_cycle is set"
@@ -288,10 +300,10 @@ def reason_to_march_elements(model: Model) -> str:
 
 
 def refuse_long_exact_run(model: Model, numerics=None) -> None:
-    """Raise Missing if an event-driven run would take more CPU time than is allowed."""
-    seconds = max_exact_seconds(model)
+    """Raise Missing if an event-driven run would take more than the allowed CPU time."""
+    seconds = estimate_max_exact_seconds(model)
     if seconds > MAX_EXACT_SECONDS:
-        march = ', or use accuracy.method = "march"' * (expected_march_seconds(model) < seconds)
+        march = ', or use accuracy.method = "march"' * (estimate_march_seconds(model) < seconds)
         raise Missing(
             f"the exact solution (about {intervals_per_cycle(model):.2g} time intervals per cycle, set by "
             "events, rows of the drive and the fastest free vibration) would need a computing time of about "
@@ -302,38 +314,35 @@ def refuse_long_exact_run(model: Model, numerics=None) -> None:
 
 
 def predict_exact_cost(model: Model, numerics, points: int) -> Cost:
-    """Return the predicted cost of an event-driven run.
+    """Predict the cost of an event-driven run.
 
     Parameters
     ----------
     model : Model
     numerics : Numerics
     points : int
-        Nodes of the interface; not used.
+        Number of interface nodes; not used.
     """
     steps = int(intervals_per_cycle(model) * numerics.cycles)
     times = {
-        "motion": expected_exact_seconds(model),
-        "histories": cost_model.KEPT_EVENT_SAMPLE_SECONDS * count_kept_samples(numerics),
+        "motion": estimate_exact_seconds(model),
+        "histories": cost_model.KEPT_EVENT_SAMPLE_SECONDS * count_stored_samples(numerics),
     }
     code = EVENT_CODE if model.rig.friction.interfaces else LINEAR_CODE
-    if _interpreted_seconds(model) <= compiled.MAX_PYTHON_SECONDS:
-        # a run in interpreted Python takes 86 MB without machine code, and 152 MB with it, because
-        # machine code loads the LLVM library
+    if _estimate_interpreted_seconds(model) <= compiled.MAX_PYTHON_SECONDS:
+        # A run in interpreted Python takes 86 MB without compiled code, and 152 MB with it, because
+        # compiled code loads the LLVM library.
         if not _is_event_loop_cached(model):
             code = code._replace(bytes=0.0)
         loading = replace(code.cost(), compile_seconds=0.0)
     else:
         loading = code.cost()
-    return Cost(times, history_memory_parts(model, numerics, EVENT_HISTORY), (), steps) + loading
+    return Cost(times, predict_history_memory(model, numerics, EVENT_HISTORY), (), steps) + loading
 
 
-def _interpreted_seconds(model: Model) -> float:
-    """Estimate the CPU time [s] of an event-driven run in interpreted Python.
-
-    Cells of a slider density are not merged.
-    """
-    count, stiffness = expected_elements(model)
+def _estimate_interpreted_seconds(model: Model) -> float:
+    """Estimate the CPU time [s] of an event-driven run in interpreted Python, without merged cells."""
+    count, stiffness = estimate_elements(model)
     each = events_cost.estimate_cycle_time(
         model.rig.modes, model.rig.drive.signal, stiffness, count if stiffness else 0
     )
@@ -343,20 +352,20 @@ def _interpreted_seconds(model: Model) -> float:
 def _is_event_loop_cached(model: Model) -> bool:
     """Return whether the compiled event loop for the number of modes of a rig is cached."""
     from ...dynamics.events.histories import (
-        is_loop_cached,  # imported here because a plan does not need the engine otherwise
+        is_loop_cached,  # The engine is imported here, because a plan needs nothing else from it.
     )
 
     return is_loop_cached(model.rig.modes, model.rig.drive.signal)
 
 
-def count_kept_samples(numerics) -> float:
+def count_stored_samples(numerics) -> float:
     """Return the number of samples of the last cycles that a run stores."""
     each = SAMPLES_PER_CYCLE if numerics.engine in RESAMPLING_ENGINES else numerics.steps
     return float(max(2, numerics.window) * each)
 
 
-def history_memory_parts(model: Model, numerics, history: HistoryBytes) -> tuple[MemoryPart, ...]:
-    """Return the memory of the histories that a run stores, by contribution.
+def predict_history_memory(model: Model, numerics, history: HistoryBytes) -> tuple[MemoryPart, ...]:
+    """Predict the memory of the histories that a run stores, as a tuple of contributions.
 
     Parameters
     ----------
@@ -365,7 +374,7 @@ def history_memory_parts(model: Model, numerics, history: HistoryBytes) -> tuple
     history : HistoryBytes
     """
     rig = model.rig
-    samples = count_kept_samples(numerics)
+    samples = count_stored_samples(numerics)
     width = 2.0 * len(rig.structure.frequencies) + 12 + 6 * len(rig.friction.interfaces)
     length_key = "drive.duration" if rig.drive.waveform.is_random else "drive.cycles"
     key = "accuracy.steps_per_cycle" if model.accuracy.steps_per_cycle else length_key
@@ -381,9 +390,9 @@ def history_memory_parts(model: Model, numerics, history: HistoryBytes) -> tuple
 
 def describe_element_engine(model: Model, engine: str) -> list:
     """Return the sentence of a plan on the engine of friction elements and its CPU time."""
-    count = expected_elements(model)[0]
-    exact = expected_exact_seconds(model)
-    march = expected_march_seconds(model)
+    count = estimate_elements(model)[0]
+    exact = estimate_exact_seconds(model)
+    march = estimate_march_seconds(model)
     return [
         f"{count} element{'s' * (count > 1)} by engine {engine}; computing time: about {exact:.2g} s with the "
         f"exact solution between yield events, about {march:.2g} s with time steps at this tolerance"
@@ -391,7 +400,7 @@ def describe_element_engine(model: Model, engine: str) -> list:
 
 
 def reason_to_march_smooth_law(model: Model) -> str:
-    """Return the reason why a smooth law needs the march instead of the smooth engine, or ""."""
+    """Return the reason to march instead of using the smooth engine, or ""."""
     rig = model.rig
     accuracy = model.accuracy
     for key in MARCH_SETTINGS:
@@ -406,16 +415,16 @@ def reason_to_march_smooth_law(model: Model) -> str:
     element = make_smooth_element(model)
     if element is None or element.state_scales is None:
         return f"for law '{model.friction.law}'"
-    if smooth_steps_per_cycle(model, element) > MAX_STEP_RATIO * max(steps_per_cycle(model), 400):
+    if estimate_smooth_steps(model, element) > MAX_STEP_RATIO * max(steps_per_cycle(model), 400):
         return "in so many steps"
     return ""
 
 
 def make_smooth_element(model: Model) -> "Element | None":
-    """Return the friction law of the interface as an Element for the smooth engine.
+    """Return the friction law of the interface as an Element of the smooth engine, or None.
 
-    The result is None if the bonds are summed in a list, or if the law averages the friction over
-    the pressure of all points.
+    It is None if the bonds are summed in a list, or if the law averages the pressure over all
+    points.
     """
     f = model.friction
     load = model.nominal_load
@@ -428,40 +437,40 @@ def make_smooth_element(model: Model) -> "Element | None":
     return stretch.points_element(model.bonds, [1.0], [load])
 
 
-def smooth_steps_per_cycle(model: Model, element: "Element") -> float:
-    """Estimate the steps per cycle of the smooth engine.
+def estimate_smooth_steps(model: Model, element: "Element") -> float:
+    """Estimate the number of steps per cycle of the smooth engine.
 
-    It is proportional to the phase of the fastest motion, plus steps at every reversal, plus the
-    steps that keep the states of a law with a short relaxation length stable.
+    It is the sum of steps for the phase of the fastest motion, for each reversal, and for the
+    stability of state variables with a short relaxation length.
     """
     rig = model.rig
     modes = model.rig.modes
     omega = find_drive_omega(rig.drive.signal)
     period = rig.drive.signal.period
     damper = modes.damping_matrix
-    pace = max(
+    max_rate = max(
         float(modes.omega.max()),
         float(np.abs(damper).sum(axis=1).max()),
         omega * find_max_frequency_ratio(rig.drive.signal),
     )
-    ease = float((modes.slide**2).sum()) / modes.mass
+    inverse_mass = float((modes.slide**2).sum()) / modes.mass
     rigid = 0.0
     if not element.length:
         slope = element.limit / model.friction.reference_speed
-        rigid = slope * ease * stiff_time_fraction(model, element)
+        rigid = slope * inverse_mass * estimate_stiff_time_fraction(model, element)
     path = 4 * model.speed_scale / omega
     states = path / element.length if element.state_scales and element.length else 0.0
     grown = model.friction.slip_growth if law_has_trait(model.friction.law, "bonds") else None
     if grown:
         states = max(states, path / grown)
-    return 24 + 1.2 * pace * period + (states + rigid * period) / MAX_STEP_RELAXATION_LENGTHS
+    return 24 + 1.2 * max_rate * period + (states + rigid * period) / MAX_STEP_RELAXATION_LENGTHS
 
 
-def stiff_time_fraction(model: Model, element: "Element") -> float:
-    """Return the fraction [1] of time in which a speed-dependent law makes the equations stiff.
+def estimate_stiff_time_fraction(model: Model, element: "Element") -> float:
+    """Estimate the fraction of time in which a speed-dependent law makes the equations stiff.
 
-    With a single mode it is 1 up to a ratio 1 of the drive force to the friction limit, and less
-    above it; with several modes it is 1.
+    It is 1 if there are several modes or if the drive force is below the friction limit, and
+    smaller otherwise.
     """
     rig = model.rig
     modes = model.rig.modes
@@ -479,29 +488,29 @@ def stiff_time_fraction(model: Model, element: "Element") -> float:
 
 
 def predict_smooth_cost(model: Model, numerics, points: int) -> Cost:
-    """Predict the cost of a run of the smooth engine, including its coarse run.
+    """Predict the cost of a run of the smooth engine and its coarse run.
 
     Parameters
     ----------
     model : Model
     numerics : Numerics
     points : int
-        Nodes of the interface; not used.
+        Number of interface nodes; not used.
     """
     rig = model.rig
     cycles = model.rig.drive.cycles
-    # the cycles after the motion has become periodic are not computed
+    # Cycles after the motion has become periodic are not computed.
     if (
         is_sinusoidal(rig.drive.signal)
         and (decay := find_min_decay_rate(rig.modes) * rig.drive.signal.period) > 0
     ):
         cycles = min(cycles, 20 + N_DECAY_TIMES_TO_REPEAT / decay)
-    steps = 2 * cycles * smooth_steps_per_cycle(model, make_smooth_element(model))
+    steps = 2 * cycles * estimate_smooth_steps(model, make_smooth_element(model))
     times = {
         "motion": cost_model.SMOOTH_RUN_SECONDS + cost_model.SMOOTH_STEP_SECONDS * steps,
-        "histories": cost_model.KEPT_SAMPLE_SECONDS * count_kept_samples(numerics),
+        "histories": cost_model.KEPT_SAMPLE_SECONDS * count_stored_samples(numerics),
     }
     return (
-        Cost(times, history_memory_parts(model, numerics, SMOOTH_HISTORY), (), int(steps))
+        Cost(times, predict_history_memory(model, numerics, SMOOTH_HISTORY), (), int(steps))
         + SMOOTH_CODE.cost()
     )

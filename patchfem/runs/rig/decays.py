@@ -1,9 +1,11 @@
-"""Frequency and damping ratio of a released rig against its amplitude, with errors.
+"""Decay curve of a released rig: frequency and damping ratio over amplitude, with errors.
 
-In: the Solution of a release and its coarse runs. Out: a `DecayCurve` whose errors include
-those of the coarse runs and of the mesh. While the nodes of both meshes stick, their decays
-agree, although both omit the dissipation by micro-slip. Therefore the error of the mesh is
-computed from the static loops of its elements at the same amplitudes (`slip.mesh_correction`).
+In: the Solution of a release and its coarse runs. Out: a `DecayCurve` whose errors include those
+due to coarse runs and to the mesh.
+
+As long as no node of either mesh slips, both meshes have the same decay, and both omit the
+dissipation by micro-slip. Therefore the mesh error is computed from static hysteresis loops at the
+same amplitudes (`slip.mesh_correction`).
 """
 
 from dataclasses import replace
@@ -37,17 +39,16 @@ NO_LOOP_REASON = (
     "the hysteresis loop of this friction law is not known without a computation in time"
 )
 NO_STATIC_CURVE_REASON = "no static curve of the mode was found at these amplitudes"
-MAX_POINT_ERROR = 0.5  # largest relative error [1] with which a point of a decay curve is kept
-AMPLITUDES_PER_DECADE = 16  # number of amplitudes at which the error due to the mesh is computed
+MAX_POINT_ERROR = 0.5  # Largest relative error at which a point of a decay curve is accepted.
+AMPLITUDES_PER_DECADE = 16  # Number of amplitudes per decade at which the mesh error is computed.
 
 
-def compute_decay(raw: Solution) -> DecayCurve | None:
-    """Return the amplitude decay curve of a released rig, with errors.
+def compute_decay_curve(raw: Solution) -> DecayCurve | None:
+    """Return the decay curve of a released rig with errors, or None if it has no points.
 
-    The result is None if the curve has no points. Points whose error exceeds MAX_POINT_ERROR of their
-    value are left out. The errors are those of the
-    evaluation plus the changes in the coarse runs at the same amplitudes; they are infinite outside
-    the range of a coarse run.
+    The errors are those of the evaluation plus the changes in the coarse runs at the same
+    amplitude. They are infinite outside the range of a coarse run. Points with a relative error
+    above MAX_POINT_ERROR are removed.
     """
     curve = _measure_decay_curve(raw)
     if not curve.time.size:
@@ -60,7 +61,7 @@ def compute_decay(raw: Solution) -> DecayCurve | None:
 
 
 def _add_coarse_changes(curve: DecayCurve, raw: Solution) -> DecayCurve:
-    """Widen the errors of a decay curve by its differences from coarse runs."""
+    """Add the differences from coarse runs to the errors of a decay curve."""
     for run, beside in raw.coarser:
         coarse = _measure_decay_curve(run).interpolate(curve.amplitude)
         reference = (
@@ -71,38 +72,37 @@ def _add_coarse_changes(curve: DecayCurve, raw: Solution) -> DecayCurve:
 
 
 def _measure_decay_curve(run: Solution) -> DecayCurve:
-    """Measure frequency and damping ratio of a decay from its half cycles while they decrease.
+    """Measure the decay curve of a run from its half cycles while they decrease.
 
-    After the last slip, the curve is that of the strongest ringing mode, at each of its half
-    cycles: other modes ring at the same time, so that the reversals of their sum belong to none of
-    them.
+    After the last slip, the curve is that of the strongest mode of the free vibration, because the
+    reversals of a sum of several modes belong to none of them.
     """
     motion = run.response
     mode = run.extra.get("tail")
     reversals = locate_reversals(motion.time, motion.output, motion.output_rate)
-    swings = fit_decay_curve(make_half_cycles(*reversals))
+    half_cycles = fit_decay_curve(make_half_cycles(*reversals))
     if mode is None:
-        return swings
+        return half_cycles
     time = np.arange(mode.begin, mode.end, 0.5 / mode.frequency)
     rate = 2 * np.pi * mode.frequency * mode.damping / np.sqrt(1 - mode.damping**2)
     amplitude = mode.displacement * np.exp(-rate * (time - mode.begin))
     zero = np.zeros(time.size)
     ringing = DecayCurve(time, amplitude, zero + mode.frequency, zero, zero + mode.damping, zero)
     ringing = ringing.at(amplitude > MIN_HALF_CYCLE * np.abs(motion.output).max())
-    slipping = swings.at(swings.time < mode.begin)
+    slipping = half_cycles.at(half_cycles.time < mode.begin)
     return DecayCurve(*map(np.concatenate, zip(slipping, ringing)))
 
 
 def make_laws_on_mesh(model, patch, meshed: tuple = ()):
-    """Return the friction laws of a rig on one of its meshes.
+    """Return the friction laws of a rig, with one of its meshes.
 
     Parameters
     ----------
     model : Model
     patch : Patch or None
-        Patch of its [contact].
+        Patch of [contact].
     meshed : tuple
-        Indices of interfaces whose own patches are those on a coarser mesh.
+        Indices of the interfaces whose patches have a coarser mesh.
 
     Raises
     ------
@@ -126,9 +126,9 @@ def make_laws_on_mesh(model, patch, meshed: tuple = ()):
 
 
 def make_laws_on_coarse_meshes(model, coarse) -> list:
-    """Return the friction laws of a rig with a coarser mesh of one patch at a time.
+    """Return the friction laws of a rig, with a coarser mesh of one patch at a time.
 
-    coarse: Patch of its [contact] on a coarser mesh, or None.
+    `coarse` is the Patch of [contact] on a coarser mesh, or None.
     """
     return [
         *([] if coarse is None else [make_laws_on_mesh(model, coarse)]),
@@ -145,7 +145,7 @@ def with_automatic_method(model):
 
 
 def compute_static_curve(modes, laws, number: int, amplitudes, samples: int) -> np.ndarray:
-    """Compute amplitude, frequency, damping ratio and loss of a mode from static load cycles.
+    """Compute amplitude, frequency, damping ratio and loss of a mode from quasi-static cycles.
 
     Parameters
     ----------
@@ -157,25 +157,30 @@ def compute_static_curve(modes, laws, number: int, amplitudes, samples: int) -> 
     amplitudes : (k,)
         Amplitudes of the output [m].
     samples : int
-        Samples of a cycle.
+        Number of samples per cycle.
 
     Returns
     -------
     (4, k) array
-        Amplitude [m], frequency [Hz], damping ratio [1], and loss per cycle [J].
+        Amplitude [m], frequency [Hz], damping ratio [1], and dissipated energy per cycle [J].
     """
-    held = modes.compute_stuck_mode(laws.rows, laws.stiffness(), number)
-    moved = float(modes.output @ held[1])
+    stuck_mode = modes.compute_stuck_mode(laws.rows, laws.stiffness(), number)
+    output_motion = float(modes.output @ stuck_mode[1])
     return tabulate_static_motions(
         modes,
         quasi_static.find_static_motions(
-            modes, laws, amplitudes / abs(moved), held, samples, modes.output / moved
+            modes,
+            laws,
+            amplitudes / abs(output_motion),
+            stuck_mode,
+            samples,
+            modes.output / output_motion,
         ),
     )
 
 
 def tabulate_static_motions(modes, motions: list) -> np.ndarray:
-    """Tabulate amplitude, frequency, damping ratio and loss (4, k) of quasi-static motions."""
+    """Return amplitude, frequency, damping ratio and loss (4, k) of quasi-static motions."""
     amplitude = [abs(float(modes.output @ motion.z)) for motion in motions]
     frequency = [motion.omega / (2 * np.pi) for motion in motions]
     damping = [motion.zeta for motion in motions]
@@ -183,27 +188,27 @@ def tabulate_static_motions(modes, motions: list) -> np.ndarray:
     return np.array([amplitude, frequency, damping, loss])
 
 
-def estimate_mesh_error(fine, rough, read) -> np.ndarray:
-    """Estimate the mesh error of values that are computed from friction laws of patches.
+def estimate_mesh_error(fine, coarse, compute) -> np.ndarray:
+    """Estimate the mesh error of quantities that are computed from the friction laws of patches.
 
-    It follows from the change on a coarser mesh at second order. It is not less than the change if
-    the elements are spread over the yield slides between the nodes (`slip.mesh_correction`): at a
-    slide at which no node slips, a coarser mesh changes nothing.
+    The change on a coarser mesh is extrapolated at second order. At a displacement at which no node
+    slips, a coarser mesh changes nothing. Therefore the error is at least the change when the
+    elements are spread over the yield displacements between the nodes (`slip.mesh_correction`).
 
     Parameters
     ----------
     fine : LawGroup
         Laws on the mesh of the run.
-    rough : list of LawGroup
-        Laws with a coarser mesh of one patch after the other.
-    read : callable
-        Function of a LawGroup that returns an array.
+    coarse : list of LawGroup
+        Laws with a coarser mesh of one patch each.
+    compute : callable
+        Function that computes the quantities from a LawGroup, as an array.
     """
-    best = read(fine)
-    changes = (read(other) - best for other in rough)
+    best = compute(fine)
+    changes = (compute(other) - best for other in coarse)
     by_meshes = sum(error_of_change(change, order=MAX_ORDER) for change in changes)
     return np.fmax(
-        SPREAD_FACTOR * np.abs(read(fine.with_elements(_spread_elements)) - best), by_meshes
+        SPREAD_FACTOR * np.abs(compute(fine.with_elements(_spread_elements)) - best), by_meshes
     )
 
 
@@ -213,36 +218,36 @@ def _spread_elements(stiffness, slide) -> tuple:
     return spread_elements(stiffness[order], slide[order])
 
 
-def estimate_decay_mesh_errors(model, patch, coarse, amplitudes, mode) -> tuple:
-    """Estimate the errors of modal frequency and damping ratio due to the mesh of patches.
+def estimate_decay_mesh_errors(model, patch, coarse, amplitudes, find_mode) -> tuple:
+    """Estimate the mesh errors of frequency and damping ratio of a mode.
 
     Parameters
     ----------
     model : Model
     patch, coarse : Patch or None
-        Patch of the [contact] of the rig, and the same on a coarser mesh.
+        Patch of [contact], and the same on a coarser mesh.
     amplitudes : (k,)
-        Increasing amplitudes of the output [m]. The errors are interpolated between those that have
-        a static motion.
-    mode : callable
+        Increasing amplitudes of the output [m]. The errors are interpolated where no static motion
+        is found.
+    find_mode : callable
         Function of a LawGroup that returns the index of the mode.
 
     Returns
     -------
     tuple
-        Errors (2, k), and the reason why they are not known, else "". They are 0 without a patch
-        that slips in part, and if they are not known.
+        Errors (2, k) [Hz, 1], and the reason why they are unknown, or "". Unknown errors are 0, as
+        are those of patches without partial slip.
     """
     rig = model.rig
-    none = np.zeros((2, len(amplitudes)))
+    zero_errors = np.zeros((2, len(amplitudes)))
     if not (model.partial_slip or rig.friction.has_partial_slip):
-        return none, ""
+        return zero_errors, ""
     moves = (model.grooves is not None, rig.friction.load_varies, rig.friction.strips_slide_apart)
     if any(moves):
-        return none, UNSUPPORTED_CONTACTS[moves.index(True)]
+        return zero_errors, UNSUPPORTED_CONTACTS[moves.index(True)]
     try:
         fine = make_laws_on_mesh(model, patch)
-        number = mode(fine)
+        number = find_mode(fine)
         error = estimate_mesh_error(
             fine,
             make_laws_on_coarse_meshes(model, coarse),
@@ -251,24 +256,24 @@ def estimate_decay_mesh_errors(model, patch, coarse, amplitudes, mode) -> tuple:
             )[1:3],
         )
     except NotConverged as reason:
-        return none, str(reason)
+        return zero_errors, str(reason)
     except PatchfemError:
-        return none, NO_LOOP_REASON
+        return zero_errors, NO_LOOP_REASON
     known = np.isfinite(error).all(axis=0)
     if not known.any():
-        return none, NO_STATIC_CURVE_REASON
-    return _interpolate_rows(amplitudes, amplitudes[known], error[:, known]), ""
+        return zero_errors, NO_STATIC_CURVE_REASON
+    return _interpolate_over_amplitude(amplitudes, amplitudes[known], error[:, known]), ""
 
 
-def _interpolate_rows(amplitudes, known_amplitudes, rows) -> np.ndarray:
-    """Interpolate rows (r, k) of values over the logarithm of the amplitude."""
+def _interpolate_over_amplitude(amplitudes, known_amplitudes, rows) -> np.ndarray:
+    """Interpolate rows (r, k) of values linearly in the logarithm of the amplitude."""
     at = np.log(amplitudes)
     known = np.log(known_amplitudes)
     return np.array([np.interp(at, known, row) for row in rows])
 
 
 def estimate_stuck_mode_mesh_errors(amplitude, frequency: float, model, patch, coarse) -> tuple:
-    """Estimate the mesh errors of frequency and damping of a mode with stuck interfaces.
+    """Estimate the mesh errors of frequency and damping ratio of a mode with stuck interfaces.
 
     Parameters
     ----------
@@ -283,9 +288,9 @@ def estimate_stuck_mode_mesh_errors(amplitude, frequency: float, model, patch, c
     low, high = np.log10([amplitude.min(), amplitude.max()])
     at = np.logspace(low, high, 2 + int(AMPLITUDES_PER_DECADE * (high - low)))
     errors, reason = estimate_decay_mesh_errors(
-        model, patch, coarse, at, lambda laws: _find_mode(model.rig.modes, laws, frequency)
+        model, patch, coarse, at, lambda laws: _find_nearest_mode(model.rig.modes, laws, frequency)
     )
-    return _interpolate_rows(amplitude, at, errors), reason
+    return _interpolate_over_amplitude(amplitude, at, errors), reason
 
 
 def describe_unknown_mesh_errors(reasons: dict, coarser_runs) -> list:
@@ -294,9 +299,9 @@ def describe_unknown_mesh_errors(reasons: dict, coarser_runs) -> list:
     Parameters
     ----------
     reasons : dict
-        Reason, or "", by the name of what has these errors.
+        Reason, or "", by the name of the result.
     coarser_runs : callable
-        Returns the `CoarserRuns` in space that contribute to them.
+        Function that returns the `CoarserRuns` in space that contribute to these errors.
     """
     sentences = []
     for reason in dict.fromkeys(filter(None, reasons.values())):
@@ -311,8 +316,11 @@ def describe_unknown_mesh_errors(reasons: dict, coarser_runs) -> list:
     return sentences
 
 
-def _find_mode(modes, laws, frequency: float) -> int:
-    """Find the mode with stuck interfaces that is nearest to a frequency and moves the output."""
+def _find_nearest_mode(modes, laws, frequency: float) -> int:
+    """Return the index of the mode with stuck interfaces that is nearest in frequency.
+
+    Modes that do not move the output are skipped.
+    """
     distances = np.full(modes.omega.size, np.inf)
     for k in range(modes.omega.size):
         omega, shape = modes.compute_stuck_mode(laws.rows, laws.stiffness(), k)

@@ -1,9 +1,8 @@
-"""Engines of a rig as records: what each can compute, how it solves, coarse runs and cost.
+"""Records of the engines of a rig: supported models, comparison runs and error limits.
 
-In: a Model. Out: its Engine (`choose_engine`): the one that the scene names, or the first one that
-can compute it. `scene.rules.methods.ENGINE_SUPPORT` has one table of what each engine can compute, for
-the rules of the scene and for this choice. The memory and the compile time of each engine are
-in `runs.memory`.
+In: a Model. Out: its Engine (`choose_engine`), i.e. the engine that the scene names, or the first
+one that can compute the model. `scene.rules.methods.ENGINE_SUPPORT` lists what each engine can
+compute. The memory and the compile time of each engine are in `runs.memory`.
 """
 
 from collections.abc import Callable
@@ -36,38 +35,38 @@ from .costs import (
     reason_to_march_smooth_law,
 )
 
-# Factor on the merge width of bonds in the run that shows the error of merging.
+# Factor on the merge width of bonds in the comparison run.
 MERGE_WIDTH_FACTOR = 0.5
-# Ratio of the neglected tail of a sum over bonds to the tolerance, above which a run with a smaller tail
-# checks its error; the automatic tail is a tenth of this.
+# Largest ratio of the neglected tail of a sum over bonds to the tolerance at which no run with a
+# smaller tail is made; the automatic tail is a tenth of this.
 MAX_UNCHECKED_TAIL_RATIO = 1e-2
-TAIL_FACTOR = 0.1  # factor on the neglected tail in the run that checks its error
-# largest number of time intervals per period with which the map of yields finds a steady motion
+TAIL_FACTOR = 0.1  # Factor on the neglected tail in the comparison run.
+# Largest number of time intervals per period at which the map of yield events is used.
 MAX_MAPPED_INTERVALS = 1e5
 
 
-# largest relative error of an energy balance with round-off only; a billion steps have less
+# Largest relative error of an energy balance due to round-off; a billion steps have less.
 BALANCE_ROUND_OFF = 1e-8
 
 
 class Engine(NamedTuple):
-    """Method that computes the motion of a rig, with its coarse runs and error limits.
+    """Method that computes the motion of a rig, with its comparison runs and error limits.
 
     `scene.rules.methods.ENGINE_SUPPORT` says what it can compute.
 
-    - method: value of accuracy.method that selects it; "" if only "auto" does.
+    - method: value of accuracy.method that selects the engine; "" if only "auto" does.
     - coarser_in_time: function (model, numerics) -> list of `CoarserRuns`.
-    - coarser_in_space: function (model, numerics, patch, coarse, solution) -> list of `CoarserRuns`;
-      coarse is the patch of [contact] on a coarser mesh, or None.
-    - why_not_cheapest: function (model) -> reason why the next engine is better for a model that names none,
-      or "".
-    - min_relative_error: relative error of every measure that no coarse run shows, such as round-off;
-      it is added to the errors by coarse runs.
-    - max_balance_error: error of the energy balance above which a run has not converged; None if the error
-      estimate of the balance decides, inf for methods that state their loss.
-    - summary_numbers: numbers of a run that the summary contains.
-    - saves_state: whether it saves its state during a run.
-    - finds_periodic_motion: whether it finds periodic motions.
+    - coarser_in_space: function (model, numerics, patch, coarse, solution) -> list of
+      `CoarserRuns`; coarse is the Patch of [contact] on a coarser mesh, or None.
+    - why_not_cheapest: function (model) -> reason to prefer the next engine for method = "auto", or
+      "".
+    - min_relative_error: relative error of every measure, such as round-off, which is added to the
+      errors from comparison runs.
+    - max_balance_error: largest error of the energy balance of a converged run; None if it follows
+      from the error estimate of the balance.
+    - summary_numbers: names of the numbers of a run that its summary contains.
+    - saves_state: whether the engine saves its state during a run.
+    - finds_periodic_motion: whether the engine computes periodic motions directly.
     """
 
     name: str
@@ -81,44 +80,43 @@ class Engine(NamedTuple):
     saves_state: bool = False
     finds_periodic_motion: bool = False
 
-    def richer_in_modes(self, model: Model, numerics) -> list:
-        """Return the settings of a comparison run with more modes of a reduced structure.
+    def list_runs_with_more_modes(self, model: Model, numerics) -> list:
+        """List the comparison run with more modes of a reduced structure, if modes are neglected.
 
-        The list is empty if no mode is left out.
-
-        For a march, the run has a quarter of the steps.
+        The comparison run of a march has a quarter of the steps.
         """
         if model.rig.structure.richer_rig is None:
             return []
         beside = None
-        few = numerics
+        coarse_numerics = numerics
         if self.coarser_in_time is _list_march_time_runs:
-            few = _divide_steps(numerics, 4)
-            beside = few
-        richer = replace(few, richer=True)
+            coarse_numerics = _divide_steps(numerics, 4)
+            beside = coarse_numerics
+        richer = replace(coarse_numerics, richer=True)
         return [CoarserRuns((richer,), finer_errors, beside, "reduced")]
 
-    def lacks(self, model: Model, *, steady: bool = False) -> str:
-        """Describe a property of a model that this engine cannot compute; "" if there is none.
+    def find_unsupported_feature(self, model: Model, *, steady: bool = False) -> str:
+        """Describe a property of a model that this engine cannot compute, or return "".
 
-        steady: whether the drive is a sine of a curve of steady motions instead of its own waveform.
+        If `steady` is true, the drive is a sine of a response curve instead of the drive of the
+        model.
         """
         return methods.find_unsupported_feature(
-            self.name, find_motion_properties(model, steady=steady)
+            self.name, collect_motion_features(model, steady=steady)
         )
 
 
 def reason_not_exact(model: Model, *, steady: bool = False) -> str:
     """Return the reason why no event-driven engine can compute a model, or "".
 
-    steady: see `Engine.lacks`.
+    See `Engine.find_unsupported_feature` for `steady`.
     """
     engines = [engine for engine in ENGINES.values() if engine.method == EXACT.method]
-    reasons = [engine.lacks(model, steady=steady) for engine in engines]
+    reasons = [engine.find_unsupported_feature(model, steady=steady) for engine in engines]
     return reasons[-1] if all(reasons) else ""
 
 
-def find_motion_properties(model: Model, *, steady: bool = False) -> methods.MotionFeatures:
+def collect_motion_features(model: Model, *, steady: bool = False) -> methods.MotionFeatures:
     """Collect the properties of a model that decide which engines can compute its motion."""
     rig = model.rig
     spring = ""
@@ -140,11 +138,11 @@ def find_motion_properties(model: Model, *, steady: bool = False) -> methods.Mot
     )
 
 
-class Finder(NamedTuple):
-    """Method that finds steady motions, with the text that a plan prints about it.
+class SteadyMethod(NamedTuple):
+    """Method that computes steady motions, with its description for a plan.
 
-    - words: text of a plan.
-    - engine: name of the engine whose code it runs and whose numerical settings apply.
+    - words: description for a plan.
+    - engine: name of the engine whose code and numerical settings it uses.
     """
 
     name: str
@@ -152,44 +150,48 @@ class Finder(NamedTuple):
     engine: str
 
 
-FINDERS = {
+STEADY_METHODS = {
     finder.name: finder
     for finder in (
-        Finder("events", "the exact solution from event to event", "exact"),
-        Finder("yields", "the exact solution between yield events", "piecewise"),
-        Finder(
+        SteadyMethod("events", "the exact solution from event to event", "exact"),
+        SteadyMethod("yields", "the exact solution between yield events", "piecewise"),
+        SteadyMethod(
             "march",
             "a time integration whose initial state is corrected until the motion repeats",
             "march",
         ),
-        Finder("balance", "harmonic balance", "harmonic"),
+        SteadyMethod("balance", "harmonic balance", "harmonic"),
     )
 }
 
 
-def choose_steady_method(model: Model) -> Finder:
-    """Choose the method that finds the steady motion of a model.
+def choose_steady_method(model: Model) -> SteadyMethod:
+    """Choose the method that computes the steady motion of a model.
 
-    Maps of events or of yields are exact. For grooves, the initial state of a march is corrected
-    until the motion repeats. Harmonic balance is used for all other models, and for a scene that
-    sets `harmonics` or whose springs ring without end between yields.
+    The maps of events or of yield events are exact. Grooves need a march whose initial state is
+    corrected to be periodic. Harmonic balance is used for all other models, for scenes that set
+    `harmonics`, and if the map of yield events would need too many time intervals.
     """
-    if not EXACT.lacks(model, steady=True):
-        return FINDERS["events"]
+    if not EXACT.find_unsupported_feature(model, steady=True):
+        return STEADY_METHODS["events"]
     if model.grooves is not None:
-        return FINDERS["march"]
+        return STEADY_METHODS["march"]
     has_harmonics = model.accuracy.harmonics is not None
-    if has_harmonics or PIECES.lacks(model) or intervals_per_cycle(model) > MAX_MAPPED_INTERVALS:
-        return FINDERS["balance"]
-    return FINDERS["yields"]
+    if (
+        has_harmonics
+        or PIECES.find_unsupported_feature(model)
+        or intervals_per_cycle(model) > MAX_MAPPED_INTERVALS
+    ):
+        return STEADY_METHODS["balance"]
+    return STEADY_METHODS["yields"]
 
 
 def _list_no_runs(*_) -> list:
-    """Return an empty list, for engines without coarse runs of a kind."""
+    """Return an empty list for engines that need no comparison runs of a kind."""
     return []
 
 
-# measures of the friction loop, which the trapezoidal rule computes from samples
+# Measures of the friction loop that are computed from samples by the trapezoidal rule.
 LOOP_MEASURES = (
     "loop_area",
     "equivalent_stiffness",
@@ -197,13 +199,13 @@ LOOP_MEASURES = (
     "slip_amplitude",
     "friction_force_peak",
 )
-LOOP_SAMPLING_ERROR = 1e-4  # relative error of loop measures from 400 samples per cycle
-# Error of the stick fraction [1] and of the phase at slip start [rad] at 400 samples.
+LOOP_SAMPLING_ERROR = 1e-4  # Relative error of loop measures from 400 samples per cycle.
+# Error of the stick fraction [1] and of the phase at slip start [rad] from 400 samples per cycle.
 INSTANT_SAMPLING_ERROR = 0.005
-MOTION_SAMPLING_ERROR = 1e-9  # relative error of all other measures, which are interpolated
+MOTION_SAMPLING_ERROR = 1e-9  # Relative error of all other measures, which are interpolated.
 
 
-def sampling_errors(values: dict) -> dict:
+def estimate_sampling_errors(values: dict) -> dict:
     """Estimate the errors of measures due to sampling with 400 samples per cycle."""
     errors = {}
     for name, value in values.items():
@@ -217,22 +219,24 @@ def sampling_errors(values: dict) -> dict:
 
 
 def _list_exact_space_runs(model: Model, numerics, patch, coarse, solution) -> list:
-    """List comparison runs on coarser meshes for the event-driven engine of Coulomb friction.
+    """List the comparison runs of the engine of Coulomb friction on coarser meshes.
 
-    The mesh matters if the loads of strips or the limit of an averaged law depend on it.
-    The measures of strips that slide independently also have the error of the trapezoidal rule with
-    400 samples per cycle.
+    The mesh matters only for the loads of strips and the slip force of an averaged law. The
+    measures of independent strips also have the error of the trapezoidal rule with 400 samples per
+    cycle.
     """
     averaged = model.friction is not None and law_has_trait(model.friction.law, "averaged")
-    meshed = coarse is not None and (model.rig.friction.strips_slide_apart or averaged)
-    samples = [CoarserRuns((), sampling_errors)] if model.rig.friction.strips_slide_apart else []
-    if not meshed:
+    has_coarser_mesh = coarse is not None and (model.rig.friction.strips_slide_apart or averaged)
+    samples = (
+        [CoarserRuns((), estimate_sampling_errors)] if model.rig.friction.strips_slide_apart else []
+    )
+    if not has_coarser_mesh:
         return samples
     return [*samples, make_spatial_coarsening(replace(numerics, coarse_patch=True))]
 
 
 def _list_element_space_runs(model: Model, numerics, patch, coarse, solution) -> list:
-    """List comparison runs with coarser meshes and slider cells of elastic-plastic elements."""
+    """List the comparison runs of elastic-plastic elements with coarser meshes and slider cells."""
     meshes = _list_coarse_mesh_numerics(model, numerics)
     if coarse is not None and model.partial_slip:
         meshes = [replace(numerics, coarse_patch=True), *meshes]
@@ -245,28 +249,28 @@ def _list_element_space_runs(model: Model, numerics, patch, coarse, solution) ->
 
 
 def _list_coarse_mesh_numerics(model: Model, numerics) -> list:
-    """List numerical settings that differ by a coarser mesh of one interface patch each."""
+    """List numerical settings with a coarser mesh of one interface patch each."""
     if not model.rig.friction.has_partial_slip:
         return []
     meshes = faces.group_interfaces_with_coarse_mesh(model)
     return [replace(numerics, meshed=interfaces) for interfaces in meshes]
 
 
-def _divide_steps(numerics, share: int):
+def _divide_steps(numerics, divisor: int):
     """Return numerical settings with a fraction of the steps per cycle."""
-    return replace(numerics, steps=max(1, numerics.steps // share))
+    return replace(numerics, steps=max(1, numerics.steps // divisor))
 
 
 def _list_march_time_runs(model: Model, numerics) -> list:
-    """List comparison runs of a march with half and with a quarter of its time steps."""
+    """List the comparison runs of a march with half and with a quarter of its steps."""
     runs = (_divide_steps(numerics, 2), _divide_steps(numerics, 4))
     return [CoarserRuns(runs, partial(step_errors, steps=numerics.steps), of="steps")]
 
 
 def _list_march_space_runs(model: Model, numerics, patch, coarse, solution) -> list:
-    """List comparison runs of a march with a coarser discretization in space.
+    """List the comparison runs of a march with another discretization in space.
 
-    These have a coarser mesh, another number of shear modes or another sum over bonds, and a quarter
+    They have a coarser mesh, another number of shear modes or another bond summation, and a quarter
     of the steps.
     """
     quarter = _divide_steps(numerics, 4)
@@ -274,7 +278,7 @@ def _list_march_space_runs(model: Model, numerics, patch, coarse, solution) -> l
     coarser_runs = []
     shape = getattr(getattr(solution.contact, "reduction", None), "stiffness", None)
     if coarse is not None and (varies or model.partial_slip):
-        # both runs have the same number of shear modes, so that only the mesh changes
+        # Both runs have the same number of shear modes, so that only the mesh changes.
         coarser = replace(quarter, coarse_patch=True)
         if shape is not None:
             coarser = replace(coarser, shear_modes=shape.size)
@@ -283,10 +287,10 @@ def _list_march_space_runs(model: Model, numerics, patch, coarse, solution) -> l
         coarser_runs.append(make_spatial_coarsening(coarser, quarter))
     climbs = model.grooves is not None
     gathers = model.patch is not None and model.patch.mesh.can_gather_points
-    # a patch reduced to few points states the error of its shear modes itself
-    pointed = coarse is not None and not gathers
+    # A patch that is reduced to a few points has its own error estimate for shear modes.
+    has_points = coarse is not None and not gathers
     if shape is not None and (
-        varies or climbs or (pointed and law_has_trait(model.friction.law, "bonds"))
+        varies or climbs or (has_points and law_has_trait(model.friction.law, "bonds"))
     ):
         n_modes = shear_modes.comparison_mode_count(shape.size)
         coarser_runs.append(
@@ -296,11 +300,11 @@ def _list_march_space_runs(model: Model, numerics, patch, coarse, solution) -> l
 
 
 def _list_bond_sum_runs(model: Model, quarter, patch, solution) -> list:
-    """List comparison runs from which the error of a bond list is estimated.
+    """List the comparison runs from which the error of a bond list is estimated.
 
-    The first entry is the bound of the sum on forces and energies. If the sum merges bonds or neglects
-    a large tail, the second is the change of the motion with narrower strips and a smaller tail; its
-    runs have the settings `quarter`, with a quarter of the steps.
+    The first entry is the error bound of the sum on forces and energies. If bonds are merged or a
+    large tail is neglected, the second entry is the change of the motion with narrower strips and a
+    smaller tail. Its runs have the settings `quarter`, i.e. a quarter of the steps.
     """
     choice = solution.summed
     if choice is None or not choice.error:
@@ -323,7 +327,7 @@ def _list_bond_sum_runs(model: Model, quarter, patch, solution) -> list:
 
 
 def _estimate_bond_sum_errors(model: Model, patch, fraction: float, values: dict, solution) -> dict:
-    """Estimate the errors of measures due to the truncation of a sum over bonds."""
+    """Estimate the errors of the measures due to truncation of the sum over bonds."""
     friction = model.friction
     load = patch.pressure.load if patch is not None else model.point.load
     passed = np.abs(np.diff(solution.window.extra["ledger"][0])).sum()
@@ -339,8 +343,8 @@ def _estimate_bond_sum_errors(model: Model, patch, fraction: float, values: dict
     return friction_errors(values, fraction, scale)
 
 
-def _list_stated_errors(model: Model, numerics, patch, coarse, solution) -> list:
-    """Return the errors that an engine states itself, in the form of coarser runs.
+def _list_engine_errors(model: Model, numerics, patch, coarse, solution) -> list:
+    """Return the error estimates of the engine itself, in the form of comparison runs.
 
     For harmonic balance these are the residual and the change with twice the harmonics, for the
     smooth engine the errors of the samples.
@@ -349,21 +353,23 @@ def _list_stated_errors(model: Model, numerics, patch, coarse, solution) -> list
 
 
 def _list_steady_space_runs(model: Model, numerics, patch, coarse, solution) -> list:
-    """List comparison runs of a steady motion on coarser meshes, and its stated errors."""
-    coarser_runs = _list_stated_errors(model, numerics, patch, coarse, solution)
+    """List the comparison runs of a steady motion on coarser meshes, and its own error estimates."""
+    coarser_runs = _list_engine_errors(model, numerics, patch, coarse, solution)
     if choose_steady_method(model).engine == PIECES.name:
         coarser_runs += _list_element_space_runs(model, numerics, patch, coarse, solution)
     return coarser_runs
 
 
-STEP_TOLERANCE_FACTOR = 30.0  # factor on the tolerance of a smooth step in the coarse run
+# Tolerance factor for the time steps of the coarse run of the smooth engine.
+STEP_TOLERANCE_FACTOR = 30.0
 estimate_smooth_errors = partial(coarser_errors, ratio=STEP_TOLERANCE_FACTOR)
 
 
 def _list_smooth_time_runs(model: Model, numerics) -> list:
     """List the comparison run of the smooth engine with a larger step tolerance.
 
-    A step may have STEP_TOLERANCE_FACTOR times the error; the error of a run is proportional to that of its steps.
+    A step may have STEP_TOLERANCE_FACTOR times the error, and the error of a run is proportional to
+    that of its steps.
     """
     wider = replace(numerics, local=numerics.local * STEP_TOLERANCE_FACTOR)
     return [CoarserRuns((wider,), estimate_smooth_errors)]
@@ -387,7 +393,7 @@ SMOOTH = Engine(
     "smooth",
     "",
     _list_smooth_time_runs,
-    _list_stated_errors,
+    _list_engine_errors,
     why_not_cheapest=reason_to_march_smooth_law,
     min_relative_error=3e-8,
     max_balance_error=None,
@@ -410,18 +416,19 @@ HARMONIC = Engine(
     finds_periodic_motion=True,
 )
 ENGINES = {engine.name: engine for engine in (EXACT, PIECES, SMOOTH, MARCH, HARMONIC)}
+# Engines in the order of preference for method = "auto".
 AUTOMATIC_ENGINES = (
     EXACT,
     PIECES,
     SMOOTH,
     MARCH,
-)  # engines in the order in which method = "auto" tries them
+)
 
 
 def describe_balance_error(engine: Engine, measures: dict) -> str:
     """Describe an energy balance that is too inaccurate for the engine of a run, or return "".
 
-    measures: measures of the run by name, with their errors.
+    `measures` are the measures of the run by name, with their errors.
     """
     balance = measures.get("energy_balance")
     if balance is None or balance.value is None:
@@ -429,7 +436,7 @@ def describe_balance_error(engine: Engine, measures: dict) -> str:
     limit = engine.max_balance_error
     if limit is None:
         limit = max(BALANCE_ROUND_OFF, balance.error or 0.0)
-    if not balance.value > limit:  # motions that are not finite are detected earlier
+    if not balance.value > limit:  # Motions that are not finite have been detected before.
         return ""
     return (
         f"the energy balance of engine {engine.name} has an error of {balance.value:.2g} of the energy exchanged, "
@@ -441,18 +448,18 @@ def describe_balance_error(engine: Engine, measures: dict) -> str:
 def choose_engine(model: Model) -> Engine:
     """Choose the engine that computes the motion of a model.
 
-    A method named in the scene selects its engine (of several, the first that can compute the model).
-    Otherwise the engine is the first of AUTOMATIC_ENGINES that can compute the model and is not more expensive
-    than the next.
+    The method of the scene selects its engine; if several have this method, the first one that can
+    compute the model. For method = "auto" it is the first of AUTOMATIC_ENGINES that can compute the
+    model and is not more expensive than the next one.
     """
     named = [engine for engine in ENGINES.values() if engine.method == model.accuracy.method]
     for engine in named[:-1]:
-        if not engine.lacks(model):
+        if not engine.find_unsupported_feature(model):
             return engine
     if named:
         return named[-1]
     for engine in AUTOMATIC_ENGINES[:-1]:
-        if not engine.lacks(model) and not engine.why_not_cheapest(model):
+        if not engine.find_unsupported_feature(model) and not engine.why_not_cheapest(model):
             return engine
     return AUTOMATIC_ENGINES[-1]
 

@@ -1,7 +1,7 @@
-"""Frames of the interface in the last cycle of a coupled run.
+"""Fields of the interface during the last cycle of a run of a rig.
 
-In: the Solution of a run with its snapshots, and the pressed patch. Out: pressure, gap, shear
-stress and slip at the nodes of the interface by name.
+In: the Solution with its snapshots, and the Patch. Out: pressure, gap, shear stress and slip at the
+interface nodes by name.
 """
 
 import numpy as np
@@ -21,8 +21,8 @@ from ..results.result import (
 )
 
 
-def collect_frames(model, numerics, patch, raw) -> dict:
-    """Collect the fields of an interface in the frames of the last cycle.
+def collect_interface_fields(model, numerics, patch, raw) -> dict:
+    """Collect the fields of the interface at the output frames of the last cycle.
 
     Parameters
     ----------
@@ -33,11 +33,11 @@ def collect_frames(model, numerics, patch, raw) -> dict:
     """
     sigma = patch.pressure.sigma_n
     f = model.friction
-    # strips that slide independently have no common shear stress
+    # Strips that slide independently have no common shear stress.
     if model.patch.mesh.can_gather_points or (model.partial_slip and patch.strips is not None):
         return collect_rest_frame(patch)
     if model.rig.friction.load_varies:
-        return _collect_varying_load_frames(patch, raw)
+        return _collect_varying_load_fields(patch, raw)
     if not raw.snapshots:
         at = (
             np.linspace(
@@ -54,58 +54,62 @@ def collect_frames(model, numerics, patch, raw) -> dict:
         slip = np.repeat(raw.window.slip[at][:, None], sigma.size, axis=1)
         return make_interface_frames(patch, raw.window.time[at], tau, slip, raw.window.slide[at])
 
-    shots = raw.snapshots
+    snapshots = raw.snapshots
     if model.partial_slip and model.grooves is not None:
         tau, local = bench_shear.compute_groove_fields(
-            patch, raw.contact, [(s["slide"], s["nodes"]) for s in shots]
+            patch, raw.contact, [(s["slide"], s["nodes"]) for s in snapshots]
         )
         return make_interface_frames(
             patch,
-            np.array([s["time"] for s in shots]),
+            np.array([s["time"] for s in snapshots]),
             tau,
             local,
-            np.array([s["slide"] for s in shots]),
+            np.array([s["slide"] for s in snapshots]),
         )
-    time = np.array([s["time"] for s in shots])
+    time = np.array([s["time"] for s in snapshots])
     shear = bool(model.partial_slip)
     rule = SlipRule()
-    pointed = numerics.per_point and model.grooves is None and not needs_bond_list(f)
-    if law_has_trait(f.law, "bonds") and (shear or pointed):
-        moments = [(s["slide"], s["bonds"]) for s in shots]
+    has_node_bonds = numerics.per_point and model.grooves is None and not needs_bond_list(f)
+    if law_has_trait(f.law, "bonds") and (shear or has_node_bonds):
+        moments = [(s["slide"], s["bonds"]) for s in snapshots]
         tau, local = fields.point_fields(patch, model.bonds, raw.contact.reduction, moments)
     elif shear:
         length = 0.0 if raw.contact.reduction is None else record.make_law(f).element(1.0).length
-        states = [(s["slide"], s["stretch"]) for s in shots]
+        states = [(s["slide"], s["stretch"]) for s in snapshots]
         tau, local = fields.element_fields(patch, raw.contact.reduction, states, length)
         rule = SlipRule(f.static * sigma)
     else:
-        tau = np.array([s["force"] / patch.pressure.load * sigma for s in shots])
-        local = np.array([np.full(sigma.size, s["slip"]) for s in shots])
-    slide = np.array([s["slide"] for s in shots])
+        tau = np.array([s["force"] / patch.pressure.load * sigma for s in snapshots])
+        local = np.array([np.full(sigma.size, s["slip"]) for s in snapshots])
+    slide = np.array([s["slide"] for s in snapshots])
     return make_interface_frames(patch, time, tau, local, slide, rule)
 
 
-def _collect_varying_load_frames(patch, raw) -> dict:
-    """Collect the interface fields of a run with varying normal load in the frames of a cycle.
+def _collect_varying_load_fields(patch, raw) -> dict:
+    """Collect the fields of an interface under varying normal load at the output frames.
 
-    The first frame is the pressed state.
+    The first frame is the initial state. The status is 0 for open, 1 for stick and 2 for slip.
     """
     law = raw.contact.law
     sets = raw.contact.sets
     weight = patch.pieces.interface.weight
-    shots = raw.snapshots
-    time, slide = (np.array([0.0] + [shot[key] for shot in shots]) for key in ("time", "slide"))
-    nodal = np.stack([patch.pressure.sigma_n * weight] + [shot["nodal"] for shot in shots])
-    lift = np.array([0.0] + [shot["heave"] for shot in shots])[:, None]
-    turn = np.array([0.0] + [shot["turn"] for shot in shots])[:, None]
+    snapshots = raw.snapshots
+    time, slide = (
+        np.array([0.0] + [snapshot[key] for snapshot in snapshots]) for key in ("time", "slide")
+    )
+    nodal = np.stack(
+        [patch.pressure.sigma_n * weight] + [snapshot["nodal"] for snapshot in snapshots]
+    )
+    lift = np.array([0.0] + [snapshot["heave"] for snapshot in snapshots])[:, None]
+    turn = np.array([0.0] + [snapshot["turn"] for snapshot in snapshots])[:, None]
     gap = np.maximum(sets.opening + lift + turn * sets.x + nodal @ sets.c, 0.0)
     gap[nodal > 0] = 0.0
     gap[0] = patch.pressure.gap
     tau = np.zeros_like(nodal)
     local = np.zeros_like(nodal)
-    for k, shot in enumerate(shots, 1):
-        tau[k], stretch = _compute_nodal_friction(law, shot, nodal[k])
-        local[k] = slide[k] - stretch - shot["bend"]
+    for k, snapshot in enumerate(snapshots, 1):
+        tau[k], stretch = _compute_nodal_friction(law, snapshot, nodal[k])
+        local[k] = slide[k] - stretch - snapshot["bend"]
     return {
         "time": time,
         "normal_stress": nodal / weight,
@@ -117,9 +121,9 @@ def _collect_varying_load_frames(patch, raw) -> dict:
     }
 
 
-def _compute_nodal_friction(law, shot, nodal) -> tuple:
+def _compute_nodal_friction(law, snapshot, nodal) -> tuple:
     """Return friction forces (m,) [N] and elastic stretches (m,) [m] at the interface nodes."""
-    top, bottom, _ = shot["memory"]
+    top, bottom, _ = snapshot["memory"]
     if law.kind == varying_load.LawKind.PLASTIC:
         return law.static * top, law.length * np.divide(
             top, bottom, out=np.zeros_like(top), where=bottom > 0
@@ -129,4 +133,4 @@ def _compute_nodal_friction(law, shot, nodal) -> tuple:
             bottom, top, out=np.zeros_like(top), where=top > 0
         )
     total = nodal.sum()
-    return (shot["force"] / total * nodal if total > 0 else 0 * nodal), np.zeros_like(nodal)
+    return (snapshot["force"] / total * nodal if total > 0 else 0 * nodal), np.zeros_like(nodal)

@@ -1,7 +1,7 @@
-"""Amplitude above which friction does not limit a mode that gains energy.
+"""Amplitude above which friction does not limit a mode with negative damping.
 
-In: a `postprocessing.CoupledRun` with a mode of negative damping. Out: `flutter_amplitude`, the amplitude of
-the largest unstable limit cycle (`dynamics.limit_cycles`), and notes.
+In: a `postprocessing.CoupledRun` with such a mode. Out: `flutter_amplitude`, the amplitude of the
+largest unstable limit cycle (`dynamics.limit_cycles`), and notes.
 """
 
 from typing import NamedTuple
@@ -41,16 +41,16 @@ NO_SLIDING_NOTE = (
 RIGID_LAW_REASON = "with rigid friction limit cycles cannot be computed if the rig has"
 
 
-def find_limit_cycles(run) -> tuple:
+def compute_flutter_amplitude(run) -> tuple:
     """Compute the amplitude of the largest unstable limit cycle of a self-excited rig.
 
-    Returns the measure by name, i.e. the amplitude of this limit cycle with its error or the reason why
-    it is not known, and notes.
+    The result is a dict with the measure, which has a value and an error or a reason, and a list of
+    notes.
     """
     model = run.model
     unit = TABLE[FLUTTER_MEASURE].unit
     floor = TABLE[FLUTTER_MEASURE].floor
-    cycles, reason, smallest_amplitude = _find_cycles(model, run.numerics, run.patch)
+    cycles, reason, smallest_amplitude = _find_limit_cycles(model, run.numerics, run.patch)
     end_notes = []
     outcome = run.solution.outcome
     if outcome is Outcome.EXCEEDS_TRAVEL and model.rig.springs.travel == MAX_TRAVEL:
@@ -61,28 +61,34 @@ def find_limit_cycles(run) -> tuple:
     unstable = [cycle for cycle in cycles if not cycle.is_stable]
     if not unstable:
         return {FLUTTER_MEASURE: Measure(None, unit, None, floor, reason=reason)}, end_notes
-    edge = unstable[-1]
-    inner = [cycle for cycle in cycles if cycle.is_stable and cycle.amplitude < edge.amplitude]
-    falls = "smaller amplitude"
+    largest_unstable = unstable[-1]
+    inner = [
+        cycle
+        for cycle in cycles
+        if cycle.is_stable and cycle.amplitude < largest_unstable.amplitude
+    ]
+    decay_text = "smaller amplitude"
     if inner:
         attractor = inner[-1].amplitude
         barriers = [cycle.amplitude for cycle in unstable if cycle.amplitude < attractor]
         if barriers:
-            falls = f"amplitude between {format_length(barriers[-1], 3)} and this"
-        falls += f" ends in the limit cycle of {format_length(attractor, 3)}, which is stable"
+            decay_text = f"amplitude between {format_length(barriers[-1], 3)} and this"
+        decay_text += f" ends in the limit cycle of {format_length(attractor, 3)}, which is stable"
     elif law_has_trait(model.friction.law, "set-valued") and model.rig.modes.omega.size == 1:
-        # a rigid interface with a single mode does not vibrate during stick
-        falls += " decays to rest"
+        # A rigid interface with a single mode does not vibrate during stick.
+        decay_text += " decays to rest"
     elif smallest_amplitude:
         lowest = format_length(smallest_amplitude, 2)
-        falls += f" decays, at least to {lowest} (smaller motions could not be followed)"
+        decay_text += f" decays, at least to {lowest} (smaller motions could not be followed)"
     else:
-        falls += " decays"
-    return {FLUTTER_MEASURE: Measure(edge.amplitude, unit, edge.error, floor)}, [
+        decay_text += " decays"
+    return {
+        FLUTTER_MEASURE: Measure(largest_unstable.amplitude, unit, largest_unstable.error, floor)
+    }, [
         "a mode of negative damping gains energy: without a drive this mode has an unstable steady oscillation of "
-        f"{format_length(edge.amplitude, 4)} at the output, at {edge.omega / 6.283185307179586:.4g} "
+        f"{format_length(largest_unstable.amplitude, 4)} at the output, at {largest_unstable.omega / 6.283185307179586:.4g} "
         "Hz; a free oscillation of "
-        f"{falls}, and a free oscillation of larger amplitude grows",
+        f"{decay_text}, and a free oscillation of larger amplitude grows",
         *end_notes,
     ]
 
@@ -91,8 +97,9 @@ class LimitCycles(NamedTuple):
     """Limit cycles of a self-excited rig, or the reason why none is unstable.
 
     - cycles: limit cycles by increasing amplitude.
-    - reason: reason why none of them is unstable.
-    - smallest_amplitude: smallest output amplitude of the search [m]; 0 if all were searched.
+    - reason: reason why no unstable one is known.
+    - smallest_amplitude: smallest output amplitude of the search [m]; 0 if it covered all
+      amplitudes.
     """
 
     cycles: list
@@ -100,7 +107,7 @@ class LimitCycles(NamedTuple):
     smallest_amplitude: float = 0.0
 
 
-def _find_cycles(model, numerics, patch) -> LimitCycles:
+def _find_limit_cycles(model, numerics, patch) -> LimitCycles:
     """Compute the limit cycles of a self-excited rig with one interface."""
     rig = model.rig
     f = model.friction
@@ -111,7 +118,7 @@ def _find_cycles(model, numerics, patch) -> LimitCycles:
     if not row[limit_cycles.find_unstable_modes(modes)].any():
         return LimitCycles([], NO_INTERFACE_NOTE)
     load = patch.pressure.load if patch is not None else model.point.load
-    if reason := ENGINES["harmonic"].lacks(model, steady=True):
+    if reason := ENGINES["harmonic"].find_unsupported_feature(model, steady=True):
         return LimitCycles([], f"limit cycles cannot be computed {reason}")
     contact = make_single_contact(model, numerics, patch)
     try:

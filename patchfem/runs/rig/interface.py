@@ -1,7 +1,7 @@
-"""Contact that an engine moves, from the friction law, the load and the pressed patch.
+"""Contact model of an engine, from friction law, load and patch.
 
-In: a Model, its Numerics and its pressed patch. Out: a contact model of `dynamics` (single
-interface, several joints, grooves, varying load) or the Elements of every interface.
+In: a Model, its Numerics and its Patch. Out: a contact model of `dynamics` (single interface,
+several joints, grooves, varying load), or the Elements of every interface.
 """
 
 from weakref import WeakKeyDictionary
@@ -25,16 +25,16 @@ from . import strips, varying_load
 from .bond_lists import choose_bond_summation
 from .numerics import Numerics
 
-# largest ratio of the backbone error to the tolerance, for the reduction to few modes and for that to
-# few points
+# Largest ratio of the error of the backbone curve to the tolerance, in the reduction to few modes
+# and in that to few points.
 REDUCTION_TOL_FRACTION = 1e-3
 
 
 def make_contact(model: Model, numerics: Numerics, patch):
     """Return the contact model of a march, with all interfaces and nonlinear springs.
 
-    The result is a ContactModel, a JointsModel for several interfaces or nonlinear springs, or a model
-    of grooves.
+    It is a ContactModel for a single interface, a JointsModel for several interfaces or nonlinear
+    springs, or a model of grooves.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def make_contact(model: Model, numerics: Numerics, patch):
     Raises
     ------
     PatchfemError
-        For a law that cannot be combined with other joints.
+        If the law cannot be combined with other joints.
     """
     rig = model.rig
     second = model.rig.modes.lateral_faces
@@ -91,9 +91,9 @@ def _make_independent_elements(model: Model, numerics: Numerics, patch) -> list:
 
 
 def make_interface_elements(model: Model, meshed: tuple) -> list:
-    """Return the friction elements of every interface under its own load.
+    """Return the friction elements of each interface under its own load.
 
-    meshed: indices of interfaces whose patches are those on the coarser mesh.
+    `meshed` are the indices of interfaces whose patches have a coarser mesh.
     """
     elements = []
     for k, interface in enumerate(model.rig.friction.interfaces):
@@ -106,7 +106,7 @@ def make_interface_elements(model: Model, meshed: tuple) -> list:
 
 
 def _make_groove_contact(model: Model, patch, count: int | None = None):
-    """Return the contact model of an interface whose load climbs grooves."""
+    """Return the contact model of an interface over grooves."""
     f = model.friction
     load = patch.pressure.load if patch is not None else model.point.load
     if model.partial_slip or not law_has_trait(f.law, "memoryless"):
@@ -118,7 +118,7 @@ def _make_groove_contact(model: Model, patch, count: int | None = None):
 
 
 def make_element(interface: InterfaceLaw, load: float, speed: float) -> Element:
-    """Convert the friction law of an interface under a load to an Element of the engines.
+    """Convert the friction law of an interface to an Element under a given load.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def make_single_contact(model: Model, numerics: Numerics, patch):
         None under [normal].
     """
     f = model.friction
-    soft = model.partial_slip
+    has_partial_slip = model.partial_slip
     if f is None:
         return models.frictionless_model()
     if model.rig.friction.load_varies:
@@ -164,10 +164,10 @@ def make_single_contact(model: Model, numerics: Numerics, patch):
             *(f.static * load * averaged_law.slip_force_ratio(model, patch),) * 2
         )
     element = make_law(f, load).element(load)
-    if not soft:
+    if not has_partial_slip:
         return models.element_model(element)
 
-    if patch.strips is not None:  # strips of a patch that does not yaw have the same slide
+    if patch.strips is not None:  # Strips of a patch that does not yaw have the same displacement.
         strip_elements = jenkins_elements.strip_elements(patch, f.static, element.length)
         return models.jenkins_model(*map(np.concatenate, zip(*strip_elements)))
     elements = jenkins_elements.elements(patch, f.static, element.length)
@@ -175,9 +175,10 @@ def make_single_contact(model: Model, numerics: Numerics, patch):
 
 
 def _make_bond_contact(model: Model, numerics: Numerics, patch, load: float):
-    """Return the contact model of a nonlocal law, whose friction comes from bonds.
+    """Return the contact model of a nonlocal law.
 
-    The bonds are summed in a list, or at the points of shear modes, of a field or of a single point.
+    The bonds are summed in a list, at the points of shear modes, at the nodes, or at a single
+    point.
     """
     law = model.bonds
     choice = choose_bond_summation(model, numerics)
@@ -209,15 +210,15 @@ def _make_bond_contact(model: Model, numerics: Numerics, patch, load: float):
 
 
 def _compute_shear_modes(patch, law, count: int | None, model) -> tuple:
-    """Return the shear modes of a solved patch, and the friction forces if there are few points.
+    """Return the shear modes of a patch, and the forces of its points if these are few.
 
-    The forces (k,) [N] are None if the modes have all points of the patch. Both are computed once for
-    all marches of a pressed patch.
+    The forces (k,) [N] are normal forces; they are None if all nodes are points. Both are cached
+    for all runs with the same Patch.
     """
-    made = _SHEAR_MODE_CACHE.setdefault(patch, {})
+    cache = _SHEAR_MODE_CACHE.setdefault(patch, {})
     tolerance = model.accuracy.tolerance
     few = model.patch.mesh.can_gather_points
-    if (law, count, tolerance, few) not in made:
+    if (law, count, tolerance, few) not in cache:
         mode_tolerance = (REDUCTION_TOL_FRACTION if few else 0.1) * tolerance
         reduced = fields.bond_shear_modes(patch, law, count, mode_tolerance, fewest=few)
         force = None
@@ -226,8 +227,8 @@ def _compute_shear_modes(patch, law, count: int | None, model) -> tuple:
                 reduced, patch.x[reduced.points], REDUCTION_TOL_FRACTION * tolerance
             )
             force = force / law.static
-        made[law, count, tolerance, few] = reduced, force
-    return made[law, count, tolerance, few]
+        cache[law, count, tolerance, few] = reduced, force
+    return cache[law, count, tolerance, few]
 
 
 def reduce_to_few_points(patch, law, tolerance: float, points: int, modes: int) -> tuple | None:
@@ -239,21 +240,21 @@ def reduce_to_few_points(patch, law, tolerance: float, points: int, modes: int) 
     law
         Bond parameters.
     tolerance : float
-        Largest error of the backbone of the patch, as a fraction of the friction limit [1].
+        Largest error of the backbone curve of the patch, relative to the friction limit.
     points, modes : int
         Number of points, and largest number of modes.
 
     Returns
     -------
     tuple or None
-        ShearModes of the points, their limits [N], and the error of the backbone as a fraction of
-        the friction limit; None if more modes are needed.
+        ShearModes of the points, their friction limits [N], and the error of the backbone curve
+        relative to the friction limit; None if more modes are needed.
     """
-    made = _SHEAR_MODE_CACHE.setdefault(patch, {})
+    cache = _SHEAR_MODE_CACHE.setdefault(patch, {})
     key = (law.static, law.length, law.ratio, tolerance, points, modes)
-    if key not in made:
+    if key not in cache:
         all_modes = fields.bond_shear_modes(patch, law, None, tolerance, fewest=True)
-        made[key] = None
+        cache[key] = None
         if all_modes.stiffness.size <= modes:
             few, limit, error = shear_modes.modes_on_gauss(
                 all_modes, patch.x[all_modes.points], points
@@ -262,9 +263,9 @@ def reduce_to_few_points(patch, law, tolerance: float, points: int, modes: int) 
             error += all_modes.spectrum.relative_difference(
                 whole, all_modes.spectrum.backbone(all_modes.stiffness.size)
             )
-            made[key] = (few, limit, error) if error <= 2 * tolerance else None
-    return made[key]
+            cache[key] = (few, limit, error) if error <= 2 * tolerance else None
+    return cache[key]
 
 
-# cache of shear modes by their parameters, which lasts as long as the Patch
+# Cache of shear modes by their parameters; it lives as long as the Patch.
 _SHEAR_MODE_CACHE = WeakKeyDictionary()

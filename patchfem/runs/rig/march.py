@@ -26,7 +26,7 @@ from ...structure.drive_sizes import (
 )
 from . import levels as rig_levels
 from . import strips
-from .bond_lists import ListGuard, choose_bond_summation, has_list
+from .bond_lists import ListGuard, choose_bond_summation, has_bond_list
 from .evaluation import RunEvaluator, compute_work_check
 from .interface import make_contact
 from .solution import CycleLoop, Solution, compute_sampled_loop, first_interface_load
@@ -88,7 +88,7 @@ def march_without_evaluation(
     begin = perf_counter()
     # Strips that slide independently have no common shear stress, so no output frames are stored.
     frames = 0 if rig.friction.strips_slide_apart else frames
-    progress = ListGuard(progress) if has_list(model, numerics) else progress
+    progress = ListGuard(progress) if has_bond_list(model, numerics) else progress
     # The histories of a patch that is reduced to a few points are not used.
     keeps_extremes = model.patch is not None and model.patch.mesh.can_gather_points
     done = engine.march(

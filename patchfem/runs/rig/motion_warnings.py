@@ -1,4 +1,4 @@
-"""Warnings of a coupled run on its law, load and engine, and notes on their meaning.
+"""Warnings and notes of a run of a rig on its friction law, load and engine.
 
 In: a `postprocessing.CoupledRun`. Out: lists of sentences.
 """
@@ -26,10 +26,10 @@ from .costs import reason_to_march_elements
 from .engines import ENGINES, PIECES
 from .solution import first_interface_load
 
-# a release still decays if its largest motion in the last cycles exceeds the amplitude of its last cycle by
-# this fraction
+# Smallest relative excess of the largest motion in the window over the amplitude of the last cycle
+# at which a release counts as still decaying.
 MIN_DECAY_EXCESS = 1e-3
-EQUAL_FREQUENCY_TOL = 1e-9  # relative difference up to which two frequencies are equal
+EQUAL_FREQUENCY_TOL = 1e-9  # Largest relative difference at which two frequencies count as equal.
 SINGLE_POINT_WARNING = (
     "the shape of the patch does not affect the motion: with pieces that are rigid in shear, a constant "
     "load and a pressure that moves with the upper piece, the patch moves exactly as one point under the "
@@ -38,7 +38,7 @@ SINGLE_POINT_WARNING = (
 
 
 def collect_warnings(run) -> list:
-    """Return the warnings of a rig run on its friction law, load and engine."""
+    """Return the warnings of a run on its friction law, load and engine."""
     model = run.model
     patch = run.patch
     solution = run.solution
@@ -54,7 +54,7 @@ def collect_warnings(run) -> list:
         *note_on_heating(model, patch, solution.response, book["friction"]),
     ]
     if run.has_friction:
-        warnings += law_warnings(
+        warnings += warn_of_law(
             model, run.outcome, measures, float(np.abs(solution.window.slide_rate).max())
         )
     warnings += warn_of_created_energy(model, book, model.rig.drive.cycles)
@@ -89,25 +89,25 @@ def collect_warnings(run) -> list:
     warnings += warn_of_large_slide(patch, solution.response.slide) if patch is not None else ()
     if model.has_interface_patches:
         warnings += faces.merge_interface_sentences(
-            model, lambda face: _warn_of_face(face, solution.response)
+            model, lambda face: _warn_of_interface_patch(face, solution.response)
         )
     return warnings
 
 
-def _warn_of_face(face, response) -> list:
+def _warn_of_interface_patch(face, response) -> list:
     """Return the warnings on the patch of one interface."""
     warnings = [] if face.partial_slip else [SINGLE_POINT_WARNING]
     return [*warnings, *warn_of_large_slide(face.patch, face.slide(response))]
 
 
 def warn_of_peak_at_sweep_end(run, modes) -> list:
-    """Return a warning, as a list, on a sweep whose largest response is at one of its ends.
+    """Return a list with a warning if the largest response is at an end of the sweep.
 
     Parameters
     ----------
     run : postprocessing.CoupledRun
     modes : callable
-        Returns the modes, as `plan.mode_frequencies` does.
+        Function that returns the modes, see `plan.mode_frequencies`.
     """
     peak = run.measures.get("peak_frequency")
     drive = run.model.rig.drive.signal
@@ -132,12 +132,12 @@ def warn_of_peak_at_sweep_end(run, modes) -> list:
 
 
 def find_sweep_end(frequency: float, *ends: float) -> float | None:
-    """Return the end [Hz] of a sweep at which a frequency [Hz] lies, or None."""
+    """Return the end [Hz] of a sweep that equals a frequency [Hz], or None."""
     return next((end for end in ends if abs(frequency - end) <= EQUAL_FREQUENCY_TOL * end), None)
 
 
 def _describe_nearest_resonance(modes: list, at: float, *, upper: bool) -> str:
-    """Describe the mode whose resonance is nearest to a frequency on one side, or return "".
+    """Describe the nearest resonance above or below a frequency, or return "".
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def _describe_nearest_resonance(modes: list, at: float, *, upper: bool) -> str:
     at : float
         Frequency [Hz].
     upper : bool
-        Whether the resonance is above the frequency.
+        Whether to search above the frequency.
     """
     near = []
     for mode in modes:
@@ -168,7 +168,7 @@ def _describe_nearest_resonance(modes: list, at: float, *, upper: bool) -> str:
 
 
 def collect_notes(run) -> list:
-    """Return the notes of a rig run on its law, engine, fields and the end of its motion."""
+    """Return the notes of a run on its friction law, engine, fields and end of motion."""
     model = run.model
     solution = run.solution
     rig = run.model.rig
@@ -202,7 +202,7 @@ def collect_notes(run) -> list:
 
 
 def _note_on_release(run) -> list:
-    """Return the note on the time span from which the measures of a release are computed."""
+    """Return a list with a note on the time interval of the measures of a release."""
     rig = run.model.rig
     window = run.solution.window
     main = run.measures["relative_displacement_amplitude"]
@@ -221,7 +221,7 @@ def _note_on_release(run) -> list:
 
 
 def _note_on_lateral_motion(run) -> list:
-    """Return the note on the neglected lateral motion of strips that yaw."""
+    """Return a list with a note on the neglected lateral motion of strips that yaw."""
     if (
         not run.model.rig.friction.strips_slide_apart
         or run.patch.strips.offsets.size < 2
@@ -240,7 +240,7 @@ def _note_on_lateral_motion(run) -> list:
 
 
 def note_on_creep(friction) -> list:
-    """Return the note on a friction law that never sticks."""
+    """Return a list with a note on a friction law that never sticks."""
     if friction is None or not law_has_trait(friction.law, "creeps"):
         return []
     return [
@@ -251,7 +251,7 @@ def note_on_creep(friction) -> list:
 
 
 def _warn_of_single_point(model, patch, numerics) -> list:
-    """Return the warning on a patch that moves exactly like a single point."""
+    """Return a list with a warning if a patch moves exactly like a single point."""
     f = model.friction
     moves = model.rig.friction.load_varies or model.rig.friction.strips_slide_apart
     if (
@@ -267,7 +267,7 @@ def _warn_of_single_point(model, patch, numerics) -> list:
 
 
 def _note_on_bond_growth(model, patch, solution) -> list:
-    """Return the notes on bonds that grow."""
+    """Return the notes on bonds that grow with contact time."""
     f = model.friction
     if f is None or not law_has_trait(f.law, "bonds"):
         return []
@@ -279,18 +279,18 @@ def _note_on_bond_growth(model, patch, solution) -> list:
 
 
 def _note_on_elements(run) -> list:
-    """Return the note on the method that computes the motion of the friction elements."""
-    if PIECES.lacks(run.model):
+    """Return a list with a note on the method that computes the motion of friction elements."""
+    if PIECES.find_unsupported_feature(run.model):
         return []
     if run.numerics.engine == "march":
-        return _note_marched_elements(run)
+        return _note_on_marched_elements(run)
     if ENGINES[run.numerics.engine].finds_periodic_motion:
-        return _note_unmoved_elements(run)
+        return _note_on_elements_without_slip(run)
     return []
 
 
-def _note_marched_elements(run) -> list:
-    """Return the note on friction elements that yield too often for the event-driven engine."""
+def _note_on_marched_elements(run) -> list:
+    """Return a list with a note if friction elements are marched because they yield too often."""
     model = run.model
     if model.accuracy.method != "auto" or "steps_per_cycle" in run.numerics.pinned:
         return []
@@ -301,8 +301,8 @@ def _note_marched_elements(run) -> list:
     ]
 
 
-def _note_unmoved_elements(run) -> list:
-    """Return the note on a steady motion in which some elements never slip."""
+def _note_on_elements_without_slip(run) -> list:
+    """Return a list with a note on a steady motion in which some elements never slip."""
     if run.solution.outcome not in (Outcome.STEADY, Outcome.STUCK):
         return []
     window = run.solution.window
@@ -321,7 +321,7 @@ def _note_unmoved_elements(run) -> list:
     return []
 
 
-def law_warnings(model, outcome, measures, peak: float) -> list:
+def warn_of_law(model, outcome, measures, peak: float) -> list:
     """Return the warnings on the friction law of a run.
 
     Parameters
@@ -331,7 +331,7 @@ def law_warnings(model, outcome, measures, peak: float) -> list:
     measures : dict
         Measures by name.
     peak : float
-        Largest speed of the slide [m/s].
+        Largest sliding speed [m/s].
     """
     if not law_has_trait(model.friction.law, "bonds"):
         return []
@@ -343,9 +343,9 @@ def law_warnings(model, outcome, measures, peak: float) -> list:
 
 
 def warn_of_created_energy(model, book: dict, cycles: float) -> list:
-    """Return the warning on energy that the law as printed in the 1985 report creates.
+    """Return a list with a warning if the law of the 1985 report has created energy.
 
-    The law creates energy in steps in which it returns more than it had stored.
+    It creates energy in steps in which it returns more energy than it has stored.
 
     Parameters
     ----------
@@ -353,7 +353,7 @@ def warn_of_created_energy(model, book: dict, cycles: float) -> list:
     book : dict
         Energies of the run by name [J].
     cycles : float
-        Cycles of the run.
+        Number of cycles of the run.
     """
     if model.friction is None or model.friction.reading != "report":
         return []
@@ -369,13 +369,13 @@ def warn_of_created_energy(model, book: dict, cycles: float) -> list:
 
 
 def note_on_shear_modes(model, kept: int, nodes: int) -> list:
-    """Return the note on the shear modes of a patch with varying normal force.
+    """Return a list with a note on the shear modes of a patch under varying normal load.
 
     Parameters
     ----------
     model : Model
     kept, nodes : int
-        Number of modes, and of nodes of the patch.
+        Number of shear modes, and number of nodes of the patch.
     """
     return [
         f"{model.partial_slip}: the normal load changes with the motion, so the patch cannot be replaced exactly by a set "

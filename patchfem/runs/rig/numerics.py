@@ -1,6 +1,6 @@
-"""Numerical settings of a coupled run: engine, steps per cycle, window, shear modes.
+"""Numerical settings of a run of a rig: engine, steps per cycle, window and shear modes.
 
-In: a Model. Out: `Numerics` by its scene, else by its tolerance (`choose_numerics`).
+In: a Model. Out: its `Numerics`, set by the scene or else by the tolerance (`choose_numerics`).
 """
 
 from dataclasses import dataclass, replace
@@ -14,11 +14,13 @@ from ...structure.drive_sizes import count_repeat_cycles, find_min_decay_rate, i
 from .costs import MARCH_SETTINGS, count_merges, steps_per_cycle
 from .engines import MARCH, PIECES, SMOOTH, choose_engine
 
-# fraction of a cycle by which a whole number of cycles may be missed by round-off, so that a record of 30
-# periods has 30 cycles
+# Largest fraction of a cycle by which round-off changes an integer number of cycles, so that a
+# record of 30 periods has 30 cycles.
 WHOLE_CYCLE_TOL = 1e-6
-N_DECAY_TIMES = 3.0  # decay times of a transient, which reduce its mean square to e^-6
-MIN_SAMPLES = 100  # smallest number of samples of a run whose drive is not sinusoidal
+# Number of decay times after which a transient is neglected; its mean square is then reduced to
+# e^-6.
+N_DECAY_TIMES = 3.0
+MIN_SAMPLES = 100  # Smallest number of samples of a run with a non-sinusoidal drive.
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,19 +29,18 @@ class Numerics:
 
     - engine: name of the engine.
     - steps: time steps per cycle.
-    - cycles, window: cycles of the run, and of the window at its end.
-    - shear_modes: number of shear modes; None: by the tolerance.
-    - per_point: whether bonds are followed at every node.
-    - pinned: settings that the scene fixed.
-    - choice: method of the sum over bonds; None: by the tolerance and the steps.
-    - whole: whether the run keeps its histories from before the window; a coarse run need not.
-    - local: relative error that a step of the smooth engine may have.
-    - pairs: how often neighbouring cells of a density are merged in pairs.
-    - joined: (number of cells that a coarse run merges into one, first cell of the merging); () for
-      none.
+    - cycles, window: number of cycles of the run, and of the window at its end.
+    - shear_modes: number of shear modes; None: set by the tolerance.
+    - per_point: whether every node has its own bonds.
+    - pinned: names of settings that the scene fixes.
+    - choice: method of bond summation; None: set by the tolerance and the steps.
+    - whole: whether the run stores the histories before the window; coarse runs may omit them.
+    - local: largest relative error per step of the smooth engine.
+    - pairs: how many times neighbouring slider cells are merged in pairs.
+    - joined: (number of cells that are merged into one, index of the first merged cell), or ().
     - richer: whether the run has more modes of a reduced structure.
-    - meshed: indices of the interfaces whose patches are those on a coarser mesh.
-    - coarse_patch: whether the patch of [contact] is that on a coarser mesh.
+    - meshed: indices of the interfaces whose patches have a coarser mesh.
+    - coarse_patch: whether the patch of [contact] has a coarser mesh.
     """
 
     engine: str
@@ -59,10 +60,10 @@ class Numerics:
     coarse_patch: bool = False
 
     def finer(self):
-        """Return refined settings for the next run.
+        """Return finer settings for the next run.
 
-        The next run has four times as many cells if cells are merged; else a hundredth of the error
-        of a step of the smooth engine, or twice as many steps.
+        If cells are merged, there are four times as many cells. Otherwise, the smooth engine has a
+        hundredth of the step error, and other engines have twice as many steps.
         """
         if self.pairs:
             return replace(self, pairs=max(0, self.pairs - 2))
@@ -81,20 +82,22 @@ def choose_numerics(model: Model) -> Numerics:
     Raises
     ------
     PatchfemError
-        For a method that cannot do it.
+        If the method of the scene cannot compute the model.
     """
     accuracy = model.accuracy
     rig = model.rig
     engine = choose_engine(model)
     window = int(max(1, min(10, (rig.drive.cycles + WHOLE_CYCLE_TOL) // 10)))
-    # under a random drive, the evaluated window is the whole record except the transient at its start
+    # Under a random drive, the window is the whole record without its initial transient.
     if rig.drive.waveform.is_random:
         rate = find_min_decay_rate(rig.modes) * rig.drive.signal.period
         start = min(rig.drive.cycles / 4, N_DECAY_TIMES / rate if rate else np.inf)
         window = int(max(1, rig.drive.cycles - start + WHOLE_CYCLE_TOL))
-    beat = count_repeat_cycles(rig.drive.signal) or 0.0
-    if 1 < beat <= rig.drive.cycles:  # the evaluated window contains whole periods of the beat
-        window = int(beat * max(1, min(10, rig.drive.cycles // (10 * beat))) + WHOLE_CYCLE_TOL)
+    beat_cycles = count_repeat_cycles(rig.drive.signal) or 0.0
+    if 1 < beat_cycles <= rig.drive.cycles:  # The window contains complete periods of the beat.
+        window = int(
+            beat_cycles * max(1, min(10, rig.drive.cycles // (10 * beat_cycles))) + WHOLE_CYCLE_TOL
+        )
     if rig.drive.levels.amplitudes:
         window = min(window, int(rig.drive.levels.cycles + WHOLE_CYCLE_TOL))
     steps = steps_per_cycle(model)
@@ -111,31 +114,31 @@ def choose_numerics(model: Model) -> Numerics:
         frozenset(pinned),
     )
     if engine is SMOOTH:
-        return replace(numerics, local=step_tolerance(accuracy.tolerance))
+        return replace(numerics, local=choose_step_tolerance(accuracy.tolerance))
     if engine is PIECES:
         return replace(numerics, pairs=count_merges(model))
     if engine is MARCH and accuracy.steps_per_cycle is None:
-        # the steps are short enough for a unique solution, and the last step ends where the run ends
+        # The steps are short enough for a unique solution, and the last one ends where the run
+        # ends.
         steps = round_steps_to_run_end(max(steps, min_unique_steps(model)), rig.drive.cycles)
         return replace(numerics, steps=steps)
     return numerics
 
 
-def step_tolerance(tolerance: float) -> float:
-    """Return the relative error that one step of the smooth engine may have.
+def choose_step_tolerance(tolerance: float) -> float:
+    """Return the largest relative error per step of the smooth engine.
 
-    The energy balance requires 1e-9 if the tolerance does not require less.
+    It is at most 1e-9, because the energy balance requires this accuracy.
     """
     return float(np.clip(1e-3 * tolerance, 1e-12, 1e-9))
 
 
 def round_steps_to_run_end(steps: int, cycles: float) -> int:
-    """Round steps per cycle up so that a sample lies nearest to the requested end of a run.
+    """Round the steps per cycle up so that a sample lies close to the requested end of a run.
 
-    The steps are a multiple of 4, because runs with a half and a quarter of them show the order. A run
-    ends at a sample, and the last of its `cycles` may be incomplete. An end that is wrong by half a
-    step is an error of first order in all measures of the last cycles. Up to an eighth more steps
-    are tried.
+    The number of steps is a multiple of 4, because comparison runs have half and a quarter of them.
+    If the number of cycles is not an integer, an end that is wrong by half a step causes an error
+    of first order in all measures of the last cycles. Up to an eighth more steps are tried.
     """
     least = ceil(steps / 4)
     if cycles == round(cycles):
@@ -148,8 +151,8 @@ def round_steps_to_run_end(steps: int, cycles: float) -> int:
 def min_unique_steps(model: Model) -> int:
     """Return the smallest even number of steps per cycle with a unique solution in each step.
 
-    It is 0 except for bonds that weaken, which need dt^2 k_t (eps_0/eps_k - 1)/(2 M) < 1, with k_t = mu_s
-    N/eps_0 and the mass M that the interface moves.
+    It is 0 except for bonds that weaken. These require dt^2 k_t (eps_0/eps_k - 1)/(2 M) < 1, where
+    k_t = mu_s N/eps_0 and M is the mass that the interface moves.
     """
     f = model.friction
     modes = model.rig.modes

@@ -1,7 +1,7 @@
-"""Predicted sizes, cost and dimensionless groups of a coupled run.
+"""Predicted cost, stiffnesses, frequencies and dimensionless groups of a rig for a plan.
 
-In: a Model. Out: `Cost` of the engine that `engines.choose_engine` chooses, the stiffness chain,
-frequencies with free and stuck interface, groups, and sentences for the plan.
+In: a Model. Out: `Cost` of its engine, the stiffness chain, natural frequencies with free and stuck
+interfaces, dimensionless groups, and sentences for the plan.
 """
 
 from dataclasses import replace
@@ -31,57 +31,59 @@ from . import bond_lists
 from .costs import (
     MARCH_HISTORY,
     count_intervals_by_cause,
-    count_kept_samples,
+    count_stored_samples,
     describe_element_engine,
-    history_memory_parts,
-    interface_load,
+    find_interface_load,
     predict_exact_cost,
+    predict_history_memory,
     predict_smooth_cost,
     steps_per_cycle,
 )
 from .engines import ENGINES, PIECES, choose_steady_method
 from .numerics import choose_numerics
 
-# memory [bytes] per pair of modes: matrices, shapes and workspace of the eigenvalue solver
+# Memory [bytes] per pair of modes: matrices, mode shapes and workspace of the eigenvalue solver.
 MODE_PAIR_BYTES = 125.0
-# memory [bytes] per pair of unknown harmonics: Jacobian of the balance, and the factors for its error
+# Memory [bytes] per pair of unknowns of harmonic balance: Jacobian, and factors for the error
+# estimate.
 HARMONIC_PAIR_BYTES = 94.0
-MODE_NODE_BYTES = 24.0  # memory per shear mode and node of the interface [bytes]
-DRIVE_ROW_BYTES = 400.0  # memory per row of a recorded drive [bytes]
+MODE_NODE_BYTES = 24.0  # Memory per shear mode and interface node [bytes].
+DRIVE_ROW_BYTES = 400.0  # Memory per row of a recorded drive [bytes].
 STEADY_CODES = {
     "exact": EVENT_CODE,
     "piecewise": EVENT_CODE,
     "harmonic": BALANCE_CODE,
     "march": None,
 }
-# expected points of a curve over frequency, including those at its bends and peak
-N_MAPPED_POINTS = 160  # points of a curve by maps of events or yields, or by marches
-# Points of a curve by harmonic balance, which follows the folds of the curve.
+# Expected number of points of a response curve, including those near its peak and bends.
+N_MAPPED_POINTS = 160  # Number of points of a curve by event maps or marches.
+# Number of points of a curve by harmonic balance, which follows its folds.
 N_BALANCE_POINTS = 250
-N_MARCHED_CYCLES = 400.0  # expected cycles of all marches until a motion repeats
-# relative distance from the frequency of a mode within which a sine excites a resonance
+N_MARCHED_CYCLES = 400.0  # Expected number of cycles of all marches until a motion is periodic.
+# Largest relative difference between the frequencies of drive and mode at which the mode counts as
+# resonant.
 RESONANCE_TOL = 0.02
-# Ratio of link to modal stiffness, from which a link holds the block nearly at rest.
+# Smallest ratio of link stiffness to modal stiffness at which the link holds the block nearly at
+# rest.
 MIN_STIFF_LINK_RATIO = 10.0
 
 
-def chain(rig) -> dict:
-    """Return the stiffnesses [N/m] of a structure that act in series with the contact."""
+def structure_stiffnesses(rig) -> dict:
+    """Return the stiffnesses [N/m] of the structure in the stiffness chain, by name."""
     return {"mode": rig.first_mode.stiffness} | (
         {"bonded": rig.springs.bonded} if rig.springs.bonded is not None else {}
     )
 
 
 def stuck_interface_stiffness(chain: dict, number: int = 0) -> float:
-    """Return the tangential stiffness [N/m] of an interface while it sticks.
+    """Return the tangential stiffness [N/m] of a stuck interface, whose links act in series.
 
-    The links of the interface act in series. The result is inf if all are rigid, and 0 for a law that
-    creeps.
+    It is inf if all links are rigid, and 0 for a law that creeps.
 
     Parameters
     ----------
     chain : dict
-        Links of the stiffness chain of a plan.
+        Stiffness chain of a plan by name.
     number : int
         Index of the interface.
     """
@@ -98,9 +100,9 @@ def stuck_interface_stiffness(chain: dict, number: int = 0) -> float:
 
 
 def stuck_stiffnesses(rig, chain: dict) -> np.ndarray:
-    """Return the tangential stiffness (i,) [N/m] of all interfaces of a rig while they stick.
+    """Return the tangential stiffness (i,) [N/m] of each stuck interface of a rig.
 
-    Strips have the stiffness of their patch; without friction the stiffness is inf.
+    Strips have the stiffness of their patch. Without friction the stiffness is inf.
     """
     n_interfaces = len(rig.friction.interfaces)
     stiffness = np.full(len(rig.modes.interfaces), inf)
@@ -111,10 +113,10 @@ def stuck_stiffnesses(rig, chain: dict) -> np.ndarray:
 
 
 def remove_expected_joint(rig, links: dict):
-    """Remove the joint that was present in the modal test from the modes of a rig.
+    """Return the rig without the joint that was present in the modal test.
 
-    The patch that forms the joint is not pressed yet, so that its stiffness follows from the links
-    of a chain. If these are stiffer than the modes allow, the Rig is unchanged.
+    The stiffness of the joint follows from the stiffness chain, because the patch has not been
+    solved yet. If it is larger than the modes allow, the Rig is returned unchanged.
     """
     try:
         bare_rig = rig.structure.without_joint(stuck_interface_stiffness(links))
@@ -125,10 +127,10 @@ def remove_expected_joint(rig, links: dict):
 
 
 def mode_frequencies(rig, chain: dict) -> list:
-    """Return name, free frequency and stuck frequency [Hz] of each mode.
+    """Return name, free and stuck frequency [Hz] of each mode as a list of dicts.
 
-    The stuck frequency is that with the contact held by the links of a chain; None if no link is
-    compliant, and without friction.
+    The stuck frequency is that with stuck interfaces. It is None without friction and if no link of
+    the stiffness chain is compliant.
     """
     modes = rig.modes
     rows = rig.modes.interfaces
@@ -157,7 +159,7 @@ def predict_cost(model: Model, points: int) -> Cost:
     ----------
     model : Model
     points : int
-        Nodes of the interface; 1 without a patch.
+        Number of interface nodes; 1 without a patch.
     """
     rig = model.rig
     numerics = choose_numerics(model)
@@ -168,29 +170,29 @@ def predict_cost(model: Model, points: int) -> Cost:
     drive = MemoryPart(DRIVE_ROW_BYTES * rows, f"{rows} rows of the drive", rows_key)
     words = ()
     if model.friction is not None:
-        words = tuple(_motion_sentences(model, numerics))
+        words = tuple(_describe_method(model, numerics))
     rig_cost = Cost(
         parts=(structure, drive), words=words, sizes={"modes": count}, engine=numerics.engine
     )
     return rig_cost + COSTS[numerics.engine](model, numerics, points)
 
 
-def _motion_sentences(model: Model, numerics) -> list:
-    """Return the sentences of a plan on the method that computes the motion."""
+def _describe_method(model: Model, numerics) -> list:
+    """Return sentences of a plan on the method that computes the motion."""
     if ENGINES[numerics.engine].finds_periodic_motion:
         return [f"the steady motion is found by {choose_steady_method(model).words}"]
-    return bond_sum_sentences(model, numerics)
+    return describe_bond_summation(model, numerics)
 
 
 def predict_march_cost(model: Model, numerics, points: int) -> Cost:
-    """Predict the cost of a march, including its coarse runs.
+    """Predict the cost of a march and its coarse runs.
 
     Parameters
     ----------
     model : Model
     numerics : Numerics
     points : int
-        Nodes of the interface.
+        Number of interface nodes.
     """
     rig = model.rig
     f = model.friction
@@ -200,33 +202,34 @@ def predict_march_cost(model: Model, numerics, points: int) -> Cost:
     sizes = {}
     parts = []
     modes = 0
-    if is_bonds and bond_lists.has_list(model, numerics):
+    if is_bonds and bond_lists.has_bond_list(model, numerics):
         entries, seconds = bond_lists.estimate_list_cost(model, numerics)
-        each = seconds / steps
+        step_seconds = seconds / steps
         sizes["bond_list_about"] = int(entries)
         parts.append(
             MemoryPart(capacity.list_bytes(int(entries)), "the list of bonds", "accuracy.tail")
         )
     elif soft and (is_bonds or model.grooves is not None or rig.friction.load_varies):
         sizes["shear_modes"] = modes = numerics.shear_modes or shear_modes.N_SHEAR_MODES
-        each = cost_model.predict_shear_mode_step(
+        step_seconds = cost_model.predict_shear_mode_step(
             points, modes, load_varies=rig.friction.load_varies or model.grooves is not None
         )
-        each += _point_step_seconds(rig, f) if is_bonds else 0.0
+        step_seconds += _predict_point_step_seconds(rig, f) if is_bonds else 0.0
         parts.append(
             MemoryPart(
                 MODE_NODE_BYTES * modes * points, f"{modes} shear modes", "accuracy.shear_modes"
             )
         )
     else:
-        each = _step_seconds_without_modes(model, numerics, points, is_bonds=is_bonds)
-    # the cost includes runs with a half and a quarter of the steps, and each halving of the step
+        step_seconds = _predict_plain_step_seconds(model, numerics, points, is_bonds=is_bonds)
+    # The cost includes runs with half and a quarter of the steps, and one more run for each halving
+    # of the step.
     passes = 0.75 + 2 ** (bond_lists.count_step_halvings(model) + 1) - 1
     times = {
-        "motion": steps * passes * each,
-        "histories": cost_model.KEPT_SAMPLE_SECONDS * count_kept_samples(numerics),
+        "motion": steps * passes * step_seconds,
+        "histories": cost_model.KEPT_SAMPLE_SECONDS * count_stored_samples(numerics),
     }
-    parts += history_memory_parts(model, numerics, MARCH_HISTORY)
+    parts += predict_history_memory(model, numerics, MARCH_HISTORY)
     return (
         Cost(times, tuple(parts), (), int(steps * passes), sizes) + choose_march_code(model).cost()
     )
@@ -237,10 +240,10 @@ def choose_march_code(model: Model) -> EngineCode:
     return SHEAR_MARCH_CODE if model.partial_slip else MARCH_CODE
 
 
-def _step_seconds_without_modes(model: Model, numerics, points: int, *, is_bonds: bool) -> float:
-    """Return the CPU time [s] of a march step without shear modes or a bond list."""
+def _predict_plain_step_seconds(model: Model, numerics, points: int, *, is_bonds: bool) -> float:
+    """Predict the CPU time [s] of a march step without shear modes or bond list."""
     rig = model.rig
-    step = _point_step_seconds(model.rig, model.friction)
+    step = _predict_point_step_seconds(model.rig, model.friction)
     if model.grooves is not None:
         return cost_model.GROOVE_STEP_SECONDS
     if is_bonds:
@@ -254,10 +257,10 @@ def _step_seconds_without_modes(model: Model, numerics, points: int, *, is_bonds
     return step
 
 
-def _point_step_seconds(rig, friction) -> float:
-    """Return the CPU time [s] of a march step of interfaces without mesh.
+def _predict_point_step_seconds(rig, friction) -> float:
+    """Predict the CPU time [s] of a march step of interfaces without mesh.
 
-    Growing bonds and several interfaces take longer than a single mode and interface.
+    It is larger for growing bonds, further modes and further interfaces.
     """
     faces = len(rig.friction.interfaces)
     grows = (
@@ -275,28 +278,31 @@ def _point_step_seconds(rig, friction) -> float:
     )
 
 
-def compute_groups(model: Model) -> dict:
-    """Return the dimensionless groups that apply to the motion of a model, as a dict.
+def compute_dimensionless_groups(model: Model) -> dict:
+    """Return the dimensionless groups of the motion of a rig, as a dict.
 
-    - D: static friction limit over largest force of the drive, D of (2.3) at resonance.
-    - D_kinetic: the same with the kinetic limit, if it differs.
-    - knee [m s-2], or knee_force [N] of a drive by force: drive above which friction alone does not
-      bound a motion at resonance, for a block that slides.
+    - D: ratio of the static friction limit to the largest force of the drive, D of (2.3) at
+      resonance.
+    - D_kinetic: the same ratio with the kinetic limit, if it differs.
+    - knee [m s-2], or knee_force [N] for a drive by force: largest drive at which friction alone
+      bounds the motion of a sliding block at resonance.
     """
     sizes = {}
     f = model.friction
     rig = model.rig
-    limits = [law.friction_limits(interface_load(model, law)) for law in rig.friction.interfaces]
+    limits = [
+        law.friction_limits(find_interface_load(model, law)) for law in rig.friction.interfaces
+    ]
     limit = sum(static for static, _ in limits)
     kinetic = sum(sliding for _, sliding in limits)
-    push = rig.drive.force or rig.first_mode.mass * find_max_acceleration(rig.drive.signal)
-    if push > 0:
-        sizes["D"] = limit / push
+    drive_force = rig.drive.force or rig.first_mode.mass * find_max_acceleration(rig.drive.signal)
+    if drive_force > 0:
+        sizes["D"] = limit / drive_force
         if kinetic != limit:
-            sizes["D_kinetic"] = kinetic / push
+            sizes["D_kinetic"] = kinetic / drive_force
     ratio = rig.first_mode.frequency * rig.drive.signal.period if rig.drive.frequency else inf
     if abs(ratio - 1) < 0.2:
-        bound = 4 / pi * kinetic * _participation_ratio(rig)
+        bound = 4 / pi * kinetic * _find_participation_ratio(rig)
         sizes |= {"knee_force": bound} if rig.drive.force else {"knee": bound / rig.first_mode.mass}
     if f is not None and f.bond_length and f.stiffness is None and rig.drive.signal.moving:
         sizes["drive_amplitude_over_bond_length"] = (
@@ -307,11 +313,11 @@ def compute_groups(model: Model) -> dict:
     return sizes
 
 
-def drive_and_knee(model: Model) -> dict:
-    """Return the drive, and the drive above which friction cannot bound the resonance.
+def find_drive_and_knee(model: Model) -> dict:
+    """Return the drive and the largest drive at which friction bounds the resonance, as a dict.
 
-    Both are accelerations of the base [m s-2], "drive" and "knee", of a single mode that a sine
-    excites at resonance; {} for another rig.
+    The keys are "drive" and "knee", both accelerations of the base [m s-2]. The dict is empty
+    unless a sine excites a single mode at resonance.
     """
     rig = model.rig
     if (
@@ -323,17 +329,17 @@ def drive_and_knee(model: Model) -> dict:
         or abs(rig.first_mode.frequency * rig.drive.signal.period - 1) > RESONANCE_TOL
     ):
         return {}
-    knee = compute_groups(model).get("knee")
+    knee = compute_dimensionless_groups(model).get("knee")
     if not knee:
         return {}
     return {"drive": float(find_max_acceleration(rig.drive.signal)), "knee": float(knee)}
 
 
-def _participation_ratio(rig) -> float:
+def _find_participation_ratio(rig) -> float:
     """Return the ratio of slide to base participation of the first mode that is not rigid.
 
-    This is the effect of friction over that of the drive. It is 1 if the scene lists no modes, or if
-    the drive does not excite the mode.
+    It is the effect of friction relative to that of the drive. It is 1 if the scene lists no modes,
+    or if the drive does not excite the mode.
     """
     first = int(np.flatnonzero(rig.modes.omega > 0)[0]) if rig.first_mode.frequency else 0
     slide = abs(float(rig.modes.slide[first]))
@@ -342,19 +348,19 @@ def _participation_ratio(rig) -> float:
 
 
 def describe_stick(rig, sizes: dict, chain: dict) -> list:
-    """Describe in a plan whether friction stops a driven block.
+    """Return sentences of a plan on whether friction stops a driven block.
 
-    The sentence on D of a single mode says whether the block sticks, and whether friction bounds its
-    motion; there is none for other rigs.
+    For a single mode, they say from D whether the block sticks, and whether friction bounds its
+    motion. There are none for other rigs.
 
     Parameters
     ----------
     rig : Rig
     sizes : dict
-        `compute_groups`.
+        Groups of `compute_dimensionless_groups`.
     chain : dict
-        Links of the stiffness chain by name; a link that is not MIN_STIFF_LINK_RATIO compared with the mode lets a
-        stuck block move.
+        Stiffness chain by name. A link with less than MIN_STIFF_LINK_RATIO times the stiffness of
+        the mode allows a stuck block to move.
     """
     d = sizes.get("D")
     if (
@@ -364,7 +370,7 @@ def describe_stick(rig, sizes: dict, chain: dict) -> list:
         or rig.drive.kind == "free"
     ):
         return []
-    d *= _participation_ratio(rig)
+    d *= _find_participation_ratio(rig)
     limit = MIN_STIFF_LINK_RATIO * rig.first_mode.stiffness
     links = {name: link for name, link in chain.items() if not isinstance(link, str)}
     soft = [name for name, link in links.items() if name != "mode" and link < limit]
@@ -375,8 +381,8 @@ def describe_stick(rig, sizes: dict, chain: dict) -> list:
         ]
     if d >= 1:
         return [f"D = {d:.3g} >= 1: friction should hold the block, so that it sticks"]
-    if "D_kinetic" in sizes:  # the kinetic friction limit acts while the block slides
-        sliding = sizes["D_kinetic"] * _participation_ratio(rig)
+    if "D_kinetic" in sizes:  # The kinetic friction limit acts while the block slides.
+        sliding = sizes["D_kinetic"] * _find_participation_ratio(rig)
         return [
             f"D = {d:.3g} is below 1, so that the block slips; with the kinetic coefficient {_describe_sliding(sliding)}"
         ]
@@ -386,17 +392,21 @@ def describe_stick(rig, sizes: dict, chain: dict) -> list:
 def _describe_sliding(friction_ratio: float) -> str:
     """Describe whether friction bounds the resonance of a block that slips.
 
-    friction_ratio: D of equation (2.3), below 1.
+    `friction_ratio` is D of equation (2.3), below 1.
     """
     if friction_ratio > pi / 4:
         return f"D = {friction_ratio:.3g} lies between pi/4 and 1: at resonance the block alternates between stick and slip"
     return f"D = {friction_ratio:.3g} is below pi/4: at resonance friction alone does not limit the amplitude"
 
 
-def bond_sum_sentences(model: Model, numerics) -> list:
-    """Return the sentences of a plan on the bond summation or the engine of elements."""
+def describe_bond_summation(model: Model, numerics) -> list:
+    """Return sentences of a plan on the bond summation or on the engine of elements."""
     if not law_has_trait(model.friction.law, "bonds"):
-        return [] if PIECES.lacks(model) else describe_element_engine(model, numerics.engine)
+        return (
+            []
+            if PIECES.find_unsupported_feature(model)
+            else describe_element_engine(model, numerics.engine)
+        )
     choice = bond_lists.choose_bond_summation(model, numerics)
     sentences = ["method of the sum over bonds: " + choice.describe()]
     if choice.engine == "recursion":
@@ -436,53 +446,53 @@ def _describe_stuck_block(model: Model) -> str:
 
 
 def predict_steady_cost(model: Model, numerics, points: int) -> Cost:
-    """Predict the cost of a curve of steady motions, including its coarse runs.
+    """Predict the cost of a response curve and its coarse runs.
 
     Parameters
     ----------
     model : Model
     numerics : Numerics
     points : int
-        Nodes of the interface; not used.
+        Number of interface nodes; not used.
     """
     rig = model.rig
     finder = choose_steady_method(model)
-    places = max(1, len(rig.drive.levels.amplitudes))
+    n_points = max(1, len(rig.drive.levels.amplitudes))
     if rig.drive.waveform.is_swept:
-        places = N_BALANCE_POINTS if finder.name == "balance" else N_MAPPED_POINTS
+        n_points = N_BALANCE_POINTS if finder.name == "balance" else N_MAPPED_POINTS
     n_soft = 0
     if finder.name == "yields":
         laws = rig.friction.interfaces
         n_soft = sum(bool(law.partial_slip or model.partial_slip) for law in laws)
     passes = (
         1.0 + 0.5 * n_soft
-    )  # each interface adds a run on a coarser mesh with half the elements
-    seconds = places * passes * _steady_point_seconds(model, finder.name)
+    )  # Each interface adds a run on a coarser mesh with half the elements.
+    seconds = n_points * passes * _estimate_point_seconds(model, finder.name)
     if rig.structure.richer_rig is not None:
-        seconds += places * _steady_point_seconds(
+        seconds += n_points * _estimate_point_seconds(
             replace(model, rig=rig.structure.richer_rig), finder.name
         )
     harmonics = model.accuracy.harmonics or 0
     balance = HARMONIC_PAIR_BYTES * (2.0 * harmonics * max(1, len(rig.friction.interfaces))) ** 2
     parts = (MemoryPart(balance, f"{harmonics} harmonics", "accuracy.harmonics"),)
     code = STEADY_CODES[finder.engine] or choose_march_code(model)
-    return Cost({"motion": seconds}, parts, (), places) + code.cost()
+    return Cost({"motion": seconds}, parts, (), n_points) + code.cost()
 
 
-def _steady_point_seconds(model: Model, by: str) -> float:
-    """Estimate the CPU time [s] per point of a curve of steady motions.
+def _estimate_point_seconds(model: Model, method_name: str) -> float:
+    """Estimate the CPU time [s] per point of a response curve.
 
-    by: name of the method that finds the motion.
+    `method_name` is the name of the method that computes the steady motion.
     """
     rig = model.rig
-    if by == "balance":
+    if method_name == "balance":
         size = 2.0 * (model.accuracy.harmonics or 0) * max(1, len(rig.friction.interfaces))
         return (
             cost_model.BALANCE_POINT_SECONDS
             + cost_model.BALANCE_UNKNOWN_SECONDS * size**3
-            + _smooth_law_seconds(rig)
+            + _estimate_smooth_law_seconds(rig)
         )
-    if by == "march":
+    if method_name == "march":
         return N_MARCHED_CYCLES * steps_per_cycle(model) * cost_model.GROOVE_STEP_SECONDS
     if not rig.friction.interfaces:
         return cost_model.CLOSED_POINT_SECONDS
@@ -498,11 +508,11 @@ def _steady_point_seconds(model: Model, by: str) -> float:
     )
 
 
-def _smooth_law_seconds(rig) -> float:
-    """Estimate the extra CPU time [s] that a smooth law needs per point of a curve.
+def _estimate_smooth_law_seconds(rig) -> float:
+    """Estimate the additional CPU time [s] per point of a response curve for a smooth law.
 
-    Their slope changes during the whole cycle, whereas that of elements that stick and slip is
-    constant for most of it.
+    The slope of such a law changes during the whole cycle, whereas elements that stick and slip
+    have a constant slope for most of it.
     """
     laws = {interface.numbers.law for interface in rig.friction.interfaces}
     with_memory = [law for law in laws if not law_has_trait(law, "memoryless")]
@@ -517,7 +527,7 @@ def _smooth_law_seconds(rig) -> float:
     )
 
 
-# function of each engine: (model, numerics, points) -> Cost
+# Function (model, numerics, points) -> Cost of each engine.
 COSTS = {
     "exact": predict_exact_cost,
     "piecewise": predict_exact_cost,

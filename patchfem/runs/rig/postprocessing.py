@@ -1,7 +1,7 @@
-"""Passes that complete a coupled run after its solution is known, in the order of `rig.run_coupled`.
+"""Completion of a run of a rig after its motion is solved, in the order of `rig.run_coupled`.
 
-In: `CoupledRun`, a run between two of its passes. Out: the same with further measures, its outcome and
-its notes; at the end its warnings and the other data of its Result.
+In: a `CoupledRun`. Out: the same with further measures, its outcome and its notes, and finally the
+warnings and other data of its Result.
 """
 
 from dataclasses import dataclass, replace
@@ -27,12 +27,12 @@ from .solution import Solution
 
 @dataclass(frozen=True, eq=False, slots=True)
 class CoupledRun:
-    """Run of a rig, whose result successive passes complete.
+    """Run of a rig whose result is being completed.
 
     - inputs: plan and pressed patch.
     - numerics, solution: settings and Solution of the engine.
-    - measures: by name.
-    - outcome: None before the pass that determines it.
+    - measures: measures by name.
+    - outcome: Outcome, or None before `add_outcome`.
     - decay: decay curve of a release, or None.
     - notes: sentences on the decay and on limit cycles.
     """
@@ -47,22 +47,22 @@ class CoupledRun:
 
     @property
     def model(self):
-        """Model that the run solved."""
+        """Model of the run."""
         return self.inputs.plan.model
 
     @property
     def patch(self):
-        """Solved patch of [contact], or None."""
+        """Patch of [contact] with its static solution, or None."""
         return self.inputs.patch
 
     @property
     def drive(self):
-        """Drive at which the measures of the result are evaluated."""
+        """Drive at which the measures are evaluated."""
         return self.solution.extra.get("at", self.model.rig.drive.signal)
 
     @property
     def has_friction(self) -> bool:
-        """Whether friction acts on the rig."""
+        """Whether the rig has friction."""
         return self.model.friction is not None
 
     @property
@@ -78,7 +78,7 @@ class CoupledRun:
 
 
 def add_level_measures(run: CoupledRun) -> CoupledRun:
-    """Add to a run the measures over all drive levels."""
+    """Return the run with the measures over all drive levels."""
     solution = run.solution
     model = run.model
     measures = levels.compute_level_measures(
@@ -93,9 +93,9 @@ def add_level_measures(run: CoupledRun) -> CoupledRun:
 
 
 def add_outcome(run: CoupledRun) -> CoupledRun:
-    """Add the outcome and the stated errors to a run.
+    """Return the run with its outcome and its own error estimates.
 
-    A run whose energy balance has too large an error gets the outcome NOT_CONVERGED.
+    The outcome is NOT_CONVERGED if the error of the energy balance is too large.
     """
     solution = run.solution
     if text := describe_balance_error(ENGINES[run.numerics.engine], run.measures):
@@ -115,7 +115,7 @@ def add_outcome(run: CoupledRun) -> CoupledRun:
         rig.drive.levels.cycles,
         find_decay_rate(rig.modes),
     )
-    # without a stop in the scene, only the largest motion that the program allows was exceeded
+    # Without a stop in the scene, the motion only exceeded the largest one that the program allows.
     if outcome is Outcome.EXCEEDS_TRAVEL and rig.springs.travel == MAX_TRAVEL:
         outcome = Outcome.GROWS
         measures = remove_errors(measures)
@@ -123,7 +123,7 @@ def add_outcome(run: CoupledRun) -> CoupledRun:
 
 
 def add_reasons(run: CoupledRun) -> CoupledRun:
-    """Add to a run the reason for each measure that lacks a value."""
+    """Return the run with a reason for each measure without a value."""
     measures = run.measures
     window = run.solution.window
     model = run.model
@@ -142,20 +142,20 @@ def add_reasons(run: CoupledRun) -> CoupledRun:
     return replace(run, measures=measures | missing)
 
 
-def add_decay(run: CoupledRun) -> CoupledRun:
-    """Add to a released run its decay curve, with errors due to the mesh.
+def add_decay_curve(run: CoupledRun) -> CoupledRun:
+    """Return a released run with its decay curve, including mesh errors.
 
-    The ringing has the mesh error at its amplitude in the last stick interval. Notes name the results
-    whose errors exclude that of the mesh.
+    The mesh error of the ringing is that at its amplitude in the last stick interval. Notes name
+    the results whose mesh error is unknown.
     """
     model = run.model
     solution = run.solution
-    run = replace(run, decay=decays.compute_decay(solution))
+    run = replace(run, decay=decays.compute_decay_curve(solution))
     if not (model.partial_slip or model.rig.friction.has_partial_slip):
         return run
     coarse = run.inputs.coarse[0]
     causes = {}
-    half_swing = _ringing_amplitude(run)
+    half_swing = _find_ringing_amplitude(run)
     if half_swing > 0:
         errors, causes["ring_frequency and ring_damping"] = decays.estimate_stuck_mode_mesh_errors(
             np.array([half_swing]),
@@ -189,8 +189,8 @@ def add_decay(run: CoupledRun) -> CoupledRun:
     return replace(run, notes=tuple(notes))
 
 
-def _ringing_amplitude(run: CoupledRun) -> float:
-    """Return half the range of the output [m] in the last stick interval with ringing."""
+def _find_ringing_amplitude(run: CoupledRun) -> float:
+    """Return the amplitude [m] of the output in the last stick interval with ringing."""
     solution = run.solution
     window = solution.window
     ring = run.measures.get("ring_frequency")
@@ -202,14 +202,14 @@ def _ringing_amplitude(run: CoupledRun) -> float:
     return np.ptp(window.output[window.time >= sticks[-1][0]]) / 2
 
 
-def add_limit_cycles(run: CoupledRun) -> CoupledRun:
-    """Add to a run the unstable limit cycle of a self-excited mode."""
-    measures, notes = flutter.find_limit_cycles(run)
+def add_flutter_amplitude(run: CoupledRun) -> CoupledRun:
+    """Return the run with the amplitude of the unstable limit cycle of a self-excited mode."""
+    measures, notes = flutter.compute_flutter_amplitude(run)
     return replace(run, measures=run.measures | measures, notes=(*run.notes, *notes))
 
 
 def collect_warnings(run: CoupledRun) -> list:
-    """Return the warnings of a completed run of a rig."""
+    """Return all warnings of a completed run."""
     plan = run.inputs.plan
     return [
         *motion_warnings.collect_warnings(run),
@@ -217,7 +217,7 @@ def collect_warnings(run: CoupledRun) -> list:
     ]
 
 
-def judge_outcome_on_pieces(run: CoupledRun) -> Outcome:
+def find_final_outcome(run: CoupledRun) -> Outcome:
     """Return the outcome of a run, or LEAVES_CONTACT if a piece slides off the other."""
     model = run.model
     response = run.solution.response
@@ -230,7 +230,7 @@ def judge_outcome_on_pieces(run: CoupledRun) -> Outcome:
     return outcome
 
 
-def collect_extra(run: CoupledRun, measures: dict, notes: list) -> dict:
+def collect_summary_data(run: CoupledRun, measures: dict, notes: list) -> dict:
     """Collect settings, levels, events, energies and notes of a run for its Result.
 
     Parameters

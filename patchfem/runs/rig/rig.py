@@ -1,8 +1,8 @@
-"""Coupled run of a rig: the refined solution, then a list of passes that complete its result.
+"""Run of a rig: solution with refined numerical settings, and completion of its result.
 
-In: the inputs of a run, i.e. its plan and its pressed patch. Out: a Result. `run_refined` makes the
-run at the first numerical settings whose displacement is known to the tolerance; `run_coupled`
-applies the functions of `postprocessing` to it.
+In: the inputs of a run, i.e. its plan and its Patch. Out: a Result. `run_refined` solves the run
+with finer and finer settings until the displacement meets the tolerance; `run_rig` completes it
+by the functions of `postprocessing`.
 """
 
 from dataclasses import replace
@@ -21,7 +21,7 @@ from ..results.result import Result, RunInputs
 from . import bond_lists, levels, postprocessing
 from .costs import MAX_MARCH_STEPS
 from .engines import ENGINES
-from .fields import collect_frames
+from .fields import collect_interface_fields
 from .motion_warnings import collect_notes
 from .numerics import Numerics, choose_numerics
 from .postprocessing import CoupledRun
@@ -29,17 +29,17 @@ from .runner import Runner
 from .solution import Solution, compute_peak_frequency
 from .solve import refuse_long_run
 
-# outcomes of runs that ended early, whose outcome more steps do not change
+# Outcomes of runs that ended early; more steps do not change them.
 EARLY_OUTCOMES = (Outcome.EXCEEDS_TRAVEL, Outcome.LEAVES_GROOVES)
-MAX_RUN_STEPS = 1e7  # largest number of time steps of a run to which the steps are doubled
-MIN_STEP_ERROR = 1e-12  # relative error of a step, below which round-off dominates
+MAX_RUN_STEPS = 1e7  # Largest number of time steps of a run after its steps were doubled.
+MIN_STEP_ERROR = 1e-12  # Smallest relative error per step; below it round-off dominates.
 
 
 class RefinedRun(NamedTuple):
     """Run with the first numerical settings whose displacement error meets the tolerance.
 
-    - numerics, solution: the settings and the Solution of the engine.
-    - measures: measures by name, with errors from coarser runs if they are estimated.
+    - numerics, solution: settings and Solution of the engine.
+    - measures: measures by name, with error estimates from coarse runs if requested.
     """
 
     numerics: Numerics
@@ -47,8 +47,8 @@ class RefinedRun(NamedTuple):
     measures: dict
 
 
-def run_coupled(inputs: RunInputs) -> Result:
-    """Run a plan for a structure with modes, drive and perhaps friction.
+def run_rig(inputs: RunInputs) -> Result:
+    """Compute the motion of a rig and return its Result.
 
     Parameters
     ----------
@@ -57,9 +57,9 @@ def run_coupled(inputs: RunInputs) -> Result:
     Raises
     ------
     Missing
-        If the run would take too long.
+        If the run would take too much CPU time.
     PatchfemError
-        If the drive moves nothing.
+        If the drive excites no mode.
     """
     model = inputs.plan.model
     rig = model.rig
@@ -76,9 +76,9 @@ def run_coupled(inputs: RunInputs) -> Result:
     run = postprocessing.add_outcome(run)
     run = postprocessing.add_reasons(run)
     if rig.drive.kind == "free" and run.has_errors:
-        run = postprocessing.add_decay(run)
+        run = postprocessing.add_decay_curve(run)
     if run.has_friction and find_decay_rate(rig.modes) < 0:
-        run = postprocessing.add_limit_cycles(run)
+        run = postprocessing.add_flutter_amplitude(run)
     warnings = postprocessing.collect_warnings(run)
     notes = [*collect_notes(run), *run.notes]
     measures = set_final_floors(run.measures, model.accuracy.tolerance)
@@ -87,10 +87,10 @@ def run_coupled(inputs: RunInputs) -> Result:
     solution = run.solution
     fields = {}
     if inputs.patch is not None:
-        fields = collect_frames(model, run.numerics, inputs.patch, solution)
+        fields = collect_interface_fields(model, run.numerics, inputs.patch, solution)
     return Result(
         plan=inputs.plan,
-        outcome=postprocessing.judge_outcome_on_pieces(run),
+        outcome=postprocessing.find_final_outcome(run),
         measures=measures,
         response=solution.response,
         window=solution.window,
@@ -98,22 +98,22 @@ def run_coupled(inputs: RunInputs) -> Result:
         fields=fields,
         seconds=inputs.seconds,
         warnings=[*inputs.warnings, *warnings],
-        extra=postprocessing.collect_extra(run, measures, notes),
+        extra=postprocessing.collect_summary_data(run, measures, notes),
     )
 
 
 def run_refined(inputs: RunInputs, numerics: Numerics) -> RefinedRun:
     """Repeat a run with finer settings until the error of the displacement meets the tolerance.
 
-    Settings that the scene does not fix are refined from run to run. All coarser runs are kept in
-    `Runner.solutions` by their settings. Runs that are coarser in space are compared with a run that is
-    coarse in time, not with the finest one, so that they are not repeated.
+    Only settings that the scene does not fix are refined. All coarse runs are stored in
+    `Runner.solutions` by their settings. Runs that are coarser in space are compared with a run
+    that is coarse in time, so that they need not be repeated.
 
     Parameters
     ----------
     inputs : RunInputs
     numerics : Numerics
-        Settings of the first run.
+        Numerical settings of the first run.
     """
     model = inputs.plan.model
     engine = ENGINES[numerics.engine]
@@ -130,13 +130,13 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> RefinedRun:
         return RefinedRun(numerics, solution, measures)
     space_runs = [
         *engine.coarser_in_space(model, numerics, inputs.patch, inputs.coarse[0], solution),
-        *engine.richer_in_modes(model, numerics),
+        *engine.list_runs_with_more_modes(model, numerics),
     ]
-    space_errors = runner.estimate(space_runs, solution)
-    displacement_errors = []  # error of the displacement [m] of each run, from coarse to fine
+    space_errors = runner.estimate_errors(space_runs, solution)
+    displacement_errors = []  # Error of the displacement [m] of each run, from coarse to fine.
     while True:
         time_runs = engine.coarser_in_time(model, numerics)
-        errors = [*runner.estimate(time_runs, solution), *space_errors]
+        errors = [*runner.estimate_errors(time_runs, solution), *space_errors]
         coarser_runs = [*time_runs, *space_runs]
         step_runs = runner.list_step_runs(numerics, solution, coarser_runs)
         measures = add_errors(
@@ -146,7 +146,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> RefinedRun:
             min_relative_error=engine.min_relative_error,
             size=size,
         )
-        if numerics.pairs and not are_errors_met(measures, model.accuracy.tolerance):
+        if numerics.pairs and not are_tolerances_met(measures, model.accuracy.tolerance):
             return run_refined(inputs, numerics.finer())
         if solution.levels or model.rig.drive.kind == "free":
             solution = _add_level_errors(solution, coarser_runs, runner.solutions)
@@ -167,10 +167,10 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> RefinedRun:
 
 
 def _count_slip_period_cycles(model, numerics, solution) -> int:
-    """Return the number of cycles that contain a complete stick-slip period on a belt.
+    """Return the number of cycles of a complete stick-slip period on a belt.
 
-    No periodic drive sets the period of such a run. It is 0 if there is no period, or if the run is
-    shorter than two windows.
+    Such a motion has its own period, because the drive is not periodic. The result is 0 if there is
+    no period, or if the run is shorter than two windows.
     """
     drive = model.rig.drive.signal
     if model.friction is None or not drive.segments or is_periodic(drive):
@@ -180,20 +180,20 @@ def _count_slip_period_cycles(model, numerics, solution) -> int:
     return n_cycles if 2 * n_cycles <= numerics.cycles else 0
 
 
-def are_errors_met(measures: dict, tolerance: float) -> bool:
+def are_tolerances_met(measures: dict, tolerance: float) -> bool:
     """Return whether the errors of all measures are within the tolerance or their floors."""
     return all(measure.error_ratio(tolerance) <= 1 for measure in measures.values())
 
 
 def _is_refinement_finished(model, run: RefinedRun, displacement_errors: list) -> bool:
-    """Return whether the displacement is accurate enough or no finer run is possible.
+    """Return whether the displacement meets the tolerance or no finer run is possible.
 
     Parameters
     ----------
     model : Model
     run : RefinedRun
     displacement_errors : list
-        Errors of the displacement [m] of this run and those before it.
+        Errors of the displacement [m] of all runs up to this one.
     """
     displacement = run.measures["relative_displacement_amplitude"]
     if displacement.error_ratio(model.accuracy.tolerance) <= 1:
@@ -214,23 +214,23 @@ def _is_refinement_finished(model, run: RefinedRun, displacement_errors: list) -
 
 
 def _add_level_errors(solution: Solution, coarser_runs: list, solutions: dict) -> Solution:
-    """Add errors from coarser runs to the drive levels of a Solution.
+    """Add errors from coarse runs to the drive levels of a Solution.
 
     Parameters
     ----------
     solution : Solution
     coarser_runs : list of CoarserRuns
     solutions : dict
-        Solution of each coarser run by its Numerics.
+        Solution of each coarse run by its Numerics.
     """
-    # an entry without coarser runs is left out if the levels already have its errors
-    used = [kind for kind in coarser_runs if kind.runs or solution.errors is None]
+    # An entry without coarse runs is skipped if the errors of the levels already include it.
+    used_runs = [kind for kind in coarser_runs if kind.runs or solution.errors is None]
     pairs = []
-    for kind in used:
-        # a run with another sum over bonds does not serve for the errors of decays and onsets
+    for kind in used_runs:
+        # Runs with another bond summation are not used for the errors of decay curves and onsets.
         if kind.runs and kind.runs[0].choice is None:
             pairs.append((solutions[kind.runs[0]], kind.beside and solutions[kind.beside]))
     level_results = ()
     if solution.levels:
-        level_results = levels.add_level_errors(solution.levels, used, solutions)
+        level_results = levels.add_level_errors(solution.levels, used_runs, solutions)
     return replace(solution, levels=level_results, coarser=tuple(pairs))

@@ -1,7 +1,7 @@
-"""Runs of one rig at several numerical settings, with the fraction that is completed.
+"""Runs of a rig with several numerical settings, and their progress.
 
-In: the inputs of a run. Out: the Solution at given settings, and errors from coarser runs, each of
-which is solved once.
+In: the inputs of a run. Out: the Solution for given settings, and error estimates from coarse runs.
+Each coarse run is solved only once.
 """
 
 from dataclasses import replace
@@ -18,16 +18,16 @@ from . import motion_warnings
 from .engines import ENGINES
 from .numerics import Numerics
 from .solution import Solution
-from .solve import solve
+from .solve import solve_rig
 from .steady import curves
 
-# largest relative difference between the peak amplitudes of a run and its coarser run; above it, the
-# coarser run may have found another peak
+# Largest relative difference between the peaks of a run and its coarse run at which they count as
+# the same peak.
 OTHER_PEAK_RATIO = 0.1
 
 
 class Runner:
-    """Solver of a rig at several numerical settings, which stores all coarser solutions.
+    """Solver of a rig with several numerical settings, which stores all coarse solutions.
 
     Parameters
     ----------
@@ -38,11 +38,11 @@ class Runner:
     Attributes
     ----------
     solutions : dict
-        Solution of each coarser run by its Numerics.
+        Solution of each coarse run by its Numerics.
     error_seconds : float
-        CPU seconds of the coarser runs.
+        CPU time of the coarse runs [s].
     cpu_seconds : dict
-        CPU seconds of each run by its Numerics.
+        CPU time of each run [s] by its Numerics.
     """
 
     def __init__(self, inputs: RunInputs, numerics: Numerics):
@@ -51,16 +51,16 @@ class Runner:
         self.solutions: dict = {}
         self.error_seconds = 0.0
         self.cpu_seconds: dict = {}
-        self.progress = RunProgress(inputs.progress, _expected_steps(inputs, numerics))
+        self.progress = RunProgress(inputs.progress, _estimate_total_steps(inputs, numerics))
 
     def solve(self, numerics: Numerics, coarser_model=None) -> Solution:
-        """Solve the rig with given settings.
+        """Solve the rig with the given settings.
 
         Parameters
         ----------
         numerics : Numerics
         coarser_model : Model, optional
-            Model of a coarser run, which needs no fields; None: the run itself.
+            Model of a coarse run, which needs no fields; default: the model of the run itself.
         """
         model = coarser_model or self.model
         frames = 0
@@ -73,15 +73,15 @@ class Runner:
         patch = self.inputs.coarse[0] if numerics.coarse_patch else self.inputs.patch
         report = self.progress.make_callback(numerics.steps)
         begin = process_time()
-        solution = solve(model, numerics, patch, frames, say, report)
+        solution = solve_rig(model, numerics, patch, frames, say, report)
         self.cpu_seconds[replace(numerics, whole=False)] = process_time() - begin
         self.progress.done += numerics.steps
         return solution
 
-    def estimate(self, coarser_runs: list, solution: Solution) -> list:
-        """Estimate the errors of a run (see `coarser.estimate_errors`)."""
+    def estimate_errors(self, coarser_runs: list, solution: Solution) -> list:
+        """Estimate the errors of a run from coarse runs, see `response.coarser.estimate_errors`."""
         errors, seconds = estimate_errors(
-            lambda numerics: self._solve_coarser(numerics, solution),
+            lambda numerics: self._solve_coarse_run(numerics, solution),
             solution.values,
             coarser_runs,
             self.solutions,
@@ -90,9 +90,9 @@ class Runner:
         return errors
 
     def list_step_runs(self, numerics: Numerics, solution: Solution, coarser_runs: list) -> list:
-        """Return the StepRuns of a run and of its coarser runs in time, fine to coarse.
+        """Return a StepRun of the run and of each run with fewer steps, from fine to coarse.
 
-        The list has only the run itself if none is coarser in its steps.
+        If no coarse run has fewer steps, the list contains only the run itself.
 
         Parameters
         ----------
@@ -100,7 +100,7 @@ class Runner:
             Settings of the run.
         solution : Solution
         coarser_runs : list of CoarserRuns
-            Those of the run, which are solved already; runs that are coarser in time come first.
+            Coarse runs, which are already solved; those with fewer steps come first.
 
         Returns
         -------
@@ -114,23 +114,24 @@ class Runner:
             seconds = self.cpu_seconds.get(replace(settings, whole=False), run.seconds)
             step_runs.append(StepRun(settings.steps, seconds, run.values))
         steps = [run.steps for run in step_runs]
-        # a method with a step tolerance has the same number of steps in all runs
+        # A method with a step tolerance has the same number of steps in all runs.
         return step_runs if steps == sorted(set(steps), reverse=True) else step_runs[:1]
 
-    def _solve_coarser(self, numerics: Numerics, fine: Solution) -> Solution:
+    def _solve_coarse_run(self, numerics: Numerics, fine: Solution) -> Solution:
         """Solve the rig with coarser settings."""
         model = self.model
         if numerics.richer:
             model = replace(model, rig=model.rig.structure.richer_rig)
-        # the decay curve and some measures need histories from the start of the run
+        # The decay curve and some measures need histories from the start of the run.
         needs_whole = self.model.rig.drive.kind == "free" or bool(ROWS_NEEDING_RUN)
         numerics = replace(numerics, whole=needs_whole)
         return self._solve_around_peak(model, numerics, fine) or self.solve(numerics, model)
 
     def _solve_around_peak(self, model, numerics: Numerics, fine: Solution) -> Solution | None:
-        """Solve a curve with coarser settings, only around its largest amplitude.
+        """Compute the response curve of a coarse run only around the peak of the run itself.
 
-        The result is None if there is no curve, or if its largest amplitude is elsewhere.
+        The result is None if the run is not a response curve, or if the coarse run has its peak
+        elsewhere.
         """
         rig = model.rig
         if "at_error" not in fine.extra or rig.drive.levels.amplitudes or rig.springs.is_nonlinear:
@@ -144,7 +145,7 @@ class Runner:
             solution = self.solve(numerics, replace(model, rig=rig.with_signal(drive)))
         except (
             NotConverged
-        ):  # the complete curve may start at a frequency at which a motion is found
+        ):  # The complete curve may start at a frequency at which a motion is found.
             return None
         name = "relative_displacement_amplitude"
         if "at" not in solution.extra or name not in solution.values:
@@ -157,19 +158,19 @@ class Runner:
 
 
 class RunProgress:
-    """Completed fraction of the work of a run and its coarser runs, weighted by their steps.
+    """Completed fraction of a run and its coarse runs, weighted by their steps per cycle.
 
     Parameters
     ----------
     callback : callable or None
-        Called with the completed fraction.
+        Function that is called with the completed fraction.
     expected_steps : float
-        Expected steps per cycle of all runs together.
+        Expected sum of the steps per cycle of all runs.
 
     Attributes
     ----------
     done : float
-        Steps per cycle of the completed runs.
+        Sum of the steps per cycle of the completed runs.
     """
 
     def __init__(self, callback, expected_steps: float):
@@ -179,9 +180,9 @@ class RunProgress:
         self.shown = 0.0
 
     def make_callback(self, steps: float):
-        """Return the progress callback of one run with a given number of steps per cycle.
+        """Return the progress callback for one run with the given steps per cycle, or None.
 
-        It is None if the caller gave no callback. The reported fraction never decreases.
+        It is None if nobody asked for the progress. The reported fraction never decreases.
         """
         if self.callback is None:
             return None
@@ -195,10 +196,10 @@ class RunProgress:
         return report
 
 
-def _expected_steps(inputs: RunInputs, numerics: Numerics) -> float:
-    """Return the expected steps per cycle of a run plus those of its coarser runs.
+def _estimate_total_steps(inputs: RunInputs, numerics: Numerics) -> float:
+    """Return the expected sum of the steps per cycle of a run and its coarse runs.
 
-    A run on a coarser mesh has the smallest number of steps.
+    A run on a coarser mesh is counted with the smallest of these numbers.
     """
     if not inputs.estimate:
         return numerics.steps
@@ -207,7 +208,7 @@ def _expected_steps(inputs: RunInputs, numerics: Numerics) -> float:
     steps = {numerics: numerics.steps}
     for kind in [
         *engine.coarser_in_time(model, numerics),
-        *engine.richer_in_modes(model, numerics),
+        *engine.list_runs_with_more_modes(model, numerics),
     ]:
         steps |= {run: run.steps for run in kind.runs}
     n_meshes = int(inputs.coarse[0] is not None and bool(model.partial_slip))

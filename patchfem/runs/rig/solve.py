@@ -1,7 +1,7 @@
-"""Solution of a rig by the engine that its numerical settings name.
+"""Solution of a rig by the engine of its numerical settings.
 
-In: a Model, its Numerics and its pressed patch. Out: a Solution. `engines` says what each engine
-can compute; the module of an engine is loaded when it solves.
+In: a Model, its Numerics and its Patch. Out: a Solution. `engines` lists what each engine can
+compute.
 """
 
 from . import bond_lists, costs, event_driven, march, smooth
@@ -9,14 +9,14 @@ from .solution import Solution, replace_output_by_gauge
 from .steady import steady
 
 
-def solve(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
-    """Solve a rig with the engine of its settings; the output is the motion at its gauge.
+def solve_rig(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
+    """Compute the motion of a rig with the engine of its settings; the output is that of the gauge.
 
     Parameters
     ----------
     model : Model
     numerics : Numerics
-        Its engine solves.
+        Numerical settings, including the name of the engine.
     patch : Patch or None
     frames : int
         Number of snapshots of the interface in the last cycle.
@@ -42,7 +42,7 @@ def solve(model, numerics, patch, frames: int = 0, say=None, progress=None) -> S
 
 
 def refuse_long_run(model, numerics) -> None:
-    """Raise Missing if the engine of a run would take too much CPU time."""
+    """Raise Missing if a run would take too much CPU time."""
     if numerics.engine in ("exact", "piecewise"):
         costs.refuse_long_exact_run(model)
     elif numerics.engine == "march":

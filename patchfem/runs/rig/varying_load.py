@@ -1,7 +1,6 @@
-"""Contact whose normal load changes with the motion, or is prescribed in time.
+"""Contact model whose normal load changes with the motion or is prescribed over time.
 
-In: a Model, its Numerics and its pressed patch. Out: a VaryingLoadModel of
-`dynamics.march.varying_load`.
+In: a Model, its Numerics and its Patch. Out: a VaryingLoadModel of `dynamics.march.varying_load`.
 """
 
 from ...dynamics.march import varying_load as march
@@ -27,7 +26,7 @@ def make_varying_load_law(model: Model, numerics: Numerics):
 
 
 def make_varying_load_model(model: Model, numerics: Numerics, patch):
-    """Return the contact model of a rig whose normal load changes.
+    """Return the contact model of a rig under varying normal load.
 
     Parameters
     ----------

@@ -144,7 +144,7 @@ def _compute_rig_slip(model, patch, frames: int) -> CycleSlip:
     """Compute the slip path of the interface nodes in the last cycle of a rig."""
     settings = numerics.choose_numerics(model)
     is_uniform = slips_uniformly(model, settings.per_point and model.grooves is None)
-    solution = solve.solve(model, settings, patch, 0 if is_uniform else frames)
+    solution = solve.solve_rig(model, settings, patch, 0 if is_uniform else frames)
     amplitude = Measure(solution.values["relative_displacement_amplitude"], "m", 0.0)
     outcome, _ = judge_outcome(
         solution,
@@ -164,7 +164,7 @@ def _compute_rig_slip(model, patch, frames: int) -> CycleSlip:
     elif is_uniform:
         slip = _compute_uniform_slip(model, patch, cycle, patch.pressure.load)
     else:
-        frame_fields = fields.collect_frames(model, settings, patch, solution)
+        frame_fields = fields.collect_interface_fields(model, settings, patch, solution)
         frame_fields = {name: values[1:] for name, values in frame_fields.items()}
         local = frame_fields["slip"]
         tau = frame_fields["shear_stress"]

@@ -44,7 +44,7 @@ from ...accuracy_warnings import Finding, tolerance_warnings
 from ...results.notes import MAX_WORK_CHECK
 from ...results.result import shorten_file_names
 from ...rig.engines import describe_unused_settings
-from ...rig.motion_warnings import law_warnings
+from ...rig.motion_warnings import warn_of_law
 from ..case_results import CaseResults
 
 # Number of windows from which the steady motion is extrapolated (response.settling).
@@ -296,7 +296,7 @@ def _insert_warnings(
         if is_wide[case] or law_has_trait(model.friction.law, "bonds"):
             measures = results.measures_with_errors(case)
             drift = {name: measures[name] for name in ("drift_per_cycle",) if name in measures}
-            warnings += law_warnings(model, outcomes[case], drift, 0.0)
+            warnings += warn_of_law(model, outcomes[case], drift, 0.0)
             warnings += ringing_warnings.get(case, ())
             warnings += tolerance_warnings(Finding(model, measures))
         else:
