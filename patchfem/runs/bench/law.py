@@ -58,3 +58,13 @@ def find_rest_ends(model, slide) -> dict:
     moves = np.sign(np.diff(slide))
     ends = np.flatnonzero((moves != 0) & np.append(True, moves[:-1] == 0))
     return {int(k): float(moves[k]) for k in ends}
+
+
+def nodal_element_limit(model, patch):
+    """Return the friction limit (m,) [Pa] at the nodes of parallel elements, otherwise None."""
+    is_element_bench = (
+        model.partial_slip
+        and model.grooves is None
+        and not law_has_trait(model.friction.law, "bonds")
+    )
+    return model.friction.static * patch.pressure.sigma_n if is_element_bench else None

@@ -39,6 +39,7 @@ from ..results.travel import (
 from . import bench, shear
 from .engine import steps_per_cycle
 from .errors import BenchErrors, estimate_bench_errors
+from .law import nodal_element_limit
 from .ledger import BenchOptions
 
 MAX_EXTRA_CYCLES = 4  # Largest number of added cycles in the search for a steady loop.
@@ -80,7 +81,7 @@ def run_prescribed(inputs: RunInputs) -> Result:
             fine.tau,
             fine.local,
             fine.slide[fine.frames],
-            SlipRule(shear.element_limit(model, patch), starts_at_rest=True),
+            SlipRule(nodal_element_limit(model, patch), starts_at_rest=True),
         )
     measures = remove_unknown_errors(
         measures, inputs.estimate and can_estimate_mesh_error(model, patch, inputs.coarse)

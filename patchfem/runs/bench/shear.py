@@ -56,16 +56,6 @@ def _slide_elements(task: SlideTask) -> SlideHistories:
     return response.to_slide_histories(patch.pressure.load, tau, local)
 
 
-def element_limit(model, patch):
-    """Return the friction limit (m,) [Pa] at the nodes of parallel elements, otherwise None."""
-    is_element_bench = (
-        model.partial_slip
-        and model.grooves is None
-        and not law_has_trait(model.friction.law, "bonds")
-    )
-    return model.friction.static * patch.pressure.sigma_n if is_element_bench else None
-
-
 def _slide_over_grooves(task: SlideTask) -> SlideHistories:
     """Compute the friction histories of elastic pieces over grooves by shear modes."""
     model = task.model

@@ -161,11 +161,11 @@ def find_holding_ratio(model: Model, acceleration: float | None = None) -> float
     rig = model.rig
     if f is None or not law_has_trait(f.law, "bonds"):
         return 0.0
-    released = rig.drive.kind == "free"
-    printed = f.reading == "report"
-    if not printed and (released or model.bonds.order != 0):
+    is_released = rig.drive.kind == "free"
+    is_printed_law = f.reading == "report"
+    if not is_printed_law and (is_released or model.bonds.order != 0):
         return 0.0
-    if released:
+    if is_released:
         if rig.start is None or sum_form(model.bonds) != FORM_REPORT_GROWING:
             return 0.0
         slides = rig.modes.interfaces @ rig.start.z
@@ -181,8 +181,10 @@ def find_min_growing_ratio(model: Model) -> float:
     It is 1 for a driven block if each step leaves a permanent strip, i.e. if the bonds grow or have
     order 0. Otherwise it is MIN_STUCK_RATIO.
     """
-    leaves = sum_form(model.bonds) == FORM_REPORT_GROWING or model.friction.reading != "report"
-    return 1.0 if leaves and model.rig.drive.kind != "free" else MIN_STUCK_RATIO
+    leaves_strips = (
+        sum_form(model.bonds) == FORM_REPORT_GROWING or model.friction.reading != "report"
+    )
+    return 1.0 if leaves_strips and model.rig.drive.kind != "free" else MIN_STUCK_RATIO
 
 
 def is_stuck_by_printed_law(model: Model) -> bool:
@@ -212,7 +214,7 @@ def is_list_growing(model: Model) -> bool:
     """Return whether the bond list gets a new entry in almost every time step.
 
     This is the case if a law without stiffness holds the block at some time of the run (see
-    `stuck_force_ratio`). Pieces with shear compliance have a stiffness, and their lists are merged.
+    `find_holding_ratio`). Pieces with shear compliance have a stiffness, and their lists are merged.
     """
     if model.partial_slip:
         return False
@@ -280,7 +282,7 @@ def _compute_constraint_force(rig, omega: float, accelerations, slides) -> float
         return inf
 
 
-def is_list_too_long(model: Model, numerics: Numerics, book: dict) -> bool:
+def is_list_too_long(model: Model, numerics: Numerics, counters: dict) -> bool:
     """Return whether the bond list is too long to halve the time step once more.
 
     This is the case if it gets a strip every few steps. Bonds that grow leave a strip in each step
@@ -290,10 +292,10 @@ def is_list_too_long(model: Model, numerics: Numerics, book: dict) -> bool:
     ----------
     model : Model
     numerics : Numerics
-    book : dict
+    counters : dict
         Counters of the run, including "strips".
     """
-    strips = book.get("strips", 0.0)
+    strips = counters.get("strips", 0.0)
     if strips <= MIN_LONG_LIST or model.bonds.reading != "report":
         return False
     if sum_form(model.bonds) == FORM_REPORT_GROWING:
@@ -301,7 +303,7 @@ def is_list_too_long(model: Model, numerics: Numerics, book: dict) -> bool:
     return strips > MAX_STRIPS_PER_STEP * numerics.cycles * numerics.steps
 
 
-def has_doubling_failed(book: dict, errors: list) -> bool:
+def has_doubling_failed(counters: dict, errors: list) -> bool:
     """Return whether two doublings of the steps have not reduced the error of a bond list.
 
     The list of a released block that reverses in almost every step depends on the step size: errors
@@ -310,12 +312,12 @@ def has_doubling_failed(book: dict, errors: list) -> bool:
 
     Parameters
     ----------
-    book : dict
+    counters : dict
         Counters of the run, including "strips".
     errors : list
         Error of the displacement [m] after each doubling.
     """
-    return book.get("strips", 0.0) > 0 and len(errors) > 2 and errors[-1] >= errors[-3]
+    return counters.get("strips", 0.0) > 0 and len(errors) > 2 and errors[-1] >= errors[-3]
 
 
 class ListCost(NamedTuple):

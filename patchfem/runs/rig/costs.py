@@ -167,7 +167,7 @@ def estimate_elements(model: Model) -> tuple:
     A rigid element has no spring and counts with stiffness 0.
     """
     count = 0
-    stiff = 0.0
+    max_stiffness = 0.0
     for interface in model.rig.friction.interfaces:
         load = find_interface_load(model, interface)
         if law_has_trait(interface.numbers.law, "set-valued"):
@@ -184,8 +184,8 @@ def estimate_elements(model: Model) -> tuple:
             if not patch.mesh.is_automatic:
                 n_elements = round(patch.pieces.length / patch.uniform_element_size) + 1
         count = count + n_elements
-        stiff = max(stiff, stiffness if stiffness < inf else 0.0)
-    return count, stiff
+        max_stiffness = max(max_stiffness, stiffness if stiffness < inf else 0.0)
+    return count, max_stiffness
 
 
 def intervals_per_cycle(model: Model) -> float:
@@ -207,13 +207,13 @@ def count_intervals_by_cause(model: Model) -> tuple:
     rate = damping / 2 + sqrt(
         damping**2 / 4 + modal.max_omega_squared + stiff * max(modal.inverse_mass, default=0.0)
     )
-    rows = 0 if drive.segments else len(drive.breaks) / model.rig.drive.cycles
-    ringing = (
+    n_rows = 0 if drive.segments else len(drive.breaks) / model.rig.drive.cycles
+    vibration = (
         max(rate * drive.period, 2 * pi * find_max_frequency_ratio(drive)) / MAX_INTERVAL_PHASE
     )
     quick = find_max_frequency_ratio(drive)
-    events = 2 * max(count, n_interfaces) * quick + 2 + rows
-    return ringing, events
+    events = 2 * max(count, n_interfaces) * quick + 2 + n_rows
+    return vibration, events
 
 
 def estimate_max_exact_seconds(model: Model) -> float:
@@ -247,7 +247,7 @@ def estimate_exact_seconds(model: Model) -> float:
     laws = rig.friction.interfaces
     limit = sum(law.numbers.static * find_interface_load(model, law) for law in laws)
     drive_force = rig.drive.force or rig.first_mode.mass * find_max_acceleration(rig.drive.signal)
-    ringing, events = count_intervals_by_cause(model)
+    vibration, events = count_intervals_by_cause(model)
     stick_fraction = (
         min(1.0, limit / drive_force) ** STICKING_EXPONENT if stiff and drive_force else 1.0
     )
@@ -257,7 +257,7 @@ def estimate_exact_seconds(model: Model) -> float:
             + _estimate_extra_interval_seconds(model)
             + cost_model.PIECE_ELEMENT_SECONDS * count
         )
-        * (ringing * stick_fraction + events)
+        * (vibration * stick_fraction + events)
         * rig.drive.cycles
     )
 
@@ -313,14 +313,14 @@ def refuse_long_exact_run(model: Model, numerics=None) -> None:
         )
 
 
-def predict_exact_cost(model: Model, numerics, points: int) -> Cost:
+def predict_exact_cost(model: Model, numerics, n_points: int) -> Cost:
     """Predict the cost of an event-driven run.
 
     Parameters
     ----------
     model : Model
     numerics : Numerics
-    points : int
+    n_points : int
         Number of interface nodes; not used.
     """
     steps = int(intervals_per_cycle(model) * numerics.cycles)
@@ -447,23 +447,27 @@ def estimate_smooth_steps(model: Model, element: "Element") -> float:
     modes = model.rig.modes
     omega = find_drive_omega(rig.drive.signal)
     period = rig.drive.signal.period
-    damper = modes.damping_matrix
+    damping = modes.damping_matrix
     max_rate = max(
         float(modes.omega.max()),
-        float(np.abs(damper).sum(axis=1).max()),
+        float(np.abs(damping).sum(axis=1).max()),
         omega * find_max_frequency_ratio(rig.drive.signal),
     )
     inverse_mass = float((modes.slide**2).sum()) / modes.mass
-    rigid = 0.0
+    stiff_rate = 0.0
     if not element.length:
         slope = element.limit / model.friction.reference_speed
-        rigid = slope * inverse_mass * estimate_stiff_time_fraction(model, element)
+        stiff_rate = slope * inverse_mass * estimate_stiff_time_fraction(model, element)
     path = 4 * model.speed_scale / omega
     states = path / element.length if element.state_scales and element.length else 0.0
-    grown = model.friction.slip_growth if law_has_trait(model.friction.law, "bonds") else None
-    if grown:
-        states = max(states, path / grown)
-    return 24 + 1.2 * max_rate * period + (states + rigid * period) / MAX_STEP_RELAXATION_LENGTHS
+    growth_length = (
+        model.friction.slip_growth if law_has_trait(model.friction.law, "bonds") else None
+    )
+    if growth_length:
+        states = max(states, path / growth_length)
+    return (
+        24 + 1.2 * max_rate * period + (states + stiff_rate * period) / MAX_STEP_RELAXATION_LENGTHS
+    )
 
 
 def estimate_stiff_time_fraction(model: Model, element: "Element") -> float:
@@ -487,14 +491,14 @@ def estimate_stiff_time_fraction(model: Model, element: "Element") -> float:
     return min(1.0, float(np.exp(STIFF_TIME_EXPONENT * (1 - r))))
 
 
-def predict_smooth_cost(model: Model, numerics, points: int) -> Cost:
+def predict_smooth_cost(model: Model, numerics, n_points: int) -> Cost:
     """Predict the cost of a run of the smooth engine and its coarse run.
 
     Parameters
     ----------
     model : Model
     numerics : Numerics
-    points : int
+    n_points : int
         Number of interface nodes; not used.
     """
     rig = model.rig

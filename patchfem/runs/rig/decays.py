@@ -43,26 +43,26 @@ MAX_POINT_ERROR = 0.5  # Largest relative error at which a point of a decay curv
 AMPLITUDES_PER_DECADE = 16  # Number of amplitudes per decade at which the mesh error is computed.
 
 
-def compute_decay_curve(raw: Solution) -> DecayCurve | None:
+def compute_decay_curve(solution: Solution) -> DecayCurve | None:
     """Return the decay curve of a released rig with errors, or None if it has no points.
 
     The errors are those of the evaluation plus the changes in the coarse runs at the same
     amplitude. They are infinite outside the range of a coarse run. Points with a relative error
     above MAX_POINT_ERROR are removed.
     """
-    curve = _measure_decay_curve(raw)
+    curve = _measure_decay_curve(solution)
     if not curve.time.size:
         return None
-    curve = _add_coarse_changes(curve, raw)
+    curve = _add_coarse_changes(curve, solution)
     known = (curve.frequency_error <= MAX_POINT_ERROR * curve.frequency) & (
         curve.damping_error <= MAX_POINT_ERROR * np.abs(curve.damping)
     )
     return curve.at(known) if known.any() else None
 
 
-def _add_coarse_changes(curve: DecayCurve, raw: Solution) -> DecayCurve:
+def _add_coarse_changes(curve: DecayCurve, solution: Solution) -> DecayCurve:
     """Add the differences from coarse runs to the errors of a decay curve."""
-    for run, beside in raw.coarser:
+    for run, beside in solution.coarser:
         coarse = _measure_decay_curve(run).interpolate(curve.amplitude)
         reference = (
             curve if beside is None else _measure_decay_curve(beside).interpolate(curve.amplitude)

@@ -306,7 +306,7 @@ def _list_bond_sum_runs(model: Model, quarter, patch, solution) -> list:
     large tail is neglected, the second entry is the change of the motion with narrower strips and a
     smaller tail. Its runs have the settings `quarter`, i.e. a quarter of the steps.
     """
-    choice = solution.summed
+    choice = solution.bond_summation
     if choice is None or not choice.error:
         return []
     coarser_runs = [

@@ -40,14 +40,20 @@ class RunEvaluator:
     patch : Patch or None
     contact : optional
         Contact model of the engine.
-    held : float
+    stick_tolerance : float
         Largest slip per cycle [m] at which the interface counts as stuck.
     steps : int, optional
         Samples per cycle; default: the steps per cycle of `numerics`.
     """
 
     def __init__(
-        self, model, numerics, patch, contact=None, held: float = 0.0, steps: int | None = None
+        self,
+        model,
+        numerics,
+        patch,
+        contact=None,
+        stick_tolerance: float = 0.0,
+        steps: int | None = None,
     ):
         self.model = model
         self.numerics = numerics
@@ -57,7 +63,7 @@ class RunEvaluator:
         self.has_friction = model.friction is not None
         # A law that creeps never sticks.
         self.creeps = self.has_friction and law_has_trait(model.friction.law, "creeps")
-        self.held = 0.0 if self.creeps else held
+        self.stick_tolerance = 0.0 if self.creeps else stick_tolerance
 
     def compute_integrated_measures(self, run, drive, *, stuck: bool = False) -> IntegratedMeasures:
         """Return the measures that the engine integrates over the last cycles.
@@ -133,16 +139,16 @@ class RunEvaluator:
         if not self.has_friction or self.creeps:
             return False
         if loops := self.find_friction_loops(run, self.model.rig.drive.signal):
-            limit = max(self.held, slip_round_off(run.window))
+            limit = max(self.stick_tolerance, slip_round_off(run.window))
             return all(loop.slip_range / 2 <= limit for loop in loops)
-        return run_events.is_all_stuck(run.window, self.held)
+        return run_events.is_all_stuck(run.window, self.stick_tolerance)
 
     def measure_ringing(self, run, drive) -> tuple:
         """Measure frequency and damping of the free vibration during stick, with error estimates."""
         if not self.has_friction or self.creeps:
             return {}, {}
         return run_events.measure_ringing_in_sticks(
-            run.window, self.model.rig.modes, drive, getattr(run, "log", None), self.held
+            run.window, self.model.rig.modes, drive, getattr(run, "log", None), self.stick_tolerance
         )
 
     def estimate_run_errors(self, run, drive, values: dict) -> dict:
@@ -193,12 +199,12 @@ class RunEvaluator:
     def find_uniform_histories(self, run, drive):
         """Return the histories of the whole run if they are uniformly sampled, otherwise None."""
         histories = getattr(run, "response", None)
-        kept = (
+        is_uniform = (
             ROWS_NEEDING_RUN
             and histories is not None
             and choose_samples_per_cycle(drive, self.numerics.cycles, needs_history=True)
         )
-        return histories if kept and histories.time.size and histories.time[0] == 0 else None
+        return histories if is_uniform and histories.time.size and histories.time[0] == 0 else None
 
     def estimate_history_sampling_errors(self, run, drive, values: dict) -> dict:
         """Estimate the sampling errors of measures that depend on all cycles of a run.
@@ -270,7 +276,7 @@ class RunEvaluator:
             book=run.ledger,
             seconds=seconds,
             contact=self.contact,
-            held=self.held,
+            stick_tolerance=self.stick_tolerance,
             run_errors=ring_errors
             | self.estimate_run_errors(run, drive, values)
             | self.estimate_history_sampling_errors(run, drive, values),
@@ -278,12 +284,12 @@ class RunEvaluator:
             **(fields | more),
         )
 
-    def evaluate_level(self, size: float, run, drive=None, relative_error: float = 0.0) -> Level:
+    def evaluate_level(self, level: float, run, drive=None, relative_error: float = 0.0) -> Level:
         """Evaluate a run as one level of the drive.
 
         Parameters
         ----------
-        size : float
+        level : float
             Drive level [m s-2].
         run
             Run of the engine, or its mark at the end of a drive level.
@@ -297,7 +303,7 @@ class RunEvaluator:
         errors = {}
         if relative_error:
             errors = {name: relative_error * abs(value) for name, value in values.items()}
-        return Level(size, self.is_stuck(run), values, errors)
+        return Level(level, self.is_stuck(run), values, errors)
 
 
 def _thin_between_reversals(histories, parity: int):
@@ -306,10 +312,10 @@ def _thin_between_reversals(histories, parity: int):
     Samples whose index modulo 2 is `parity` (0 or 1) remain.
     """
     step = np.diff(histories.slide)
-    kept = np.arange(histories.time.size) % 2 == parity
-    kept[1:-1] |= step[1:] * step[:-1] < 0
-    kept[[0, -1]] = True
-    return histories.select(kept)
+    is_retained = np.arange(histories.time.size) % 2 == parity
+    is_retained[1:-1] |= step[1:] * step[:-1] < 0
+    is_retained[[0, -1]] = True
+    return histories.select(is_retained)
 
 
 def thin_samples(window):
@@ -317,11 +323,11 @@ def thin_samples(window):
 
     The last sample and the samples of events in between remain.
     """
-    place = (window.time - window.time[0]) / np.diff(window.time).max()
-    number = np.round(place).astype(int)
-    kept = (np.abs(place - number) > 1e-6) | (number % 2 == 0)
-    kept[-1] = True
-    return window.select(kept)
+    position = (window.time - window.time[0]) / np.diff(window.time).max()
+    number = np.round(position).astype(int)
+    is_retained = (np.abs(position - number) > 1e-6) | (number % 2 == 0)
+    is_retained[-1] = True
+    return window.select(is_retained)
 
 
 def compute_sampled_work(response) -> dict:

@@ -74,9 +74,9 @@ def run_event_driven(model, numerics, patch, frames: int = 0, say=None, progress
     reader = EventEvaluator(model, numerics, patch, contact_elements(model, numerics, patch))
     rig = model.rig
     begin = perf_counter()
-    more = {}
+    further_fields = {}
     histories.load_event_kernels(say)
-    prepare = {"reduce": reader.reduced, "compiled_code": perf_counter() - begin}
+    prepare = {"reduce": reader.reduction_seconds, "compiled_code": perf_counter() - begin}
     begin = perf_counter()
 
     def integrate(drive, state, watch, is_last, cycles: float = rig.drive.levels.cycles):
@@ -93,7 +93,7 @@ def run_event_driven(model, numerics, patch, frames: int = 0, say=None, progress
             Whether this is the last run, which stores snapshots of the interface.
         cycles : float
         """
-        done = histories.simulate(
+        run = histories.simulate(
             rig.modes,
             drive,
             reader.groups,
@@ -105,15 +105,17 @@ def run_event_driven(model, numerics, patch, frames: int = 0, say=None, progress
             *state,
             even=bool(ROWS_NEEDING_RUN),
         )
-        return reader.average_over_strips(done)
+        return reader.average_over_strips(run)
 
     if rig.drive.levels.amplitudes:
-        done, more = run_levels(reader, integrate, (rig.start, None), lambda run: run.end, progress)
+        run, further_fields = run_levels(
+            reader, integrate, (rig.start, None), lambda run: run.end, progress
+        )
     else:
-        done = integrate(rig.drive.signal, (rig.start, None), progress, True, numerics.cycles)
-        done = remove_incomplete_cycle(done)
-    more |= {} if reader.rigid else {"prepare": prepare}
-    return reader.make_solution(done, perf_counter() - begin, **more)
+        run = integrate(rig.drive.signal, (rig.start, None), progress, True, numerics.cycles)
+        run = remove_incomplete_cycle(run)
+    further_fields |= {} if reader.rigid else {"prepare": prepare}
+    return reader.make_solution(run, perf_counter() - begin, **further_fields)
 
 
 class EventEvaluator(RunEvaluator):
@@ -122,20 +124,27 @@ class EventEvaluator(RunEvaluator):
     `found` are the RigidElements or YieldingElements of the run.
     """
 
-    def __init__(self, model, numerics, patch, found):
+    def __init__(self, model, numerics, patch, contact_elements):
         super().__init__(
-            model, numerics, patch, found.contact, found.held, histories.SAMPLES_PER_CYCLE
+            model,
+            numerics,
+            patch,
+            contact_elements.contact,
+            contact_elements.stick_tolerance,
+            histories.SAMPLES_PER_CYCLE,
         )
-        self.groups = found.groups
-        self.rigid = found.rigid
-        self.reduced = found.seconds
-        self.apart = found.rigid and model.rig.friction.strips_slide_apart
+        self.groups = contact_elements.groups
+        self.rigid = contact_elements.rigid
+        self.reduction_seconds = contact_elements.seconds
+        self.strips_slide_independently = (
+            contact_elements.rigid and model.rig.friction.strips_slide_apart
+        )
 
     def average_over_strips(self, run):
         """Average the histories of strips that slide independently."""
-        if not self.apart:
+        if not self.strips_slide_independently:
             return run
-        loads = strips.strip_loads(self.patch)
+        loads = strips.compute_strip_loads(self.patch)
         offsets = self.patch.strips.offsets
         return replace(
             run,
@@ -145,8 +154,8 @@ class EventEvaluator(RunEvaluator):
 
     def is_stuck(self, run) -> bool:
         """Return whether the interface sticks; strips that slide independently must all stick."""
-        if self.apart and self.has_friction:
-            return run_events.is_all_stuck(run.window, self.held)
+        if self.strips_slide_independently and self.has_friction:
+            return run_events.is_all_stuck(run.window, self.stick_tolerance)
         return super().is_stuck(run)
 
     def compute_integrated_measures(self, run, drive, *, stuck: bool = False) -> IntegratedMeasures:
@@ -168,20 +177,20 @@ class EventEvaluator(RunEvaluator):
             stiffness=first_mode_stiffness(self.model, run.window),
             size=find_max_acceleration(drive),
         )
-        known = {name: None if np.isnan(value) else float(value) for name, value in values.items()}
-        names = list(known)
+        floats = {name: None if np.isnan(value) else float(value) for name, value in values.items()}
+        names = list(floats)
         if not self.has_friction:
             names = [*MOTION_MEASURES, "drift_per_cycle"]
-        elif self.apart:
+        elif self.strips_slide_independently:
             names = [*MOTION_MEASURES, "slip_start_phase"]
         return IntegratedMeasures(
-            {name: known[name] for name in names},
+            {name: floats[name] for name in names},
             loops=self.find_friction_loops(run, drive),
         )
 
     def find_friction_loops(self, run, drive) -> tuple:
         """Return the friction loop of each interface, or that of the mean of independent strips."""
-        return (_compute_strips_loop(run, drive),) if self.apart else run.loops
+        return (_compute_strips_loop(run, drive),) if self.strips_slide_independently else run.loops
 
     def collect_cycle_data(self, run, drive, *, stuck: bool) -> dict:
         """Return the energies of rigid elements, which dissipate all friction work.
@@ -194,7 +203,10 @@ class EventEvaluator(RunEvaluator):
         if not (self.has_friction and self.rigid):
             return {}
         lost = run.ledger["friction"]
-        return {"ledger": np.array([[lost], [0.0], [lost], [0.0]]), "together": self.apart}
+        return {
+            "ledger": np.array([[lost], [0.0], [lost], [0.0]]),
+            "together": self.strips_slide_independently,
+        }
 
     def measure_ringing(self, run, drive) -> tuple:
         """Compute frequency and damping of the free vibration during stick, with error estimates.
@@ -206,8 +218,8 @@ class EventEvaluator(RunEvaluator):
             return {}, {}
         if run.ring is not None:
             return make_ringing_measures(*run.ring, run.acceleration), {}
-        if held := self.compute_stuck_vibration(run, run.window, drive):
-            mode = select_strongest(held, "acceleration")
+        if vibration := self.compute_stuck_vibration(run, run.window, drive):
+            mode = select_strongest(vibration, "acceleration")
             omega = 2 * np.pi * mode.frequency
             return make_ringing_measures(
                 mode.acceleration, omega, mode.damping, run.acceleration
@@ -231,14 +243,14 @@ class EventEvaluator(RunEvaluator):
             Drive of the run.
         """
         springs = [group.stiffness for group in self.groups]
-        held = (
+        is_stuck = (
             self.has_friction
             and not self.rigid
             and all(spring.size == 1 for spring in springs)
             and not any(loop.slip_range for loop in run.loops)
             and (not run.log.time.size or run.log.time[-1] < motion.time[0])
         )
-        if not held or is_periodic(drive) or not drive.segments or motion.time.size < 2:
+        if not is_stuck or is_periodic(drive) or not drive.segments or motion.time.size < 2:
             return []
         return compute_stuck_vibration(self.model.rig.modes, np.concatenate(springs), motion)
 
@@ -252,8 +264,8 @@ class EventEvaluator(RunEvaluator):
         ):
             return {}
         after = run.response.select(run.response.time > run.log.time[-1])
-        held = self.compute_stuck_vibration(run, after, drive)
-        return {"tail": select_strongest(held, "displacement")} if held else {}
+        vibration = self.compute_stuck_vibration(run, after, drive)
+        return {"tail": select_strongest(vibration, "displacement")} if vibration else {}
 
     def estimate_run_errors(self, run, drive, values: dict) -> dict:
         """Estimate the errors due to sampling, and the error of the drift of rigid elements.
@@ -273,13 +285,17 @@ class EventEvaluator(RunEvaluator):
         """
         window = run.window
         modes = self.model.rig.modes
-        left = {} if self.apart else self.estimate_sampling_errors(run, drive, values)
+        errors = {}
+        if not self.strips_slide_independently:
+            errors = self.estimate_sampling_errors(run, drive, values)
         if not self.rigid or window.time[-1] - window.time[0] < 1.5 * drive.period:
-            return left
-        if not self.apart:
-            return left | {"drift_per_cycle": 1e-14 * float(np.abs(window.slide).max(initial=0.0))}
+            return errors
+        if not self.strips_slide_independently:
+            return errors | {
+                "drift_per_cycle": 1e-14 * float(np.abs(window.slide).max(initial=0.0))
+            }
         faster = max(1.0, float(modes.omega.max()) / find_drive_omega(drive)) ** 2
-        return left | {"drift_per_cycle": 1e-13 * faster * float(np.ptp(window.slide))}
+        return errors | {"drift_per_cycle": 1e-13 * faster * float(np.ptp(window.slide))}
 
     def collect_solution_fields(self, run, drive) -> dict:
         """Return the vibration after a release, and the steady amplitude of an unsteady run."""
@@ -312,7 +328,7 @@ def _compute_strips_loop(run, drive) -> InterfaceLoop:
     omega = find_drive_omega(drive)
     gaps = np.diff(window.time)
     weight = np.concatenate([[0.0], gaps / 2]) + np.concatenate([gaps / 2, [0.0]])
-    held = ~window.extra["slide_rates"].any(axis=1)
+    is_stuck = ~window.extra["slide_rates"].any(axis=1)
     power = (window.extra["forces"] * window.extra["slide_rates"]).sum(axis=1)
     slide = window.slide - weight @ window.slide / weight.sum()
     return InterfaceLoop(
@@ -320,7 +336,7 @@ def _compute_strips_loop(run, drive) -> InterfaceLoop:
         force_harmonic=complex(compute_harmonic(window.time, weight, window.force, omega)),
         work=float(weight @ power),
         slip_range=float(np.ptp(window.slip)),
-        stuck_time=float(weight[held].sum()),
+        stuck_time=float(weight[is_stuck].sum()),
         max_force=float(np.abs(window.force).max()),
     )
 
@@ -350,7 +366,7 @@ def may_still_change(extremes, window: int, tolerance: float, decay: float) -> b
     return np.ptp(last, axis=0).max() > limit
 
 
-def find_steady_motion(modes, drive, groups, done) -> tuple | None:
+def find_steady_motion(modes, drive, groups, run) -> tuple | None:
     """Compute the amplitude [m] of the steady motion to which a run converges, and its error.
 
     It is the fixed point of the map over a drive period, which is linear between yield events.
@@ -376,12 +392,12 @@ def find_steady_motion(modes, drive, groups, done) -> tuple | None:
         last is None
         or not is_sinusoidal(drive)
         or last.constant != 0
-        or abs(done.cycles_done - round(done.cycles_done)) > 1e-9
+        or abs(run.cycles_done - round(run.cycles_done)) > 1e-9
     ):
         return None
     sine = SineDrive(last.amplitude, last.omega, drive.moving)
     try:
-        motion = steady_events.continue_to_steady_state(modes, sine, groups, *done.end)
+        motion = steady_events.continue_to_steady_state(modes, sine, groups, *run.end)
     except NotConverged:
         return None
     amplitude, error = find_stable_amplitude(motion.amplitude, motion.residual, motion.multipliers)
@@ -403,8 +419,10 @@ def find_stable_amplitude(amplitude: float, residual: float, multipliers) -> tup
     """
     if np.abs(multipliers).max(initial=0.0) >= 1:
         return np.nan, np.nan
-    apart = max(float(np.abs(1 - multipliers).min(initial=1.0)), 1e-12)
-    return float(amplitude), float(amplitude * max(1e-9, 10 * residual / apart))
+    strips_slide_independently = max(float(np.abs(1 - multipliers).min(initial=1.0)), 1e-12)
+    return float(amplitude), float(
+        amplitude * max(1e-9, 10 * residual / strips_slide_independently)
+    )
 
 
 class YieldingElements:
@@ -412,7 +430,7 @@ class YieldingElements:
 
     - groups: elements of each interface.
     - contact: ContactModel of a single interface.
-    - held: largest slip per cycle [m] at which the interface counts as stuck.
+    - stick_tolerance: largest slip per cycle [m] at which the interface counts as stuck.
     - seconds: CPU time of the reduction [s].
     """
 
@@ -428,7 +446,7 @@ class YieldingElements:
             self.contact = interface.make_single_contact(model, numerics, patch)
             parts = [self.contact.element]
         lengths = [element.length for element in parts if element.limit > 0]
-        self.held = 1e-3 * min(lengths, default=0.0)
+        self.stick_tolerance = 1e-3 * min(lengths, default=0.0)
         self.groups = tuple(convert_to_elements(element) for element in parts)
         for _ in range(numerics.pairs):
             self.groups = tuple(map(elements.merge_elements, self.groups))
@@ -449,7 +467,7 @@ class RigidElements:
 
     rigid = True
     contact = None
-    held = 0.0
+    stick_tolerance = 0.0
     seconds = 0.0
 
     def __init__(self, model, numerics, patch):
@@ -462,7 +480,7 @@ def coulomb_limits(model, patch) -> list:
     rig = model.rig
     friction = model.friction
     if rig.friction.strips_slide_apart:
-        loads = strips.strip_loads(patch)
+        loads = strips.compute_strip_loads(patch)
         return [tuple(map(float, model.friction_limits(load))) for load in loads]
     if friction is None:
         return [(0.0, 0.0)] * len(rig.modes.interfaces)

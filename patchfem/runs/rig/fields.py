@@ -21,7 +21,7 @@ from ..results.result import (
 )
 
 
-def collect_interface_fields(model, numerics, patch, raw) -> dict:
+def collect_interface_fields(model, numerics, patch, solution) -> dict:
     """Collect the fields of the interface at the output frames of the last cycle.
 
     Parameters
@@ -29,7 +29,7 @@ def collect_interface_fields(model, numerics, patch, raw) -> dict:
     model : Model
     numerics : Numerics
     patch : Patch
-    raw : Solution
+    solution : Solution
     """
     sigma = patch.pressure.sigma_n
     f = model.friction
@@ -37,27 +37,31 @@ def collect_interface_fields(model, numerics, patch, raw) -> dict:
     if model.patch.mesh.can_gather_points or (model.partial_slip and patch.strips is not None):
         return collect_rest_frame(patch)
     if model.rig.friction.load_varies:
-        return _collect_varying_load_fields(patch, raw)
-    if not raw.snapshots:
+        return _collect_varying_load_fields(patch, solution)
+    if not solution.snapshots:
         at = (
             np.linspace(
-                max(0, len(raw.window.time) - 1 - len(raw.window.time) // numerics.window),
-                len(raw.window.time) - 1,
+                max(
+                    0, len(solution.window.time) - 1 - len(solution.window.time) // numerics.window
+                ),
+                len(solution.window.time) - 1,
                 N_FRAMES,
             )
             .round()
             .astype(int)
         )
-        tau = np.outer(raw.window.force[at] / patch.pressure.load, sigma)
+        tau = np.outer(solution.window.force[at] / patch.pressure.load, sigma)
         if f is not None and law_has_trait(f.law, "averaged"):
-            tau = averaged_law.distribute_slip_force(model, patch, raw.window.force[at])
-        slip = np.repeat(raw.window.slip[at][:, None], sigma.size, axis=1)
-        return make_interface_frames(patch, raw.window.time[at], tau, slip, raw.window.slide[at])
+            tau = averaged_law.distribute_slip_force(model, patch, solution.window.force[at])
+        slip = np.repeat(solution.window.slip[at][:, None], sigma.size, axis=1)
+        return make_interface_frames(
+            patch, solution.window.time[at], tau, slip, solution.window.slide[at]
+        )
 
-    snapshots = raw.snapshots
+    snapshots = solution.snapshots
     if model.partial_slip and model.grooves is not None:
         tau, local = bench_shear.compute_groove_fields(
-            patch, raw.contact, [(s["slide"], s["nodes"]) for s in snapshots]
+            patch, solution.contact, [(s["slide"], s["nodes"]) for s in snapshots]
         )
         return make_interface_frames(
             patch,
@@ -72,11 +76,13 @@ def collect_interface_fields(model, numerics, patch, raw) -> dict:
     has_node_bonds = numerics.per_point and model.grooves is None and not needs_bond_list(f)
     if law_has_trait(f.law, "bonds") and (shear or has_node_bonds):
         moments = [(s["slide"], s["bonds"]) for s in snapshots]
-        tau, local = fields.point_fields(patch, model.bonds, raw.contact.reduction, moments)
+        tau, local = fields.point_fields(patch, model.bonds, solution.contact.reduction, moments)
     elif shear:
-        length = 0.0 if raw.contact.reduction is None else record.make_law(f).element(1.0).length
+        length = (
+            0.0 if solution.contact.reduction is None else record.make_law(f).element(1.0).length
+        )
         states = [(s["slide"], s["stretch"]) for s in snapshots]
-        tau, local = fields.element_fields(patch, raw.contact.reduction, states, length)
+        tau, local = fields.element_fields(patch, solution.contact.reduction, states, length)
         rule = SlipRule(f.static * sigma)
     else:
         tau = np.array([s["force"] / patch.pressure.load * sigma for s in snapshots])
@@ -85,31 +91,29 @@ def collect_interface_fields(model, numerics, patch, raw) -> dict:
     return make_interface_frames(patch, time, tau, local, slide, rule)
 
 
-def _collect_varying_load_fields(patch, raw) -> dict:
+def _collect_varying_load_fields(patch, solution) -> dict:
     """Collect the fields of an interface under varying normal load at the output frames.
 
     The first frame is the initial state. The status is 0 for open, 1 for stick and 2 for slip.
     """
-    law = raw.contact.law
-    sets = raw.contact.sets
+    law = solution.contact.law
+    sets = solution.contact.sets
     weight = patch.pieces.interface.weight
-    snapshots = raw.snapshots
+    snapshots = solution.snapshots
     time, slide = (
-        np.array([0.0] + [snapshot[key] for snapshot in snapshots]) for key in ("time", "slide")
+        np.array([0.0] + [state[key] for state in snapshots]) for key in ("time", "slide")
     )
-    nodal = np.stack(
-        [patch.pressure.sigma_n * weight] + [snapshot["nodal"] for snapshot in snapshots]
-    )
-    lift = np.array([0.0] + [snapshot["heave"] for snapshot in snapshots])[:, None]
-    turn = np.array([0.0] + [snapshot["turn"] for snapshot in snapshots])[:, None]
+    nodal = np.stack([patch.pressure.sigma_n * weight] + [state["nodal"] for state in snapshots])
+    lift = np.array([0.0] + [state["heave"] for state in snapshots])[:, None]
+    turn = np.array([0.0] + [state["turn"] for state in snapshots])[:, None]
     gap = np.maximum(sets.opening + lift + turn * sets.x + nodal @ sets.c, 0.0)
     gap[nodal > 0] = 0.0
     gap[0] = patch.pressure.gap
     tau = np.zeros_like(nodal)
     local = np.zeros_like(nodal)
-    for k, snapshot in enumerate(snapshots, 1):
-        tau[k], stretch = _compute_nodal_friction(law, snapshot, nodal[k])
-        local[k] = slide[k] - stretch - snapshot["bend"]
+    for k, state in enumerate(snapshots, 1):
+        tau[k], stretch = _compute_nodal_friction(law, state, nodal[k])
+        local[k] = slide[k] - stretch - state["bend"]
     return {
         "time": time,
         "normal_stress": nodal / weight,

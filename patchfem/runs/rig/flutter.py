@@ -58,19 +58,15 @@ def compute_flutter_amplitude(run) -> tuple:
         end_notes.append(
             f"the run ended after {end_time:.4g} s, when the motion exceeded {MAX_TRAVEL:g} m"
         )
-    unstable = [cycle for cycle in cycles if not cycle.is_stable]
-    if not unstable:
+    unstable_cycles = [cycle for cycle in cycles if not cycle.is_stable]
+    if not unstable_cycles:
         return {FLUTTER_MEASURE: Measure(None, unit, None, floor, reason=reason)}, end_notes
-    largest_unstable = unstable[-1]
-    inner = [
-        cycle
-        for cycle in cycles
-        if cycle.is_stable and cycle.amplitude < largest_unstable.amplitude
-    ]
+    limit = unstable_cycles[-1]
+    inner = [cycle for cycle in cycles if cycle.is_stable and cycle.amplitude < limit.amplitude]
     decay_text = "smaller amplitude"
     if inner:
         attractor = inner[-1].amplitude
-        barriers = [cycle.amplitude for cycle in unstable if cycle.amplitude < attractor]
+        barriers = [cycle.amplitude for cycle in unstable_cycles if cycle.amplitude < attractor]
         if barriers:
             decay_text = f"amplitude between {format_length(barriers[-1], 3)} and this"
         decay_text += f" ends in the limit cycle of {format_length(attractor, 3)}, which is stable"
@@ -82,11 +78,9 @@ def compute_flutter_amplitude(run) -> tuple:
         decay_text += f" decays, at least to {lowest} (smaller motions could not be followed)"
     else:
         decay_text += " decays"
-    return {
-        FLUTTER_MEASURE: Measure(largest_unstable.amplitude, unit, largest_unstable.error, floor)
-    }, [
+    return {FLUTTER_MEASURE: Measure(limit.amplitude, unit, limit.error, floor)}, [
         "a mode of negative damping gains energy: without a drive this mode has an unstable steady oscillation of "
-        f"{format_length(largest_unstable.amplitude, 4)} at the output, at {largest_unstable.omega / 6.283185307179586:.4g} "
+        f"{format_length(limit.amplitude, 4)} at the output, at {limit.omega / 6.283185307179586:.4g} "
         "Hz; a free oscillation of "
         f"{decay_text}, and a free oscillation of larger amplitude grows",
         *end_notes,

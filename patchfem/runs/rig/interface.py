@@ -49,31 +49,31 @@ def make_contact(model: Model, numerics: Numerics, patch):
         If the law cannot be combined with other joints.
     """
     rig = model.rig
-    second = model.rig.modes.lateral_faces
-    many = len(rig.modes.interfaces) > 1 or second is not None
+    lateral_rows = model.rig.modes.lateral_faces
+    has_joints = len(rig.modes.interfaces) > 1 or lateral_rows is not None
     if model.grooves is not None:
         return _make_groove_contact(model, patch, numerics.shear_modes)
-    alone = None if many else make_single_contact(model, numerics, patch)
-    if not many and not rig.springs.is_nonlinear:
+    alone = None if has_joints else make_single_contact(model, numerics, patch)
+    if not has_joints and not rig.springs.is_nonlinear:
         return alone
 
     rows = [*rig.modes.interfaces]
     all_joints = []
-    if many:
+    if has_joints:
         elements = _make_independent_elements(model, numerics, patch)
         all_joints = [joints.Joint(k, element) for k, element in enumerate(elements)]
-    if second is not None:
+    if lateral_rows is not None:
         is_lateral = [bool(interface.lateral) for interface in rig.friction.interfaces]
         all_joints = joints.pair_plane_joints(all_joints, is_lateral)
-        rows += [row for row, lateral in zip(second, is_lateral) if lateral]
+        rows += [row for row, lateral in zip(lateral_rows, is_lateral) if lateral]
     if rig.springs.interlock is not None:
         all_joints.append(joints.make_interlocking_spring(0, *rig.springs.interlock))
     if rig.springs.cubic is not None:
         all_joints.append(joints.make_cubic_spring(len(rows), rig.springs.cubic))
         rows.append(rig.modes.output)
     size = rig.modes.mass * find_drive_omega(rig.drive.signal) * rig.speed_scale
-    beside = alone if alone is not None and alone.limit > 0 else None
-    return joints.JointsModel(beside, tuple(all_joints), np.array(rows), size)
+    single_contact = alone if alone is not None and alone.limit > 0 else None
+    return joints.JointsModel(single_contact, tuple(all_joints), np.array(rows), size)
 
 
 def _make_independent_elements(model: Model, numerics: Numerics, patch) -> list:
@@ -87,7 +87,7 @@ def _make_independent_elements(model: Model, numerics: Numerics, patch) -> list:
         return [parallel_element(*strip_element) for strip_element in strip_elements]
     law = model.rig.friction.interfaces[0]
     speed = model.rig.speed_scale
-    return [make_element(law, load, speed) for load in strips.strip_loads(patch)]
+    return [make_element(law, load, speed) for load in strips.compute_strip_loads(patch)]
 
 
 def make_interface_elements(model: Model, meshed: tuple) -> list:
@@ -217,21 +217,23 @@ def _compute_shear_modes(patch, law, count: int | None, model) -> tuple:
     """
     cache = _SHEAR_MODE_CACHE.setdefault(patch, {})
     tolerance = model.accuracy.tolerance
-    few = model.patch.mesh.can_gather_points
-    if (law, count, tolerance, few) not in cache:
-        mode_tolerance = (REDUCTION_TOL_FRACTION if few else 0.1) * tolerance
-        reduced = fields.bond_shear_modes(patch, law, count, mode_tolerance, fewest=few)
+    has_few_points = model.patch.mesh.can_gather_points
+    if (law, count, tolerance, has_few_points) not in cache:
+        mode_tolerance = (REDUCTION_TOL_FRACTION if has_few_points else 0.1) * tolerance
+        reduced = fields.bond_shear_modes(patch, law, count, mode_tolerance, fewest=has_few_points)
         force = None
-        if few:
+        if has_few_points:
             reduced, force, _ = shear_modes.fewest_gauss_points(
                 reduced, patch.x[reduced.points], REDUCTION_TOL_FRACTION * tolerance
             )
             force = force / law.static
-        cache[law, count, tolerance, few] = reduced, force
-    return cache[law, count, tolerance, few]
+        cache[law, count, tolerance, has_few_points] = reduced, force
+    return cache[law, count, tolerance, has_few_points]
 
 
-def reduce_to_few_points(patch, law, tolerance: float, points: int, modes: int) -> tuple | None:
+def reduce_to_few_points(
+    patch, law, tolerance: float, n_points: int, max_modes: int
+) -> tuple | None:
     """Approximate a patch by a few contact points and as few shear modes as possible.
 
     Parameters
@@ -241,7 +243,7 @@ def reduce_to_few_points(patch, law, tolerance: float, points: int, modes: int) 
         Bond parameters.
     tolerance : float
         Largest error of the backbone curve of the patch, relative to the friction limit.
-    points, modes : int
+    n_points, modes : int
         Number of points, and largest number of modes.
 
     Returns
@@ -251,19 +253,19 @@ def reduce_to_few_points(patch, law, tolerance: float, points: int, modes: int) 
         relative to the friction limit; None if more modes are needed.
     """
     cache = _SHEAR_MODE_CACHE.setdefault(patch, {})
-    key = (law.static, law.length, law.ratio, tolerance, points, modes)
+    key = (law.static, law.length, law.ratio, tolerance, n_points, max_modes)
     if key not in cache:
         all_modes = fields.bond_shear_modes(patch, law, None, tolerance, fewest=True)
         cache[key] = None
-        if all_modes.stiffness.size <= modes:
-            few, limit, error = shear_modes.modes_on_gauss(
-                all_modes, patch.x[all_modes.points], points
+        if all_modes.stiffness.size <= max_modes:
+            reduced, limit, error = shear_modes.modes_on_gauss(
+                all_modes, patch.x[all_modes.points], n_points
             )
-            whole = all_modes.spectrum.backbone(max(shear_modes.N_REFERENCE_MODES, 4 * modes))
+            whole = all_modes.spectrum.backbone(max(shear_modes.N_REFERENCE_MODES, 4 * max_modes))
             error += all_modes.spectrum.relative_difference(
                 whole, all_modes.spectrum.backbone(all_modes.stiffness.size)
             )
-            cache[key] = (few, limit, error) if error <= 2 * tolerance else None
+            cache[key] = (reduced, limit, error) if error <= 2 * tolerance else None
     return cache[key]
 
 

@@ -69,7 +69,7 @@ def _find_level_values(solution, number: int) -> dict:
     return solution.levels[number].values if number < len(solution.levels) else {}
 
 
-def find_onset(levels, probe, tolerance: float, is_past_onset=None) -> tuple | None:
+def find_onset(levels, run_level, tolerance: float, is_past_onset=None) -> tuple | None:
     """Find the drive level [m s-2] of the onset by bisection, with its uncertainty.
 
     The bisection starts between the last level before the onset and the first level after it, and
@@ -79,7 +79,7 @@ def find_onset(levels, probe, tolerance: float, is_past_onset=None) -> tuple | N
     Parameters
     ----------
     levels : sequence of Level
-    probe : callable
+    run_level : callable
         Function (index, level) -> Level that runs a level [m s-2] from the final state of the level
         with this index, or from rest for the index -1.
     tolerance : float
@@ -104,7 +104,7 @@ def find_onset(levels, probe, tolerance: float, is_past_onset=None) -> tuple | N
         if high - low <= tolerance * (high if low else first.drive):
             break
         middle = (low + high) / 2
-        if is_past_onset(probe(before, middle)):
+        if is_past_onset(run_level(before, middle)):
             high = middle
         else:
             low = middle
@@ -128,7 +128,7 @@ def replace_level(drive, number: int, level: float):
 
 
 def compute_level_measures(
-    rig, levels, probe, tolerance: float, *, has_friction: bool, coarser=()
+    rig, levels, run_level, tolerance: float, *, has_friction: bool, coarser=()
 ) -> dict:
     """Compute onset level, largest jump and hysteresis of a drive in levels.
 
@@ -140,7 +140,7 @@ def compute_level_measures(
     rig : Rig
         Defines the kind of onset.
     levels : sequence of Level
-    probe : callable
+    run_level : callable
         See `find_onset`.
     tolerance : float
     has_friction : bool
@@ -152,15 +152,15 @@ def compute_level_measures(
     unit_factor = _find_level_factor(rig)
     measures = {}
     is_past_onset = make_onset_test(*rig.drive.levels.onset)
-    lowest = find_onset(levels, probe, tolerance, is_past_onset) if has_friction else None
+    lowest = find_onset(levels, run_level, tolerance, is_past_onset) if has_friction else None
     if lowest is not None:
         level, half_width = lowest
         change = 0.0
         for run, beside in coarser:
-            coarse_onset = find_onset(run.levels, run.probe, tolerance, is_past_onset)
+            coarse_onset = find_onset(run.levels, run.run_level, tolerance, is_past_onset)
             reference = lowest
             if beside is not None:
-                reference = find_onset(beside.levels, beside.probe, tolerance, is_past_onset)
+                reference = find_onset(beside.levels, beside.run_level, tolerance, is_past_onset)
             is_missing = coarse_onset is None or reference is None
             change += level if is_missing else abs(coarse_onset[0] - reference[0])
         measures["onset_level"] = Measure(
@@ -225,7 +225,7 @@ def run_levels(reader, integrate, state, find_end_state, progress=None) -> tuple
     Returns
     -------
     tuple
-        Joined run, and the fields `levels` and `probe` of its Solution.
+        Joined run, and the fields `levels` and `run_level` of its Solution.
     """
     rig = reader.model.rig
     omega = find_drive_omega(rig.drive.signal)
@@ -234,7 +234,7 @@ def run_levels(reader, integrate, state, find_end_state, progress=None) -> tuple
     runs = []
     level_results = []
 
-    def probe(number: int, level: float) -> Level:
+    def run_level(number: int, level: float) -> Level:
         """Run a level from the final state of level `number`, or from rest if it is -1."""
         sine = SineDrive(level, omega, moving)
         run = integrate(sine, states[number + 1], None, False)
@@ -254,7 +254,7 @@ def run_levels(reader, integrate, state, find_end_state, progress=None) -> tuple
         if run.outcome is not None:
             break
     joined = join_runs(runs, rig.drive.levels.cycles * rig.drive.signal.period)
-    return joined, {"levels": tuple(level_results), "probe": probe}
+    return joined, {"levels": tuple(level_results), "run_level": run_level}
 
 
 def _report_fraction(progress, level: int, n_levels: int, fraction: float) -> None:
@@ -262,12 +262,12 @@ def _report_fraction(progress, level: int, n_levels: int, fraction: float) -> No
     progress((level + fraction) / n_levels)
 
 
-def remove_incomplete_cycle(done):
+def remove_incomplete_cycle(run):
     """Remove the extremes and the Fourier coefficient of an incomplete last cycle."""
-    count = int(done.cycles_done + 1e-9)
-    if not count or count >= len(done.amplitudes):
-        return done
-    return replace(done, amplitudes=done.amplitudes[:count], phasors=done.phasors[:count])
+    count = int(run.cycles_done + 1e-9)
+    if not count or count >= len(run.amplitudes):
+        return run
+    return replace(run, amplitudes=run.amplitudes[:count], phasors=run.phasors[:count])
 
 
 def join_runs(runs: list, duration: float):

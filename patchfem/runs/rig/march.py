@@ -91,7 +91,7 @@ def march_without_evaluation(
     progress = ListGuard(progress) if has_bond_list(model, numerics) else progress
     # The histories of a patch that is reduced to a few points are not used.
     keeps_extremes = model.patch is not None and model.patch.mesh.can_gather_points
-    done = engine.march(
+    run = engine.march(
         rig.modes,
         rig.drive.signal,
         contact,
@@ -109,32 +109,30 @@ def march_without_evaluation(
         even=bool(ROWS_NEEDING_RUN),
     )
     seconds = perf_counter() - begin
-    done = (
-        strips.average_march_over_strips(done, patch) if rig.friction.strips_slide_apart else done
-    )
-    return March(contact, done, seconds, {"reduce": reduced, "compiled_code": loaded})
+    run = strips.average_march_over_strips(run, patch) if rig.friction.strips_slide_apart else run
+    return March(contact, run, seconds, {"reduce": reduced, "compiled_code": loaded})
 
 
 class MarchEvaluator(RunEvaluator):
     """Evaluation of the runs of a march."""
 
     def __init__(self, model, numerics, patch, contact):
-        held = 0.0
+        stick_tolerance = 0.0
         if model.friction is not None and contact.set_valued:
             drive = model.rig.drive.signal
-            held = 1e-15 * estimate_peak_speed(drive) * drive.period
+            stick_tolerance = 1e-15 * estimate_peak_speed(drive) * drive.period
         elif model.friction is not None:
-            held = 1e-3 * contact.length
-        super().__init__(model, numerics, patch, contact, held)
+            stick_tolerance = 1e-3 * contact.length
+        super().__init__(model, numerics, patch, contact, stick_tolerance)
 
     def collect_solution_fields(self, run, drive) -> dict:
         """Return drive levels, bond summation and errors due to the end of the run."""
         fields = {
-            "summed": self.choose_bond_summation(),
+            "bond_summation": self.choose_bond_summation(),
             "extra": {"late": self.estimate_end_errors(run.window)},
         }
         if self.model.rig.drive.levels.amplitudes:
-            fields["levels"], fields["probe"] = self._evaluate_levels(run)
+            fields["levels"], fields["run_level"] = self._evaluate_levels(run)
         return fields
 
     def estimate_run_errors(self, run, drive, values: dict) -> dict:
@@ -208,7 +206,7 @@ class MarchEvaluator(RunEvaluator):
         return {
             "book": self._compute_energies(run, drive, stuck=stuck),
             "loop": self._compute_loop(run, drive),
-            "still": self.held if self.contact.set_valued else 0.0,
+            "still": self.stick_tolerance if self.contact.set_valued else 0.0,
             "together": self.model.rig.friction.strips_slide_apart,
             "inside": self.add_samples_inside_steps,
         }
@@ -272,7 +270,7 @@ class MarchEvaluator(RunEvaluator):
         rig = self.model.rig
         numerics = self.numerics
 
-        def probe(number, level):
+        def run_level(number, level):
             """Run a level from the final state of level `number`, or from rest if it is -1."""
             other = rig_levels.replace_level(rig.drive.signal, number + 1, level)
             if number >= 0:
@@ -287,4 +285,4 @@ class MarchEvaluator(RunEvaluator):
             return self.evaluate_level(level, mark, other)
 
         marks = zip(rig.drive.levels.amplitudes, done.marks)
-        return tuple(self.evaluate_level(size, mark) for size, mark in marks), probe
+        return tuple(self.evaluate_level(size, mark) for size, mark in marks), run_level

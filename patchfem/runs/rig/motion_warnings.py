@@ -111,22 +111,22 @@ def warn_of_peak_at_sweep_end(run, modes) -> list:
     """
     peak = run.measures.get("peak_frequency")
     drive = run.model.rig.drive.signal
-    at = None
+    end = None
     if peak is not None and peak.value is not None:
-        at = find_sweep_end(peak.value, drive.low, drive.high)
-    if at is None or not run.measures["relative_displacement_amplitude"].value > 0:
+        end = find_sweep_end(peak.value, drive.low, drive.high)
+    if end is None or not run.measures["relative_displacement_amplitude"].value > 0:
         return []
-    upper = at == max(drive.low, drive.high)
-    key = "drive.from" if at == drive.low else "drive.to"
+    upper = end == max(drive.low, drive.high)
+    key = "drive.from" if end == drive.low else "drive.to"
     side, move = ("above", "raise") if upper else ("below", "lower")
-    resonance = _describe_nearest_resonance(modes(), at, upper=upper)
+    resonance = _describe_nearest_resonance(modes(), end, is_above=upper)
     beyond = f"no mode of the scene has its resonance {side} this frequency"
     if resonance:
         beyond = (
             f"a resonance may lie {side} this frequency: {resonance}; {move} {key} to include it"
         )
     return [
-        f"the largest response lies at {key} = {format_number(at, 6)} Hz, the {'upper' if upper else 'lower'} end of the "
+        f"the largest response lies at {key} = {format_number(end, 6)} Hz, the {'upper' if upper else 'lower'} end of the "
         f"swept frequencies, so that it may be no resonance; {beyond}"
     ]
 
@@ -136,35 +136,35 @@ def find_sweep_end(frequency: float, *ends: float) -> float | None:
     return next((end for end in ends if abs(frequency - end) <= EQUAL_FREQUENCY_TOL * end), None)
 
 
-def _describe_nearest_resonance(modes: list, at: float, *, upper: bool) -> str:
+def _describe_nearest_resonance(modes: list, frequency: float, *, is_above: bool) -> str:
     """Describe the nearest resonance above or below a frequency, or return "".
 
     Parameters
     ----------
     modes : list of dict
         See `plan.mode_frequencies`.
-    at : float
+    frequency : float
         Frequency [Hz].
-    upper : bool
+    is_above : bool
         Whether to search above the frequency.
     """
-    near = []
+    candidates = []
     for mode in modes:
         free = mode["free_frequency"]
         stuck = mode["stuck_frequency"]
         low = free
         high = free if stuck is None else max(free, stuck)
-        is_beyond = 0 < low < at * (1 - EQUAL_FREQUENCY_TOL)
-        if upper:
-            is_beyond = high > at * (1 + EQUAL_FREQUENCY_TOL)
+        is_beyond = 0 < low < frequency * (1 - EQUAL_FREQUENCY_TOL)
+        if is_above:
+            is_beyond = high > frequency * (1 + EQUAL_FREQUENCY_TOL)
         if is_beyond:
             phrase = f"{mode['name']} has its resonance at {format_number(low, 4)} Hz"
             if high > low:
                 phrase += (
                     f" with a free interface and {format_number(high, 4)} Hz with one that sticks"
                 )
-            near.append((max(low - at, at - high, 0.0), phrase))
-    return min(near)[1] if near else ""
+            candidates.append((max(low - frequency, frequency - high, 0.0), phrase))
+    return min(candidates)[1] if candidates else ""
 
 
 def collect_notes(run) -> list:
@@ -172,13 +172,13 @@ def collect_notes(run) -> list:
     model = run.model
     solution = run.solution
     rig = run.model.rig
-    ended = _note_on_lateral_motion(run)
+    end_notes = _note_on_lateral_motion(run)
     if solution.message and solution.outcome is Outcome.LEAVES_GROOVES:
-        ended.append(solution.message)
+        end_notes.append(solution.message)
     if run.patch is not None and run.patch.strips is not None and model.partial_slip:
         return [
             "strips that slip part by part have no common shear stress, so the fields contain only the pressure",
-            *ended,
+            *end_notes,
         ]
     notes = [
         *_note_on_bond_growth(model, run.patch, solution),
@@ -187,17 +187,17 @@ def collect_notes(run) -> list:
     f = model.friction
     if len(rig.friction.interfaces):
         notes += _note_on_elements(run)
-    if solution.levels and rig.drive.levels.onset[0] == "slip" and solution.held > 0:
+    if solution.levels and rig.drive.levels.onset[0] == "slip" and solution.stick_tolerance > 0:
         notes.append(
-            f"onset_level: slip counts only if its amplitude is above {format_length(solution.held)}, a thousandth of the "
-            "elastic range of the interface; a part of the interface may slip earlier"
+            f"onset_level: slip counts only if its amplitude is above {format_length(solution.stick_tolerance)}, "
+            "a thousandth of the elastic range of the interface; a part of the interface may slip earlier"
         )
     return [
         *rig.structure.reduction_notes,
         *notes,
         *note_on_creep(f),
         *_note_on_release(run),
-        *ended,
+        *end_notes,
     ]
 
 
@@ -228,14 +228,16 @@ def _note_on_lateral_motion(run) -> list:
         or not run.patch.strips.load
     ):
         return []
-    swing, share = strips.estimate_lateral_motion(run.patch, run.solution.window, run.drive.period)
-    if not swing > 0:
+    amplitude, lengthening = strips.estimate_lateral_motion(
+        run.patch, run.solution.window, run.drive.period
+    )
+    if not amplitude > 0:
         return []
     computed = "friction is" if run.model.wear is None else "friction and the wear are"
     return [
-        f"the yaw moves the ends of the patch by up to {format_length(swing)} across x, but the "
+        f"the yaw moves the ends of the patch by up to {format_length(amplitude)} across x, but the "
         f"{computed} computed without this motion, which would lengthen the sliding path of the last cycle by "
-        f"{100 * share:.2g} % (mean over the patch, weighted by the pressure)"
+        f"{100 * lengthening:.2g} % (mean over the patch, weighted by the pressure)"
     ]
 
 
@@ -253,14 +255,14 @@ def note_on_creep(friction) -> list:
 def _warn_of_single_point(model, patch, numerics) -> list:
     """Return a list with a warning if a patch moves exactly like a single point."""
     f = model.friction
-    moves = model.rig.friction.load_varies or model.rig.friction.strips_slide_apart
+    can_move = model.rig.friction.load_varies or model.rig.friction.strips_slide_apart
     if (
         patch is None
         or f is None
         or law_has_trait(f.law, "averaged")
         or model.partial_slip
         or numerics.per_point
-        or moves
+        or can_move
     ):
         return []
     return [SINGLE_POINT_WARNING]
@@ -309,19 +311,20 @@ def _note_on_elements_without_slip(run) -> list:
     slides = window.extra.get("slides", window.slide[:, None])
     elements = event_driven.YieldingElements(run.model, run.numerics, run.patch)
     for group, slide in zip(elements.groups, slides.T):
-        most = float(group.yield_displacement.max(initial=0.0))
-        half = float(np.ptp(slide)) / 2
-        if most > half:
+        largest_yield = float(group.yield_displacement.max(initial=0.0))
+        amplitude = float(np.ptp(slide)) / 2
+        if largest_yield > amplitude:
             return [
-                f"a part of the joint slips only at a slide above {format_length(most)}, but the slide in this motion is "
-                f"{format_length(half)}, so this part never slips and keeps the force that earlier motion left in it; the "
-                "steady motion is therefore not unique; the motion given here has no mean force; for the motion "
+                f"a part of the joint slips only at a slide above {format_length(largest_yield)}, but the slide in this "
+                f"motion is {format_length(amplitude)}, so this part never slips and keeps the force that earlier "
+                "motion left in it; the steady motion is therefore not unique; the motion given here has no "
+                "mean force; for the motion "
                 'that is reached from rest set accuracy.method = "auto"'
             ]
     return []
 
 
-def warn_of_law(model, outcome, measures, peak: float) -> list:
+def warn_of_law(model, outcome, measures, peak_speed: float) -> list:
     """Return the warnings on the friction law of a run.
 
     Parameters
@@ -330,19 +333,19 @@ def warn_of_law(model, outcome, measures, peak: float) -> list:
     outcome : Outcome
     measures : dict
         Measures by name.
-    peak : float
+    peak_speed : float
         Largest sliding speed [m/s].
     """
     if not law_has_trait(model.friction.law, "bonds"):
         return []
     return [
         *warn_of_unbounded_bonds(model.bonds),
-        *warn_of_unformed_bonds(model.bonds, peak),
+        *warn_of_unformed_bonds(model.bonds, peak_speed),
         *warn_of_creep(model.bonds, outcome, measures),
     ]
 
 
-def warn_of_created_energy(model, book: dict, cycles: float) -> list:
+def warn_of_created_energy(model, energies: dict, cycles: float) -> list:
     """Return a list with a warning if the law of the 1985 report has created energy.
 
     It creates energy in steps in which it returns more energy than it has stored.
@@ -350,15 +353,15 @@ def warn_of_created_energy(model, book: dict, cycles: float) -> list:
     Parameters
     ----------
     model : Model
-    book : dict
+    energies : dict
         Energies of the run by name [J].
     cycles : float
         Number of cycles of the run.
     """
     if model.friction is None or model.friction.reading != "report":
         return []
-    made = book.get("created", 0.0)
-    work = book.get("dissipated", 0.0)
+    made = energies.get("created", 0.0)
+    work = energies.get("dissipated", 0.0)
     if made <= 1e-9 * work or made <= 0:
         return []
     return [
@@ -368,16 +371,16 @@ def warn_of_created_energy(model, book: dict, cycles: float) -> list:
     ]
 
 
-def note_on_shear_modes(model, kept: int, nodes: int) -> list:
+def note_on_shear_modes(model, n_modes: int, n_nodes: int) -> list:
     """Return a list with a note on the shear modes of a patch under varying normal load.
 
     Parameters
     ----------
     model : Model
-    kept, nodes : int
+    n_modes, nodes : int
         Number of shear modes, and number of nodes of the patch.
     """
     return [
         f"{model.partial_slip}: the normal load changes with the motion, so the patch cannot be replaced exactly by a set "
-        f"of elements; {kept} tangential modes of the {nodes} nodes are used instead (key accuracy.shear_modes)"
+        f"of elements; {n_modes} tangential modes of the {n_nodes} nodes are used instead (key accuracy.shear_modes)"
     ]

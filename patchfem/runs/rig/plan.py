@@ -138,13 +138,13 @@ def mode_frequencies(rig, chain: dict) -> list:
     if modes.lateral_faces is not None:
         rows = np.concatenate([rows, modes.lateral_faces])
         stiffness = np.tile(stiffness, 2)
-    named = rig.structure.lists_modes and modes.shapes is None
+    has_names = rig.structure.lists_modes and modes.shapes is None
     frequencies = []
     for k, omega in enumerate(modes.omega):
         stuck_omega = modes.compute_stuck_mode(rows, stiffness, k)[0]
         frequencies.append(
             {
-                "name": modes.names[k] if named else f"mode {k + 1}",
+                "name": modes.names[k] if has_names else f"mode {k + 1}",
                 "free_frequency": float(omega) / (2 * pi),
                 "stuck_frequency": None if stuck_omega is None else stuck_omega / (2 * pi),
             }
@@ -152,29 +152,29 @@ def mode_frequencies(rig, chain: dict) -> list:
     return frequencies
 
 
-def predict_cost(model: Model, points: int) -> Cost:
+def predict_cost(model: Model, n_points: int) -> Cost:
     """Predict the cost of a run of a rig.
 
     Parameters
     ----------
     model : Model
-    points : int
+    n_points : int
         Number of interface nodes; 1 without a patch.
     """
     rig = model.rig
     numerics = choose_numerics(model)
-    count = len(rig.structure.frequencies)
+    n_modes = len(rig.structure.frequencies)
     rows = len(getattr(rig.drive.signal, "breaks", ())) if not rig.drive.signal.segments else 0
     rows_key = "drive.file" if "file" in rig.drive.waveform.required_keys else "drive.duration"
-    structure = MemoryPart(MODE_PAIR_BYTES * count**2, f"{count} modes", "structure")
+    structure = MemoryPart(MODE_PAIR_BYTES * n_modes**2, f"{n_modes} modes", "structure")
     drive = MemoryPart(DRIVE_ROW_BYTES * rows, f"{rows} rows of the drive", rows_key)
-    words = ()
+    sentences = ()
     if model.friction is not None:
-        words = tuple(_describe_method(model, numerics))
+        sentences = tuple(_describe_method(model, numerics))
     rig_cost = Cost(
-        parts=(structure, drive), words=words, sizes={"modes": count}, engine=numerics.engine
+        parts=(structure, drive), words=sentences, sizes={"modes": n_modes}, engine=numerics.engine
     )
-    return rig_cost + COSTS[numerics.engine](model, numerics, points)
+    return rig_cost + COSTS[numerics.engine](model, numerics, n_points)
 
 
 def _describe_method(model: Model, numerics) -> list:
@@ -184,44 +184,46 @@ def _describe_method(model: Model, numerics) -> list:
     return describe_bond_summation(model, numerics)
 
 
-def predict_march_cost(model: Model, numerics, points: int) -> Cost:
+def predict_march_cost(model: Model, numerics, n_points: int) -> Cost:
     """Predict the cost of a march and its coarse runs.
 
     Parameters
     ----------
     model : Model
     numerics : Numerics
-    points : int
+    n_points : int
         Number of interface nodes.
     """
     rig = model.rig
     f = model.friction
-    soft = bool(model.partial_slip)
+    has_shear = bool(model.partial_slip)
     steps = int(numerics.cycles * numerics.steps)
-    is_bonds = model.grooves is None and f is not None and law_has_trait(f.law, "bonds")
+    has_bonds = model.grooves is None and f is not None and law_has_trait(f.law, "bonds")
     sizes = {}
     parts = []
-    modes = 0
-    if is_bonds and bond_lists.has_bond_list(model, numerics):
+    n_modes = 0
+    if has_bonds and bond_lists.has_bond_list(model, numerics):
         entries, seconds = bond_lists.estimate_list_cost(model, numerics)
         step_seconds = seconds / steps
         sizes["bond_list_about"] = int(entries)
         parts.append(
             MemoryPart(capacity.list_bytes(int(entries)), "the list of bonds", "accuracy.tail")
         )
-    elif soft and (is_bonds or model.grooves is not None or rig.friction.load_varies):
-        sizes["shear_modes"] = modes = numerics.shear_modes or shear_modes.N_SHEAR_MODES
+    elif has_shear and (has_bonds or model.grooves is not None or rig.friction.load_varies):
+        sizes["shear_modes"] = n_modes = numerics.shear_modes or shear_modes.N_SHEAR_MODES
         step_seconds = cost_model.predict_shear_mode_step(
-            points, modes, load_varies=rig.friction.load_varies or model.grooves is not None
+            n_points, n_modes, load_varies=rig.friction.load_varies or model.grooves is not None
         )
-        step_seconds += _predict_point_step_seconds(rig, f) if is_bonds else 0.0
+        step_seconds += _predict_point_step_seconds(rig, f) if has_bonds else 0.0
         parts.append(
             MemoryPart(
-                MODE_NODE_BYTES * modes * points, f"{modes} shear modes", "accuracy.shear_modes"
+                MODE_NODE_BYTES * n_modes * n_points,
+                f"{n_modes} shear modes",
+                "accuracy.shear_modes",
             )
         )
     else:
-        step_seconds = _predict_plain_step_seconds(model, numerics, points, is_bonds=is_bonds)
+        step_seconds = _predict_plain_step_seconds(model, numerics, n_points, has_bonds=has_bonds)
     # The cost includes runs with half and a quarter of the steps, and one more run for each halving
     # of the step.
     passes = 0.75 + 2 ** (bond_lists.count_step_halvings(model) + 1) - 1
@@ -240,20 +242,20 @@ def choose_march_code(model: Model) -> EngineCode:
     return SHEAR_MARCH_CODE if model.partial_slip else MARCH_CODE
 
 
-def _predict_plain_step_seconds(model: Model, numerics, points: int, *, is_bonds: bool) -> float:
+def _predict_plain_step_seconds(model: Model, numerics, n_points: int, *, has_bonds: bool) -> float:
     """Predict the CPU time [s] of a march step without shear modes or bond list."""
     rig = model.rig
     step = _predict_point_step_seconds(model.rig, model.friction)
     if model.grooves is not None:
         return cost_model.GROOVE_STEP_SECONDS
-    if is_bonds:
-        return cost_model.BOND_NODE_SECONDS * points if numerics.per_point else step
+    if has_bonds:
+        return cost_model.BOND_NODE_SECONDS * n_points if numerics.per_point else step
     if model.partial_slip:
-        return cost_model.SLIP_NODE_SECONDS * points + cost_model.LIST_STEP_SECONDS
+        return cost_model.SLIP_NODE_SECONDS * n_points + cost_model.LIST_STEP_SECONDS
     if rig.friction.has_partial_slip:
-        return step + cost_model.SLIP_NODE_SECONDS * points
+        return step + cost_model.SLIP_NODE_SECONDS * n_points
     if rig.friction.load_varies and model.patch is not None:
-        return cost_model.PRESSING_STEP_SECONDS + cost_model.PRESSING_NODE_SECONDS * points
+        return cost_model.PRESSING_STEP_SECONDS + cost_model.PRESSING_NODE_SECONDS * n_points
     return step
 
 
@@ -262,8 +264,8 @@ def _predict_point_step_seconds(rig, friction) -> float:
 
     It is larger for growing bonds, further modes and further interfaces.
     """
-    faces = len(rig.friction.interfaces)
-    grows = (
+    n_interfaces = len(rig.friction.interfaces)
+    has_growing_bonds = (
         friction is not None
         and friction.slip_growth is not None
         and law_has_trait(friction.law, "bonds")
@@ -273,8 +275,8 @@ def _predict_point_step_seconds(rig, friction) -> float:
             cost_model.BOND_STEP_SECONDS
             + cost_model.STEP_MODE_SECONDS * (len(rig.structure.frequencies) - 1)
         )
-        * (cost_model.GROWING_BOND_STEP_FACTOR if grows else 1.0)
-        * (cost_model.INTERFACE_STEP_FACTOR * faces if faces > 1 else 1.0)
+        * (cost_model.GROWING_BOND_STEP_FACTOR if has_growing_bonds else 1.0)
+        * (cost_model.INTERFACE_STEP_FACTOR * n_interfaces if n_interfaces > 1 else 1.0)
     )
 
 
@@ -290,9 +292,8 @@ def compute_dimensionless_groups(model: Model) -> dict:
     sizes = {}
     f = model.friction
     rig = model.rig
-    limits = [
-        law.friction_limits(find_interface_load(model, law)) for law in rig.friction.interfaces
-    ]
+    laws = rig.friction.interfaces
+    limits = [law.friction_limits(find_interface_load(model, law)) for law in laws]
     limit = sum(static for static, _ in limits)
     kinetic = sum(sliding for _, sliding in limits)
     drive_force = rig.drive.force or rig.first_mode.mass * find_max_acceleration(rig.drive.signal)
@@ -362,31 +363,33 @@ def describe_stick(rig, sizes: dict, chain: dict) -> list:
         Stiffness chain by name. A link with less than MIN_STIFF_LINK_RATIO times the stiffness of
         the mode allows a stuck block to move.
     """
-    d = sizes.get("D")
+    friction_ratio = sizes.get("D")
     if (
-        d is None
+        friction_ratio is None
         or rig.modes.omega.size != 1
         or not rig.structure.lists_modes
         or rig.drive.kind == "free"
     ):
         return []
-    d *= _find_participation_ratio(rig)
+    friction_ratio *= _find_participation_ratio(rig)
     limit = MIN_STIFF_LINK_RATIO * rig.first_mode.stiffness
     links = {name: link for name, link in chain.items() if not isinstance(link, str)}
-    soft = [name for name, link in links.items() if name != "mode" and link < limit]
-    if d >= 1 and soft:
+    compliant_links = [name for name, link in links.items() if name != "mode" and link < limit]
+    if friction_ratio >= 1 and compliant_links:
         return [
-            f"D = {d:.3g} >= 1, but the block still moves, because the interface is elastic: its stiffness "
-            f"({soft[-1]}) is {chain[soft[-1]]:.4g} N/m and the stiffness of the mode is {rig.first_mode.stiffness:.4g} N/m"
+            f"D = {friction_ratio:.3g} >= 1, but the block still moves, because the interface is elastic: its stiffness "
+            f"({compliant_links[-1]}) is {chain[compliant_links[-1]]:.4g} N/m and the "
+            f"stiffness of the mode is {rig.first_mode.stiffness:.4g} N/m"
         ]
-    if d >= 1:
-        return [f"D = {d:.3g} >= 1: friction should hold the block, so that it sticks"]
+    if friction_ratio >= 1:
+        return [f"D = {friction_ratio:.3g} >= 1: friction should hold the block, so that it sticks"]
     if "D_kinetic" in sizes:  # The kinetic friction limit acts while the block slides.
         sliding = sizes["D_kinetic"] * _find_participation_ratio(rig)
         return [
-            f"D = {d:.3g} is below 1, so that the block slips; with the kinetic coefficient {_describe_sliding(sliding)}"
+            f"D = {friction_ratio:.3g} is below 1, so that the block slips; "
+            f"with the kinetic coefficient {_describe_sliding(sliding)}"
         ]
-    return [_describe_sliding(d)]
+    return [_describe_sliding(friction_ratio)]
 
 
 def _describe_sliding(friction_ratio: float) -> str:
@@ -402,11 +405,9 @@ def _describe_sliding(friction_ratio: float) -> str:
 def describe_bond_summation(model: Model, numerics) -> list:
     """Return sentences of a plan on the bond summation or on the engine of elements."""
     if not law_has_trait(model.friction.law, "bonds"):
-        return (
-            []
-            if PIECES.find_unsupported_feature(model)
-            else describe_element_engine(model, numerics.engine)
-        )
+        if PIECES.find_unsupported_feature(model):
+            return []
+        return describe_element_engine(model, numerics.engine)
     choice = bond_lists.choose_bond_summation(model, numerics)
     sentences = ["method of the sum over bonds: " + choice.describe()]
     if choice.engine == "recursion":
@@ -432,50 +433,50 @@ def describe_bond_summation(model: Model, numerics) -> list:
 def _describe_stuck_block(model: Model) -> str:
     """Describe how bonds stop a block while its bond list grows."""
     if bond_lists.is_stuck_without_stiffness(model):
-        held = "bonds of order 0 keep the block from sliding, but they have no stiffness"
+        motion = "bonds of order 0 keep the block from sliding, but they have no stiffness"
     elif bond_lists.is_stuck_after_release(model):
-        held = "with the law as printed in the report the block does not slide after its release"
+        motion = "with the law as printed in the report the block does not slide after its release"
     else:
-        held = (
+        motion = (
             "with the law as printed in the report the block hardly slides or does not slide at all"
         )
     return (
-        f"{held}: it reverses its motion in almost every time step, and each reversal makes the list of bonds "
+        f"{motion}: it reverses its motion in almost every time step, and each reversal makes the list of bonds "
         "longer"
     )
 
 
-def predict_steady_cost(model: Model, numerics, points: int) -> Cost:
+def predict_steady_cost(model: Model, numerics, n_nodes: int) -> Cost:
     """Predict the cost of a response curve and its coarse runs.
 
     Parameters
     ----------
     model : Model
     numerics : Numerics
-    points : int
+    n_nodes : int
         Number of interface nodes; not used.
     """
     rig = model.rig
-    finder = choose_steady_method(model)
+    method = choose_steady_method(model)
     n_points = max(1, len(rig.drive.levels.amplitudes))
     if rig.drive.waveform.is_swept:
-        n_points = N_BALANCE_POINTS if finder.name == "balance" else N_MAPPED_POINTS
+        n_points = N_BALANCE_POINTS if method.name == "balance" else N_MAPPED_POINTS
     n_soft = 0
-    if finder.name == "yields":
+    if method.name == "yields":
         laws = rig.friction.interfaces
         n_soft = sum(bool(law.partial_slip or model.partial_slip) for law in laws)
     passes = (
         1.0 + 0.5 * n_soft
     )  # Each interface adds a run on a coarser mesh with half the elements.
-    seconds = n_points * passes * _estimate_point_seconds(model, finder.name)
+    seconds = n_points * passes * _estimate_point_seconds(model, method.name)
     if rig.structure.richer_rig is not None:
         seconds += n_points * _estimate_point_seconds(
-            replace(model, rig=rig.structure.richer_rig), finder.name
+            replace(model, rig=rig.structure.richer_rig), method.name
         )
     harmonics = model.accuracy.harmonics or 0
     balance = HARMONIC_PAIR_BYTES * (2.0 * harmonics * max(1, len(rig.friction.interfaces))) ** 2
     parts = (MemoryPart(balance, f"{harmonics} harmonics", "accuracy.harmonics"),)
-    code = STEADY_CODES[finder.engine] or choose_march_code(model)
+    code = STEADY_CODES[method.engine] or choose_march_code(model)
     return Cost({"motion": seconds}, parts, (), n_points) + code.cost()
 
 
@@ -516,14 +517,14 @@ def _estimate_smooth_law_seconds(rig) -> float:
     """
     laws = {interface.numbers.law for interface in rig.friction.interfaces}
     with_memory = [law for law in laws if not law_has_trait(law, "memoryless")]
-    flowing = any("pieces" not in LAWS[law].supports.split() for law in with_memory)
-    smooth = (
-        flowing or rig.springs.is_nonlinear or any(law_has_trait(law, "creeps") for law in laws)
+    is_flowing = any("pieces" not in LAWS[law].supports.split() for law in with_memory)
+    is_smooth = (
+        is_flowing or rig.springs.is_nonlinear or any(law_has_trait(law, "creeps") for law in laws)
     )
     size = 2 * len(rig.structure.frequencies) + len(rig.friction.interfaces)
     return (
-        flowing * cost_model.FLOWING_LAW_POINT_SECONDS
-        + smooth * cost_model.MULTIPLIER_SECONDS[flowing] * size**3
+        is_flowing * cost_model.FLOWING_LAW_POINT_SECONDS
+        + is_smooth * cost_model.MULTIPLIER_SECONDS[is_flowing] * size**3
     )
 
 

@@ -1,4 +1,4 @@
-"""Completion of a run of a rig after its motion is solved, in the order of `rig.run_coupled`.
+"""Completion of a run of a rig after its motion is solved, in the order of `rig.run_rig`.
 
 In: a `CoupledRun`. Out: the same with further measures, its outcome and its notes, and finally the
 warnings and other data of its Result.
@@ -84,7 +84,7 @@ def add_level_measures(run: CoupledRun) -> CoupledRun:
     measures = levels.compute_level_measures(
         model.rig,
         solution.levels,
-        solution.probe,
+        solution.run_level,
         model.accuracy.tolerance,
         has_friction=run.has_friction,
         coarser=solution.coarser,
@@ -155,10 +155,10 @@ def add_decay_curve(run: CoupledRun) -> CoupledRun:
         return run
     coarse = run.inputs.coarse[0]
     causes = {}
-    half_swing = _find_ringing_amplitude(run)
-    if half_swing > 0:
+    ringing_amplitude = _find_ringing_amplitude(run)
+    if ringing_amplitude > 0:
         errors, causes["ring_frequency and ring_damping"] = decays.estimate_stuck_mode_mesh_errors(
-            np.array([half_swing]),
+            np.array([ringing_amplitude]),
             run.measures["ring_frequency"].value,
             model,
             run.patch,
@@ -196,7 +196,9 @@ def _find_ringing_amplitude(run: CoupledRun) -> float:
     ring = run.measures.get("ring_frequency")
     if ring is None or not ring.value or ring.error is None:
         return 0.0
-    sticks = run_events.find_stick_intervals(window, run.drive, solution.log, solution.held)
+    sticks = run_events.find_stick_intervals(
+        window, run.drive, solution.log, solution.stick_tolerance
+    )
     if not sticks:
         return 0.0
     return np.ptp(window.output[window.time >= sticks[-1][0]]) / 2
@@ -257,14 +259,14 @@ def collect_summary_data(run: CoupledRun, measures: dict, notes: list) -> dict:
         extra["shots"] = snapshots
     if run.has_friction:
         extra["events"] = run_events.list_events(
-            solution.window, run.drive, solution.log, solution.held
+            solution.window, run.drive, solution.log, solution.stick_tolerance
         )
     reduced = getattr(solution.contact, "reduction", None)
     if reduced is not None:
         name = "elements" if hasattr(reduced, "yield_displacement") else "shear_modes"
         extra[name] = int(np.size(reduced.stiffness))
-    if solution.summed is not None:
-        extra["quadrature"] = solution.summed.engine
+    if solution.bond_summation is not None:
+        extra["quadrature"] = solution.bond_summation.engine
     if rig.drive.waveform.is_random:
         extra["spectra"] = stationary.compute_spectra(solution.window, rig.drive.signal)
         notes = [*notes, *stationary.warn_if_short(measures, solution.window)]

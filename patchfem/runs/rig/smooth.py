@@ -44,7 +44,7 @@ def integrate_smooth_motion(
     engine.load_loop(contact.element.kernels, say)
     loaded = perf_counter() - begin
     begin = perf_counter()
-    done = engine.simulate(
+    run = engine.simulate(
         rig.modes,
         rig.drive.signal,
         contact.element,
@@ -59,12 +59,12 @@ def integrate_smooth_motion(
     )
     reader = SmoothEvaluator(model, numerics, patch, contact)
     solution = reader.make_solution(
-        done,
+        run,
         perf_counter() - begin,
         prepare={"compiled_code": loaded},
-        extra={"step_tolerance": numerics.local, "steps_taken": int(done.ledger["steps"])},
+        extra={"step_tolerance": numerics.local, "steps_taken": int(run.ledger["steps"])},
     )
-    return replace(solution, errors=reader.estimate_integration_errors(done, solution.values))
+    return replace(solution, errors=reader.estimate_integration_errors(run, solution.values))
 
 
 class SmoothEvaluator(RunEvaluator):

@@ -34,14 +34,14 @@ class Solution:
     - contact: contact model of the run.
     - prepare: CPU seconds of the preparation by name.
     - message: reason of an early end.
-    - levels, probe: Level of each drive level, and a function that runs another level, see
+    - levels, run_level: Level of each drive level, and a function that runs another level, see
       `levels.find_onset`.
     - log: events of an event-driven engine.
     - notes: warnings of the engine.
-    - held: largest slip per cycle [m] at which the interface counts as stuck.
+    - stick_tolerance: largest slip per cycle [m] at which the interface counts as stuck.
     - run_errors: error estimates by measure from the run itself, without coarse runs.
     - errors: error estimates by measure of an engine that needs no coarse runs, or None.
-    - summed: EngineChoice of the bond summation; None without bonds.
+    - bond_summation: EngineChoice of the bond summation; None without bonds.
     - coarser: pairs of a coarse run and its reference run (None for this run).
     - extremes (c, 2): minimum and maximum output of every cycle [m], from which the outcome is
       determined; None if the engine sets the outcome.
@@ -62,13 +62,13 @@ class Solution:
     prepare: dict | None = None
     message: str = ""
     levels: tuple = ()
-    probe: object = None
+    run_level: object = None
     log: object = None
     notes: tuple = ()
-    held: float = 0.0
+    stick_tolerance: float = 0.0
     run_errors: dict = field(default_factory=dict)
     errors: dict | None = None
-    summed: object = None
+    bond_summation: object = None
     coarser: tuple = ()
     extremes: np.ndarray | None = None
     bounded: bool = False
@@ -87,7 +87,7 @@ class CycleLoop(NamedTuple):
     work: float
 
 
-def replace_output_by_gauge(model, raw: Solution) -> Solution:
+def replace_output_by_gauge(model, solution: Solution) -> Solution:
     """Return a Solution whose output is the motion at the gauge instead of the accelerometer.
 
     Whether the motion has become steady is still judged at the accelerometer. The steady amplitude
@@ -95,19 +95,19 @@ def replace_output_by_gauge(model, raw: Solution) -> Solution:
     """
     gauge = model.rig.modes.gauge
     if gauge is None:
-        return raw
+        return solution
     name = "relative_displacement_amplitude"
-    window = _compute_gauge_histories(raw.window, gauge)
+    window = _compute_gauge_histories(solution.window, gauge)
     amplitude = measure_half_range(window.time, window.output, window.output_rate)
     if model.rig.drive.kind == "free":
         amplitude = find_release_amplitude(window, model.rig.drive.signal.period, amplitude)
-    ratio = max(1.0, amplitude / max(raw.values[name], 1e-300))
-    errors = raw.errors and raw.errors | {name: ratio * raw.errors.get(name, 0.0)}
-    values = {key: value for key, value in raw.values.items() if key != f"{name}_steady"}
+    ratio = max(1.0, amplitude / max(solution.values[name], 1e-300))
+    errors = solution.errors and solution.errors | {name: ratio * solution.errors.get(name, 0.0)}
+    values = {key: value for key, value in solution.values.items() if key != f"{name}_steady"}
     return replace(
-        raw,
+        solution,
         values=values | {name: amplitude},
-        response=_compute_gauge_histories(raw.response, gauge),
+        response=_compute_gauge_histories(solution.response, gauge),
         window=window,
         steady=(None, None),
         errors=errors,

@@ -9,28 +9,30 @@ from dataclasses import replace
 import numpy as np
 
 
-def strip_loads(patch) -> np.ndarray:
+def compute_strip_loads(patch) -> np.ndarray:
     """Return the normal load (s,) [N] on each strip of a patch."""
     return patch.strips.force.sum(axis=1)
 
 
-def average_march_over_strips(done, patch):
+def average_march_over_strips(march, patch):
     """Average the histories of a march of independently sliding strips."""
-    loads = strip_loads(patch)
+    loads = compute_strip_loads(patch)
     offsets = patch.strips.offsets
-    window = average_histories_over_strips(done.window, loads, offsets)
+    window = average_histories_over_strips(march.window, loads, offsets)
     return replace(
-        done,
-        response=average_histories_over_strips(done.response, loads, offsets),
+        march,
+        response=average_histories_over_strips(march.response, loads, offsets),
         window=window,
-        marks=tuple(average_mark_over_strips(mark, patch) for mark in done.marks),
+        marks=tuple(average_mark_over_strips(mark, patch) for mark in march.marks),
         step_force=(window.force[1:] + window.force[:-1]) / 2,
     )
 
 
 def average_mark_over_strips(mark, patch):
     """Average the stored last cycles of a drive level of independently sliding strips."""
-    window = average_histories_over_strips(mark.window, strip_loads(patch), patch.strips.offsets)
+    window = average_histories_over_strips(
+        mark.window, compute_strip_loads(patch), patch.strips.offsets
+    )
     return replace(mark, window=window, step_force=(window.force[1:] + window.force[:-1]) / 2)
 
 

@@ -81,7 +81,7 @@ def compute_motions(
     numerics = []
     for model, case in zip(models, solved_cases):
         load = case.patch.pressure.load
-        fine_cases.append(pieces.Case(model, case.fine.groups, case.fine.held, load))
+        fine_cases.append(pieces.Case(model, case.fine.groups, case.fine.stick_tolerance, load))
         coarse_cases.append(fine_cases[-1]._replace(groups=case.coarse.groups))
         numerics.append(size_settings(case))
     fine = pieces.simulate_cases(fine_cases, cycles, window, report, MIN_CASES_PER_THREAD)

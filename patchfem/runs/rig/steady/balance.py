@@ -112,8 +112,8 @@ class BalanceFinder:
     If several motions exist, the iteration starts from a given point of the response curve.
     """
 
-    tries_another = False
-    leaves = (1e-2, 0.1)
+    has_fallback = False
+    peak_tolerances = (1e-2, 0.1)
 
     def __init__(self, model, numerics, patch, frames: int = 0, say=None):
         load("dynamics.harmonic.cycle_kernels", say)
@@ -133,7 +133,7 @@ class BalanceFinder:
         self.group = LawGroup(rig.modes, parts)
         self.tolerance = model.accuracy.tolerance
 
-    def point(self, drive, near=None) -> tuple:
+    def compute_steady_motion(self, drive, guess=None) -> tuple:
         """Compute the steady motion under sinusoidal drive, with error estimates.
 
         The errors are estimated with twice as many harmonics and twice as many samples.
@@ -141,12 +141,12 @@ class BalanceFinder:
         Parameters
         ----------
         drive : SineDrive
-        near : SteadyMotion, optional
+        guess : SteadyMotion, optional
             Initial guess from the response curve, for use if several motions exist.
         """
         begin = perf_counter()
         motion = periodic_point(
-            self.modes, drive, self.group, self.harmonics, self.tolerance, start=near
+            self.modes, drive, self.group, self.harmonics, self.tolerance, start=guess
         )
         motion, stability, notes = self._find_stable_motion(drive, motion)
         values, response, book = self._compute_measures(motion, drive)
@@ -162,7 +162,7 @@ class BalanceFinder:
             )
             errors["stick_fraction"] = max(errors.get("stick_fraction", 0.0), 4 / SAMPLES_PER_CYCLE)
         name, _ = balanced_regime(motion)
-        held = name == "stuck"
+        is_stuck = name == "stuck"
         extra = {
             "regime": name if stability.stable else f"{name}, unstable",
             "multipliers": stability.multipliers,
@@ -170,7 +170,7 @@ class BalanceFinder:
             "harmonics": motion.harmonics,
         }
         amplitude = np.array([values["relative_displacement_amplitude"]])
-        outcome = Outcome.STUCK if held else Outcome.STEADY
+        outcome = Outcome.STUCK if is_stuck else Outcome.STEADY
         message = ""
         if not stability.stable:
             outcome = Outcome.NOT_CONVERGED
@@ -191,7 +191,7 @@ class BalanceFinder:
             notes=notes,
         ), motion
 
-    def _estimate_errors(self, values: dict, motion, drive, read) -> dict:
+    def _estimate_errors(self, values: dict, motion, drive, compute_measures) -> dict:
         """Estimate the errors of the measures of a steady motion from a solution with more harmonics.
 
         If that solution does not converge, the error estimate of the balance itself is used.
@@ -202,7 +202,7 @@ class BalanceFinder:
             Measures by name.
         motion : SteadyMotion
         drive : SineDrive
-        read : callable
+        compute_measures : callable
             Function (SteadyMotion, drive) that returns measures by name.
         """
         errors = {name: abs(v) * min(motion.error, 1.0) for name, v in values.items()}
@@ -211,7 +211,7 @@ class BalanceFinder:
         except NotConverged:
             return errors
         residual = max(motion.left, finer.left)
-        finer_values = read(finer, drive) if np.isfinite(finer.error) else {}
+        finer_values = compute_measures(finer, drive) if np.isfinite(finer.error) else {}
         for name, error in finer_errors(values, finer_values).items():
             errors[name] = error + abs(values[name]) * residual
         return errors
@@ -244,10 +244,10 @@ class BalanceFinder:
             )
         return StableMotion(motion, add_stability(motion, self.modes), (note,))
 
-    def curve_point(self, drive, near=None) -> CurvePoint:
+    def compute_curve_point(self, drive, guess=None) -> CurvePoint:
         """Compute one point of a response curve, without error estimates."""
         motion = periodic_point(
-            self.modes, drive, self.group, self.harmonics, self.tolerance, start=near
+            self.modes, drive, self.group, self.harmonics, self.tolerance, start=guess
         )
         return self._make_curve_point(add_stability(motion, self.modes))
 
@@ -298,7 +298,7 @@ class BalanceFinder:
         reader.turns = motion.find_reversals()
         return CycleMeasures(reader.evaluate_measures(run, drive), response, book)
 
-    def curve(self, drive) -> tuple:
+    def trace_curve(self, drive) -> tuple:
         """Compute the response curve over frequency by continuation through its folds."""
         first = SineDrive(drive.acceleration, 2 * np.pi * drive.low, drive.moving)
         branch = branches.trace_over_frequency(
@@ -312,27 +312,29 @@ class BalanceFinder:
         )
         return [self._convert_branch_point(point, first) for point in branch.points], branch.folds
 
-    def curve_distance(self, one: CurvePoint, other: CurvePoint) -> float:
+    def measure_curve_distance(self, first: CurvePoint, second: CurvePoint) -> float:
         """Return the arc length between two points of a response curve.
 
         The frequency is scaled by the width of the sweep.
         """
-        return branches.measure_distance(one.near, other.near, self._sweep_width)
+        return branches.measure_distance(first.guess, second.guess, self._sweep_width)
 
-    def point_between(self, one: CurvePoint, other: CurvePoint, share: float) -> CurvePoint:
+    def compute_point_between(
+        self, first: CurvePoint, second: CurvePoint, fraction: float
+    ) -> CurvePoint:
         """Compute the curve point at a fraction of the arc length between two points.
 
         The balance is solved in the hyperplane normal to the line between these points.
 
         Parameters
         ----------
-        one, other : CurvePoint
-        share : float
+        first, other : CurvePoint
+        fraction : float
             Fraction of the arc length between the points, from the first one.
         """
-        drive = replace(one.drive, omega=one.near.omega)
+        drive = replace(first.drive, omega=first.guess.omega)
         motion = branches.find_point_between(
-            self.modes, drive, one.near, other.near, share, self._sweep_width
+            self.modes, drive, first.guess, second.guess, fraction, self._sweep_width
         )
         return self._convert_branch_point(motion, drive)
 
@@ -349,7 +351,7 @@ class BalanceFinder:
             regime="stable" if motion.stable else "unstable"
         )
         errors = self._estimate_errors(
-            point.values, point.near, point.drive, self._compute_curve_measures
+            point.values, point.guess, point.drive, self._compute_curve_measures
         )
         for name in errors:
             errors[name] += HARMONIC_ROUND_OFF * abs(point.values[name])

@@ -46,7 +46,7 @@ class CurvePoint(NamedTuple):
     - multiplier: largest magnitude of the Floquet multipliers.
     - stable: whether the motion is stable.
     - outcome: Outcome of the motion.
-    - near: initial guess for the motion at a neighbouring drive.
+    - guess: initial guess for the motion at a neighbouring drive.
     """
 
     drive: SineDrive
@@ -56,7 +56,7 @@ class CurvePoint(NamedTuple):
     multiplier: float
     stable: bool
     outcome: Outcome
-    near: Any = None
+    guess: Any = None
 
     @property
     def level(self) -> Level:
@@ -94,27 +94,27 @@ def describe_instability(multipliers) -> str:
     )
 
 
-def make_curve_point(drive, raw, near=None) -> CurvePoint:
+def make_curve_point(drive, solution, guess=None) -> CurvePoint:
     """Convert the Solution of a steady motion to a point of a response curve.
 
     Parameters
     ----------
     drive : SineDrive
-    raw : Solution
-    near : optional
+    solution : Solution
+    guess : optional
         Initial guess for the motion at a neighbouring drive.
     """
-    size = float(np.abs(np.asarray(raw.extra["multipliers"])).max(initial=0.0))
-    bounded = raw.outcome not in (Outcome.GROWS, Outcome.LEAVES_GROOVES, Outcome.NOT_CONVERGED)
+    size = float(np.abs(np.asarray(solution.extra["multipliers"])).max(initial=0.0))
+    bounded = solution.outcome not in (Outcome.GROWS, Outcome.LEAVES_GROOVES, Outcome.NOT_CONVERGED)
     return CurvePoint(
         drive,
-        raw.values if bounded else {},
-        raw.errors if bounded else {},
-        raw.extra["regime"],
+        solution.values if bounded else {},
+        solution.errors if bounded else {},
+        solution.extra["regime"],
         size,
-        "unstable" not in raw.extra["regime"] and bounded,
-        raw.outcome,
-        near,
+        "unstable" not in solution.extra["regime"] and bounded,
+        solution.outcome,
+        guess,
     )
 
 
@@ -126,26 +126,28 @@ def make_missing_point(drive) -> CurvePoint:
 class TracedCurve:
     """Base class of finders whose response curve has no folds; subclasses compute its points.
 
-    `leaves` are tolerances, see `peak.refine_peak`.
+    `peak_tolerances` are tolerances, see `peak.refine_peak`.
     """
 
-    leaves = 1e-2, 0.1
+    peak_tolerances = 1e-2, 0.1
 
-    def curve_distance(self, one: CurvePoint, other: CurvePoint) -> float:
+    def measure_curve_distance(self, first: CurvePoint, second: CurvePoint) -> float:
         """Return the distance [rad/s] between two points of a response curve."""
-        return abs(other.drive.omega - one.drive.omega)
+        return abs(second.drive.omega - first.drive.omega)
 
-    def point_between(self, one: CurvePoint, other: CurvePoint, share: float) -> CurvePoint:
+    def compute_point_between(
+        self, first: CurvePoint, second: CurvePoint, fraction: float
+    ) -> CurvePoint:
         """Compute the curve point at a fraction of the distance between two points.
 
         Parameters
         ----------
-        one, other : CurvePoint
-        share : float
+        first, other : CurvePoint
+        fraction : float
             Fraction of the distance between the points, from the first one.
         """
-        omega = one.drive.omega + share * (other.drive.omega - one.drive.omega)
-        return self.curve_point(replace(one.drive, omega=omega), one.near)
+        omega = first.drive.omega + fraction * (second.drive.omega - first.drive.omega)
+        return self.compute_curve_point(replace(first.drive, omega=omega), first.guess)
 
 
 def compute_response_curve(modes, drive, find_point) -> list:
@@ -160,14 +162,14 @@ def compute_response_curve(modes, drive, find_point) -> list:
         Modal basis.
     drive : SweepDrive
     find_point : callable
-        Function (sine, near) that returns a CurvePoint, where near is the initial guess from the
+        Function (sine, guess) that returns a CurvePoint, where guess is the initial guess from the
         previous point or None.
     """
 
     def sample(frequency, before):
         """Return the amplitude [m] at a frequency [Hz], and the curve point."""
         sine = SineDrive(drive.acceleration, 2 * np.pi * frequency, drive.moving)
-        point = find_point(sine, before and before[1].near)
+        point = find_point(sine, before and before[1].guess)
         return point.values.get(COLUMN_MEASURES["amplitude"], np.nan), point
 
     samples = sample_adaptively(sample, choose_start_frequencies(modes, drive), INTERPOLATION_TOL)[
@@ -192,7 +194,7 @@ def choose_start_frequencies(modes, drive) -> np.ndarray:
     return places if drive.low < drive.high else places[::-1]
 
 
-def sweep_around_peak(drive, curve: dict, at: float):
+def sweep_around_peak(drive, curve: dict, peak_frequency: float):
     """Return a narrow sweep around the largest peak of a response curve.
 
     The neighbourhood of the peak ends where the curve falls to PEAK_END_RATIO of the peak. The
@@ -203,7 +205,7 @@ def sweep_around_peak(drive, curve: dict, at: float):
     drive : SweepDrive
     curve : dict
         Columns from `tabulate_curve`.
-    at : float
+    peak_frequency : float
         Frequency of the largest amplitude [Hz].
 
     Returns
@@ -214,7 +216,7 @@ def sweep_around_peak(drive, curve: dict, at: float):
     order = np.argsort(curve["frequency"], kind="stable")
     places = curve["frequency"][order]
     heights = np.nan_to_num(curve["amplitude"][order])
-    best = int(np.argmin(np.abs(places - at)))
+    best = int(np.argmin(np.abs(places - peak_frequency)))
     low = heights < PEAK_END_RATIO * heights[best]
     before = np.flatnonzero(low[:best])
     after = np.flatnonzero(low[best:])
@@ -280,33 +282,35 @@ def solve_levels(finder, drive):
     best = None
     for part in drive.segments:
         sine = SineDrive(part.amplitude, part.omega, drive.moving)
-        near = points[-1].near if points and points[-1].stable else None
+        guess = points[-1].guess if points and points[-1].stable else None
         try:
-            solution, near = finder.point(sine, near)
+            solution, guess = finder.compute_steady_motion(sine, guess)
         except NotConverged as failure:
-            if finder.tries_another:
+            if finder.has_fallback:
                 raise
             points.append(make_missing_point(sine))
             failures.append(failure)
             continue
-        points.append(make_curve_point(sine, replace_output_by_gauge(finder.model, solution), near))
+        points.append(
+            make_curve_point(sine, replace_output_by_gauge(finder.model, solution), guess)
+        )
         if best is None or find_largest_point(points) == len(points) - 1:
             best = solution, sine
         failures += [solution.message] if solution.message else []
     if best is None:
         raise failures[0]  # No drive level has a steady motion.
 
-    def probe(number: int, level: float) -> Level:
+    def run_level(number: int, level: float) -> Level:
         """Compute the steady motion at another level [m s-2], starting from that of level `number`."""
         sine = SineDrive(level, drive.segments[0].omega, drive.moving)
-        return finder.curve_point(sine, points[number].near if number >= 0 else None).level
+        return finder.compute_curve_point(sine, points[number].guess if number >= 0 else None).level
 
     message = f"no steady motion was found at {len(failures)} of {len(points)} drive levels; at the first of them: "
     notes = tuple(f"{message}{one}" for one in failures[:1])
     return replace(
         best[0],
         extra=best[0].extra | {"curve": tabulate_curve(points), "at": best[1]},
-        probe=probe,
+        run_level=run_level,
         levels=tuple(point.level for point in points),
         notes=(*best[0].notes, *notes),
     )

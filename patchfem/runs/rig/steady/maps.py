@@ -36,31 +36,31 @@ class PeriodicMotion(NamedTuple):
     """Fixed point of the map of a period, with its stability.
 
     - start, memory: state of the rig and memory of its elements at phase 0 of the drive.
-    - near: initial guess for the motion at a neighbouring drive.
+    - guess: initial guess for the motion at a neighbouring drive.
     - regime: name of the motion, such as "stick-slip".
     - multipliers (m,): Floquet multipliers.
     - residual: relative change of the state over a period.
     - error: relative error due to the residual.
     - iterations: number of iterations.
     - bounded: whether a bounded motion exists.
-    - lasting: whether the motion is stable.
+    - stable: whether the motion is stable.
     """
 
     start: InitialState
     memory: Any
-    near: Any
+    guess: Any
     regime: str
     multipliers: np.ndarray
     residual: float
     error: float
     iterations: int
     bounded: bool
-    lasting: bool
+    stable: bool
 
     @property
     def regime_text(self) -> str:
         """Regime as text, which names an unstable motion as such."""
-        return self.regime if self.lasting else f"{self.regime}, unstable"
+        return self.regime if self.stable else f"{self.regime}, unstable"
 
     @property
     def largest_multiplier(self) -> float:
@@ -72,12 +72,12 @@ class MapFinder(TracedCurve):
     """Base class for steady motions as fixed points of the map of a drive period.
 
     Subclasses compute the fixed point in `find_periodic_motion`. If several motions exist, the search starts
-    from `near`.
+    from `guess`.
     """
 
     name = ""
     elements = None
-    tries_another = False
+    has_fallback = False
 
     def __init__(self, model, numerics, patch, frames: int = 0, say=None):
         histories.load_event_kernels(say)
@@ -89,14 +89,14 @@ class MapFinder(TracedCurve):
         self.contact_elements = self.elements(model, numerics, patch)
         self.groups = self.contact_elements.groups
 
-    def find_periodic_motion(self, drive, near) -> PeriodicMotion:
+    def find_periodic_motion(self, drive, guess) -> PeriodicMotion:
         """Find the periodic motion under sinusoidal drive."""
         raise NotImplementedError
 
-    def point(self, drive, near=None) -> tuple:
+    def compute_steady_motion(self, drive, guess=None) -> tuple:
         """Compute the steady motion under sinusoidal drive, and a guess for neighbouring drives."""
         begin = perf_counter()
-        motion = self.find_periodic_motion(drive, near)
+        motion = self.find_periodic_motion(drive, guess)
         numerics = replace(self.numerics, cycles=2.0, window=1)
         reader = EventEvaluator(self.model, numerics, self.patch, self.contact_elements)
         run = histories.simulate(
@@ -112,14 +112,14 @@ class MapFinder(TracedCurve):
             self.convert_memory(motion.memory),
         )
         run = reader.average_over_strips(run)
-        raw = reader.make_solution(run, perf_counter() - begin, drive)
-        outcome = raw.outcome or Outcome.STEADY
+        solution = reader.make_solution(run, perf_counter() - begin, drive)
+        outcome = solution.outcome or Outcome.STEADY
         if not motion.bounded:
             outcome = Outcome.GROWS
         elif float(np.abs(run.amplitudes).max()) > self.model.rig.springs.travel:
             outcome = Outcome.EXCEEDS_TRAVEL
-        message = raw.message
-        if not motion.lasting:
+        message = solution.message
+        if not motion.stable:
             outcome = Outcome.NOT_CONVERGED
             message = describe_instability(motion.multipliers)
         extra = {
@@ -129,22 +129,22 @@ class MapFinder(TracedCurve):
             "map": self.name,
         }
         return replace(
-            raw,
+            solution,
             outcome=outcome,
             message=message,
             steady=(None, None),
             extra=extra,
-            errors=estimate_exact_errors(raw.values, motion.error),
-            book=raw.book | {"iterations": float(motion.iterations)},
-        ), motion.near
+            errors=estimate_exact_errors(solution.values, motion.error),
+            book=solution.book | {"iterations": float(motion.iterations)},
+        ), motion.guess
 
     def convert_memory(self, memory):
         """Return the initial memory of the friction elements."""
         return memory
 
-    def curve_point(self, drive, near=None) -> CurvePoint:
+    def compute_curve_point(self, drive, guess=None) -> CurvePoint:
         """Compute one point of a response curve."""
-        motion = self.find_periodic_motion(drive, near)
+        motion = self.find_periodic_motion(drive, guess)
         if not motion.bounded:
             return CurvePoint(
                 drive, {}, {}, motion.regime_text, motion.largest_multiplier, False, Outcome.GROWS
@@ -172,17 +172,17 @@ class MapFinder(TracedCurve):
             errors=estimate_exact_errors(values, motion.error),
             regime=motion.regime_text,
             multiplier=motion.largest_multiplier,
-            stable=motion.lasting,
+            stable=motion.stable,
             outcome=Outcome.STUCK if is_stuck else Outcome.STEADY,
-            near=motion.near,
+            guess=motion.guess,
         )
 
-    def curve(self, drive) -> tuple:
+    def trace_curve(self, drive) -> tuple:
         """Compute the response curve over frequency, which has no folds.
 
         Each point starts from the motion at the previous one.
         """
-        return compute_response_curve(self.modes, drive, self.curve_point), ()
+        return compute_response_curve(self.modes, drive, self.compute_curve_point), ()
 
 
 def _collect_curve_measures(amplitude: float, acceleration: float, waves: dict) -> dict:
@@ -203,26 +203,26 @@ class YieldFinder(MapFinder):
 
     def __init__(self, model, *given):
         super().__init__(model, *given)
-        self.tries_another = len(model.rig.friction.interfaces) == 1
+        self.has_fallback = len(model.rig.friction.interfaces) == 1
 
     def convert_memory(self, memory):
         """Return the initial memory of the elements with zero work and dissipation."""
         return event_elements.reset_work(memory)
 
-    def find_periodic_motion(self, drive, near) -> PeriodicMotion:
+    def find_periodic_motion(self, drive, guess) -> PeriodicMotion:
         """Find the periodic motion of elastic-plastic elements under sinusoidal drive."""
-        state = steady.solve_steady(self.modes, drive, self.groups, near)
+        state = steady.solve_steady(self.modes, drive, self.groups, guess)
         return PeriodicMotion(
             start=state.start,
             memory=state.memory,
-            near=state.point,
+            guess=state.point,
             regime=state.regime,
             multipliers=state.multipliers,
             residual=state.residual,
             error=state.error,
             iterations=state.iterations,
             bounded=True,
-            lasting=is_stable(state.multipliers),
+            stable=is_stable(state.multipliers),
         )
 
 
@@ -237,43 +237,43 @@ class EventFinder(MapFinder):
         """Static and kinetic friction limits (2, i) [N] of the interfaces."""
         return np.array([(group.static, group.kinetic) for group in self.groups]).T
 
-    def find_periodic_motion(self, drive, near) -> PeriodicMotion:
+    def find_periodic_motion(self, drive, guess) -> PeriodicMotion:
         """Find the periodic motion of Coulomb interfaces under sinusoidal drive.
 
         If static friction exceeds kinetic friction, several motions exist, and the search starts
-        from the state `near`. The multipliers of two simultaneous events depend on their order, so
+        from the state `guess`. The multipliers of two simultaneous events depend on their order, so
         they do not decide the stability.
         """
         falls = bool(np.any(self.friction_limits[0] > self.friction_limits[1]))
-        start = near if falls else None
+        start = guess if falls else None
         state = stick_steady.solve_steady(self.modes, drive, self.groups, start=start)
         bounded = state.regime != "unbounded"
         return PeriodicMotion(
             start=state.start,
             memory=None,
-            near=state.start,
+            guess=state.start,
             regime=state.regime,
             multipliers=state.multipliers,
             residual=state.residual,
             error=state.residual,
             iterations=state.iterations,
             bounded=bounded,
-            lasting=not bounded or not state.alone or is_stable(state.multipliers),
+            stable=not bounded or not state.alone or is_stable(state.multipliers),
         )
 
-    def curve_point(self, drive, near=None) -> CurvePoint:
+    def compute_curve_point(self, drive, guess=None) -> CurvePoint:
         """Compute one point of a response curve, which has a closed form without friction.
 
         An undamped resonance has no closed form.
         """
         if self.friction_limits.any():
-            return super().curve_point(drive, near)
+            return super().compute_curve_point(drive, guess)
         modes = self.modes
         gauge = self.modes.output if self.modes.gauge is None else self.modes.gauge
         try:
             receptance = compute_receptance(modes, drive.omega, [gauge, modes.output], modes.base)
         except PatchfemError:
-            return super().curve_point(drive)
+            return super().compute_curve_point(drive)
         at_gauge, at_output = receptance[0, :, 0] * modes.mass
         acceleration = drive.acceleration * float(abs(drive.moving + drive.omega**2 * at_output))
         amplitude = drive.acceleration * float(abs(at_gauge))

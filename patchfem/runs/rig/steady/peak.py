@@ -56,8 +56,8 @@ def refine_peak(points: list, finder, tolerance: float) -> RefinedPeak:
     points : list of CurvePoint
         Points of the curve in order.
     finder
-        Has the methods curve_distance(a, b) and point_between(a, b, fraction) of CurvePoints, and
-        `leaves`, the ratios of the remaining errors of the peak to the tolerance: that of the
+        Has the methods measure_curve_distance(a, b) and compute_point_between(a, b, fraction) of CurvePoints, and
+        `peak_tolerances`, the ratios of the remaining errors of the peak to the tolerance: that of the
         amplitude, and that of the position relative to the width.
     tolerance : float
 
@@ -68,7 +68,7 @@ def refine_peak(points: list, finder, tolerance: float) -> RefinedPeak:
     """
     points = list(points)
     for left in range(MAX_ADDED_POINTS, -1, -1):
-        s = np.cumsum([0.0, *(finder.curve_distance(a, b) for a, b in pairwise(points))])
+        s = np.cumsum([0.0, *(finder.measure_curve_distance(a, b) for a, b in pairwise(points))])
         y = _collect_amplitudes(points)
         is_stable = np.array([point.stable for point in points])
         best = find_largest_point(points)
@@ -85,8 +85,8 @@ def refine_peak(points: list, finder, tolerance: float) -> RefinedPeak:
         above = max(float(reach.max()) - y[best], 0.0)
         reach[np.diff(s) <= IDENTICAL_POINT_TOL * s[-1]] = 0.0
         k = int(np.argmax(reach))
-        if reach[k] <= y[best] * (1 + finder.leaves[0] * tolerance):
-            share = max(finder.leaves[1] * tolerance, POSITION_TOL)
+        if reach[k] <= y[best] * (1 + finder.peak_tolerances[0] * tolerance):
+            share = max(finder.peak_tolerances[1] * tolerance, POSITION_TOL)
             added = _choose_added_point(s, y, best, share)
             k = -1
             if added is not None:
@@ -96,7 +96,9 @@ def refine_peak(points: list, finder, tolerance: float) -> RefinedPeak:
         try:
             points.insert(
                 k + 1,
-                finder.point_between(points[k], points[k + 1], float(np.clip(at[k], 0.05, 0.95))),
+                finder.compute_point_between(
+                    points[k], points[k + 1], float(np.clip(at[k], 0.05, 0.95))
+                ),
             )
         except NotConverged:
             return RefinedPeak(points, best, above)
@@ -131,13 +133,13 @@ def _choose_added_point(s, y, best: int, min_fraction: float) -> tuple | None:
     return (best, off / after) if off > 0 else (best - 1, 1 + off / before)
 
 
-def _measure_peak_width(y, away) -> float:
+def _measure_peak_width(y, distances) -> float:
     """Return the distance from a peak at which the curve has fallen to WIDTH_HEIGHT_FRACTION of it.
 
-    `away` (k,) are the distances of the values y (k,) from the peak.
+    `distances` (k,) are the distances of the values y (k,) from the peak.
     """
     low = ~(y >= WIDTH_HEIGHT_FRACTION * y[0])
-    return float(away[: (int(np.argmax(low)) if low.any() else y.size - 1) + 1].max())
+    return float(distances[: (int(np.argmax(low)) if low.any() else y.size - 1) + 1].max())
 
 
 def _collect_amplitudes(points) -> np.ndarray:
@@ -203,20 +205,22 @@ def solve_peak(points: list, folds, finder) -> Solution:
     """
     points, best, above = refine_peak(points, finder, finder.model.accuracy.tolerance)
     top = points[best]
-    raw = finder.point(top.drive, top.near)[0]
-    errors = dict(raw.errors or {})
+    solution = finder.compute_steady_motion(top.drive, top.guess)[0]
+    errors = dict(solution.errors or {})
     extra = {"curve": tabulate_curve(points, folds), "at": top.drive}
     height = top.values.get(AMPLITUDE, 0.0)
     y = _collect_amplitudes(points)
-    if not height > 0 or AMPLITUDE not in raw.values:
+    if not height > 0 or AMPLITUDE not in solution.values:
         # The error None indicates that the curve has no peak.
-        return replace(raw, extra=raw.extra | extra | {"at_error": None if height == 0 else 0.0})
+        return replace(
+            solution, extra=solution.extra | extra | {"at_error": None if height == 0 else 0.0}
+        )
     # The curve point was computed with fewer samples, which adds this error.
-    missed = abs(replace_output_by_gauge(finder.model, raw).values[AMPLITUDE] - height)
+    missed = abs(replace_output_by_gauge(finder.model, solution).values[AMPLITUDE] - height)
     error = min(missed + errors.get(AMPLITUDE, 0.0), height)
     places = np.array([point.drive.omega for point in points]) / (2 * np.pi)
     off = 0.0
-    position_errors = dict.fromkeys(raw.values, 0.0)
+    position_errors = dict.fromkeys(solution.values, 0.0)
     for direction in (-1, 1):
         heights = y[best::direction]
         away = np.abs(places[best::direction] - places[best])
@@ -226,25 +230,27 @@ def solve_peak(points: list, folds, finder) -> Solution:
         low = ~(heights >= height - min(above, height) - 2 * error)
         number = int(np.argmax(low)) if low.any() else heights.size - 1
         far = float(away[: number + 1].max())
-        near = min(
+        position_error = min(
             far,
             float(away[1])
             + ERROR_SHIFT_FACTOR * error / height * _measure_peak_width(heights, away),
         )
-        off = max(off, near)
+        off = max(off, position_error)
         for name, gap in _compute_neighbour_differences(
-            finder, points[best + direction * number], raw
+            finder, points[best + direction * number], solution
         ).items():
-            position_errors[name] = max(position_errors[name], gap * near / far if far else gap)
-    position_errors[AMPLITUDE] = min(above, raw.values[AMPLITUDE]) + missed
+            position_errors[name] = max(
+                position_errors[name], gap * position_error / far if far else gap
+            )
+    position_errors[AMPLITUDE] = min(above, solution.values[AMPLITUDE]) + missed
     errors = {name: error + position_errors.get(name, 0.0) for name, error in errors.items()}
-    return replace(raw, errors=errors, extra=raw.extra | extra | {"at_error": float(off)})
+    return replace(solution, errors=errors, extra=solution.extra | extra | {"at_error": float(off)})
 
 
-def _compute_neighbour_differences(finder, beside, raw: Solution) -> dict:
+def _compute_neighbour_differences(finder, neighbour, solution: Solution) -> dict:
     """Return the differences of all measures between a curve point and a Solution."""
     try:
-        other = finder.point(beside.drive, beside.near)[0]
+        other = finder.compute_steady_motion(neighbour.drive, neighbour.guess)[0]
     except NotConverged:
         return {}
-    return absolute_change(raw.values, other.values)
+    return absolute_change(solution.values, other.values)

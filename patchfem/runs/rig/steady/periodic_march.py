@@ -63,7 +63,7 @@ def march_out_of_grooves(model, numerics, patch, drive, contact) -> Solution | N
     solutions = []
     rig = model.rig.with_signal(drive, levels=DriveLevels(), waveform=SINE_WAVEFORM)
     for steps in (START_STEPS, START_STEPS // 2):
-        done = engine.march(
+        run = engine.march(
             rig.modes,
             drive,
             contact,
@@ -73,11 +73,11 @@ def march_out_of_grooves(model, numerics, patch, drive, contact) -> Solution | N
             rig.springs.travel,
             keeps_samples=False,
         )
-        if done.outcome is not Outcome.LEAVES_GROOVES:
+        if run.outcome is not Outcome.LEAVES_GROOVES:
             return None
         few_cycles = replace(numerics, cycles=N_CYCLES_IN_GROOVES, steps=steps, window=1)
         reader = MarchEvaluator(replace(model, rig=rig), few_cycles, patch, contact)
-        solutions.append(reader.make_solution(done, perf_counter() - begin))
+        solutions.append(reader.make_solution(run, perf_counter() - begin))
     fine, half = solutions
     errors = {}
     for name, value in fine.values.items():
@@ -106,8 +106,8 @@ class MarchFinder(TracedCurve):
 
     # The points of the curve have errors of the size of the tolerance, so that a refined peak
     # cannot have a smaller error.
-    tries_another = True
-    leaves = (0.3, 30.0)
+    has_fallback = True
+    peak_tolerances = (0.3, 30.0)
 
     def __init__(self, model, numerics, patch, frames: int = 0, say=None):
         self.model = model
@@ -121,43 +121,43 @@ class MarchFinder(TracedCurve):
         self.numerics = replace(numerics, cycles=1.0, window=1)
         engine.warm_up(model.rig.modes, model.rig.drive.signal, self.contact, say)
 
-    def _march_to_periodic(self, drive, near, steps: int):
+    def _march_to_periodic(self, drive, guess, steps: int):
         """March until the motion is periodic; return the run and its remaining change per period."""
         run = engine.start_run(
             self.model.rig.modes, drive, self.contact, steps, self.model.rig.springs.travel
         )
-        if near is not None:
-            run.contact = type(near.contact)(*(array.copy() for array in near.contact))
-            run.state[:] = near.state
-            run.move_to(*near.state)
-        left = orbits.march_to_periodic(run)
+        if guess is not None:
+            run.contact = type(guess.contact)(*(array.copy() for array in guess.contact))
+            run.state[:] = guess.state
+            run.move_to(*guess.state)
+        change = orbits.march_to_periodic(run)
         if run.outcome is not None and run.outcome is not Outcome.EXCEEDS_TRAVEL:
             raise NotConverged(run.message)
-        if run.outcome is None and left > PERIODIC_TOL:
+        if run.outcome is None and change > PERIODIC_TOL:
             raise NotConverged(
                 f"no periodic motion was found within {orbits.MAX_CYCLES} cycles: "
-                f"the motion still changes by {left:.2g} of its amplitude from one cycle to the next; "
+                f"the motion still changes by {change:.2g} of its amplitude from one cycle to the next; "
                 'use accuracy.method = "march"'
             )
-        return run, left
+        return run, change
 
     def _evaluate_cycle(self, run, steps: int, frames: int = 0) -> CycleEvaluation:
         """Evaluate one cycle of a periodic march."""
         mark, snapshots = orbits.march_cycle(run, frames)
         numerics = replace(self.numerics, steps=steps)
         reader = MarchEvaluator(self.model, numerics, self.patch, self.contact)
-        is_stuck = bool(np.ptp(mark.window.slip) <= reader.held) and not reader.creeps
+        is_stuck = bool(np.ptp(mark.window.slip) <= reader.stick_tolerance) and not reader.creeps
         values = reader.evaluate_measures(mark, run.drive, stuck=is_stuck)
         return CycleEvaluation(values | {"drift_per_cycle": 0.0}, mark, snapshots, is_stuck)
 
-    def point(self, drive, near=None) -> tuple:
+    def compute_steady_motion(self, drive, guess=None) -> tuple:
         """Compute the steady motion under sinusoidal drive, and the run from which to continue.
 
         If the lifted mass leaves its grooves, there is no steady motion. The Solution is then that
         of the motion that leaves them, and the run is None.
         """
         try:
-            return self._refine_point(drive, near)
+            return self._refine_point(drive, guess)
         except NotConverged:
             if (
                 gone := march_out_of_grooves(
@@ -167,7 +167,7 @@ class MarchFinder(TracedCurve):
                 raise
         return gone, None
 
-    def _refine_point(self, drive, near) -> tuple:
+    def _refine_point(self, drive, guess) -> tuple:
         """Compute the steady motion with as many time steps as the tolerance requires.
 
         The steps are doubled until the amplitude changes by less than the tolerance. The errors
@@ -175,7 +175,7 @@ class MarchFinder(TracedCurve):
         """
         begin = perf_counter()
         name = "relative_displacement_amplitude"
-        run, left = self._march_to_periodic(drive, near, self.steps)
+        run, change = self._march_to_periodic(drive, guess, self.steps)
         half = self._evaluate_cycle(
             self._march_to_periodic(drive, run, self.steps // 2)[0], self.steps // 2
         ).values
@@ -186,7 +186,7 @@ class MarchFinder(TracedCurve):
                 break
             steps = 2 * steps
             half = reading.values
-            run, left = self._march_to_periodic(drive, run, steps)
+            run, change = self._march_to_periodic(drive, run, steps)
             reading = self._evaluate_cycle(run, steps, self.frames)
         values, mark, snapshots, is_stuck = reading
         peak_errors = peak_sampling_errors(mark.window, True)
@@ -204,7 +204,7 @@ class MarchFinder(TracedCurve):
         errors = {}
         for key, value in values.items():
             if value is not None:
-                error = abs(value - half.get(key, value)) + abs(value) * (left + STEP_END_ERROR)
+                error = abs(value - half.get(key, value)) + abs(value) * (change + STEP_END_ERROR)
                 errors[key] = error + peak_errors.get(key, 0.0)
         if "slip_start_phase" in errors:
             errors["slip_start_phase"] = (
@@ -213,7 +213,7 @@ class MarchFinder(TracedCurve):
         extra = {
             "regime": regime,
             "multipliers": multipliers,
-            "residual": left,
+            "residual": change,
             "map": "march",
             "steps_per_cycle": steps,
         }
@@ -237,18 +237,18 @@ class MarchFinder(TracedCurve):
         """Return whether half the steps change the amplitude by more than the tolerance."""
         return abs(value - half) > self.model.accuracy.tolerance * abs(value)
 
-    def curve_point(self, drive, near=None) -> CurvePoint:
+    def compute_curve_point(self, drive, guess=None) -> CurvePoint:
         """Compute one point of a response curve, from a neighbouring motion or else from rest."""
         try:
-            return make_curve_point(drive, *self.point(drive, near))
+            return make_curve_point(drive, *self.compute_steady_motion(drive, guess))
         except NotConverged:
-            if near is None:
+            if guess is None:
                 raise
-        return make_curve_point(drive, *self.point(drive))
+        return make_curve_point(drive, *self.compute_steady_motion(drive))
 
-    def curve(self, drive) -> tuple:
+    def trace_curve(self, drive) -> tuple:
         """Compute the response curve over frequency, which has no folds.
 
         Each point starts from the motion at the previous one.
         """
-        return compute_response_curve(self.model.rig.modes, drive, self.curve_point), ()
+        return compute_response_curve(self.model.rig.modes, drive, self.compute_curve_point), ()

@@ -57,7 +57,7 @@ def _solve_drive(finder, model) -> Solution:
     """Compute the steady motion, response curve or drive levels that the drive of a model requests."""
     drive = model.rig.drive.signal
     if isinstance(drive, SineDrive):
-        return finder.point(drive)[0]
+        return finder.compute_steady_motion(drive)[0]
     if model.rig.drive.levels.amplitudes:
         return solve_levels(finder, drive)
-    return solve_peak(*finder.curve(drive), finder)
+    return solve_peak(*finder.trace_curve(drive), finder)
