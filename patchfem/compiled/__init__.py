@@ -44,7 +44,7 @@ from ..disk.installed import find_package_version
 from . import cache_limit, machine, prebuilt
 from .no_jit import load_uncompiled
 
-# names that other folders use, by module
+# Names that other folders use, by module.
 PUBLIC = {
     "jit": (
         "NJIT_INTERNAL",
@@ -54,8 +54,8 @@ PUBLIC = {
 }
 
 PACKAGE_FOLDER = Path(__file__).parents[1]  # folder of the package
-# Modules of tuples that kernels take and of row numbers. They belong to the hash because the machine code depends on
-# the order of the fields and on the numbers.
+# Modules of tuples that kernels take and of row numbers; they belong to the hash because the
+# machine code depends on the order of the fields and on the numbers.
 TUPLE_MODULES = (
     "contact/batch/arrays.py",
     "contact/set_arrays.py",
@@ -69,19 +69,22 @@ TUPLE_MODULES = (
     "dynamics/events/modal_system.py",
     "dynamics/events/elements.py",
 )
-# Numba's environment variable that disables compilation; all kernels then run as Python.
+# State of the environment variable that makes numba run all kernels as Python.
 IS_JIT_DISABLED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
-MIN_FREE_BYTES = 1 << 21  # the machine code of a run needs this disk space
-# CPU seconds; a function that would take longer as Python in this process is compiled. This is about a tenth of the
-# compile time (10 to 30 s), because later processes reuse the machine code.
+MIN_FREE_BYTES = 1 << 21  # disk space in bytes that the machine code of a run needs
+# Largest time [CPU s] that a function may take as Python in this process before it is
+# compiled; this is about a tenth of the compile time (10 to 30 s), because later
+# processes reuse the machine code.
 MAX_PYTHON_SECONDS = 2.0
 # Time to wait for another process that compiles [s]: ten times the longest compilation.
 MAX_LOCK_WAIT = 300.0
-# Time between two attempts to take the lock [s]; short compared with a compilation.
+# Time between two attempts to take the lock [s], short compared with a compilation.
 LOCK_CHECK_INTERVAL = 0.05
-# Functions called by this process whose machine code cannot be stored, so every process imports numba for them.
+# Functions called by this process whose machine code cannot be stored, so that every
+# process imports numba for them.
 UNCACHED_FUNCTIONS = set()
-# One thread at a time loads code, because loading a function twice at the same time crashes the process.
+# Lock that lets one thread at a time load code, because loading a function twice at the
+# same time crashes the process.
 LOADING_LOCK = RLock()
 _MESSAGE_CALLBACKS = []  # callbacks that receive a message when a function is compiled
 ARITHMETIC_OPERATORS = {
@@ -124,7 +127,7 @@ def _describe_cpu() -> str:
         lines = Path("/proc/cpuinfo").read_text().splitlines()
     except OSError:
         return platform.processor()
-    # the flags are needed because a virtual machine may hide some instruction sets of a CPU model
+    # The flags are needed because a virtual machine may hide some instruction sets of a CPU model.
     names = ("model name", "flags", "Features")
     descriptions = [line for line in dict.fromkeys(lines) if line.startswith(names)]
     return " ".join(descriptions) or platform.processor()
@@ -161,7 +164,7 @@ def _choose_folder() -> tuple[Path, str]:
     if session and not user_cache.prepare_folder(Path(session) / name):
         return Path(session) / name, reason
     process_folder = user_cache.make_process_folder() / name
-    user_cache.prepare_folder(process_folder)  # makes it if possible
+    user_cache.prepare_folder(process_folder)  # creates the folder if possible
     return process_folder, reason
 
 
@@ -206,7 +209,7 @@ class KernelModule:
         return self._importer()
 
 
-# s; time in which this process compiled code or waited for another process that did
+# Time [s] in which this process compiled code or waited for another process that did.
 COMPILE_SECONDS = [0.0]
 
 
@@ -245,7 +248,7 @@ def lock_exclusively(path: Path):
 
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         file = os.open(path, os.O_CREAT | os.O_RDWR, 0o600)
-    except (ImportError, OSError):  # Windows; a folder that cannot be written
+    except (ImportError, OSError):  # raised on Windows, or if the folder is not writable
         yield
         return
     try:
@@ -283,7 +286,7 @@ class KernelFunction:
         self.name = name
         self.file_prefix = file_prefix
         self.converter = machine.ArgumentConverter()
-        # loaded function for each tuple of type codes; False if numba runs the function itself
+        # Loaded function for each tuple of type codes; False if numba runs the function itself.
         self.loaded_functions = {}
         self.python_seconds = inf  # predicted cost of all calls as Python [CPU s]
 
@@ -339,7 +342,7 @@ class KernelFunction:
         function = self.loaded_functions.get(type_codes)
         if function is None:
             with LOADING_LOCK:
-                # another thread may have loaded it in the meantime
+                # Another thread may have loaded it in the meantime.
                 function = self.loaded_functions.get(type_codes)
                 if function is None:
                     return self._call_first_time(type_codes, words, arguments)

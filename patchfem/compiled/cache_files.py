@@ -10,12 +10,13 @@ from contextlib import suppress
 
 from numba.core import caching
 
-CHECKSUM_SIZE = 32  # bytes of the SHA-256 hash at the start of a file
-# The class is private in numba 0.61.
+CHECKSUM_SIZE = 32  # number of bytes of the SHA-256 hash at the start of a file
+# Locator class of numba, which is private in version 0.61.
 NUMBA_LOCATOR = (
     getattr(caching, "UserProvidedCacheLocator", None) or caching._UserProvidedCacheLocator
 )
-# Private attributes of IndexDataCacheFile that ChecksummedFiles uses; another version of numba may lack them.
+# Private attributes of IndexDataCacheFile that ChecksummedFiles uses; another
+# version of numba may lack them.
 NUMBA_ATTRIBUTES = ("_index_path", "_version", "_source_stamp")
 
 

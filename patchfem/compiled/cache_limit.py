@@ -11,10 +11,13 @@ from contextlib import suppress
 from pathlib import Path
 from time import time
 
-# folders kept besides the one in use: a few releases, environments and machines may share a home folder
+# Largest number of folders besides the one in use: several releases, environments and
+# machines may share a home folder.
 MAX_OTHER_FOLDERS = 8
-MIN_UNUSED_TIME = 3600.0  # s; a folder used more recently may belong to a running process
-MARK_INTERVAL = 60.0  # s; a mark that is younger is not renewed
+# Smallest time [s] since the last use of a folder that is removed; one used later
+# may belong to a running process.
+MIN_UNUSED_TIME = 3600.0
+MARK_INTERVAL = 60.0  # smallest age [s] of a mark that is renewed
 STATE_NAME = re.compile(r"[0-9a-f]{16}")
 REMOVED_NAME = re.compile(r"\.[0-9a-f]{16}\.\d+\.gone")  # name of a folder that is being removed
 
@@ -40,7 +43,7 @@ def remove_old_folders(folder: Path, max_others: int = MAX_OTHER_FOLDERS) -> Non
     """
     others = {}
     for entry in os.scandir(folder.parent):
-        if REMOVED_NAME.fullmatch(entry.name):  # a killed process left it
+        if REMOVED_NAME.fullmatch(entry.name):  # a killed process left the folder
             shutil.rmtree(entry.path, ignore_errors=True)
         elif (
             STATE_NAME.fullmatch(entry.name)
@@ -65,7 +68,7 @@ def find_last_use(folder: Path) -> float:
 def _remove(folder: Path) -> None:
     """Remove a folder unless another process used it in the meantime."""
     removed = folder.with_name(f".{folder.name}.{os.getpid()}.gone")
-    with suppress(OSError):  # another process removed it first
+    with suppress(OSError):  # another process removed the folder first
         os.rename(folder, removed)
         if time() - find_last_use(removed) < MIN_UNUSED_TIME and not folder.exists():
             os.rename(removed, folder)

@@ -17,13 +17,13 @@ from shutil import copytree, ignore_patterns
 from tempfile import TemporaryDirectory
 
 ROOT = Path(__file__).parents[2]
-# program that prints the name of the common CPU in LLVM and the folder name KEY
+# Program that prints the name of the common CPU in LLVM and the folder name KEY.
 CPU_AND_KEY_PROGRAM = """import platform, numba
 from patchfem.compiled import hash_sources, prebuilt
 if not prebuilt.is_cpu_sufficient():
     raise SystemExit('this CPU lacks instruction sets of the machine code')
 print(prebuilt.COMMON_CPUS[platform.machine()].name, prebuilt.compute_key(hash_sources))"""
-# program that compiles every kernel that it calls, even if running it as Python would cost less
+# Program that compiles every kernel that it calls, even if running it as Python would cost less.
 COMPILE_PROGRAM = """import sys
 from patchfem import compiled
 from patchfem.__main__ import main
@@ -73,7 +73,7 @@ def list_usual_commands(folder: Path):
         scene = folder / f"{number}.toml"
         scene.write_text(f"{RIG_TEXT}{modes}{DRIVE_TEXT}{law}\n", "utf-8")
         yield "run", scene
-    for number in range(2):  # laws for which a sweep integrates many cases at once
+    for number in range(2):  # for these laws, a sweep integrates many cases at once
         yield "sweep", folder / f"{number}.toml", "--over", "drive.acceleration=3 g..6 g:64"
 
 

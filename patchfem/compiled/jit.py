@@ -28,12 +28,15 @@ NO_C_WRAPPER = {"no_cfunc_wrapper": True} if hasattr(DefaultOptions, "no_cfunc_w
 NO_PYTHON_WRAPPER = (
     {"no_cpython_wrapper": True} if hasattr(DefaultOptions, "no_cpython_wrapper") else {}
 )
-# Functions that allocate nothing need no reference counting, which took 1.3 of the 1.6 us of a time step.
+# Options for functions that allocate nothing and need no reference counting, which took
+# 1.3 of the 1.6 us of a time step.
 NJIT_NO_REFCOUNT = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
-# Functions that only compiled code calls need no wrappers, which take most of their compile time.
+# Options for functions that only compiled code calls; without wrappers, most
+# of their compile time is saved.
 NJIT_INTERNAL = NJIT_NO_REFCOUNT | NO_C_WRAPPER | NO_PYTHON_WRAPPER
-# Numba's passes that the kernels need. The omitted ones handle closures, generators, `with`, lists, raise and array
-# expressions, which no kernel contains; they took a seventh of the compile time of a loop.
+# Compiler passes of numba that the kernels need. The omitted ones handle closures, generators,
+# `with`, lists, raise and array expressions, which no kernel contains; they took a seventh of the
+# compile time of a loop.
 NUMBA_PASSES = [
     getattr(home, name, None)
     for home, names in (
@@ -62,7 +65,7 @@ NUMBA_PASSES = [
     )
     for name in names
 ]
-# private methods of numba's JITCodeLibrary that the libraries below replace or call
+# Private methods of numba's JITCodeLibrary that the libraries below replace or call.
 LIBRARY_METHODS = (
     "_optimize_final_module",
     "_finalize_final_module",
@@ -194,7 +197,7 @@ def compile_optimised(function, arguments: tuple) -> tuple:
 class UnoptimisedCompiler(Compiler):
     """Compiler that stops at LLVM code without optimisation, which callers link in."""
 
-    # class of the library that contains the LLVM code
+    # Class of the library that contains the LLVM code.
     library_class = property(lambda self: UnoptimisedLibrary)
 
     def define_pipelines(self):

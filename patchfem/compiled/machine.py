@@ -25,10 +25,11 @@ import numpy as np
 from ..disk import user_cache
 
 SUCCESS_CODES = (0, -2)  # status codes of numba for success: a function returned a value, or None
-# type code of `struct` for each type of number that a function takes
+# Type code of `struct` for each type of number that a function takes.
 NUMBER_CODES = {float: "d", int: "q", np.float64: "d", np.int64: "q"}
-_ARRAY_FORMATS = {}  # (dtype, dimensions, flags) of an array -> its `ArrayFormat`
-MAX_CACHED_TUPLES = 12  # tuples whose words are cached; a run passes the same few in many calls
+_ARRAY_FORMATS = {}  # `ArrayFormat` for each (dtype, number of dimensions, flags) of an array
+# Number of tuples whose words are cached; a run passes the same few in many calls.
+MAX_CACHED_TUPLES = 12
 
 
 class UnsupportedError(Exception):
@@ -57,9 +58,9 @@ class ArgumentConverter:
         known = self.known_tuples.get(id(value))
         if known is None:
             codes, words = zip(*map(self.convert, value)) if value else ((), ())
-            # the tuple itself is cached too, so that no other object gets its `id`
+            # The tuple itself is cached too, so that no other object gets its `id`.
             known = value, f"{type(value).__name__}({','.join(codes)})", b"".join(words)
-            # a tuple of numbers is made for a single call and would displace others from the cache
+            # A tuple of numbers is made for a single call and would displace others from the cache.
             if all(map(NUMBER_CODES.__contains__, map(type, value))):
                 return known[1:]
             with self.lock:
@@ -88,7 +89,7 @@ def _convert_array(array) -> tuple:
     known = _ARRAY_FORMATS.get(key)
     if known is None:
         known = _ARRAY_FORMATS[key] = _make_array_format(array)
-    # `__array_interface__` takes 3 us, which matters in a short call
+    # `__array_interface__` takes 3 us, which matters in a short call.
     if known.is_buffer and array.size:
         address = ctypes.addressof(ctypes.c_char.from_buffer(array))
     else:
@@ -123,12 +124,12 @@ class LoadedFunction:
     """
 
     def __init__(self, address: int, result_format, *, nogil: bool = False):
-        # CFUNCTYPE releases the global interpreter lock during the call, PYFUNCTYPE keeps it
+        # CFUNCTYPE releases the global interpreter lock during the call, PYFUNCTYPE keeps it.
         prototype = ctypes.CFUNCTYPE if nogil else ctypes.PYFUNCTYPE
         self.call = prototype(None, ctypes.c_void_p)(address)
         self.result_format = result_format
         self.flat_format = _flatten_format(result_format)
-        # words of the status and of the results, which precede the arguments
+        # Words of the status and of the results, which precede the arguments.
         self.header = bytes(8 * (1 + max(len(self.flat_format), 1)))
 
     def __call__(self, words: bytes):
@@ -242,7 +243,9 @@ def store_code(path: Path, function, arguments: tuple) -> bool:
         result = function.overloads[tuple(map(function.typeof_pyval, arguments))]
         content = _make_file_content(path.name, function.targetctx, result, function.targetoptions)
         return user_cache.write_cache_file(path, content)
-    except Exception:  # numba and llvmlite may raise any; the run already has its function
+    except Exception:
+        # Numba and llvmlite may raise any exception; it can be ignored because the function is
+        # already compiled.
         return False
 
 
@@ -319,7 +322,7 @@ def _describe_result(kind):
     if isinstance(kind, types.NoneType):
         return ""
     if isinstance(kind, types.BaseTuple):
-        # a boolean in a tuple takes one byte, not a word of eight
+        # A boolean in a tuple takes one byte, not a word of eight.
         if types.boolean in kind.types:
             raise UnsupportedError
         return [_describe_result(element) for element in kind]
@@ -401,7 +404,8 @@ def _write_entry_function(target, result, name: str, n_result_words: int, linked
     buffer = entry.args[0]
     arguments = []
     offset = 1 + n_result_words
-    # the first two arguments of a function of numba are the addresses of the result and of the exception
+    # The first two arguments of a function compiled by numba are the addresses of
+    # the result and of the exception.
     result_type, exception_type, *llvm_types = function_type.args
     remaining_types = iter(llvm_types)
     for argument_type in signature.args:

@@ -19,7 +19,7 @@ def _return_unchanged(function=None, **options):
     return function if function is not None else lambda decorated: decorated
 
 
-# stands for the module `jit` in kernel modules that are not compiled
+# Replacement of the module `jit` in kernel modules that are not compiled.
 JIT_REPLACEMENT = SimpleNamespace(njit=_return_unchanged, NJIT_NO_REFCOUNT={}, NJIT_INTERNAL={})
 
 

@@ -13,7 +13,7 @@ from numba.core.extending import register_model
 from numba.core.imputils import lower_getattr_generic
 from numba.core.typing.templates import AttributeTemplate, infer_getattr
 
-WORD_BYTES = 8  # bytes of a number in a tuple, and of each word that describes an array
+WORD_BYTES = 8  # number of bytes of a number in a tuple, and of each word that describes an array
 
 
 class ReferencedTuple(types.Type):

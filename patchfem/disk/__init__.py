@@ -6,7 +6,7 @@ process write to a folder, `open_with_timeout` opens files for reading, `user_ca
 `file_hashes` detects files that changed, `installed` lists package versions. Read `atomic_write` first.
 """
 
-# names that other folders use, by module
+# Names that other folders use, by module.
 PUBLIC = {
     "atomic_write": (
         "RESUMABLE_FOLDERS",

@@ -21,11 +21,13 @@ from ..core import Missing
 from .lock import HOST_HASH, is_running
 
 NO_SPACE_ERRNOS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-# bytes; numpy and HDF5 raise errors without a number, which mean a full disk if less than this is free
+# Free space in bytes below which an error of numpy or HDF5 that has no
+# error number means a full disk.
 MIN_FREE_BYTES = 65536
 PLACED_PATHS = deque(maxlen=100)  # last completed files; the message on an interrupt names them
 RESUMABLE_FOLDERS = []  # folders in which this process left a checkpoint
-MAX_NAME_LENGTH = 150  # characters of a name in its partial name; file systems allow 255 bytes
+# Largest number of characters of a name within its partial name; file systems allow 255 bytes.
+MAX_NAME_LENGTH = 150
 
 
 class WriteError(Missing):
@@ -192,13 +194,14 @@ def explain_write_error(
         States the path and the reason, and for a full disk the space that is needed and available.
     """
     name = format_path(path)
-    # the size of a device is not the free space of a disk
+    # The size of a device is not the free space of a disk.
     if partial == path and error.errno in NO_SPACE_ERRNOS:
         return WriteError(f"{name}: not enough space ({error.strerror})")
     with suppress(OSError):
         space = find_free_space(path)
         written = partial.stat().st_size if partial != path and partial.exists() else 0
-        # the partial file counts against a limit on file sizes; from the free space it is already subtracted
+        # The partial file counts against a limit on file sizes, but is already
+        # subtracted from the free space.
         remaining = space.size - written if space.is_file_limit else space.size
         if error.errno in NO_SPACE_ERRNOS and not _has_free_inodes(path):
             return WriteError(
@@ -308,7 +311,7 @@ def _read_file_size_limit() -> float:
     """Return the limit of this process on the size of a file [bytes]."""
     try:
         import resource
-    except ImportError:  # Windows
+    except ImportError:  # raised on Windows
         return float("inf")
     limit = resource.getrlimit(resource.RLIMIT_FSIZE)[0]
     return float("inf") if limit == resource.RLIM_INFINITY else limit

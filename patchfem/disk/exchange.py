@@ -14,9 +14,9 @@ from .atomic_write import PLACED_PATHS
 END_SIGNALS = tuple(
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
 )
-RENAME_EXCHANGE = 2  # flag of renameat2(2) of Linux
-AT_FDCWD = -100  # value of renameat2(2) for the working folder
-# errors of a system or a disk that cannot exchange two folders
+RENAME_EXCHANGE = 2  # flag of renameat2(2) on Linux that exchanges two paths
+AT_FDCWD = -100  # file descriptor for the working folder in renameat2(2)
+# Errors of a system or a disk that cannot exchange two folders.
 UNSUPPORTED_ERRNOS = (errno.EINVAL, errno.ENOSYS, errno.EOPNOTSUPP, errno.ENOTSUP)
 
 
@@ -34,7 +34,9 @@ def replace_folder(new: Path, target: Path) -> None:
             os.rename(new, target)
         elif exchange_folders(new, target):
             os.rename(new, old)
-        else:  # for an instant the folder does not exist; if the process is killed then, `restore_folder` helps
+        else:
+            # For an instant, the folder does not exist; `restore_folder` recovers it if the process
+            # is killed then.
             os.rename(target, old)
             try:
                 os.rename(new, target)
@@ -75,7 +77,7 @@ def exchange_folders(first: Path, second: Path) -> bool:
 @contextmanager
 def defer_signals() -> Iterator[None]:
     """Defer signals that end this process until the block is done."""
-    # signals reach the main thread only
+    # Signals reach only the main thread.
     if threading.current_thread() is not threading.main_thread():
         yield
         return

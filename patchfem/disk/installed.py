@@ -27,7 +27,7 @@ def list_installed_versions() -> dict:
             continue
         for name in names:
             if match := METADATA_PATTERN.fullmatch(name):
-                # Python imports the first package on the path
+                # Python imports the first package on the path.
                 versions.setdefault(_normalise_name(match[1]), match[2])
     return versions
 

@@ -54,7 +54,7 @@ def is_running(pid: int, start: str = "") -> bool:
     try:
         os.kill(pid, 0)
     except PermissionError:
-        pass  # the process runs and belongs to another user
+        pass  # the process is running and belongs to another user
     except (OSError, OverflowError):
         return False
     ticks = read_start_ticks(pid)
@@ -94,7 +94,7 @@ class FolderLock:
                         f"{self.path.parent.name}/{self.path.name}"
                     )
                 os.ftruncate(file, 0)
-                # an incomplete entry would name no process
+                # An incomplete entry would not identify a process.
                 if os.pwrite(file, self.owner.encode(), 0) < len(self.owner):
                     os.ftruncate(file, 0)
                     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
@@ -123,7 +123,7 @@ class FolderLock:
             return False
         if len(owner) > 2 and owner[2] != HOST_HASH:
             return True
-        # the file is that of another thread, or remains from an earlier failure of this process
+        # The file belongs to another thread, or remains from an earlier failure of this process.
         if int(owner[0]) == os.getpid():
             return self.path in OWN_LOCK_PATHS
         return is_running(int(owner[0]), owner[1] if len(owner) > 1 and owner[1] != "-" else "")
@@ -138,7 +138,7 @@ def _open_exclusively(path: Path) -> Iterator[int]:
             try:
                 _lock_file(file)
                 with suppress(FileNotFoundError):
-                    # if the path is another file now, the previous owner has removed this one
+                    # If the path is another file now, the previous owner has removed this one.
                     if os.path.samestat(os.fstat(file), os.stat(path)):
                         yield file
                         return
@@ -150,7 +150,7 @@ def _lock_file(file: int) -> None:
     """Lock a file by the operating system, where it supports this."""
     try:
         import fcntl
-    except ImportError:  # Windows
+    except ImportError:  # raised on Windows
         return
     with suppress(OSError):
         fcntl.flock(file, fcntl.LOCK_EX)

@@ -8,12 +8,12 @@ import stat
 from pathlib import Path
 from typing import BinaryIO
 
-PIPE_TIMEOUT = 5.0  # s until the first data of a pipe
+PIPE_TIMEOUT = 5.0  # time to wait for the first data of a pipe [s]
 
 
 def open_for_reading(path: str | Path) -> BinaryIO:
     """Open a file or a pipe for reading bytes; raise TimeoutError for a pipe without data."""
-    if not hasattr(os, "O_NONBLOCK"):  # Windows, where pipes are not files
+    if not hasattr(os, "O_NONBLOCK"):  # on Windows, where pipes are not files
         return open(path, "rb")
     file = open(path, "rb", opener=lambda name, flags: os.open(name, flags | os.O_NONBLOCK))
     if stat.S_ISFIFO(os.fstat(file.fileno()).st_mode):

@@ -23,7 +23,7 @@ def find_cache_base() -> Path:
         return Path(folder)
     try:
         return Path.home() / ".cache"
-    except RuntimeError:  # user without a name, as in a container
+    except RuntimeError:  # raised for a user without a name, as in a container
         return make_process_folder()
 
 

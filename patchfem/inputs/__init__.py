@@ -12,7 +12,7 @@ Matrices of finite-element programs: `matrices`, with the formats of Nastran in 
 Read `columns` first.
 """
 
-# names that other folders use, by module
+# Names that other folders use, by module.
 PUBLIC = {
     "cells": (
         "NUMBER_PATTERN",

@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 from ..exceptions import Missing, PatchfemError
 
-MAX_BYTES = 64 * 2**20  # largest size of a text file [bytes]
-BLOCK_BYTES = 2**17  # bytes that are read at a time, so a long file takes little memory
+MAX_BYTES = 64 * 2**20  # largest size of a text file in bytes
+BLOCK_BYTES = 2**17  # number of bytes read at a time, so that a long file takes little memory
 MAX_VALUE = 1e50  # largest value in SI; the keys of a scene have the same limit
 NUMBER_PATTERN = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _HEADER_CELL_PATTERN = re.compile(r"\s*([A-Za-z_]\w*)\s*(?:\[\s*([^\[\]]*?)\s*\])?\s*")

@@ -98,7 +98,7 @@ def _read_plain_block(lines: list, names: list, factors: dict) -> np.ndarray | N
         return None
     try:
         numbers = np.array(list(map(float, text.split(","))))
-    except ValueError:  # an empty cell, or signs without a number
+    except ValueError:  # an empty cell, or a sign without a number
         return None
     values = numbers.reshape(len(lines), -1) * list(factors.values())
     return values if np.abs(values).max() <= MAX_VALUE else None

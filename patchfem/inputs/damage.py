@@ -8,15 +8,15 @@ from contextlib import contextmanager
 
 from ..exceptions import PatchfemError
 
-MAX_REASON_LENGTH = 160  # largest number of characters of the quoted reason; longer reasons are cut
+MAX_REASON_LENGTH = 160  # largest number of characters of a quoted reason; longer reasons are cut
 
-# What the readers and the libraries that they call raise for wrong bytes. A NameError, an
-# AttributeError or a TypeError is a mistake in the program and stays visible as such.
+# Exceptions that the readers and the libraries that they call raise for damaged files; a NameError,
+# an AttributeError or a TypeError is a mistake in the program and is not caught.
 DAMAGE_ERRORS = (
-    ValueError,  # also UnicodeDecodeError
+    ValueError,  # includes UnicodeDecodeError
     LookupError,  # KeyError and IndexError
     OverflowError,
-    RuntimeError,  # HDF5 and encrypted archives; also NotImplementedError of zipfile
+    RuntimeError,  # from HDF5 and encrypted archives; includes NotImplementedError of zipfile
     OSError,
     EOFError,
     struct.error,

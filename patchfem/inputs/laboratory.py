@@ -29,8 +29,8 @@ from .units import CHANNEL_UNITS, find_unit_factor
 EXTENSIONS = (*UNIVERSAL_EXTENSIONS, ".mat", ".csv", ".txt")
 # Channels that every motion of `patchfem export` has.
 MOTION_CHANNELS = {"absolute_acceleration", "base_acceleration"}
-MAX_COLUMNS = 1000  # largest number of columns of a table
-MAX_LISTED_ARRAYS = 20  # arrays of a MATLAB file that an error message lists
+MAX_COLUMNS = 1000  # largest number of columns in a table
+MAX_LISTED_ARRAYS = 20  # largest number of arrays of a MATLAB file that an error message lists
 _HEADER_CELL_PATTERN = re.compile(r"(.*?)\s*(?:\[\s*([^\[\]]*?)\s*\]|\(\s*([^()]*?)\s*\))?", re.S)
 _COLUMN_PATTERN = re.compile(r"([\w.]+)\(:,\s*([1-9][0-9]*)\)")
 

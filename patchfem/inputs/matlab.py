@@ -5,8 +5,8 @@ import os
 from ..core import PatchfemError
 from . import matlab5, matlab73
 
-MAX_BYTES = 512 * 2**20  # largest size of a file [bytes]
-# signature at the beginning of the file, or after the user block that MATLAB puts there
+MAX_BYTES = 512 * 2**20  # largest size of a MATLAB file in bytes
+# Signature at the beginning of an HDF5 file, or after the user block that MATLAB puts there.
 HDF5_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
@@ -43,7 +43,7 @@ def read_variables(path, data: bytes | None = None) -> dict:
 def _read_bytes(path) -> bytes:
     with open(path, "rb") as file:
         head = file.read(128)
-        # a version-4 file has zeros there, and so may a file that is not from MATLAB
+        # A version-4 file has zeros there, and so may a file that is not from MATLAB.
         if len(head) < 128 or 0 in head[:4]:
             raise PatchfemError(f"{path}: {matlab5.FILE_HEADER_DAMAGE}")
         if os.fstat(file.fileno()).st_size > MAX_BYTES:

@@ -28,9 +28,10 @@ from .damage import refuse_damage
 MAX_NUMBERS = 15 * 10**7  # largest number of values in one variable
 MAX_VARIABLES = 1000
 MAX_NESTING = 8  # largest depth of nested structures
-MAX_UNPACK_RATIO = 200  # unpacked / packed size of a variable above UNPACK_CHECK_BYTES
+# Largest ratio of unpacked to packed size of a variable above UNPACK_CHECK_BYTES.
+MAX_UNPACK_RATIO = 200
 UNPACK_CHECK_BYTES = 2**20
-HEADER_BYTES = 1024  # bytes of a packed variable that contain its shape and its name
+HEADER_BYTES = 1024  # number of bytes of a packed variable that contain its shape and its name
 COMPLEX_FLAG = 0x0800
 FILE_HEADER_DAMAGE = (
     "the header of the MATLAB file is damaged or of version 4; save it anew with save(name, '-v7')"

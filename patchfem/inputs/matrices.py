@@ -17,23 +17,25 @@ from ..core import PatchfemError
 from . import matlab, nastran
 from .damage import refuse_damage
 
-# Names of a matrix in a file of several matrices.
+# Names of each matrix in a file with several matrices.
 MATRIX_NAMES = {
     "stiffness": ("k", "kaax", "kaa", "kgg", "stiffness"),
     "mass": ("m", "maax", "maa", "mgg", "mass"),
     "damping": ("c", "d", "baax", "baa", "bgg", "damping"),
 }
-MAX_SKEW = 1e-8  # |A - A^T| / |A| of a matrix that counts as symmetric
+MAX_SKEW = 1e-8  # largest skew part |A - A^T| / |A| of a matrix that counts as symmetric
 SKEW_REFUSAL = "gyroscopic and follower terms are not supported"
-MAX_LISTED_ARRAYS = 12  # arrays that an error message lists
-# Number of entries of a matrix from which its rounding is estimated; with fewer distinct ones it stays unknown.
+MAX_LISTED_ARRAYS = 12  # largest number of arrays that an error message lists
+# Number of entries from which the rounding of a matrix is estimated.
 N_SAMPLED_NUMBERS = 500
-MIN_DISTINCT_NUMBERS = 10
-SINGLE_PRECISION_DIGITS = 7  # decimal digits of single precision
-DOUBLE_PRECISION_DIGITS = 15  # decimal digits that double precision always keeps
-# If at least this fraction of the numbers need nearly all digits, all numbers were rounded to these digits.
+MIN_DISTINCT_NUMBERS = 10  # smallest number of distinct entries that shows the rounding
+SINGLE_PRECISION_DIGITS = 7  # number of decimal digits of single precision
+DOUBLE_PRECISION_DIGITS = 15  # number of decimal digits that double precision always keeps
+# Smallest fraction of numbers with nearly all digits for which the whole
+# matrix was rounded to these digits.
 MIN_FULL_DIGITS_FRACTION = 0.6
-# digits by which a number may be shorter: a sign or an exponent takes their room in the field
+# Number of digits by which a number may be shorter, because a sign or an
+# exponent takes up part of its field.
 N_DROPPED_DIGITS = 2
 ROUNDING_DEVIATION = 12**-0.5  # standard deviation of the error of rounding to a multiple of 1
 
@@ -333,7 +335,7 @@ def _read_dmig(path: Path, matrix_name: str) -> Matrix:
     return Matrix(values, places, has_size=False)
 
 
-# ending of a file -> its reader
+# Reader of each file extension.
 READERS_BY_EXTENSION = {
     ".mtx": _read_market,
     ".mat": _read_matlab,

@@ -18,10 +18,10 @@ from ..core import PatchfemError
 from .damage import refuse_damage
 
 MAX_NUMBERS = 5 * 10**7  # largest number of values in a matrix
-MAX_ROWS = 2 * 10**6  # largest number of rows of a matrix
-ROW_FACTOR = 2**16  # the header word of a string is length * ROW_FACTOR + row
+MAX_ROWS = 2 * 10**6  # largest number of rows in a matrix
+ROW_FACTOR = 2**16  # factor in the header word of a string, which is length * ROW_FACTOR + row
 SYMMETRIC_FORM = 6  # form of a DMIG matrix of which one triangle is stored
-WIDE_FIELD_CHARACTERS = 16  # characters of a wide field of a DMIG card
+WIDE_FIELD_CHARACTERS = 16  # width of a wide field of a DMIG card in characters
 _NUMBER_PATTERN = re.compile(r"([+-]?[\d.]+)(?:[ED]?([+-]?\d+))?\Z", re.IGNORECASE)
 
 

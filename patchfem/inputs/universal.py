@@ -16,7 +16,7 @@ from .records import Channel, check_file
 from .units import CHANNEL_UNITS, normalize_unit
 
 DIRECTION_NAMES = ("x", "y", "z", "rx", "ry", "rz")  # directions 1 to 6 of a node
-TIME_ABSCISSA_TYPE = 17  # abscissa type "time"
+TIME_ABSCISSA_TYPE = 17  # type code of the abscissa "time"
 
 
 class OrdinateType(IntEnum):

@@ -5,7 +5,7 @@ wear. No later folder knows a scene. Read `model` first, then `patch` for presse
 and drives; `files` checks the files that a scene names.
 """
 
-# names that other folders use, by module
+# Names that other folders use, by module.
 PUBLIC = {
     "earlier_wear": (
         "GAP_DIFFERENCE_FRACTION",

@@ -9,7 +9,8 @@ from ..structure import drives
 from ..structure.drive_sizes import DriveKeys, count_cycles_per_level, find_first_period
 from .file_cache import cache_by_file
 
-MIN_RUN_CYCLES = 0.25  # drive cycles; minimum length of a run whose length is given as a duration
+# Smallest number of drive cycles in a run whose length is given as a duration.
+MIN_RUN_CYCLES = 0.25
 
 
 def build_signal(scene, modes: ModalBasis):

@@ -13,7 +13,7 @@ from ..scene.keys.tables import Tables
 from ..scene.text import format_toml
 
 START_KEY = "wear.start"
-# keys of [contact] that may differ between two runs because they do not describe the surfaces
+# Keys of [contact] that may differ between two runs because they do not describe the surfaces.
 LOADING_KEYS = (
     "load",
     "approach",
@@ -23,17 +23,19 @@ LOADING_KEYS = (
     "load_line",
     "plane",
 )
-# keys of [contact] that may be written differently; the gap shows whether the surfaces are the same
+# Keys of [contact] that may be written differently; the gap shows
+# whether the surfaces are the same.
 SURFACE_KEYS = (
     "tilt",
     "profile",
     "mesh",
 )
-# largest difference between the gaps of one patch on two meshes, relative to the range of the gap
+# Largest difference between the gaps of one patch on two meshes, relative to the range of the gap.
 GAP_DIFFERENCE_FRACTION = 1e-2
-MIN_GAP_DIFFERENCE = 1e-12  # m; a smaller difference between gaps is round-off
-MAX_LENGTH_DIFFERENCE = 1e-6  # relative; the lengths of one interface on two meshes differ by less
-# errors of h5py, json and tomllib for a file of another kind
+MIN_GAP_DIFFERENCE = 1e-12  # difference between gaps [m] below which it is round-off
+# Largest relative difference between the lengths of one interface on two meshes.
+MAX_LENGTH_DIFFERENCE = 1e-6
+# Exceptions of h5py, json and tomllib for a file of another kind.
 FILE_ERRORS = OSError, KeyError, ValueError, TypeError, IndexError, RuntimeError, AttributeError
 
 

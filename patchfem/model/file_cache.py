@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from functools import lru_cache, wraps
 
-# results that are kept for each function; those of large traces and modes take memory
+# Number of cached results of each function; results for large traces and modes take much memory.
 MAX_CACHED_RESULTS = 8
 
 

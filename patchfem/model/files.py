@@ -26,9 +26,10 @@ from . import (
     structure_reduced,
 )
 
-MAX_FULLY_READ_MESH_BYTES = 2 * 2**20  # bytes; of a larger mesh file only the start is examined
-MESH_START_BYTES = 4096  # bytes of the start of a mesh file
-# first bytes of a mesh file, by its extension
+# File size in bytes above which only the start of a mesh file is examined.
+MAX_FULLY_READ_MESH_BYTES = 2 * 2**20
+MESH_START_BYTES = 4096  # number of bytes at the start of a mesh file that are examined
+# Text at the start of a mesh file, by its extension.
 MESH_STARTS = {
     ".msh": (b"$MeshFormat",),
     ".vtu": (b"<?xml", b"<VTKFile"),

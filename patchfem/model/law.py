@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from ..scene.scene import Scene
     from .patch import PatchModel
 
-# default of the rest speed of bonds (2.10) as a fraction of the peak speed
+# Default rest speed of bonds (2.10) as a fraction of the peak speed.
 REST_SPEED_FRACTION = 1e-3
-DEFAULT_LOAD = 1.0  # N; an unloaded law with a stiffness takes its bond length at this load
+DEFAULT_LOAD = 1.0  # load [N] at which an unloaded law with a stiffness takes its bond length
 
 
 class FrictionLimits(NamedTuple):

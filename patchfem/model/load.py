@@ -10,10 +10,11 @@ from ..core import Missing
 from ..friction import grooves
 from .slide import SlidePath
 
-MAX_SLIDE_SAMPLES = 5_000_000  # samples of a slide; more take too much memory
-# fraction of the largest load; a smaller load is round-off of zero, so the contact is lost
+MAX_SLIDE_SAMPLES = 5_000_000  # largest number of samples in a slide; more take too much memory
+# Fraction of the largest load below which a load is round-off of zero, so that the contact is lost.
 MIN_LOAD_FRACTION = 1e-12
-# periods of the load; samples that are closer are the same instant with different round-off
+# Smallest time between two samples in periods of the load; closer samples are the
+# same instant apart from round-off.
 MIN_SAMPLE_SPACING = 1e-9
 
 

@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from .slide import SlidePath
     from .wear import WearModel
 
-MIN_RIG_REST_SPEED = 1e-12  # m/s; smallest default of the rest speed of bonds (2.10) in a rig
-MAX_SHOWN_EFFECTS = 160  # maximum number of characters of the effects in the repr of a model
+MIN_RIG_REST_SPEED = 1e-12  # smallest default of the rest speed of bonds (2.10) in a rig [m/s]
+MAX_SHOWN_EFFECTS = 160  # largest number of characters of the effects in the repr of a model
 
 
 class MeasuredFile(NamedTuple):

@@ -12,7 +12,7 @@ from . import peaks, profile
 from .gap import DEFAULT_CELLS, Gap, ProfileLengths, build_gap, list_gap_shapes
 
 TYPICAL_N_NODES = 160  # number of interface nodes that a patch takes at the default tolerance
-LENGTH_TOL = 1e-9  # lengths that differ by a smaller fraction are equal
+LENGTH_TOL = 1e-9  # largest relative difference of equal lengths
 
 
 @dataclass(frozen=True, slots=True)

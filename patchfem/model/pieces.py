@@ -9,7 +9,8 @@ from ..mesh import files, shaped
 from ..mesh.tensor import ROW_GROWTH, TensorGrid, graded_grid
 from .patch import PatchModel, PatchPiece
 
-# fraction of the length of the interface; mesh files contain coordinates of few digits
+# Largest difference of equal sizes, as a fraction of the interface length; mesh files
+# contain coordinates of few digits.
 MESH_SIZE_TOL = 1e-6
 
 

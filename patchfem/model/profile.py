@@ -16,15 +16,18 @@ from ..surface.profile import Profile, clean, level, resample_evenly
 from ..surface.roughness.filter import mean_line
 from .file_cache import cache_by_file
 
-CURVE_POINTS_PER_CELL = 16  # line segments per cell that represent a smooth profile
-# m; heights with a smaller standard deviation are round-off of a straight line
+CURVE_POINTS_PER_CELL = 16  # number of line segments per cell that represent a smooth profile
+# Standard deviation of heights [m] below which they are round-off of a straight line.
 MIN_HEIGHT_DEVIATION = 1e-10
-STRAIGHT_TOL = 1e-5  # standard deviation over range of heights; a straighter profile is a line
-# (removed slope x length of the trace) / range of the heights; a note reports a larger ratio
+# Largest standard deviation of the heights of a straight profile, relative to their range.
+STRAIGHT_TOL = 1e-5
+# Ratio (removed slope x length of the trace) / (range of the heights) above
+# which a note reports the slope.
 MAX_UNREPORTED_SLOPE = 1e-2
-SAMPLES_PER_CUTOFF = 16  # minimum number of samples per cut-off on which a trace is filtered
-SPACING_TOL = 1e-9  # spacings that differ by a smaller fraction of the interface are equal
-CELL_TOL = 1e-2  # relative difference of the nodes' spacing from the averaging length
+SAMPLES_PER_CUTOFF = 16  # smallest number of samples per cut-off with which a trace is filtered
+# Largest difference of equal node spacings, as a fraction of the interface length.
+SPACING_TOL = 1e-9
+CELL_TOL = 1e-2  # largest relative difference of the node spacing from the averaging length
 
 
 class _LevelledProfile(NamedTuple):

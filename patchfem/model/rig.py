@@ -29,8 +29,10 @@ from .structure import (
     read_file_notes,
 )
 
-MAX_TRAVEL = 1e3  # m; a motion that grows without bound is not followed beyond this displacement
-# fraction of the largest slide per modal coordinate of all modes; less is round-off
+# Largest displacement [m] up to which a motion that grows without bound is computed.
+MAX_TRAVEL = 1e3
+# Slide of the first mode per modal coordinate, relative to the largest one of all
+# modes, below which it is round-off.
 MIN_SLIDE_FRACTION = 1e-9
 
 
@@ -312,7 +314,7 @@ def _build_first_mode(scene, own_modes: ModalBasis, modes: ModalBasis) -> FirstM
     slide = own_modes.interfaces[0] if len(own_modes.interfaces) else own_modes.output
     elastic = np.flatnonzero(own_modes.omega > 0)
     first = int(elastic[0]) if elastic.size else 0
-    # both bases describe the same masses, so a least-squares fit converts the coordinates
+    # Both bases describe the same masses, so a least-squares fit converts the coordinates.
     own_from_modes = np.eye(slide.size)
     if modes is not own_modes and modes.shapes is not None:
         own_from_modes = modes.shapes

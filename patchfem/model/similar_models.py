@@ -110,7 +110,7 @@ def replace_numbers(
     if "contact" in tables:
         changes["patch"] = patches.replace_loading_and_shapes(model.patch, scene.contact)
     if "structure" in tables and scene.structure.bonded is not None:
-        # the bonded spring couples the modes of the scene, so they are computed anew
+        # The bonded spring couples the modes of the scene, so they are computed anew.
         rig = build_rig(scene)
         changes["point"] = build_point_load(scene)
         changes["friction"] = rig.friction.interfaces[0].numbers

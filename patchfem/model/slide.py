@@ -13,17 +13,21 @@ from ..scene.keys.quantities import UNIT_FACTORS
 from ..scene.rules.limits import find_lateral_slide_obstacle
 from .file_cache import cache_by_file
 
-# steps per straight leg; the coarsest run of the error estimate keeps two of them
+# Smallest number of steps per straight leg; the coarsest run of the
+# error estimate keeps two of them.
 MIN_STEPS_PER_LEG = 8
-# steps per leg at rest; the growth of bonds at rest, eq. (2.10), is exact in any step
+# Number of steps per leg at rest; the growth of bonds at rest, eq. (2.10), is exact for any step.
 STEPS_PER_HOLD = 4
-REFERENCE_STEPS = 400  # steps per cycle that give an error of about REFERENCE_ERROR
-REFERENCE_ERROR = 1e-3  # relative error; it falls with the square of the time step
-STEPS_PER_BOND_LENGTH = 20  # steps while the slide covers the length of a bond
-MAX_BOND_LENGTHS = 1000  # bond lengths per cycle that are resolved by STEPS_PER_BOND_LENGTH
-MIN_STEPS_PER_CYCLE = 100  # steps per cycle; they resolve the loop at any tolerance
-MAX_STEPS_PER_CYCLE = 20_000  # steps per cycle; more would take too long
-MAX_PATH_SAMPLES = 20_000_000  # samples of a path; more take too much memory
+REFERENCE_STEPS = 400  # number of steps per cycle that gives an error of about REFERENCE_ERROR
+# Relative error with REFERENCE_STEPS; it falls with the square of the time step.
+REFERENCE_ERROR = 1e-3
+STEPS_PER_BOND_LENGTH = 20  # number of steps while the slide covers the length of a bond
+# Largest number of bond lengths per cycle that STEPS_PER_BOND_LENGTH resolves.
+MAX_BOND_LENGTHS = 1000
+# Smallest number of steps per cycle, which resolves the loop at any tolerance.
+MIN_STEPS_PER_CYCLE = 100
+MAX_STEPS_PER_CYCLE = 20_000  # largest number of steps per cycle; more would take too long
+MAX_PATH_SAMPLES = 20_000_000  # largest number of samples in a path; more take too much memory
 STEP_COUNT_TOL = 1e-12  # relative round-off of a number of steps that is exactly an integer
 
 

@@ -18,7 +18,8 @@ from ..structure import modes as listed_modes
 from . import structure_files, structure_reduced
 from .law import InterfaceLaw, build_interface_laws, find_normal_load
 
-# fraction of the squared motion of the output; a mode with less moves the output by round-off only
+# Fraction of the squared motion of the output below which a mode
+# moves the output by round-off only.
 MIN_MODE_FRACTION = 1e-12
 
 
@@ -47,10 +48,11 @@ def build_modes(scene, own_modes: ModalBasis | None = None) -> ModalBasis:
     """
     modes = _split_into_strips(scene, build_own_modes(scene) if own_modes is None else own_modes)
     if modes.faces is not None and not len(modes.faces):
-        # without an interface there is no friction, and the motion of the output replaces the slide
+        # Without an interface there is no friction, and the motion of
+        # the output replaces the slide.
         modes = replace(modes, faces=None)
     bonded = scene.structure.bonded
-    # a bonded spring that interlocks is not linear, so the time integration applies it
+    # A bonded spring that interlocks is not linear, so the time integration applies it.
     if bonded is None or bonded.wavelength is not None:
         return modes
     if len(modes.interfaces) != 1 and not scene.structure.mode:
@@ -173,7 +175,7 @@ def _build_listed_modes(structure, is_forced: bool) -> ModalBasis:
     basis = listed_modes.build_basis(structure.mode, structure.moving_mass)
     accelerometer = np.array([mode.accelerometer for mode in structure.mode], float)
     gauge = np.array([mode.gauge for mode in structure.mode], float)
-    # a force acts at the output, wherever the sensors are
+    # A force acts at the output, wherever the sensors are.
     base = frozen_array(-basis.output) if is_forced else basis.base
     gauge_field = None if np.array_equal(accelerometer, gauge) else frozen_array(gauge)
     return replace(basis, base=base, output=frozen_array(accelerometer), gauge=gauge_field)
@@ -270,7 +272,7 @@ def compute_named_motions(modes: ModalBasis, modal) -> np.ndarray:
 def compute_natural_frequencies(structure, modes: ModalBasis) -> np.ndarray:
     """Return the natural frequencies (n,) [Hz] with the bonded spring, 0 for rigid modes."""
     if structure.mode and structure.bonded is None and structure.measured == "free":
-        # frequencies that the scene states are returned without round-off of the modes
+        # Frequencies that the scene states are returned without the round-off of the modes.
         return np.array([mode.frequency for mode in structure.mode])
     return modes.omega / (2 * pi)
 

@@ -8,7 +8,7 @@ from ..structure import arrays, places, universal
 from .file_cache import cache_by_file
 
 LOCATION_KEYS = ("slide_at", "output_at", "base_at", "force_at", "normal_at", "pitch_at")
-UNIVERSAL_EXTENSIONS = (".uff", ".unv")  # extensions of universal files
+UNIVERSAL_EXTENSIONS = (".uff", ".unv")  # file extensions of universal files
 
 
 class FileModes(NamedTuple):
@@ -49,7 +49,7 @@ def read_modes(path: Path, structure, drive, *, needs_interface: bool) -> FileMo
     """
     mass = None if drive.kind == "base" else drive.mass
     try:
-        # raises OSError for a file that cannot be found
+        # Raises OSError for a file that cannot be found.
         path.stat()
         return _build_modes(path, structure, drive.kind, mass, needs_interface)
     except OSError as error:

@@ -13,11 +13,11 @@ from ..inputs import matrices
 from ..structure import masses, reduced
 from ..structure.places import DIRECTION_NAMES
 
-# relative uncertainty of a frequency; a smaller one is not reported
+# Smallest relative uncertainty of a frequency that is reported.
 MIN_REPORTED_UNCERTAINTY = 1e-5
 MATRIX_KEYS = ("stiffness", "mass", "damping")  # keys of the files of [structure.reduced]
-NODE_PATTERN = re.compile(r"(\d+)(?::(r?[xyz]))?")  # "1201:x" or "1201"
-RANGE_PATTERN = re.compile(r"(\d+)\.\.(\d+)(?::(\d+))?")  # "a..b" or "a..b:n"
+NODE_PATTERN = re.compile(r"(\d+)(?::(r?[xyz]))?")  # pattern of "1201:x" or "1201"
+RANGE_PATTERN = re.compile(r"(\d+)\.\.(\d+)(?::(\d+))?")  # pattern of "a..b" or "a..b:n"
 
 
 class ReducedModes(NamedTuple):

@@ -29,7 +29,7 @@ class WornFriction:
 
     def compute_worn_law(self, law: Friction, depth: float) -> Friction:
         """Return a friction law with the parameters for a mean worn depth [m]."""
-        # with a given stiffness, the bond length follows the coefficient
+        # With a given stiffness, the bond length follows from the coefficient.
         bond_length = self.bond_length if law.stiffness is None else self.coefficient
         factors = {
             "static": self.coefficient,

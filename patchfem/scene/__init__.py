@@ -5,7 +5,7 @@ In: text of a scene and --set words. Out: `Scene`, frozen tables of SI values wi
 Read `scene` first, then `keys/tables`. README.md in this folder explains every key.
 """
 
-# names that other folders use, by module
+# Names that other folders use, by module.
 PUBLIC = {
     "axes": (
         "Axis",

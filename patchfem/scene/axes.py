@@ -33,15 +33,16 @@ from .keys.types import (
 )
 from .reader import read_set_value
 
-LENGTH_KEY = "drive.displacement"  # key of a length, whose values `read_lengths` reads
-# values of one range; more would fill the memory with the cases of a sweep
+LENGTH_KEY = "drive.displacement"  # key of a length whose values `read_lengths` reads
+# Largest number of values in one range; the cases of a larger sweep would exhaust the memory.
 MAX_RANGE_VALUES = 10_000_000
-# ratio of the ends; a range of positive numbers with at least this ratio is logarithmic by default
+# Smallest ratio of the ends from which on a range of positive numbers is logarithmic by default.
 MIN_LOG_RATIO = 10
-MAX_SUGGESTED_KEYS = 4  # maximum number of keys that a message suggests in place of their table
-# significant digits of a value; a tenth of a range is 0.1 and not 0.1000000000000001
+MAX_SUGGESTED_KEYS = 4  # largest number of keys of a table that a message suggests
+# Number of significant digits of a value, so that a tenth of a range is
+# 0.1 and not 0.1000000000000001.
 SIGNIFICANT_DIGITS = 15
-# magnitude up to which a whole number without a unit is written without a decimal point
+# Magnitude below which a whole number without a unit is written without a decimal point.
 MAX_EXACT_INTEGER = 1e15
 _NUMBER_PATTERN = r"[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?"
 _RANGE_PATTERN = re.compile(r"(.*?)\s*\.\.\s*(.*?)\s*(?::\s*([0-9]*)\s*(log|lin)?)?")
@@ -430,7 +431,7 @@ def _make_value_reader(key: str) -> Callable[[str], float | str]:
 
     def read_value(text: str) -> float | str:
         if is_number and takes_float and _PLAIN_NUMBER_PATTERN.fullmatch(text):
-            # most drawn values are plain numbers; `read_set_value` is slow for thousands of them
+            # Most drawn values are plain numbers; `read_set_value` is slow for thousands of them.
             return float(text)
         value = read_set_value(key, text)
         if isinstance(value, dict) and find_inner_table(*place) is not None:

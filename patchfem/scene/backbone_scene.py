@@ -13,11 +13,11 @@ from ..exceptions import PatchfemError
 from .keys.quantities import format_si, parse_quantity
 
 MODES_FORM = 'write "FREQUENCY:DAMPING" or "FREQUENCY:DAMPING:SLIDE" for each mode, such as "120 Hz:0.01, 170 Hz:0.02"'
-ASSUMED_MODES = "100 Hz:0.001"  # Mode of a scene without modes.
-ASSUMED_MASS = "1 kg"  # Modal mass of modes of a scene without [structure].
-# Drive of a scene without one; nothing that a backbone gives depends on it.
+ASSUMED_MODES = "100 Hz:0.001"  # modes of a scene that states none
+ASSUMED_MASS = "1 kg"  # modal mass for the modes of a scene without [structure]
+# Drive of a scene that has none; no result of a backbone depends on it.
 UNUSED_DRIVE = {"kind": "force", "frequency": "100 Hz", "force": "1 N", "cycles": 10}
-STRUCTURES = {"mode", "masses", "reduced", "file"}  # Keys of [structure] that give its modes.
+STRUCTURES = {"mode", "masses", "reduced", "file"}  # keys of [structure] that give its modes
 MODE_NAMES = ("first", "second", "third", "fourth", "fifth", "sixth")
 
 
@@ -152,6 +152,6 @@ class BackboneTables:
             )
         self.assumes_mass = "moving_mass" not in structure
         structure.setdefault("moving_mass", ASSUMED_MASS)
-        # the key `measured` of the scene belongs to the modes that are replaced
+        # The key `measured` of the scene belongs to the modes that are replaced.
         structure["measured"] = "stuck" if self.has_frequencies_of_stuck_modes else "free"
         structure["mode"] = [_write_mode(k, mode) for k, mode in enumerate(self.modes)]

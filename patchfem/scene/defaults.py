@@ -20,7 +20,7 @@ from .rules.selectors import (
     list_unused_keys,
 )
 
-SLIDE_DEFAULTS = {  # slide.kind -> defaults of the keys that this kind uses
+SLIDE_DEFAULTS = {  # default values of the keys that each slide.kind uses
     "sine": {"cycles": 1.0},
     "triangle": {"cycles": 1.0, "distance": 0.0},
     "dwell": {"distance_after": 0.0},

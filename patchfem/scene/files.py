@@ -26,7 +26,7 @@ def list_named_files(tables: Any) -> list[tuple[str, str]]:
         ("slide.file", scene["slide"].file),
         ("drive.file", scene["drive"].file),
         ("structure.file", structure.file),
-        # damping may also be a ratio, which names no file
+        # Damping may also be a ratio, which is not the name of a file.
         *(
             (f"structure.reduced.{key}", structure.reduced[key])
             for key in _MATRIX_KEYS

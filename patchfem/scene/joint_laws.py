@@ -13,10 +13,10 @@ from .keys.types import advise_on_name
 from .starting import TEMPLATE_FOLDER
 
 GUIDE_SECTION = 'patchfem/scene/guide/friction.md, "Which law for my joint?"'
-COMMENT_WIDTH = 120  # columns of a scene
+COMMENT_WIDTH = 120  # width of a scene file in characters
 NOTHING = "nothing"  # word of KNOWLEDGE that excludes the others
 
-# word of an answer -> what it means
+# Words that a user may answer, with their meanings.
 KNOWLEDGE = {
     "damping": "damping of the joint at several amplitudes",
     "loop": "a measured loop of force over slide",
@@ -60,8 +60,8 @@ class JointLaw(NamedTuple):
     scene: str
 
 
-# Laws in the order of preference where several need no more knowledge than there is: measurements of the joint first,
-# then its parts, then single numbers.
+# Friction laws; of several that answer as much and need as little, the first is chosen: laws from
+# measurements of the joint come first, then those from its parts, then those from single numbers.
 JOINT_LAWS = (
     JointLaw(
         ("damping",),
@@ -242,10 +242,10 @@ def choose_law(known: str, wanted: str) -> Choice:
 
     def count_costs(row: JointLaw) -> tuple[int, int, int]:
         """Return what a law leaves to wish and to assume; the least of all rows is chosen."""
-        # a friction coefficient can be assumed from tables, the other knowledge cannot
+        # A friction coefficient can be taken from tables; the other inputs must be measured.
         missing = set(row.known).difference(known_words, {"coefficient"})
         n_answered = len(set(row.wanted).intersection(wanted_words))
-        # of laws whose values must be assumed, that with fewer of them
+        # Of the laws with missing inputs, the one with the fewest assumed values is preferred.
         n_assumed_keys = len(row.keys) if missing else 0
         return -n_answered, len(missing), n_assumed_keys
 
@@ -263,7 +263,7 @@ def describe_choice(choice: Choice) -> list[str]:
     """Return sentences on the chosen law, its accuracy and limits, and the answers that it does not use."""
     row = choice.row
     missing = [word for word in row.known if word not in choice.known]
-    # every law has the coefficient (key `static`); another word may be a key of the law
+    # Every law has a coefficient (key `static`); another word may be a key of the law.
     used = {*row.known, *row.keys, "coefficient", NOTHING}
     if "bond_length" in row.keys:
         used.add("stiffness")

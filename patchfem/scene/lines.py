@@ -7,7 +7,8 @@ from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 
-# Parts of a dotted key. No key of a scene has more than five, and the run time is quadratic in the number of parts.
+# Largest number of parts in a dotted key; no key of a scene has more than five, and the run
+# time is quadratic in their number.
 MAX_KEY_PARTS = 50
 _BARE_KEY_PATTERN = re.compile(r"[A-Za-z0-9_-]+")
 _ITEM_PATTERN = re.compile(r"(.+)\[([1-9][0-9]{0,8})\]")
@@ -36,7 +37,7 @@ def split_key(key: str) -> list[str]:
 def number_items_from_one(text: str) -> str:
     """Write array items of a message in the form `structure.mode[1]`."""
     changed = _ITEM_IN_MESSAGE_PATTERN.sub(lambda item: f"{item[1]}[{int(item[2]) + 1}]", text)
-    # an item inside another item needs a second pass
+    # An item inside another item needs a second pass.
     return changed if changed == text else number_items_from_one(changed)
 
 
@@ -98,8 +99,8 @@ class _Scanner:
         self.position = 0
         self.lines: dict[str, int] = {}
         self._line = 1
-        self._counted = 0  # position up to which `_line` counts the line ends
-        self._last_item: dict[str, int] = {}  # array of tables -> index of its last item
+        self._counted = 0  # text position up to which `_line` has counted the lines
+        self._last_item: dict[str, int] = {}  # index of the last item of each array of tables
 
     def scan_document(self) -> None:
         """Scan a complete TOML text."""

@@ -19,10 +19,11 @@ from .rules.structure import MAX_USUAL_DAMPING
 from .rules.view import TableView
 from .scene import Scene, finish_scene
 
-# Tables that a BaseScene keeps, which saves the cases of a sweep from reading them again.
+# Largest number of tables that a BaseScene caches, so that the cases of
+# a sweep do not read them again.
 MAX_CACHED_TABLES = 4096
-# Keys of a rig with sinusoidal base motion, or of a pressed patch. No rule or remark depends on their values as
-# long as they lie between 0 and this number (SI).
+# Largest values in SI of keys of a rig with sinusoidal base motion, or of a pressed patch; no rule
+# or remark depends on a value between 0 and this limit.
 PLAIN_KEYS = {
     "normal.load": inf,
     "contact.load": inf,
@@ -65,7 +66,7 @@ class BaseScene:
         for assignment in scene.sets:
             apply_set(self._draft, assignment)
         read_tables(self._draft)
-        # assignments to the keys of a table -> the resulting table
+        # Table that results from each group of assignments to its keys.
         self._known: dict[tuple[str, ...], _ReadTable] = {}
 
     def override(self, sets: Iterable[str]) -> Scene:
@@ -80,7 +81,7 @@ class BaseScene:
         draft.sets = set(self._draft.sets)
         draft.read_before = dict(self._draft.read_now)
         fresh = [group for group in _group_by_table(sets) if not self._reuse(draft, group)]
-        for assignment in sets:  # mistakes are listed in the order of the assignments
+        for assignment in sets:  # the mistakes are listed in the order of the assignments
             if any(assignment in group for group in fresh):
                 _copy_tables(draft.raw, assignment.partition("=")[0])
                 apply_set(draft, assignment)

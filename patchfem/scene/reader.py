@@ -34,7 +34,7 @@ from .rules.scene_draft import SceneDraft
 
 # Numbers such as .3 and 5., which people write but TOML does not allow.
 _BARE_POINT_PATTERN = re.compile(r"[-+]?(\.[0-9]+|[0-9]+\.)([eE][-+]?[0-9]+)?")
-# matches a string in quotes without escapes
+# String in quotes without escapes.
 _PLAIN_TEXT_PATTERN = re.compile(r'"[^"\\\x00-\x1f\x7f]*"')
 
 
@@ -95,7 +95,8 @@ def _validate_values(
         model.model_validate(values, context=valid)
     except ValidationError as caught:
         reported = set()
-        # A key may accept several types; a value that only breaks a limit of one type was meant to be of this type.
+        # A key may accept several types; a value that only breaks a limit of one
+        # type was meant to be of this type.
         errors = sorted(
             caught.errors(include_url=False),
             key=lambda error: error["type"] not in LIMITS_BY_ERROR_TYPE,
@@ -150,12 +151,14 @@ def _suggest_name(
     """Return the key or table that was probably meant by an unknown one; "" if none is similar."""
     is_table = _is_table(raw[key])
     if not table_key and not is_table:
-        # --set may be given a key without its table; the key then belongs to a table that has a key of this name.
+        # --set may name a key without its table; the key then belongs to a
+        # table that has a key of this name.
         owners = _list_tables_with_key(model, key)
         present = [name for name in owners if name in raw]
         if owners:
             return "' or '".join(f"{name}.{key}" for name in present[:1] or owners)
-    # A file that contains both keys did not misspell one for the other; a key of --set may be meant for one of the file.
+    # A file that contains both keys did not misspell one of them; a key of --set may be a
+    # misspelling of a key in the file.
     is_set = (f"{table_key}.{key}" if table_key else key) in draft.sets
     written_table = {
         name: raw[name]
@@ -266,7 +269,7 @@ def read_set_value(key: str, text: str) -> Any:
     except (ValueError, RecursionError):
         return float(text) if _BARE_POINT_PATTERN.fullmatch(text) and not is_text_key else text
     value = content["value"]
-    if _is_cut_by_comment(text) or len(content) > 1:  # as in "26#", where '#' belongs to the value
+    if _is_cut_by_comment(text) or len(content) > 1:  # as in "26#", where '#' is part of the value
         return text
     if not isinstance(value, str | bool | int | float | list | dict):
         return text

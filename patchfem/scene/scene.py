@@ -28,7 +28,7 @@ from .toml_text import parse_text, read_text
 
 __all__ = ["Scene", "SceneError", "load", "loads", "move_scene", "read_sweep_axes"]
 
-# maximum number of characters of the effects, and of the --set values, in the repr of a Scene
+# Largest number of characters of the effects, and of the --set values, in the repr of a Scene.
 MAX_LISTED_CHARACTERS = 160
 
 

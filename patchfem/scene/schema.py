@@ -20,7 +20,7 @@ from .keys.types import (
 from .rules.selectors import SELECTORS, split_keys
 
 SCHEMA_DIALECT = "https://json-schema.org/draft/2020-12/schema"
-# Part of a unit -> regular expression of all its spellings.
+# Regular expressions of all spellings of a part of a unit.
 UNIT_SPELLINGS = {"u": "[uµμ]", "^2": "(?:\\^2|²)", "^3": "(?:\\^3|³)", " ": "[ ·]"}
 
 

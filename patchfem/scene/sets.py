@@ -12,7 +12,7 @@ from .keys.quantities import format_si
 from .keys.types import find_quantity_kind
 from .rules.scene_draft import SceneError
 
-MAX_JOINT_LENGTH = 1.0  # m; of the lengths of a joint only a radius can be larger
+MAX_JOINT_LENGTH = 1.0  # largest length of a joint [m]; of its lengths, only a radius can be larger
 
 
 def format_assignments(sets: dict[str, Any]) -> tuple[str, ...]:

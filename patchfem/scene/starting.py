@@ -18,7 +18,7 @@ TEMPLATE_DESCRIPTIONS = {
     "misalignment": "a sweep: how far the patch in the rig of the 1985 report may be tilted",
     "wear": "how a tilted patch wears in over many cycles",
 }
-# Kind of scene -> the patchfem command to use with it, if this is not `run`.
+# Verb of patchfem for each kind of scene that does not use `run`.
 NEXT_VERBS = {
     "beam": "backbone",
     "damper": "sweep",

@@ -71,7 +71,7 @@ def suggest_table(model: type[Table], written_table: dict, key: str) -> str:
         Name of the unknown table.
     """
     inside = written_table[key][0] if isinstance(written_table[key], list) else written_table[key]
-    n_shared = {}  # dotted name of a table -> number of keys that it shares with the unknown one
+    n_shared = {}  # number of keys that each table shares with the unknown one, by its dotted name
     for name, inner in _list_inner_tables(model):
         n_shared[name] = len(set(inside) & attributes_by_key(inner).keys())
         for deeper, last in _list_inner_tables(inner):

@@ -12,13 +12,13 @@ from ..effects import MAX_COORDINATES
 from .lines import MAX_KEY_PARTS, TooManyKeyParts, find_key_lines
 from .rules.scene_draft import SceneDraft, SceneError
 
-# bytes; maximum size of a scene file, because larger data belong in files that the scene names
+# Largest size of a scene file in bytes; larger data belong in files that the scene names.
 MAX_BYTES = 32 * 2**20
-MAX_QUOTED_CHARACTERS = 60  # maximum length of a value in the advice on missing quotes
-# n modes with full matrices need 3 n^2 BYTES_PER_ENTRY of memory and n^3 SECONDS_PER_CUBED_MODE on one core.
-BYTES_PER_ENTRY = 8
-SECONDS_PER_CUBED_MODE = 1.5e-9
-# A key with a value that opens neither quotes nor a bracket.
+# Largest number of characters of a value in the advice on missing quotes.
+MAX_QUOTED_CHARACTERS = 60
+BYTES_PER_ENTRY = 8  # memory of an entry of a matrix in bytes; n modes need three (n, n) matrices
+SECONDS_PER_CUBED_MODE = 1.5e-9  # time to compute n modes on one core, divided by n^3 [s]
+# Key with a value that opens neither quotes nor a bracket.
 _BARE_VALUE_PATTERN = re.compile(r"\s*([\w.-]+)\s*=\s*([^#\"'\[{]+)")
 _DECIMAL_POINT_PATTERN = re.compile(r"([-+]?)(\d*)\.(\d*)((?:[eE][-+]?\d+)?)")
 _DECIMAL_COMMA_PATTERN = re.compile(r"[-+]?\d+,\d+")
@@ -70,7 +70,7 @@ def parse_text(text: str, path: str | Path) -> ParsedText:
     """
     try:
         if any(line.count(".") > MAX_KEY_PARTS for line in text.split("\n")):
-            # refuses a key of very many parts, which tomllib would take minutes to read
+            # Refuses a key with very many parts, which tomllib would take minutes to read.
             find_key_lines(text)
         values = tomllib.loads(text)
         _refuse_too_many_coordinates(values, text, path)

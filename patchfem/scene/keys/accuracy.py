@@ -7,8 +7,10 @@ from pydantic import BeforeValidator
 from . import removed
 from .types import Fraction, Table, key, number, whole_number
 
-MAX_STEPS_PER_CYCLE = 10_000_000  # time steps; more would take days for a single cycle
-MAX_MODES = 10_000  # harmonics or shear modes; more of them make their dense matrices too large
+# Largest number of time steps per cycle; more would take days for a single cycle.
+MAX_STEPS_PER_CYCLE = 10_000_000
+# Largest number of harmonics or shear modes; more make the dense matrices too large.
+MAX_MODES = 10_000
 
 
 def _refuse_removed(value: object) -> object:

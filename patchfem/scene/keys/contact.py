@@ -27,8 +27,9 @@ from .types import (
 )
 
 Piece = Literal["upper", "lower"]
-MAX_PAIRS = 1_000_000  # equal patches; far more than any joint has
-MAX_STRIPS = 10_000  # strips over the width; the pressures of more strips would not fit into memory
+MAX_PAIRS = 1_000_000  # largest number of equal patches, far more than any joint has
+# Largest number of strips over the width; the pressures of more strips do not fit into memory.
+MAX_STRIPS = 10_000
 MATERIAL_REQUIREMENT = (
     'a material name or {young = "121 GPa", poisson = 0.32, density = "4370 kg/m^3"} is needed'
 )
@@ -54,7 +55,7 @@ def find_material(value: object) -> object:
     if isinstance(value, Material):
         return value
     if isinstance(value, int | float) and find_material_name(str(value)) is not None:
-        value = str(value)  # the number of a steel or alloy, such as 718 or 1.4404
+        value = str(value)  # the name of a steel or alloy may be a number, such as 718 or 1.4404
     if not isinstance(value, str):
         raise ValueError(MATERIAL_REQUIREMENT)
     name = find_material_name(value)

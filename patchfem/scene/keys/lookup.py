@@ -23,7 +23,7 @@ from .types import (
     list_key_types,
 )
 
-MAX_SHOWN_CHARACTERS = 60  # maximum number of characters of a wrong value in a message
+MAX_SHOWN_CHARACTERS = 60  # largest number of characters of a wrong value in a message
 MATERIAL_REQUIREMENT = (
     'a material name or {young = "121 GPa", poisson = 0.32, density = "4370 kg/m^3"} is needed'
 )
@@ -36,7 +36,7 @@ class Limit(NamedTuple):
     sign: str
 
 
-LIMITS_BY_ERROR_TYPE = {  # type of an error of pydantic -> the limit that the value breaks
+LIMITS_BY_ERROR_TYPE = {  # limit that a value breaks, by the type of the pydantic error
     "greater_than": Limit("gt", ">"),
     "greater_than_equal": Limit("ge", ">="),
     "less_than": Limit("lt", "<"),

@@ -13,12 +13,13 @@ from difflib import get_close_matches
 from functools import cache
 from typing import NamedTuple
 
-SEPARATORS = r"[\s_-]"  # characters that do not count in the name of a material
-MAX_NEAR_NAMES = 3  # materials that are proposed for an unknown name
-MIN_PREFIX_LENGTH = 3  # characters from which the beginning of a name counts as near
-# Names that mean another material in other letter case: tin is a metal of about 50 GPa.
+SEPARATORS = r"[\s_-]"  # characters that are ignored in the name of a material
+MAX_NEAR_NAMES = 3  # largest number of materials that are proposed for an unknown name
+MIN_PREFIX_LENGTH = 3  # smallest number of characters for which the beginning of a name is compared
+# Names with another meaning in other letter case: tin is a metal of about 50 GPa.
 CASE_SENSITIVE_NAMES = ("TiN",)
-# similarity (difflib) from which a material is proposed; below it the numbers of steels look alike
+# Smallest similarity ratio (difflib) for a proposal; below it, the
+# numbers of all steels look alike.
 MIN_SIMILARITY = 0.7
 
 

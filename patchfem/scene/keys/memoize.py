@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from functools import wraps
 
-# maximum number of cached results of one function; at this number, the cache is emptied
+# Number of results of one function at which its cache is emptied.
 MAX_CACHED_RESULTS = 1024
 
 

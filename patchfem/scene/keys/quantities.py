@@ -10,9 +10,9 @@ import re
 from decimal import MAX_EMAX, MIN_EMIN, Context, Decimal
 from functools import cache, lru_cache
 
-_POUND_FORCE = 4.4482216152605  # N, exact: 0.45359237 kg times standard gravity
+_POUND_FORCE = 4.4482216152605  # one pound-force in N, exact: 0.45359237 kg times standard gravity
 
-# Kind -> unit -> factor to SI. The first unit of each kind is its SI unit.
+# Factors to SI by unit for each kind of quantity; the first unit of each kind is its SI unit.
 UNIT_FACTORS: dict[str, dict[str, float]] = {
     "length": {
         "m": 1.0,
@@ -111,7 +111,7 @@ UNIT_FACTORS: dict[str, dict[str, float]] = {
     "curvature": {"1/m": 1.0, "1/mm": 1e3, "1/um": 1e6},
 }
 
-# Kind -> a quantity that messages and the schema give as an example.
+# Example of each kind of quantity for messages and the schema.
 EXAMPLE_QUANTITIES: dict[str, str] = {
     "length": "12.7 mm",
     "area": "161 mm^2",
@@ -140,15 +140,16 @@ EXAMPLE_QUANTITIES: dict[str, str] = {
     "curvature": "0.05 1/um",
 }
 
-# regular expression of a number
+# Regular expression of a number.
 NUMBER_PATTERN = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _QUANTITY_PATTERN = re.compile(rf"({NUMBER_PATTERN})[ \t]+(\S.*)")
 _BARE_NUMBER_PATTERN = re.compile(NUMBER_PATTERN)
 _JOINED_UNIT_PATTERN = re.compile(rf"({NUMBER_PATTERN})([^\s0-9.,#+±-].*)")
 _DECIMAL_COMMA_PATTERN = re.compile(r"[+-]?[0-9]+,[0-9]+")
-_MAX_CHARACTERS = 100  # maximum length of a quantity; a longer string is refused unread
-_MAX_SHOWN_CHARACTERS = 60  # maximum length of a wrong quantity in a message
-# Context with room for all digits of a product of a value and a factor.
+# Largest length of a quantity; a longer string is refused without being parsed.
+_MAX_CHARACTERS = 100
+_MAX_SHOWN_CHARACTERS = 60  # largest length of a wrong quantity in a message
+# Decimal context that holds all digits of the product of a value and a factor.
 _EXACT_CONTEXT = Context(prec=2 * _MAX_CHARACTERS, Emax=MAX_EMAX, Emin=MIN_EMIN)
 
 

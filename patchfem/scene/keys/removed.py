@@ -1,12 +1,12 @@
 """Options, keys and values that patchfem 1.0 no longer takes, and what to use instead."""
 
 REMOVING_VERSION = "patchfem 1.0"
-REMOVED_METHODS = {  # values of accuracy.method
+REMOVED_METHODS = {  # removed values of accuracy.method
     name: f"'{name}' was removed in {REMOVING_VERSION}; use 'march' (studies/integrators compares the methods)"
     for name in ("duhamel", "newmark", "euler")
 }
 LAWS_REMOVED_OVER_GROOVES = ("iwan", "bouc-wen", "lugre")
-# values of accuracy.quadrature
+# Removed values of accuracy.quadrature.
 REMOVED_QUADRATURES = {
     "exponential": f"'exponential' was removed in {REMOVING_VERSION}; use 'merged'"
 }
@@ -21,7 +21,7 @@ REMOVED_KEYS = {
 REMOVED_KEYS["wear.scheme"] = (
     f"this key was removed in {REMOVING_VERSION}; leave it out: contact and wear are always solved together in each jump"
 )
-REMOVED_OPTIONS = {  # (verb, option): what to do instead
+REMOVED_OPTIONS = {  # advice for each removed (verb, option)
     (
         "profile",
         "--level",

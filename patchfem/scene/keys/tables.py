@@ -39,8 +39,8 @@ from .types import (
 
 LawName = Literal[tuple(LAWS)]
 WaveName = Literal[tuple(WAVEFORMS)]
-MAX_MASS_NUMBER = 1_000_000  # largest number of a mass that a key may name
-MAX_ROW_NUMBER = 2_000_000  # largest row of a matrix that a key may name
+MAX_MASS_NUMBER = 1_000_000  # largest number of a mass in a key
+MAX_ROW_NUMBER = 2_000_000  # largest row of a matrix in a key
 
 
 class Normal(Table):

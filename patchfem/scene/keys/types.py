@@ -17,10 +17,11 @@ from pydantic_core import core_schema
 
 from .quantities import EXAMPLE_QUANTITIES, parse_quantity
 
-# Largest magnitude of a value in SI. Its fourth power, and products with it, stay within double precision.
+# Largest magnitude of a value in SI; its fourth power, and products with
+# that, stay within double precision.
 MAX_MAGNITUDE = 1e50
-# Kinds of quantities that are divisors in the equations of a rig. A magnitude that is not 0 must be at least
-# 1/MAX_MAGNITUDE, which keeps the quotients finite.
+# Kinds of quantities that are divisors in the equations of a rig; a nonzero magnitude must be at
+# least 1/MAX_MAGNITUDE, which keeps the quotients finite.
 DIVISOR_KINDS = {
     "mass",
     "frequency",
@@ -30,7 +31,7 @@ DIVISOR_KINDS = {
     "cubic stiffness",
     "sweep rate",
 }
-# Minimum similarity ratio of difflib at which an unknown name is taken for a misspelling.
+# Smallest similarity ratio (difflib) for which an unknown name is taken for a misspelling.
 MIN_NAME_SIMILARITY = 0.6
 
 
@@ -146,7 +147,7 @@ def key(kind: Any, meaning: str, required: str = "") -> Any:
     return Annotated[kind, KeyRecord(meaning, required)]
 
 
-# types that many keys share
+# Types that many keys share.
 Text = Annotated[str, Field(min_length=1), CheckAfter(_require_printable)]
 Title = Annotated[str, CheckAfter(_require_printable)]
 Number = number()
@@ -166,7 +167,7 @@ PerMetre = quantity("participation")
 
 
 _NESTED_STATE = object()  # state of _OUTER_TABLE in which validators include those of inner tables
-# the table whose validator is being made
+# Table whose validator is under construction.
 _OUTER_TABLE: ContextVar = ContextVar("outer", default=None)
 
 

@@ -26,7 +26,7 @@ class SettingScope(NamedTuple):
     trait: str = ""
 
 
-# numerical setting, a key of [accuracy] -> where it has an effect
+# Scope in which each numerical setting (a key of [accuracy]) has an effect.
 SETTING_SCOPES: dict[str, SettingScope] = {
     "steps_per_cycle": SettingScope("bench rig linear", "auto bench march smooth harmonic"),
     "tail": SettingScope("bench rig", "auto bench march", "bonds"),

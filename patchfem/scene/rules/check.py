@@ -145,7 +145,8 @@ def _find_kind(draft: SceneDraft) -> str:
                 f"[{name}] and [[structure.interface]] exclude each other: each interface has its own law and load"
                 f"{instead}",
             )
-        # Each interface holds a law and a load, which count as the tables [friction] and [normal] here.
+        # Each interface holds a law and a load, which count here as the
+        # tables [friction] and [normal].
         tables = tables - {"contact"} | {"friction", "normal"}
     if {"contact", "normal"} <= tables:
         draft.add_mistake(

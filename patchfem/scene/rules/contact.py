@@ -12,9 +12,11 @@ from .scene_draft import SceneDraft
 from .selectors import ASPERITY_LAW_SELECTOR, HERTZ_PEAK_DESCRIPTIONS, check_selector
 from .view import TableView
 
-# Largest ratio of the height of a piece to its length. From 80 000 on, the stiffness of the piece is lost to round-off.
+# Largest ratio of the height of a piece to its length; from 80 000 on, the stiffness of
+# the piece is lost to round-off.
 MAX_SLENDERNESS = 10_000
-# Elements along the interface. Even with 10 000 elements, the dense matrices take gigabytes.
+# Largest number of elements along the interface; even with 10 000, the
+# dense matrices take gigabytes.
 MAX_ELEMENTS = 100_000
 
 

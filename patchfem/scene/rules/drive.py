@@ -11,9 +11,10 @@ from .scene_draft import SceneDraft
 from .selectors import WAVEFORM_SELECTOR, check_selector, list_dependent_keys, list_unused_keys
 from .structure import check_driven_mass
 
-MIN_CYCLES = 0.25  # cycles of a run; a shorter one does not reach the first peak of the drive
+# Smallest number of cycles in a run; a shorter one does not reach the first peak of the drive.
+MIN_CYCLES = 0.25
 RELEASE_KEYS = {"displacement", "cycles", "duration"}  # keys of waveforms that a release also uses
-KEYS_UNUSED_BY_KIND = {  # drive.kind -> keys that have no meaning, whatever the waveform
+KEYS_UNUSED_BY_KIND = {  # keys that have no meaning for a drive.kind, whatever the waveform
     "base": ("force", "mass"),
     "force": ("acceleration", "displacement"),
     "free": ("waveform", *sorted(list_dependent_keys(WAVEFORM_SELECTOR) - RELEASE_KEYS)),

@@ -32,7 +32,7 @@ from .rule_table import MissingKeyRule, MistakeRule, TableFacts, apply_rules, ma
 from .scene_draft import SceneDraft
 from .view import TableView, wrap_value
 
-UNSUPPORTED_KEY = "structure.mode.lateral"  # no run supports this key yet
+UNSUPPORTED_KEY = "structure.mode.lateral"  # key that no run supports yet
 
 
 class JointFacts(TableFacts):

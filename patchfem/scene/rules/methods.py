@@ -75,7 +75,8 @@ class EngineSupport(NamedTuple):
     features: str
 
 
-# Function for each feature that an engine may lack. It returns the end of a message, or "" if a motion lacks the feature.
+# Functions that detect each feature that an engine may lack; they return the end of a message, or
+# "" if a motion does not have the feature.
 FEATURE_FINDERS = {
     "no-law": lambda motion: "" if motion.joints else "for law 'none'",
     "load": lambda motion: motion.load_change,
@@ -94,7 +95,8 @@ FEATURE_FINDERS = {
     "faces": lambda motion: "with several interfaces" if len(motion.joints) > 1 else "",
     "levels": lambda motion: "with waveform 'levels'" if motion.waveform.has_levels else "",
 }
-ENGINE_SUPPORT = {  # engine of a rig -> what it supports; `runs.rig.engines` refers to these names
+# Features that each engine of a rig supports; `runs.rig.engines` refers to these names.
+ENGINE_SUPPORT = {
     "exact": EngineSupport("exact", "no-law yaw faces levels"),
     "piecewise": EngineSupport("pieces", "parts faces levels"),
     "smooth": EngineSupport("", ""),
@@ -137,7 +139,8 @@ def _is_supported(word: str, joint: Joint) -> bool:
     if word == "exact":  # the event-driven solution supports only patches that slip as a whole
         return not joint.compliance
     if word == "pieces":
-        # a law that sticks without displacement becomes spring-slider elements only with a compliance in series
+        # A law that sticks without displacement becomes spring-slider elements
+        # only with a compliance in series.
         return bool(joint.compliance) or not law_has_trait(joint.law.law, "set-valued")
     return True
 

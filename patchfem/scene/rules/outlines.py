@@ -7,7 +7,8 @@ from .view import UNKNOWN_VALUE, TableView
 
 PIECE_NAMES = ("upper", "lower")
 END_KEYS = ("chamfer", "end_radius")
-# An end, or a difference of lengths, below this fraction of the length of a piece is smaller than any element.
+# Smallest end, or difference of lengths, as a fraction of the length of a piece; a smaller
+# one is smaller than any element.
 MIN_END_FRACTION = 1e-5
 
 

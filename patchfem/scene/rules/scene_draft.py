@@ -14,11 +14,11 @@ from ..keys.types import build_table
 from ..lines import number_items_from_one, split_key
 from .view import TableView
 
-# sort order of the mistakes of --set, which are listed after those of all lines of a file
+# Sort order of mistakes in --set, which are listed after those of all lines of a file.
 SET_MISTAKE_ORDER = 10**9
-# characters; no key, unit or file name is as long, so a message cuts a longer word
+# Length in characters from which on a message cuts a word; keys, units and file names are shorter.
 MAX_WORD_CHARACTERS = 200
-N_SHOWN_CHARACTERS = 60  # characters shown of a word longer than MAX_WORD_CHARACTERS
+N_SHOWN_CHARACTERS = 60  # number of characters of a cut word that a message shows
 _LONG_WORD_PATTERN = re.compile(rf"[^\s/\\:]{{{MAX_WORD_CHARACTERS},}}")
 
 
@@ -62,9 +62,9 @@ class SceneDraft:
         self.remarks: list[str] = []
         self.read_before: dict[int, tuple[dict, Any]] = {}
         self.read_now: dict[int, tuple[dict, Any]] = {}
-        # keys that an unknown key probably means; they are not reported as missing
+        # Keys that an unknown key probably means; they are not reported as missing.
         self.suggested_keys: set[str] = set()
-        # keys (order, line of text); a dict lists each mistake only once
+        # Keys (order, line of text); a dict lists each mistake only once.
         self._mistakes: dict[tuple[int, str], None] = {}
 
     @property

@@ -63,7 +63,7 @@ ASPERITY_LAW_SELECTOR = Selector(
 WAVEFORM_SELECTOR = Selector(
     Drive, "waveform", {name: waveform.keys for name, waveform in effects.WAVEFORMS.items()}
 )
-# tables whose selector the schema and the suggestions explain, by their dotted key
+# Selectors that the schema and the suggestions explain, by the dotted key of their table.
 SELECTORS = {
     "friction": LAW_SELECTOR,
     "slide": SLIDE_KIND_SELECTOR,

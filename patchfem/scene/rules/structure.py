@@ -14,7 +14,7 @@ from .scene_draft import SceneDraft
 
 ARRAY_EXTENSIONS = (".npz", ".mat")
 UNIVERSAL_EXTENSIONS = (".uff", ".unv")
-# Endings of matrices from finite-element programs, for [structure.reduced].
+# File extensions of matrices from finite-element programs, for [structure.reduced].
 MATRIX_EXTENSIONS = (
     ".mtx",
     ".mat",
@@ -24,13 +24,14 @@ MATRIX_EXTENSIONS = (
     ".bdf",
     ".dat",
 )
-# Damping ratio at which a free oscillation decays to a few per cent within one cycle; a larger one is probably a
-# wrong unit, because 1 % is 0.01.
+# Largest plausible damping ratio, at which a free oscillation decays to a few per cent within one
+# cycle; a larger value probably has a wrong unit, because 1 % is 0.01.
 MAX_USUAL_DAMPING = 0.5
-# Excess over 1 of the sum of squared base participations that round-off of the mode shapes can cause.
+# Largest excess over 1 of the sum of squared base participations that
+# round-off of the mode shapes can cause.
 BASE_PARTICIPATION_TOL = 1e-9
 LOCATION_KEYS = ("slide_at", "output_at", "base_at", "force_at", "normal_at", "pitch_at")
-# keys that describe a rig; a scene has one
+# Keys that describe a rig; a scene has one of them.
 DESCRIPTION_KEYS = ("mode", "masses", "file", "reduced")
 
 

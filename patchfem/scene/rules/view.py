@@ -37,7 +37,7 @@ class TableView:
 
     def __getattr__(self, name: str) -> Any:
         value = UNKNOWN_VALUE if self.table is None else wrap_value(getattr(self.table, name))
-        self.__dict__[name] = value  # the next access finds it without this method
+        self.__dict__[name] = value  # the next access finds the value without this method
         return value
 
     def __getitem__(self, name: str) -> Any:
