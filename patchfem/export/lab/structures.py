@@ -182,7 +182,7 @@ def _refuse_unsupported(model: Model) -> None:
     if _is_speed_only(rig):
         reason = methods.find_first_unsupported(SPEED_LAW_SUPPORT, motion)
     else:
-        reason = engines.PIECES.lacks(model, steady=True)
+        reason = engines.PIECES.find_unsupported_feature(model, steady=True)
     if reason.startswith("for law"):
         raise PatchfemError(
             f"{reason.removeprefix('for ')} cannot be written as friction elements that stretch and slip; "

@@ -71,12 +71,12 @@ def run_event_driven(model, numerics, patch, frames: int = 0, say=None, progress
     Solution
     """
     contact_elements = RigidElements if numerics.engine == "exact" else YieldingElements
-    reader = EventEvaluator(model, numerics, patch, contact_elements(model, numerics, patch))
+    evaluator = EventEvaluator(model, numerics, patch, contact_elements(model, numerics, patch))
     rig = model.rig
     begin = perf_counter()
-    further_fields = {}
+    solution_fields = {}
     histories.load_event_kernels(say)
-    prepare = {"reduce": reader.reduction_seconds, "compiled_code": perf_counter() - begin}
+    prepare = {"reduce": evaluator.reduction_seconds, "compiled_code": perf_counter() - begin}
     begin = perf_counter()
 
     def integrate(drive, state, watch, is_last, cycles: float = rig.drive.levels.cycles):
@@ -96,26 +96,26 @@ def run_event_driven(model, numerics, patch, frames: int = 0, say=None, progress
         run = histories.simulate(
             rig.modes,
             drive,
-            reader.groups,
+            evaluator.groups,
             cycles,
             numerics.window,
             rig.springs.travel,
-            frames * (is_last and not reader.rigid),
+            frames * (is_last and not evaluator.is_rigid),
             watch,
             *state,
             even=bool(ROWS_NEEDING_RUN),
         )
-        return reader.average_over_strips(run)
+        return evaluator.average_over_strips(run)
 
     if rig.drive.levels.amplitudes:
-        run, further_fields = run_levels(
-            reader, integrate, (rig.start, None), lambda run: run.end, progress
+        run, solution_fields = run_levels(
+            evaluator, integrate, (rig.start, None), lambda run: run.end, progress
         )
     else:
         run = integrate(rig.drive.signal, (rig.start, None), progress, True, numerics.cycles)
         run = remove_incomplete_cycle(run)
-    further_fields |= {} if reader.rigid else {"prepare": prepare}
-    return reader.make_solution(run, perf_counter() - begin, **further_fields)
+    solution_fields |= {} if evaluator.is_rigid else {"prepare": prepare}
+    return evaluator.make_solution(run, perf_counter() - begin, **solution_fields)
 
 
 class EventEvaluator(RunEvaluator):
@@ -134,10 +134,10 @@ class EventEvaluator(RunEvaluator):
             histories.SAMPLES_PER_CYCLE,
         )
         self.groups = contact_elements.groups
-        self.rigid = contact_elements.rigid
+        self.is_rigid = contact_elements.is_rigid
         self.reduction_seconds = contact_elements.seconds
         self.strips_slide_independently = (
-            contact_elements.rigid and model.rig.friction.strips_slide_apart
+            contact_elements.is_rigid and model.rig.friction.strips_slide_apart
         )
 
     def average_over_strips(self, run):
@@ -200,7 +200,7 @@ class EventEvaluator(RunEvaluator):
         run, drive, stuck
             See `RunEvaluator.collect_cycle_data`.
         """
-        if not (self.has_friction and self.rigid):
+        if not (self.has_friction and self.is_rigid):
             return {}
         lost = run.ledger["friction"]
         return {
@@ -245,7 +245,7 @@ class EventEvaluator(RunEvaluator):
         springs = [group.stiffness for group in self.groups]
         is_stuck = (
             self.has_friction
-            and not self.rigid
+            and not self.is_rigid
             and all(spring.size == 1 for spring in springs)
             and not any(loop.slip_range for loop in run.loops)
             and (not run.log.time.size or run.log.time[-1] < motion.time[0])
@@ -288,7 +288,7 @@ class EventEvaluator(RunEvaluator):
         errors = {}
         if not self.strips_slide_independently:
             errors = self.estimate_sampling_errors(run, drive, values)
-        if not self.rigid or window.time[-1] - window.time[0] < 1.5 * drive.period:
+        if not self.is_rigid or window.time[-1] - window.time[0] < 1.5 * drive.period:
             return errors
         if not self.strips_slide_independently:
             return errors | {
@@ -310,7 +310,7 @@ class EventEvaluator(RunEvaluator):
             self.model.accuracy.tolerance,
             find_min_decay_rate(modes) * drive.period,
         )
-        may_settle = numerics.whole and run.outcome is None and not self.rigid
+        may_settle = numerics.whole and run.outcome is None and not self.is_rigid
         if may_settle and unsettled and not self.is_stuck(run):
             steady = find_steady_motion(modes, drive, self.groups, run)
             if steady is not None:
@@ -434,7 +434,7 @@ class YieldingElements:
     - seconds: CPU time of the reduction [s].
     """
 
-    rigid = False
+    is_rigid = False
 
     def __init__(self, model, numerics, patch):
         rig = model.rig
@@ -465,7 +465,7 @@ class RigidElements:
     There is no elastic displacement, so any motion of the interface counts as slip.
     """
 
-    rigid = True
+    is_rigid = True
     contact = None
     stick_tolerance = 0.0
     seconds = 0.0

@@ -208,12 +208,12 @@ def _find_level_factor(rig) -> float:
     return rig.modes.mass if rig.drive.kind == "force" else 1.0
 
 
-def run_levels(reader, integrate, state, find_end_state, progress=None) -> tuple:
+def run_levels(evaluator, integrate, state, find_end_state, progress=None) -> tuple:
     """Run the levels of a drive in order, each from the final state of the previous one.
 
     Parameters
     ----------
-    reader : RunEvaluator
+    evaluator : RunEvaluator
     integrate : callable
         Function (sine, state, watch, is_last) that returns a run.
     state
@@ -227,7 +227,7 @@ def run_levels(reader, integrate, state, find_end_state, progress=None) -> tuple
     tuple
         Joined run, and the fields `levels` and `run_level` of its Solution.
     """
-    rig = reader.model.rig
+    rig = evaluator.model.rig
     omega = find_drive_omega(rig.drive.signal)
     moving = rig.drive.signal.moving
     states = [state]
@@ -238,7 +238,7 @@ def run_levels(reader, integrate, state, find_end_state, progress=None) -> tuple
         """Run a level from the final state of level `number`, or from rest if it is -1."""
         sine = SineDrive(level, omega, moving)
         run = integrate(sine, states[number + 1], None, False)
-        return reader.evaluate_level(level, run, sine, EXACT_RELATIVE_ERROR)
+        return evaluator.evaluate_level(level, run, sine, EXACT_RELATIVE_ERROR)
 
     amplitudes = rig.drive.levels.amplitudes
     n_levels = len(amplitudes)
@@ -249,7 +249,7 @@ def run_levels(reader, integrate, state, find_end_state, progress=None) -> tuple
         sine = SineDrive(amplitude, omega, moving)
         run = integrate(sine, states[-1], watch, k + 1 == n_levels)
         runs.append(run)
-        level_results.append(reader.evaluate_level(amplitude, run, sine, EXACT_RELATIVE_ERROR))
+        level_results.append(evaluator.evaluate_level(amplitude, run, sine, EXACT_RELATIVE_ERROR))
         states.append(find_end_state(run))
         if run.outcome is not None:
             break

@@ -65,8 +65,8 @@ def march_in_time(model, numerics, patch, frames: int = 0, say=None, progress=No
         Callbacks for a line of text and for the completed fraction.
     """
     march = march_without_evaluation(model, numerics, patch, frames, say, progress)
-    reader = MarchEvaluator(model, numerics, patch, march.contact)
-    return reader.make_solution(march.result, march.seconds, prepare=march.prepare)
+    evaluator = MarchEvaluator(model, numerics, patch, march.contact)
+    return evaluator.make_solution(march.result, march.seconds, prepare=march.prepare)
 
 
 def march_without_evaluation(

@@ -57,14 +57,14 @@ def integrate_smooth_motion(
         progress,
         even=bool(ROWS_NEEDING_RUN),
     )
-    reader = SmoothEvaluator(model, numerics, patch, contact)
-    solution = reader.make_solution(
+    evaluator = SmoothEvaluator(model, numerics, patch, contact)
+    solution = evaluator.make_solution(
         run,
         perf_counter() - begin,
         prepare={"compiled_code": loaded},
         extra={"step_tolerance": numerics.local, "steps_taken": int(run.ledger["steps"])},
     )
-    return replace(solution, errors=reader.estimate_integration_errors(run, solution.values))
+    return replace(solution, errors=evaluator.estimate_integration_errors(run, solution.values))
 
 
 class SmoothEvaluator(RunEvaluator):

@@ -294,9 +294,9 @@ class BalanceFinder:
         middle = (response.output.max() + response.output.min()) / 2
         extremes = np.array([[middle - top, middle + top]])
         run = EngineResult(response, response, extremes, np.zeros(1), book)
-        reader = BalanceEvaluator(self.model, self.numerics, self.patch, steps=samples)
-        reader.turns = motion.find_reversals()
-        return CycleMeasures(reader.evaluate_measures(run, drive), response, book)
+        evaluator = BalanceEvaluator(self.model, self.numerics, self.patch, steps=samples)
+        evaluator.turns = motion.find_reversals()
+        return CycleMeasures(evaluator.evaluate_measures(run, drive), response, book)
 
     def trace_curve(self, drive) -> tuple:
         """Compute the response curve over frequency by continuation through its folds."""

@@ -98,7 +98,7 @@ class MapFinder(TracedCurve):
         begin = perf_counter()
         motion = self.find_periodic_motion(drive, guess)
         numerics = replace(self.numerics, cycles=2.0, window=1)
-        reader = EventEvaluator(self.model, numerics, self.patch, self.contact_elements)
+        evaluator = EventEvaluator(self.model, numerics, self.patch, self.contact_elements)
         run = histories.simulate(
             self.modes,
             drive,
@@ -111,8 +111,8 @@ class MapFinder(TracedCurve):
             motion.start,
             self.convert_memory(motion.memory),
         )
-        run = reader.average_over_strips(run)
-        solution = reader.make_solution(run, perf_counter() - begin, drive)
+        run = evaluator.average_over_strips(run)
+        solution = evaluator.make_solution(run, perf_counter() - begin, drive)
         outcome = solution.outcome or Outcome.STEADY
         if not motion.bounded:
             outcome = Outcome.GROWS

@@ -76,8 +76,8 @@ def march_out_of_grooves(model, numerics, patch, drive, contact) -> Solution | N
         if run.outcome is not Outcome.LEAVES_GROOVES:
             return None
         few_cycles = replace(numerics, cycles=N_CYCLES_IN_GROOVES, steps=steps, window=1)
-        reader = MarchEvaluator(replace(model, rig=rig), few_cycles, patch, contact)
-        solutions.append(reader.make_solution(run, perf_counter() - begin))
+        evaluator = MarchEvaluator(replace(model, rig=rig), few_cycles, patch, contact)
+        solutions.append(evaluator.make_solution(run, perf_counter() - begin))
     fine, half = solutions
     errors = {}
     for name, value in fine.values.items():
@@ -145,9 +145,11 @@ class MarchFinder(TracedCurve):
         """Evaluate one cycle of a periodic march."""
         mark, snapshots = orbits.march_cycle(run, frames)
         numerics = replace(self.numerics, steps=steps)
-        reader = MarchEvaluator(self.model, numerics, self.patch, self.contact)
-        is_stuck = bool(np.ptp(mark.window.slip) <= reader.stick_tolerance) and not reader.creeps
-        values = reader.evaluate_measures(mark, run.drive, stuck=is_stuck)
+        evaluator = MarchEvaluator(self.model, numerics, self.patch, self.contact)
+        is_stuck = (
+            bool(np.ptp(mark.window.slip) <= evaluator.stick_tolerance) and not evaluator.creeps
+        )
+        values = evaluator.evaluate_measures(mark, run.drive, stuck=is_stuck)
         return CycleEvaluation(values | {"drift_per_cycle": 0.0}, mark, snapshots, is_stuck)
 
     def compute_steady_motion(self, drive, guess=None) -> tuple:
