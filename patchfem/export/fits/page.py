@@ -98,16 +98,17 @@ def _values_table(values: dict) -> str:
         value, unit, ends = format_fitted(entry)
         interval = "&ndash;"
         if ends:
-            interval = " .. ".join(ends)
+            interval = "&nbsp;..&nbsp;".join(ends)
         elif "interval" in entry:
             interval = "not determined"
         searched = "&ndash;"
         if "bounds" in entry:
-            searched = " .. ".join(_format_bound(entry, end) for end in entry["bounds"])
+            ends = [_format_bound(entry, end) for end in entry["bounds"]]
+            searched = " .. ".join(ends).replace(" ", "&nbsp;")
         if entry.get("at_bound"):
             searched += f", at its {entry['at_bound']} bound"
         rows.append([escape(key), value, interval, escape(unit), searched])
-    return table_html(("key", ">value", ">95 %", "unit", "searched"), rows)
+    return table_html(("key", ">value", ">95&nbsp;%", "unit", "searched"), rows)
 
 
 def _format_bound(entry: dict, end: float) -> str:
