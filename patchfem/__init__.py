@@ -110,10 +110,8 @@ __all__ = [
     "sweep",
     "view",
 ]
-_CALLABLE_FOLDERS = (
-    "export",
-    "mesh",
-)  # subpackages whose names are also functions of the Python interface
+# subpackages whose names are also functions of the Python interface
+_CALLABLE_FOLDERS = ("export", "mesh")
 _get_module = make_getattr(__name__, __path__)
 
 

@@ -121,9 +121,8 @@ VERB_GROUPS = {
 }
 # module of the function of each verb
 VERBS = {verb: row[0] for verbs in VERB_GROUPS.values() for verb, row in verbs.items()}
-MAX_EXAMPLE_WIDTH = (
-    45  # largest number of characters of an example on the same line as its description
-)
+# largest number of characters of an example on the same line as its description
+MAX_EXAMPLE_WIDTH = 45
 
 OUT_OF_MEMORY = (
     "out of memory; if a key of the scene sets the size of the largest part of the "

@@ -85,7 +85,8 @@ class Waveform(NamedTuple):
         """Return whether the waveform accepts a key of the table [drive]."""
         return key in " ".join(self.keys).split()
 
-    def _has(self, trait: str) -> bool:
+    def _has_trait(self, trait: str) -> bool:
+        """Return whether the waveform has a trait."""
         return trait in self.traits.split()
 
     @property
@@ -96,37 +97,37 @@ class Waveform(NamedTuple):
     @property
     def is_sine(self) -> bool:
         """Whether the drive is a single sine of constant amplitude and frequency."""
-        return self._has("sine")
+        return self._has_trait("sine")
 
     @property
     def has_levels(self) -> bool:
         """Whether the drive is a sine whose amplitude takes the values of `drive.levels` in turn."""
-        return self._has("levels")
+        return self._has_trait("levels")
 
     @property
     def is_swept(self) -> bool:
         """Whether the drive is a sine whose frequency varies from `drive.from` to `drive.to`."""
-        return self._has("swept")
+        return self._has_trait("swept")
 
     @property
     def is_step(self) -> bool:
         """Whether the drive is a step at t = 0, after which the motion decays."""
-        return self._has("step")
+        return self._has_trait("step")
 
     @property
     def is_random(self) -> bool:
         """Whether the drive is a random signal with a given spectral density."""
-        return self._has("random")
+        return self._has_trait("random")
 
     @property
     def is_for_base_only(self) -> bool:
         """Whether the drive can only be a motion of the base, not a force."""
-        return self._has("base-only")
+        return self._has_trait("base-only")
 
     @property
     def needs_duration(self) -> bool:
         """Whether the scene must set the duration by `drive.cycles` or `drive.duration`."""
-        return self._has("endless")
+        return self._has_trait("endless")
 
     @property
     def has_steady_motion(self) -> bool:

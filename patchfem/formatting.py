@@ -12,13 +12,11 @@ from math import isfinite, log10
 
 MAX_SIGNIFICANT_DIGITS = 7  # largest number of significant digits of a value
 DIGITS_WITHOUT_ERROR = 6  # number of significant digits of a value without a known error
-MAX_ROUND_OFF_FRACTION = (
-    1e-6  # largest round-off of a value with a unit, as a fraction of its floor
-)
+# largest round-off of a value with a unit, as a fraction of its floor
+MAX_ROUND_OFF_FRACTION = 1e-6
 MAX_RATIO_ROUND_OFF = 0.1  # largest round-off of a dimensionless value, as a fraction of its floor
-MAX_RELATIVE_ERROR = (
-    0.1  # largest relative error of a value below its floor that is not displayed as 0
-)
+# largest relative error of a value below its floor that is not displayed as 0
+MAX_RELATIVE_ERROR = 0.1
 MIN_PLAIN_POWER = -4  # smallest power of ten of a number without an exponent
 FIRST_EXPONENT_POWER = 7  # smallest power of ten of a large number with an exponent
 ZERO_ERROR_POWER = -400  # power of ten of a vanishing error, smaller than that of any float
@@ -239,6 +237,7 @@ def rewrite_powers_of_ten(text: str) -> str:
     """Rewrite the numbers of a sentence with readable units, such as 302 nJ for 3.02e-07 J."""
 
     def rewrite(match) -> str:
+        """Return the readable form of a matched number with its unit."""
         number, unit = match.groups()
         digits = len(re.sub(r"[eE].*|\D", "", number))
         if unit is None:

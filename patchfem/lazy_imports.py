@@ -52,6 +52,7 @@ def make_getattr(folder: str, path: list):
     """
 
     def get_module(name: str) -> LazyModule:
+        """Return a LazyModule for a module of the folder; raise AttributeError if there is none."""
         full_name = f"{folder}.{name}"
         if (
             name.startswith("__")

@@ -44,19 +44,17 @@ N_TIMINGS = 3
 MIN_SECONDS_TIMED_ONCE = 0.3
 # Largest total CPU time [s] of runs with proposed settings.
 MAX_TRIAL_SECONDS = 10.0
-# The advice at the end of a warning about a missed tolerance, which may propose a setting.
+# Pattern of the advice at the end of a warning about a missed tolerance.
 _REMEDY_TEXT = re.compile(r"; the tolerance is [^;]*; (.*)", re.DOTALL)
 _PROPOSED_SETTING = re.compile(
     r"(?:set|.*try) accuracy\.(steps_per_cycle|shear_modes|harmonics) = (\d+)"
 )
-MIN_ELAPSED_TO_CPU_RATIO = (
-    1.5  # Largest ratio of elapsed to CPU time at which only the CPU time is reported.
-)
+# Smallest ratio of elapsed to CPU time at which both times are reported.
+MIN_ELAPSED_TO_CPU_RATIO = 1.5
 EQUAL_COST_RATIO = 1.1  # Largest ratio of the CPU times of equally expensive runs.
 TIMING_SCATTER = 2e-3  # Scatter of the CPU time of repeated short runs [s].
-NO_EFFECT_RATIO = (
-    0.9  # Smallest ratio of the smallest to the largest error at which a setting is ineffective.
-)
+# Smallest ratio of the smallest to the largest error at which a setting is ineffective.
+NO_EFFECT_RATIO = 0.9
 UNCHANGED_TOL = 1e-11  # Largest relative change of an unaffected measure.
 # Largest change of a measure by round-off, as a fraction of its floor.
 ROUND_OFF_FRACTION = 1e-6

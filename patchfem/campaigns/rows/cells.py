@@ -206,12 +206,12 @@ def _find_distinct_conditions(inputs) -> np.ndarray:
     return np.array(conditions)
 
 
-def compute_rms_scores(cells: Readings, log_ratios, selected) -> dict | None:
+def compute_rms_scores(readings: Readings, log_ratios, selected) -> dict | None:
     """Return the root mean square log ratio of selected readings by kind of reading.
 
     Parameters
     ----------
-    cells : Readings
+    readings : Readings
     log_ratios : (n,) array
         ln(computed/measured).
     selected : (n,) bool
@@ -228,8 +228,8 @@ def compute_rms_scores(cells: Readings, log_ratios, selected) -> dict | None:
     log_ratios = np.asarray(log_ratios)
     is_any = np.ones(len(log_ratios), bool)
     kinds = {
-        "acceleration": cells.is_acceleration,
-        "displacement": ~cells.is_acceleration,
+        "acceleration": readings.is_acceleration,
+        "displacement": ~readings.is_acceleration,
         "all": is_any,
     }
     out: dict = {}

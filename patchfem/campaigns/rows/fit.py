@@ -249,21 +249,21 @@ def fit_rows(
 
 
 def _require_enough_readings(
-    cells: Readings, training, n_values: int, settings: SearchSettings
+    readings: Readings, training, n_values: int, settings: SearchSettings
 ) -> None:
     """Raise PatchfemError unless there are more fitted readings than free parameters."""
-    used = training & ~cells.unstable if settings.unstable == "out" else training
-    if used.sum() <= n_values:
+    is_used = training & ~readings.unstable if settings.unstable == "out" else training
+    if is_used.sum() <= n_values:
         raise PatchfemError(
-            f"{cells.path}: only {int(used.sum())} readings are used for the fit (neither held out "
+            f"{readings.path}: only {int(is_used.sum())} readings are used for the fit (neither held out "
             f"nor left out), too few to determine {n_values} values and their intervals"
         )
 
 
-def _predict_from_rest(computed: ModelReadings, values, conditions) -> np.ndarray:
+def _predict_from_rest(model_readings: ModelReadings, values, conditions) -> np.ndarray:
     """Predict the readings (2, c) at given conditions with motions that start from rest."""
-    computed.reset_motions()
-    return np.array(computed(values, list(conditions)))
+    model_readings.reset_motions()
+    return np.array(model_readings(values, list(conditions)))
 
 
 class _RowsFitter(NamedTuple):
@@ -336,33 +336,35 @@ def _split_placebo(text: str, ranges) -> list:
     return [f"{key}={value.strip()}" for value in values.split(",")]
 
 
-def _predict_with_null_model(cells: Readings, name: str, fitted, groups: dict) -> NullPrediction:
+def _predict_with_null_model(readings: Readings, name: str, fitted, groups: dict) -> NullPrediction:
     """Predict all readings by a null model, the left-out ones by fits without them."""
-    logs, numbers = fit_null_model(cells, name, fitted)
+    logs, numbers = fit_null_model(readings, name, fitted)
     left_out_logs = np.full(fitted.size, np.nan)
     for group in groups.values():
-        left_out_logs[group] = fit_null_model(cells, name, fitted & ~group)[0][group]
+        left_out_logs[group] = fit_null_model(readings, name, fitted & ~group)[0][group]
     return NullPrediction(logs, left_out_logs, numbers)
 
 
-def _warn_of_doubtful_fit(cells: Readings, search: BestFit, logs, settings: SearchSettings) -> list:
+def _warn_of_doubtful_fit(
+    readings: Readings, search: BestFit, logs, settings: SearchSettings
+) -> list:
     """Return warnings about rows without readings, unstable readings and an unreliable search."""
     warnings = []
-    if cells.empty_rows:
-        numbers = ", ".join(str(k + 1) for k in cells.empty_rows)
+    if readings.empty_rows:
+        numbers = ", ".join(str(k + 1) for k in readings.empty_rows)
         warnings.append(
-            f"{len(cells.empty_rows)} of {len(cells.rows)} rows have no reading and are left out: rows "
+            f"{len(readings.empty_rows)} of {len(readings.rows)} rows have no reading and are left out: rows "
             f"{numbers}"
         )
-    n_unstable = int(cells.unstable.sum())
+    n_unstable = int(readings.unstable.sum())
     if n_unstable:
         warnings.append(
             f"{n_unstable} readings flagged U (unstable) {UNSTABLE_MEANINGS[settings.unstable]}; "
             "scores_stable leaves these readings out"
         )
     unbounded = set()
-    for k in cells.row[np.abs(logs) >= MAX_LOG_RATIO]:
-        unbounded.add(f"{cells.rows[k].frequency:.6g} Hz, {cells.rows[k].input:.4g} m/s^2")
+    for k in readings.row[np.abs(logs) >= MAX_LOG_RATIO]:
+        unbounded.add(f"{readings.rows[k].frequency:.6g} Hz, {readings.rows[k].input:.4g} m/s^2")
     if unbounded:
         warnings.append(
             f"no bounded motion is found at {'; '.join(sorted(unbounded))}: each row at these inputs "

@@ -12,7 +12,7 @@ from .cells import MIN_DISPLACEMENT, Readings
 NULL_MODELS = ("constant", "power_input", "power_input_frequency")
 
 
-def fit_null_model(cells: Readings, name: str, training) -> tuple:
+def fit_null_model(readings: Readings, name: str, training) -> tuple:
     """Fit a power law without mechanics to selected readings, and predict all readings with it.
 
     The models are y = C a ("constant"), y = C a^p ("power_input") and y = C a^p f^q
@@ -21,7 +21,7 @@ def fit_null_model(cells: Readings, name: str, training) -> tuple:
 
     Parameters
     ----------
-    cells : Readings
+    readings : Readings
     name : str
         One of NULL_MODELS.
     training : (n,) bool
@@ -33,18 +33,18 @@ def fit_null_model(cells: Readings, name: str, training) -> tuple:
         Log ratios ln(computed/measured) (n,), NaN for a kind without training readings; and a dict
         by kind of the fitted "factor" C and the exponents of "input" and "frequency".
     """
-    logs = np.full(cells.row.size, np.nan)
+    logs = np.full(readings.row.size, np.nan)
     numbers = {}
-    inputs = np.log(cells.conditions[cells.condition])
-    for kind, of_kind in (
-        ("acceleration", cells.is_acceleration),
-        ("displacement", ~cells.is_acceleration),
+    inputs = np.log(readings.conditions[readings.condition])
+    for kind, is_of_kind in (
+        ("acceleration", readings.is_acceleration),
+        ("displacement", ~readings.is_acceleration),
     ):
-        fitted = of_kind & training
+        fitted = is_of_kind & training
         if not fitted.any():
             continue
         minimum = 1e-300 if kind == "acceleration" else MIN_DISPLACEMENT
-        measured = np.log(np.maximum(cells.measured, minimum))
+        measured = np.log(np.maximum(readings.measured, minimum))
         y = measured - inputs[:, 1]
         columns = [np.ones(len(inputs))]
         mean = inputs[fitted].mean(axis=0)
@@ -56,7 +56,7 @@ def fit_null_model(cells: Readings, name: str, training) -> tuple:
         coefficients = np.linalg.lstsq(design[fitted], y[fitted], rcond=1e-10)[0]
         input_power, frequency_power = [*coefficients[1:].tolist(), 0.0, 0.0][:2]
         computed = np.maximum(design @ coefficients + inputs[:, 1], np.log(minimum))
-        logs[of_kind] = (computed - measured)[of_kind]
+        logs[is_of_kind] = (computed - measured)[is_of_kind]
         offset = input_power * mean[1] + frequency_power * mean[0]
         numbers[kind] = {
             "factor": float(np.exp(coefficients[0] - offset)),

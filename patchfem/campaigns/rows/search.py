@@ -70,13 +70,15 @@ class SearchSettings:
     access_ends: Callable = lambda *arguments: None
 
 
-def make_residual(cells: Readings, computed: ModelReadings, training, unstable: str) -> Callable:
+def make_residual(
+    readings: Readings, model_readings: ModelReadings, training, unstable: str
+) -> Callable:
     """Return the function that computes the log ratios of selected readings from free parameters.
 
     Parameters
     ----------
-    cells : Readings
-    computed : ModelReadings
+    readings : Readings
+    model_readings : ModelReadings
     training : (n,) bool
         Mask of the readings in the residual.
     unstable : str
@@ -84,15 +86,15 @@ def make_residual(cells: Readings, computed: ModelReadings, training, unstable: 
         motion was still growing, so that only a smaller computed value gives a residual; "out":
         the reading is excluded; "read": it is treated like any other reading.
     """
-    is_used = training & ~cells.unstable if unstable == "out" else training
-    conditions = sorted(set(cells.condition[is_used].tolist()))
+    is_used = training & ~readings.unstable if unstable == "out" else training
+    conditions = sorted(set(readings.condition[is_used].tolist()))
     is_lower_bound = (
-        cells.unstable[is_used] if unstable == "bound" else np.zeros(int(is_used.sum()), bool)
+        readings.unstable[is_used] if unstable == "bound" else np.zeros(int(is_used.sum()), bool)
     )
 
     def residual(values):
         """Return the log ratios (r,) of the selected readings for free parameters (n,)."""
-        logs = cells.compute_log_ratios(*computed(values, conditions))[is_used]
+        logs = readings.compute_log_ratios(*model_readings(values, conditions))[is_used]
         return np.where(is_lower_bound, np.minimum(logs, 0.0), logs)
 
     return residual

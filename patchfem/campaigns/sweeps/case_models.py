@@ -192,10 +192,7 @@ class _SweepBase(NamedTuple):
 
 @lru_cache(maxsize=2)
 def _get_cached_base(sweep_scene: SweepScene) -> _SweepBase:
-    """Return the base of the cases of a sweep, which is cached for the last two sweeps.
-
-    Those of the last two sweeps are kept.
-    """
+    """Return the base of the cases of a sweep, which is cached for the last two sweeps."""
     try:
         return _SweepBase(BaseScene(sweep_scene._parse_scene(())), {})
     except SceneError:

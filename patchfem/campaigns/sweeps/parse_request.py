@@ -27,9 +27,8 @@ from .cases import Cases, combine_cases
 N_CHECKED = 32  # Largest number of cases that are validated before a sweep starts.
 MAX_PRINTED = 12  # Largest number of validation errors that are printed.
 MAX_SUGGESTIONS = 4  # Largest number of measures that are suggested for an unknown name.
-MAX_CASES = (
-    3_000_000  # Largest number of cases; the hashes and columns of more cases take gigabytes.
-)
+# Largest number of cases; the hashes and columns of more cases take gigabytes.
+MAX_CASES = 3_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,17 +81,17 @@ def read_sweep(path: Path, sets: Sequence[str], request: Request) -> tuple[Sweep
     sweep_scene = SweepScene(Path(path), read_text(path), tuple(sets), request.of)
     cases = read_cases(sweep_scene, request)
     swept_keys = {sweep_scene.replace_mode_name(axis.key): axis.key for axis in cases.axes}
-    mistakes = []
+    errors = []
     for text in sets:
         key = ".".join(split_key(text.partition("=")[0]))
         swept_key = swept_keys.get(sweep_scene.replace_mode_name(key))
         if swept_key:
-            mistakes.append(
+            errors.append(
                 f"--set {text}: the sweep already sets {swept_key} in every case; remove this --set, "
                 "or remove the key from the sweep"
             )
-    if mistakes:
-        raise SceneError(mistakes)
+    if errors:
+        raise SceneError(errors)
     return sweep_scene, cases
 
 
@@ -114,34 +113,34 @@ def read_cases(sweep_scene: SweepScene, request: Request) -> Cases:
             ]
         )
     parts = []
-    mistakes = []
+    errors = []
     file_axes: tuple = ()
     if request.file is not None:
-        listed, mistakes = table.read_case_table(request.file)
+        listed, errors = table.read_case_table(request.file)
         if listed is not None:
             parts.append(listed)
             file_axes = listed.axes
-    mistakes += _validate_measure_name(request.of)
-    axes, axis_mistakes = read_axes(request.over, sampled=request.count > 0)
-    mistakes += [f"--over {mistake.removeprefix('--over ')}" for mistake in axis_mistakes]
+    errors += _validate_measure_name(request.of)
+    axes, axis_errors = read_axes(request.over, sampled=request.count > 0)
+    errors += [f"--over {message.removeprefix('--over ')}" for message in axis_errors]
     if not request.over and request.file is None:
-        axes, axis_mistakes = sweep_scene.read_axes()
-        mistakes += axis_mistakes
-        if not axes and not axis_mistakes:
-            mistakes.append(
+        axes, axis_errors = sweep_scene.read_axes()
+        errors += axis_errors
+        if not axes and not axis_errors:
+            errors.append(
                 f"{sweep_scene.path}: no key to sweep is given; add --over table.key=v1,v2,... or a table [sweep]"
             )
     for key in sorted({axis.key for axis in file_axes} & {axis.key for axis in axes}):
-        mistakes.append(
+        errors.append(
             f"--over {key}: {request.file} sets this key already; remove the key from the file or leave out "
             "this --over"
         )
     every_axis = [*axes, *file_axes]
-    mistakes = mistakes or _find_duplicate_keys(sweep_scene, [axis.key for axis in every_axis])
-    if mistakes:
+    errors = errors or _find_duplicate_keys(sweep_scene, [axis.key for axis in every_axis])
+    if errors:
         listed_axes = [axis for axis in every_axis if isinstance(axis, Axis)]
         first_case = [f"{axis.key}={axis.texts[0]}" for axis in listed_axes]
-        raise SceneError([*sweep_scene.find_errors(first_case), *mistakes])
+        raise SceneError([*sweep_scene.find_errors(first_case), *errors])
     count = prod(map(len, parts))
     count *= request.count or prod(len(axis.texts) for axis in axes)
     if count > MAX_CASES:
@@ -206,27 +205,27 @@ def _find_duplicate_keys(sweep_scene: SweepScene, keys: Sequence[str]) -> list[s
     Two keys are equivalent if they denote a mode by its name and by its index.
     """
     first_keys: dict = {}
-    mistakes = []
+    errors = []
     for key in keys:
         first = first_keys.setdefault(sweep_scene.replace_mode_name(key), key)
         if first != key:
-            mistakes.append(
+            errors.append(
                 f"--over {key}: this key is the same as {first}, which is given already; remove one of them"
             )
-    return mistakes
+    return errors
 
 
 def _require_valid_case(sweep_scene: SweepScene, cases: Cases) -> None:
     """Raise SceneError if none of the representative cases of a sweep is valid."""
     messages: dict = {}
     for number in cases.representative_case_numbers(N_CHECKED):
-        mistakes = sweep_scene.find_errors(cases.assignments(number))
-        if not mistakes:
+        errors = sweep_scene.find_errors(cases.assignments(number))
+        if not errors:
             return
-        for mistake in mistakes:
+        for message in errors:
             # Errors that differ only in their random values are reported once.
-            kind = re.sub(NUMBER_PATTERN, "", mistake) if cases.is_random else mistake
-            messages.setdefault(kind, mistake)
+            kind = re.sub(NUMBER_PATTERN, "", message) if cases.is_random else message
+            messages.setdefault(kind, message)
     lines = list(messages.values())
     if len(lines) > MAX_PRINTED:
         lines = [*lines[:MAX_PRINTED], f"and {len(lines) - MAX_PRINTED} more"]
@@ -244,13 +243,13 @@ def warn_of_invalid_cases(sweep_scene: SweepScene, cases: Cases) -> str:
     )
     if not invalid_cases:
         return ""
-    mistake = invalid_cases[0][0]
+    message = invalid_cases[0][0]
     swept = {sweep_scene.replace_mode_name(axis.key) for axis in cases.axes}
-    key = re.search(r"(?:^|: )([a-z_]+(?:\.[\w-]+)+): ", mistake)
+    key = re.search(r"(?:^|: )([a-z_]+(?:\.[\w-]+)+): ", message)
     advice = "give other values in --over"
     if key and sweep_scene.replace_mode_name(key[1]) not in swept:
         advice = f"sweep {key[1]}, too, remove this key from the scene, or {advice}"
     extent = f"{len(invalid_cases)} of {len(numbers)} cases"
     if len(numbers) != len(cases):
         extent += " that were checked"
-    return f"{extent} will fail: {mistake}; {advice}"
+    return f"{extent} will fail: {message}; {advice}"

@@ -98,7 +98,7 @@ def compute_chunk(
     numbers : sequence of int
         Numbers of the cases.
     say : callable, optional
-        Takes a line of text.
+        Called with a line of text.
 
     Returns
     -------
@@ -299,7 +299,7 @@ def iterate_chunks(
         method begin(work, count, say) is called before the shared meshes are chosen, and the optional
         method end() at the end.
     say : callable, optional
-        Takes a line of text.
+        Called with a line of text.
 
     Yields
     ------

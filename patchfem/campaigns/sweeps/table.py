@@ -54,22 +54,22 @@ def read_case_table(path: Path) -> tuple[Cases | None, list[str]]:
             f"{path}:{header.number}: the first line must be a header such as `{HEADER}`, not "
             f"'{','.join(header.cells)[:80]}'"
         ]
-    mistakes = []
+    errors = []
     n_columns = len(header.cells)
     for line in lines:
         if len(line.cells) != n_columns:
-            mistakes.append(
+            errors.append(
                 f"{path}:{line.number}: the line must have {n_columns} cells, as the header has, not "
                 f"{len(line.cells)}"
             )
     keys = [head[1] for head in header_matches]
     for key in dict.fromkeys(keys):
         if keys.count(key) > 1:
-            mistakes.append(
+            errors.append(
                 f"{path}:{header.number}: {key}: two columns have this key; remove one of them"
             )
-    if mistakes:
-        return None, mistakes
+    if errors:
+        return None, errors
     axes = []
     for column, head in enumerate(header_matches):
         key, unit = head.groups()
@@ -77,8 +77,8 @@ def read_case_table(path: Path) -> tuple[Cases | None, list[str]]:
         axis, wrong_cells = _parse_column(key, unit, cells)
         axes.append(axis)
         for number, text in wrong_cells:
-            mistakes.append(f"{path}:{number or header.number}: {key}: {text}")
-    return (None, mistakes) if mistakes else (Cases(tuple(axes), True), [])
+            errors.append(f"{path}:{number or header.number}: {key}: {text}")
+    return (None, errors) if errors else (Cases(tuple(axes), True), [])
 
 
 class _TableLine(NamedTuple):
@@ -101,12 +101,12 @@ def _read_nonempty_lines(file) -> list:
 def _parse_column(key: str, unit: str | None, cells: list) -> tuple[Axis | None, list[tuple]]:
     """Parse a column of (line number, cell) pairs to an axis, or return its validation errors."""
     axes = {}
-    mistakes = []
+    errors = []
     for number, cell in cells:
         if cell in axes:
             continue
         if unit is not None and not NUMBER_PATTERN.fullmatch(cell):
-            mistakes.append(
+            errors.append(
                 (
                     number,
                     f"'{cell[:60]}' must be a number without a unit; write the unit in the header",
@@ -116,11 +116,11 @@ def _parse_column(key: str, unit: str | None, cells: list) -> tuple[Axis | None,
         try:
             axes[cell] = make_axis(key, [f"{cell} {unit}" if unit else cell])
         except ValueError as error:
-            mistakes.append((number, str(error)))
+            errors.append((number, str(error)))
             if str(error).startswith("not a key"):
                 return None, [(0, str(error))]
-    if mistakes:
-        return None, mistakes
+    if errors:
+        return None, errors
     values = [axes[cell] for _, cell in cells]
     texts = tuple(value.texts[0] for value in values)
     if not all(value.unit for value in values):

@@ -122,7 +122,7 @@ class Pool:
         count : int
             Number of cases.
         say : callable, optional
-            Takes a line of text.
+            Called with a line of text.
         """
         self.end()
         for _ in range(min(self.workers, count)):
