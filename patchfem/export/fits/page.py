@@ -114,7 +114,7 @@ def _values_table(values: dict) -> str:
 def _format_bound(entry: dict, end: float) -> str:
     """Format a bound that limited a fitted value."""
     value, unit, _ = format_fitted(entry | {"value": end, "interval": None})
-    return f"{value} {unit}"
+    return f"{value} {unit}".strip()
 
 
 def _correlation_table(correlation: list, names: list) -> str:
