@@ -192,6 +192,7 @@ def solve_on_refined_meshes(
     grids = make_base_grids(patch_model).bodies
     patches = []
     points = None
+    has_failed_on_points = False
     while True:
         patch = None
         if estimate or len(patches) == MIN_LEVELS - 1:
@@ -222,10 +223,13 @@ def solve_on_refined_meshes(
         if (
             seconds > MAX_CONDENSING_SECONDS[False]
             and not is_within
+            and not has_failed_on_points
             and profile_points.can_use_points(patch_model)
         ):
             meets_tolerance = partial(_meets_tolerance, patches, tolerance)
             points = profile_points.solve_on_points(patch_model, meets_tolerance)
+            # points that do not converge do not do so on the next mesh either
+            has_failed_on_points = points is None
             patches[0] = _attach_point_solution(patch, points)
             is_within = (
                 max_mesh_error_ratio(

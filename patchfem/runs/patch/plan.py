@@ -14,7 +14,7 @@ from ...formatting import format_length
 from ...model.model import Model
 from ...model.pieces import make_piece_meshes
 from ..cost import Cost, MemoryPart
-from . import skin, store
+from . import profile_points, skin, store
 from .grids import (
     MAX_CONDENSING_SECONDS,
     MIN_LEVELS,
@@ -127,6 +127,8 @@ def predict_cost(model: Model) -> Cost:
     patches = [*interface_patches.values()] if model.patch is None else [model.patch]
     if not patches:
         return total_cost
+    seconds = sum(_predict_point_seconds(patch, model.kind) for patch in patches)
+    total_cost = replace(total_cost, times=total_cost.times | {"points": seconds})
     points = total_cost.sizes["interface_points"]
     layers = [patch.interface.strips for patch in patches]
     strips = max(1 if layer is None else layer.count for layer in layers)
@@ -140,6 +142,17 @@ def predict_cost(model: Model) -> Cost:
         ),
     )
     return replace(total_cost, parts=parts)
+
+
+def _predict_point_seconds(patch_model, kind: str) -> float:
+    """Predict the CPU time [s] of solving the contact of a patch on points of its profile.
+
+    A bench with partial slip does so twice: for the mesh of its motion and for that of its static measures.
+    """
+    if patch_model.gap.profile is None or not profile_points.can_use_points(patch_model):
+        return 0.0
+    n_solutions = 2 if kind == "bench" and patch_model.interface.partial_slip else 1
+    return n_solutions * profile_points.predict_seconds(patch_model)
 
 
 def predict_contact_cost(patch_model, tolerance: float) -> Cost:
