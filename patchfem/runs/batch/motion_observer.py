@@ -230,7 +230,7 @@ class MotionObserver:
             "events",
             lambda: maps.EventFinder(self.model, self.numerics, self.patch, 0, self.report),
         )
-        return _observe_solution(solver.point(drive)[0])
+        return _observe_solution(solver.compute_steady_motion(drive)[0])
 
     def _compute_by_run(self, drive, initial_guess) -> ObservedMotion | None:
         """Compute the last cycles of the motion by a run from rest."""
