@@ -122,9 +122,25 @@ def test_always_ageing_scene_gives_force_after_rest(tmp_path, monkeypatch):
         path.write_text(scene.replace('hold = "1 s"', f'hold = "{hold}"'), "utf-8")
         end = 0.05 + float(hold.split()[0])
         forces.append(eval(command.replace("1.05", f"{end}"), {"patchfem": pf}))
-    assert forces == pytest.approx([1918.42, 1369.57], rel=1e-4)
+    assert forces == pytest.approx([2076.54, 1398.16], rel=1e-4)
     ratio = pf.run(path).measures["friction_ratio_peak"].value
-    assert ratio == pytest.approx(0.23988, rel=1e-4)
+    assert ratio == pytest.approx(0.270535, rel=1e-4)
+
+
+def test_scenes_of_one_joint_have_one_stiffness():
+    """The scene to fit a loop and those of the same bolt for other aims have the same stiffness before slip."""
+    stiffnesses = {}
+    for name, row in ROWS.items():
+        scene = loads(compose_scene(choose_law("loop", "loss")._replace(row=row)))
+        law = scene.friction
+        if (
+            scene.normal is not None
+            and law is not None
+            and {"stiffness", "bond_length"} & {*row.keys}
+        ):
+            stiffnesses[name] = law.stiffness or law.static * scene.normal.load / law.bond_length
+    assert {"bouc-wen-bouc-wen", "nonlocal-ageing"} < {*stiffnesses}
+    assert [*stiffnesses.values()] == pytest.approx([3.9e9] * len(stiffnesses), rel=1e-3)
 
 
 @pytest.mark.parametrize("law", SMALL_LOOPS)
