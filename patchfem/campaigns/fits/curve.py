@@ -193,7 +193,7 @@ class CurveModel:
         return self._cached_curve(tuple(map(float, values)), method)
 
     def build_model(self, values):
-        """Build the rig model for given free parameters, with the modes without the joint."""
+        """Build the rig model for given free parameters; its modes are those without the joint."""
         return build_model_without_joint(self.base, format_assignments(self.ranges, values))
 
     def compute_model_curve(self, model, method: str) -> np.ndarray:

@@ -43,13 +43,13 @@ class ModelReadings:
         self.last_readings = (None, {})
 
     def __call__(self, values, conditions) -> tuple:
-        inner = tuple(float(values[k]) for k in self.models.model_parameters)
+        key_values = tuple(float(values[k]) for k in self.models.model_parameters)
         last_values, last_readings = self.last_readings
-        readings = last_readings if last_values == inner else {}
+        readings = last_readings if last_values == key_values else {}
         missing = [k for k in conditions if k not in readings]
         if missing:
             readings = readings | self._compute_readings(values, missing)
-            self.last_readings = inner, readings
+            self.last_readings = key_values, readings
         out = np.full((2, len(self.models.rigs)), np.nan)
         for k in conditions:
             out[:, k] = readings[k]
