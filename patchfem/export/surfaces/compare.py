@@ -90,7 +90,8 @@ PAGE_NOTE = (
     "parabola, or a step where a step fits clearly better. The intervals of both ends, of the "
     "width and of the mean depth within hold for flanks that leave the surface at an angle or in a "
     "step, as those of a parabola or a box do; a flank that runs out flat begins farther outside "
-    "than its interval says. The intervals of ratios hold for the whole surface and assume "
+    "than its interval says. They hold for the ends on these traces: at another place a ragged track "
+    "has another width. The intervals of ratios hold for the whole surface and assume "
     "Gaussian heights with the same statistics everywhere. If both traces are of the same place, "
     "their heights vary together, and the intervals are narrower."
 )

@@ -50,7 +50,7 @@ _ONE_SIDE = "area above the first trace (before wear) within one track width"
 TEXTS = {
     "from": "x in the second trace (after wear) at which the longest track begins",
     "to": "x in the second trace (after wear) at which the longest track ends",
-    "width": "width of the longest track",
+    "width": "width of the longest track on these traces, not its mean width over several places",
     "depth_mean": "mean depth of the longest track: lost area divided by width",
     "depth_floor": "floor of the longest track: bottom of the parabola through the deepest fifth of its width",
     "step": "step: mean depth over the middle third of the longest track, as ISO 5436-1 defines for a groove of "

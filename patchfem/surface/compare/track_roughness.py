@@ -30,7 +30,10 @@ RA_VARIANCE_RATIO = np.pi - 2
 TEXTS = {
     "Ra": ("m", "mean of the absolute heights of the roughness profile"),
     "Rq": ("m", "root mean square of the heights of the roughness profile"),
-    "slope": ("1", "root mean square slope of the roughness profile between neighbouring samples"),
+    "slope": (
+        "1",
+        "root mean square slope of the roughness profile between neighbouring samples, noise included",
+    ),
 }
 NO_TRACK = "no wear track was found, so inside and outside are not known"
 TOO_SHORT = "the traces show too little of the surface inside or outside the track"
