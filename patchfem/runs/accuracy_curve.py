@@ -1,7 +1,7 @@
-"""Accuracy of a motion against its computing time, from runs that were made for its errors.
+"""Accuracy of a motion against its computing time, from the runs of its error estimate.
 
-In: a Result whose `extra["step_runs"]` has the run and its coarser runs in time. Out: an
-`AccuracyCurve`, which takes no further run. `campaigns.cost` measures whole runs instead.
+In: a Result whose `extra["step_runs"]` has the run and its runs with fewer steps. Out: an
+`AccuracyCurve`; no further run is needed. In contrast, `campaigns.cost` measures whole runs.
 """
 
 from typing import NamedTuple
@@ -10,18 +10,18 @@ from ..response.errors import ERROR_MEASURES, MIN_ORDER, absolute_change
 from .accuracy_warnings import MAIN_MEASURES
 
 STEPS_KEY = "accuracy.steps_per_cycle"
-ROUND_OFF = 1e-9  # relative error below which an error is that of round-off in long sums
-# ratio of the errors of two numbers of steps above which the steps do not matter
+ROUND_OFF = 1e-9  # Largest relative error that counts as round-off in long sums.
+# Smallest ratio of the errors with finer and coarser steps at which the steps do not matter.
 NO_EFFECT_RATIO = 0.9
 
 
 class StepSetting(NamedTuple):
-    """A number of time steps, the time that its motion takes, and its accuracy.
+    """Number of time steps with the CPU time and the accuracy of the motion.
 
     - steps: steps per cycle.
     - seconds: CPU seconds of the motion: the steps times the smallest time per step of all runs.
-    - error: worst error of the main measures, as the smallest tolerance that allows it [1].
-    - measure: name of the worst measure.
+    - error: largest error of the main measures, as the smallest tolerance that it meets [1].
+    - measure: name of the measure with this error.
     """
 
     steps: int
@@ -31,13 +31,14 @@ class StepSetting(NamedTuple):
 
 
 class AccuracyCurve(NamedTuple):
-    """Accuracy of a motion at several numbers of steps per cycle.
+    """Accuracy of a motion for several numbers of steps per cycle.
 
-    - coarser: StepSettings of the coarser runs, fine to coarse.
+    - coarser: StepSettings of the runs with fewer steps, from fine to coarse.
     - present: StepSetting of the run.
-    - finer: StepSetting expected of twice the steps; None if these would not reduce the worst error.
-    - limiting_measure: measure with the worst error after twice the steps.
-    - cause: kind of coarsening, other than the steps, that contributes most to its error, as in
+    - finer: predicted StepSetting for twice the steps; None if they would not reduce the largest
+      error.
+    - limiting_measure: measure with the largest error for twice the steps.
+    - cause: kind of coarsening, other than the steps, that contributes most to this error, as in
       `CoarserRuns.of`; "" if there is none.
     - tolerance: tolerance of the scene.
     """
@@ -51,10 +52,10 @@ class AccuracyCurve(NamedTuple):
 
 
 def compute_accuracy_curve(result) -> AccuracyCurve | None:
-    """Return the accuracy of a motion against its CPU time.
+    """Compute the accuracy of a motion as a function of its CPU time.
 
-    The error of a coarser run is its distance from the run plus the error of the run. That of twice
-    the steps is expected from the observed order of convergence.
+    The error of a coarser run is its difference from the run plus the error of the run. The error
+    for twice the steps is predicted from the observed order of convergence.
 
     Parameters
     ----------
@@ -63,8 +64,8 @@ def compute_accuracy_curve(result) -> AccuracyCurve | None:
     Returns
     -------
     AccuracyCurve or None
-        None without coarser runs in time, if no measure has an error above round-off, or if the
-        steps do not limit the accuracy.
+        None if there is no run with fewer steps, if no error exceeds round-off, or if the steps do
+        not limit the accuracy.
     """
     step_runs = result.extra.get("step_runs", ())
     if len(step_runs) < 2:
@@ -74,11 +75,11 @@ def compute_accuracy_curve(result) -> AccuracyCurve | None:
     tolerance = result.plan.model.accuracy.tolerance
     errors = {name: measure.error for name, measure in measures.items()}
 
-    # the first run also loads compiled code, so that the run that was fastest per step counts
+    # The first run also loads compiled code, so that the smallest time per step is used.
     step_seconds = min(run.seconds / run.steps for run in step_runs)
 
     def make_setting(steps: int, errors_by_name: dict) -> StepSetting:
-        """Return a StepSetting with its worst measure."""
+        """Return the StepSetting with the largest error of all measures."""
         fractions = {}
         for name, measure in measures.items():
             size = abs(measure.value) + measure.floor / tolerance
@@ -95,15 +96,15 @@ def compute_accuracy_curve(result) -> AccuracyCurve | None:
     distances = errors
     for run in coarser_runs:
         change = absolute_change(present_run.values, run.values)
-        # a coarse run that is accurate by chance counts as no better than the finer one
+        # A coarse run that is accurate by chance gets the error of the finer one.
         distances = {name: max(change[name] + errors[name], distances[name]) for name in measures}
         coarser.append(make_setting(run.steps, distances))
     if coarser[-1].error * NO_EFFECT_RATIO < present.error:
         return None
-    expected = make_setting(2 * present.steps, _expect_errors(measures))
+    expected = make_setting(2 * present.steps, _predict_errors(measures))
     limiting = measures[expected.measure]
     other_errors = dict(limiting.causes.parts)
-    # The run states the rest itself, such as the error between samples.
+    # The remainder is estimated by the run itself, for example the error between samples.
     other_errors["own"] = limiting.error - sum(other_errors.values())
     other_errors.pop("steps", None)
     cause = max(other_errors, key=other_errors.get, default="")
@@ -112,18 +113,18 @@ def compute_accuracy_curve(result) -> AccuracyCurve | None:
 
 
 def _select_measures(measures: dict, step_runs) -> dict:
-    """Return the main measures with an error that all runs have; all such measures without a main one."""
-    shared = {}
+    """Return the main measures that have errors and occur in all runs; else all such measures."""
+    common = {}
     for name, measure in measures.items():
         is_known = None not in (measure.value, measure.error, measure.causes)
-        is_shared = all(name in run.values for run in step_runs)
-        if is_known and is_shared and name not in ERROR_MEASURES:
-            shared[name] = measure
-    main = {name: measure for name, measure in shared.items() if name in MAIN_MEASURES}
-    return main or shared
+        is_in_all_runs = all(name in run.values for run in step_runs)
+        if is_known and is_in_all_runs and name not in ERROR_MEASURES:
+            common[name] = measure
+    main = {name: measure for name, measure in common.items() if name in MAIN_MEASURES}
+    return main or common
 
 
-def _expect_errors(measures: dict) -> dict:
+def _predict_errors(measures: dict) -> dict:
     """Predict the errors of all measures for a run with twice as many steps."""
     expected = {}
     for name, measure in measures.items():

@@ -1,7 +1,7 @@
-"""Predicted cost of a run: the record that engines return and that a plan adds up.
+"""Predicted cost of a run: the record that each step returns and that a plan adds up.
 
-In: seconds, bytes and sentences of each step of a run. Out: `Cost`, with the memory as a list
-of parts.
+In: seconds, bytes and sentences of each step of a run. Out: `Cost`, with a list of contributions to
+the memory.
 """
 
 from __future__ import annotations
@@ -10,17 +10,15 @@ from dataclasses import dataclass, field
 from operator import add
 from typing import NamedTuple
 
-# Label of the memory that compiled code occupies. A run that must compile it also needs address space
-# for the compiler (`memory.free_bytes`).
+# Label of the memory of compiled code. A run that must compile it also needs address space for the
+# compiler (`memory.free_bytes`).
 COMPILED_CODE_LABEL = "compiled code"
 
 
 class MemoryPart(NamedTuple):
-    """Contribution to the peak memory of a run, with the scene key that sets its size.
+    """Contribution to the peak memory of a run, with the scene key that determines its size.
 
-    key: "" if no key sets the size.
-
-    key: the key of the scene that sets its size; "" if there is none.
+    key: "" if no scene key determines the size.
     """
 
     bytes: float
@@ -38,7 +36,7 @@ class Cost:
         CPU seconds on one core by activity.
     parts : tuple of MemoryPart
     words : tuple of str
-        Sentences of the plan.
+        Sentences for the plan.
     steps : int
         Steps of the time loop, including those of the coarse runs.
     sizes : dict
@@ -46,7 +44,7 @@ class Cost:
     engine : str
         Name of the engine; "" for a step without one.
     compile_seconds : float
-        CPU seconds of compiling in the first run of this kind.
+        CPU seconds of compiling, in the first run that needs this code.
     """
 
     times: dict = field(default_factory=dict)
@@ -97,7 +95,7 @@ class EngineCode(NamedTuple):
     compile: float = 0.0
 
     def cost(self) -> Cost:
-        """Return the cost of loading the compiled code."""
+        """Return the Cost of loading the compiled code."""
         part = MemoryPart(self.bytes, COMPILED_CODE_LABEL if self.compile else "code")
         return Cost({"code": self.seconds}, (part,), compile_seconds=self.compile)
 
@@ -105,9 +103,10 @@ class EngineCode(NamedTuple):
 NO_CODE = EngineCode(0.0, 0.0)
 # A linear motion in closed form loads the LLVM library, but no kernels.
 LINEAR_CODE = EngineCode(58e6, 0.0)
-SHORT_CODE = EngineCode(58e6, 0.15, 2.0)  # for the slide of a bench, which has few kernels
+# For the prescribed displacement of a bench, which has few kernels.
+SHORT_CODE = EngineCode(58e6, 0.15, 2.0)
 MARCH_CODE = EngineCode(58e6, 0.15, 3.5)
-SHEAR_MARCH_CODE = EngineCode(58e6, 0.15, 7.0)  # for a march with shear modes of a patch
+SHEAR_MARCH_CODE = EngineCode(58e6, 0.15, 7.0)  # For a march with shear modes of a patch.
 SMOOTH_CODE = EngineCode(74e6, 0.15, 9.0)
-EVENT_CODE = EngineCode(82e6, 0.15, 12.0)  # for the event-driven engines
+EVENT_CODE = EngineCode(82e6, 0.15, 12.0)  # For the event-driven engines.
 BALANCE_CODE = EngineCode(1e8, 0.3, 3.0)

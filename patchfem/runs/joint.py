@@ -1,7 +1,7 @@
-"""Stiffness of a pressed patch that is removed from the modes of a rig measured with it.
+"""Removal of a joint from the modes of a rig that were measured with the joint.
 
-In: a model whose modes were measured with the joint, and its pressed patch. Out: the model with
-the modes without the joint.
+In: a model whose modes were measured with the joint, and its solved patch. Out: the model with the
+modes without the joint.
 """
 
 from dataclasses import replace
@@ -18,15 +18,15 @@ from .patch.jenkins_elements import elements, strip_elements
 
 
 def remove_joint(model: Model, patch=None) -> Model:
-    """Remove the joint from the modes of a rig that were measured with the joint in place.
+    """Subtract the stiffness of the joint from modes that were measured with the joint.
 
-    Any other model is returned unchanged.
+    All other models are returned unchanged.
 
     Parameters
     ----------
     model : Model
     patch : Patch, optional
-        Pressed patch; None: it is pressed here.
+        Solved patch; None: it is solved here.
 
     Raises
     ------
@@ -38,12 +38,12 @@ def remove_joint(model: Model, patch=None) -> Model:
     with locate_errors(model.source):
         if patch is None:
             patch = patch_result.solve_with_coarser(model.patch, model.accuracy.tolerance)[0]
-        stiffness = patch_stiffness(model, patch)
+        stiffness = compute_full_stick_stiffness(model, patch)
         return replace(model, rig=model.rig.structure.without_joint(stiffness))
 
 
-def patch_stiffness(model: Model, patch) -> float:
-    """Return the tangential stiffness [N/m] of a patch that sticks everywhere; 0 without contact."""
+def compute_full_stick_stiffness(model: Model, patch) -> float:
+    """Return the tangential stiffness [N/m] of a patch in full stick; 0 without contact."""
     f = model.friction
     load = patch.pressure.load
     if not load > 0:
@@ -65,17 +65,17 @@ def patch_stiffness(model: Model, patch) -> float:
     return float(elements(patch, f.static, length).stiffness.sum())
 
 
-def stuck_patch_stiffness(model: Model, patch, apart: tuple):
-    """Return the tangential stiffness [N/m] of a sticking patch with its error, or None.
+def stuck_patch_stiffness(model: Model, patch, coarse: tuple):
+    """Return the tangential stiffness [N/m] of a patch in full stick with its error, or None.
 
-    It is the value that its run prints, extrapolated over the meshes, and exists only if the pieces
-    alone are compliant.
+    It is the extrapolated value that the run reports. It is None unless the pieces alone are
+    compliant.
 
     Parameters
     ----------
     model : Model
     patch : Patch or None
-    apart : tuple
+    coarse : tuple
         The patch on coarser meshes; None for a missing one.
 
     Returns
@@ -88,5 +88,5 @@ def stuck_patch_stiffness(model: Model, patch, apart: tuple):
         or not law_has_trait(model.friction.law, "set-valued")
     ):
         return None
-    measure = patch_result.static_measures(model, patch, tuple(apart)).get("tangential_stiffness")
+    measure = patch_result.static_measures(model, patch, tuple(coarse)).get("tangential_stiffness")
     return None if measure is None or measure.value is None or measure.error is None else measure

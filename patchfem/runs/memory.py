@@ -1,7 +1,7 @@
-"""Memory that this process may still use, and the refusal of a run that needs more.
+"""Memory that this process may use, and the refusal of runs that need more.
 
-In: the memory parts of a plan. Out: the available memory, and the reason of a refusal with the
-key that helps.
+In: the memory contributions of a plan. Out: the available memory, and the reason for a refusal with
+the scene key to change.
 """
 
 import os
@@ -10,10 +10,11 @@ from pathlib import Path
 from ..core import Missing
 from .cost import COMPILED_CODE_LABEL
 
-MAPPED_BYTES = 60e6  # address space [bytes] that the packages map in addition to the memory in use
-COMPILER_BYTES = 150e6  # address space [bytes] of the compiler library
-MIN_NAMED_FRACTION = 0.3  # fraction of the total memory from which a plan names the largest part
-REMEDIES = {
+MAPPED_BYTES = 60e6  # Address space [bytes] that the packages map in addition to the memory in use.
+COMPILER_BYTES = 150e6  # Address space [bytes] of the compiler library.
+# Smallest fraction of the total memory at which a plan names the largest contribution.
+MIN_NAMED_FRACTION = 0.3
+KEY_ADVICE = {
     "contact.element_size": "make contact.element_size larger",
     "contact.mesh": "give contact.mesh fewer nodes on the interface",
     "accuracy.tail": "raise accuracy.tail or accuracy.merge",
@@ -24,9 +25,9 @@ REMEDIES = {
 
 
 def describe_largest_part(parts: tuple) -> str:
-    """Describe the largest memory consumer of a run and the scene key that sets its size.
+    """Describe the largest memory contribution of a run and the scene key that determines it.
 
-    The sentence is "" if this part is small, or if no key sets its size.
+    The result is "" if the contribution is small, or if no scene key determines it.
     """
     largest = next((part for part in parts if part.key), None)
     if largest is None or largest.bytes < MIN_NAMED_FRACTION * sum(part.bytes for part in parts):
@@ -37,20 +38,20 @@ def describe_largest_part(parts: tuple) -> str:
 def free_bytes(*, needs_compiler: bool = False) -> float:
     """Return the total memory [bytes] that this process may use.
 
-    The system, its control group and its own limits are considered; inf if none is known.
-    needs_compiler: whether the compiler library is needed as well, which counts for address space
+    The system, its control group and the limits of the process are considered; inf if none is
+    known. needs_compiler: whether the compiler library is needed, which affects the address space
     only.
     """
-    used, mapped = process_bytes()
-    beside = mapped - used + MAPPED_BYTES + (COMPILER_BYTES if needs_compiler else 0.0)
+    used, mapped = read_process_bytes()
+    other_address_space = mapped - used + MAPPED_BYTES + (COMPILER_BYTES if needs_compiler else 0.0)
     return min(
-        _available_bytes() + used,
+        _read_available_bytes() + used,
         free_in_control_group(used),
-        *(limit - beside for limit in _process_limits()),
+        *(limit - other_address_space for limit in _read_process_limits()),
     )
 
 
-def process_bytes(status: Path = Path("/proc/self/statm")) -> tuple:
+def read_process_bytes(status: Path = Path("/proc/self/statm")) -> tuple:
     """Return the memory in use and the address space of this process [bytes]."""
     try:
         size, resident = map(int, status.read_text("ascii").split()[:2])
@@ -60,7 +61,7 @@ def process_bytes(status: Path = Path("/proc/self/statm")) -> tuple:
     return float(resident * page), float(size * page)
 
 
-def _available_bytes() -> float:
+def _read_available_bytes() -> float:
     """Return the available memory of the system [bytes]; inf if unknown."""
     try:
         with open("/proc/meminfo", encoding="ascii") as file:
@@ -70,7 +71,7 @@ def _available_bytes() -> float:
         return float("inf")
 
 
-def _process_limits() -> list:
+def _read_process_limits() -> list:
     """Return the limits on address space and data of this process [bytes]; inf if unlimited."""
     try:
         import resource
@@ -83,18 +84,18 @@ def _process_limits() -> list:
 def free_in_control_group(
     used: float, groups: Path = Path("/proc/self/cgroup"), root: Path = Path("/sys/fs/cgroup")
 ) -> float:
-    """Return the memory [bytes] that the control groups of this process still allow.
+    """Return the memory [bytes] that the control groups of this process allow.
 
-    The result contains the memory that the process already uses.
+    Memory that the process already uses is included.
 
     Parameters
     ----------
     used : float
         Memory in use by the process [bytes].
     groups : Path
-        File with the control groups of the process.
+        File that lists the control groups of the process.
     root : Path
-        Folder of the file system of the control groups.
+        Root folder of the control group file system.
 
     Returns
     -------
@@ -107,16 +108,16 @@ def free_in_control_group(
         return float("inf")
     free = float("inf")
     for _, kinds, path in (line for line in lines if len(line) == 3):
-        old = "memory" in kinds.split(",")
-        if not old and kinds:
+        is_version_1 = "memory" in kinds.split(",")
+        if not is_version_1 and kinds:
             continue
         base = root
         names = ("memory.max", "memory.current")
-        if old:
+        if is_version_1:
             base = root / "memory"
             names = ("memory.limit_in_bytes", "memory.usage_in_bytes")
-        place = base / path.strip("/")
-        for folder in (place, *place.parents):
+        group_folder = base / path.strip("/")
+        for folder in (group_folder, *group_folder.parents):
             free = min(free, _remaining_bytes(folder, *names) + used)
             if folder == base:
                 break
@@ -124,16 +125,17 @@ def free_in_control_group(
 
 
 def _remaining_bytes(folder: Path, limit: str, usage: str) -> float:
-    """Return the memory [bytes] that one control group still allows; inf if unlimited.
+    """Return the memory [bytes] that a control group still allows; inf if unlimited.
 
-    Inactive cached files count as free.
+    Inactive cached files count as free memory.
     """
     try:
         max_bytes = int((folder / limit).read_text("ascii"))
         used_bytes = int((folder / usage).read_text("ascii"))
         lines = (folder / "memory.stat").read_text("ascii").splitlines()
         known = dict(line.split() for line in lines)
-    except (OSError, ValueError):  # the limit is "max", i.e. there is none, or a file is missing
+    # The limit is "max", which means unlimited, or a file is missing.
+    except (OSError, ValueError):
         return float("inf")
     return float(
         max_bytes
@@ -142,10 +144,11 @@ def _remaining_bytes(folder: Path, limit: str, usage: str) -> float:
     )
 
 
-def reason_of_refusal(parts: tuple, free: float | None = None) -> str:
-    """Return why a run needs more memory than is free, or "".
+def reason_for_refusal(parts: tuple, free: float | None = None) -> str:
+    """Return why a run needs more memory than is free, or "" if it does not.
 
-    The sentence names the required and the free memory, and the largest part with its key.
+    The reason gives the required and the free memory, and the largest contribution with its scene
+    key.
     """
     if free is None:
         free = free_bytes(needs_compiler=any(part.what == COMPILED_CODE_LABEL for part in parts))
@@ -156,11 +159,11 @@ def reason_of_refusal(parts: tuple, free: float | None = None) -> str:
     text = f"about {total / 1e9:.3g} GB of memory are needed, but only {max(free, 0.0) / 1e9:.2g} GB are free"
     if largest is None or largest.bytes < 0.1 * total:
         return f"{text}; free some memory, or run on a machine with more memory"
-    remedy = REMEDIES.get(largest.key, f"lower {largest.key}")
-    return f"{text}; {largest.bytes / 1e9:.3g} GB of these are for {largest.what}: {remedy}"
+    advice = KEY_ADVICE.get(largest.key, f"lower {largest.key}")
+    return f"{text}; {largest.bytes / 1e9:.3g} GB of these are for {largest.what}: {advice}"
 
 
-def refuse_large_memory(parts: tuple) -> None:
+def refuse_insufficient_memory(parts: tuple) -> None:
     """Raise Missing if a run would need more memory than is free."""
-    if text := reason_of_refusal(parts):
+    if text := reason_for_refusal(parts):
         raise Missing(text, "")

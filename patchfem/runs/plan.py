@@ -320,7 +320,7 @@ def _write_verdict(model: Model, groups: dict, parts: tuple, said: tuple) -> lis
     said: sentences on the motion, the patch and the friction law.
     """
     sentences = list(said[0])
-    if text := memory.reason_of_refusal(parts):
+    if text := memory.reason_for_refusal(parts):
         sentences.append(f"`run` will refuse this scene: {text}")
     elif text := memory.describe_largest_part(parts):
         sentences.append(text)
@@ -344,7 +344,7 @@ def _write_verdict(model: Model, groups: dict, parts: tuple, said: tuple) -> lis
 
 def refuse_large_run(what: Plan) -> None:
     """Raise Missing if a run needs too much memory or CPU time."""
-    memory.refuse_large_memory(what.cost.parts)
+    memory.refuse_insufficient_memory(what.cost.parts)
     if what.seconds > MAX_CPU_SECONDS:
         key = ""
         if what.model.accuracy.steps_per_cycle is not None:

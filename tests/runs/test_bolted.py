@@ -124,7 +124,9 @@ def test_exact_stuck_patch_has_measured_frequency():
     measured = pf.build(SHEARED + MODES % (STUCK, 14300.0, 1.0, 1.0) + DRIVE.replace("143", "9000"))
     model = joint.remove_joint(measured)
     patch, *_ = joint.patch_result.solve_with_coarser(model.patch, 1e-3)
-    stuck = np.sqrt(model.rig.modes.omega[0] ** 2 + joint.patch_stiffness(model, patch) / 0.884)
+    stuck = np.sqrt(
+        model.rig.modes.omega[0] ** 2 + joint.compute_full_stick_stiffness(model, patch) / 0.884
+    )
     assert stuck / (2 * np.pi) == pytest.approx(14300.0, rel=1e-12)
     assert pf.run(measured).plan.model.rig.modes.omega[0] == pytest.approx(
         model.rig.modes.omega[0], rel=1e-12

@@ -75,7 +75,7 @@ def _find_sticking_stiffness(model: Model) -> StickingContact:
         return StickingContact(None, None)
     if model.patch is not None:
         patch = patch_result.solve_with_coarser(model.patch, model.accuracy.tolerance)[0]
-        stiffness = joint.patch_stiffness(model, patch)
+        stiffness = joint.compute_full_stick_stiffness(model, patch)
         is_elastic = 0 < stiffness < np.inf
         return StickingContact(patch, stiffness if is_elastic else None)
     try:

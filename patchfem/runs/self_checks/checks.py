@@ -1,6 +1,6 @@
-"""Table of all self-checks, and the result of a run whose checks failed.
+"""Table of all self-checks, and the Result of a run whose checks failed.
 
-In: a Result. Out: its failed Findings, and the Result as `not_converged` if there are any.
+In: a Result. Out: its failed Findings, and the Result marked as `not_converged` if there are any.
 """
 
 from collections.abc import Callable, Iterator
@@ -26,23 +26,22 @@ CHECKS: tuple[Callable[[Evidence], Iterator[Finding]], ...] = (
 )
 
 
-def list_failed_findings(result: Result) -> list:
-    """Return the self-checks of a Result whose difference exceeds the threshold."""
+def run_failed_checks(result: Result) -> list:
+    """Return the findings of all self-checks that fail for a Result."""
     run = Evidence(result)
     return [finding for check in CHECKS for finding in check(run) if finding.has_failed]
 
 
 def mark_failed_checks(result: Result) -> Result:
-    """Return the result, marked as `not_converged` if any of its self-checks fails.
+    """Return the Result, marked as `not_converged` with a warning for each failed self-check.
 
-    Every failed check of CHECKS adds a sentence.
-
-    A model that was changed after it was built from its scene is not compared with the scene.
+    If no check fails it is returned unchanged. A model that was changed after it was built is not
+    compared with its scene.
     """
     model = result.plan.model
     if result.outcome is Outcome.NOT_CONVERGED or not model.source.describes(model):
         return result
-    failed = list_failed_findings(result)
+    failed = run_failed_checks(result)
     if not failed:
         return result
     return replace(

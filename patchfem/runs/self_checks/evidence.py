@@ -1,4 +1,4 @@
-"""Data of a result that the checks use: scene, modes, last cycles, friction by two methods.
+"""Data of a result for the self-checks: scene, modes, last cycles, two values of the friction force.
 
 In: a Result. Out: `Evidence`.
 """
@@ -14,11 +14,11 @@ from ..results.result import Result
 from ..rig import engines
 from .finding import CUBIC_QUADRATURE_TOL
 
-MIN_CYCLE_SAMPLES = 40  # Smallest number of samples per cycle of a window that the checks use.
+MIN_CYCLE_SAMPLES = 40  # Smallest number of samples per cycle at which the checks use a window.
 
 
 class Evidence:
-    """Result of a run together with its scene as a table of numbers in SI units."""
+    """Result of a run, together with its scene as a table of numbers in SI units."""
 
     def __init__(self, result: Result):
         self.result = result
@@ -26,7 +26,7 @@ class Evidence:
         self.scene = tomllib.loads(self.model.source.resolved)
 
     def number(self, *keys) -> float | None:
-        """Return the number of a scene key in SI units; None if the scene does not give it."""
+        """Return the value of a scene key in SI units; None if the scene does not have it."""
         value = self.scene
         for key in keys:
             if not isinstance(value, dict) or key not in value:
@@ -46,7 +46,7 @@ class Evidence:
 
     @property
     def area(self) -> float:
-        """Area [m2] of the interfaces of all contact pairs."""
+        """Interface area [m2] of all contact pairs together."""
         contact = self.scene["contact"]
         return (
             self.number("contact", "width")
@@ -73,19 +73,21 @@ class Evidence:
             return False
         if model.load_varies if model.rig is None else model.rig.friction.load_varies:
             return False
-        across = model.slide is not None and model.slide.across is not None
-        several = model.rig is not None and (
+        is_two_dimensional = model.slide is not None and model.slide.across is not None
+        has_several_interfaces = model.rig is not None and (
             len(model.rig.modes.interfaces) > 1 or bool(model.rig.friction.names)
         )
-        in_plane = model.rig is not None and model.rig.modes.lateral_faces is not None
-        lists = "temperature" in friction or "spread" in friction
-        return not (across or several or in_plane or lists)
+        has_lateral_motion = model.rig is not None and model.rig.modes.lateral_faces is not None
+        has_varying_bonds = "temperature" in friction or "spread" in friction
+        return not (
+            is_two_dimensional or has_several_interfaces or has_lateral_motion or has_varying_bonds
+        )
 
     @cached_property
     def modes(self) -> "SceneModes | None":
-        """Modes that the scene lists in [[structure.mode]]; None if the engine uses other modes.
+        """Modes listed in [[structure.mode]]; None if the engine uses other modes.
 
-        Reduction, or a bonded spring, replaces the modes of the scene.
+        This is the case for a reduced structure and for a bonded spring.
         """
         structure = self.scene.get("structure", {})
         if (
@@ -113,9 +115,9 @@ class Evidence:
 
     @cached_property
     def window(self):
-        """Last cycles of a run under sinusoidal drive; None under other drives.
+        """Histories of the last cycles under a sinusoidal drive; None otherwise.
 
-        It is also None for too few samples.
+        It is also None if there are too few samples.
         """
         window = self.result.window
         frequency = self.frequency
@@ -133,7 +135,7 @@ class Evidence:
 
     @cached_property
     def frequency(self) -> float | None:
-        """Frequency [Hz] of a drive or displacement that stays sinusoidal to the end; else None."""
+        """Frequency [Hz] of a drive or displacement that is sinusoidal to the end; else None."""
         drive = self.scene.get("drive")
         slide = self.scene.get("slide", {})
         if drive is None:
@@ -143,7 +145,7 @@ class Evidence:
 
     @cached_property
     def balance(self) -> "ForceBalance | None":
-        """First harmonics of the friction force from the equation of motion and from samples.
+        """First harmonic of the friction force from the equation of motion and from samples.
 
         It is None if other forces act as well.
         """
@@ -165,15 +167,15 @@ class Evidence:
             return None
         size = self.number("drive", "acceleration")
         force = self.number("drive", "force")
-        # The drive has another kind, for example a displacement of the base.
+        # The drive is of another kind, for example a displacement of the base.
         if size is None and force is None:
             return None
         drive = force / modes.mass if size is None else size
-        return energy_balance(modes, window, drive, 2 * np.pi * self.frequency)
+        return compute_force_balance(modes, window, drive, 2 * np.pi * self.frequency)
 
 
 class LastCycle(NamedTuple):
-    """Time [s], displacement [m] and friction force [N] (k,) of the last cycle of a bench."""
+    """Time [s], displacement [m] and friction force [N] (k,) in the last cycle of a bench."""
 
     time: np.ndarray
     slide: np.ndarray
@@ -181,9 +183,9 @@ class LastCycle(NamedTuple):
 
 
 class SceneModes(NamedTuple):
-    """Natural frequencies, damping and participations of the modes in the scene.
+    """Natural frequencies, damping ratios and participations of the modes in the scene.
 
-    omega [rad/s], zeta, slide, base and output [1], (n,) each, and the mass [kg].
+    omega [rad/s]; zeta, slide, base and output [1]; (n,) each; and the mass [kg].
     """
 
     omega: np.ndarray
@@ -195,13 +197,13 @@ class SceneModes(NamedTuple):
 
 
 class ForceBalance(NamedTuple):
-    """First harmonics of displacement and friction force, the force computed in two ways.
+    """First harmonics of displacement and friction force, the latter computed in two ways.
 
-    - from_motion: harmonic of the force by the equation of motion [N].
-    - from_samples: harmonic of the force by its samples [N].
-    - slide: harmonic of the slide [m].
-    - sampling: error of `from_samples` by the sampling [N].
-    - terms: magnitude of the terms of which `from_motion` is a difference [N].
+    - from_motion: harmonic of the force from the equation of motion [N].
+    - from_samples: harmonic of the force from its samples [N].
+    - slide: harmonic of the displacement [m].
+    - sampling: error of `from_samples` due to the sampling [N].
+    - terms: sum of the magnitudes of the terms whose sum is `from_motion` [N].
     """
 
     from_motion: complex
@@ -217,7 +219,7 @@ class ForceBalance(NamedTuple):
 
 
 def parse_scene_number(value) -> float | None:
-    """Return the number of a scene value such as 0.3 or "700.0 N"; None for other values."""
+    """Return the number in a scene value such as 0.3 or "700.0 N"; None for other values."""
     if isinstance(value, str):
         head = value.split()[0] if value else ""
         try:
@@ -227,15 +229,15 @@ def parse_scene_number(value) -> float | None:
     return float(value) if isinstance(value, int | float) else None
 
 
-def cubic_harmonic(time, value, rate, omega: float) -> complex:
-    """Compute a Fourier coefficient of samples by integrating piecewise cubics.
+def integrate_harmonic_by_cubics(time, value, rate, omega: float) -> complex:
+    """Compute a Fourier coefficient of samples (k,) from their piecewise cubic interpolation.
 
-    The samples (k,) are joined by cubics and integrated by Simpson's rule.
+    The interpolant is integrated by Simpson's rule.
 
     Parameters
     ----------
     time, value, rate : (k,)
-        Times [s], samples of y and their rates.
+        Times [s], samples, and their derivatives with respect to time.
     omega : float
         Angular frequency [rad/s].
     """
@@ -243,60 +245,62 @@ def cubic_harmonic(time, value, rate, omega: float) -> complex:
     middle = (value[1:] + value[:-1]) / 2 + step * (rate[:-1] - rate[1:]) / 8
     wave = np.exp(-1j * omega * time)
     wave_middle = np.exp(-1j * omega * (time[1:] + time[:-1]) / 2)
-    ends = value * wave
-    total = np.sum(step / 6 * (ends[:-1] + 4 * middle * wave_middle + ends[1:]))
+    node_values = value * wave
+    total = np.sum(step / 6 * (node_values[:-1] + 4 * middle * wave_middle + node_values[1:]))
     return complex(2 / (time[-1] - time[0]) * total)
 
 
-def energy_balance(modes: SceneModes, window, acceleration: float, omega: float) -> ForceBalance:
+def compute_force_balance(
+    modes: SceneModes, window, acceleration: float, omega: float
+) -> ForceBalance:
     """Compute the first harmonic of the friction force from the motion and from samples.
 
     The equation of motion times exp(-i omega t) is integrated by parts over the window: the
     harmonic of z'' is [v e + i omega z e] 2/T - omega^2 z1, that of v is [z e] 2/T + i omega z1.
-    From the samples it is computed by the trapezoidal rule; if the force is monotonic between two
-    samples, the error of this rule is at most h |change of F|/2 per step. Twice as much is allowed,
-    for a force that reverses within a step.
+    The harmonic from samples uses the trapezoidal rule, whose error is at most h |change of F|/2
+    per step if the force is monotonic between samples. Twice as much is allowed, for a force that
+    reverses within a step.
 
     Parameters
     ----------
     modes : SceneModes
     window : Response
     acceleration : float
-        Acceleration of the drive, or its force over the mass [m s-2].
+        Acceleration of the drive, or its force divided by the mass [m s-2].
     omega : float
         Angular frequency of the drive [rad/s].
     """
     time = window.time
     span = window.time[-1] - window.time[0]
     wave = np.exp(-1j * omega * time)
-    first = np.zeros(modes.omega.size, complex)
-    rest = np.zeros(modes.omega.size, complex)
-    size = 0.0
+    displacement_harmonic = np.zeros(modes.omega.size, complex)
+    force_harmonic = np.zeros(modes.omega.size, complex)
+    sum_of_magnitudes = 0.0
     drive = -1j * acceleration
     for i in range(modes.omega.size):
         z = window.modal[:, i]
         v = window.modal_rate[:, i]
-        first[i] = cubic_harmonic(time, z, v, omega)
-        ends = 2 / span * (z[-1] * wave[-1] - z[0] * wave[0])
-        speed = ends + 1j * omega * first[i]
-        inertia = 2 / span * (v[-1] * wave[-1] - v[0] * wave[0]) + 1j * omega * speed
+        displacement_harmonic[i] = integrate_harmonic_by_cubics(time, z, v, omega)
+        boundary_term = 2 / span * (z[-1] * wave[-1] - z[0] * wave[0])
+        velocity_harmonic = boundary_term + 1j * omega * displacement_harmonic[i]
+        inertia = 2 / span * (v[-1] * wave[-1] - v[0] * wave[0]) + 1j * omega * velocity_harmonic
         terms = (
             inertia,
-            2 * modes.zeta[i] * modes.omega[i] * speed,
-            modes.omega[i] ** 2 * first[i],
+            2 * modes.zeta[i] * modes.omega[i] * velocity_harmonic,
+            modes.omega[i] ** 2 * displacement_harmonic[i],
             modes.base[i] * drive,
         )
-        rest[i] = -sum(terms)
-        size += abs(modes.slide[i]) * sum(abs(term) for term in terms)
+        force_harmonic[i] = -sum(terms)
+        sum_of_magnitudes += abs(modes.slide[i]) * sum(abs(term) for term in terms)
     scale = modes.mass / (modes.slide @ modes.slide)
     step = np.diff(time)
     product = window.force * wave
     samples = 2 / span * np.sum(step * (product[1:] + product[:-1]) / 2)
     sampling = 2 / span * np.sum(step * np.abs(np.diff(window.force)))
     return ForceBalance(
-        complex(scale * (modes.slide @ rest)),
+        complex(scale * (modes.slide @ force_harmonic)),
         complex(samples),
-        complex(modes.slide @ first),
+        complex(modes.slide @ displacement_harmonic),
         float(sampling),
-        float(scale * size),
+        float(scale * sum_of_magnitudes),
     )

@@ -20,17 +20,17 @@ from .finding import (
     Finding,
 )
 
-# Relative error of a peak between two of 40 samples per cycle of the fastest motion.
+# Largest relative error of a peak between two of 40 samples per cycle of the fastest motion.
 SAMPLED_PEAK_TOL = 0.05
 LAWS_WITH_FRICTION_LIMIT = ("coulomb", "tanh", "elastic-plastic", "iwan", "bouc-wen", "convolution")
-# Relative error of the equivalent damping of a window whose cycles differ slightly.
+# Largest relative error of the equivalent damping if the cycles of the window differ slightly.
 MAX_SLIP_CORRECTION = 0.05
 
 
 def check_friction_harmonic(run: Evidence) -> Iterator[Finding]:
-    """Compare the first harmonic of the friction force from the motion and from samples.
+    """Compare the first harmonic of the friction force from the motion with that from samples.
 
-    See `energy_balance` for both computations and for the threshold. `equivalent_stiffness` is
+    See `compute_force_balance` for both computations and the threshold. `equivalent_stiffness` is
     Re(F1/q1) by definition.
     """
     balance = run.balance
@@ -49,7 +49,7 @@ def check_friction_harmonic(run: Evidence) -> Iterator[Finding]:
     stiffness = run.value("equivalent_stiffness")
     if stiffness is not None and abs(balance.slide) > 0:
         expected = (balance.from_samples / balance.slide).real
-        # The displacement is a divisor, so that the error of its quadrature counts in proportion.
+        # The displacement is a divisor, so that its quadrature error enters in proportion.
         slack = (balance.threshold + CUBIC_QUADRATURE_TOL * size) / abs(balance.slide)
         yield Finding(
             "equivalent_stiffness",
@@ -61,17 +61,17 @@ def check_friction_harmonic(run: Evidence) -> Iterator[Finding]:
 
 
 def check_friction_limit(run: Evidence) -> Iterator[Finding]:
-    """Compare the peak friction force with the friction limit, static x load.
+    """Compare the peak friction force with the friction limit, static × load.
 
-    Laws that exceed it (lugre, growing bonds) are left out. A Coulomb contact of rigid pieces that
-    slips carries at least kinetic × load; an elastic-plastic one that slides 4 bond lengths in a
-    bench carries static × load.
+    Laws that can exceed the limit (lugre, growing bonds) are left out. For a Coulomb contact of
+    rigid pieces that slips, the peak is at least kinetic × load. For an elastic-plastic contact
+    that slides 4 bond lengths in a bench, it is static × load.
     """
     peak = run.value("friction_force_peak")
     if (
         peak is None
         or run.result.outcome
-        is Outcome.GROWS  # The motion is unbounded, so that the error of the peak is not known.
+        is Outcome.GROWS  # The motion is unbounded, so that the error of the peak is unknown.
         or not run.has_plain_friction
         or run.scene["friction"]["law"] not in LAWS_WITH_FRICTION_LIMIT
     ):
@@ -79,8 +79,10 @@ def check_friction_limit(run: Evidence) -> Iterator[Finding]:
     friction = run.scene["friction"]
     static = parse_scene_number(friction["static"])
     limit = static * run.load
-    slack = CONTACT_RESIDUAL_TOL * limit + run.error("friction_force_peak")
-    yield Finding("friction_force_peak", peak, min(peak, limit), slack, "N", ROUTE_OF_UPPER_BOUND)
+    threshold = CONTACT_RESIDUAL_TOL * limit + run.error("friction_force_peak")
+    yield Finding(
+        "friction_force_peak", peak, min(peak, limit), threshold, "N", ROUTE_OF_UPPER_BOUND
+    )
     if run.result.patch is not None and (run.model.partial_slip or run.model.side == "lower"):
         return
     slip = run.value("slip_amplitude")
@@ -105,7 +107,7 @@ def check_friction_limit(run: Evidence) -> Iterator[Finding]:
             "friction_force_peak",
             peak,
             max(peak, lower_bound),
-            EVALUATION_TOL * limit + slack,
+            EVALUATION_TOL * limit + threshold,
             "N",
             ROUTE_OF_LOWER_BOUND,
         )
@@ -114,10 +116,9 @@ def check_friction_limit(run: Evidence) -> Iterator[Finding]:
 def check_loop_area(run: Evidence) -> Iterator[Finding]:
     """Compare the loop area with a trapezoidal sum of force over displacement.
 
-    The equivalent damping is compared as well. Between two samples force and displacement are
-    assumed to be monotonic, so that the error of a step is at most |change of F| |change of q|/2;
-    twice as much is allowed. `equivalent_damping` is loop_area/(2 pi K A^2) with K and A of the
-    first mode of the scene.
+    The equivalent damping is compared as well: it is loop_area/(2 pi K A^2) with K and A of the
+    first mode of the scene. If force and displacement are monotonic between two samples, the error
+    of a step is at most |change of F| |change of q|/2; twice as much is allowed.
     """
     window = run.window
     area = run.value("loop_area")
@@ -129,16 +130,18 @@ def check_loop_area(run: Evidence) -> Iterator[Finding]:
     ):
         return
     cycles = round((window.time[-1] - window.time[0]) * run.frequency)
-    move = np.diff(window.slide)
+    slide_change = np.diff(window.slide)
     force = window.force
-    expected = float(np.sum(move * (force[1:] + force[:-1]) / 2)) / cycles
-    missed = float(np.sum(np.abs(move) * np.abs(np.diff(force)))) / cycles
-    largest = float(np.sum(np.abs(move) * np.abs(force[1:]))) / cycles
+    expected = float(np.sum(slide_change * (force[1:] + force[:-1]) / 2)) / cycles
+    quadrature_error = float(np.sum(np.abs(slide_change) * np.abs(np.diff(force)))) / cycles
+    sum_of_magnitudes = float(np.sum(np.abs(slide_change) * np.abs(force[1:]))) / cycles
     yield Finding(
         "loop_area",
         area,
         expected,
-        missed + CUBIC_QUADRATURE_TOL * largest + STATED_ERROR_FACTOR * run.error("loop_area"),
+        quadrature_error
+        + CUBIC_QUADRATURE_TOL * sum_of_magnitudes
+        + STATED_ERROR_FACTOR * run.error("loop_area"),
         "J",
     )
     damping = run.value("equivalent_damping")
@@ -168,9 +171,9 @@ def check_motion_measures(run: Evidence) -> Iterator[Finding]:
     """Compare displacement amplitude and acceleration with sums over modal coordinates.
 
     Half the range of sum output_i z_i over the samples is at most the amplitude, and at most a few
-    percent less; the same holds for the largest absolute acceleration. The acceleration of a sample
-    follows from the equation of motion, output . z'' + a(t); since friction that jumps at a sample
-    may be on either side of the jump, the median over the samples is used.
+    percent smaller; the same holds for the largest absolute acceleration. The acceleration at a
+    sample follows from the equation of motion, output . z'' + a(t). The median over the samples is
+    compared, because a friction force that jumps at a sample may have either value there.
     """
     modes = run.modes
     window = run.window
@@ -214,13 +217,13 @@ def check_motion_measures(run: Evidence) -> Iterator[Finding]:
         return
     drive = run.number("drive", "acceleration") * np.sin(2 * np.pi * run.frequency * window.time)
     friction = np.outer(window.force, modes.slide) / modes.mass
-    second = (
+    modal_acceleration = (
         -np.outer(drive, modes.base)
         - friction
         - 2 * modes.zeta * modes.omega * window.modal_rate
         - modes.omega**2 * window.modal
     )
-    recomputed = second @ modes.output + drive
+    recomputed = modal_acceleration @ modes.output + drive
     size = float(np.median(np.abs(recomputed)))
     yield Finding(
         "the median size of the acceleration",
@@ -236,15 +239,15 @@ def check_motion_measures(run: Evidence) -> Iterator[Finding]:
 def check_energy_balance(run: Evidence) -> Iterator[Finding]:
     """Compare the residual of the energy balance of a bench with zero.
 
-    Work = change of the stored energy + dissipated - created. A bench integrates each of them by
-    the same rule, so that the error falls with the steps; a hundredth of the exchanged energy is
-    more than the error of its first run.
+    Work = change of the stored energy + dissipated - created. A bench integrates all terms by the
+    same rule, so that the residual falls with the number of steps. In the first run it is less than
+    a hundredth of the exchanged energy.
     """
-    missing = run.value("energy_balance")
-    if missing is not None and run.model.rig is None:
+    residual = run.value("energy_balance")
+    if residual is not None and run.model.rig is None:
         yield Finding(
             "energy_balance",
-            missing,
+            residual,
             0.0,
             EVALUATION_TOL + STATED_ERROR_FACTOR * run.error("energy_balance"),
         )

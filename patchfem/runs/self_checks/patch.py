@@ -1,4 +1,4 @@
-"""Self-checks of a pressed patch: area, load, stiffness and pressure.
+"""Self-checks of a static patch: area, load, stiffness and pressure.
 
 In: `Evidence`. Out: Findings.
 """
@@ -21,10 +21,10 @@ from .finding import (
 
 
 def check_interface_area(run: Evidence) -> Iterator[Finding]:
-    """Compare the sum of the nodal areas with length x width x number of pairs.
+    """Compare the sum of the nodal areas with length × width × number of pairs.
 
-    The nodal areas integrate a constant exactly, so that both differ by round-off; coordinates of a
-    mesh file have about seven digits.
+    The nodal areas integrate a constant exactly, so that the two numbers differ only by round-off;
+    coordinates of a mesh file have about seven digits.
     """
     if run.result.patch is None:
         return
@@ -36,7 +36,8 @@ def check_interface_area(run: Evidence) -> Iterator[Finding]:
 def check_normal_load(run: Evidence) -> Iterator[Finding]:
     """Compare the prescribed load with the integral of the pressure and with `normal_load`.
 
-    This is the equilibrium of the upper piece, which the contact solver satisfies to its residual.
+    This is the equilibrium of the upper piece, which the contact solver satisfies up to its
+    residual.
     """
     if (
         run.result.patch is None
@@ -59,32 +60,32 @@ def check_normal_load(run: Evidence) -> Iterator[Finding]:
 def check_stiffness_bounds(run: Evidence) -> Iterator[Finding]:
     """Compare normal and tangential stiffness with the bounds of a layered column.
 
-    Two pieces of equal length are clamped over their whole far faces. A uniform strain is
-    admissible (potential energy): the stiffness is at most that of columns M A/H in series, M = E
-    (1 - nu)/((1 + nu)(1 - 2 nu)) in plane strain and E/(1 - nu^2) in plane stress; in shear G A/H.
-    If the whole interface is in contact and nothing lies between the pieces, a uniform stress is
-    admissible (complementary energy): the stiffness is at least E' A/H, E' = E/(1 - nu^2) or E.
-    Partial contact and asperities only reduce it. Elements on bilinear cells contain the uniform
-    strain and are stiffer than the continuum, so that they lie between the same bounds. The stated
-    errors of the measures are added.
+    Two pieces of equal length are clamped over their whole far faces. Uniform strain is admissible
+    (minimum potential energy), so that the stiffness is at most that of columns M A/H in series,
+    with M = E (1 - nu)/((1 + nu)(1 - 2 nu)) in plane strain and E/(1 - nu^2) in plane stress; in
+    shear G A/H. If the whole interface is in contact without an asperity layer, uniform stress is
+    admissible (minimum complementary energy), so that the stiffness is at least E' A/H, with E' =
+    E/(1 - nu^2) or E. Partial contact and asperities only reduce the stiffness. Bilinear elements
+    contain the uniform strain and are stiffer than the continuum, so that the bounds hold for them
+    as well. The error estimates of the measures are added to the thresholds.
     """
     patch = run.result.patch
-    found = run.model.patch
+    patch_model = run.model.patch
     if (
         patch is None
-        or found.mesh.file is not None
+        or patch_model.mesh.file is not None
         or run.value("normal_stiffness") is None
-        or found.pieces.has_overhang
+        or patch_model.pieces.has_overhang
     ):
         return
     if any(
-        piece.length > found.pieces.length * (1 + ROUND_OFF_TOL)
-        or piece.corner_kind(found.pieces.length / 2) != "sharp"
-        for piece in (found.pieces.lower, found.pieces.upper)
+        piece.length > patch_model.pieces.length * (1 + ROUND_OFF_TOL)
+        or piece.corner_kind(patch_model.pieces.length / 2) != "sharp"
+        for piece in (patch_model.pieces.lower, patch_model.pieces.upper)
     ):
         return
     flexibility = {"column": 0.0, "stress": 0.0, "shear": 0.0}
-    for piece in (found.pieces.lower, found.pieces.upper):
+    for piece in (patch_model.pieces.lower, patch_model.pieces.upper):
         for material, thickness in (
             (piece.substrate, piece.height - piece.thickness),
             (piece.coating and piece.coating.material, piece.thickness),
@@ -93,7 +94,7 @@ def check_stiffness_bounds(run: Evidence) -> Iterator[Finding]:
                 continue
             young = material.young
             nu = material.poisson
-            if found.pieces.plane == "strain":
+            if patch_model.pieces.plane == "strain":
                 column = young * (1 - nu) / ((1 + nu) * (1 - 2 * nu))
                 stress = young / (1 - nu**2)
             else:
@@ -140,11 +141,12 @@ def check_stiffness_bounds(run: Evidence) -> Iterator[Finding]:
 
 
 def check_pressure_measures(run: Evidence) -> Iterator[Finding]:
-    """Compare the pressure measures with the pressures at the nodes.
+    """Compare the measures of the pressure with the nodal pressures.
 
-    By definition loaded_fraction × pressure_peak is the mean, load/(length × width); the moment is
-    the sum of force × x; each edge of the contact lies within one cell of its last node. Measures
-    may come from another mesh than the nodal pressures, therefore their stated errors are added.
+    By definition, loaded_fraction × pressure_peak is the mean pressure, load/(length × width); the
+    moment is the sum of force × x; each contact edge lies within one cell of its last node. The
+    error estimates of the measures are added to the thresholds, because the measures may come from
+    another mesh than the nodal pressures.
     """
     patch = run.result.patch
     names = ("loaded_fraction", "pressure_peak", "moment", "contact_fraction", "normal_load")
@@ -152,14 +154,16 @@ def check_pressure_measures(run: Evidence) -> Iterator[Finding]:
         return
     if patch.pressure.outcome is Outcome.NO_CONTACT or "wear" in run.scene:
         return
-    fraction, peak, moment, share, load = (run.value(name) for name in names)
+    loaded_fraction, peak, moment, contact_fraction, load = (run.value(name) for name in names)
     mean = load / run.area
     weight = patch.pieces.interface.weight
-    relative_errors = run.error("loaded_fraction") / fraction + run.error("pressure_peak") / peak
+    relative_errors = (
+        run.error("loaded_fraction") / loaded_fraction + run.error("pressure_peak") / peak
+    )
     relative = STATED_ERROR_FACTOR * relative_errors
     yield Finding(
         "the mean pressure, loaded_fraction × pressure_peak,",
-        fraction * peak,
+        loaded_fraction * peak,
         mean,
         (EVALUATION_TOL + relative) * mean,
         "Pa",
@@ -178,11 +182,11 @@ def check_pressure_measures(run: Evidence) -> Iterator[Finding]:
         "N m",
     )
     cells = float(values.edge_cell_lengths(patch.x, patch.active).sum())
-    bearing = float(weight[patch.active].sum()) / run.area
+    nodal_fraction = float(weight[patch.active].sum()) / run.area
     yield Finding(
         "contact_fraction",
-        share,
-        bearing,
+        contact_fraction,
+        nodal_fraction,
         EVALUATION_TOL
         + 2 * cells / run.model.patch.pieces.length
         + STATED_ERROR_FACTOR * run.error("contact_fraction"),

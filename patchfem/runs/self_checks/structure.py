@@ -1,6 +1,6 @@
 """Self-check of the modes that an engine uses.
 
-In: `Evidence`. Out: Findings on modes, or on masses and springs, of the scene.
+In: `Evidence`. Out: Findings on the modes, or on the masses and springs, of the scene.
 """
 
 from collections.abc import Iterator
@@ -14,9 +14,9 @@ from .finding import ROUND_OFF_TOL, Finding
 def check_modes(run: Evidence) -> Iterator[Finding]:
     """Compare the modes that an engine uses with those of the scene.
 
-    [[structure.mode]]: frequency, damping ratio and participations of each. Masses and springs: the
-    sum of omega^2 is the trace of M^-1 K, the sum of spring stiffness/mass over the masses that a
-    spring joins. Both hold to round-off.
+    For [[structure.mode]], frequency, damping ratio and participations of each mode are compared.
+    For masses and springs, the sum of omega^2 is the trace of M^-1 K, i.e. the sum of
+    stiffness/mass over the masses that each spring joins. Both comparisons hold to round-off.
     """
     rig = run.model.rig
     if rig is None:
