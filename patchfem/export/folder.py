@@ -74,7 +74,7 @@ def run_into(
             StateFile(folder.path / STATE, __version__, resume) if saves_state(run_plan) else None
         )
         try:
-            result = run(run_plan, say, progress, fresh=fresh, kept=state_file)
+            result = run(run_plan, say, progress, fresh=fresh, state_file=state_file)
         except NotConverged as error:
             if error.partial_result is None:
                 raise NotConverged(

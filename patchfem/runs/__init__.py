@@ -1,23 +1,24 @@
 """Plan and run of a scene: the entry points that use all other folders.
 
-In: a `Scene`. Out: `Result` with measures, errors, histories and fields. `plan` predicts what
-would run, `run` runs it. A module imports only its own entry of this list and entries above it:
+In: a `Scene`. Out: `Result` with measures, histories, fields and error estimates. `plan` predicts
+what would run, `run` runs it. A module imports only its own entry of this list and entries above
+it:
 
 1.  `results`  what every run returns, with its notes
-2.  `cost`  seconds, memory and sentences of a plan, as every step of a run returns them
-3.  `patch`  a static patch: its grids, its pressure, its measures with errors
-4.  `bench`  a prescribed slide of a patch or a point
-5.  `joint`  a pressed patch removed from modes that were measured with it
+2.  `cost`  CPU time, memory and sentences of a plan, as each step of a run predicts them
+3.  `patch`  a static patch: its grids, its pressure, its measures with error estimates
+4.  `bench`  a patch or a point under a prescribed displacement
+5.  `joint`  removal of a joint from modes that were measured with it
 6.  `rig`  a driven structure with friction
-7.  `wear`  a patch worn by a bench or a rig over many cycles
-8.  `accuracy_warnings`  measures whose errors exceed the tolerance, and the setting that helps
+7.  `wear`  wear of a patch in a bench or a rig over many cycles
+8.  `accuracy_warnings`  measures that miss the tolerance, and the setting to change
 9.  `accuracy_curve`  accuracy of a motion against its computing time
 10. `memory`  the memory that a run may use
 11. `tolerance_forecast`  whether a tolerance will be missed, before anything runs
 12. `plan`  what would run: engine, sizes, cost
-13. `self_checks`  two computations of one number, by which a run detects faults
+13. `self_checks`  comparison of results with a second computation
 14. `run`  from a plan to its result
-15. `batch`  many models at once
+15. `batch`  many models in one batch
 """
 
 # names that other folders use, by module

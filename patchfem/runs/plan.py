@@ -1,6 +1,7 @@
-"""Plan of a scene, before anything runs: engine, sizes, cost, stiffness chain and groups.
+"""Plan of a scene before it is run: engine, sizes, cost, stiffnesses and dimensionless groups.
 
-In: a Scene or a Model. Out: a `Plan`; no mesh is assembled and nothing is solved.
+In: a Scene or a Model. Out: a `Plan`. Nothing is solved, except for the contact search by which an
+automatic mesh is graded.
 """
 
 from dataclasses import dataclass, replace
@@ -26,19 +27,20 @@ from .rig import plan as of_rig
 from .tolerance_forecast import EMPTY_FORECAST, Forecast, forecast_tolerance
 from .wear import plan as of_wear
 
-PACKAGE_BYTES = 80e6  # memory of the packages that every run imports [bytes]
-MAX_CPU_SECONDS = 1e6  # largest predicted CPU time [s] of a run that is started, twelve days
+PACKAGE_BYTES = 80e6  # Memory of the packages that every run imports [bytes].
+MAX_CPU_SECONDS = 1e6  # Largest predicted CPU time [s] of a run that is started; twelve days.
 SKIPPING_ENGINES = (
     "march",
     "exact",
     "piecewise",
-)  # engines that skip the cycles of a periodic motion
-MIN_SKIPPED_CYCLES = 100  # number of cycles from which a plan says that cycles may be skipped
+)  # Engines that skip cycles once the motion is periodic.
+# Smallest number of cycles at which a plan mentions that cycles may be skipped.
+MIN_SKIPPED_CYCLES = 100
 UPPER_LIMIT_NOTE = (
     "the computing time is an upper limit: as soon as the motion repeats itself, the remaining cycles are not "
     "computed one by one"
 )
-GROUPS = {  # meaning and SI unit of each dimensionless group
+GROUPS = {  # Definition and SI unit of each group.
     "D": (
         "D: friction limit (static, if there are two) divided by the largest force of the drive",
         "1",
@@ -70,16 +72,16 @@ GROUPS = {  # meaning and SI unit of each dimensionless group
 class Plan:
     """Model with the engine that will run it, the numbers of unknowns and the predicted cost.
 
-    - model, kind: model and kind of its run.
+    - model, kind: model, and the kind of its run.
     - effects: names of the effects in the scene.
     - not_in_scene: effects that the scene does not contain.
-    - cost: cost of the run, its memory with the largest part first.
-    - chain: stiffness [N/m] or "rigid" of each link of the stiffness chain.
+    - cost: predicted cost of the run; its memory contributions from the largest to the smallest.
+    - chain: stiffness [N/m], or "rigid", of each element in series between modes and interface.
     - groups: dimensionless groups by name.
-    - verdict: sentences.
-    - compile_seconds: CPU seconds of compiling in addition to `seconds`, if no run of this kind has
-      left compiled code.
-    - tolerance: whether the tolerance will be missed.
+    - verdict: sentences on the run.
+    - compile_seconds: CPU seconds of compiling in addition to `seconds`, if no earlier run has
+      compiled this code.
+    - tolerance: forecast whether the run misses the tolerance.
     """
 
     model: Model
@@ -100,7 +102,7 @@ class Plan:
 
     @property
     def unknowns(self) -> dict:
-        """Numbers of unknowns of the mesh and the motion, as a dict."""
+        """Numbers of unknowns of mesh and motion by name."""
         return self.cost.sizes
 
     @property
@@ -115,7 +117,7 @@ class Plan:
 
     @property
     def bytes(self) -> int:
-        """Predicted memory at the peak of the run."""
+        """Predicted peak memory of the run [bytes]."""
         return self.cost.bytes
 
     def __repr__(self) -> str:
@@ -131,7 +133,7 @@ class Plan:
         return "\n".join([*lines, *(f"  {text}" for text in self.verdict)])
 
     def modes(self, chain: dict) -> list:
-        """Name, free and stuck frequency [Hz] of each mode of a rig."""
+        """Return name, free and stuck frequency [Hz] of each mode of a rig."""
         return of_rig.mode_frequencies(self.model.rig, chain) if self.model.rig is not None else []
 
     def as_json(self) -> dict:
@@ -156,32 +158,32 @@ class Plan:
 
 
 def describe_compile_time(seconds: float) -> str:
-    """Return a phrase on the compile time, or "" if nothing is compiled."""
+    """Return a phrase on the compile time; "" if nothing is compiled."""
     return f" (and {seconds:.0f} s once for compiling)" if seconds else ""
 
 
-def plan(asked) -> Plan:
-    """Plan a Scene or a Model without making a mesh or a solution.
+def plan(source) -> Plan:
+    """Plan the run of a Scene or a Model.
 
     Parameters
     ----------
-    asked : Scene or Model
+    source : Scene or Model
 
     Raises
     ------
     PatchfemError
-        With its position in the scene, if nothing can run it.
+        If the scene cannot be run, with the position of the error in the scene.
     """
-    model = asked if isinstance(asked, Model) else build(asked)
+    model = source if isinstance(source, Model) else build(source)
     with locate_errors(model.source):
         return _make_plan(model)
 
 
 def _make_plan(model: Model) -> Plan:
-    """Choose engine and settings of a Model and predict the cost of its run."""
+    """Choose engine and settings for a Model, and predict the cost of its run."""
     if model.measured is not None:
         try:
-            # an invalid table of measured responses is reported before anything runs
+            # An invalid table of measured responses is reported before anything runs.
             measured.read_table(model.measured.path)
         except PatchfemError as error:
             error.key = error.key or "measured.file"
@@ -192,49 +194,51 @@ def _make_plan(model: Model) -> Plan:
         model = replace(
             model,
             rig=of_rig.remove_expected_joint(
-                model.rig, patch_plan.stiffness_chain(model.patch) | _interface_links(model)
+                model.rig, patch_plan.stiffness_chain(model.patch) | _interface_stiffnesses(model)
             ),
         )
-    on_motion = []
-    on_patch = []
-    on_law = []
+    motion_sentences = []
+    patch_sentences = []
+    law_sentences = []
     if model.rig is not None:
         chain = of_rig.structure_stiffnesses(model.rig) | chain
         groups |= of_rig.compute_dimensionless_groups(model) if model.kind == "rig" else {}
-        on_motion += engines.describe_unused_settings(model, engines.choose_engine(model).name)
+        motion_sentences += engines.describe_unused_settings(
+            model, engines.choose_engine(model).name
+        )
     if model.patch is not None:
         chain |= patch_plan.stiffness_chain(model.patch)
         groups |= patch_plan.compute_groups(model)
-        on_patch += patch_plan.describe_patch_plan(groups, model.patch)
+        patch_sentences += patch_plan.describe_patch_plan(groups, model.patch)
     interfaces = model.rig.friction.interfaces if model.rig is not None else ()
     for number, interface in enumerate(interfaces):
         if interface.patch is not None:
             for name, link in patch_plan.stiffness_chain(interface.patch).items():
                 if link != "rigid":
                     chain[rows.add_interface_number(name, number)] = link
-            on_patch += patch_plan.describe_interface_patch(
+            patch_sentences += patch_plan.describe_interface_patch(
                 model.rig.friction.names[number], interface
             )
     cost = _predict_cost(model)
-    on_law += cost.words
+    law_sentences += cost.words
     if model.kind == "bench":
         groups = of_bench.compute_dimensionless_groups(model) | groups
     if model.friction is not None:
-        chain |= _interface_links(model)
-        groups |= _law_groups(model)
-        on_law += _describe_grooves(model)
+        chain |= _interface_stiffnesses(model)
+        groups |= _compute_law_groups(model)
+        law_sentences += _describe_grooves(model)
     if model.rig is not None:
-        on_motion += of_rig.describe_stick(model.rig, groups, chain)
+        motion_sentences += of_rig.describe_stick(model.rig, groups, chain)
     if (
         cost.engine in SKIPPING_ENGINES
         and drive_sizes.is_sinusoidal(model.rig.drive.signal)
         and model.rig.drive.cycles >= MIN_SKIPPED_CYCLES
     ):
-        on_law.append(UPPER_LIMIT_NOTE)
-    foreseen = forecast_tolerance(model)
-    on_motion = [*([foreseen.sentence()] if foreseen.causes else []), *on_motion]
+        law_sentences.append(UPPER_LIMIT_NOTE)
+    forecast = forecast_tolerance(model)
+    motion_sentences = [*([forecast.sentence()] if forecast.causes else []), *motion_sentences]
     is_compiled = cost.compile_seconds == 0 or compiled.has_run(
-        compiled_kind(model, cost.engine, cost.sizes)
+        compiled_code_key(model, cost.engine, cost.sizes)
     )
     return Plan(
         model,
@@ -244,16 +248,20 @@ def _make_plan(model: Model) -> Plan:
         cost,
         chain,
         groups,
-        tuple(_write_verdict(model, groups, cost.parts, (on_motion, on_patch, on_law))),
+        tuple(
+            _arrange_sentences(
+                model, groups, cost.parts, (motion_sentences, patch_sentences, law_sentences)
+            )
+        ),
         0.0 if is_compiled else cost.compile_seconds,
-        foreseen,
+        forecast,
     )
 
 
 def _predict_cost(model: Model) -> Cost:
-    """Return the predicted cost of a run, including all coarse runs.
+    """Predict the cost of a run, including all coarse runs.
 
-    The memory parts are ordered from the largest to the smallest.
+    The memory contributions are sorted from the largest to the smallest.
     """
     pressing = Cost()
     if model.patch is not None or model.has_interface_patches:
@@ -278,10 +286,10 @@ def _predict_cost(model: Model) -> Cost:
     )
 
 
-def compiled_kind(model: Model, engine: str, unknowns: dict) -> str:
+def compiled_code_key(model: Model, engine: str, unknowns: dict) -> str:
     """Return a text that identifies the compiled code that a run needs.
 
-    Two runs of one kind run the same code.
+    Runs with equal texts use the same code.
 
     Parameters
     ----------
@@ -289,11 +297,11 @@ def compiled_kind(model: Model, engine: str, unknowns: dict) -> str:
     engine : str
         Name of the engine.
     unknowns : dict
-        Number of unknowns by name.
+        Numbers of unknowns by name.
     """
     rig = model.rig
-    f = model.friction
-    laws = [] if f is None else [f]
+    friction = model.friction
+    laws = [] if friction is None else [friction]
     if rig is not None:
         laws = [interface.numbers for interface in rig.friction.interfaces]
     words = [
@@ -314,25 +322,27 @@ def compiled_kind(model: Model, engine: str, unknowns: dict) -> str:
     return ", ".join([*words, *(name for name, holds in flags.items() if holds)])
 
 
-def _write_verdict(model: Model, groups: dict, parts: tuple, said: tuple) -> list:
-    """Write the sentences of a plan on what the run will do and what it lacks.
+def _arrange_sentences(model: Model, groups: dict, parts: tuple, sentence_groups: tuple) -> list:
+    """Return the sentences of a plan in their final order, with those on memory and shear.
 
-    said: sentences on the motion, the patch and the friction law.
+    sentence_groups: sentences on the motion, on the patch, and on the friction law.
     """
-    sentences = list(said[0])
+    sentences = list(sentence_groups[0])
     if text := memory.reason_for_refusal(parts):
         sentences.append(f"`run` will refuse this scene: {text}")
     elif text := memory.describe_largest_part(parts):
         sentences.append(text)
-    sentences += [*said[1], *said[2]]
+    sentences += [*sentence_groups[1], *sentence_groups[2]]
     if "slip_length" in groups:
-        about = f"by {format_length(groups['slip_length'], 3)} or more before the whole patch slips"
+        shear_phrase = (
+            f"by {format_length(groups['slip_length'], 3)} or more before the whole patch slips"
+        )
         sentence = (
-            f"the pieces are rigid in shear in this scene; elastic pieces would shear {about}; add "
+            f"the pieces are rigid in shear in this scene; elastic pieces would shear {shear_phrase}; add "
             "[contact.shear] to include this shear"
         )
         if model.patch.interface.has_shear:
-            sentence = f"the pieces shear elastically {about}"
+            sentence = f"the pieces shear elastically {shear_phrase}"
         sentences.append(sentence)
     if model.kind == "rig" and model.partial_slip and model.rig.friction.load_varies:
         sentences.append(
@@ -342,50 +352,50 @@ def _write_verdict(model: Model, groups: dict, parts: tuple, said: tuple) -> lis
     return sentences
 
 
-def refuse_large_run(what: Plan) -> None:
+def refuse_large_run(run_plan: Plan) -> None:
     """Raise Missing if a run needs too much memory or CPU time."""
-    memory.refuse_insufficient_memory(what.cost.parts)
-    if what.seconds > MAX_CPU_SECONDS:
+    memory.refuse_insufficient_memory(run_plan.cost.parts)
+    if run_plan.seconds > MAX_CPU_SECONDS:
         key = ""
-        if what.model.accuracy.steps_per_cycle is not None:
+        if run_plan.model.accuracy.steps_per_cycle is not None:
             key = "accuracy.steps_per_cycle or "
-        if what.kind == "bench":
+        if run_plan.kind == "bench":
             key += "slide.cycles"
-        elif what.model.rig is not None:
+        elif run_plan.model.rig is not None:
             key += "drive.cycles"
         raise Missing(
-            f"the run would need a computing time of about {what.seconds:.2g} s ({what.steps:.2g} time "
+            f"the run would need a computing time of about {run_plan.seconds:.2g} s ({run_plan.steps:.2g} time "
             f"steps), more than the limit of {MAX_CPU_SECONDS:.0e} s; lower {key or 'the number of elements'}",
             "",
         )
 
 
-def _interface_links(model: Model) -> dict:
-    """Return the stiffnesses in series at the interface: grooves and bonds."""
+def _interface_stiffnesses(model: Model) -> dict:
+    """Return the stiffnesses of grooves and bonds, in series at the interface, by name."""
     load = model.nominal_load
     if not load > 0:
         return {}
-    links = {}
+    stiffnesses = {}
     if model.grooves is not None:
-        links["grooves"] = model.grooves.stiffness(load)
-    links["bonds"] = _law_stiffness(model.friction, load)
+        stiffnesses["grooves"] = model.grooves.stiffness(load)
+    stiffnesses["bonds"] = _law_stiffness(model.friction, load)
     others = model.rig.friction.interfaces[1:] if model.rig is not None else ()
     for number, interface in enumerate(others, 2):
         interface_load = load if interface.load is None else interface.load
-        links[f"bonds_{number}"] = _law_stiffness(interface.numbers, interface_load)
-    return links
+        stiffnesses[f"bonds_{number}"] = _law_stiffness(interface.numbers, interface_load)
+    return stiffnesses
 
 
 def _law_stiffness(law, load: float):
-    """Return the stiffness [N/m] of a friction law in stick, or a text."""
+    """Return the stiffness [N/m] of a friction law in stick; a text if it is infinite or undefined."""
     if law_has_trait(law.law, "creeps"):
         return "none: it creeps"
     stiffness = record.stick_stiffness(law, load)
     return "rigid until it slips" if stiffness == inf else stiffness
 
 
-def _law_groups(model: Model) -> dict:
-    """Return the dimensionless groups of the friction law as a dict."""
+def _compute_law_groups(model: Model) -> dict:
+    """Return the dimensionless groups of the friction law by name."""
     if model.spread is None:
         return {}
 
@@ -393,14 +403,14 @@ def _law_groups(model: Model) -> dict:
 
 
 def _describe_grooves(model: Model) -> list:
-    """Return the sentence of a plan on the grooves that the load climbs."""
+    """Return a sentence, as a list, on the grooves that the load climbs."""
     load = model.nominal_load
     if model.grooves is None or not load > 0:
         return []
-    g = model.grooves
+    grooves = model.grooves
     mu = model.friction.static
     return [
-        f"at their bottom the grooves act as a spring of stiffness N k^2 A = {g.stiffness(load):.4g} N/m; on their "
-        f"steepest flank the contact resists a force of up to {g.max_force(load, mu):.4g} N; without grooves "
+        f"at their bottom the grooves act as a spring of stiffness N k^2 A = {grooves.stiffness(load):.4g} N/m; on their "
+        f"steepest flank the contact resists a force of up to {grooves.max_force(load, mu):.4g} N; without grooves "
         f"friction would resist up to mu N = {mu * load:.4g} N"
     ]

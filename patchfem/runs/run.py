@@ -1,4 +1,4 @@
-"""Run of a plan: from the pressed patch and the motion to the result with its warnings.
+"""Run of a plan, from the contact and the motion to the result with its warnings.
 
 In: a `Plan`, or a Scene or Model that is planned first. Out: a `Result`.
 """
@@ -18,11 +18,11 @@ from ..dynamics import checkpoint
 from ..model.model import Model
 from ..model.source import locate_errors
 from . import joint
-from .accuracy_warnings import Finding, tolerance_warnings
+from .accuracy_warnings import AccuracyContext, tolerance_warnings
 from .bench import result as bench_result
 from .patch import faces, strength
 from .patch import result as patch_result
-from .plan import Plan, compiled_kind, plan, refuse_large_run
+from .plan import Plan, compiled_code_key, plan, refuse_large_run
 from .results.patch_rows import find_unknown_measures
 from .results.result import Result, RunInputs, describe_measure, shorten_file_names
 from .rig import engines, rig
@@ -37,8 +37,8 @@ NO_MOTION_FOUND = "no motion was found; the measures are those of the pressed pa
 class StateFile(NamedTuple):
     """File with the state of a long run, from which a later run can continue.
 
-    - path: the file.
-    - version: version of the program that the state must have.
+    - path: path of the file.
+    - version: program version that the state must have.
     - resume: whether to continue from the state.
     """
 
@@ -50,10 +50,11 @@ class StateFile(NamedTuple):
 class PatchMeshes(NamedTuple):
     """Patch of [contact], solved on several meshes.
 
-    - patch: on the finest mesh; None without [contact].
-    - coarse: on coarser meshes, fine to coarse; None for a missing one.
-    - static: on the meshes of its static measures, fine to coarse; () if these are the same.
-    - unworn: before wear, on the meshes of its ladder, fine to coarse; () if it is not worn.
+    - patch: patch on the finest mesh; None without [contact].
+    - coarse: patch on coarser meshes, from fine to coarse; None for a missing one.
+    - static: patch on the meshes of its static measures, from fine to coarse; () if these meshes
+      are the same.
+    - unworn: patch before wear on its nested meshes, from fine to coarse; () without wear.
     """
 
     patch: object = None
@@ -63,27 +64,27 @@ class PatchMeshes(NamedTuple):
 
 
 def run(
-    what,
+    runnable,
     say=None,
     progress=None,
     estimate: bool = True,
     fresh: bool = False,
-    kept: StateFile | None = None,
+    state_file: StateFile | None = None,
 ) -> Result:
     """Run a Plan, or plan and run a Scene or a Model.
 
     Parameters
     ----------
-    what : Plan, Scene or Model
+    runnable : Plan, Scene or Model
     say : callable, optional
         Callback for a line of text when code has to be compiled.
     progress : callable, optional
-        Callback for the completed fraction: of all passes of a rig, of the main pass of a bench.
+        Callback for the completed fraction: of all passes of a rig, or of the main pass of a bench.
     estimate : bool
-        If False, there are no coarse runs and the errors are None.
+        Whether to estimate the errors from coarser runs; if False, the errors are None.
     fresh : bool
-        Whether the pieces are condensed again.
-    kept : StateFile, optional
+        Whether to condense the pieces without using cached compliance matrices.
+    state_file : StateFile, optional
         File in which the state of a run with [wear] or of a long march is saved.
 
     Returns
@@ -93,84 +94,86 @@ def run(
     Raises
     ------
     NotConverged
-        With the pressed patch as partial result if only the motion was not found.
+        With the static patch as partial result if the motion was not found.
     Missing
         If the scene cannot be run.
     """
-    what = what if isinstance(what, Plan) else plan(what)
-    with locate_errors(what.model.source):
-        refuse_large_run(what)
-        return _run_plan(what, say, progress, kept, estimate=estimate, fresh=fresh)
+    runnable = runnable if isinstance(runnable, Plan) else plan(runnable)
+    with locate_errors(runnable.model.source):
+        refuse_large_run(runnable)
+        return _run_plan(runnable, say, progress, state_file, estimate=estimate, fresh=fresh)
 
 
 def _run_plan(
-    what: Plan, say, progress, kept: StateFile | None, *, estimate: bool, fresh: bool
+    run_plan: Plan, say, progress, state_file: StateFile | None, *, estimate: bool, fresh: bool
 ) -> Result:
-    """Run a plan whose size was accepted."""
-    begin = perf_counter()
-    model = what.model
+    """Run a plan whose memory and CPU time are accepted."""
+    start = perf_counter()
+    model = run_plan.model
     seconds = {}
     warnings = list(model.source.remarks)
     notes = list(model.source.notes)
     meshes = PatchMeshes()
     if model.rig is not None:
-        warnings += engines.describe_unused_settings(model, what.engine)
+        warnings += engines.describe_unused_settings(model, run_plan.engine)
     if model.patch is not None:
-        meshes = _press_patch(model, estimate=estimate, fresh=fresh)
-        seconds["contact"] = perf_counter() - begin
+        meshes = _solve_contact_patch(model, estimate=estimate, fresh=fresh)
+        seconds["contact"] = perf_counter() - start
         if model.rig is not None and model.rig.structure.without_joint is not None:
             model = joint.remove_joint(model, meshes.patch)
-            what = replace(what, model=model)
-        warnings += _warn_of_patch(model, meshes, estimate=estimate)
+            run_plan = replace(run_plan, model=model)
+        warnings += _warn_of_coarse_patch_mesh(model, meshes, estimate=estimate)
         notes += patch_result.notes_on_neglected_effects(model, meshes.patch, meshes.coarse)
     if model.has_interface_patches:
         if fresh:
             faces.recondense_interface_pieces(model)
         warnings += faces.collect_warnings(model)
         notes += faces.collect_notes(model)
-        seconds["contact"] = perf_counter() - begin
+        seconds["contact"] = perf_counter() - start
     inputs = RunInputs(
-        what, meshes.patch, meshes.coarse, seconds, warnings, say, progress, estimate
+        run_plan, meshes.patch, meshes.coarse, seconds, warnings, say, progress, estimate
     )
     if _is_open(meshes.patch) and model.kind != "patch":
         result = patch_result.make_static_result(replace(inputs, warnings=[*warnings, NO_MOTION]))
     elif _has_no_load(model):
-        result = _result_without_load(inputs)
+        result = _make_result_without_load(inputs)
     else:
-        evolved = None
+        worn_patch = None
         if model.wear is not None and meshes.patch is not None:
-            evolved = _wear_patch(inputs, kept)
+            worn_patch = _wear_patch(inputs, state_file)
             unworn = (meshes.patch, *meshes.coarse)
-            meshes = PatchMeshes(evolved.patch, tuple(evolved.coarse), meshes.static, unworn)
-            inputs = _worn_inputs(inputs, evolved)
+            meshes = PatchMeshes(worn_patch.patch, tuple(worn_patch.coarse), meshes.static, unworn)
+            inputs = _make_worn_inputs(inputs, worn_patch)
         try:
-            with _saving_context(kept, what, meshes.patch):
-                if what.kind == "patch":
+            with _saving_context(state_file, run_plan, meshes.patch):
+                if run_plan.kind == "patch":
                     result = patch_result.make_static_result(inputs)
-                elif what.kind == "bench":
+                elif run_plan.kind == "bench":
                     result = bench_result.run_prescribed(inputs)
                 else:
                     result = rig.run_rig(inputs)
         except NotConverged as error:
-            if meshes.patch is not None and what.kind != "patch":
+            if meshes.patch is not None and run_plan.kind != "patch":
                 at_rest = patch_result.make_static_result(
-                    replace(inputs, plan=what, warnings=[*warnings, NO_MOTION_FOUND])
+                    replace(inputs, plan=run_plan, warnings=[*warnings, NO_MOTION_FOUND])
                 )
                 at_rest = replace(at_rest, outcome=Outcome.NOT_CONVERGED)
                 unworn = PatchMeshes(meshes.patch, meshes.coarse)
-                error.partial_result = _complete_result(at_rest, notes, begin, unworn)
+                error.partial_result = _complete_result(at_rest, notes, start, unworn)
             raise
         if model.kind != "patch":
             result = _add_static_measures(result, model, meshes)
         if model.wear is not None:
-            result = measures.add_wear_measures(replace(result, plan=what), evolved, estimate)
-    if what.compile_seconds and estimate:
-        compiled.record_run(compiled_kind(model, what.engine, what.unknowns))
-    return _complete_result(mark_failed_checks(result), notes, begin, meshes)
+            result = measures.add_wear_measures(
+                replace(result, plan=run_plan), worn_patch, estimate
+            )
+    if run_plan.compile_seconds and estimate:
+        compiled.record_run(compiled_code_key(model, run_plan.engine, run_plan.unknowns))
+    return _complete_result(mark_failed_checks(result), notes, start, meshes)
 
 
-def _press_patch(model: Model, *, estimate: bool, fresh: bool) -> PatchMeshes:
-    """Solve the patch of [contact] on the meshes that the run and its error estimate need."""
+def _solve_contact_patch(model: Model, *, estimate: bool, fresh: bool) -> PatchMeshes:
+    """Solve the patch of [contact] on the meshes of the run and of its error estimate."""
     tolerance = model.accuracy.tolerance
     patch, *coarse = patch_result.solve_with_coarser(model.patch, tolerance, estimate, fresh)
     static = ()
@@ -184,8 +187,8 @@ def _is_open(patch) -> bool:
     return patch is not None and patch.pressure.outcome is Outcome.NO_CONTACT
 
 
-def _warn_of_patch(model: Model, meshes: PatchMeshes, *, estimate: bool) -> list:
-    """Return the warnings on large strains and on an unknown mesh error of a patch."""
+def _warn_of_coarse_patch_mesh(model: Model, meshes: PatchMeshes, *, estimate: bool) -> list:
+    """Return warnings on large strains, and on a mesh too coarse for an error estimate."""
     patch = meshes.patch
     warnings = list(patch_result.patch_warnings(model.patch, patch))
     if estimate and meshes.coarse[0] is None:
@@ -199,7 +202,7 @@ def _warn_of_patch(model: Model, meshes: PatchMeshes, *, estimate: bool) -> list
     return warnings
 
 
-def _result_without_load(inputs: RunInputs) -> Result:
+def _make_result_without_load(inputs: RunInputs) -> Result:
     """Return the Result of a rig whose interfaces carry no load."""
     return Result(
         plan=inputs.plan,
@@ -215,27 +218,35 @@ def _result_without_load(inputs: RunInputs) -> Result:
     )
 
 
-def _wear_patch(inputs: RunInputs, kept: StateFile | None):
-    """Compute the wear of a patch; continue from a saved state if there is one."""
+def _wear_patch(inputs: RunInputs, state_file: StateFile | None):
+    """Compute the wear of a patch, continuing from a saved state if there is one."""
     model = inputs.plan.model
     patch = inputs.patch
-    key = kept and state_key(model, patch, kept.version)
-    return evolve.compute_and_save_wear(kept, key, model, patch, inputs.coarse[:2], inputs.progress)
+    key = state_file and hash_run(model, patch, state_file.version)
+    return evolve.compute_and_save_wear(
+        state_file, key, model, patch, inputs.coarse[:2], inputs.progress
+    )
 
 
-def _worn_inputs(inputs: RunInputs, evolved) -> RunInputs:
+def _make_worn_inputs(inputs: RunInputs, worn_patch) -> RunInputs:
     """Return the inputs of a run with worn surfaces."""
-    plan_of_run = inputs.plan
-    if evolved.state is not None:
-        worn = evolve.make_worn_model(plan_of_run.model, evolved.patch, evolved.state.depth)
-        plan_of_run = replace(plan_of_run, model=worn)
+    run_plan = inputs.plan
+    if worn_patch.state is not None:
+        worn_model = evolve.make_worn_model(
+            run_plan.model, worn_patch.patch, worn_patch.state.depth
+        )
+        run_plan = replace(run_plan, model=worn_model)
     return replace(
-        inputs, plan=plan_of_run, patch=evolved.patch, coarse=tuple(evolved.coarse), progress=None
+        inputs,
+        plan=run_plan,
+        patch=worn_patch.patch,
+        coarse=tuple(worn_patch.coarse),
+        progress=None,
     )
 
 
 def _add_static_measures(result: Result, model: Model, meshes: PatchMeshes) -> Result:
-    """Add the static measures of the patches to the result of a motion."""
+    """Add the static measures of the patches to the Result of a motion."""
     if meshes.patch is not None:
         motion = {name: m for name, m in result.measures.items() if name != "normal_load"}
         patch, *coarse = meshes.static or (meshes.patch, *meshes.coarse)
@@ -253,24 +264,24 @@ def _add_static_measures(result: Result, model: Model, meshes: PatchMeshes) -> R
     return result
 
 
-def _complete_result(result: Result, notes: list, begin: float, meshes: PatchMeshes) -> Result:
-    """Add CPU time, notes, accuracy warnings and meanings of measures to a result.
+def _complete_result(result: Result, notes: list, start: float, meshes: PatchMeshes) -> Result:
+    """Add CPU time, notes, accuracy warnings and definitions of the measures to a Result.
 
     Parameters
     ----------
     result : Result
     notes : list
         Notes on the scene and the patch.
-    begin : float
-        Time at the start [s].
+    start : float
+        Start time of the run [s].
     meshes : PatchMeshes
     """
     model = result.plan.model
-    result.seconds["total"] = perf_counter() - begin
-    finding = Finding(model, result.measures, result.patch, result.extra, meshes.unworn)
-    warnings = [*result.warnings, *tolerance_warnings(finding, meshes.coarse, meshes.static)]
+    result.seconds["total"] = perf_counter() - start
+    context = AccuracyContext(model, result.measures, result.patch, result.extra, meshes.unworn)
+    warnings = [*result.warnings, *tolerance_warnings(context, meshes.coarse, meshes.static)]
     notes = [*notes, *result.extra.get("notes", [])]
-    yielding_faces = _yielding_faces(result)
+    yielding_faces = _note_on_yielding_faces(result)
     outcome = result.outcome
     if outcome is Outcome.DONE and find_unknown_measures(result.measures):
         outcome = Outcome.NOT_CONVERGED
@@ -279,7 +290,7 @@ def _complete_result(result: Result, notes: list, begin: float, meshes: PatchMes
     patch = result.patch
     if patch is not None:
         patch = replace(patch, frames=result.fields)
-    # a number after the name of a measure counts the strips of a patch, or else the interfaces
+    # A number after the name of a measure counts the strips of a patch, or else the interfaces.
     part = "interface" if model.patch is None else "strip"
     described = {}
     for name, measure in result.measures.items():
@@ -294,8 +305,8 @@ def _complete_result(result: Result, notes: list, begin: float, meshes: PatchMes
     )
 
 
-def _yielding_faces(result: Result) -> dict:
-    """Return the notes on surfaces that yield at the peak pressure less its error."""
+def _note_on_yielding_faces(result: Result) -> dict:
+    """Return notes on surfaces that yield at the pressure peak minus its error."""
     peak = result.measures.get("pressure_peak")
     patch_model = result.plan.model.patch
     if patch_model is None or result.patch is None or peak is None or peak.value is None:
@@ -303,36 +314,36 @@ def _yielding_faces(result: Result) -> dict:
     return strength.note_on_yielding_faces(patch_model, peak.value - (peak.error or 0.0))
 
 
-def _saving_context(kept: StateFile | None, what: Plan, patch):
-    """Return a context in which marches save their states, or a context that does nothing.
+def _saving_context(state_file: StateFile | None, run_plan: Plan, patch):
+    """Return a context in which marches save their states; one that does nothing without them.
 
     Raises
     ------
     PatchfemError
-        If there is no state from which to continue.
+        If the run should continue from a state that does not exist.
     """
-    model = what.model
-    if kept is None or not is_march(what):
+    model = run_plan.model
+    if state_file is None or not is_march(run_plan):
         return nullcontext()
 
-    def path_of_march(number: int) -> Path:
-        """Return the file in which the state of one march is saved."""
-        return kept.path.parent / f"march_{number}.npz"
+    def march_state_path(number: int) -> Path:
+        """Return the path of the state file of one march."""
+        return state_file.path.parent / f"march_{number}.npz"
 
-    if kept.resume and model.wear is None and not path_of_march(1).is_file():
-        raise evolve.make_missing_state_error(kept.path)
+    if state_file.resume and model.wear is None and not march_state_path(1).is_file():
+        raise evolve.make_missing_state_error(state_file.path)
     return checkpoint.store_checkpoints(
         checkpoint.CheckpointFiles(
-            path_of_march, state_key(model, patch, kept.version), kept.resume
+            march_state_path, hash_run(model, patch, state_file.version), state_file.resume
         )
     )
 
 
-def state_key(model, patch, version: str) -> str:
-    """Return the hash of a run, which a saved state must match to be continued.
+def hash_run(model, patch, version: str) -> str:
+    """Return the hash of a run, which a saved state must match.
 
-    The key depends on the scene in SI units, the unworn gap on the nodes, a slide from a file, and the
-    version of the program.
+    It depends on the scene in SI units, the unworn gap at the nodes, the worn depth of an earlier
+    run, a displacement from a file, and the version of the program.
 
     Parameters
     ----------
@@ -353,16 +364,16 @@ def state_key(model, patch, version: str) -> str:
     return digest.hexdigest()
 
 
-def is_march(what: Plan) -> bool:
+def is_march(run_plan: Plan) -> bool:
     """Return whether a run is a time march, whose state can be saved."""
-    if what.model.rig is None:
+    if run_plan.model.rig is None:
         return False
 
-    return engines.ENGINES[what.engine].saves_state
+    return engines.ENGINES[run_plan.engine].saves_state
 
 
 def _has_no_load(model: Model) -> bool:
-    """Return whether no interface of a model without a patch carries a load."""
+    """Return whether no interface of a model without [contact] carries a load."""
     if model.rig is not None and len(model.rig.friction.names):
         return not any(interface.load for interface in model.rig.friction.interfaces)
     return model.point is not None and model.point.load == 0

@@ -1,10 +1,11 @@
-"""Forecast whether a scene will miss its tolerance, and by which key it would meet it.
+"""Forecast whether a scene will miss its tolerance, and which keys to change.
 
 In: a Model, before anything is computed. Out: a `Forecast`. A scene that leaves its numerical
-settings to the tolerance mostly meets it. A key that fixes a setting can prevent this: steps
-per cycle, the element size, a method, the neglected part of a sum over bonds. The rules below
-compare such a key with what the tolerance requires. They apply only where measured runs nearly
-always missed the tolerance (`MIN_RIG_STEP_RATIO`, `MIN_ELEMENT_ERROR_RATIO`); otherwise the run itself warns.
+settings to the tolerance usually meets it. A key that fixes a setting can prevent this: steps per
+cycle, the element size, a method, or the neglected part of a sum over bonds. The rules below
+compare such a key with the value that the tolerance requires. They apply only where nearly all
+measured runs missed the tolerance (`MIN_RIG_STEP_RATIO`, `MIN_ELEMENT_ERROR_RATIO`); in other cases
+the run itself warns.
 """
 
 from dataclasses import replace
@@ -19,34 +20,34 @@ from .bench import engine as bench_engine
 from .patch import grids as patch_grids
 from .rig import bond_lists, costs, engines, numerics
 
-# Ratio of present to required steps per cycle of a rig, below which runs missed the tolerance: of 60 random
-# rigs and 30 benches with 50 to 6400 steps and tolerances of 0.1 to 1e-4, one in twenty met it below
-# these ratios.
+# Smallest ratio of present to required steps per cycle at which a rig may meet the tolerance. Of 60
+# random rigs and 30 benches with 50 to 6400 steps and tolerances of 0.1 to 1e-4, one in twenty met
+# it below the ratios for rigs and benches.
 MIN_RIG_STEP_RATIO = 2 / 3
 # The same ratio for a bench, by whether its law has bonds.
 MIN_BENCH_STEP_RATIOS = {True: 1 / 3, False: 1 / 8}
-# Ratio of proposed to required steps per cycle of a rig, with which all measures met the tolerance, not
-# only the displacement.
+# Ratio of proposed to required steps per cycle of a rig, at which all measures met the tolerance,
+# not only the displacement.
 RIG_STEP_FACTOR = 4.0
-BENCH_STEP_FACTOR = 2.0  # the same ratio for a bench: a triangle needs 1.1, a sine at most 1
-# Smallest ratio of the relative error of a patch to (element size / contact length); patches with equal
-# elements had 0.2 to 7 (crowns, tilts, flat ends).
+BENCH_STEP_FACTOR = 2.0  # The same ratio for a bench: a triangle needs 1.1, a sine at most 1.
+# Smallest ratio of the relative error of a patch to (element size / contact length); patches with
+# equal elements had 0.2 to 7 (crowns, tilts, flat ends).
 MIN_ELEMENT_ERROR_RATIO = 0.2
 # Relative error on the finest mesh of a static patch, which takes some CPU seconds.
 MIN_PATCH_ERROR = 1e-6
-# relative error on the finest mesh of a patch that slips in part in a rig, coarser because of the time
-# steps
+# Relative error on the finest mesh of a patch with partial slip in a rig, which is coarser because
+# of the time steps.
 MIN_SLIP_PATCH_ERROR = 3e-5
-SAFE_TOLERANCE = 1e-3  # tolerance that a cure proposes, because the meshes of all patches meet it
-STEPLESS_ENGINES = ("exact", "piecewise", "smooth")  # engines that choose their own steps
-MAX_CYCLES = 1e5  # largest number of drive cycles that a cure proposes
+SAFE_TOLERANCE = 1e-3  # Tolerance that is proposed, because the meshes of all patches meet it.
+STEPLESS_ENGINES = ("exact", "piecewise", "smooth")  # Engines that choose their own steps.
+MAX_CYCLES = 1e5  # Largest number of drive cycles that is proposed.
 
 
 class Cause(NamedTuple):
-    """Reason why a run will miss its tolerance, with the keys that remove it.
+    """Reason why a run will miss its tolerance, with the scene keys to change.
 
-    - words: the cause as the end of a sentence.
-    - cure: {key: value to set, or None to leave the key out}.
+    - words: reason, as the end of a sentence.
+    - cure: value to set by scene key; None to leave the key out.
     """
 
     words: str
@@ -54,27 +55,29 @@ class Cause(NamedTuple):
 
 
 class Forecast(NamedTuple):
-    """Tolerance that a run is asked for, and the reasons why it will be missed."""
+    """Tolerance of a run, and the reasons why it will be missed."""
 
     asked: float
     causes: tuple
 
     def sentence(self) -> str:
-        """Return a sentence on why the tolerance will be missed and what to set, or ""."""
+        """Return a sentence on why the tolerance will be missed and what to change; "" if it is met."""
         if not self.causes:
             return ""
         words = " and ".join(cause.words for cause in self.causes)
-        return f"the tolerance {self.asked:g} will not be met {words}; {_cure_words(self.cure())}"
+        return (
+            f"the tolerance {self.asked:g} will not be met {words}; {_format_changes(self.cure())}"
+        )
 
     def cure(self) -> dict:
-        """Return the scene keys to set, or to leave out (None), so that the tolerance is met."""
+        """Return the values to set by scene key so that the tolerance is met; None: leave it out."""
         cure = {}
         for cause in self.causes:
             cure |= cause.cure
         return cure
 
     def as_json(self) -> dict:
-        """Return the forecast as the object that `plan --json` has under "tolerance"."""
+        """Return the forecast as the object under "tolerance" in the output of `plan --json`."""
         return {
             "asked": self.asked,
             "missed": bool(self.causes),
@@ -86,8 +89,8 @@ class Forecast(NamedTuple):
 EMPTY_FORECAST = Forecast(0.0, ())
 
 
-def _cure_words(cure: dict) -> str:
-    """Describe the scene keys to set and those to leave out."""
+def _format_changes(cure: dict) -> str:
+    """Format the scene keys to set and those to leave out as advice."""
     dropped = [key for key, value in cure.items() if value is None]
     given = [f"{key} = {value:.15g}" for key, value in cure.items() if value is not None]
     parts = [f"leave out {' and '.join(dropped)}"] * bool(dropped) + [
@@ -97,25 +100,25 @@ def _cure_words(cure: dict) -> str:
 
 
 def forecast_tolerance(model: Model) -> Forecast:
-    """Predict from the settings of a model whether it will miss its tolerance."""
+    """Forecast from the settings of a model whether its run will miss the tolerance."""
     tolerance = model.accuracy.tolerance
-    if cause := _mesh_cause(model, tolerance):
+    if cause := _find_mesh_cause(model, tolerance):
         return Forecast(tolerance, (cause,))
-    causes = [_uniform_mesh_cause(model, tolerance)]
+    causes = [_find_element_size_cause(model, tolerance)]
     if model.kind in ("rig", "linear"):
-        causes += [_rig_steps_cause(model), _bond_sum_cause(model, tolerance)]
+        causes += [_find_rig_steps_cause(model), _find_bond_sum_cause(model, tolerance)]
     elif model.kind == "bench":
-        causes.append(_bench_steps_cause(model))
+        causes.append(_find_bench_steps_cause(model))
     return Forecast(tolerance, tuple(cause for cause in causes if cause is not None))
 
 
 def _replace_accuracy(model: Model, **keys) -> Model:
-    """Return a model with some values of its section [accuracy] replaced."""
+    """Return the model with some values of its [accuracy] table replaced."""
     return replace(model, accuracy=model.accuracy.model_copy(update=keys))
 
 
-def _mesh_cause(model: Model, tolerance: float) -> Cause | None:
-    """Return the reason if no affordable mesh of the pieces meets the tolerance, else None."""
+def _find_mesh_cause(model: Model, tolerance: float) -> Cause | None:
+    """Return the Cause if no affordable mesh of the pieces meets the tolerance, else None."""
     if model.kind == "patch" and model.patch.mesh.file is None and tolerance < MIN_PATCH_ERROR / 2:
         finest = MIN_PATCH_ERROR
     elif (
@@ -134,12 +137,12 @@ def _mesh_cause(model: Model, tolerance: float) -> Cause | None:
     ):
         cure["contact.element_size"] = None
     if model.kind == "rig":
-        cure |= _steps_cure(_replace_accuracy(model, tolerance=SAFE_TOLERANCE))
+        cure |= _suggest_steps(_replace_accuracy(model, tolerance=SAFE_TOLERANCE))
     return Cause(f"by any mesh: the finest one leaves errors of about {finest:g} or more", cure)
 
 
-def _uniform_mesh_cause(model: Model, tolerance: float) -> Cause | None:
-    """Return the reason if elements of prescribed size are too long for the contact, else None."""
+def _find_element_size_cause(model: Model, tolerance: float) -> Cause | None:
+    """Return the Cause if elements of prescribed size are too long for the contact, else None."""
     patch = model.patch
     if patch is None or patch.mesh.is_automatic:
         return None
@@ -148,15 +151,15 @@ def _uniform_mesh_cause(model: Model, tolerance: float) -> Cause | None:
     if not patch.nominal_load > 0:
         return None
     size = patch.uniform_element_size
-    share = size / patch_grids.make_base_grids(patch).contact.width
-    if tolerance > MIN_ELEMENT_ERROR_RATIO * share:
+    size_ratio = size / patch_grids.make_base_grids(patch).contact.width
+    if tolerance > MIN_ELEMENT_ERROR_RATIO * size_ratio:
         return None
-    words = f"with contact.element_size = {format_length(size, 3)} ({format_number(share, 2)} of the length in contact)"
+    words = f"with contact.element_size = {format_length(size, 3)} ({format_number(size_ratio, 2)} of the length in contact)"
     return Cause(words, {"contact.element_size": None})
 
 
-def _rig_steps_cause(model: Model) -> Cause | None:
-    """Return the reason if a rig has too few time steps for its tolerance, else None."""
+def _find_rig_steps_cause(model: Model) -> Cause | None:
+    """Return the Cause if a rig has too few time steps for its tolerance, else None."""
     engine = engines.choose_engine(model)
     if (
         not engine.coarser_in_time(model, numerics.choose_numerics(model))
@@ -164,45 +167,48 @@ def _rig_steps_cause(model: Model) -> Cause | None:
     ):
         return None
     steps = numerics.choose_numerics(model).steps
-    wanted = costs.required_steps_per_cycle(model)
-    if steps > MIN_RIG_STEP_RATIO * wanted:
+    required_steps = costs.required_steps_per_cycle(model)
+    if steps > MIN_RIG_STEP_RATIO * required_steps:
         return None
     words = f"with the {steps} steps per cycle of this run"
     if model.accuracy.steps_per_cycle is not None:
         words = f"with accuracy.steps_per_cycle = {steps}"
-    return Cause(words, _steps_cure(model) | _cycles_cure(model))
+    return Cause(words, _suggest_steps(model) | _suggest_cycles(model))
 
 
-def _steps_cure(model: Model) -> dict:
+def _suggest_steps(model: Model) -> dict:
     """Return the scene keys that give a rig enough time steps for its tolerance.
 
-    The keys select an engine without steps if there is one, else more steps; {} if there are enough.
+    They select an engine that chooses its own steps if there is one, else more steps. The result is
+    {} if the steps suffice.
     """
     accuracy = model.accuracy
-    free = engines.choose_engine(_replace_accuracy(model, method="auto", steps_per_cycle=None))
-    if free.name in STEPLESS_ENGINES:
-        dropped = {"accuracy.steps_per_cycle": None} if accuracy.steps_per_cycle is not None else {}
-        return dropped | ({"accuracy.method": None} if accuracy.method != "auto" else {})
+    automatic_engine = engines.choose_engine(
+        _replace_accuracy(model, method="auto", steps_per_cycle=None)
+    )
+    if automatic_engine.name in STEPLESS_ENGINES:
+        changes = {"accuracy.steps_per_cycle": None} if accuracy.steps_per_cycle is not None else {}
+        return changes | ({"accuracy.method": None} if accuracy.method != "auto" else {})
     steps = numerics.choose_numerics(model).steps
-    enough = RIG_STEP_FACTOR * costs.required_steps_per_cycle(model)
-    if steps >= enough:
+    required_steps = RIG_STEP_FACTOR * costs.required_steps_per_cycle(model)
+    if steps >= required_steps:
         return {}
-    return {"accuracy.steps_per_cycle": _round_steps(enough)}
+    return {"accuracy.steps_per_cycle": _round_steps(required_steps)}
 
 
 def _round_steps(steps: float) -> int:
-    """Round steps per cycle up to two significant digits and a multiple of four.
+    """Round steps per cycle up to two significant digits and to a multiple of four.
 
-    Half and a quarter of the steps are then whole numbers.
+    Half and a quarter of the steps are then integers.
     """
     unit = 10 ** (floor(log10(steps)) - 1)
     return 4 * ceil(ceil(steps / unit) * unit / 4)
 
 
-def _cycles_cure(model: Model) -> dict:
-    """Return the cycles, as a scene key, after which the transient is below the tolerance.
+def _suggest_cycles(model: Model) -> dict:
+    """Return the number of drive cycles needed for the transient to decay below the tolerance.
 
-    The slowest mode counts; {} if the scene has enough cycles.
+    It is {drive.cycles: number} for the slowest mode; {} if the scene has enough cycles.
     """
     rig = model.rig
     tolerance = model.accuracy.tolerance
@@ -215,12 +221,12 @@ def _cycles_cure(model: Model) -> dict:
     return {"drive.cycles": cycles} if cycles <= MAX_CYCLES else {}
 
 
-def _bond_sum_cause(model: Model, tolerance: float) -> Cause | None:
-    """Return the reason if the scene truncates the sum over bonds too early, else None."""
+def _find_bond_sum_cause(model: Model, tolerance: float) -> Cause | None:
+    """Return the Cause if the scene truncates the sum over bonds too early, else None."""
     keys = [key for key in ("tail", "merge") if getattr(model.accuracy, key) is not None]
-    pinned = [f"accuracy.{key}" for key in keys]
+    fixed_keys = [f"accuracy.{key}" for key in keys]
     if (
-        not pinned
+        not fixed_keys
         or model.friction is None
         or not law_has_trait(model.friction.law, "bonds")
         or engines.choose_engine(model).name != engines.MARCH.name
@@ -228,18 +234,20 @@ def _bond_sum_cause(model: Model, tolerance: float) -> Cause | None:
         return None
     if bond_lists.choose_bond_summation(model, numerics.choose_numerics(model)).error <= tolerance:
         return None
-    return Cause(f"with {' and '.join(pinned)} as given", dict.fromkeys(pinned))
+    return Cause(f"with {' and '.join(fixed_keys)} as given", dict.fromkeys(fixed_keys))
 
 
-def _bench_steps_cause(model: Model) -> Cause | None:
-    """Return the reason if a bench has too few time steps for its tolerance, else None."""
+def _find_bench_steps_cause(model: Model) -> Cause | None:
+    """Return the Cause if a bench has too few time steps for its tolerance, else None."""
     if model.accuracy.steps_per_cycle is None or (
         law_has_trait(model.friction.law, "memoryless") and not model.partial_slip
     ):
-        return None  # a law without memory has a closed form
+        return None  # A law without memory has a closed form.
     steps = bench_engine.steps_per_cycle(model)
-    wanted = bench_engine.steps_per_cycle(_replace_accuracy(model, steps_per_cycle=None))
-    if steps > MIN_BENCH_STEP_RATIOS[law_has_trait(model.friction.law, "bonds")] * wanted:
+    required_steps = bench_engine.steps_per_cycle(_replace_accuracy(model, steps_per_cycle=None))
+    if steps > MIN_BENCH_STEP_RATIOS[law_has_trait(model.friction.law, "bonds")] * required_steps:
         return None
-    enough = _round_steps(BENCH_STEP_FACTOR * wanted)
-    return Cause(f"with accuracy.steps_per_cycle = {steps}", {"accuracy.steps_per_cycle": enough})
+    proposed_steps = _round_steps(BENCH_STEP_FACTOR * required_steps)
+    return Cause(
+        f"with accuracy.steps_per_cycle = {steps}", {"accuracy.steps_per_cycle": proposed_steps}
+    )

@@ -10,7 +10,7 @@ from scene_texts import DRIVE, JOINT_SHAKEN, MODE, NONLOCAL, POINT
 
 from patchfem import build, run
 from patchfem.core import ErrorCauses, Measure
-from patchfem.runs.accuracy_warnings import Finding, tolerance_warnings
+from patchfem.runs.accuracy_warnings import AccuracyContext, tolerance_warnings
 from patchfem.scene import choose_law, compose_scene
 
 SHAKEN_RIG = POINT + NONLOCAL + MODE + DRIVE
@@ -85,7 +85,9 @@ def test_exact_warning_names_main_measures_first(errors, warning):
         name: Measure(1.0, "1", error, causes=ErrorCauses({"steps": error}, 2.0))
         for name, error in errors.items()
     }
-    finding = Finding(build(SHAKEN_RIG + SIXTEEN_STEPS), measures, None, {"steps_per_cycle": 16})
+    finding = AccuracyContext(
+        build(SHAKEN_RIG + SIXTEEN_STEPS), measures, None, {"steps_per_cycle": 16}
+    )
     assert tolerance_warnings(finding) == [warning]
 
 

@@ -16,7 +16,7 @@ from ...core import Outcome, compute_allowed_error
 from ...elasticity.lapack import one_thread
 from ...model.model import Model
 from ...model.similar_models import SimilarModels, select_models
-from ..accuracy_warnings import Finding, tolerance_warnings
+from ..accuracy_warnings import AccuracyContext, tolerance_warnings
 from ..patch import result as of_patch
 from ..patch import static_batch, store
 from ..patch.strength import note_on_yielding_faces
@@ -174,7 +174,9 @@ def _solve_cases(models: Sequence[Model], report: Callable | None) -> CaseResult
             *of_patch.strain_warnings(
                 model.patch, float(largest_pressure[case]), float(solution.approach[case])
             ),
-            *tolerance_warnings(Finding(model, measures, _NodePositions(solution.levels[0].x))),
+            *tolerance_warnings(
+                AccuracyContext(model, measures, _NodePositions(solution.levels[0].x))
+            ),
         ]
         if warnings:
             results.warnings[case] = shorten_file_names(warnings, model.source.path)

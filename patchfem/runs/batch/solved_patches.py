@@ -17,7 +17,7 @@ import numpy as np
 from ...core import Outcome
 from ...model.model import Model
 from ...model.source import locate_errors
-from ..accuracy_warnings import Finding, tolerance_warnings
+from ..accuracy_warnings import AccuracyContext, tolerance_warnings
 from ..patch import result as patch_result
 from ..results.result import shorten_file_names
 from ..results.travel import check_pieces_overlap, warn_of_large_slide
@@ -155,7 +155,7 @@ def add_patch_results(
     slide : float
         Largest relative displacement of the interface [m].
     extra : Mapping
-        Settings of the run that the accuracy warnings mention (`accuracy_warnings.Finding`).
+        Settings of the run that the accuracy warnings mention (`accuracy_warnings.AccuracyContext`).
     causes : Mapping
         ErrorCauses of the motion measures by name.
     """
@@ -171,7 +171,7 @@ def add_patch_results(
     results.fill(case, pressed.measures)
     drift = {name: motion[name] for name in ("drift_per_cycle",) if name in motion}
     motion.pop("normal_load", None)
-    finding = Finding(model, pressed.measures | motion, pressed.patch, extra)
+    finding = AccuracyContext(model, pressed.measures | motion, pressed.patch, extra)
     warnings = [
         *pressed.warnings,
         *model.rig.structure.notes,

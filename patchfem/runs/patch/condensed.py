@@ -33,7 +33,7 @@ class CondensedPair:
 
     - grid, piece: mesh and assembled piece on the lower side: TensorGrid with Piece, or PieceMesh
       with Substructure.
-    - upper_grid, upper: the same on the upper side; identical objects if the pieces are alike.
+    - upper_grid, upper: the same on the upper side; identical objects if the pieces are identical.
     - compliance: sum of the compliances of both pieces, for all contact pairs together.
     - closing (m, m): normal approach of the surfaces per shear force [m/N]; zero for alike
       pieces.
@@ -56,7 +56,7 @@ class CondensedPair:
     def coupling(self) -> float:
         """Largest ratio of normal to tangential displacement under a shear force [1].
 
-        It is 0 for alike pieces.
+        It is 0 for identical pieces.
         """
         return float(np.abs(self.closing).max() / np.abs(self.compliance.tangential).max())
 
@@ -120,7 +120,7 @@ def condense(patch_model, grid, upper_grid=None, ignore_cache: bool = False) -> 
     ----------
     patch_model : PatchModel
     grid, upper_grid : TensorGrid or PieceMesh
-        Meshes from `make_piece_meshes`; the upper one is None if the pieces are alike.
+        Meshes from `make_piece_meshes`; the upper one is None if the pieces are identical.
     ignore_cache : bool
         Whether to ignore the disk cache.
 
@@ -153,7 +153,7 @@ def condense(patch_model, grid, upper_grid=None, ignore_cache: bool = False) -> 
         x = joint.x
         tributary_lengths = joint.tributary_lengths
         compliances = joint.compliance
-    # Equal and opposite shear forces raise the interface of one of two alike pieces as much as they
+    # Equal and opposite shear forces raise the interface of one of two identical pieces as much as they
     # lower that of the other, so that the coupling nt cancels.
     else:
         compliances = (

@@ -149,7 +149,7 @@ def group_interfaces_with_coarse_mesh(model) -> list:
 def solve_faces_with_slip_fields(model, snapshots) -> tuple:
     """Return all interfaces that have a patch, with frames of their slip and shear stress.
 
-    Without elements or snapshots, an interface has the fields of the pressed patch only.
+    Without elements or snapshots, an interface has only the fields of its static contact.
 
     Parameters
     ----------

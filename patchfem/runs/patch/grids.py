@@ -124,7 +124,7 @@ def condense_on_search_grid(patch_model) -> CondensedPair:
 class BaseGrids(NamedTuple):
     """Coarsest grids of the pieces of a patch, graded to its contact.
 
-    There is a single grid if the pieces are alike.
+    There is a single grid if the pieces are identical.
 
     contact: ContactExtent to which the grids are graded; None without a load.
     """
@@ -397,7 +397,7 @@ def _find_pressure_maxima(x, sigma) -> tuple:
 
 
 def make_grids(patch_model, layout: Layout) -> list:
-    """Return the grids of both pieces with the columns of a layout; one grid for alike pieces."""
+    """Return the grids of both pieces with the columns of a layout; one grid for identical pieces."""
     pieces = (patch_model.pieces.lower, patch_model.pieces.upper)
     if patch_model.pieces.are_alike:
         pieces = pieces[:1]
@@ -477,7 +477,7 @@ def is_mirror_symmetric(body) -> bool:
 def predict_condensing_seconds(bodies) -> float:
     """Predict the CPU time [s] of condensing the pieces of a patch.
 
-    bodies: (lower, upper or None), or a single mesh for alike pieces.
+    bodies: (lower, upper or None), or a single mesh for identical pieces.
     """
     total = 0.0
     for body in bodies:

@@ -191,7 +191,7 @@ def solve(patch_model, grid, upper_grid=None, ignore_cache: bool = False) -> Pat
     ----------
     patch_model : PatchModel
     grid, upper_grid : TensorGrid or PieceMesh
-        Meshes from `make_piece_meshes`; the upper one is None if the pieces are alike.
+        Meshes from `make_piece_meshes`; the upper one is None if the pieces are identical.
     ignore_cache : bool
         Whether to ignore compliance matrices cached on disk.
 

@@ -331,7 +331,7 @@ def _solve_level(patch_model, ends: FreeEnds, count: int, start=None) -> PointLe
         solution.approach,
         patch_model.gap.angle + solution.rotation,
     )
-    # For unlike pieces, the tangential stiffness also depends on the coupling of shear and normal
+    # For dissimilar pieces, the tangential stiffness also depends on the coupling of shear and normal
     # displacement, which is not computed here.
     tangential = np.nan
     if patch_model.pieces.are_alike:

@@ -58,7 +58,7 @@ def static_measures_without_errors(model) -> dict:
 def make_piece_meshes_of_run(model) -> tuple:
     """Return the meshes of the lower and the upper piece of a model, as in a run.
 
-    The upper one is None if the pieces are alike.
+    The upper one is None if the pieces are identical.
     """
     with locate_errors(model.source):
         if not model.patch.mesh.is_automatic:
@@ -335,9 +335,9 @@ def _describe_results_on_mesh(model, patch) -> str:
 
 
 def note_on_normal_shear_coupling(patch_model, patch) -> list:
-    """Return a note, as a list, on the coupling of normal and shear displacement of unlike pieces.
+    """Return a note, as a list, on the coupling of normal and shear displacement of dissimilar pieces.
 
-    The surfaces of unlike pieces slide on each other under pressure. If they stick, shear stresses
+    The surfaces of dissimilar pieces slide on each other under pressure. If they stick, shear stresses
     prevent this sliding and stiffen the contact.
     """
     pair = patch.pair

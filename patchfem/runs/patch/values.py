@@ -229,7 +229,7 @@ def contact_ends(patch: Patch) -> list:
 def _full_stick_stiffness(patch: Patch, ends: list) -> float:
     """Return the tangential contact stiffness [N/m] in full stick.
 
-    Approach and rotation are fixed. For unlike pieces, the stiffness includes the coupling of shear
+    Approach and rotation are fixed. For dissimilar pieces, the stiffness includes the coupling of shear
     and normal displacement. ends: contact edges.
     """
     active = patch.active

@@ -205,7 +205,7 @@ def note_on_surface_temperature(model, patch, work: float, duration: float) -> l
     """Return a note, as a list, on the rise of the surface temperature due to frictional heating.
 
     All heat is assumed to flow through the loaded area into a single half-space of the substrate;
-    two alike pieces would warm by half as much. The list is empty without loaded area or motion.
+    two identical pieces would warm by half as much. The list is empty without loaded area or motion.
 
     Parameters
     ----------

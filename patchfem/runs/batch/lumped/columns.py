@@ -40,7 +40,7 @@ from ....response.settling import (
     window_amplitude_means,
 )
 from ....structure.drive_sizes import find_max_acceleration, find_min_decay_rate
-from ...accuracy_warnings import Finding, tolerance_warnings
+from ...accuracy_warnings import AccuracyContext, tolerance_warnings
 from ...results.notes import MAX_WORK_CHECK
 from ...results.result import shorten_file_names
 from ...rig.engines import describe_unused_settings
@@ -298,7 +298,7 @@ def _insert_warnings(
             drift = {name: measures[name] for name in ("drift_per_cycle",) if name in measures}
             warnings += warn_of_law(model, outcomes[case], drift, 0.0)
             warnings += ringing_warnings.get(case, ())
-            warnings += tolerance_warnings(Finding(model, measures))
+            warnings += tolerance_warnings(AccuracyContext(model, measures))
         else:
             warnings += ringing_warnings.get(case, ())
         if warnings:
