@@ -92,7 +92,7 @@ def profile(
             )
         _print_split(file, split, options["cutoff"], out, json_=json_)
         return
-    options["form"] = forms.parse_form(form)
+    options["form"] = forms.parse_form_option(form)
     reports = [
         roughness_report.make_report(read.read_surface(path, parse_units(units)), **options)
         for path in (file, *more)

@@ -37,7 +37,7 @@ class UnsupportedError(Exception):
 
 
 class ArgumentConverter:
-    """Conversion of arguments to words, with a cache of tuples, whose fields never change."""
+    """Converter of call arguments to machine words, with a cache for tuples, which are immutable."""
 
     def __init__(self):
         self.known_tuples = {}
@@ -71,7 +71,7 @@ class ArgumentConverter:
 
 
 class ArrayFormat(NamedTuple):
-    """Conversion of arrays of one type to words.
+    """Format in which arrays of one type are converted to machine words.
 
     - type_code: dtype, number of dimensions, memory order, and "r" for read-only or "u" for unaligned arrays
     - pack: function that packs the words
@@ -84,7 +84,7 @@ class ArrayFormat(NamedTuple):
 
 
 def _convert_array(array) -> tuple:
-    """Return the type code and the words (bytes) of an array."""
+    """Return the type code and the machine words (bytes) of an array."""
     key = array.dtype, array.ndim, array.flags.num
     known = _ARRAY_FORMATS.get(key)
     if known is None:
@@ -112,7 +112,7 @@ def _make_array_format(array) -> ArrayFormat:
 
 
 class LoadedFunction:
-    """Loaded machine code of a function; a call takes the words of its arguments as bytes.
+    """Loaded machine code of a function; a call takes its arguments as machine words in bytes.
 
     Parameters
     ----------

@@ -147,7 +147,7 @@ def _open_exclusively(path: Path) -> Iterator[int]:
 
 
 def _lock_file(file: int) -> None:
-    """Lock a file by the operating system, where it supports this."""
+    """Lock a file with the operating system, if it supports locks."""
     try:
         import fcntl
     except ImportError:  # raised on Windows

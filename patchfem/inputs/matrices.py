@@ -73,7 +73,7 @@ class MatrixRounding(NamedTuple):
 
 
 def estimate_rounding(values) -> MatrixRounding | None:
-    """Estimate how the numbers of a sparse array (k of them) were rounded.
+    """Estimate the rounding of the k stored numbers of a sparse array.
 
     Returns None if they have all digits of double precision, or too few distinct values to tell.
     """
@@ -85,13 +85,13 @@ def estimate_rounding(values) -> MatrixRounding | None:
     if samples.size < MIN_DISTINCT_NUMBERS:
         return None
     digits = np.array([_count_digits(sample) for sample in samples.tolist()])
-    most = digits.max()
-    if most > SINGLE_PRECISION_DIGITS and np.array_equal(samples.astype(np.float32), samples):
+    max_digits = digits.max()
+    if max_digits > SINGLE_PRECISION_DIGITS and np.array_equal(samples.astype(np.float32), samples):
         unit = np.where(size > 0, np.spacing(size.astype(np.float32)), 0.0).astype(float)
         return MatrixRounding("single precision", ROUNDING_DEVIATION * unit)
     if (
-        most >= DOUBLE_PRECISION_DIGITS
-        or np.mean(digits >= most - N_DROPPED_DIGITS) < MIN_FULL_DIGITS_FRACTION
+        max_digits >= DOUBLE_PRECISION_DIGITS
+        or np.mean(digits >= max_digits - N_DROPPED_DIGITS) < MIN_FULL_DIGITS_FRACTION
     ):
         return None
     count = int(np.median(digits))
@@ -166,7 +166,7 @@ def _append_empty_rows(values, n: int) -> sparse.csr_array:
 
 
 def _insert_empty_rows(values, rows: np.ndarray, n: int) -> sparse.csr_array:
-    """Expand a matrix to (n, n) by empty rows and columns between those it has."""
+    """Expand a matrix to (n, n) by inserting empty rows and columns between its own."""
     matrix = values.tocoo()
     i, j = matrix.coords
     return sparse.coo_array((matrix.data, (rows[i], rows[j])), (n, n)).tocsr()
@@ -266,7 +266,7 @@ def _read_market(path: Path, matrix_name: str) -> Matrix:
     if field == "complex":
         numbers = table[:, -2] + 1j * table[:, -1]
     values = sparse.coo_array((numbers, (rows, columns)), (n_rows, n_columns)).tocsr()
-    return Matrix(values if symmetry == "general" else nastran.mirror_triangle(values))
+    return Matrix(values if symmetry == "general" else nastran.complete_symmetric_matrix(values))
 
 
 def _read_abaqus(path: Path) -> Matrix:
@@ -296,7 +296,7 @@ def _read_abaqus(path: Path) -> Matrix:
         n = labels.max()
     values = sparse.coo_array((table[:, -1], (rows, columns)), (n, n)).tocsr()
     if (rows <= columns).all() or (rows >= columns).all():
-        values = nastran.mirror_triangle(values)
+        values = nastran.complete_symmetric_matrix(values)
     return Matrix(values, places, has_size=False)
 
 

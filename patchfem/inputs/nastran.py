@@ -53,7 +53,7 @@ class StringMatrix:
         self.strings = []
 
     def assemble(self) -> sparse.csr_array:
-        """Return the matrix; PatchfemError if its rows do not fit or its numbers cannot be read."""
+        """Return the matrix; raise PatchfemError if its rows do not fit or its numbers cannot be read."""
         with _refuse_output4(self.path):
             numbers = np.frombuffer(b"".join(self.strings), self.number).astype(float)
             sizes = np.array([len(string) for string in self.strings], int) // self.number.itemsize
@@ -70,7 +70,7 @@ class StringMatrix:
 
 
 def read_output4(path) -> dict[str, StringMatrix]:
-    """Read the matrices of an OUTPUT4 file; PatchfemError if it is damaged or complex."""
+    """Read the matrices of an OUTPUT4 file; raise PatchfemError if it is damaged or complex."""
     with open(path, "rb") as file:
         data = file.read()
     is_binary = 0 in data[:8]
@@ -249,7 +249,9 @@ class DmigMatrix:
         columns = np.array([column[1:3] for column in self.columns], int).reshape(-1, 2)
         places, index = rank_dofs(np.vstack([rows, np.repeat(columns, sizes, axis=0)]))
         values = sparse.coo_array((numbers, index.reshape(2, -1)), 2 * (len(places),)).tocsr()
-        return (mirror_triangle(values) if self.form == SYMMETRIC_FORM else values), places
+        return (
+            complete_symmetric_matrix(values) if self.form == SYMMETRIC_FORM else values
+        ), places
 
     def _parse_entries(self, sizes: np.ndarray) -> tuple:
         """Parse the entries one by one, to accept all spellings of numbers."""
@@ -264,9 +266,9 @@ class DmigMatrix:
         return np.array(rows, int).reshape(-1, 2), np.array(numbers)
 
 
-def mirror_triangle(values: sparse.csr_array) -> sparse.csr_array:
-    """Return the symmetric matrix of which one triangle is given."""
-    return (values + (values - sparse.diags_array(values.diagonal())).T).tocsr()
+def complete_symmetric_matrix(triangle: sparse.csr_array) -> sparse.csr_array:
+    """Return the symmetric matrix for a given triangle."""
+    return (triangle + (triangle - sparse.diags_array(triangle.diagonal())).T).tocsr()
 
 
 def rank_dofs(places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -341,7 +343,7 @@ def _start_card(path, matrices: dict, line: int, fields: list) -> DmigMatrix | N
 
 
 def parse_real(text: str) -> float:
-    """Parse a Nastran number, as in 1.5-3, 1.5D-3 and 1.5E-3; ValueError for other text."""
+    """Parse a Nastran number, as in 1.5-3, 1.5D-3 and 1.5E-3; raise ValueError for other text."""
     match = _NUMBER_PATTERN.match(text)
     if match is None:
         raise ValueError(f"'{text}' is not a number")

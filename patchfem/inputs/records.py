@@ -199,8 +199,8 @@ def describe_channels(channels: list) -> str:
         place = f" at {channel.place}" if channel.place else ""
         unit = f" [{channel.unit[:20]}]" if channel.unit else ""
         texts.append(f"{number} '{channel.name[:40]}'{place}{unit}")
-    rest = len(channels) - MAX_LISTED_CHANNELS
-    return ", ".join(texts) + (f" and {rest} more" if rest > 0 else "")
+    n_unlisted = len(channels) - MAX_LISTED_CHANNELS
+    return ", ".join(texts) + (f" and {n_unlisted} more" if n_unlisted > 0 else "")
 
 
 def make_records(path, values: dict, notes: list, channel_list: str = "") -> Records:

@@ -15,15 +15,15 @@ def cache_by_file(function: Callable) -> Callable:
     """
 
     @lru_cache(MAX_CACHED_RESULTS)
-    def call(path, _version, *arguments):
+    def call_cached(path, _version, *arguments):
         return function(path, *arguments)
 
     @wraps(function)
-    def read(path, *arguments):
+    def read_cached(path, *arguments):
         version = None
         if path.exists():
             stat = path.stat()
             version = (stat.st_mtime_ns, stat.st_size)
-        return call(path, version, *arguments)
+        return call_cached(path, version, *arguments)
 
-    return read
+    return read_cached

@@ -59,7 +59,7 @@ def find_file_faults(
     list of tuple
         Key and message of each fault.
     """
-    found = []
+    faults = []
     for key, file in list_named_files(tables):
         path = folder / file
         if not file_exists(path):
@@ -69,12 +69,12 @@ def find_file_faults(
             sentences = FILE_CHECKS[checked.key](path, checked.tables, is_valid=is_valid) or ()
         except PatchfemError as error:
             fault_key = checked.prefix + (error.key or checked.key)
-            found.append((fault_key, str(error).removeprefix(f"{checked.key}: ")))
+            faults.append((fault_key, str(error).removeprefix(f"{checked.key}: ")))
             continue
         if notes is not None:
             notes += [sentence.replace(str(path), path.name) for sentence in sentences]
-    if found or not is_valid:
-        return found
+    if faults or not is_valid:
+        return faults
     return _check_reduction(tables, folder)
 
 
@@ -92,7 +92,7 @@ class _FileKey(NamedTuple):
 
 
 def _select_interface(key: str, tables) -> _FileKey:
-    """Return the key of a file, and the tables with which it is checked: for an interface, its own."""
+    """Return the key of a file, and the tables with which it is checked; an interface has its own."""
     prefix, separator, name = key.partition(".contact.")
     if not separator:
         return _FileKey("", key, tables)

@@ -77,7 +77,7 @@ class Gap:
 
     @property
     def tilt(self) -> float | None:
-        """Absolute angle [rad] between the pieces, None without a tilt."""
+        """Absolute angle [rad] between the pieces, None if they are not tilted."""
         return next((abs(angle) for _, angle in self._values("angle")), None)
 
     @property
@@ -87,7 +87,7 @@ class Gap:
 
     @property
     def wave(self) -> float:
-        """Shortest wavelength [m] of the wavy shapes; inf without waves.
+        """Shortest wavelength [m] of the wavy shapes; inf if there are none.
 
         The cells of the mesh have to resolve it.
         """

@@ -55,7 +55,7 @@ class InterfaceLaw:
 
     @property
     def partial_slip(self) -> str:
-        """Name of the key that makes partial slip of the patch possible; "" without partial slip."""
+        """Name of the key that enables partial slip of the patch; "" if it slips as a whole."""
         return self.patch.interface.partial_slip if self.patch is not None else ""
 
     def friction_limits(self, load: float) -> FrictionLimits:
@@ -224,7 +224,7 @@ def find_pad_width(scene: Scene) -> float | None:
 
 
 def make_interface_names(structure) -> list:
-    """Return the names of the interfaces between masses, such as "1-2"; [] without masses."""
+    """Return the names of the interfaces between masses, such as "1-2"; [] if there are no masses."""
     names = ["-".join(map(str, interface.between)) for interface in structure.interface]
     return [
         name if names.count(name) == 1 else f"{name} ({number})"

@@ -103,7 +103,7 @@ class Model:
 
     @property
     def partial_slip(self) -> str:
-        """Name of the key that makes partial slip of the patch possible; "" without partial slip."""
+        """Name of the key that enables partial slip of the patch; "" if it slips as a whole."""
         return self.patch.interface.partial_slip if self.patch is not None else ""
 
     @property
@@ -120,7 +120,7 @@ class Model:
 
     @property
     def nominal_load(self) -> float:
-        """Normal load [N] of the patch or the point, 0 without either."""
+        """Normal load [N] of the patch or the point, 0 if there is neither."""
         if self.patch is not None:
             return self.patch.nominal_load
         return self.point.load if self.point is not None else 0.0
@@ -233,7 +233,7 @@ def _find_edge_motion(scene: Scene, rig_model: Rig | None) -> str:
 
 
 def _request_slip_mesh(model: PatchModel, path: SlidePath, law: Friction | None) -> PatchModel:
-    """Request a mesh that resolves partial slip under a prescribed slide, except for bond laws."""
+    """Request a mesh that resolves partial slip under a prescribed slide; bond laws need none."""
     if not model.interface.partial_slip or path.across is not None:
         return model
     if law is None or law_has_trait(law.law, "bonds") or not law.static or law.static <= 0:

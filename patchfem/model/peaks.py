@@ -60,7 +60,7 @@ def complete_asperities(
 def read_spectral_moments(path: Path, cutoff: float | None = None) -> TraceMoments:
     """Return the spectral moments of the waves below a cut-off [m] of the trace in a file.
 
-    PatchfemError names the key if no isotropic Gaussian surface has these moments.
+    Raises PatchfemError, which names the key, if no isotropic Gaussian surface has these moments.
     """
     try:
         return _compute_spectral_moments(path, cutoff)
@@ -71,7 +71,7 @@ def read_spectral_moments(path: Path, cutoff: float | None = None) -> TraceMomen
 
 @cache_by_file
 def _compute_spectral_moments(path: Path, cutoff: float | None) -> TraceMoments:
-    """Compute the spectral moments of a trace; PatchfemError if no isotropic Gaussian surface has them."""
+    """Compute the spectral moments of a trace; raise PatchfemError if no isotropic Gaussian surface has them."""
     moments = trace_moments(read_profile(path), cutoff)
     gaussian_peaks(moments.fine)
     return moments

@@ -113,7 +113,7 @@ def compute_profile_gap(
 def read_trace(path: Path) -> Profile:
     """Read the trace in a file, with its heights unchanged.
 
-    PatchfemError names the key of the file.
+    A PatchfemError names the key of the file.
     """
     try:
         return _read_profile(path)
@@ -143,7 +143,7 @@ def _filter_waviness(trace: Profile, cutoff: float) -> Profile:
 
 
 def _describe_short_waves(trace: Profile, cutoff: float) -> tuple:
-    """Return sentences about the waves shorter than a cut-off [m], () without such waves."""
+    """Return sentences about the waves shorter than a cut-off [m], () if there are none."""
     fraction = fine_fraction(trace, cutoff)
     if not fraction > 0:
         return ()

@@ -115,7 +115,7 @@ class RigSprings:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FirstMode:
-    """First mode of the scene that is not rigid, without the bonded spring.
+    """First mode of the scene that is not rigid, for the rig without its bonded spring.
 
     - frequency: natural frequency [Hz], 0 if all modes are rigid.
     - mass: moving mass [kg].

@@ -36,7 +36,7 @@ class ReducedModes(NamedTuple):
 
 
 class _MatrixFile(NamedTuple):
-    """Matrix file of a scene: key, path, and the version by which a change is noticed."""
+    """Matrix file of a scene: key, path, and a version that changes with the file."""
 
     key: str
     path: Path

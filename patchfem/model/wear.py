@@ -71,7 +71,7 @@ class WearModel:
 
 
 def build_wear_model(scene: Scene) -> WearModel | None:
-    """Build the wear model of a scene; None without [wear]."""
+    """Build the wear model of a scene; None if it has no [wear]."""
     wear = scene.wear
     if wear is None:
         return None

@@ -184,7 +184,7 @@ def read_axes(
 def read_lengths(text: str, name: str) -> list[float]:
     """Return the lengths [m] of a range ``a..b:n`` or a list in rising order; all are above 0.
 
-    PatchfemError, which begins with `name`, for any other text.
+    Raises PatchfemError, whose message begins with `name`, for any other text.
     """
     try:
         lengths = sorted(_read_axis(LENGTH_KEY, text).values)
@@ -327,9 +327,9 @@ def _find_range(key: str, piece: str, *, is_sampled: bool) -> _WrittenRange | No
 
 
 def _range_about(text: str) -> str:
-    """Convert a value with tolerance such as "5 mm +- 1 mm" to a range; "" without tolerance.
+    """Convert a value with tolerance such as "5 mm +- 1 mm" to a range; "" if there is no tolerance.
 
-    ValueError if the tolerance has another unit than the value.
+    Raises ValueError if the tolerance has another unit than the value.
     """
     match = _TOLERANCE_PATTERN.fullmatch(text)
     if match is None:

@@ -22,7 +22,7 @@ MODE_NAMES = ("first", "second", "third", "fourth", "fifth", "sixth")
 
 
 class GivenMode(NamedTuple):
-    """Mode given beside a scene, with the contact stuck.
+    """Mode specified separately from the scene, for the rig with the contact stuck.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ def parse_modes(modes: str | Iterable) -> tuple[GivenMode, ...]:
 
 
 def _parse_mode(frequency, damping, slide=None) -> GivenMode:
-    """Read the parts of a mode; ValueError if one is not a quantity of its kind."""
+    """Parse the parts of a mode; raise ValueError if a part has the wrong unit."""
     if isinstance(frequency, str):
         frequency = parse_quantity(frequency.strip(), "frequency")
     slide = None if slide is None else _parse_ratio(slide)
@@ -80,7 +80,7 @@ def _parse_mode(frequency, damping, slide=None) -> GivenMode:
 
 
 def _parse_ratio(value) -> float:
-    """Read a damping ratio or a slide; ValueError if it is not a number."""
+    """Parse a damping ratio or a slide; raise ValueError if it is not a number."""
     try:
         return float(value)
     except ValueError:

@@ -43,7 +43,7 @@ _MATRIX_KEYS = ("stiffness", "mass", "damping")
 
 
 def _list_patch_files(table_key: str, contact: Any) -> list[tuple[str, Any]]:
-    """Return the keys of the files of the patch with this table key, each with its file or UNKNOWN_VALUE."""
+    """List the file keys of the patch with this table key, each with its file or UNKNOWN_VALUE."""
     asperities = contact.asperities
     return [
         (f"{table_key}.mesh", contact.mesh),

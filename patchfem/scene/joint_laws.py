@@ -183,23 +183,23 @@ JOINT_LAWS = (
 
 
 class Choice(NamedTuple):
-    """Law for the answers of a user: the row of JOINT_LAWS, and both answers as lists of words."""
+    """Friction law that answers a user's question: the row of JOINT_LAWS, and both answers as lists of words."""
 
     row: JointLaw
     known: list[str]
     wanted: list[str]
 
 
-def parse_answer(answer: str, words: Iterable[str], name: str) -> list[str]:
-    """Return the words of an answer, separated by commas; a repeated word counts once.
+def parse_choice(text: str, allowed_words: Iterable[str], option: str) -> list[str]:
+    """Parse the words of an answer, separated by commas; a repeated word counts once.
 
     Parameters
     ----------
-    answer : str
+    text : str
         Such as "loop, roughness".
-    words : iterable of str
+    allowed_words : iterable of str
         Words that may occur.
-    name : str
+    option : str
         Option of the question, for the message.
 
     Raises
@@ -207,23 +207,23 @@ def parse_answer(answer: str, words: Iterable[str], name: str) -> list[str]:
     PatchfemError
         If a word is unknown, or if there is none.
     """
-    permitted = list(words)
-    parts = [part.strip().lower() for part in answer.split(",")]
+    permitted = list(allowed_words)
+    parts = [part.strip().lower() for part in text.split(",")]
     chosen = list(dict.fromkeys(part for part in parts if part))
     if not chosen:
-        raise PatchfemError(f"{name}: no answer; use one or more of {', '.join(permitted)}")
+        raise PatchfemError(f"{option}: no answer; use one or more of {', '.join(permitted)}")
     for word in chosen:
         if word not in permitted:
             raise PatchfemError(
-                f"{name}: unknown answer '{word}'; {advise_on_name(word, permitted)}"
+                f"{option}: unknown answer '{word}'; {advise_on_name(word, permitted)}"
             )
     if NOTHING in chosen and len(chosen) > 1:
-        raise PatchfemError(f"{name}: '{NOTHING}' excludes other answers")
+        raise PatchfemError(f"{option}: '{NOTHING}' excludes other answers")
     return chosen
 
 
 def choose_law(known: str, wanted: str) -> Choice:
-    """Choose the law that answers most wishes; of several, the one with least to assume.
+    """Choose the law that answers the most wishes; of several, the one with the fewest assumptions.
 
     Parameters
     ----------
@@ -237,8 +237,8 @@ def choose_law(known: str, wanted: str) -> Choice:
     PatchfemError
         If an answer has an unknown word or none.
     """
-    known_words = parse_answer(known, KNOWLEDGE, "--know")
-    wanted_words = parse_answer(wanted, WISHES, "--want")
+    known_words = parse_choice(known, KNOWLEDGE, "--know")
+    wanted_words = parse_choice(wanted, WISHES, "--want")
 
     def count_costs(row: JointLaw) -> tuple[int, int, int]:
         """Return what a law leaves to wish and to assume; the least of all rows is chosen."""

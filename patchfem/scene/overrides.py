@@ -73,20 +73,22 @@ class BaseScene:
         """Return the scene with further assignments `table.key=value`.
 
         Tables that no key touches, or that had the same values before, are not read again; all rules are checked.
-        SceneError as in `scene.loads`, and if a file that the scene names does not exist.
+        Raises SceneError as `scene.loads` does, and if a file that the scene names does not exist.
         """
         sets = tuple(sets)
         base = self.scene
         draft = SceneDraft(str(base.path), self._lines, dict(self._draft.raw))
         draft.sets = set(self._draft.sets)
         draft.read_before = dict(self._draft.read_now)
-        fresh = [group for group in _group_by_table(sets) if not self._reuse(draft, group)]
+        changed_groups = [group for group in _group_by_table(sets) if not self._reuse(draft, group)]
         for assignment in sets:  # the mistakes are listed in the order of the assignments
-            if any(assignment in group for group in fresh):
+            if any(assignment in group for group in changed_groups):
                 _copy_tables(draft.raw, assignment.partition("=")[0])
                 apply_set(draft, assignment)
         scene = require_files(finish_scene(draft, base.path, base.text, (*base.sets, *sets)))
-        for group in fresh:  # no SceneError was raised, so these tables are valid and can be reused
+        for group in (
+            changed_groups
+        ):  # no SceneError was raised, so these tables are valid and can be reused
             name = _find_table_name(group[0])
             read = draft.read_now.get(id(draft.raw.get(name)))
             if read is not None and len(self._known) < MAX_CACHED_TABLES:
@@ -187,7 +189,7 @@ class PlainNumbers:
                 changed[part] = _update_table(getattr(table, part), new)
         return _update_table(table, changed)
 
-    def replace_sets(self, sets: Sequence[str]) -> tuple:
+    def replace_assignments(self, sets: Sequence[str]) -> tuple:
         """Return the assignments of the scene with some of them replaced."""
         return (*self.scene.sets[: len(self.scene.sets) - len(self.keys)], *sets)
 
@@ -198,7 +200,7 @@ class PlainNumbers:
         """
         numbers = self.values_by_location(values)
         tables = {name: self.make_table(name, numbers) for name in self.changed_tables()}
-        return replace(self.scene, sets=self.replace_sets(sets), **tables)
+        return replace(self.scene, sets=self.replace_assignments(sets), **tables)
 
     def changed_tables(self) -> set[str]:
         """Return the names of the tables in which a number differs."""

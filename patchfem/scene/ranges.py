@@ -76,7 +76,7 @@ def _read_range(text: str) -> Range:
 
 
 def _require_number_key(key: str) -> KeyDefinition:
-    """Find a key that holds one number; ValueError for any other."""
+    """Find a key that holds one number; raise ValueError for any other."""
     definition = require_key(key)
     types = list_key_types(*definition)
     if find_inner_table(*definition) is not None or tuple in types or float not in types:
@@ -87,7 +87,7 @@ def _require_number_key(key: str) -> KeyDefinition:
 
 
 def _read_number(definition: KeyDefinition, key: str, text: str) -> float:
-    """Convert the string of a value to SI units; ValueError if the key does not accept it."""
+    """Convert the string of a value to SI units; raise ValueError if the key does not accept it."""
     written = read_set_value(key, text)
     if isinstance(written, int) and not isinstance(written, bool):
         written = float(written)

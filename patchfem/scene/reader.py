@@ -89,7 +89,7 @@ def _read_inner(draft: SceneDraft, definition: KeyDefinition, value: Any, path: 
 def _validate_values(
     draft: SceneDraft, model: type[Table], values: dict[str, Any], table_key: str
 ) -> dict[str, Any]:
-    """Return attribute -> valid value; the first mistake of every other key is reported."""
+    """Return the valid values by attribute; report the first mistake of every other key."""
     valid: dict[str, Any] = {}
     try:
         model.model_validate(values, context=valid)
@@ -189,9 +189,9 @@ def apply_set(draft: SceneDraft, assignment: str) -> None:
     try:
         assignment.encode()
     except UnicodeEncodeError:
-        shown = assignment.encode(errors="backslashreplace").decode()
+        displayed_text = assignment.encode(errors="backslashreplace").decode()
         draft.add_set_mistake(
-            f"{shown}: contains bytes that are not UTF-8 text; save the file as UTF-8"
+            f"{displayed_text}: contains bytes that are not UTF-8 text; save the file as UTF-8"
         )
         return
     key, equals, text = assignment.partition("=")
@@ -245,16 +245,16 @@ def _find_item(draft: SceneDraft, items: list[Any], path: str, written_key: str)
     if is_number and int(item_name) < len(items):
         return int(item_name)
     table = number_items_from_one(above)
-    shown = number_items_from_one(path)
-    what = "such item" if is_number else f"'{item_name}'"
+    displayed_key = number_items_from_one(path)
+    description = "such item" if is_number else f"'{item_name}'"
     known = [name for name in names if isinstance(name, str)]
     advice = f"{table} has {len(items)}, numbered from 1 as in {table}[1]"
     if known:
         advice = advise_on_name(item_name, known)
     if is_number and f"[{int(item_name) + 1}]" not in written_key:
-        shown = f"{table}.{item_name}"
+        displayed_key = f"{table}.{item_name}"
         advice += f"; {table}.0, with a dot, means {table}[1]"
-    draft.add_set_mistake(f"{shown}: no {what} here; {advice}")
+    draft.add_set_mistake(f"{displayed_key}: no {description} here; {advice}")
     return None
 
 

@@ -75,7 +75,7 @@ class Scene:
     def with_(self, **sets: Any) -> Scene:
         """Return a copy of the scene with other values of some keys.
 
-        Texts are written as in a scene, numbers are in SI. SceneError as in `load`, and for a length without a unit
+        Texts are written as in a scene, numbers are in SI. Raises SceneError as in `load`, and for a length without a unit
         that is longer than any joint.
         """
         scene = loads(self.text, self.path, (*self.sets, *format_assignments(sets)))

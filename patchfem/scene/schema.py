@@ -87,7 +87,7 @@ def _describe_key(model: type[Table], key: str, raw: dict) -> dict:
 
 def _describe_selection(model: type[Table], key: str) -> str:
     """Return which keys the values of a selector need, or which values need a key; "" otherwise."""
-    selector = next((one for one in SELECTORS.values() if issubclass(model, one.model)), None)
+    selector = next((row for row in SELECTORS.values() if issubclass(model, row.model)), None)
     if selector is None:
         return ""
     if key == selector.key:

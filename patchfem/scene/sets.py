@@ -16,7 +16,7 @@ MAX_JOINT_LENGTH = 1.0  # largest length of a joint [m]; of its lengths, only a 
 
 
 def format_assignments(sets: dict[str, Any]) -> tuple[str, ...]:
-    """Return a ``table.key=value`` for each key; SceneError for values that no scene can hold.
+    """Return a ``table.key=value`` for each key; raise SceneError for values that no scene can hold.
 
     A text stands as in a scene without quotes. A number is in SI and gets the unit of its key. Booleans, lists, dicts
     and NumPy scalars and arrays are accepted too.
@@ -28,7 +28,7 @@ def format_assignments(sets: dict[str, Any]) -> tuple[str, ...]:
 
 
 def format_scene(tables: dict[str, Any]) -> str:
-    """Return a dict of tables as the text of a scene; SceneError for values it cannot hold.
+    """Return a dict of tables as the text of a scene; raise SceneError for values it cannot hold.
 
     Texts are as in a scene, numbers are in SI.
     """
@@ -46,7 +46,7 @@ def format_values(key: str, values: Any) -> list[str]:
 
 
 def require_units(scene: Any, values: dict[str, Any]) -> Any:
-    """Return a scene; SceneError if lengths were given as bare numbers that cannot be metres.
+    """Return a scene; raise SceneError if lengths were given as bare numbers that cannot be metres.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def _is_length(key: str, value: Any) -> bool:
 
 
 def _to_plain_value(value: Any) -> Any:
-    """Return a NumPy array or scalar as Python values, and any other value unchanged."""
+    """Convert a NumPy array or scalar to Python values; return any other value unchanged."""
     return value.tolist() if hasattr(value, "tolist") else value
 
 

@@ -39,8 +39,8 @@ def read_template(kind: str) -> str:
 def find_shipped_scene() -> Path:
     """Return the path of the example scene, a rig with measured responses.
 
-    It lies in `studies/rig` of a checkout and in `templates/shipped` of an installed package. Missing if it was removed
-    from the installation.
+    It lies in `studies/rig` of a checkout and in `templates/shipped` of an installed package. Raises
+    Missing if it was removed from the installation.
     """
     for folder in (TEMPLATE_FOLDER / "shipped", TEMPLATE_FOLDER.parents[2] / "studies" / "rig"):
         if (folder / "rig.toml").is_file():

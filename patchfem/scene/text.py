@@ -132,10 +132,10 @@ def _find_kind(table: Table, name: str) -> str | None:
 def _format_value(value: Any, kind: str | None) -> str:
     """Format a value as TOML."""
     if isinstance(value, Material):
-        given = {key: getattr(value, name) for key, name in attributes_by_key(Material).items()}
+        record = {key: getattr(value, name) for key, name in attributes_by_key(Material).items()}
         pairs = [
             f"{key} = {_format_value(item, find_quantity_kind(Material, attributes_by_key(Material)[key]))}"
-            for key, item in given.items()
+            for key, item in record.items()
             if item is not None
         ]
         return f"{{{', '.join(pairs)}}}"

@@ -38,7 +38,7 @@ class ParsedText(NamedTuple):
 
 
 def read_text(path: str | Path) -> str:
-    """Return the text of a scene file; SceneError if it cannot be read."""
+    """Return the text of a scene file; raise SceneError if it cannot be read."""
     try:
         with open_for_reading(path) as file:
             content = file.read(MAX_BYTES + 1)
@@ -66,7 +66,7 @@ def read_text(path: str | Path) -> str:
 def parse_text(text: str, path: str | Path) -> ParsedText:
     """Return the plain values of a text and the lines of its keys.
 
-    SceneError if the text is not TOML, or lists more masses or modes than any run can use.
+    Raises SceneError if the text is not TOML, or lists more masses or modes than any run can use.
     """
     try:
         if any(line.count(".") > MAX_KEY_PARTS for line in text.split("\n")):

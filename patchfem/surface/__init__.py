@@ -55,7 +55,7 @@ PUBLIC = {
         "make_unknown",
     ),
     "roughness.filter": ("mean_line",),
-    "roughness.form": ("parse_form",),
+    "roughness.form": ("parse_form_option",),
     "roughness.means": (
         "Means",
         "average_reports",

@@ -32,7 +32,7 @@ class Areal:
 
     @property
     def missing(self) -> np.ndarray:
-        """Mask (m, n) of the points without a measured height."""
+        """Mask (m, n) of the points that have no measured height."""
         return np.isnan(self.z)
 
     def row(self, k: int) -> Profile:

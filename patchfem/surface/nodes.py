@@ -152,7 +152,7 @@ def _check_nodes(x) -> np.ndarray:
 
 
 def _max_missing(x) -> tuple[float, float]:
-    """Return how far [m] a trace may end inside the patch, which is half an element."""
+    """Return the length [m] by which a trace may end inside the patch, which is half an element."""
     return MAX_MISSING_ELEMENTS * float(x[1] - x[0]), MAX_MISSING_ELEMENTS * float(x[-1] - x[-2])
 
 

@@ -65,7 +65,7 @@ def level(profile: Profile) -> Profile:
 
 
 def resample_evenly(profile: Profile) -> Profile:
-    """Resample a trace at a constant step without gaps, as filters and spectra need.
+    """Resample a trace to a constant sampling interval without gaps, for filters and spectra.
 
     Missing heights are bridged by straight lines. An uneven trace is resampled at the 10th
     percentile of its steps, so that nothing between its samples is lost. The notes state both.
@@ -111,15 +111,15 @@ def clean(profile: Profile, max_gap: float) -> Profile:
     counts. Raises PatchfemError for a longer gap, and for fewer than two good heights.
     """
     is_spike = find_spikes(profile)
-    good = np.flatnonzero(~(profile.missing | is_spike))
-    if good.size < 2:
+    usable = np.flatnonzero(~(profile.missing | is_spike))
+    if usable.size < 2:
         raise PatchfemError(
-            f"{profile.source}: {good.size} usable heights; a trace needs at least two"
+            f"{profile.source}: {usable.size} usable heights; a trace needs at least two"
         )
-    if good.size == profile.z.size:
+    if usable.size == profile.z.size:
         return profile
-    x = profile.x[good]
-    gaps = np.where(np.diff(good) > 1, np.diff(x), 0.0)
+    x = profile.x[usable]
+    gaps = np.where(np.diff(usable) > 1, np.diff(x), 0.0)
     longest = int(np.argmax(gaps))
     if gaps[longest] > max_gap * (1 + 1e-9):
         raise PatchfemError(
@@ -137,8 +137,8 @@ def clean(profile: Profile, max_gap: float) -> Profile:
         )
     if profile.missing.any():
         notes += (_describe_missing(profile, float(gaps[longest])),)
-    places = profile.x[good[0] : good[-1] + 1]
-    z = np.interp(places, x, profile.z[good])
+    places = profile.x[usable[0] : usable[-1] + 1]
+    z = np.interp(places, x, profile.z[usable])
     return replace(profile, x=frozen_array(places), z=frozen_array(z), notes=notes)
 
 

@@ -91,7 +91,7 @@ def average_quantities(quantities: list, text: str) -> Mean | None:
     if count < 2:
         return None
     values = np.array([quantity.value for quantity in quantities])
-    own = np.array(
+    errors = np.array(
         [
             0.0 if quantity.high is None else (quantity.high - quantity.low) / 2
             for quantity in quantities
@@ -100,7 +100,7 @@ def average_quantities(quantities: list, text: str) -> Mean | None:
     scatter = float(values.std(ddof=1))
     mean = float(values.mean())
     student = float(stdtrit(count - 1, (1 + LEVEL) / 2))
-    error = max(student * scatter, float(np.sqrt((own**2).mean()))) / np.sqrt(count)
+    error = max(student * scatter, float(np.sqrt((errors**2).mean()))) / np.sqrt(count)
     is_positive = all(quantity.low is not None and quantity.low >= 0 for quantity in quantities)
     low = max(mean - error, 0.0) if is_positive else mean - error
     return Mean(

@@ -108,7 +108,7 @@ def _sample_place(path, lines, k: int) -> str:
 
 
 def undo_rounding(path, x, factor: float, name: str = "x") -> Places:
-    """Replace positions by equally spaced ones if they differ only by printed digits.
+    """Replace positions by equally spaced ones if they differ from these only by rounding.
 
     A step of 0.15625 um printed to 0.1 um makes the slopes 14 % too large.
 
@@ -159,7 +159,7 @@ def _min_step(x) -> float:
 
 
 def _require_increasing(path, x, lines, factor: float) -> None:
-    """Raise PatchfemError for positions (n,) that reverse or are all the same."""
+    """Raise PatchfemError if positions (n,) decrease or are all the same."""
     steps = np.diff(x)
     reverses = steps < -_min_step(x)
     if reverses.any():
@@ -239,10 +239,10 @@ def check_span(path, x, z, stated: str = "") -> tuple:
         return ()
     text = f"{path}: heights span {format_length(span)} over a length of {format_length(length)}"
     count = max(1, int(OUTLIER_FRACTION * heights.size)) if heights.size >= MIN_ROUNDED else 0
-    most = float(heights[-1 - count] - heights[count])
-    if most <= length:
+    span_without_outliers = float(heights[-1 - count] - heights[count])
+    if span_without_outliers <= length:
         return (
-            f"{text}, but only {format_length(most)} without the {count} highest and the {count} lowest of "
+            f"{text}, but only {format_length(span_without_outliers)} without the {count} highest and the {count} lowest of "
             f"{heights.size}; write nan for each of these heights that is a fault of the "
             "measurement",
         )

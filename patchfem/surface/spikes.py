@@ -44,12 +44,12 @@ def find_isolated(z, distance, deviation: float) -> np.ndarray:
     -------
     (m, n) bool array
     """
-    found = np.zeros(z.shape, bool)
+    is_isolated = np.zeros(z.shape, bool)
     for threshold in THRESHOLDS:
         with np.errstate(invalid="ignore"):
             far = distance > threshold * deviation
-        found |= _select_isolated(z, far, threshold * deviation)
-    return found
+        is_isolated |= _select_isolated(z, far, threshold * deviation)
+    return is_isolated
 
 
 def _median_distances(z, places) -> np.ndarray:
@@ -67,7 +67,7 @@ def _median_distances(z, places) -> np.ndarray:
 
 
 def _scatter_about_medians(z, known) -> float:
-    """Estimate the standard deviation of known heights (m, n) about the medians around them.
+    """Estimate the standard deviation of known heights (m, n) from the medians around them.
 
     Heights that are the median, as most are on a smooth slope, say nothing about the scatter.
     """
@@ -98,11 +98,11 @@ def _select_isolated(z, far, threshold: float) -> np.ndarray:
         if sizes[number] > MAX_SPIKE_POINTS:
             continue
         around = tuple(slice(max(part.start - 1, 0), part.stop + 1) for part in place)
-        own = groups[around] == number
-        group = z[around][own]
-        rim = z[around][~own & np.isfinite(z[around])]
+        is_member = groups[around] == number
+        group = z[around][is_member]
+        rim = z[around][~is_member & np.isfinite(z[around])]
         if not rim.size:
             continue
         if group.min() > rim.max() + threshold / 2 or group.max() < rim.min() - threshold / 2:
-            out[around] |= own
+            out[around] |= is_member
     return out

@@ -14,7 +14,7 @@ MAX_MODES = 10_000
 
 
 def _refuse_removed(value: object) -> object:
-    """Return a value of a key; ValueError for a removed value, with what to use instead."""
+    """Return a value of a key; raise ValueError for a removed value, with the replacement."""
     for values in (removed.REMOVED_METHODS, removed.REMOVED_QUADRATURES):
         if isinstance(value, str) and value in values:
             raise ValueError(values[value])

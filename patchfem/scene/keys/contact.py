@@ -51,7 +51,7 @@ class Material(Table):
 
 
 def find_material(value: object) -> object:
-    """Return the Material of a name; ValueError for an unknown name and for other values."""
+    """Return the Material of a name; raise ValueError for an unknown name and for other values."""
     if isinstance(value, Material):
         return value
     if isinstance(value, int | float) and find_material_name(str(value)) is not None:
@@ -157,7 +157,7 @@ class Holder(Table):
 
 
 def require_convex_radius(value: object) -> object:
-    """Return the radius of a crown; ValueError for the negative radius of a hollow."""
+    """Return the radius of a crown; raise ValueError for the negative radius of a hollow."""
     if str(value).lstrip().startswith("-"):
         raise ValueError(
             "a crown is convex, so its radius must be > 0; for a hollow surface leave out [contact.crown] "
@@ -386,7 +386,7 @@ class Contact(Table):
 
     @property
     def compliance_key(self) -> str:
-        """Key of the compliance that allows partial slip; "" if the patch slips as a whole."""
+        """Key of the compliance that enables partial slip; "" if the patch slips as a whole."""
         if self.shear is not None:
             return "[contact.shear]"
         if self.asperities is not None and self.asperities.tangential_ratio is not None:

@@ -71,7 +71,7 @@ def find_key(key: str) -> KeyDefinition:
 
 
 def require_key(key: str) -> KeyDefinition:
-    """Find a key as `find_key` does; ValueError, with the nearest known key, if no scene has it."""
+    """Find a key as `find_key` does; raise ValueError, with the nearest known key, if no scene has it."""
     definition = find_key(key)
     if definition.model is not None:
         return definition
@@ -127,7 +127,7 @@ def is_table_or_value(model: type[Table], name: str) -> bool:
 
 @cache
 def describe_requirement(model: type[Table] | None, name: str) -> str:
-    """Return what a key requires, as a clause of a message; "" for a table and an unknown key."""
+    """Describe what a key requires, as a clause of a message; "" for a table and an unknown key."""
     if model is None:
         return ""
     types = list_key_types(model, name)

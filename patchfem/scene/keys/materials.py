@@ -347,7 +347,7 @@ def normalise_material_name(name: str) -> str:
 
 @cache
 def list_spellings() -> dict[str, str]:
-    """Return the name in MATERIALS of every known name, whose key is its normalised spelling."""
+    """Return the dict from the normalised spelling of every known name to the name in MATERIALS."""
     spellings = {}
     for name, record in MATERIALS.items():
         for spelling in (name, *record.other_names):
@@ -356,7 +356,7 @@ def list_spellings() -> dict[str, str]:
 
 
 def find_material_name(written_name: str) -> str | None:
-    """Return the name in MATERIALS that is meant by a written one; None if it is unknown."""
+    """Return the name in MATERIALS that a written name means; None if it is unknown."""
     spelling = normalise_material_name(written_name)
     name = list_spellings().get(spelling)
     if is_case_sensitive(spelling) and re.sub(SEPARATORS, "", written_name) != name:

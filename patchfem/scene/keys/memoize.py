@@ -8,7 +8,7 @@ MAX_CACHED_RESULTS = 1024
 
 
 def memoize(function: Callable) -> Callable:
-    """Cache the results of a function by the identity of the first argument.
+    """Cache the results of a function by the identity of its first argument.
 
     The first argument and the result must be frozen, and the other arguments hashable. Equal tables are not looked for,
     because a comparison of tables takes as long as the functions that are remembered.
@@ -16,7 +16,7 @@ def memoize(function: Callable) -> Callable:
     results: dict[tuple, tuple] = {}
 
     @wraps(function)
-    def call(frozen, *others):
+    def call_cached(frozen, *others):
         entry = results.get((id(frozen), *others))
         if entry is None:
             if len(results) >= MAX_CACHED_RESULTS:
@@ -26,4 +26,4 @@ def memoize(function: Callable) -> Callable:
             results[id(frozen), *others] = entry
         return entry[1]
 
-    return call
+    return call_cached

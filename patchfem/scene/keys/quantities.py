@@ -156,7 +156,7 @@ _EXACT_CONTEXT = Context(prec=2 * _MAX_CHARACTERS, Emax=MAX_EMAX, Emin=MIN_EMIN)
 def parse_quantity(text: object, kind: str) -> float:
     """Return the SI value of a quantity ``"<number> <unit>"``, correctly rounded.
 
-    ValueError, with the kind and an example, for a bare number, an unknown or ambiguous unit, a unit of another kind,
+    Raises ValueError, with the kind and an example, for a bare number, an unknown or ambiguous unit, a unit of another kind,
     anything but one number and one unit, and a value that is not finite.
     """
     if not isinstance(text, str):
@@ -196,7 +196,7 @@ def describe_requirement(kind: str) -> str:
 
 
 def _multiply(number: str, factor: float, kind: str) -> float:
-    """Return number times factor; ValueError if the product is out of range."""
+    """Return number times factor; raise ValueError if the product is out of range."""
     rounded = float(number)
     if rounded == 0.0:
         if re.search("[1-9]", re.split("[eE]", number)[0]):
@@ -239,24 +239,26 @@ def _describe_non_text(value: object, kind: str) -> str:
 
 def _describe_malformed_text(words: str, kind: str) -> str:
     """Return the message about a string that does not consist of a number, a blank and a unit."""
-    shown = (
+    displayed_text = (
         words if len(words) <= _MAX_SHOWN_CHARACTERS else f"{words[: _MAX_SHOWN_CHARACTERS - 3]}..."
     )
     glued = _JOINED_UNIT_PATTERN.fullmatch(words)
     if _BARE_NUMBER_PATTERN.fullmatch(words):
-        reason = f"'{shown}' is a bare number without a unit"
+        reason = f"'{displayed_text}' is a bare number without a unit"
     elif any(sign in words for sign in ("±", "+/-", "+-")):
-        reason = f"'{shown}' has a tolerance: give only the nominal value"
+        reason = f"'{displayed_text}' has a tolerance: give only the nominal value"
     elif _DECIMAL_COMMA_PATTERN.match(words):
-        reason = f"'{shown}' has a comma: use a point as the decimal separator"
+        reason = f"'{displayed_text}' has a comma: use a point as the decimal separator"
     elif "#" in words:
-        reason = f"'{shown}': '#' is ambiguous, write the name of the unit ({_list_units(kind)})"
+        reason = f"'{displayed_text}': '#' is ambiguous, write the name of the unit ({_list_units(kind)})"
     elif re.match(r"[+-]?(nan|inf)", words, re.IGNORECASE):
-        reason = f"'{shown}' is not a finite number"
+        reason = f"'{displayed_text}' is not a finite number"
     elif glued and normalize_unit(glued[2]) in UNIT_FACTORS[kind]:
-        reason = f"'{shown}' lacks the space between number and unit: write '{glued[1]} {glued[2]}'"
+        reason = f"'{displayed_text}' lacks the space between number and unit: write '{glued[1]} {glued[2]}'"
     else:
-        reason = f"'{shown}' does not consist of one number and one unit ({_list_units(kind)})"
+        reason = (
+            f"'{displayed_text}' does not consist of one number and one unit ({_list_units(kind)})"
+        )
     return f"{reason}; {describe_requirement(kind)}"
 
 

@@ -63,7 +63,7 @@ class Kind(str):
 
 
 def _require_magnitude(value: float, smallest: float) -> float:
-    """Return a value; ValueError if its magnitude is above MAX_MAGNITUDE or in (0, `smallest`)."""
+    """Return a value; raise ValueError if its magnitude is above MAX_MAGNITUDE or in (0, `smallest`)."""
     if value and not smallest <= abs(value) <= MAX_MAGNITUDE:
         allowed = f"must not exceed {MAX_MAGNITUDE:g} in magnitude"
         if smallest:
@@ -111,7 +111,7 @@ def whole_number(low: int, high: int) -> Any:
 
 
 def _require_printable(value: str) -> str:
-    """Return a text; ValueError for characters that results files cannot hold."""
+    """Return a text; raise ValueError for characters that results files cannot hold."""
     for sign in value:
         if category(sign) in ("Cc", "Cs") and sign not in "\n\t":
             raise ValueError(
@@ -249,7 +249,7 @@ def advise_on_name(written_name: str, names: Iterable[str]) -> str:
 
 @cache
 def attributes_by_key(model: type[BaseModel]) -> dict[str, str]:
-    """Return key -> attribute of a table; they differ if the key is a reserved word of Python."""
+    """Return the dict from key to attribute of a table; they differ for reserved words of Python."""
     return {field.alias or name: name for name, field in model.model_fields.items()}
 
 
@@ -282,7 +282,7 @@ def find_key_record(model: type[BaseModel], written_name: str) -> KeyRecord | No
 
 
 def find_meaning(model: type[BaseModel], written_name: str) -> str:
-    """Return the meaning of a key of a table; KeyError if the key is not documented."""
+    """Return the meaning of a key of a table; raise KeyError if the key is not documented."""
     record = find_key_record(model, written_name)
     if record is None:
         raise KeyError(
@@ -293,7 +293,7 @@ def find_meaning(model: type[BaseModel], written_name: str) -> str:
 
 @cache
 def find_quantity_kind(model: type[BaseModel], name: str) -> str | None:
-    """Return the kind of quantity that an attribute or its items hold; None without a unit."""
+    """Return the kind of quantity that an attribute or its items hold; None if they have no unit."""
     marks = (*model.model_fields[name].metadata, *list_key_types(model, name))
     return next((str(mark) for mark in marks if isinstance(mark, Kind)), None)
 

@@ -125,7 +125,7 @@ def check_settings(draft: SceneDraft, kind: str) -> None:
 
 
 def find_unused_settings(tables: Tables, kind: str) -> dict[str, str]:
-    """Return the numerical settings without effect, with the reason for each."""
+    """Return the numerical settings that have no effect, with the reason for each."""
     accuracy = tables.accuracy
     method = "bench" if kind == "bench" else accuracy.method or "auto"
     unused = {}

@@ -184,7 +184,7 @@ def check_grooves(draft: SceneDraft, kind: str) -> None:
 
 
 def find_groove_key(draft: SceneDraft) -> str:
-    """Return the key of the grooves of a scene; "" without grooves."""
+    """Return the key of the grooves of a scene; "" if it has none."""
     for name in ("contact", "normal"):
         if draft.values[name].grooves:
             return f"{name}.grooves"
@@ -192,5 +192,5 @@ def find_groove_key(draft: SceneDraft) -> str:
 
 
 def find_groove_table(draft: SceneDraft) -> Any:
-    """Return the table of the grooves of a scene; UNKNOWN_VALUE without grooves."""
+    """Return the table of the grooves of a scene; UNKNOWN_VALUE if it has none."""
     return draft.values.contact.grooves or draft.values.normal.grooves

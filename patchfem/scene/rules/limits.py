@@ -68,7 +68,7 @@ class JointFacts(TableFacts):
 
     @property
     def law_description(self) -> str:
-        """Law in words, with the reading or the order that makes it a sum over all bonds."""
+        """Law as text, with the reading or the order that makes it a sum over all bonds."""
         return describe_law(self.table)
 
     @property
@@ -124,14 +124,14 @@ class JointFacts(TableFacts):
 
     @property
     def recursion_feature(self) -> str:
-        """Feature that requires a recursive computation of the sum over bonds, in words; "" if there is none."""
+        """Feature that requires a recursive computation of the sum over bonds, as text; "" if there is none."""
         if self.has_lower_shape:
             return "a shape on the lower piece"
         return "friction.breakaway" if self.breakaway else ""
 
     @property
     def breakaway_circumstance(self) -> str:
-        """Circumstance in which a breakaway needs order = 1, in words; "" if there is none."""
+        """Circumstance in which a breakaway needs order = 1, as text; "" if there is none."""
         if self.kind == "rig":
             return "in a rig"
         return f"and {self.compliance}" if self.compliance else ""
@@ -409,7 +409,7 @@ def _check_interface(draft: SceneDraft, table_key: str, interface: Any) -> None:
 
 
 def _find_upper_piece_need(joint: JointFacts) -> str:
-    """Return what requires that the shapes lie on the upper piece, in words; "" if nothing does."""
+    """Return the feature that requires shapes on the upper piece, as text; "" if there is none."""
     law = f"with law '{joint.law}'"
     if joint.has_trait("bonds"):
         needs_upper = joint.compliance and joint.breakaway

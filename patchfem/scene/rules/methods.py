@@ -55,7 +55,7 @@ class MotionFeatures(NamedTuple):
 
     @property
     def compliance(self) -> str:
-        """Key of the compliance that allows partial slip, for the first patch that has one."""
+        """Key of the compliance that enables partial slip, for the first patch that has one."""
         return next((joint.compliance for joint in self.joints if joint.compliance), "")
 
     @property
@@ -160,7 +160,7 @@ def check_method(draft: SceneDraft, kind: str) -> None:
 
 
 def list_unused_methods(kind: str) -> tuple[str, ...]:
-    """Return the methods without meaning in a kind of scene that has no time integration."""
+    """Return the methods that have no meaning in a kind of scene without time integration."""
     return ("exact", "march") if kind in ("patch", "bench") else ()
 
 
@@ -200,7 +200,7 @@ def list_lower_shapes(contact: Any, table_key: str = "contact") -> list[str]:
 
 
 def find_nonlinear_spring(tables: Tables) -> str:
-    """Return the key of the nonlinear spring of the rig; "" without one."""
+    """Return the key of the nonlinear spring of the rig; "" if it has none."""
     structure = TableView(tables).structure
     if structure.stiffening:
         return "[structure.stiffening]"
@@ -208,7 +208,7 @@ def find_nonlinear_spring(tables: Tables) -> str:
 
 
 def find_climbed_grooves(tables: Tables) -> str:
-    """Return the key of the grooves that the upper piece climbs; "" without grooves or if they are flat."""
+    """Return the key of the grooves that the upper piece climbs; "" if there are none or they are flat."""
     for name in ("contact", "normal"):
         if TableView(tables)[name].grooves.amplitude:
             return f"[{name}.grooves]"
@@ -224,7 +224,7 @@ def find_yaw_key(tables: Tables) -> str:
 
 
 def find_load_change_key(tables: Tables) -> str:
-    """Return the key by which the load of a rig changes; "" if the load is constant."""
+    """Return the key that makes the load of a rig vary; "" if the load is constant."""
     scene = TableView(tables)
     if scene.normal.amplitude:
         return "normal.amplitude"

@@ -45,12 +45,12 @@ class TableFacts(TableView):
 
     @cached_property
     def load_change(self) -> str:
-        """Key by which the load changes; "" if it is constant."""
+        """Name of the key that makes the load vary; "" if the load is constant."""
         return find_load_change_key(self.draft.tables)
 
     @cached_property
     def compliance(self) -> str:
-        """Key of the compliance that allows partial slip of the patch; "" if there is none."""
+        """Key of the compliance that enables partial slip of the patch; "" if there is none."""
         return find_compliance_key(self.table, self.draft.tables)
 
     def has(self, *names: str) -> bool:

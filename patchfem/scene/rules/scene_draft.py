@@ -166,7 +166,7 @@ def find_value(value: Any, key: str) -> Any:
 
 
 def find_item_or_value(holder: Any, piece: str) -> Any:
-    """Return the value under a key, name or number of a plain table or array; None without one."""
+    """Return the value at a key, name or number in a plain table or array; None if there is none."""
     if isinstance(holder, dict):
         return holder.get(piece)
     if not isinstance(holder, list):

@@ -104,7 +104,7 @@ class StructureFacts(TableFacts):
 
     @property
     def extension(self) -> str:
-        """Ending of structure.file in lower case; "" without a file."""
+        """Extension of structure.file in lower case; "" if there is no file."""
         return find_file_extension(self.file) if self.file else ""
 
     @property

@@ -33,7 +33,7 @@ class WearFacts(TableFacts):
 
     @property
     def groove_key(self) -> str:
-        """Key of the grooves; "" without grooves."""
+        """Key of the grooves; "" if there are none."""
         return find_groove_key(self.draft)
 
     @property
@@ -44,7 +44,7 @@ class WearFacts(TableFacts):
 
     @property
     def strip_compliance(self) -> str:
-        """Key that sets the compliance for partial slip of the strips; "" without such a key or without strips."""
+        """Key of the compliance that enables partial slip of the strips; "" if there is none or no strips."""
         return self.compliance if self.scene.contact.strips else ""
 
     @property

@@ -55,7 +55,7 @@ MAX_ROUNDS = 4
 
 @dataclass(frozen=True, eq=False)
 class Alignment:
-    """Alignment of a second trace on a first one, with the depth between them.
+    """Alignment of a second trace with a first one, and the depth between them.
 
     - x, first, depth: samples of the second trace on the first one, heights of the first trace
       there, and depths of the second trace below it, (n,) [m].
@@ -99,12 +99,12 @@ class Alignment:
 
     @property
     def stretch(self) -> float:
-        """Relative difference in length of the second trace for the same surface."""
+        """Relative difference between the lengths of the second and the first trace of the same surface."""
         return float(self.state[Parameter.STRETCH])
 
     @property
     def bend(self) -> float:
-        """Sag [m] of the second datum over the common length, which is subtracted."""
+        """Sag [m] of the second datum over the common length; it is subtracted."""
         return float(self.state[Parameter.BEND]) * (np.ptp(self.x) / 2 / self.half) ** 2
 
     @cached_property
@@ -131,7 +131,7 @@ class Alignment:
 
     @property
     def agreed_fraction(self) -> float:
-        """Fraction of the heights that agree in both traces: the larger of this and the rival floor."""
+        """Fraction of the heights that agree in both traces, on this floor or on the rival one."""
         other = self if self.rival is None else self.rival
         return float(max(self.unworn.mean(), other.unworn.mean()))
 
@@ -152,7 +152,7 @@ class Alignment:
         return self.middle + (place - self.middle) / (1 + self.stretch) - self.shift
 
     def has_unworn_ends(self) -> tuple:
-        """Whether the first and the last twentieth of the trace are unworn."""
+        """Return whether the first and the last twentieth of the trace are unworn."""
         count = max(int(LONG_FLANK * self.x.size), min(40, self.x.size // 4))
         return tuple(
             bool(self.unworn[part].mean() > MIN_UNWORN_FRACTION)
@@ -184,14 +184,14 @@ def align(before: Profile, after: Profile, shift: float, is_straight: bool = Fal
     """
     model = TraceModel(before, after, shift)
     thin = model.thin(N_THINNED)
-    found = _choose_floor(
+    floor = _choose_floor(
         find_floors(thin, model.start(shift), list(STRAIGHT_PARAMETERS), [0, 1]), thin
     )
-    if found is None:
+    if floor is None:
         raise PatchfemError(f"{after.source}: no heights of this trace agree with {before.source}")
-    model.smooth_slope(found.scale)
+    model.smooth_slope(floor.scale)
     thin.slope = model.slope
-    best = _fit_all_heights(model, found.state, STRAIGHT_PARAMETERS)
+    best = _fit_all_heights(model, floor.state, STRAIGHT_PARAMETERS)
     if is_straight:
         return replace(_align_straight_datum(model, best), is_straight=True)
     bent = _choose_floor(
@@ -205,7 +205,7 @@ def align(before: Profile, after: Profile, shift: float, is_straight: bool = Fal
 
 
 def _choose_floor(floors: list, model):
-    """Choose the unworn floor: small scale, an unworn end, few heights above it, many on it."""
+    """Choose the unworn floor: quiet, with an unworn end, few heights above it and many on it."""
     known = [floor for floor in floors if floor.unworn >= MIN_UNWORN] or floors
     if not known:
         return None
@@ -215,15 +215,15 @@ def _choose_floor(floors: list, model):
     def rank(floor) -> tuple:
         depth, _ = model.linearize(floor.state)
         count = max(int(LONG_FLANK * depth.size), 4)
-        on = np.abs(depth) <= MAX_UNWORN * floor.scale
-        has_end = max(on[:count].mean(), on[-count:].mean()) > MIN_UNWORN_FRACTION
+        is_on_floor = np.abs(depth) <= MAX_UNWORN * floor.scale
+        has_end = max(is_on_floor[:count].mean(), is_on_floor[-count:].mean()) > MIN_UNWORN_FRACTION
         return not has_end, round(floor.grown, 1), -floor.unworn
 
     return min(quiet, key=rank)
 
 
 def _fit_all_heights(model, state, free) -> Alignment:
-    """Fit the chosen floor to all heights but the worn parts, until these stay the same.
+    """Fit the chosen floor to all heights outside the worn parts, until these no longer change.
 
     Then the worn parts are widened to the ends of their flanks, and the fit is repeated.
     """
@@ -245,7 +245,7 @@ def _fit_all_heights(model, state, free) -> Alignment:
 
 
 def _make_alignment(model, state, free, scale: float, worn) -> Alignment:
-    """Make the alignment at parameters `state`, and select the heights that show the datum drift."""
+    """Make the alignment for given parameters, and select the heights that show the drift of the datum."""
     depth, jacobian = model.linearize(state)
     unworn = (np.abs(depth) <= MAX_UNWORN * scale) & ~worn
     clear = unworn.copy()
@@ -271,7 +271,7 @@ def _make_alignment(model, state, free, scale: float, worn) -> Alignment:
 
 
 def find_worn_samples(depth, scale: float) -> np.ndarray:
-    """Find the worn heights, (n,) bool, by single heights, running means of 4 and 16, and boxes.
+    """Find the worn heights (n,) bool by single heights, running means of 4 and 16, and boxes.
 
     A box over some of 60 parts of the trace shows a track that is shallower than the noise.
     """
@@ -329,10 +329,10 @@ def find_shallow_track(depth, scale: float) -> tuple:
     means = means - boxes.datum @ (boxes.datum.T @ means)
     heights = boxes.shapes @ means
     best = int(np.argmax(heights))
-    left = means - heights[best] * boxes.shapes[best]
+    residual = means - heights[best] * boxes.shapes[best]
     freedom = N_PARTS - DATUM_DEGREE - 4
-    correlation = correlation_length(left, np.ones(N_PARTS, bool))
-    spread = float(np.sqrt(left @ left / freedom * correlation))
+    correlation = correlation_length(residual, np.ones(N_PARTS, bool))
+    spread = float(np.sqrt(residual @ residual / freedom * correlation))
     spread = max(spread, 1e-3 * scale)
     third = boxes.spans.index((N_PARTS // 3, N_PARTS - N_PARTS // 3))
     threshold = MIN_STEP * spread / float(boxes.sizes[third])
@@ -380,25 +380,25 @@ def _fit_line_through_ends(
         state, scale = fit_biweight(model, state, list(STRAIGHT_PARAMETERS), worn, rounds=20)
         depth, _ = model.linearize(state)
         worn = widen_to_flank_ends(depth, scale, find_worn_samples(depth, scale))
-    found = _make_alignment(model, state, STRAIGHT_PARAMETERS, scale, worn)
-    return found if found.unworn[ends].mean() >= MIN_UNWORN_FRACTION else None
+    alignment = _make_alignment(model, state, STRAIGHT_PARAMETERS, scale, worn)
+    return alignment if alignment.unworn[ends].mean() >= MIN_UNWORN_FRACTION else None
 
 
 def _are_straight(depth, ends) -> bool:
-    """Whether both ends follow the common line, with allowance for correlated noise."""
+    """Return whether both ends follow the common line, with allowance for correlated noise."""
     for part in np.split(np.flatnonzero(ends), 2):
-        rest = depth[part]
+        depths = depth[part]
         base = np.linalg.qr(np.vander(np.linspace(-1, 1, part.size), 3, True))[0]
-        own = base.T @ rest
-        left = rest - base @ own
-        correlation = correlation_length(left, np.ones(part.size, bool))
-        if own @ own > MAX_CHI2 * correlation * float(np.mean(left**2)):
+        coefficients = base.T @ depths
+        residual = depths - base @ coefficients
+        correlation = correlation_length(residual, np.ones(part.size, bool))
+        if coefficients @ coefficients > MAX_CHI2 * correlation * float(np.mean(residual**2)):
             return False
     return True
 
 
 def _check_for_wide_scar(model, best: Alignment) -> Alignment:
-    """Return the alignment on a line through both ends if a wide scar is possible, too."""
+    """Return the alignment on a line through both ends if a wide scar is also possible."""
     count = max(int(0.005 * best.depth.size), 12)
     ends = [
         float(np.median(best.depth[part])) / best.noise
@@ -417,7 +417,7 @@ def _check_for_wide_scar(model, best: Alignment) -> Alignment:
 
 
 def _align_straight_datum(model, best: Alignment) -> Alignment:
-    """Align traces of a straight datum, where short flanks on a common line count as unworn."""
+    """Align traces whose datum is straight, where short flanks on a common line count as unworn."""
     line = _fit_line_through_ends(
         model, best, model.start(model.guess), RIGID_PARAMETERS, SHORT_FLANK
     )

@@ -14,6 +14,7 @@ from ..quantity import SIDE, Quantity, make_quantity, make_unknown
 from ..roughness.spectrum import BAND
 from ..scans.change import Change, compare_scans
 from .alignment import Alignment
+from .ambiguity import BENT_DATUM_HEADLINE, Ambiguity, find_ambiguity, find_worn_flanks
 from .flanks import Flanks, find_flanks
 from .gain import find_gain
 from .model import Parameter
@@ -31,7 +32,6 @@ from .ratios import (
     resample,
     widen_ratio,
 )
-from .readings import BENT_DATUM_HEADLINE, Reading, find_ambiguity, find_worn_flanks
 from .reference import Reference, cut_at_wear, find_reference, has_grown, limit_hidden_wear
 from .search import Match
 from .section import Section
@@ -77,7 +77,7 @@ N_SPECK_ROUNDS = 2
 
 
 class Ratios(NamedTuple):
-    """Ratios after / before wear of amplitude and slope; `Size` of both surfaces, () if unknown."""
+    """Ratios of amplitude and slope after wear to before; `Size` of both surfaces, () if unknown."""
 
     amplitude: Quantity
     slope: Quantity
@@ -118,7 +118,7 @@ class Comparison:
     - change: changes between two scans, None for traces.
     - detection_limit: depth [m] from which a track would have been found, where none was, or
       None.
-    - ambiguity: readings that explain both traces equally well, "" where there is a single one.
+    - ambiguity: interpretations that explain both traces equally well, "" if there is only one.
     """
 
     before: Profile | Areal
@@ -213,7 +213,7 @@ def compare_traces(
     traces = (before, after) if keep_spikes else (remove_spikes(before), remove_spikes(after))
     place = find_place(*traces, shift, is_straight=is_straight)
     if place.alignment is None:
-        return _check_flanks(_compare_apart(place, direction), shift, is_straight)
+        return _check_flanks(_compare_separate(place, direction), shift, is_straight)
     if not keep_spikes:
         place = _remove_specks(place, is_straight)
     heights = after.z[::-1] if place.is_mirrored else after.z
@@ -221,12 +221,12 @@ def compare_traces(
 
 
 def _name_track_sizes(sizes) -> dict:
-    """Return the dimensions of a track by their names in a comparison."""
+    """Return the dimensions of a track by the names that they have in a comparison."""
     return {f"track_{name.removesuffix('_mean')}": size for name, size in sizes.items()}
 
 
 def are_identical(before, after) -> bool:
-    """Whether two surfaces have equal heights at equal positions, as if a file was given twice."""
+    """Return whether two surfaces have equal heights at equal positions, as if a file was given twice."""
     if type(before) is not type(after):
         return False
     names = [name for name in "xyz" if hasattr(before, name)]
@@ -241,7 +241,7 @@ def _count_removed(place: Place) -> tuple:
 
 
 def _remove_specks(place: Place, is_straight: bool) -> Place:
-    """Align the traces again without specks."""
+    """Remove the specks of two traces, and align the traces again."""
     for _ in range(N_SPECK_ROUNDS):
         before, after = remove_specks(place.alignment, place.before, place.after)
         if before is place.before and after is place.after:
@@ -260,7 +260,7 @@ class _Wear(NamedTuple):
     tracks: Tracks
     reference: Reference
     hidden: Quantity
-    reading: Reading
+    ambiguity: Ambiguity
     has_grown: bool
     is_exchanged: bool
 
@@ -279,7 +279,7 @@ def _compare_aligned(place: Place, heights, direction: str) -> Comparison:
     left_out = limit_left_out_wear(alignment, section, before, after, heights)
     wear = _measure_wear(alignment, section, left_out)
     is_unchanged = not wear.reference.kind and not wear.has_grown
-    needs_limit = is_unchanged and not wear.reading.headline
+    needs_limit = is_unchanged and not wear.ambiguity.headline
     step = _common_step(before, after)
     notes = [*_note_steps(before, after), *_note_stretch(alignment)]
     return Comparison(
@@ -289,7 +289,7 @@ def _compare_aligned(place: Place, heights, direction: str) -> Comparison:
         basis="place",
         motion=_measure_motion(alignment),
         worn=wear.worn,
-        ratios=_divide_aligned(alignment, wear.tracks, step),
+        ratios=_compute_aligned_ratios(alignment, wear.tracks, step),
         match=place.match,
         alignment=alignment,
         notes=tuple(notes),
@@ -301,23 +301,23 @@ def _compare_aligned(place: Place, heights, direction: str) -> Comparison:
         is_mirrored=place.is_mirrored,
         gain=find_gain(alignment) if is_unchanged else None,
         detection_limit=alignment.detection_limit if needs_limit else None,
-        ambiguity=wear.reading.headline,
+        ambiguity=wear.ambiguity.headline,
     )
 
 
 def _measure_wear(alignment: Alignment, section: Section, left_out: float) -> _Wear:
-    """Measure worn depth and tracks of aligned traces, or give the reason why they are unknown.
+    """Measure worn depth and tracks of aligned traces, or state why they are unknown.
 
     left_out [m2]: area of the dips that were left out (`limit_left_out_wear`).
     """
     reference = find_reference(alignment, section)
     grew = has_grown(alignment, section)
-    reading = find_ambiguity(
+    ambiguity = find_ambiguity(
         alignment,
         is_referenced=bool(reference.kind),
         is_changed=bool(reference.kind) or grew,
     )
-    if reading.headline:
+    if ambiguity.headline:
         reference = reference._replace(kind="")
     tracks = measure_tracks(alignment, section, BAND[1]) if reference.kind else NO_TRACKS
     worn = measure_worn(alignment, section, tracks, left_out)
@@ -327,14 +327,14 @@ def _measure_wear(alignment: Alignment, section: Section, left_out: float) -> _W
     hidden = limit_hidden_wear(alignment, reference)
     if not reference.kind:
         tracks = NO_TRACKS
-        reason = reading.reason or (
+        reason = ambiguity.reason or (
             "no part of the traces is known to be unworn, so uniform, wedge-shaped or bow-shaped wear cannot be "
             "told from no wear"
         )
         worn = make_unknown_worn(reason, worn.deposited if grew else 0.0)
     is_worn = (worn.mean.low or 0.0) > 0
-    is_exchanged = not reading.headline and is_mostly_deposit and grew and not is_worn
-    return _Wear(worn, tracks, reference, hidden, reading, grew, is_exchanged)
+    is_exchanged = not ambiguity.headline and is_mostly_deposit and grew and not is_worn
+    return _Wear(worn, tracks, reference, hidden, ambiguity, grew, is_exchanged)
 
 
 def _measure_motion(alignment: Alignment) -> Motion:
@@ -356,8 +356,8 @@ def _refuse_motion(reason: str) -> Motion:
     )
 
 
-def _divide_aligned(alignment: Alignment, tracks: Tracks, step: float) -> Ratios:
-    """Divide the amplitudes and slopes of aligned traces, without the edges of the tracks.
+def _compute_aligned_ratios(alignment: Alignment, tracks: Tracks, step: float) -> Ratios:
+    """Compute the ratios of amplitude and slope of aligned traces, excluding the edges of tracks.
 
     The difference between the ratios with and without the form of the tracks widens the intervals.
     """
@@ -393,7 +393,7 @@ def _divide_aligned(alignment: Alignment, tracks: Tracks, step: float) -> Ratios
     return Ratios(*ratios, flat_sizes)
 
 
-def _compare_apart(place: Place, direction: str) -> Comparison:
+def _compare_separate(place: Place, direction: str) -> Comparison:
     """Compare two traces that have no part of the surface in common."""
     before = place.before
     after = place.after
@@ -427,7 +427,7 @@ def _compare_apart(place: Place, direction: str) -> Comparison:
         basis="" if flanks is None else "flanks",
         motion=_refuse_motion(reason),
         worn=worn,
-        ratios=_divide_apart(sizes),
+        ratios=_compute_separate_ratios(sizes),
         match=place.match,
         flanks=flanks,
         notes=tuple(notes),
@@ -438,7 +438,7 @@ def _compare_apart(place: Place, direction: str) -> Comparison:
     )
 
 
-def _divide_apart(sizes: tuple) -> Ratios:
+def _compute_separate_ratios(sizes: tuple) -> Ratios:
     """Return the ratios of amplitude and slope of two traces from different parts of a surface."""
     before, after = sizes
     amplitude = divide_sizes("amplitude", AMPLITUDE, after, before)
@@ -451,7 +451,7 @@ def _check_flanks(comparison: Comparison, shift: float | None, is_straight: bool
     shift [m]: known shift between the traces; None takes that of a clear match.
     """
     match = comparison.match
-    if shift is None and match is not None and not match.is_ambiguous and match.is_clear:
+    if shift is None and match is not None and not match.is_ambiguous and match.is_significant:
         shift = match.shift
     flanks = comparison.flanks
     if flanks is None or shift is None:
@@ -472,12 +472,12 @@ def _check_flanks(comparison: Comparison, shift: float | None, is_straight: bool
 
 
 def _common_step(before: Profile, after: Profile) -> float:
-    """Return the coarser of the steps [m] of two traces."""
+    """Return the coarser sampling interval [m] of two traces."""
     return max(resample_evenly(before).step, resample_evenly(after).step)
 
 
 def _note_steps(before: Profile, after: Profile) -> list:
-    """Collect the notes of two traces, and add one where their steps differ."""
+    """Collect the notes of two traces, and add one if their sampling intervals differ."""
     steps = [resample_evenly(trace).step for trace in (before, after)]
     notes = [*before.notes, *after.notes]
     if max(steps) > 1.01 * min(steps):
@@ -511,7 +511,7 @@ def _pool_with_scatter(pieces: list, step: float) -> Size:
     """Pool like `_pool`, but limit the degrees of freedom by the scatter along the trace."""
     size = _pool(pieces, step)
     scatter = np.sum([estimate_freedom(piece, step, BAND) for piece in pieces], axis=0)
-    freedom = tuple(min(own, other) for own, other in zip(size.freedom, scatter))
+    freedom = tuple(min(value, limit) for value, limit in zip(size.freedom, scatter))
     return size._replace(freedom=freedom)
 
 
@@ -576,7 +576,9 @@ def compare_waves(scans: tuple, filled: tuple, direction: str) -> Comparison:
     """
     reason = "areal scans are compared point by point in x and y together"
     try:
-        ratios = _divide_apart(tuple(measure_scan_size(*scan, direction, BAND) for scan in filled))
+        ratios = _compute_separate_ratios(
+            tuple(measure_scan_size(*scan, direction, BAND) for scan in filled)
+        )
     except PatchfemError as error:  # a scan may be too short for the longest waves of the band
         unknown = [make_unknown("1", text, str(error)) for text in (AMPLITUDE, SLOPE)]
         ratios = Ratios(*unknown, ())

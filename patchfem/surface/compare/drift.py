@@ -35,7 +35,7 @@ JITTER = 1e-8
 
 
 class Parts(NamedTuple):
-    """Parts of a trace, whose unworn heights are averaged.
+    """Parts of a trace in which the unworn heights are averaged.
 
     - edges: first sample of each part, and the number of samples, (k + 1,) int.
     - unworn: heights that are averaged, (n,) bool.
@@ -50,7 +50,7 @@ class Parts(NamedTuple):
 
     @property
     def middles(self) -> np.ndarray:
-        """Middles (k,) of the parts, as fractions of the trace."""
+        """Centres (k,) of the parts, as fractions of the trace."""
         return (self.edges[1:] + self.edges[:-1]) / 2 / self.edges[-1]
 
     def average(self, values) -> np.ndarray:
@@ -59,7 +59,7 @@ class Parts(NamedTuple):
         return sums[..., self.known] / self.count[self.known]
 
     def interpolate(self, values) -> np.ndarray:
-        """Interpolate values (..., k) at the middles to all heights (..., n)."""
+        """Interpolate values (..., k) at the centres of the parts to all heights (..., n)."""
         place = (np.arange(self.edges[-1]) + 0.5) / self.edges[-1]
         after = np.clip(np.searchsorted(self.middles, place), 1, self.middles.size - 1)
         width = self.middles[after] - self.middles[after - 1]
@@ -68,7 +68,7 @@ class Parts(NamedTuple):
 
 
 class Drift(NamedTuple):
-    """Linear prediction of a drift, and drawn drifts.
+    """Linear prediction of a drift, and random drifts.
 
     - smoother: matrix from the means of the known parts to datum and drift of all parts, (k,
       known).
@@ -80,7 +80,7 @@ class Drift(NamedTuple):
     draws: np.ndarray
 
     def remove(self, values) -> np.ndarray:
-        """Subtract from values (..., n) the datum and drift predicted from their means."""
+        """Subtract datum and drift, predicted from the means of the parts, from values (..., n)."""
         return values - self.parts.interpolate(self.parts.average(values) @ self.smoother.T)
 
 
@@ -100,7 +100,7 @@ class _Covariance(NamedTuple):
 
 
 def split_parts(unworn) -> Parts:
-    """Split a trace into parts, and find those with enough unworn heights (n,) bool."""
+    """Split a trace into parts, and find those with enough unworn heights."""
     n_parts = int(np.clip(unworn.size // MIN_HEIGHTS, 3, N_PARTS))
     edges = part_edges(unworn.size, n_parts)
     count = np.add.reduceat(unworn.astype(float), edges[:-1])
@@ -153,7 +153,7 @@ def model_drift(depth, unworn, degree: int, n_draws: int, random) -> Drift | Non
 
 
 def _matern(distance, root: float, length: float) -> np.ndarray:
-    """Return the Matern correlation of smoothness root / 2 at distances / length of the trace."""
+    """Return the Matern correlation of smoothness root / 2 at distances relative to the trace length."""
     scaled = np.sqrt(root) * distance / length
     polynomial = {1.0: 1.0, 3.0: 1 + scaled, 5.0: 1 + scaled + scaled**2 / 3}[root]
     return polynomial * np.exp(-scaled)
@@ -169,7 +169,7 @@ def _distances(places, other) -> np.ndarray:
 
 
 def _fit_covariances(centres, means, noise, degree: int) -> list:
-    """Fit the variance of each covariance of the grid by restricted likelihood.
+    """Fit the variance of each covariance of the grid by restricted maximum likelihood.
 
     The logarithms of the weights are relative to the largest one. No drift (ratio 0) counts once for
     each smoothness and range, as any other ratio does.
@@ -223,7 +223,7 @@ def _predict(covariance: _Covariance, centres, places, noise, degree: int) -> np
 
 
 def _draw_drift(covariance: _Covariance, places, freedom: int, count: int, random) -> np.ndarray:
-    """Draw drifts (count, m) [m] at positions (m,); the variance is scaled inverse chi-squared."""
+    """Draw random drifts (count, m) [m] at positions (m,); the variance is scaled inverse chi-squared."""
     root, length, ratio = covariance[:3]
     correlation = _matern(_distances(places, places), root, length)
     factor = np.linalg.cholesky(correlation + JITTER * np.eye(places.size))

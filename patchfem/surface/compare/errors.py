@@ -22,7 +22,7 @@ SEED = 1989
 
 
 class DrawnErrors(NamedTuple):
-    """Drift of the datum and drawn errors of the depth.
+    """Predicted drift of the datum and random errors of the depth.
 
     - drift: predicted drift, which is subtracted from the depth, (n,) [m].
     - depth: errors of the depth without the drift, (draws, n) [m].
@@ -60,10 +60,10 @@ def estimate_noise(depth, unworn, slope, curvature, min_noise: float) -> np.ndar
     variance = np.full(depth.size, start)
     for _ in range(3):
         weight = 1 / variance[used]
-        found = nnls(
+        coefficients = nnls(
             columns[used] * weight[:, None], depth[used] ** 2 * weight / TRUNCATED_VARIANCE
         )[0]
-        variance = np.maximum(columns @ found, min_noise**2)
+        variance = np.maximum(columns @ coefficients, min_noise**2)
         used = unworn & (depth**2 <= (MAX_UNWORN + 0.5) ** 2 * variance)
         if used.sum() < 30:
             break
@@ -104,7 +104,7 @@ def correlation_length(values, present, longest: int | None = None) -> float:
 
 
 def draw_blocks(values, length: int, count: int) -> np.ndarray:
-    """Draw series (draws, count) from blocks of consecutive values (moving-block bootstrap)."""
+    """Draw random series (draws, count) from blocks of consecutive values (moving-block bootstrap)."""
     random = np.random.default_rng(SEED)
     length = min(max(length, 1), values.size)
     n_blocks = -(-count // length)
@@ -115,7 +115,7 @@ def draw_blocks(values, length: int, count: int) -> np.ndarray:
 
 
 def block_length(correlation: float, count: int) -> int:
-    """Return the block length, of order count^(1/3).
+    """Return the block length of a bootstrap, of order count^(1/3).
 
     It is twice the length of least mean square error, as intervals suffer more from blocks that are
     too short (variance too small) than from few blocks (`student_factor`).
@@ -124,14 +124,14 @@ def block_length(correlation: float, count: int) -> int:
 
 
 def student_factor(blocks: float) -> float:
-    """Return the ratio of Student's interval for a number of blocks to the normal interval."""
+    """Return the ratio of the interval of Student's t for a number of blocks to the normal interval."""
     from scipy.special import stdtrit
 
     return float(stdtrit(max(blocks - 1, 1.0), (1 + LEVEL) / 2)) / SIDE
 
 
 def draw_errors(depth, noise, unworn, clear, jacobian, degree: int) -> DrawnErrors:
-    """Predict the drift of the datum, and draw the errors of the remaining depth.
+    """Predict the drift of the datum, and draw random errors of the remaining depth.
 
     Parameters
     ----------
@@ -166,10 +166,10 @@ def draw_errors(depth, noise, unworn, clear, jacobian, degree: int) -> DrawnErro
 
 def _propagate_to_parameters(errors, noise, unworn, jacobian) -> np.ndarray:
     """Return the changes (draws, k) of the fitted parameters due to depth errors (draws, n) [m]."""
-    off = errors[:, unworn] / noise[unworn] / BIWEIGHT
-    inside = np.clip(1 - off**2, 0, None)
-    influence = BIWEIGHT * off * inside**2
-    sensitivity = float((inside * (1 - 5 * off**2)).mean())
+    relative = errors[:, unworn] / noise[unworn] / BIWEIGHT
+    inside = np.clip(1 - relative**2, 0, None)
+    influence = BIWEIGHT * relative * inside**2
+    sensitivity = float((inside * (1 - 5 * relative**2)).mean())
     part = jacobian[unworn] / noise[unworn][:, None]
     size = np.sqrt((part**2).sum(axis=0))
     size = np.where(size > 0, size, 1.0)

@@ -28,7 +28,7 @@ MIN_CLEARANCE = 1.2
 
 
 class Interval(NamedTuple):
-    """Value and bounds of its interval."""
+    """Value with the bounds of its interval."""
 
     value: float
     low: float
@@ -73,7 +73,7 @@ class _Track(NamedTuple):
 
 
 def find_flanks(before: Profile, after: Profile) -> Flanks | None:
-    """Find the wear track in the second trace; None if nothing exceeds the roughness.
+    """Find the wear track in the second trace; return None if nothing exceeds the roughness.
 
     A line with a box (a rectangular track) is fitted to the means of 40 parts, for every box that leaves a
     tenth of the trace on either side. The best box is a track if it is deeper than in all random traces
@@ -134,9 +134,11 @@ def _draw_traces(spectrum, second: Profile) -> np.ndarray:
     count = second.x.size
     if not spectrum.density.any():
         return np.zeros((0, count))
-    made = simulate_traces(spectrum, Heights(second.z, second.step), None)
+    simulated = simulate_traces(spectrum, Heights(second.z, second.step), None)
     places = np.linspace(0, 1, count)
-    return np.array([np.interp(places, np.linspace(0, 1, trace.z.size), trace.z) for trace in made])
+    return np.array(
+        [np.interp(places, np.linspace(0, 1, trace.z.size), trace.z) for trace in simulated]
+    )
 
 
 def _fit_line(x, z) -> tuple:
@@ -161,7 +163,7 @@ def _smooth(depth) -> np.ndarray:
 
 
 def _find_span(depth, box: tuple) -> slice:
-    """Find the samples of the track: from its deepest point to where the running mean is zero."""
+    """Find the samples of the track, from its deepest point to where the running mean is zero."""
     edges = part_edges(depth.size, PARTS)
     smooth = _smooth(depth)
     # A running mean this small is zero apart from rounding.
@@ -174,7 +176,7 @@ def _find_span(depth, box: tuple) -> slice:
 
 
 def _measure_flanks(second: Profile, box: tuple, traces) -> Flanks:
-    """Measure a track; its intervals come from copies of it that are cut into random traces."""
+    """Measure a track; its confidence intervals come from copies of it in random traces."""
     x = second.x
     step = second.step
     track = _find_track(x, second.z, box)
@@ -187,16 +189,16 @@ def _measure_flanks(second: Profile, box: tuple, traces) -> Flanks:
         shape[track.span] = np.maximum(_smooth(track.depth)[track.span], 0)
         sums = [_find_track(x, z - shape, box).sum_and_peak()[0] for z in traces[:N_DRAWS]]
         errors = np.array(sums) * step - float(shape.sum()) * step
-        tail = (1 - LEVEL) / 2
+        tail_probability = (1 - LEVEL) / 2
         median = float(np.median(errors))
         low, high = median + SPECTRUM_ERROR_FACTOR * (
-            np.quantile(errors, (tail, 1 - tail)) - median
+            np.quantile(errors, (tail_probability, 1 - tail_probability)) - median
         )
         area_interval = Interval(
             area, float(np.clip(area - high, 0.0, area)), float(max(area - low, area))
         )
         # The highest or lowest point of the roughness may lie anywhere in the track.
-        error = float(np.quantile(np.abs(traces[:, track.span]).max(axis=1), 1 - tail))
+        error = float(np.quantile(np.abs(traces[:, track.span]).max(axis=1), 1 - tail_probability))
         largest = Interval(peak, max(peak - error, 0.0), peak + error)
     start = float(x[track.span.start])
     end = float(x[track.span.stop - 1])

@@ -31,7 +31,7 @@ class _Windows(NamedTuple):
 
 
 class _Group(NamedTuple):
-    """Samples of a window, and the depths evaluated from it with their rows of its parabolas."""
+    """Samples of a window, and the depths evaluated from its parabola with their rows of coefficients."""
 
     samples: slice
     members: np.ndarray
@@ -162,7 +162,7 @@ def _parabolas(length: int) -> np.ndarray:
 
 
 def _fit_windows(depth, noise, correlation: float) -> _Windows:
-    """Find the longest window around each depth that a parabola fits, at least a single sample.
+    """Find the longest window around each depth that a parabola fits; it may be a single sample.
 
     Of the windows of a length, the one with the nearest middle is taken. A depth is read from the half
     of the window around it.
@@ -193,7 +193,7 @@ def _fit_windows(depth, noise, correlation: float) -> _Windows:
 
 
 def _fits_parabola(windows, noise, correlation: float) -> np.ndarray:
-    """Return which windows (m, length) a parabola fits within the noise (m, length)."""
+    """Return which windows (m, length) a parabola fits to within the noise (m, length)."""
     length = windows.shape[1]
     base = _parabolas(length)
     residual = windows - (windows @ base) @ base.T

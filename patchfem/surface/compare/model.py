@@ -78,7 +78,7 @@ class TraceModel:
         self.middle = float(self.x[inside][0] + self.x[inside][-1]) / 2
 
     def start(self, shift: float) -> np.ndarray:
-        """Return a parameter vector in which only the shift [m] is not zero."""
+        """Return a parameter vector that is zero except for the shift [m]."""
         return np.array([0.0, 0.0, shift, 0.0, 0.0])
 
     def places(self, state) -> np.ndarray:
@@ -109,7 +109,7 @@ class TraceModel:
         return depth, np.column_stack(columns)
 
     def limit_step(self, step, free) -> np.ndarray:
-        """Limit a step of shift and stretch so no height moves by more than a few samples."""
+        """Limit a step of shift and stretch so that no height moves by more than a few samples."""
         limits = {
             Parameter.SHIFT: MAX_STEP * self.step,
             Parameter.STRETCH: MAX_STEP * self.step / self.half,
@@ -137,14 +137,14 @@ class TraceModel:
 
         rough = float(np.std(savgol_filter(self.before.z, 5, 2, 1, delta=self.step)))
         ratio = scale / (self.step * SLOPE_NOISE * max(rough, 1e-300))
-        wanted = (6 * ratio**2) ** (1 / 3)
-        count = int(np.clip(2 * np.ceil(wanted / 2) + 1, 3, MAX_WINDOW))
+        min_samples = (6 * ratio**2) ** (1 / 3)
+        count = int(np.clip(2 * np.ceil(min_samples / 2) + 1, 3, MAX_WINDOW))
         count = min(count, self.before.z.size // 2 * 2 - 1)
         smooth = savgol_filter(self.before.z, count, 2, 1, delta=self.step)
         self.slope = lambda at: np.interp(at, self.before.x, smooth)
 
     def cut(self, state) -> "TraceModel":
-        """Return the model of only those samples that overlap the first trace at parameters `state`."""
+        """Return the model restricted to the samples that overlap the first trace at parameters `state`."""
         inside = self.overlap(self.places(state))
         out = copy(self)
         out.x = self.x[inside]
@@ -153,9 +153,9 @@ class TraceModel:
         return out
 
     def thin(self, count: int) -> "TraceModel":
-        """Return the model with about `count` evenly chosen samples of the second trace."""
-        every = max(self.x.size // count, 1)
+        """Return the model restricted to about `count` evenly spaced samples of the second trace."""
+        stride = max(self.x.size // count, 1)
         out = copy(self)
-        out.x = self.x[::every]
-        out.z = self.z[::every]
+        out.x = self.x[::stride]
+        out.z = self.z[::stride]
         return out

@@ -90,7 +90,7 @@ def find_place(
     place = place._replace(before=before, after=after)
     if place.alignment is not None or shift is not None:
         return place
-    if place.match.is_ambiguous and place.match.is_clear:
+    if place.match.is_ambiguous and place.match.is_significant:
         return place
     x = frozen_array(after.x[0] + after.x[-1] - after.x[::-1])
     mirrored = replace(after, x=x, z=frozen_array(after.z[::-1]))
@@ -127,7 +127,7 @@ def _search_place(before: Profile, after: Profile, is_straight: bool) -> _Candid
         alignment = _align_at_match(before, after, match, is_straight)
     if alignment is None:
         parts = search_shift_in_parts(before, after)
-        if parts is not None and parts.is_clear and not parts.is_ambiguous:
+        if parts is not None and parts.is_significant and not parts.is_ambiguous:
             match = parts
             alignment = _align_at_match(before, after, parts, is_straight)
     return _Candidate(match, alignment, valleys)
@@ -156,7 +156,7 @@ def _align_at_match(
 
 
 def _align_at_mark(before: Profile, after: Profile, shift: float, is_straight: bool) -> Place:
-    """Align two traces at a known shift [m], or state the reason why they do not agree near it."""
+    """Align two traces at a known shift [m], or state why they do not agree there."""
     start = f"at the given shift of {format_length(shift)}, "
     alignment = try_align(before, after, shift, is_straight)
     if alignment is None:
@@ -177,7 +177,7 @@ def _align_at_mark(before: Profile, after: Profile, shift: float, is_straight: b
 
 
 def _has_enough_unworn(alignment: Alignment) -> bool:
-    """Whether enough heights agree for a reference: for a straight datum, more than two flanks."""
+    """Return whether enough heights agree for a reference: for a straight datum, more than two flanks."""
     return alignment.agreed_fraction > (2 * SHORT_FLANK if alignment.is_straight else MIN_UNWORN)
 
 
@@ -187,39 +187,39 @@ def _rms_height(x, z) -> float:
 
 
 def _relative_noise(alignment: Alignment) -> float:
-    """Return the noise over the root mean square height of the first trace."""
+    """Return the ratio of the noise to the root mean square height of the first trace."""
     return alignment.noise / _rms_height(alignment.x, alignment.first)
 
 
 def _is_same_place(alignment: Alignment, match: Match) -> bool:
-    """Whether enough unworn heights agree closely enough for a common part of the surface."""
+    """Return whether enough unworn heights agree closely enough for a common part of the surface."""
     if _agrees_closely(alignment, match):
         return True
     is_quiet = _is_quiet(alignment, MAX_WHITE_NOISE) and _has_enough_unworn(alignment)
-    return match.is_clear and (is_quiet or _has_high_agreement(alignment))
+    return match.is_significant and (is_quiet or _has_high_agreement(alignment))
 
 
 def _has_high_agreement(alignment: Alignment) -> bool:
-    """Whether more heights agree than in traces of different surfaces."""
+    """Return whether more heights agree than in traces of different surfaces."""
     height = _rms_height(alignment.x, alignment.first)
     return alignment.agreed_fraction > MIN_AGREED and alignment.noise < MAX_AGREED_NOISE * height
 
 
 def _agrees_closely(alignment: Alignment, match: Match, max_height: float = np.inf) -> bool:
-    """Whether the traces agree so closely that they need not pass the test of white noise.
+    """Return whether the traces agree so closely that no test for white noise is needed.
 
     max_height [m] limits the height that the noise is compared with: the depth of a track does not
     count as roughness.
     """
     height = min(_rms_height(alignment.x, alignment.first), max_height)
-    is_close = alignment.noise < MAX_NOISE * height and match.is_clear
+    is_close = alignment.noise < MAX_NOISE * height and match.is_significant
     if not is_close:
         is_close = alignment.noise < MAX_LOW_NOISE * height and match.clearance > MIN_LOW_CLEARANCE
     return is_close and _has_enough_unworn(alignment)
 
 
 def _is_quiet(alignment: Alignment, max_white: float) -> bool:
-    """Whether the relative noise is below 10 %, or white and below a limit."""
+    """Return whether the relative noise is below 10 %, or white and below a limit."""
     noise = _relative_noise(alignment)
     if noise < MAX_NOISE:
         return True
@@ -228,17 +228,19 @@ def _is_quiet(alignment: Alignment, max_white: float) -> bool:
 
 
 def _is_reversed(before: Profile, after: Profile, match: Match) -> bool:
-    """Whether the traces match only if the second one was measured before wear.
+    """Return whether the traces match only in the reverse order, with the second one as the unworn trace.
 
     In this order wear alone must explain the difference, and in the given order neither end may be
     unworn, or the traces are too noisy for a match.
     """
-    if not match.is_clear or match.is_ambiguous:
+    if not match.is_significant or match.is_ambiguous:
         return False
-    back = try_align(after, before, -match.shift)
-    if back is None or not _agrees_closely(back, match, _rms_height(before.x, before.z)):
+    reversed_alignment = try_align(after, before, -match.shift)
+    if reversed_alignment is None or not _agrees_closely(
+        reversed_alignment, match, _rms_height(before.x, before.z)
+    ):
         return False
-    if not wear_balance(back) > MIN_WEAR_BALANCE:
+    if not wear_balance(reversed_alignment) > MIN_WEAR_BALANCE:
         return False
     alignment = try_align(before, after, match.shift)
     return alignment is None or not any(alignment.has_unworn_ends())
@@ -254,12 +256,12 @@ def _describe_noise(alignment: Alignment) -> str:
 
 def _describe_failure(before: Profile, after: Profile, match: Match, valleys: Match) -> str:
     """Describe why no common part was found and what the user can do."""
-    if valleys.is_ambiguous and valleys.is_clear and match is valleys:
+    if valleys.is_ambiguous and valleys.is_significant and match is valleys:
         return (
             f"the surface is periodic, with a period of {format_length(find_period(before, after))}, so shifts that are far "
             f"apart match equally well (correlations {valleys.correlation:.3f} and {valleys.second:.3f}); {USE_SAME_MARK}"
         )
-    if match.is_clear and not match.is_ambiguous:
+    if match.is_significant and not match.is_ambiguous:
         alignment = try_align(before, after, match.shift)
         if alignment is None:
             return f"at the most likely shift, {format_length(match.shift)}, hardly any heights are unworn"

@@ -220,7 +220,7 @@ class PredictedWear:
 
     @property
     def sentence(self) -> str:
-        """Sentence that says where the depths differ, and by how much."""
+        """Sentence that states where the depths differ, and by how much."""
         mean = float(self.depths.computed[self.on_patch].mean())
         text = (
             f"With a wear coefficient of {_format_coefficient(self.coefficient, self.history.coefficient)}, the "
@@ -242,7 +242,7 @@ class PredictedWear:
 
     @property
     def notes(self) -> tuple:
-        """Sentences about how far the fit can be trusted."""
+        """Sentences on the reliability of the fit."""
         out = []
         value = self.coefficient.value
         if self.is_extrapolated:
@@ -294,7 +294,7 @@ def fit_computed_wear(comparison: Comparison, history: WearHistory) -> Predicted
     others.append(_refine(near, history, opposite))
     _check_width(near, history, best, comparison)
     _check_ratio(best.ratio, history)
-    return _evaluate(near, history, best, others)
+    return _make_result(near, history, best, others)
 
 
 def _average_measured_depth(comparison: Comparison, width: float) -> MeasuredDepth:
@@ -350,7 +350,7 @@ def _average_computed_depth(history: WearHistory, edges, placement: Placement) -
 
 
 def _check_length(measured: MeasuredDepth, comparison: Comparison, history: WearHistory) -> None:
-    """Refuse traces that are too short for the patch, or show a track that is wider than it."""
+    """Refuse traces that are too short for the patch, or that show a track wider than it."""
     patch = 2 * history.half
     length = float(measured.edges[-1] - measured.edges[0])
     if length < MIN_OVERLAP * patch:
@@ -428,7 +428,7 @@ def _search_placements(measured: MeasuredDepth, history: WearHistory) -> tuple:
 def _refine(
     measured: MeasuredDepth, history: WearHistory, start: Placement, *, is_fixed: bool = False
 ) -> Placement:
-    """Refine coefficient and place of a placement by least squares; with `is_fixed` the place stays."""
+    """Refine the coefficient and the position by least squares; with `is_fixed`, the position is held."""
     from scipy.optimize import least_squares
 
     def make_placement(values) -> Placement:
@@ -446,7 +446,7 @@ def _refine(
 
 
 def _check_ratio(ratio: float, history: WearHistory) -> None:
-    """Refuse a measured depth that is far beyond that of the run, or before its first frame."""
+    """Refuse a measured depth that is much larger than that of the run, or lies before its first frame."""
     if history.work[1] <= ratio <= MAX_RATIO:
         return
     size = f"{ratio:.3g} times" if ratio > 1 else f"1/{1 / ratio:.3g} of"
@@ -467,15 +467,15 @@ class _Spread(NamedTuple):
     correlation: float
 
 
-def _evaluate(
+def _make_result(
     measured: MeasuredDepth,
     history: WearHistory,
     best: Placement,
     others: list,
 ) -> PredictedWear:
-    """Make the result of the best placement; the interval contains the placements that fit as well."""
+    """Make the result for the best placement; its interval contains the placements that fit as well."""
     computed = _average_computed_depth(history, measured.edges, best)
-    jacobian = _derive(measured, history, best)
+    jacobian = _compute_derivatives(measured, history, best)
     spread = _measure_spread(measured, computed, jacobian)
     final = _scale_last_depth(history)
     proportional = _refine(measured, final, best, is_fixed=True).ratio
@@ -541,14 +541,16 @@ def _check_width(
     if width is None or width.high is None or width.value is None:
         return
     computed = _average_computed_depth(history, measured.edges, best)
-    shown = float((computed > WORN_FRACTION * computed.max()).sum()) * measured.width
-    is_too_wide = width.value > MAX_WIDTH_RATIO * shown and best.ratio <= MAX_RATIO
-    if is_too_wide or width.value < shown / MAX_WIDTH_RATIO:
-        raise _refuse_width(width.value, shown, history)
+    computed_width = float((computed > WORN_FRACTION * computed.max()).sum()) * measured.width
+    is_too_wide = width.value > MAX_WIDTH_RATIO * computed_width and best.ratio <= MAX_RATIO
+    if is_too_wide or width.value < computed_width / MAX_WIDTH_RATIO:
+        raise _refuse_width(width.value, computed_width, history)
 
 
-def _derive(measured: MeasuredDepth, history: WearHistory, best: Placement) -> np.ndarray:
-    """Return the derivatives (b, 2) of the computed depth by ratio and by centre."""
+def _compute_derivatives(
+    measured: MeasuredDepth, history: WearHistory, best: Placement
+) -> np.ndarray:
+    """Return the derivatives (b, 2) of the computed depth with respect to ratio and centre."""
 
     def compute_depth(name: str, change: float) -> np.ndarray:
         placement = best._replace(**{name: getattr(best, name) + change})
@@ -561,12 +563,12 @@ def _derive(measured: MeasuredDepth, history: WearHistory, best: Placement) -> n
 
 
 def _project_out(draws, jacobian) -> np.ndarray:
-    """Return drawn errors (k, b) [m] without the part that coefficient and place take up."""
+    """Return random errors (k, b) [m] without the part that the fitted coefficient and position absorb."""
     return draws - draws @ np.linalg.pinv(jacobian).T @ jacobian.T
 
 
 def _measure_spread(measured: MeasuredDepth, computed, jacobian) -> _Spread:
-    """Measure the errors of ratio and centre from the draws and from the differences."""
+    """Estimate the errors of ratio and centre from the random errors and from the differences."""
     gain = np.linalg.pinv(jacobian)
     residual = measured.depth - computed
     worn = np.flatnonzero(computed > WORN_FRACTION * computed.max())
@@ -585,7 +587,7 @@ def _measure_spread(measured: MeasuredDepth, computed, jacobian) -> _Spread:
 
 
 def _sum_variance(terms, weights) -> float:
-    """Estimate the variance of the sum of correlated terms (b,), widened as Student's t asks.
+    """Estimate the variance of the sum of correlated terms (b,), widened by Student's t.
 
     The fit takes up about two correlation lengths of the terms, so the correlation length and the
     variance that the terms show are smaller than the true ones by the same part.
@@ -601,8 +603,8 @@ def _sum_variance(terms, weights) -> float:
     if not scale > 0:
         return 0.0
     count = float(weights.sum() ** 2 / (weights @ weights))
-    shown = max(correlation_length(terms / scale, np.ones(terms.size, bool)), 1.0)
-    correlation = shown / max(1 - 2 * shown / count, MIN_REMAINDER)
+    observed_length = max(correlation_length(terms / scale, np.ones(terms.size, bool)), 1.0)
+    correlation = observed_length / max(1 - 2 * observed_length / count, MIN_REMAINDER)
     variance = float(terms @ terms) * correlation / max(1 - 2 * correlation / count, MIN_REMAINDER)
     return student_factor(max(count / correlation - 2, MIN_BLOCKS)) ** 2 * variance
 
@@ -610,7 +612,7 @@ def _sum_variance(terms, weights) -> float:
 def _find_difference(
     x, measured: MeasuredDepth, computed, draws, history: WearHistory
 ) -> Difference | None:
-    """Find the part of the patch where both depths differ most, None where noise explains it.
+    """Find the part of the patch where both depths differ most; None if noise explains the difference.
 
     The sums over all parts, divided by the root of their length, are compared with those of the drawn
     errors (scan statistic).
@@ -620,11 +622,11 @@ def _find_difference(
     last = inside[-1] + 1
     residual = (measured.depth - computed)[first:last]
     if measured.draws.any():
-        peaks = [_scan(draw[first:last])[0] for draw in draws]
+        peaks = [_find_scan_maximum(draw[first:last])[0] for draw in draws]
         limit = float(np.quantile(peaks, LEVEL))
     else:
         limit = 0.0
-    peak, low, high = _scan(residual)
+    peak, low, high = _find_scan_maximum(residual)
     if peak <= limit:
         return None
     ends = sorted(float(end) for end in (x[first + low], x[first + high - 1]))
@@ -638,8 +640,8 @@ def _find_difference(
     )
 
 
-class _Scan(NamedTuple):
-    """Part with the largest sum divided by the root of its length.
+class _ScanMaximum(NamedTuple):
+    """Part with the largest sum divided by the square root of its length.
 
     - peak: this quotient.
     - low, high: first bin of the part, and the bin after its last one.
@@ -650,12 +652,12 @@ class _Scan(NamedTuple):
     high: int
 
 
-def _scan(values) -> _Scan:
-    """Find the part of values (b,) with the largest sum over the root of its length."""
+def _find_scan_maximum(values) -> _ScanMaximum:
+    """Find the part of values (b,) whose sum divided by the square root of its length is largest."""
     sums = np.concatenate([[0.0], np.cumsum(values)])
     lengths = np.arange(sums.size)
     distance = lengths[None, :] - lengths[:, None]
     scores = np.abs(sums[None, :] - sums[:, None]) / np.sqrt(np.maximum(distance, 1))
     scores[distance < 1] = 0.0
     low, high = np.unravel_index(int(np.argmax(scores)), scores.shape)
-    return _Scan(float(scores[low, high]), int(low), int(high))
+    return _ScanMaximum(float(scores[low, high]), int(low), int(high))

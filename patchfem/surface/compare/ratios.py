@@ -24,7 +24,7 @@ N_PARTS = 6  # number of parts of a trace whose mean squares show the scatter al
 
 
 class Size(NamedTuple):
-    """Amplitude in the band [m], rms slope [1], degrees of freedom of each, and spectrum."""
+    """Amplitude in the band [m], rms slope [1], the degrees of freedom of each, and the spectrum."""
 
     amplitude: float
     slope: float
@@ -54,7 +54,7 @@ def measure_size(trace: Profile, step: float, band: tuple = BAND) -> Size:
 
 
 def _measure_heights(z, step: float, band: tuple) -> Size:
-    """Measure levelled heights (n,) [m] at a step [m]."""
+    """Measure the amplitude and the slope of levelled heights (n,) [m] with a sampling interval [m]."""
     spectrum = estimate_spectrum(z, step)
     freedom = (1.0, 1.0)
     if spectrum.density.any():
@@ -65,7 +65,7 @@ def _measure_heights(z, step: float, band: tuple) -> Size:
 
 
 def resample(trace: Profile, step: float) -> tuple:
-    """Resample a trace to a step [m] if its step is smaller, and level it.
+    """Resample a trace to a sampling interval [m] unless its own is larger, and level it.
 
     Returns the heights (n,) [m] and their step.
     """
@@ -79,7 +79,7 @@ def resample(trace: Profile, step: float) -> tuple:
 
 
 def fill_scan(scan: Areal) -> tuple:
-    """Level a scan and fill its missing heights smoothly; returns it and a mask (m, n) of these."""
+    """Level a scan and fill its missing heights smoothly; return it with a mask (m, n) of these."""
     flat = level_plane(scan)
     return replace(flat, z=fill_missing(flat.z, flat.missing)), flat.missing
 
@@ -171,12 +171,17 @@ def divide_sizes(
     value = over[place] / under[place]
     first = over.freedom[place]
     second = under.freedom[place]
-    tail = (1 - LEVEL) / 2
+    tail_probability = (1 - LEVEL) / 2
     if correlation <= 0:
-        low, high = (1 / fdtri(first, second, p) for p in (1 - tail, tail))
+        low, high = (1 / fdtri(first, second, p) for p in (1 - tail_probability, tail_probability))
     else:
         freedom = max(min(first, second) - 1, 1.0)
-        k = 2 * (1 - min(correlation, 1.0) ** 2) * stdtrit(freedom, 1 - tail) ** 2 / freedom
+        k = (
+            2
+            * (1 - min(correlation, 1.0) ** 2)
+            * stdtrit(freedom, 1 - tail_probability) ** 2
+            / freedom
+        )
         high = 1 + k + np.sqrt(k * (2 + k))
         low = 1 / high
     return Quantity(value, value * float(np.sqrt(low)), value * float(np.sqrt(high)), "1", text)
@@ -194,7 +199,7 @@ def widen_ratio(ratio: Quantity, error: float) -> Quantity:
 
 
 def noise_fractions(sizes: tuple, noise: float, step: float, band: tuple) -> tuple:
-    """Return the relative errors of amplitude and slope that noise causes.
+    """Return the relative errors of amplitude and slope due to noise.
 
     Half of the mean square of white noise counts in the amplitude, as the noise of both traces differs,
     and all of it in the slope, from which interpolation between samples takes most.
@@ -243,7 +248,7 @@ def _is_in_band(count: int, step: float, band: tuple) -> np.ndarray:
 
 
 def correlate_traces(first, second, step: float, band: tuple = BAND) -> tuple:
-    """Return the correlation of two aligned traces in the band, and that of their slopes.
+    """Return the correlations of two aligned traces in the band, and of their slopes.
 
     Parameters
     ----------

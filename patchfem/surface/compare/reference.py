@@ -86,13 +86,13 @@ def find_deep_runs(relative) -> list:
 
 
 def _shallow_runs(alignment: Alignment) -> list:
-    """Return the runs that the fit found worn although no single height shows it."""
+    """Return the runs that the fit found to be worn although no single height shows it."""
     is_shallow = ~alignment.unworn & (np.abs(alignment.depth) <= MAX_UNWORN * alignment.noise)
     return [(first, last) for first, last in find_runs(is_shallow) if last - first > MIN_SAMPLES]
 
 
 def _has_wear(alignment: Alignment, relative, places: list) -> bool:
-    """Whether a deep run is wider than an interpolation error, or as deep as a scratch."""
+    """Return whether a deep run is wider than an interpolation error, or as deep as a scratch."""
     if _shallow_runs(alignment) or _is_wide(relative, places):
         return True
     for first, last in places:
@@ -103,7 +103,7 @@ def _has_wear(alignment: Alignment, relative, places: list) -> bool:
 
 
 def _is_wide(relative, places: list) -> bool:
-    """Whether a deep run has more samples above half its depth than interpolation errors have."""
+    """Return whether a deep run has more samples above half its depth than interpolation errors have."""
     parts = [relative[first : last + 1] for first, last in places]
     return any((deep > deep.max() / 2).sum() >= SPECK_SAMPLES for deep in parts)
 
@@ -117,7 +117,7 @@ def _higher_fraction(alignment: Alignment, relative) -> float:
 
 
 def _is_flank(alignment: Alignment, first: int, last: int) -> bool:
-    """Whether a run of heights is long, unworn and straight."""
+    """Return whether a run of heights is long, unworn and straight."""
     x = alignment.x
     min_length = (SHORT_FLANK if alignment.is_straight else LONG_FLANK) * (x[-1] - x[0])
     if x[last] - x[first] < min_length or last - first < MIN_SAMPLES:
@@ -139,7 +139,7 @@ def _is_flank(alignment: Alignment, first: int, last: int) -> bool:
 
 
 def has_grown(alignment: Alignment, section: Section) -> bool:
-    """Whether material above the first trace is clearly wider than an interpolation error."""
+    """Return whether material above the first trace is clearly wider than an interpolation error."""
     relative = median_of_five(-section.depth / section.noise)
     return _is_wide(relative, find_deep_runs(relative))
 
@@ -154,15 +154,17 @@ def limit_hidden_wear(alignment: Alignment | None, reference: Reference | None) 
     if alignment is None:
         return make_unknown("m", HIDDEN_TEXT, "the traces are not registered to each other")
     if reference.kind:
-        what = "valleys between worn tops" if reference.kind == "valleys" else "unworn parts"
-        return make_unknown("m", HIDDEN_TEXT, f"{what} are used for the alignment")
+        reference_name = (
+            "valleys between worn tops" if reference.kind == "valleys" else "unworn parts"
+        )
+        return make_unknown("m", HIDDEN_TEXT, f"{reference_name} are used for the alignment")
     length = float(alignment.x[-1] - alignment.x[0])
     error = SIDE * alignment.error_of(Parameter.SLOPE) / alignment.half
     return Quantity((abs(alignment.slope) + error) * length / 2, 0.0, None, "m", HIDDEN_TEXT)
 
 
 def cut_at_wear(reference: Reference, extent) -> Reference:
-    """Cut off the unworn parts at the first and last worn position (`worn.Extent` or None)."""
+    """Shorten the unworn parts to end at the first and last worn position (`worn.Extent` or None)."""
     if extent is None:
         return reference
     wear_start, wear_end = (end.value for end in extent.after)
@@ -186,11 +188,11 @@ def describe_reference(reference: Reference) -> str:
             "the heights) agree in both traces and are taken as unworn; if the valleys also wore uniformly, the "
             "true depths are larger by the wear of the valleys."
         )
-    shown = reference.parts[:4]
+    listed_parts = reference.parts[:4]
     spans = ", ".join(
-        f"{format_length(start, 4)} to {format_length(end, 4)}" for start, end in shown
+        f"{format_length(start, 4)} to {format_length(end, 4)}" for start, end in listed_parts
     )
-    n_more = len(reference.parts) - len(shown)
+    n_more = len(reference.parts) - len(listed_parts)
     more = f" and {n_more} more" if n_more else ""
     return (
         f"Depths are measured from the parts in which the traces agree: x = {spans}{more} of the second trace "
@@ -200,7 +202,7 @@ def describe_reference(reference: Reference) -> str:
 
 
 def describe_hidden_wear(alignment: Alignment, hidden: Quantity) -> str:
-    """Describe what wear may be hidden without a reference, and what measurement would show it."""
+    """Describe which wear may be hidden if there is no reference, and which measurement would show it."""
     bow = ""
     if alignment.bend:
         bow = (

@@ -59,7 +59,7 @@ class Fit(NamedTuple):
 
 
 def estimate_scale(depth) -> float:
-    """Estimate the standard deviation [m] of noise from depths of the sign that scatters less."""
+    """Estimate the standard deviation [m] of noise from the depths of the sign with less scatter."""
     sides = depth[depth > 0], -depth[depth < 0]
     return min((robust_deviation(side) for side in sides if side.size > 3), default=0.0)
 
@@ -81,8 +81,8 @@ def concentrate(model, state, free, rounds: int = 12) -> np.ndarray:
     """Improve a starting point by C-steps of least trimmed squares."""
     for _ in range(rounds):
         depth, jacobian = model.linearize(state)
-        off = np.abs(depth)
-        keep = off <= np.quantile(off, TRIMMED_FRACTION)
+        distance = np.abs(depth)
+        keep = distance <= np.quantile(distance, TRIMMED_FRACTION)
         step = solve_weighted(jacobian[keep][:, free], depth[keep], np.ones(keep.sum()))
         state = state.copy()
         state[list(free)] += model.limit_step(step, free)
@@ -144,15 +144,15 @@ def find_floors(model, state, free, form) -> list:
     """
     floors = []
     depth, _ = model.linearize(state)
-    left = model.blocks(depth.size)
+    remaining_blocks = model.blocks(depth.size)
     rigid = [k for k in free if k in form or k in model.shifts]
     for _ in range(MAX_FLOORS):
-        if len(left) < len(form) + 1:
+        if len(remaining_blocks) < len(form) + 1:
             break
-        for start in _find_starts(model, state, form, left):
+        for start in _find_starts(model, state, form, remaining_blocks):
             fit = fit_biweight(model, concentrate(model, start, rigid), free, rounds=20)
             floors.append(_make_floor(model, fit))
-            left = _drop_blocks(model, floors[-1], left)
+            remaining_blocks = _drop_blocks(model, floors[-1], remaining_blocks)
     return floors
 
 
@@ -181,15 +181,15 @@ def _find_starts(model, state, form, blocks) -> list:
     base = np.array([jacobian[block][:, form].mean(axis=0) for block in blocks])
     subsets = np.array(_choose_subsets(len(blocks), len(form)))
     matrices = base[subsets]
-    good = np.abs(np.linalg.det(matrices)) > MIN_DETERMINANT
-    if not good.any():
+    is_regular = np.abs(np.linalg.det(matrices)) > MIN_DETERMINANT
+    if not is_regular.any():
         return []
-    shapes = np.linalg.solve(matrices[good], centres[subsets[good]][..., None])[..., 0]
+    shapes = np.linalg.solve(matrices[is_regular], centres[subsets[is_regular]][..., None])[..., 0]
     places = np.concatenate(blocks)
     places = places[:: max(places.size // N_RANKING_HEIGHTS, 1)]
-    off = np.abs(depth[places] - shapes @ jacobian[places][:, form].T)
-    kept = max(int(TRIMMED_FRACTION * off.shape[1]), 4)
-    cost = (np.partition(off, kept - 1, axis=1)[:, :kept] ** 2).mean(axis=1)
+    distance = np.abs(depth[places] - shapes @ jacobian[places][:, form].T)
+    kept = max(int(TRIMMED_FRACTION * distance.shape[1]), 4)
+    cost = (np.partition(distance, kept - 1, axis=1)[:, :kept] ** 2).mean(axis=1)
     order = np.argsort(cost)
     lines = shapes @ base.T
     near = 10 * np.sqrt(cost[order[0]])

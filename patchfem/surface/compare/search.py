@@ -45,7 +45,7 @@ class Chance(NamedTuple):
     scatter: float
 
     def clearance(self, z: float) -> float:
-        """Return the distance of a Fisher's z from the mean in standard deviations."""
+        """Return the distance of a Fisher's z from the mean, in standard deviations."""
         return float((z - self.mean) / max(self.scatter, 1e-12))
 
 
@@ -71,13 +71,13 @@ class Match(NamedTuple):
         return self.second > MAX_SECOND or lead < MIN_LEAD
 
     @property
-    def is_clear(self) -> bool:
+    def is_significant(self) -> bool:
         """Whether the correlation is too large to be due to chance."""
         return self.clearance > MIN_CLEARANCE
 
 
 class Resampled(NamedTuple):
-    """Two traces at a common constant step without their long waves.
+    """Two traces with a common constant sampling interval and without their long waves.
 
     first, second: (n,), (m,) heights [m]; step [m]; start: x of the first sample of the second trace
     less that of the first [m].
@@ -141,7 +141,7 @@ def search_shift_in_parts(before: Profile, after: Profile) -> Match | None:
 
 
 def resample_both(before: Profile, after: Profile) -> Resampled:
-    """Resample two traces at a common constant step and filter out their long waves.
+    """Resample two traces to a common constant sampling interval and filter out their long waves.
 
     Raises
     ------
@@ -162,7 +162,7 @@ def resample_both(before: Profile, after: Profile) -> Resampled:
 
 
 def decorrelation_lag(z) -> int:
-    """Return the lag in samples at which the autocorrelation of a trace first is zero."""
+    """Return the lag, in samples, of the first zero of the autocorrelation of a trace."""
     zeros = np.flatnonzero(_autocorrelate(z - z.mean())[: z.size] <= 0)
     return int(zeros[0]) if zeros.size else z.size // 2
 
@@ -193,7 +193,7 @@ def _overlapping_lags(count: int, other: int) -> np.ndarray:
 
 
 def _resample(trace: Profile, step: float) -> np.ndarray:
-    """Return the heights at a constant step, as means over the step if it is the coarser one."""
+    """Return the heights at a constant sampling interval; means if it is coarser than that of the trace."""
     count = int(trace.length / step * (1 + 1e-9)) + 1
     z = running_mean(trace.z, max(1, round(step / trace.step)))
     return np.interp(trace.x[0] + step * np.arange(count), trace.x, z)
@@ -206,7 +206,7 @@ def _cut_to_valleys(z) -> np.ndarray:
 
 
 def _draw_chance(first, best_score) -> Chance:
-    """Return mean and scatter of the best score of random traces with the first trace's spectrum."""
+    """Return mean and standard deviation of the best scores of random traces with the spectrum of the first."""
     random = np.random.default_rng(SEED)
     z = np.array([best_score(_randomize_phases(first, random)) for _ in range(N_RANDOM)])
     return Chance(float(z.mean()), float(z.std(ddof=1)))
@@ -219,8 +219,8 @@ def _randomize_phases(z, random) -> np.ndarray:
     return np.fft.irfft(np.abs(transform) * phases, z.size)
 
 
-class _Best(NamedTuple):
-    """Lag of the largest correlation, that correlation, and the largest one beyond its peak."""
+class _BestLag(NamedTuple):
+    """Lag and value of the largest correlation, and the largest correlation outside that peak."""
 
     lag: int
     correlation: float
@@ -228,7 +228,7 @@ class _Best(NamedTuple):
 
 
 class _ValleySearch:
-    """Correlations of a fixed trace with others at all lags with enough overlap, by FFT."""
+    """Correlations of a fixed trace with others at all lags with enough overlap, computed by FFT."""
 
     def __init__(self, count: int, fixed):
         from scipy.fft import next_fast_len, rfft
@@ -246,7 +246,7 @@ class _ValleySearch:
         sums = irfft(transform * np.conj(rfft(moved, self.size)), self.size)
         return sums[self.lags % self.size]
 
-    def find_best(self, moved) -> _Best:
+    def find_best(self, moved) -> _BestLag:
         """Find the lag of the largest correlation of a trace."""
         from scipy.fft import rfft
 
@@ -266,11 +266,11 @@ class _ValleySearch:
         if above.size:
             second = correlation[above[0] :].max(initial=second)
         limited = [float(np.clip(value, -1.0, 1.0)) for value in (correlation[best], second)]
-        return _Best(int(self.lags[best]), *limited)
+        return _BestLag(int(self.lags[best]), *limited)
 
 
 class _PartSearch:
-    """Scores of the parts of a trace against a fixed trace at the lags, by FFT."""
+    """Scores of the parts of a trace against a fixed trace at the lags, computed by FFT."""
 
     def __init__(self, fixed, size: int, lags):
         from scipy.fft import next_fast_len, rfft
@@ -284,7 +284,7 @@ class _PartSearch:
         self.power = size * np.maximum(square - mean**2, 1e-12 * max(float(fixed.var()), 1e-300))
 
     def scores(self, moved) -> np.ndarray:
-        """Return the score at each lag of a trace that is cut into parts."""
+        """Return the score of a trace, cut into parts, at each lag."""
         from scipy.fft import irfft, rfft
 
         size = self.size

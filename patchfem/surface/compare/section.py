@@ -96,7 +96,7 @@ class Section(NamedTuple):
         return gap * np.abs(np.diff(self.depth)) / np.sqrt(12)
 
     def integrate(self, inside) -> tuple:
-        """Integrate the depth over samples (n,) bool; return area [m2] and standard deviation."""
+        """Integrate the depth over samples (n,) bool; return the area [m2] and its standard deviation."""
         part = np.flatnonzero(inside)
         if not part.size:
             return 0.0, 0.0
@@ -171,7 +171,7 @@ def median_of_five(values) -> np.ndarray:
 
 
 def find_worn_heights(section: Section) -> np.ndarray:
-    """Find the worn heights (n,) bool by tests of single heights and averages of 4, 16 and 64."""
+    """Find the worn heights (n,) bool by tests of single heights and of means of 4, 16 and 64."""
     relative = section.depth / section.noise
     threshold = noise_threshold(relative.size)
     worn = median_of_five(relative) > threshold
@@ -296,7 +296,7 @@ def _widen_by_level_error(flank: FlankEnd, depth, noise, draws, correlation, wor
 
 
 def _outside_deviances(depth, noise) -> np.ndarray:
-    """Return the deviances (n + 1,) of the first 0, 1, ..., n depths from a model of noise alone."""
+    """Return the deviances (n + 1,) of the first 0, 1, ..., n depths from pure noise."""
     squares = np.where(depth < -MIN_PILE_UP * noise, 1.0, (depth / noise) ** 2)
     terms = np.minimum(squares, MAX_NOISE**2) + 2 * np.log(noise)
     sums = np.concatenate([[0.0], np.cumsum(terms)])
@@ -451,8 +451,8 @@ def find_flank_ends(depth, noise, correlation: float, first: int, last: int, dra
 
 def _locate_end(x, flank: FlankEnd, name: str) -> Quantity:
     """Return the position where a flank begins; x (n,) [m] is ordered from outside to inside."""
-    back = (x[0] - x[1]) * flank.offset
-    value, *bounds = (float(x[sample] + back) for sample in (flank.first, flank.low, flank.high))
+    offset = (x[0] - x[1]) * flank.offset
+    value, *bounds = (float(x[sample] + offset) for sample in (flank.first, flank.low, flank.high))
     return Quantity(value, min(bounds), max(bounds), "m", TEXTS[name])
 
 
@@ -509,20 +509,20 @@ def measure_track(section: Section, span: tuple, free: tuple) -> dict:
 
 
 def _mark_unknown_if_cut(values: dict, x, is_cut: tuple) -> dict:
-    """Mark quantities as unknown or as lower bounds for a track that leaves the section."""
+    """Mark quantities as unknown or as lower bounds if the track extends beyond the section."""
     ends = [format_length(float(x[k]), 4) for k, is_end in zip((0, -1), is_cut) if is_end]
-    why = (
+    reason = (
         "the track reaches the end of the common part of the traces at "
         f"{' and '.join(f'x = {end}' for end in ends)} and may be longer"
     )
     unknown = {"from": is_cut[0], "to": is_cut[1], "step": True, "area_net": True, "pile_up": True}
     unknown |= {"pile_up_left": is_cut[0], "pile_up_right": is_cut[1]}
     known = {
-        name: make_unknown(size.unit, size.text, why) if unknown.get(name) else size
+        name: make_unknown(size.unit, size.text, reason) if unknown.get(name) else size
         for name, size in values.items()
     }
     for name in ("width", "area_gross"):
-        text = f"{known[name].text}, at least: {why}"
+        text = f"{known[name].text}, at least: {reason}"
         known[name] = known[name]._replace(high=None, text=text)
     for name in ("depth_mean", "depth_floor"):
         text = f"{known[name].text}, of the part that the traces show"
@@ -588,7 +588,7 @@ def _measure_floor(section: Section, start: float, width: float) -> Quantity:
 
 
 class _Vertex(NamedTuple):
-    """Largest depth of a parabola through values (n,), weights (n,) of these, and their scatter."""
+    """Largest depth of a parabola through values (n,), the weights (n,) of these, and their scatter."""
 
     depth: float
     weights: np.ndarray

@@ -7,8 +7,8 @@ from ..areal import Areal
 from ..profile import Profile
 from ..quantity import SIDE, Quantity, format_interval
 from ..scans import change as scans
+from .ambiguity import describe_other
 from .compare import Comparison, are_identical
-from .readings import describe_other
 from .reference import describe_bow_area, describe_hidden_wear, describe_reference
 
 # Smallest ratio of deposited to worn area from which on material above the first trace is reported.
@@ -42,7 +42,7 @@ def describe_comparisons(parts: list, directions: list) -> list:
 
 
 def describe_ratio_change(ratio: Quantity) -> str:
-    """Describe the change by a ratio of after to before: reduced, increased, none or unknown."""
+    """Describe the change that a ratio of after to before shows: reduced, increased, none or unknown."""
     if ratio.value is None:
         return "not known"
     if ratio.high < 1 - ROUNDING:
@@ -70,17 +70,17 @@ def _describe_confidence(ratio: Quantity) -> str:
 
 
 def is_significant(mean: Quantity) -> bool:
-    """Whether a mean depth is significantly above zero."""
+    """Return whether a mean depth is significantly above zero."""
     return mean.value is not None and mean.low > 0
 
 
 def is_elsewhere(part: Comparison) -> bool:
-    """Whether two traces have no part of the surface in common."""
+    """Return whether two traces have no part of the surface in common."""
     return isinstance(part.before, Profile) and part.alignment is None
 
 
 def is_gain(part: Comparison) -> bool:
-    """Whether a single factor explains all heights and changed waves or slopes."""
+    """Return whether one gain factor of the instrument explains the changes of heights, waves and slopes."""
     changes = {
         describe_ratio_change(part.ratios.amplitude),
         describe_ratio_change(part.ratios.slope),
@@ -89,7 +89,7 @@ def is_gain(part: Comparison) -> bool:
 
 
 def _describe_traces(part: Comparison, name: str) -> list:
-    """Describe the wear that two traces show; name: their direction in words."""
+    """Describe the wear that two traces show; `name` is their direction as text."""
     out = []
     if part.is_mirrored:
         out.append(
@@ -105,17 +105,17 @@ def _describe_traces(part: Comparison, name: str) -> list:
 
 
 def _describe_wear(part: Comparison, name: str) -> str:
-    """Describe the worn depth of the second surface, or why it is not known."""
+    """Describe the worn depth of the second surface, or state why it is not known."""
     if are_identical(part.before, part.after):
         return f"Worn depth{name}: none; the heights before and after wear are the same."
     mean = part.worn.mean
     above = _describe_deposits(part)
     if part.basis == "place" and not part.reference.kind and not part.ambiguity:
-        seen = ""
+        visible_depth = ""
         if part.detection_limit is not None:
-            seen = f" {describe_visible_depth(part.detection_limit)}"
+            visible_depth = f" {describe_visible_depth(part.detection_limit)}"
         hidden = describe_hidden_wear(part.alignment, part.hidden)
-        return f"Worn depth{name}: no wear detected.{above}{seen} {hidden}"
+        return f"Worn depth{name}: no wear detected.{above}{visible_depth} {hidden}"
     if mean.value is None:
         return f"Worn depth{name}: not available; {mean.reason}."
     if not is_significant(mean):
@@ -182,7 +182,7 @@ def _describe_other_tracks(part: Comparison) -> list:
 
 
 def _describe_track(part: Comparison) -> str:
-    """Return the beginning of the sentence on the longest track, "" without a track."""
+    """Return the beginning of the sentence on the longest track, "" if there is no track."""
     if part.flanks is not None:
         span = _format_span(part.flanks.start, part.flanks.end)
         return f"a track from about x = {span} in the second trace (after wear); "
@@ -190,7 +190,7 @@ def _describe_track(part: Comparison) -> str:
 
 
 def _describe_sizes(sizes: dict) -> str:
-    """Return the beginning of a sentence on a track with these dimensions, "" without a track."""
+    """Return the beginning of a sentence on a track with these dimensions, "" if there is no track."""
     if not sizes:
         return ""
     start = sizes["from"].value
@@ -258,8 +258,8 @@ def _describe_slope(ratio: Quantity, name: str) -> str:
     if ratio.value is None:
         return f"Slope{name}: {ratio.reason}."
     word = {"reduced": "flatter", "increased": "steeper"}.get(describe_ratio_change(ratio))
-    shown = "no change is shown" if word is None else f"{word}, {_describe_confidence(ratio)}"
-    return f"The slope{name} is {_format_ratio(ratio)} times the slope before wear: {shown}."
+    change = "no change is shown" if word is None else f"{word}, {_describe_confidence(ratio)}"
+    return f"The slope{name} is {_format_ratio(ratio)} times the slope before wear: {change}."
 
 
 def _compare_directions(when: str, amplitude: Quantity, slope: Quantity) -> str:
@@ -269,17 +269,19 @@ def _compare_directions(when: str, amplitude: Quantity, slope: Quantity) -> str:
         if ratio.value is None:
             continue
         word = {"reduced": "smaller", "increased": "larger"}.get(describe_ratio_change(ratio))
-        shown = "no difference is shown"
+        difference = "no difference is shown"
         if word is not None:
-            shown = f"{word} along x, {_describe_confidence(ratio)}"
-        texts.append(f"{name} along x divided by that along y = {_format_ratio(ratio)}: {shown}")
+            difference = f"{word} along x, {_describe_confidence(ratio)}"
+        texts.append(
+            f"{name} along x divided by that along y = {_format_ratio(ratio)}: {difference}"
+        )
     is_anisotropic = describe_ratio_change(amplitude) in ("reduced", "increased")
-    found = "anisotropic" if is_anisotropic else "no anisotropy shown"
-    return f"{when[0].upper() + when[1:]}: {found}; {'; '.join(texts)}."
+    anisotropy = "anisotropic" if is_anisotropic else "no anisotropy shown"
+    return f"{when[0].upper() + when[1:]}: {anisotropy}; {'; '.join(texts)}."
 
 
 def describe_visible_depth(depth: float) -> str:
-    """Describe the mean depth [m] from which a track would have been found."""
+    """Describe the smallest mean depth [m] of a track that would have been found."""
     return (
         "A track over the middle third of the common length, with both of its flanks unworn, would have been found "
         f"from a mean depth of {format_length(depth, 2)} on."
@@ -291,7 +293,7 @@ def _format_ratio(ratio: Quantity) -> str:
 
 
 def _format_span(first: float, last: float) -> str:
-    """Format two positions [m], both to the fourth digit of the larger one."""
+    """Format two positions [m] to the fourth digit of the larger one."""
     step = 10.0 ** (np.floor(np.log10(max(abs(first), abs(last), 1e-12))) - 3)
     return " to ".join(
         format_length(float(np.round(place / step)) * step) for place in (first, last)

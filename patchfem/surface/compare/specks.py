@@ -52,7 +52,7 @@ def remove_specks(alignment: Alignment, before: Profile, after: Profile) -> tupl
         return before, after
     deviation = depth - _running_median(depth)
     # Each height may be above or below, so there are two tests per height.
-    sure = noise_threshold(2 * depth.size, 1)
+    threshold = noise_threshold(2 * depth.size, 1)
     step = robust_deviation(np.diff(first)) + 1.5 * alignment.noise
     # A jump is roughness if most of its neighbours jump too, as on a rough floor.
     jumps = np.abs(np.diff(depth, append=depth[-1]))
@@ -66,11 +66,11 @@ def remove_specks(alignment: Alignment, before: Profile, after: Profile) -> tupl
         height = float(sizes.max())
         at = low + int(np.argmax(sizes))
         is_wide = (sizes > height / 2).sum() > MAX_WIDTH or sizes.size > 3 * MAX_WIDTH
-        if is_wide or height < sure * float(alignment.noise_at[at]):
+        if is_wide or height < threshold * float(alignment.noise_at[at]):
             continue
         walls = np.diff(depth[around])
         is_deep = bool(deviation[at] > 0)
-        min_step = _min_wall_step(alignment, at, height, float(steps[at]), is_deep=is_deep)
+        min_step = _min_edge_jump(alignment, at, height, float(steps[at]), is_deep=is_deep)
         if min(walls.max(), -walls.min()) < min_step:
             continue
         side = int(np.argmax([np.abs(np.diff(z[around])).max() for z in surfaces]))
@@ -86,7 +86,7 @@ def remove_specks(alignment: Alignment, before: Profile, after: Profile) -> tupl
 def limit_left_out_wear(
     alignment: Alignment, section: Section, before: Profile, after: Profile, heights
 ) -> float:
-    """Return the area [m2] of the dips of the second trace that were left out.
+    """Return the area [m2] of the dips of the second trace that were left out as specks.
 
     Parameters
     ----------
@@ -112,10 +112,10 @@ def limit_left_out_wear(
     return float(lost.sum() * np.median(np.diff(after.x)))
 
 
-def _min_wall_step(
+def _min_edge_jump(
     alignment: Alignment, at: int, height: float, step: float, *, is_deep: bool
 ) -> float:
-    """Return the jump [m] that both walls of a peak or dip must reach to make it a speck.
+    """Return the smallest jump [m] at both edges that makes a peak or dip a speck.
 
     The jump is between neighbouring samples; height [m] is that of the peak or dip. step [m]: robust
     deviation of the differences of neighbouring heights around it.

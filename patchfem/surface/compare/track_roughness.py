@@ -67,12 +67,12 @@ def measure_track_roughness(comparison: Comparison) -> TrackRoughness:
         return TrackRoughness(None, {}, TOO_SHORT)
     regions = {}
     for region, sides in pieces.items():
-        regions[region] = {name: _measure(side, cutoff, step) for name, side in sides.items()}
+        regions[region] = {name: _measure_side(side, cutoff, step) for name, side in sides.items()}
     return TrackRoughness(cutoff, regions)
 
 
 def _split_regions(comparison: Comparison) -> dict | None:
-    """Return the pieces of both traces in each region, None without a track."""
+    """Return the pieces of both traces in each region, None if there is no track."""
     if not isinstance(comparison.before, Profile):
         return None
     if comparison.flanks is not None:
@@ -99,16 +99,16 @@ def _split_regions(comparison: Comparison) -> dict | None:
 
 
 def _contains(span: tuple, ends: tuple) -> bool:
-    """Whether a piece lies within a track."""
+    """Return whether a piece lies within a track."""
     return span[0] <= ends[0] and ends[1] <= span[1]
 
 
 def _crosses(ends: tuple, span: tuple) -> bool:
-    """Whether an end of a track lies within a piece."""
+    """Return whether an end of a track lies within a piece."""
     return any(ends[0] < end < ends[1] for end in span)
 
 
-def _measure(pieces: list, cutoff: float, step: float) -> dict:
+def _measure_side(pieces: list, cutoff: float, step: float) -> dict:
     """Measure Ra, Rq and slope of pieces, pooled by length, with their intervals."""
     weights = []
     values = []

@@ -76,7 +76,7 @@ class _Facts(NamedTuple):
 
     @property
     def change(self) -> str:
-        """Headline on wear and waviness, without position and order of the surfaces."""
+        """Headline on wear and waviness, which leaves out position and order of the surfaces."""
         if self.scan_headline and self.waves == "not known":
             is_plain = self.scan_headline in (scans.WORN_HEADLINE, scans.NONE)
             return self.scan_headline if is_plain else "waves not known"
@@ -103,13 +103,13 @@ def _collect_facts(parts: list) -> _Facts:
 
 
 def _has_grown(facts: _Facts) -> bool:
-    """Whether material stands above the first surface and no worn depth is shown."""
+    """Return whether material stands above the first surface and no worn depth is shown."""
     grew = facts.scan_headline == GREW or any(part.is_exchanged for part in facts.parts)
     return grew and not facts.is_worn
 
 
 def _has_no_place(facts: _Facts) -> bool:
-    """Whether the two surfaces have no part in common."""
+    """Return whether the two surfaces have no part in common."""
     return facts.scan_headline == ELSEWHERE or any(is_elsewhere(part) for part in facts.parts)
 
 
@@ -133,10 +133,10 @@ def _find_headline(parts: list) -> str:
         if condition(facts):
             headline = words(facts, headline)
             break
-    readings = [part.ambiguity for part in parts if part.ambiguity]
-    if readings:
+    ambiguities = [part.ambiguity for part in parts if part.ambiguity]
+    if ambiguities:
         headline = "no change detected in the waves" if headline == NO_CHANGE else headline
-        headline = f"{readings[0]}; {headline}"
+        headline = f"{ambiguities[0]}; {headline}"
     if any(
         is_gain(part) and describe_ratio_change(part.ratios.amplitude) != NO_CHANGE
         for part in parts

@@ -61,7 +61,7 @@ class Extent(NamedTuple):
 
     @property
     def known(self) -> "Extent":
-        """Extent with unknown ends where only the common part of the traces ends."""
+        """Extent in which an end is unknown where only the common part of the traces ends."""
         reason = "the wear reaches the end of the common part of the traces here and may go on"
         sides = []
         for ends in (self.before, self.after):
@@ -168,7 +168,7 @@ def measure_worn(
 
 
 def limit_slight_wear(alignment: Alignment, section: Section) -> float:
-    """Limit the error [m] of the reference level that slight wear below the noise causes.
+    """Estimate the largest error [m] of the reference level due to wear that the noise hides.
 
     Heights that wore less than the noise shows are taken as unworn. They lower the level from which
     all depths are measured by their sum / the number of unworn heights. As many heights may have worn
@@ -271,7 +271,7 @@ def measure_tracks(alignment: Alignment, section: Section, longest: float) -> Tr
 
 
 def _raise_upper_ends(sizes: dict, floor_error: float) -> dict:
-    """Raise the upper ends of depths and lost areas of a track by an error [m] of the floor."""
+    """Increase the upper bounds of depths and lost areas of a track by an error [m] of the floor."""
     area_error = floor_error * sizes["width"].value
     raised = dict(sizes)
     for name in ("depth_mean", "depth_floor", "step", "area_gross", "area_net"):
@@ -422,7 +422,7 @@ def make_unknown_worn(reason: str, deposited: float = 0.0) -> Worn:
 
 def wear_balance(alignment: Alignment) -> float:
     """Return (lost - grown) / (lost + grown) area of significant heights; 1 if nothing grew."""
-    is_clear = np.abs(alignment.depth) > MAX_NOISE * alignment.noise_at
-    clear = np.where(is_clear, alignment.depth, 0.0)
+    is_significant = np.abs(alignment.depth) > MAX_NOISE * alignment.noise_at
+    clear = np.where(is_significant, alignment.depth, 0.0)
     total = float(np.abs(clear).sum())
     return float(clear.sum()) / total if total > 0 else 0.0

@@ -15,7 +15,7 @@ from ...inputs.matlab import read_variables
 from ..areal import Areal
 from ..profile import Profile
 from ..samples import GIVEN_UNITS_NOTE, make_trace
-from .raster import make_scan_of_matrix, make_scan_of_points
+from .raster import make_scan_from_matrix, make_scan_from_points
 from .raw import MAX_POINTS, RawFile, shorten
 from .units import GIVE_PIXEL_SIZE, GIVE_UNITS, UNIT_LIST, parse_length_unit, parse_pixel_size
 
@@ -44,7 +44,7 @@ def read_npy(raw: RawFile, units: tuple | None) -> Profile | Areal:
     if pixel is not None and table.ndim == 2 and min(table.shape) > 1:
         factor = length_factors(raw, units[1:] * 2).height
         rows, columns = table.shape
-        return make_scan_of_matrix(
+        return make_scan_from_matrix(
             raw.path,
             np.arange(columns) * pixel,
             np.arange(rows) * pixel,
@@ -65,23 +65,23 @@ def read_npy(raw: RawFile, units: tuple | None) -> Profile | Areal:
 def read_mat(raw: RawFile, units: tuple | None) -> Profile | Areal:
     """Read a MATLAB file: variables x, (y,) and z or gap, or one matrix of two or three columns."""
     numbers = {
-        name: found
-        for name, found in read_variables(raw.path, raw.data).items()
-        if found.kind == "number"
+        name: array
+        for name, array in read_variables(raw.path, raw.data).items()
+        if array.kind == "number"
     }
     factors = length_factors(raw, units)
-    by_name = {name.lower(): found for name, found in numbers.items()}
+    by_name = {name.lower(): array for name, array in numbers.items()}
     height = next((by_name[name] for name in HEIGHT_NAMES if name in by_name), None)
     if height is not None and "x" in by_name:
         places = [by_name[name].values() for name in ("x", "y") if name in by_name]
         return _read_variables(raw, places, height.values(), factors)
     tables = [
-        found for found in numbers.values() if len(found.shape) == 2 and found.shape[1] in (2, 3)
+        array for array in numbers.values() if len(array.shape) == 2 and array.shape[1] in (2, 3)
     ]
-    tables = [found for found in tables if found.shape[0] >= MIN_ROWS]
+    tables = [array for array in tables if array.shape[0] >= MIN_ROWS]
     if len(tables) != 1:
         listed = ", ".join(
-            f"{shorten(name)} {found.shape}" for name, found in list(numbers.items())[:8]
+            f"{shorten(name)} {array.shape}" for name, array in list(numbers.items())[:8]
         )
         raise PatchfemError(
             f"{raw.path}: holds {listed or 'no array'}; variables x, z or x, y, z, or one matrix "
@@ -114,7 +114,7 @@ def _read_table(raw: RawFile, table, factors: LengthFactors) -> Profile | Areal:
         raise PatchfemError(f"{raw.path}: {len(columns[0])} rows; a trace needs at least two")
     if len(columns) == 2:
         return make_trace(raw.path, *columns, None, factors, GIVEN_UNITS_NOTE)
-    return make_scan_of_points(
+    return make_scan_from_points(
         raw.path, columns, None, (factors.lateral, *factors), GIVEN_UNITS_NOTE
     )
 
@@ -129,7 +129,7 @@ def _read_variables(raw: RawFile, places: list, z, factors: LengthFactors) -> Pr
         return _read_table(raw, np.column_stack([*flat, z.ravel()]), factors)
     if len(flat) == 2 and z.shape == (flat[1].size, flat[0].size):
         x, y = (values * factors.lateral for values in flat)
-        return make_scan_of_matrix(raw.path, x, y, z * factors.height, GIVEN_UNITS_NOTE)
+        return make_scan_from_matrix(raw.path, x, y, z * factors.height, GIVEN_UNITS_NOTE)
     shapes = ", ".join(str(np.shape(values)) for values in (*places, z))
     raise PatchfemError(
         f"{raw.path}: x, y and z of shapes {shapes} do not fit together; z needs a row for each y "
@@ -158,10 +158,10 @@ def _load_npy(raw: RawFile) -> np.ndarray:
             f"it anew: {ARRAY_EXAMPLE}"
         ) from None
     if kind.kind not in "fiu" or kind.itemsize > 8:
-        what = f"'{shorten(kind.str)}'"
+        content = f"'{shorten(kind.str)}'"
         if kind.hasobject:
-            what = "Python objects, which are not loaded because they may run code"
-        raise PatchfemError(f"{path}: contains {what}; save plain numbers: {ARRAY_EXAMPLE}")
+            content = "Python objects, which are not loaded because they may run code"
+        raise PatchfemError(f"{path}: contains {content}; save plain numbers: {ARRAY_EXAMPLE}")
     count = math.prod(shape)
     size = len(raw.data) - file.tell()
     if count > MAX_POINTS * 3:

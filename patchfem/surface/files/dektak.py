@@ -32,7 +32,7 @@ _HEADER = re.compile(r"^\s*Lateral\s+(\w+)\s*,\s*Raw\s+(\w+)[^\n]*$", re.MULTILI
 
 
 def read_dektak(raw: RawFile) -> Profile:
-    """Read the trace of a Dektak export; raises PatchfemError that names the line."""
+    """Read the trace of a Dektak export; a PatchfemError names the line at fault."""
     path = raw.path
     text = decode_text(raw)
     header = _HEADER.search(text)

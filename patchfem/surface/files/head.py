@@ -69,7 +69,7 @@ _GERMAN = re.compile("breite|höhe|länge|größe|schritt", re.IGNORECASE)
 
 
 class Line(NamedTuple):
-    """Line of the header of a text file, without its comment sign."""
+    """Line of the header of a text file, with its comment sign removed."""
 
     number: int
     text: str
@@ -124,7 +124,7 @@ class Head(NamedTuple):
         """Find the names of the columns, and their units if these are in a separate line."""
         if self.names:
             return ColumnNames(self.number, self.names, [])
-        found = ColumnNames(0, [], [])
+        column_names = ColumnNames(0, [], [])
         for line in self.lines:
             cells, delimiter = split_cells(line.text)
             if len(cells) != len(self.row):
@@ -133,12 +133,12 @@ class Head(NamedTuple):
             if any(is_unit) and all(
                 cell in NO_UNIT for cell, known in zip(cells, is_unit) if not known
             ):
-                found = found._replace(units=cells)
+                column_names = column_names._replace(units=cells)
             elif has_column_names(cells) or not (
                 line.is_comment or delimiter != self.delimiter or re.search(r"[:=：]", line.text)
             ):
-                found = found._replace(number=line.number, names=cells)
-        return found
+                column_names = column_names._replace(number=line.number, names=cells)
+        return column_names
 
     def facts(self, path) -> dict:
         """Return what the header states about a matrix of heights, such as its pixel size.
@@ -170,7 +170,7 @@ class Head(NamedTuple):
 
 
 def read_head(path, text: str) -> Head:
-    """Read the header of a text file; raises PatchfemError if no row of numbers follows it."""
+    """Read the header of a text file; raise PatchfemError if no row of numbers follows it."""
     start = 0
     number = 0
     lines = []

@@ -19,7 +19,7 @@ from ..areal import Areal
 from ..profile import Profile
 from ..samples import GIVEN_UNITS_NOTE, make_trace
 from .arrays import length_factors
-from .raster import make_scan_of_matrix
+from .raster import make_scan_from_matrix
 from .raw import MAX_POINTS, UNPACK_ERRORS, RawFile, shorten, shorten_reason
 from .units import UNITS_IGNORED
 
@@ -33,7 +33,7 @@ CPU_LIMIT_SIGNAL = -24  # exit code of a process that exceeded its CPU time (SIG
 
 
 def read_instrument(raw: RawFile, units: tuple | None) -> Profile | Areal:
-    """Read a file in the format of an instrument by the package SurfaceTopography.
+    """Read a file in the format of an instrument with the package SurfaceTopography.
 
     Raises Missing without SurfaceTopography, and PatchfemError if it cannot read the file, if the
     file is too large, or if neither the file nor the caller states the units.
@@ -43,11 +43,11 @@ def read_instrument(raw: RawFile, units: tuple | None) -> Profile | Areal:
         with tempfile.TemporaryDirectory() as folder:
             unpacked = Path(folder) / f"surface{suffix}"
             unpacked.write_bytes(raw.data)
-            found = _run_script(raw.path, unpacked)
+            content = _run_script(raw.path, unpacked)
     else:
-        found = _run_script(raw.path, raw.path)
-    about = json.loads(str(found["about"]))
-    arrays = [found[name] for name in ("x", "y", "z") if name in found]
+        content = _run_script(raw.path, raw.path)
+    about = json.loads(str(content["about"]))
+    arrays = [content[name] for name in ("x", "y", "z") if name in content]
     stated = "the file states the units of heights and length"
     if not about["unit"]:
         factors = length_factors(raw, units)
@@ -61,18 +61,18 @@ def read_instrument(raw: RawFile, units: tuple | None) -> Profile | Areal:
     if about["unit"] and units:
         notes += (f"{raw.path}: {UNITS_IGNORED}",)
     if len(arrays) == 3:
-        return make_scan_of_matrix(raw.path, *arrays, stated, notes)
+        return make_scan_from_matrix(raw.path, *arrays, stated, notes)
     trace = make_trace(raw.path, *arrays, None, (1.0, 1.0), stated)
     return replace(trace, notes=(*notes, *trace.notes))
 
 
 def _run_script(path, file: Path) -> dict:
-    """Read a file in a separate process by SurfaceTopography; return its arrays."""
+    """Read a file with SurfaceTopography in a separate process and return its arrays."""
     script = Path(__file__).with_name("topography.py")
     arguments = map(str, (script, file.absolute(), MAX_POINTS, MAX_CPU_SECONDS))
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}  # each thread takes address space
     try:
-        done = subprocess.run(
+        process = subprocess.run(
             [PYTHON, "-P", *arguments],
             capture_output=True,
             timeout=MAX_SECONDS,
@@ -85,26 +85,26 @@ def _run_script(path, file: Path) -> dict:
         ) from None
     except (OSError, ValueError) as error:
         raise Missing(f"{path}: no process could be started to read this file ({error})") from None
-    if done.returncode == EXIT_NO_LIBRARY:
+    if process.returncode == EXIT_NO_LIBRARY:
         raise Missing(
             f"{path}: a file in an instrument's own format; the package SurfaceTopography can read "
             "many such formats: pip install 'patchfem[profiles]', or export the surface as text "
             "with the header `x [um],z [um]`"
         )
-    if done.returncode == CPU_LIMIT_SIGNAL:
+    if process.returncode == CPU_LIMIT_SIGNAL:
         raise _make_refusal(
             path, f"did not finish reading this file in {MAX_CPU_SECONDS:g} s of CPU time"
         )
     try:
-        found = dict(np.load(io.BytesIO(done.stdout), allow_pickle=False))
+        content = dict(np.load(io.BytesIO(process.stdout), allow_pickle=False))
     except UNPACK_ERRORS:
         raise _make_refusal(path, "failed to read this file") from None
-    if "error" in found:
-        raise _make_refusal(path, f"cannot read this file ({shorten_reason(found['error'])})")
-    if "z" not in found or not all(values.size for values in found.values()):
+    if "error" in content:
+        raise _make_refusal(path, f"cannot read this file ({shorten_reason(content['error'])})")
+    if "z" not in content or not all(values.size for values in content.values()):
         raise _make_refusal(path, "found no heights in this file")
-    return found
+    return content
 
 
-def _make_refusal(path, what: str) -> PatchfemError:
-    return PatchfemError(f"{path}: SurfaceTopography {what}; export the surface as text or X3P")
+def _make_refusal(path, reason: str) -> PatchfemError:
+    return PatchfemError(f"{path}: SurfaceTopography {reason}; export the surface as text or X3P")

@@ -10,7 +10,7 @@ from ..areal import Areal
 from ..profile import Profile
 from ..samples import GIVEN_UNITS_NOTE, make_trace
 from .head import Fact, Head, has_column_names
-from .raster import make_scan_of_matrix
+from .raster import make_scan_from_matrix
 from .raw import shorten
 from .rows import read_matrix
 from .units import GIVE_PIXEL_SIZE, GIVE_UNITS, parse_length_unit, parse_pixel_size
@@ -111,7 +111,7 @@ def read_scan(path, head: Head, facts: dict, units: tuple | None, body: str) -> 
     if rows == 1:
         trace = make_trace(path, x, z[0], None, (1.0, 1.0), stated)
         return Profile(trace.x, trace.z, trace.source, (*notes, *trace.notes))
-    return make_scan_of_matrix(path, x, np.arange(rows) * step_y.value, z, stated, notes)
+    return make_scan_from_matrix(path, x, np.arange(rows) * step_y.value, z, stated, notes)
 
 
 def _is_even(values) -> bool:
@@ -185,9 +185,9 @@ def _find_step(path, axis: str, count: int, facts: dict, units: tuple | None) ->
     )
 
 
-def _choose_unit(path, what: str, stated: str | None, given: str | None) -> Unit:
+def _choose_unit(path, quantity: str, stated: str | None, given: str | None) -> Unit:
     """Return the unit that the user gave, else that of the file, with a note if they differ."""
     if given is None or stated is None or parse_length_unit(given) == parse_length_unit(stated):
         return Unit(given or stated)
-    note = f"{path}: the header gives {what} in {shorten(stated)}, but {given} is used, as given by --units"
+    note = f"{path}: the header gives {quantity} in {shorten(stated)}, but {given} is used, as given by --units"
     return Unit(given, (note,))

@@ -23,7 +23,7 @@ class Axis(NamedTuple):
     numbers: np.ndarray
 
 
-def make_scan_of_points(
+def make_scan_from_points(
     path, columns: list, lines, factors: tuple, stated: str = ""
 ) -> Profile | Areal:
     """Arrange points as an areal scan, or as a trace if they form a single row or column.
@@ -39,7 +39,7 @@ def make_scan_of_points(
     factors : tuple
         Factors of x, y, z to metres.
     stated : str
-        As for `make_scan_of_matrix`.
+        As for `make_scan_from_matrix`.
 
     Returns
     -------
@@ -73,12 +73,12 @@ def make_scan_of_points(
     heights = np.full(cells, np.nan)
     heights[place] = z
     heights = heights.reshape(shape) * factors[2]
-    return make_scan_of_matrix(
+    return make_scan_from_matrix(
         path, along_x.places * factors[0], along_y.places * factors[1], heights, stated
     )
 
 
-def make_scan_of_matrix(path, x, y, z, stated: str = "", notes: tuple = ()) -> Profile | Areal:
+def make_scan_from_matrix(path, x, y, z, stated: str = "", notes: tuple = ()) -> Profile | Areal:
     """Make an areal scan of heights on a grid, or a trace if y has one position.
 
     Parameters

@@ -73,7 +73,7 @@ def fetch(path) -> RawFile:
             raise PatchfemError(f"{path}: not a file; a profile is a text file with two columns")
         with open(file_path, "rb") as file:
             head = file.read(HEAD_BYTES)
-            kind = _find_kind(head)
+            kind = _detect_format(head)
             suffix = file_path.suffix.lower()
             if kind == "binary" and suffix in TEXT_SUFFIXES:
                 kind = "text"  # the reader of text files names the line that is not text
@@ -94,14 +94,14 @@ def fetch(path) -> RawFile:
 def _read_limited(file, head: bytes, size: int) -> bytes:
     """Read a file up to a size limit without allocating all of it at once."""
     parts = [head]
-    left = size - len(head)
-    while left > 0 and (part := file.read(min(left, BLOCK_BYTES))):
+    remaining = size - len(head)
+    while remaining > 0 and (part := file.read(min(remaining, BLOCK_BYTES))):
         parts.append(part)
-        left -= len(part)
+        remaining -= len(part)
     return b"".join(parts)
 
 
-def _find_kind(head: bytes) -> str:
+def _detect_format(head: bytes) -> str:
     kind = next((kind for mark, kind in FIRST_BYTES.items() if head.startswith(mark)), None)
     if kind is None:
         kind = "binary" if any(byte in head for byte in b"\x00\x01\x02\x03\x04") else "text"
@@ -121,7 +121,7 @@ def _check_size(path, kind: str, size: int) -> None:
 
 def _unpack(path: Path, name: Path, data: bytes) -> RawFile:
     """Decompress the contents of a packed surface file."""
-    kind = _find_kind(data[:HEAD_BYTES])
+    kind = _detect_format(data[:HEAD_BYTES])
     if kind == "gzip" or (kind == "zip" and path.suffix.lower() == ".zip"):
         raise PatchfemError(f"{path}: the file was compressed twice; unpack it once")
     _check_size(path, kind, len(data))
@@ -130,12 +130,12 @@ def _unpack(path: Path, name: Path, data: bytes) -> RawFile:
 
 
 def _gunzip(path, data: bytes) -> bytes:
-    """Decompress a gzip file after its size was checked without storing it."""
+    """Decompress a gzip file after a first pass that checks its size without storing it."""
     limit = min(MAX_BYTES, max(MIB, MAX_UNPACK_RATIO * len(data)))
     try:
         with gzip.open(io.BytesIO(data)) as file:
             head = file.read(HEAD_BYTES)
-            if _find_kind(head) == "text":
+            if _detect_format(head) == "text":
                 limit = min(MAX_TEXT_BYTES, limit)
             size = len(head)
             while size <= limit and (part := file.read(BLOCK_BYTES)):
@@ -147,7 +147,7 @@ def _gunzip(path, data: bytes) -> bytes:
             f"{path}: the gzip file is damaged ({shorten_reason(error)}); pack it again"
         ) from None
     if size > limit:
-        _check_size(path, _find_kind(head), size)
+        _check_size(path, _detect_format(head), size)
         raise PatchfemError(
             f"{path}: the file unpacks to more than {MAX_UNPACK_RATIO} times its size; give the "
             "unpacked file"

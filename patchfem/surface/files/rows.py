@@ -181,7 +181,7 @@ def _row_numbers(body: str) -> np.ndarray:
 
 
 def _split_row(place: str, line: str, delimiter: str | None, width: int) -> list:
-    """Split a row into its cells; raises PatchfemError for another number of them."""
+    """Split a row into its cells; raise PatchfemError if their number is not `width`."""
     words = _NUMBER_WORDS[width]
     if len(line) > MAX_LINE:
         raise PatchfemError(

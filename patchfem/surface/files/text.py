@@ -21,7 +21,7 @@ from ..profile import Profile
 from ..samples import GIVEN_UNITS_NOTE, make_trace
 from .head import HEADER_EXAMPLE, ColumnNames, Fact, parse_column, read_head
 from .matrix import is_matrix, read_scan
-from .raster import make_scan_of_points
+from .raster import make_scan_from_points
 from .raw import RawFile, shorten
 from .rows import read_columns
 from .units import GIVE_UNITS, UNIT_LIST, parse_length_unit, parse_pixel_size
@@ -100,7 +100,7 @@ def read_text(raw: RawFile, units: tuple | None = None) -> Profile | Areal:
     factors = _find_factors(line, columns, named, facts, units)
     stated = GIVEN_UNITS_NOTE if units else ""
     if "y" in columns:
-        surface = make_scan_of_points(
+        surface = make_scan_from_points(
             path, [values[name] for name in "xyz"], lines, factors.values, stated
         )
     else:
@@ -157,10 +157,10 @@ def _find_places(line: str, names: list, *, has_units: bool) -> Places:
         data = {k: role.replace("y", "z") for k, role in data.items()}
     strange = next((names[k] for k, role in data.items() if role not in known), None)
     if strange is not None and not has_units:
-        wanted = "x and z" if len(data) == 2 else "x, y and z"
+        required = "x and z" if len(data) == 2 else "x, y and z"
         raise PatchfemError(
             f"{line}: column '{shorten(strange.partition('[')[0].strip())}' is not known; the "
-            f"columns {wanted} are needed; {HEADER_EXAMPLE}"
+            f"columns {required} are needed; {HEADER_EXAMPLE}"
         )
     if strange is not None:
         listed = ", ".join(f"'{shorten(names[k])}'" for k in data)

@@ -18,7 +18,7 @@ MAX_MEMORY = 1 << 32
 
 
 def main(path: str, max_points: int, max_seconds: float) -> int:
-    """Read a surface file by SurfaceTopography and write its arrays to stdout.
+    """Read a surface file with SurfaceTopography and write its arrays to stdout.
 
     Parameters
     ----------

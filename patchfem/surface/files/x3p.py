@@ -20,7 +20,7 @@ from ...core import PatchfemError
 from ..areal import Areal
 from ..profile import Profile
 from ..samples import METRES_NOTE
-from .raster import make_scan_of_matrix, make_scan_of_points
+from .raster import make_scan_from_matrix, make_scan_from_points
 from .raw import MAX_POINTS, MIB, RawFile, open_zip, read_member, shorten, shorten_reason
 
 # Largest size of main.xml in bytes; heights stored there take 30 bytes each.
@@ -144,7 +144,7 @@ def _make_grid(
                 f"Increment of {name} is {axis.increment:g}; a length > 0 m is needed"
             )
     x, y = (axis.scale(np.arange(count)) for axis, count in zip(axes, counts))
-    return make_scan_of_matrix(
+    return make_scan_from_matrix(
         package.raw.path, x, y, heights.reshape(shape.rows, shape.columns), METRES_NOTE, notes
     )
 
@@ -160,7 +160,7 @@ def _make_raster(package: Package, columns: list, axes: list, shape: Shape) -> P
     if known.sum() < 2:
         raise package.refuse(f"{known.sum()} points with coordinates; a trace needs at least two")
     points = [values[known] for values in (*places, columns[-1])]
-    return make_scan_of_points(package.raw.path, points, None, (1.0, 1.0, 1.0), METRES_NOTE)
+    return make_scan_from_points(package.raw.path, points, None, (1.0, 1.0, 1.0), METRES_NOTE)
 
 
 def _read_axis(package: Package, name: str) -> Axis:
@@ -278,7 +278,7 @@ def _read_list(package: Package, axes: list, shape: Shape) -> list:
 
 
 def _verify_main(package: Package, text: bytes) -> tuple:
-    """Return a note if the checksum file is about main.xml and disagrees with it."""
+    """Return a note if the checksum file lists main.xml with another checksum."""
     name = posixpath.join(
         package.folder, _text(package.root, "Record4/ChecksumFile", "md5checksum.hex")
     )

@@ -57,7 +57,7 @@ def rms_gradient(surface: Surface) -> float:
 
 
 def developed_area_ratio(surface: Surface) -> float:
-    """Compute Sdr, the area of the surface over that of its plane, minus one [1].
+    """Compute Sdr, the ratio of the area of the surface to that of its plane, minus one [1].
 
     Each cell of four heights is cut into two triangles, along either diagonal; its area is the mean
     of both.

@@ -42,8 +42,8 @@ class Cylinder(NamedTuple):
         return self.level + self.rise * along + np.sqrt(1 + self.rise**2) * arc
 
 
-def parse_form(text: str) -> int | str:
-    """Parse the option for the form to remove: a polynomial degree or "cylinder"."""
+def parse_form_option(text: str) -> int | str:
+    """Parse the option that names the form to subtract: a polynomial degree or "cylinder"."""
     text = text.strip()
     if text == CYLINDER:
         return text
@@ -91,9 +91,11 @@ def _subtract_cylinder(surface: Profile | Areal) -> tuple[Profile | Areal, str]:
     x = (surface.x - (surface.x[0] + surface.x[-1]) / 2) / size
     y = (y - (y[0] + y[-1]) / 2) / size
     z = np.atleast_2d(surface.z) / size
-    every = max(1, int(np.ceil((z.size / MAX_FITTED_HEIGHTS) ** (0.5 if is_scan else 1))))
-    rows, columns = np.nonzero(~np.isnan(z[::every, ::every]))
-    points = np.stack([x[::every][columns], y[::every][rows], z[::every, ::every][rows, columns]])
+    stride = max(1, int(np.ceil((z.size / MAX_FITTED_HEIGHTS) ** (0.5 if is_scan else 1))))
+    rows, columns = np.nonzero(~np.isnan(z[::stride, ::stride]))
+    points = np.stack(
+        [x[::stride][columns], y[::stride][rows], z[::stride, ::stride][rows, columns]]
+    )
     if rows.size < 10:
         raise PatchfemError(
             f"{surface.source}: {rows.size} heights; a {CYLINDER} needs at least ten"
@@ -106,8 +108,8 @@ def _subtract_cylinder(surface: Profile | Areal) -> tuple[Profile | Areal, str]:
     part = np.floor((across - across.min()) / (np.ptp(across) * (1 + 1e-9)) * N_PARTS)
     curvatures = [_fit_cylinder(points[:, part != k], fitted).curvature for k in range(N_PARTS)]
     error = STUDENT_T * float(np.sqrt((N_PARTS - 1) * np.var(curvatures)))
-    rest = surface.z - size * fitted.height(x, y[:, None] if is_scan else 0.0)
-    return replace(surface, z=frozen_array(rest)), _describe_cylinder(
+    remainder = surface.z - size * fitted.height(x, y[:, None] if is_scan else 0.0)
+    return replace(surface, z=frozen_array(remainder)), _describe_cylinder(
         fitted, error, size, "cylinder" if is_scan else "circle"
     )
 
@@ -142,11 +144,11 @@ def _estimate_cylinder(points) -> Cylinder:
     columns = np.column_stack([np.ones(x.size), x, y, x * x / 2, x * y, y * y / 2])
     base = np.linalg.lstsq(columns, z, rcond=None)[0]
     values, vectors = np.linalg.eigh([[base[3], base[4]], [base[4], base[5]]])
-    most = int(np.argmax(np.abs(values)))
-    angle = np.arctan2(-vectors[0, most], vectors[1, most])
+    largest = int(np.argmax(np.abs(values)))
+    angle = np.arctan2(-vectors[0, largest], vectors[1, largest])
     rise = base[1] * np.cos(angle) + base[2] * np.sin(angle)
     sine = base[2] * np.cos(angle) - base[1] * np.sin(angle)
-    return Cylinder(base[0], rise, sine, values[most], angle)
+    return Cylinder(base[0], rise, sine, values[largest], angle)
 
 
 def _fit_cylinder(points, start: Cylinder) -> Cylinder:

@@ -89,8 +89,10 @@ class Intervals:
     def _slope_widening(self) -> float:
         return _estimate_widening(Heights(np.diff(self.heights.z), self.heights.step))
 
-    def interval(self, row: Parameter, value: float | None) -> tuple[float | None, float | None]:
-        """Return the bounds of a parameter; (None, None) if they are unknown."""
+    def confidence_interval(
+        self, row: Parameter, value: float | None
+    ) -> tuple[float | None, float | None]:
+        """Return the confidence bounds of a parameter; (None, None) if they are unknown."""
         if value is None or not row.kind or not self.spectrum.density.any():
             return None, None
         if (self.is_uneven and row.kind not in LATERAL) or (self.is_short and row.kind in SIZES):
@@ -201,14 +203,14 @@ def simulate_traces(spectrum: Spectrum, heights: Heights, degree: int | None) ->
 
     total = np.cumsum(spectrum.density[::-1])[::-1]
     shortest = 1 / spectrum.frequency[np.flatnonzero(total >= 0.01 * total[0])[-1]]
-    every = max(1, int(shortest / (6 * heights.step)))
+    stride = max(1, int(shortest / (6 * heights.step)))
     section = 0 if heights.section is None else heights.section / heights.step
     if section:
-        every = min(every, max(1, int(section) // 8))
-    size = max(min(heights.z.size // every, MAX_SAMPLES), 8, round(section / every))
+        stride = min(stride, max(1, int(section) // 8))
+    size = max(min(heights.z.size // stride, MAX_SAMPLES), 8, round(section / stride))
     if size == MAX_SAMPLES:  # the spectrum of each trace needs a length with a fast transform
         size = prev_fast_len(size + 1, real=True) - 1
-    step = every * heights.step
+    step = stride * heights.step
     period = next_fast_len(2 * size, real=True)
     frequency = np.arange(period // 2 + 1) / (period * step)
     density = np.interp(frequency, spectrum.frequency, spectrum.density, right=0.0)

@@ -135,7 +135,7 @@ def mean_spacing(heights: Heights) -> float | None:
 
 
 def mean_element_height(heights: Heights) -> float | None:
-    """Compute Rc, the mean height [m] of the elements of `mean_spacing`; None without elements."""
+    """Compute Rc, the mean height [m] of the elements of `mean_spacing`; None if there are none."""
     places = find_crossings(heights)
     if places.size < 3:
         return None

@@ -287,7 +287,7 @@ def _make_quantity(row: Parameter, value: float | None, intervals: Intervals) ->
         elif not len(heights.sections):
             reason = "the trace is shorter than one cut-off"
         return make_unknown(row.unit, row.text, reason)._replace(name=row.name)
-    low, high = intervals.interval(row, value)
+    low, high = intervals.confidence_interval(row, value)
     if (
         row.kind == "wave"
         and low is not None

@@ -120,8 +120,8 @@ def estimate_spectrum(z: np.ndarray, step: float, tapers: int | None = None) -> 
     first = Spectrum(frozen_array(frequency), frozen_array(density), MIN_TAPERS, length)
     if tapers is None:
         wave = first.dominant_wavelength
-        wanted = MIN_TAPERS if wave is None else np.floor(2 * BLUR_FRACTION * length / wave) - 1
-        tapers = int(np.clip(wanted, MIN_TAPERS, MAX_TAPERS))
+        n_tapers = MIN_TAPERS if wave is None else np.floor(2 * BLUR_FRACTION * length / wave) - 1
+        tapers = int(np.clip(n_tapers, MIN_TAPERS, MAX_TAPERS))
     if tapers == MIN_TAPERS:
         return first
     return Spectrum(
@@ -150,7 +150,7 @@ def _average_tapers(transform, n: int, step: float, tapers: int) -> np.ndarray:
 
 
 def band_amplitude(spectrum: Spectrum, low: float, high: float) -> float:
-    """Return the amplitude [m] of a sine with the mean square of a band of waves.
+    """Return the amplitude [m] of the sine that has the mean square of a wavelength band.
 
     Parameters
     ----------

@@ -106,13 +106,13 @@ def _find_place(before: Areal, after: Areal) -> tuple:
     Returns the placement, the second scan mirrored or inverted by it, and the state (6,).
     """
     step = pixel_size(before, after)
-    tried = []
+    candidates = []
     for placement in find_placements(before, after):
         other = transform_scan(after, placement.mirrored, placement.is_inverted)
         state = np.array([0.0, 0.0, 0.0, placement.angle, *placement.shift])
         noise, state = _fit_images(before, other, state, step)
-        tried.append((noise, len(tried), state, placement, other))
-    _, _, state, placement, other = min(tried)
+        candidates.append((noise, len(candidates), state, placement, other))
+    _, _, state, placement, other = min(candidates)
     finest = max(*make_raster(before).steps, *make_raster(other).steps, step * SIZE / MAX_SIDE)
     while step > 1.5 * finest:
         step = max(step / 2, finest)

@@ -49,7 +49,7 @@ GROWN_HEADLINE = f"apart from what grew, {UNSURE}"
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """Measured differences of two areal scans.
+    """Measured differences between two areal scans.
 
     - before, after: the scans without spikes.
     - volumes: measures of the depth map; None, like `alignment`, without a common place.
@@ -106,9 +106,9 @@ def compare_scans(before: Areal, after: Areal, keep_spikes: bool = False) -> Cha
             alignment, volumes, n_specks = _align_and_measure(before, inverted, keep_spikes)
             alignment = replace(alignment, placement=placement)
     except PatchfemError as error:
-        why = str(error)
-        registration = {name: make_unknown(*meaning, why) for name, meaning in PLACEMENT.items()}
-        return Change(before, after, None, None, why, removed, registration)
+        reason = str(error)
+        registration = {name: make_unknown(*meaning, reason) for name, meaning in PLACEMENT.items()}
+        return Change(before, after, None, None, reason, removed, registration)
     track = None
     if volumes.values["worn_volume"].low > 0:
         axes = (before.x, before.y)
@@ -238,7 +238,7 @@ def describe_change(change: Change) -> list:
 
 
 def _describe_wear(change: Change) -> list:
-    """Describe the wear, or why none is shown, in sentences."""
+    """Describe the wear, or state why none is shown, in sentences."""
     values = change.volumes.values
     worn = values["worn_volume"]
     grown = values["grown_volume"]

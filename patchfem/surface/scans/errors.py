@@ -61,9 +61,9 @@ class ScanErrors(NamedTuple):
         (draws,) array
         """
         random = np.random.default_rng(1990)
-        own = noise * float(np.sqrt(self.correlation_area * (weight**2).sum()))
-        own = own * random.standard_normal(len(self.fields))
-        return np.tensordot(self.fields, _sum_tiles(weight, self.tile), 2) + own
+        noise_error = noise * float(np.sqrt(self.correlation_area * (weight**2).sum()))
+        noise_error = noise_error * random.standard_normal(len(self.fields))
+        return np.tensordot(self.fields, _sum_tiles(weight, self.tile), 2) + noise_error
 
 
 def draw_scan_errors(depth, unworn, plane_error) -> ScanErrors:
@@ -173,12 +173,12 @@ def estimate_placement_covariance(model: ScanModel, state, scale: float, changed
         Of angle [rad] and shift [m].
     """
     depth, jacobian = model.linearize(state)
-    off = depth / (BIWEIGHT * scale)
-    inside = np.clip(1 - off**2, 0, None) * ~changed
+    relative = depth / (BIWEIGHT * scale)
+    inside = np.clip(1 - relative**2, 0, None) * ~changed
     size = np.sqrt((jacobian**2).mean(axis=0))
     jacobian = jacobian / np.where(size > 0, size, 1.0)
     scores = jacobian * (depth * inside**2)[:, None]
-    normal = (jacobian * (inside * (1 - 5 * off**2))[:, None]).T @ jacobian
+    normal = (jacobian * (inside * (1 - 5 * relative**2))[:, None]).T @ jacobian
     part = np.clip(((model.at / model.before.half + 1) / 2 * N_PARTS).astype(int), 0, N_PARTS - 1)
     part = part[:, 0] + N_PARTS * part[:, 1]
     sums = np.array([np.bincount(part, column, N_PARTS**2) for column in scores.T])

@@ -84,7 +84,7 @@ def rotation(angle: float) -> np.ndarray:
 
 
 class _Linearized(NamedTuple):
-    """Depth (k,) [m] between two scans without a plane, and its Jacobian (k, 6).
+    """Depth (k,) [m] between two scans after removal of the plane, and its Jacobian (k, 6).
 
     place: rotation [rad] and shifts [m] of the second scan.
     """

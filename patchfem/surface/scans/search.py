@@ -67,7 +67,7 @@ def find_placements(before: Areal, after: Areal) -> list:
     is significant; this one is then returned alone.
     """
     step = pixel_size(before, after)
-    search = _Search(*whiten_valleys(*resample_image(before, step)))
+    search = _ImageCorrelator(*whiten_valleys(*resample_image(before, step)))
     out = []
     for is_inverted in (False, True):
         for mirrored, half_turn in (("", 0.0), ("x", 0.0), ("y", 0.0), ("", np.pi)):
@@ -162,7 +162,7 @@ class _Peak(NamedTuple):
     significance: float
 
 
-class _Search:
+class _ImageCorrelator:
     """Masked normalized correlation of a fixed image with other images."""
 
     def __init__(self, z, known):
@@ -170,7 +170,7 @@ class _Search:
         self.known = known
         self.size = None
 
-    def _prepare(self, shape) -> None:
+    def _prepare_transforms(self, shape) -> None:
         """Compute the Fourier transforms of the fixed image, padded for an image of this shape."""
         from scipy.fft import next_fast_len, rfft2
 
@@ -190,7 +190,7 @@ class _Search:
         """Return the correlation at every lag, -1 where the images overlap too little."""
         from scipy.fft import irfft2, rfft2
 
-        self._prepare(z.shape)
+        self._prepare_transforms(z.shape)
         fixed, fixed_squares, fixed_known = self.transforms
         moved, moved_squares, moved_known = (
             rfft2(part, self.size) for part in (z, z**2, known.astype(float))
@@ -219,25 +219,25 @@ class _Search:
         return self.correlate(np.where(known, z, 0.0), known)
 
     def find_peaks(self, z, known, half_turn: float) -> list:
-        """Find the highest maxima of the correlation over angle and lag.
+        """Find the highest peaks of the correlation over angle and lag.
 
         half_turn: pi if the image is rotated by 180 degrees first, else 0.
         """
         if half_turn:
             z = np.rot90(z, 2)
             known = np.rot90(known, 2)
-        tried = [_find_maximum(self._correlate_rotated(z, known, angle), angle) for angle in ANGLES]
-        best = max(tried)
+        peaks = [_find_maximum(self._correlate_rotated(z, known, angle), angle) for angle in ANGLES]
+        best = max(peaks)
         values = self._correlate_rotated(z, known, best.angle)
         for angle in best.angle + FINE_ANGLES[FINE_ANGLES != 0]:
-            tried.append(_find_maximum(self._correlate_rotated(z, known, angle), angle))
+            peaks.append(_find_maximum(self._correlate_rotated(z, known, angle), angle))
         rows, columns = np.indices(values.shape)
         distance = np.maximum(abs(rows - best.row), abs(columns - best.column))
         others = values[(distance > MIN_PIXEL_DISTANCE) & (values > -1.0)]
         others = np.arctanh(np.clip(others, -0.999999, 0.999999))
         centre = np.subtract(z.shape, self.z.shape)[::-1] / 2
         out = []
-        for maximum in _select_distinct(tried):
+        for maximum in _select_distinct(peaks):
             lag = np.array([self.columns[maximum.column], self.rows[maximum.row]]) - centre
             excess = np.arctanh(min(maximum.value, 0.999999)) - others.mean()
             significance = float(excess / max(float(others.std()), 1e-9))
@@ -259,10 +259,10 @@ def _find_maximum(values, angle: float) -> _Maximum:
     return _Maximum(float(values[row, column]), float(angle), int(row), int(column))
 
 
-def _select_distinct(tried: list) -> list:
-    """Select the largest maxima that differ from each other in angle or lag."""
+def _select_distinct(peaks: list) -> list:
+    """Select the largest peaks that differ from each other in angle or lag."""
     kept = []
-    for new in sorted(tried, reverse=True):
+    for new in sorted(peaks, reverse=True):
         is_new = all(
             abs(new.angle - other.angle) > MIN_ANGLE_DISTANCE
             or max(abs(new.row - other.row), abs(new.column - other.column)) > MIN_PIXEL_DISTANCE

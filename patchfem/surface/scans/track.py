@@ -150,8 +150,8 @@ def measure_scan_track(
         return _refuse_track("the worn part has no single direction, so it is no track")
     rotated = _rotate_map(depth, *axes, angle)
     section = _mean_section(rotated.depth)
-    most = np.isfinite(rotated.depth).sum(axis=0).max()
-    span = _find_deep_span(section, alignment.noise / np.sqrt(max(most, 1)))
+    n_points = np.isfinite(rotated.depth).sum(axis=0).max()
+    span = _find_deep_span(section, alignment.noise / np.sqrt(max(n_points, 1)))
     if span is None:
         return _refuse_track("the worn part is not one strip with unworn surface on both sides")
     complete = np.isfinite(rotated.depth[:, span[0] : span[1] + 1]).all(axis=1)
@@ -191,10 +191,10 @@ def measure_scan_track(
     )
 
 
-def _refuse_track(why: str) -> ScanTrack:
+def _refuse_track(reason: str) -> ScanTrack:
     nothing = np.zeros(0)
-    values = {name: make_unknown(*meaning, why) for name, meaning in TEXTS.items()}
-    return ScanTrack(values, {}, nothing, nothing, nothing, 0, why)
+    values = {name: make_unknown(*meaning, reason) for name, meaning in TEXTS.items()}
+    return ScanTrack(values, {}, nothing, nothing, nothing, 0, reason)
 
 
 def find_direction(depth, worn, x, y) -> tuple:
@@ -205,11 +205,11 @@ def find_direction(depth, worn, x, y) -> tuple:
     """
     from scipy.ndimage import binary_dilation, gaussian_filter
 
-    every = max(min(depth.shape) // N_DIRECTION, 1)
-    depth = depth[::every, ::every]
-    worn = worn[::every, ::every]
-    x = x[::every]
-    y = y[::every]
+    stride = max(min(depth.shape) // N_DIRECTION, 1)
+    depth = depth[::stride, ::stride]
+    worn = worn[::stride, ::stride]
+    x = x[::stride]
+    y = y[::stride]
     known = np.isfinite(depth)
     sigma = max(min(depth.shape) * SMOOTHING, 2.0)
     weight = gaussian_filter(known.astype(float), sigma, mode="constant")
@@ -237,9 +237,9 @@ def _rotate_map(depth, x, y, angle: float) -> _RotatedMap:
     half = np.array([np.ptp(x), np.ptp(y)]) / 2
     step = max(np.ptp(x) / (x.size - 1), np.ptp(y) / (y.size - 1))
 
-    def places(direction, most: int) -> np.ndarray:
+    def places(direction, max_points: int) -> np.ndarray:
         reach = float(np.abs(direction) @ half)
-        return np.linspace(-reach, reach, int(np.clip(2 * reach / step + 1, 3, most)))
+        return np.linspace(-reach, reach, int(np.clip(2 * reach / step + 1, 3, max_points)))
 
     along = places(ahead, MAX_SECTIONS)
     across = places(beside, MAX_PLACES)
@@ -361,13 +361,13 @@ def _measure_direction(angle: float, measured: list, along: list, step: float) -
 
 
 def _measure_volume(area: Quantity, length: _Length) -> dict:
-    """Return length and volume of the track, refused if it runs over the edge of the scans."""
+    """Return length and volume of the track; refuse both if it runs over the edge of the scans."""
     if length.is_cut:
-        why = (
+        reason = (
             "the track leaves the region that both scans show, so its volume must be computed as "
             "lost area times stroke"
         )
-        return {name: make_unknown(*TEXTS[name], why) for name in ("length", "volume")}
+        return {name: make_unknown(*TEXTS[name], reason) for name in ("length", "volume")}
     area_error = (area.high - area.value) / area.value
     length_error = (length.high - length.low) / 2 / length.value
     relative_error = float(np.hypot(area_error, length_error))

@@ -48,7 +48,7 @@ class Volumes(NamedTuple):
 
 
 def refuse_measures(reason: str) -> dict:
-    """Return all volumes and depths without values, with the reason."""
+    """Return all volumes and depths as unknown, with the reason."""
     return {name: make_unknown(*meaning, reason) for name, meaning in MEASURES.items()}
 
 
@@ -92,7 +92,7 @@ def _measure(alignment: ScanAlignment, x, y) -> Volumes:
     values = {
         "worn_volume": Quantity(*volume, *MEASURES["worn_volume"]),
         "grown_volume": Quantity(*growth, *MEASURES["grown_volume"]),
-        "worn_share": _measure_share(alignment, cell, worn, walls > 0, nearest),
+        "worn_share": _compute_worn_fraction(alignment, cell, worn, walls > 0, nearest),
         "worn_depth_mean": Quantity(*mean, *MEASURES["worn_depth_mean"]),
         "worn_depth_max": _measure_largest(alignment, worn),
     }
@@ -168,7 +168,7 @@ def _estimate_wall_error(alignment: ScanAlignment, changed) -> np.ndarray:
     return np.where(is_wall, size[tuple(place)] / 2, 0.0)
 
 
-def _measure_share(alignment: ScanAlignment, cell, worn, walls, nearest) -> Quantity:
+def _compute_worn_fraction(alignment: ScanAlignment, cell, worn, walls, nearest) -> Quantity:
     """Compute the worn fraction of the common region of two scans.
 
     Near the edge of round wear the area above a threshold falls linearly with the threshold. The

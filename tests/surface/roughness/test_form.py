@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from patchfem.core import PatchfemError
-from patchfem.surface import Profile, parse_form
+from patchfem.surface import Profile, parse_form_option
 from patchfem.surface.areal import Areal, level
 from patchfem.surface.roughness.form import subtract_form
 
@@ -138,7 +138,7 @@ def test_exact_flat_trace_gives_lower_bound_of_radius():
 def test_refuses_unknown_form(text):
     """An unknown form or degree is refused."""
     with pytest.raises(PatchfemError, match="use a degree from 1"):
-        parse_form(text)
+        parse_form_option(text)
 
 
 def test_refuses_too_few_heights_for_form():

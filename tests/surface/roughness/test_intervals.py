@@ -56,7 +56,7 @@ def interval_coverage(count: int, seed: int, names=None, n_reference: int = 2000
             intervals = intervals_by_record.setdefault(
                 id(heights), Intervals(heights, 1 if heights.section is None else None)
             )
-            low, high = intervals.interval(row, value)
+            low, high = intervals.confidence_interval(row, value)
             if low is not None:
                 covers[row.name].append(low <= truth[row.name] <= high)
     # at most a tenth of the traces has no interval, because they seem not Gaussian
@@ -91,7 +91,7 @@ def test_exact_degrees_of_freedom_of_white_noise():
     heights = Heights(np.random.default_rng(0).normal(size=n), UM)
     found = Intervals(heights, None)
     assert found.freedom("power") == pytest.approx(n, rel=0.05)
-    low, high = found.interval(TABLE["Rq"], 1.0)
+    low, high = found.confidence_interval(TABLE["Rq"], 1.0)
     assert high - low == pytest.approx(2 * 1.645 / np.sqrt(2 * n), rel=0.05)
 
 
@@ -113,7 +113,7 @@ def test_always_longer_trace_has_narrower_interval():
         widths = []
         for size in (16_000, 64_000):
             heights = Heights(z[:size], UM)
-            low, high = Intervals(heights, None).interval(row, row.compute(heights))
+            low, high = Intervals(heights, None).confidence_interval(row, row.compute(heights))
             widths.append(high - low)
         assert widths[0] / widths[1] == pytest.approx(2, rel=0.2), name
 
@@ -135,10 +135,15 @@ def test_exact_interval_of_ratio_stays_within_bounds():
     z = draw_traces(1, 0.3e-3, UM, 6e-6, 2)[0]
     heights = Heights(z - z.mean(), UM)
     for name in ("PMr1", "PMr2"):
-        low, high = Intervals(heights, 1).interval(TABLE[name], TABLE[name].compute(heights))
+        low, high = Intervals(heights, 1).confidence_interval(
+            TABLE[name], TABLE[name].compute(heights)
+        )
         assert 0 <= low <= high <= 1
 
 
 def test_exact_flat_trace_has_no_interval():
     """A flat trace has no interval."""
-    assert Intervals(Heights(np.zeros(100), UM), 1).interval(TABLE["Pa"], 0.0) == (None, None)
+    assert Intervals(Heights(np.zeros(100), UM), 1).confidence_interval(TABLE["Pa"], 0.0) == (
+        None,
+        None,
+    )

@@ -1,6 +1,6 @@
 """Ambiguous traces: scar or bent datum, scar or growth, wear or a drifting datum.
 
-A reading is one of the floors that the fit finds (`alignment`). If two readings explain the traces
+An interpretation is one of the floors that the fit finds (`alignment`). If two of them explain the traces
 equally well, no worn depth is given, and a sentence states the numbers of both.
 """
 
@@ -39,14 +39,14 @@ MAX_SCATTER_RATIO = 1.3
 MIN_BLOCKS = 12.0
 
 
-class Reading(NamedTuple):
+class Ambiguity(NamedTuple):
     """Headline of an ambiguity, "" if there is none, and the reason why no depth is given."""
 
     headline: str
     reason: str
 
 
-def find_ambiguity(alignment: Alignment, *, is_referenced: bool, is_changed: bool) -> Reading:
+def find_ambiguity(alignment: Alignment, *, is_referenced: bool, is_changed: bool) -> Ambiguity:
     """Check whether two interpretations explain the traces equally well.
 
     Parameters
@@ -63,20 +63,20 @@ def find_ambiguity(alignment: Alignment, *, is_referenced: bool, is_changed: boo
         is_line = alignment.bend == 0 and is_deeper
         if not (is_line and is_referenced):
             bow, line = (rival, alignment) if is_line else (alignment, rival)
-            return Reading(_name_ambiguity(bow), describe_both(bow, line))
+            return Ambiguity(_name_ambiguity(bow), describe_both(bow, line))
     if is_changed and may_be_drift(alignment):
-        return Reading(DRIFT, describe_drift(alignment))
-    return Reading("", "")
+        return Ambiguity(DRIFT, describe_drift(alignment))
+    return Ambiguity("", "")
 
 
-def _have_different_areas(one: Alignment, other: Alignment) -> bool:
-    """Whether two interpretations give different worn or grown areas, as printed."""
-    has_other_loss = _describe_loss(one) != _describe_loss(other)
-    return has_other_loss or _format_grown_area(one) != _format_grown_area(other)
+def _have_different_areas(first: Alignment, second: Alignment) -> bool:
+    """Return whether two interpretations give different worn or grown areas, as printed."""
+    has_other_loss = _describe_loss(first) != _describe_loss(second)
+    return has_other_loss or _format_grown_area(first) != _format_grown_area(second)
 
 
 def _name_ambiguity(bow: Alignment) -> str:
-    if bow.bend and not _has_grown_more(bow):
+    if bow.bend and not _growth_exceeds_wear(bow):
         return BENT_DATUM_HEADLINE
     return GROWN_ENDS_HEADLINE if _has_changed(bow) else NOISE
 
@@ -92,7 +92,7 @@ def detrended_means(depth, unworn=None) -> np.ndarray:
 
 
 def may_be_drift(alignment: Alignment) -> bool:
-    """Whether a drift of the datum may explain what looks like wear.
+    """Return whether a drift of the datum may explain what looks like wear.
 
     This is so if the means of unworn parts vary slowly, with a standard deviation of a twelfth of the
     depth or more, or if cosines of at most eight half waves fit the whole difference of the traces.
@@ -117,7 +117,7 @@ def may_be_drift(alignment: Alignment) -> bool:
 
 def describe_both(bow: Alignment, line: Alignment) -> str:
     """State why no worn depth is given, with the numbers of both interpretations."""
-    if bow.bend and not _has_grown_more(bow):
+    if bow.bend and not _growth_exceeds_wear(bow):
         other = (
             f"the datum bent by {format_length(bow.bend, 3)} (sag over the common length) and "
             f"{_describe_loss(bow)} at the ends"
@@ -137,18 +137,18 @@ def describe_both(bow: Alignment, line: Alignment) -> str:
 
 
 def _has_changed(alignment: Alignment) -> bool:
-    """Whether an interpretation has growth or wear that is large enough to be printed."""
+    """Return whether an interpretation has growth or wear that is large enough to be printed."""
     return any(format_number(1e12 * area, 3) != "0" for area in _measure_areas(alignment))
 
 
-def _has_grown_more(alignment: Alignment) -> bool:
-    """Whether more material grew than wore off in an interpretation."""
+def _growth_exceeds_wear(alignment: Alignment) -> bool:
+    """Return whether more material grew than wore off in an interpretation."""
     lost, grown = _measure_areas(alignment)
     return grown > lost
 
 
 def _measure_areas(alignment: Alignment) -> tuple:
-    """Return the area [m2] of lost and of deposited material in an interpretation of the traces."""
+    """Return the areas [m2] of lost and of deposited material in an interpretation of the traces."""
     step = float(np.ptp(alignment.x)) / (alignment.x.size - 1)
     deposit = alignment.depth < -MAX_NOISE * alignment.noise_at
     lost = max(float(alignment.depth[~deposit].sum()) * step, 0.0)
@@ -173,12 +173,12 @@ def _describe_loss(alignment: Alignment) -> str:
 def describe_drift(alignment: Alignment) -> str:
     """State why no worn depth is given if the datum may drift, with both interpretations."""
     along = np.linspace(-1, 1, alignment.depth.size)
-    seen = float(np.ptp(detrended_means(np.asarray(alignment.depth) - alignment.bend * along**2)))
+    span = float(np.ptp(detrended_means(np.asarray(alignment.depth) - alignment.bend * along**2)))
     bent = ""
     if alignment.bend:
         bent = f" and the datum bent by {format_length(abs(alignment.bend), 3)} (over the common length)"
     return (
-        f"the traces differ slowly along x, by {format_length(seen, 3)} from the lowest to the highest place about a line, "
+        f"the traces differ slowly along x, by {format_length(span, 3)} from the lowest to the highest place about a line, "
         "and what would be unworn differs in the same way, as with an instrument whose datum drifts; two readings "
         f"explain both traces: either nothing wore off and the datum drifted, or {_describe_loss(alignment)}{bent}; measure "
         "the datum on a flat, or each trace twice to see the drift"
@@ -208,15 +208,15 @@ def find_worn_flanks(
     both = (at >= before.x[0]) & (at <= before.x[-1]) & ~after.missing
     known = ~before.missing
     x = x[both]
-    off = np.interp(at[both], before.x[known], before.z[known]) - after.z[both]
-    means = detrended_means(off, (x < flanks.start) | (x > flanks.end))
+    difference = np.interp(at[both], before.x[known], before.z[known]) - after.z[both]
+    means = detrended_means(difference, (x < flanks.start) | (x > flanks.end))
     slow = float(means.max() - means.min()) if means.size else 0.0
     if slow < MAX_FLANK_ERROR * flanks.largest.value:
         return ""
     ends = np.minimum(np.arange(x.size), np.arange(x.size)[::-1]) < max(
         int(SHORT_FLANK * x.size), 1
     )
-    deep = off - np.polyval(np.polyfit(x[ends], off[ends], 1), x)
+    deep = difference - np.polyval(np.polyfit(x[ends], difference[ends], 1), x)
     means = average_parts(deep, part_edges(x.size, N_PARTS))
     worn = (
         f"{format_length(float(deep.mean()), 3)} wore off on average over the common length and "
