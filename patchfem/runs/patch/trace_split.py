@@ -16,6 +16,7 @@ from ...core import PatchfemError
 from ...formatting import format_length, format_quantity
 from ...model import profile
 from ...surface.fine import NEGLIGIBLE_LOST, unrepresented_fraction, wave_spectrum
+from ...surface.profile import Profile
 from ...surface.roughness.peaks import PERSSON, trace_moments
 from .skin import combined_surface_modulus
 
@@ -92,19 +93,11 @@ def split_trace(
         )
     pieces = patch_model.pieces
     element = element or patch_model.uniform_element_size
-    ends = np.array([-0.5, 0.5]) * pieces.length
-    trace = profile.level_profile(gap.profile, ends, element, is_material=False).profile
+    trace = _level_trace(patch_model, element)
     pressure = loading.load / (pieces.length * pieces.width * pieces.pairs)
     modulus = combined_surface_modulus(patch_model)
     is_given = cutoff is not None
     if not is_given:
-        if unrepresented_fraction(trace, element) <= NEGLIGIBLE_LOST:
-            raise PatchfemError(
-                f"{trace.source}: elements of {format_length(element, 3)} represent "
-                f"{100 - 100 * NEGLIGIBLE_LOST:g} % of the rms height, so that there is nothing to split; reduce "
-                "contact.element_size if the errors are too large, or give a cutoff",
-                PROFILE_KEY,
-            )
         spectrum = wave_spectrum(trace)
         cutoff = float(f"{spectrum.shortest_resolved_wave(element, pressure / modulus):.3g}")
     if is_given and not cutoff < trace.length:
@@ -151,12 +144,28 @@ def split_trace(
     )
 
 
-def advise_split(patch_model, element: float) -> list[str]:
-    """Return the advice to split the trace of a patch, as a list; [] if it cannot be split.
+def _level_trace(patch_model, element: float) -> Profile:
+    """Return the trace of a patch, levelled over its length; element: length [m] that may be missing."""
+    ends = np.array([-0.5, 0.5]) * patch_model.pieces.length
+    return profile.level_profile(patch_model.gap.profile, ends, element, is_material=False).profile
 
-    element: length [m] of the elements that carry load.
+
+def advise_split(patch_model, element: float) -> list[str]:
+    """Return the advice to split the trace of a patch, as a list.
+
+    It is empty if the trace cannot be split, or if the elements represent all of its waves, so that only smaller
+    elements help.
+
+    Parameters
+    ----------
+    patch_model : PatchModel
+    element : float
+        Length [m] of the elements that carry load.
     """
     try:
-        return [split_trace(patch_model, element=element).describe()]
+        split = split_trace(patch_model, element=element)
     except PatchfemError:
         return []
+    if unrepresented_fraction(_level_trace(patch_model, element), element) <= NEGLIGIBLE_LOST:
+        return []
+    return [split.describe()]
