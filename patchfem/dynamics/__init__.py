@@ -27,7 +27,7 @@ entry of this list and the entries before it:
 Read `events` first for motion from event to event, `propagator` and `interfaces` for steps of a march.
 """
 
-# names that other folders use, by module
+# Names that other folders use, by module.
 PUBLIC = {
     "checkpoint": (
         "CheckpointFiles",

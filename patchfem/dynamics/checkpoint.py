@@ -20,15 +20,16 @@ import numpy as np
 from ..core import Missing, PatchfemError
 from ..disk.atomic_write import write_atomically
 
-# smallest elapsed time [s] between two checkpoints; a shorter part of a march is inexpensive to repeat
+# Smallest time between two checkpoints [s]; a shorter part of a march is quickly repeated.
 MIN_WRITE_INTERVAL = 20.0
-# largest fraction of the elapsed time for writing checkpoints, so that they do not slow a march
+# Largest fraction of the elapsed time that is spent on writing checkpoints.
 MAX_WRITE_FRACTION = 0.02
-# largest number of samples that are kept from before the last cycles; it bounds the size of the file
+# Largest number of samples from before the last cycles in a checkpoint, which limits the file size.
 MAX_EARLY_SAMPLES = 400_000
-# attributes of a Run that are not stored, because a new Run computes them or each step overwrites them
+# Attributes of a Run that a checkpoint omits, because a new Run computes
+# them or each step overwrites them.
 UNSTORED_ATTRIBUTES = "periodic", "workspace"
-# attributes of a Run that are filled during the march, so that they cannot identify it at its start
+# Attributes of a Run that are empty at the start of a march and therefore do not identify it.
 UNFILLED_ATTRIBUTES = ("sets",)
 RETRY_ADVICE = "run without --resume"
 _FILES = ContextVar("checkpoint_files", default=None)
@@ -325,7 +326,7 @@ def load_checkpoint(path: Path, key: str, run, samples: MarchSamples, start_marc
         samples.restore(arrays, start_march)
     except PatchfemError:
         raise
-    except Exception as error:  # a damaged archive can raise errors of many classes
+    except Exception as error:  # a damaged archive can raise exceptions of many classes
         raise PatchfemError(
             f"{path.parent.name}: the state saved there cannot be read ({error}); {RETRY_ADVICE}"
         ) from None

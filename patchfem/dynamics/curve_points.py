@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-# smallest reference of relative errors, over the largest value of the curve, because a
-# curve may start from 0
+# Smallest reference value of relative errors, relative to the largest value of the curve; it is
+# needed where a curve starts from 0.
 MIN_VALUE_RATIO = 1e-3
-# smallest interval over its abscissa, at which the refinement ends at a jump of the curve
+# Smallest interval that is halved, relative to its abscissa; it ends the refinement at a jump.
 MIN_INTERVAL_RATIO = 1e-6
 
 
@@ -58,7 +58,8 @@ def sample_adaptively(
         intervals = find_coarse_intervals(np.array(abscissas), values, tolerance)
         if not intervals.size or len(abscissas) >= max_points:
             return CurvePoints(np.array(abscissas), results)
-        # intervals are split from the last to the first, so that the indices of the others stay valid
+        # The intervals are split from the last to the first, so that
+        # the other indices remain valid.
         for k in intervals[::-1][: max_points - len(abscissas)]:
             middle = 0.5 * (abscissas[k] + abscissas[k + 1])
             abscissas.insert(k + 1, middle)
@@ -87,10 +88,10 @@ def find_coarse_intervals(abscissas, values, tolerance: float) -> np.ndarray:
         curvature = np.abs(values[1:-1] - line) / (4 * h[:-1] * h[1:])
         largest = np.maximum(np.maximum(values[:-2], values[1:-1]), values[2:])
         floor = MIN_VALUE_RATIO * np.max(values, initial=0.0, where=np.isfinite(values))
-        # factor 0.75, because on the worst flank of a peak the error of linear interpolation is 1.25 times the
-        # estimate
+        # The factor is 0.75 because, on the steepest flank of a peak, the error of linear
+        # interpolation is 1.25 times the estimate.
         max_error = 0.75 * tolerance * np.maximum(largest, floor)
-        # a comparison with nan is false, so no point is added next to nan
+        # Comparisons with nan are false, so no point is added next to nan.
         is_left_coarse = curvature * h[:-1] ** 2 > max_error
         is_right_coarse = curvature * h[1:] ** 2 > max_error
     is_coarse = np.zeros(h.size, bool)

@@ -7,15 +7,18 @@ import numpy as np
 
 from ..core import STICK_SPEED_RATIO
 
-# product of two successive rates over the square of the largest rate, below which it is round-off, as at rest
+# Largest product of two successive rates, relative to the square of the largest rate,
+# that is attributed to round-off.
 REST_RATIO = 1e-12
-# round-off level of speeds over the largest speed, and of slip increments over the largest output
+# Round-off error of a speed relative to the largest speed, and of a slip increment
+# relative to the largest output.
 ROUND_OFF_RATIO = 1e-13
-# largest number of samples that are kept of a cycle before the last cycles, which bounds the memory
+# Largest number of samples per cycle that are kept from before the last
+# cycles, which limits the memory.
 MAX_SAMPLES_PER_CYCLE = 100
-# number of samples of each of the last cycles, for engines that choose the length of their steps
+# Number of samples per cycle in the last cycles, for methods that choose their own step length.
 SAMPLES_PER_CYCLE = 400
-# smallest number of samples of the last cycles, for a run that is shorter than a cycle
+# Smallest number of samples in the last cycles, for runs shorter than one cycle.
 MIN_SAMPLES = 101
 
 
@@ -164,8 +167,8 @@ def find_hermite_extremes(values, rates, dt) -> Extremes:
     rates = rates.reshape(-1, values.shape[-1])
     minimum = values.min(axis=1)
     maximum = values.max(axis=1)
-    # a change of sign of a rate that is zero within round-off, as at a stop, is no reversal; the cubic
-    # would overshoot there
+    # A rate that changes sign within round-off, as at a stop, is not a reversal;
+    # the cubic would overshoot there.
     max_square = (rates**2).max(axis=1, keepdims=True)
     row, column = np.nonzero(rates[:, :-1] * rates[:, 1:] < -REST_RATIO * max_square)
     if column.size:
@@ -173,8 +176,8 @@ def find_hermite_extremes(values, rates, dt) -> Extremes:
         b = values[row, column + 1]
         p = rates[row, column] * dt
         q = rates[row, column + 1] * dt
-        # the interpolant a + p s + quadratic s^2 + cubic s^3 of the fraction s of the step has the
-        # derivative 3 cubic s^2 + 2 quadratic s + p
+        # With the fraction s of the step, the interpolant is a + p s + quadratic s^2 + cubic s^3,
+        # and its derivative is p + 2 quadratic s + 3 cubic s^2.
         cubic = 2 * (a - b) + p + q
         quadratic = 3 * (b - a) - 2 * p - q
         root = np.sqrt(np.maximum(quadratic**2 - 3 * cubic * p, 0))

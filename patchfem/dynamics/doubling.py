@@ -47,7 +47,7 @@ def make_short_step(square, damping, push, parts: dict, quadratic) -> StepMap:
     Step
     """
     position_push, rate_push = push
-    # free motion of z minus identity, computed without cancellation
+    # The deviation of the free motion of z from the identity is computed without cancellation.
     position_change = -position_push @ square
     change = np.block(
         [[position_change, rate_push], [-rate_push @ square, position_change - rate_push @ damping]]

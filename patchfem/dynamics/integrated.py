@@ -9,7 +9,8 @@ import numpy as np
 
 from ..core import ModalBasis, Outcome, Response
 
-# smallest mean resultant length of twice the phases of slip onsets, at which they count as one common phase
+# Smallest mean resultant length of the doubled phases of slip onsets for
+# which a common phase is reported.
 MIN_ALIGNMENT = 0.95
 
 

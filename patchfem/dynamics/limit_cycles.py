@@ -24,31 +24,36 @@ from .harmonic.forces import LawGroup
 from .harmonic.harmonic import pack_harmonics
 from .harmonic.point import make_balance
 
-# Number of samples of a cycle for its amplitude; parabolas between samples make the error
-# negligible.
+# Number of samples of a cycle for its amplitude; with parabolas between
+# samples the error is negligible.
 N_SAMPLES = 4096
-# Number of amplitudes at which the damping of a free motion is evaluated to bracket its sign
-# changes.
+# Number of amplitudes at which the damping of a free motion is
+# evaluated to bracket its sign changes.
 N_AMPLITUDES = 48
-# smallest and largest of these amplitudes over the amplitude 4 F/(pi |c| omega) of den Hartog's balance
+# Smallest of these amplitudes, relative to the amplitude 4 F/(pi |c|
+# omega) of den Hartog's balance.
 MIN_AMPLITUDE_RATIO = 1e-6
+# Largest of these amplitudes, relative to the same amplitude.
 MAX_AMPLITUDE_RATIO = 4.0
-# smallest amplitude ratio and number of amplitudes if the free motions in micro-slip cannot be followed
+# Smallest relative amplitude if the free motions in micro-slip cannot be computed.
 MIN_SLIDING_RATIO = 0.02
+# Number of amplitudes if the free motions in micro-slip cannot be computed.
 N_SLIDING_AMPLITUDES = 16
 NOT_FOLLOWED_MESSAGE = (
     "limit cycles are looked for among free motions of rising amplitude, and these could not be followed up to the "
     "amplitude at which friction dissipates what the mode gains"
 )
-# relative error of an amplitude due to round-off and the tolerances of the solvers
+# Relative error of an amplitude due to round-off and the tolerances of the solvers.
 AMPLITUDE_TOL = 1e-9
-# largest slide velocity at a reversal times the half period, over the slide, that counts as zero
+# Largest velocity at a reversal that counts as zero, times the half
+# period and relative to the slide.
 REST_TOL = 1e-8
 MAX_SECANT_STEPS = 12  # largest number of secant steps for the damping that balances an amplitude
-# Largest damping ratio of friction by den Hartog's balance; above it friction is at least 3 times the
-# elastic force at the reversal, so the interface sticks there.
+# Largest damping ratio of friction by den Hartog's balance; above it friction is at least 3 times
+# the elastic force at the reversal, so the interface sticks there.
 MAX_FIRST_RATIO = 2.0
-# Number of harmonics of the first solution; a second one with twice as many estimates its error.
+# Number of harmonics of the first solution; a second solution with
+# twice as many estimates its error.
 N_HARMONICS = 9
 
 
@@ -137,7 +142,7 @@ def _find_mode_relay_cycles(modes: ModalBasis, row, forces: tuple, mode: int) ->
             xtol=1e-16,
             rtol=1e-14,
         )
-        # the interface does not stop at the reversal where an undamped mode is in resonance
+        # Where an undamped mode is in resonance, the interface does not stop at the reversal.
         is_reversal = abs(_find_reversal(modes, row, forces[0], half_period)[1]) < REST_TOL
         if (
             is_reversal
@@ -285,7 +290,8 @@ def _make_relay_cycle(
     cycle = np.concatenate([motion, -motion[1:]])
     amplitude = _find_maximum(cycle)
     coarse_amplitude = _find_maximum(cycle[::2])
-    # a shift of the reversal in time absorbs part of a perturbation, so the map is from reversal to reversal
+    # A time shift of the reversal absorbs part of a perturbation, so the
+    # map is from reversal to reversal.
     speed = np.concatenate([path[-1, n:], _find_accelerations(modes, path[-1], row, slip_force)])
     face = np.concatenate([np.zeros(n), row])
     reversal_map = (np.eye(2 * n) - np.outer(speed, face) / (face @ speed)) @ _free_motion_matrices(
@@ -443,7 +449,7 @@ def _solve_undamped_between(
             return middle
         side = int(np.sign(middle.zeta) == np.sign(above))
         ends[side] = (at, middle.zeta, middle)
-        if side == last:  # Illinois rule: the value at the retained end is halved
+        if side == last:  # the Illinois rule halves the value at the retained end
             k = 1 - side
             ends[k] = (ends[k][0], ends[k][1] / 2, ends[k][2])
         last = side

@@ -17,7 +17,7 @@ from ..compiled.jit import njit
 from ..friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from .ledger import Ledger, SampleColumn
 
-# status values that `write_interface_sample` returns
+# Status codes that `write_interface_sample` returns.
 WITHIN_TRAVEL = 0
 EXCEEDS_TRAVEL = 1
 NOT_FINITE = 3

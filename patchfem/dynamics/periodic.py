@@ -19,21 +19,23 @@ from scipy.linalg.lapack import dgetrf, dgetrs
 
 from ..core import NotConverged
 
-# fractions of the Newton step that are tried in turn until the residual decreases
+# Fractions of the Newton step that are tried in turn until the residual decreases.
 STEP_FRACTIONS = 1.0, 0.5, 0.2, 0.05
-# largest number of Newton steps
+# Largest number of Newton steps.
 MAX_STEPS = 40
-# largest residual of a periodic motion, relative to the motion of a free mass under the drive
+# Largest residual of a periodic motion, relative to the motion of a free mass under the drive.
 MAX_FREE_MASS_RESIDUAL = 1e-6
-# largest motion over that of a free mass that a step may lead to: a resonance with a damping ratio of 5e-10
+# Largest motion that a step may lead to, relative to that of a free mass; it is a resonance
+# with a damping ratio of 5e-10.
 MAX_SIZE = 1e9
-# number of periods of each of two runs by which growth of the motion is tested
+# Number of periods of each of the two runs that test whether the motion grows.
 N_GROWTH_PERIODS = 60
-# distance of the largest multiplier from 1, below which the motion counts as undamped (cf. MAX_SIZE)
+# Largest distance of the largest multiplier from 1 at which the motion
+# counts as undamped (cf. MAX_SIZE).
 UNDAMPED_TOL = 2e-9
-# residual at the level of round-off, which a further step would not reduce
+# Residual at round-off level, which a further step would not reduce.
 ROUND_OFF_RESIDUAL = 1e-14
-# excess of the magnitude of a multiplier over 1 that may be due to round-off
+# Largest excess of the magnitude of a multiplier over 1 that is attributed to round-off.
 UNIT_CIRCLE_TOL = 1e-5
 
 
@@ -192,9 +194,8 @@ class Shooting:
                 return PeriodicPoint(mapped_point, n_steps)
             fractions = STEP_FRACTIONS[:1] if is_periodic else STEP_FRACTIONS
             better = self._damped_newton_step(mapped_point, fractions)
-            if (
-                is_periodic
-            ):  # a last full step squares the residual, unless it changes the set of numbers
+            # A last full step squares the residual, unless it changes the set of numbers.
+            if is_periodic:
                 if better is None or not better.has_same_numbers:
                     better = mapped_point
                 return PeriodicPoint(better, n_steps)
@@ -224,8 +225,8 @@ class Shooting:
                 trial = self.map_point(self.move_by_newton_step(mapped_point, fraction * step))
             except NotConverged:
                 continue
-            # the relative residual of an unbounded motion decreases as the step grows, so the
-            # size is limited
+            # The relative residual of an unbounded motion decreases as the step
+            # grows, so the size is limited.
             max_residual = (1 - 0.4 * fraction) * mapped_point.max_residual
             if trial.max_residual < max_residual and trial.size <= MAX_SIZE:
                 return trial

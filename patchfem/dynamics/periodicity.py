@@ -10,7 +10,7 @@ of two cycles shows only in the change over the last cycle.
 
 import numpy as np
 
-# number of cycles before the first check; the later checks are at 8, 16, 32, ... cycles
+# Number of cycles before the first check; the later checks are at 8, 16, 32, ... cycles.
 FIRST_CHECK = 4
 
 
@@ -48,7 +48,7 @@ def bound_remaining_change(
     creep = 2 * n_remaining / n_checked
     if previous_change == 0.0:
         return change * max(1.0, creep)
-    # a decay by the factor a per half of the interval gives a + a^2 = change/previous_change
+    # A decay by the factor a per half of the interval gives a + a^2 = change/previous_change.
     factor = (np.sqrt(1 + 4 * change / previous_change) - 1) / 2
     decay = factor**2 / (1 - factor**2) if factor < 1 else np.inf
     return change * max(1.0, min(decay, creep))

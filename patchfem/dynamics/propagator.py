@@ -15,16 +15,18 @@ import numpy as np
 from ..core import ModalBasis
 from . import doubling
 
-# smallest and largest number of Gauss points in a step; 48 resolve 20 radians of the fastest motion
+# Smallest number of Gauss points in a step.
 MIN_GAUSS_POINTS = 8
+# Largest number of Gauss points in a step; they resolve 20 radians of the fastest motion.
 MAX_GAUSS_POINTS = 48
-# number of propagators in the cache, and largest number of coordinates of a cached one, which
-# bound the memory
+# Largest number of propagators in the cache, which limits the memory.
 MAX_CACHED = 4
+# Largest number of coordinates of a cached propagator.
 MAX_CACHED_COORDINATES = 32
-# largest fastest rate times step length [rad] that MAX_GAUSS_POINTS Gauss points resolve
+# Largest product of fastest rate and step length [rad] that MAX_GAUSS_POINTS resolve.
 MAX_RATE_TIME = 20.0
-SHORT_STEP_RATE_TIME = 4.0  # fastest rate times length of the short step that is doubled [rad]
+# Product of fastest rate and length of the short step that is doubled [rad].
+SHORT_STEP_RATE_TIME = 4.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -77,7 +79,8 @@ class Propagator:
         drive_values = drive.values((start_times[:, None] + self.nodes).ravel()).reshape(count, -1)
         weights = self.parts
         driven_motion = drive_values @ weights["z"]
-        # the quadratic form is computed as a product and a sum, because an einsum of three factors is four times slower
+        # The quadratic form is computed as a product and a sum, because an einsum of
+        # three factors is four times slower.
         scalars = np.stack(
             [
                 ((drive_values @ weights["work"]) * drive_values).sum(axis=1),
@@ -169,7 +172,7 @@ def _make_propagator(modes: ModalBasis, period: float, steps_per_cycle: int, row
             _integrate_by_doubling(modes, dt, fastest_rate, 2 * np.pi / period)
         )
     else:
-        # two more Gauss points for each radian of the fastest motion
+        # Each radian of the fastest motion needs two more Gauss points.
         nodes, weight = _gauss_rule(
             dt,
             int(
@@ -287,7 +290,7 @@ def free_motion(modes: ModalBasis, times) -> tuple:
         return _free_motion_uncoupled(modes.omega, modes.zeta, times[:, None])
     n = modes.omega.size
     scale = max(float(modes.omega.max()), 1 / float(times.max()))
-    # rates are divided by `scale`, so that all entries of the matrix have a similar size
+    # Rates are divided by `scale`, so that all entries of the matrix have a similar size.
     a = np.block(
         [[np.zeros((n, n)), scale * np.eye(n)], [-np.diag(modes.omega**2) / scale, -modes.damping]]
     )
@@ -373,7 +376,7 @@ def _compute_drive_weights(modes: ModalBasis, dt, nodes, weight, node_blocks) ->
     def base_times(part):
         return np.einsum("i,kij->kj", base, part) if is_coupled else part * base
 
-    # velocity at point k per drive at point j: -int_0^tau_k E_vv(tau_k - s) base l_j(s) ds
+    # The velocity at point k per drive at point j is -int_0^tau_k E_vv(tau_k - s) base l_j(s) ds.
     node_velocities = np.empty((m, m, n))
     positions = (1 + np.polynomial.legendre.leggauss(m)[0]) / 2
     for k, tau in enumerate(nodes):

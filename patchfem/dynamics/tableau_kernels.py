@@ -11,8 +11,9 @@ import numpy as np
 # Number of stages: 12 of the step, the slope at its end, and three of the dense output.
 N_STAGES = 16
 
-# A row of a table below begins in the first column of its line. The first number is the column in which the second and
-# all further coefficients stand, one after the other; the first coefficient stands in column 0. All others are 0.
+# In the tables below, each line that begins in the first column starts a new row. Its first number
+# is the column of the second coefficient; the further coefficients follow in the next columns, and
+# the first coefficient belongs to column 0. All other entries are 0.
 
 
 def parse_coefficients(table: str, n_rows: int, n_columns: int):
@@ -35,7 +36,7 @@ def parse_coefficients(table: str, n_rows: int, n_columns: int):
     return coefficients
 
 
-# Runge-Kutta nodes c_i of the stages, as fractions of the step
+# Runge-Kutta nodes c_i of the stages, as fractions of the step.
 STAGE_NODES = np.array(
     """
     0.0 0.05260015195876773 0.0789002279381516 0.1183503419072274
@@ -45,9 +46,10 @@ STAGE_NODES = np.array(
     """.split(),
     float,
 )
-# first nonzero column of each row of the Runge-Kutta matrix, apart from column 0
+# First nonzero column of each row of the Runge-Kutta matrix, apart from column 0.
 FIRST_COLUMNS = np.array("0 1 1 2 2 3 3 3 3 3 3 3 5 6 5 5".split(), int)
-# Runge-Kutta matrix a_ij, of which the table has the rows 1 to 15; row 12 holds the weights b_j of the step
+# Runge-Kutta matrix a_ij; the table has the rows 1 to 15, and row 12
+# holds the weights b_j of the step.
 RUNGE_KUTTA_MATRIX = parse_coefficients(
     """
 1 0.05260015195876773
@@ -78,7 +80,8 @@ RUNGE_KUTTA_MATRIX = parse_coefficients(
     N_STAGES,
     N_STAGES,
 )
-# weights of the step of order 8 minus those of the embedded methods of order 5 and of order 3
+# Differences between the weights of the step of order 8 and those of the
+# embedded methods of orders 5 and 3.
 ERROR_WEIGHTS = parse_coefficients(
     """
 5 0.01312004499419488 -1.2251564463762044 -0.4957589496572502 1.6643771824549864
@@ -91,7 +94,7 @@ ERROR_WEIGHTS = parse_coefficients(
 )
 ORDER_5_WEIGHTS = ERROR_WEIGHTS[0]
 ORDER_3_WEIGHTS = ERROR_WEIGHTS[1]
-# weights of the stages in the four highest terms of the dense output
+# Weights of the stages in the four highest terms of the dense output.
 DENSE_OUTPUT_WEIGHTS = parse_coefficients(
     """
 5 -8.428938276109013 0.5667149535193777 -3.0689499459498917 2.38466765651207 2.117034582445028

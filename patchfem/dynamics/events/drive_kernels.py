@@ -82,7 +82,7 @@ def drive_phase(segment, instant):
         if segment[Segment.TURNS] != 0.0:
             extra = cycles * segment[Segment.TURNS]
             theta += 2 * pi * (extra - floor(extra) + cycles * segment[Segment.TURNS_REMAINDER])
-        # The floor takes a tenth of the time of the operator %.
+        # This takes a tenth of the time of the operator %.
         return theta - 2 * pi * floor(theta / (2 * pi))
     if segment[Segment.KIND] == SEGMENT_KIND.line:
         return 2 * pi * offset / instant.period

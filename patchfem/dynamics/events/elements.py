@@ -11,10 +11,11 @@ import numpy as np
 
 from ...core import PatchfemError, frozen_array
 
-# Coarse runs that estimate the error of a discretized density of elements: (number of neighbouring cells that are
-# merged into one, first cell that is merged).
+# Coarser discretizations for the error estimate: number of adjacent cells that are merged, and
+# index of the first merged cell.
 CELL_MERGES = tuple((4, first_cell) for first_cell in range(4))
-# Relative difference below which two yield displacements count as equal; it is above round-off.
+# Largest relative difference of two yield displacements that are treated
+# as equal; it exceeds round-off.
 YIELD_TOL = 1e-14
 
 
@@ -70,7 +71,7 @@ def make_elements(stiffness, yield_displacement) -> Elements:
         raise PatchfemError(
             "friction: the stiffness and the yield slide of each element must be finite and >= 0"
         )
-    # A single element takes this short path, because the general case takes 2.5 times as long.
+    # The general case would take 2.5 times as long for a single element.
     if k.size == 1 and k[0] > 0 and y[0] > 0:
         return Elements(frozen_array(k), frozen_array(y), frozen_array([0], np.int64))
     order = np.flatnonzero((k > 0) & (y > 0))
@@ -135,7 +136,8 @@ def merge_elements(elements: Elements, count: int = 2, first: int = 0) -> Elemen
     begins = np.r_[0, np.arange(first, k.size - n_last, count), [k.size - 1] * n_last]
     begins = np.unique(begins).astype(int)
     stiffness = np.add.reduceat(k, begins)
-    # The yield displacement of a merged element lies between those of its members, so the order stays increasing.
+    # The yield displacement of a merged element lies between those of its
+    # members, so the order is preserved.
     yield_slide = np.add.reduceat(k * elements.yield_displacement, begins) / stiffness
     return Elements(
         frozen_array(stiffness),

@@ -4,12 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-# Kinds of events in `EventLog.kind`: a slip ends, a slip starts, the slip changes its sign, the drive changes.
+# Kinds of events in `EventLog.kind`: end of slip, start of slip, reversal of
+# the slip, change of the drive.
 STOP = 0
 RELEASE = 1
 REVERSAL = 2
 DRIVE_CHANGE = 9
-# Largest number of events in the log of a run; it bounds the memory and the file of a long run.
+# Largest number of events in the log of a run, which limits the memory and the file size.
 MAX_EVENTS = 400_000
 
 

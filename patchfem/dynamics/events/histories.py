@@ -53,21 +53,23 @@ from .positions_kernels import (
 from .reading import Reading, find_stick_vibration
 
 PACKAGE = "dynamics.events"
-# Number of time intervals that one call of the march records.
+# Number of time intervals recorded per call of the march.
 ROWS_PER_CALL = 4096
-# Maximum number of reversals and slip events from before the window whose rows are kept.
+# Maximum number of stored rows of reversals and slip events from before the window.
 MAX_REVERSAL_ROWS = 400_000
 # Maximum number of repeating cycles for which the reversals are stored.
 MAX_REPEATED_CYCLES = 1000
-# Fraction of the sum of the magnitudes of its terms below which a velocity is round-off.
+# Largest velocity that is treated as round-off, relative to the sum of the magnitudes of its terms.
 REST_TOL = 64 * np.finfo(float).eps
-# Fraction of the friction limit; an interface slips where more than this fraction of it slips.
+# Smallest slipping fraction of the friction limit at which an interface counts as slipping.
 SLIP_FRACTION = 0.5
-# Minimum number of cycles that are measured of a repeating motion; three contain every stick of a cycle completely.
+# Minimum number of cycles over which a repeating motion is measured; three contain
+# every stick of a cycle completely.
 MIN_MEASURED_CYCLES = 3
-# A run that ends within this fraction of a cycle from the end of a cycle counts as ending there.
+# Largest distance between the end of a run and the end of a cycle, in
+# cycles, at which they count as equal.
 CYCLE_END_TOL = 1e-9
-# Fraction of a cycle within which two events count as simultaneous.
+# Largest time between two simultaneous events, in cycles.
 SAME_TIME_TOL = 1e-12
 
 
@@ -271,8 +273,8 @@ def simulate(
         )
     run = start_event_run(modes, drive, groups, cycles, window, travel, start, memory)
     result = run.run(frames, progress, even=even)
-    # the output exceeded the travel: the run is repeated up to that time, because only a run whose end is known
-    # keeps the samples of its last cycles
+    # The output exceeded the travel. The run is repeated up to that time, because only a run with a
+    # known end keeps the samples of its last cycles.
     if result is None:
         shortened_run = start_event_run(
             modes, drive, groups, run.now / drive.period, window, np.inf, start, memory
@@ -427,8 +429,8 @@ class _EventRun:
         energy_at_rest = self.kernels.stored_energy(
             np.zeros_like(self.motion), self.modal_system, self.table, self.memory
         )
-        # Energy [J] of the stretched elements minus their work and loss so far; the energy balance of the run begins
-        # with it.
+        # This is the energy [J] of the stretched elements minus their work and loss so far, with
+        # which the energy balance of the run begins.
         self.start_stretch_energy = energy_at_rest - float(
             np.sum(self.memory.work - self.memory.loss)
         )
@@ -558,7 +560,7 @@ class _EventRun:
         k = int(self.time_state.now[Time.SEGMENT]) + 1
         if k < len(self.time_state.segments):
             end = min(end, int(self.time_state.segments[k, Segment.CYCLE]))
-        end -= 1  # The last cycle is marched, because it contains the end of the run or of the segment.
+        end -= 1  # the last cycle is marched, because the run or the segment ends in it
         n_skipped = end - begin - 1
         if n_skipped < 1:
             return
@@ -743,7 +745,7 @@ class _EventRun:
             row[self._column_index(0, column) :: N_COLUMNS] = values
         rows = np.concatenate([*window_rows, row[None]])
         if self.has_rigid:
-            # An event within round-off of the start of the window counts as before it.
+            # An event within round-off of the start of the window belongs to the time before it.
             is_long = rows[:, Row.DURATION] > SAME_TIME_TOL * self.period
             rows = rows[min(int(np.argmax(is_long)), len(rows) - 2) :]
         return rows
@@ -884,7 +886,8 @@ class _EventRun:
             is_jump | is_reversal | np.any(np.diff(slipping, axis=0, prepend=slipping[:1]), axis=1)
         )
         if np.count_nonzero(rows[:, Row.BEGIN]) <= 2 * grid.size:
-            # The force has a kink at a yield, so a sample there closes the energy balance of the samples.
+            # The force has a kink at a yield, so a sample there closes the
+            # energy balance of the samples.
             is_sampled |= rows[:, Row.BEGIN] == ROW_BEGIN.yielding
         is_jump = rows[is_jump & (rows[:, Row.TIME] > grid[0]), Row.TIME]
         time = np.unique(

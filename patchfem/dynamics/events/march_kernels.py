@@ -68,19 +68,20 @@ from .stick_kernels import (
 )
 from .sum_kernels import add_piece_sums
 
-# Fraction of a time interval; an interface that was at rest at a reversal still counts as resting until then, so that
-# no second reversal is found there.
+# Largest fraction of a time interval after which an interface that rested at a reversal still
+# counts as resting; it prevents a second reversal at the same instant.
 MIN_MOVING_FRACTION = 1e-12
-# Maximum number of successive events without progress in time; more count as an endless sequence of events.
+# Maximum number of successive events without progress in time; a larger number
+# indicates an endless sequence.
 MAX_IDLE_EVENTS = 1000.0
-# Ratio of the duration of a time interval to the predicted time to the next yield; with a margin of 30 % the yield
-# mostly lies inside the interval.
+# Ratio of a time interval to the predicted time until the next yield; with the margin of 30 % the
+# interval usually contains the yield.
 YIELD_MARGIN_FACTOR = 1.3
-# Minimum duration of a time interval over the longest possible one, where a yield is near.
+# Minimum duration of a time interval near a yield, relative to the longest possible interval.
 MIN_DURATION_FRACTION = 0.02
-# Fraction of the sum of the magnitudes of its terms below which a velocity is round-off.
+# Largest velocity that is treated as round-off, relative to the sum of the magnitudes of its terms.
 REST_TOL = 64 * EPS
-# Progress in time as a fraction of a cycle, below which an event counts as idle.
+# Minimum progress in time per event, in cycles; an event with less progress is idle.
 MIN_PROGRESS = 1e-13
 
 
@@ -680,7 +681,8 @@ def cross_breakpoint(kind, remaining, stop, run):
         repeats = detect_repeat(run)
     elif time_state.now[Time.OFFSET] == 0.0:
         clear_previous_cycle(run.previous)
-    # The forces are reset at every end, so that a run in parts gives the same result as a single run.
+    # The forces are reset at the end of every cycle, so that a run in several calls gives
+    # the same result as a single call.
     reset_forces(run)
     return drive_changes, repeats
 
@@ -832,7 +834,7 @@ def march(stop, run, rows):
     now[Time.IS_PAUSED] = 0.0
     while is_before(now, stop):
         if n_rows == rows.shape[0] and n_rows > 0:
-            # After a pause the forces are not reset, because they continue unchanged.
+            # The forces are not reset after a pause, because they continue unchanged.
             now[Time.BEGIN] = begin
             now[Time.IS_PAUSED] = 1.0
             return MARCH_STATUS.full, n_rows

@@ -19,9 +19,9 @@ from typing import NamedTuple
 from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_INLINE
 
-# Stiffness [N/m] of an interface while its rigid element sticks.
+# Stiffness of an interface while its rigid element sticks [N/m].
 RIGID_STIFFNESS = inf
-# Yield displacement [m] of an interface whose elements all slip; no motion reaches it.
+# Yield displacement of an interface whose elements all slip [m]; no motion reaches it.
 NO_YIELD = 1e300
 
 

@@ -17,10 +17,11 @@ from .positions_kernels import (
     Time,
 )
 
-# Relative difference below which the number of drive revolutions per cycle counts as an integer; it is round-off.
+# Largest relative deviation from an integer, due to round-off, of the number
+# of drive revolutions per cycle.
 INTEGER_TOL = 4e-15
-# Bits of the leading part of the revolutions per cycle; its product with a number of cycles is exact in double
-# precision.
+# Number of bits of the leading part of the revolutions per cycle; its product with a number of
+# cycles is exact in double precision.
 REVOLUTION_BITS = 24
 
 series_kernels = get_kernel_module("dynamics.events.series_kernels")

@@ -15,7 +15,8 @@ from .period import PeriodMap, PoincarePoint
 from .positions_kernels import MARCH_STATUS, N_COLUMNS, Limit, Row
 from .steady import find_antisymmetric_motion
 
-# Initial number of rows for the time intervals of half a period; it is doubled where it does not suffice.
+# Initial number of rows for the time intervals of half a period; it is
+# doubled when it does not suffice.
 INITIAL_ROWS = 256
 
 

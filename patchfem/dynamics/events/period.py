@@ -24,11 +24,11 @@ from .modal_system import (
 )
 from .positions_kernels import Limit
 
-# Ratio of the CPU time of a map with derivatives to that of a map without, both as interpreted Python.
+# Ratio of the CPU time of a map with derivatives to that of a map without them, both interpreted.
 SLOPE_COST_FACTOR = 2.0
 # Maximum number of drives whose segments are cached.
 MAX_KEPT_DRIVES = 256
-# Fields of the memory that change sign when the motion changes sign.
+# Memory fields that change sign when the motion changes sign.
 ODD_MEMORY_FIELDS = ("slide", "direction", "group_slide", "group_sign", "force", "slip")
 
 

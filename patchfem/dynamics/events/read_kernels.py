@@ -28,16 +28,16 @@ from .series_kernels import (
     find_largest_magnitude,
 )
 
-# Fraction of the friction limit; an interface slips where more than this fraction of it slips.
+# Smallest slipping fraction of the friction limit at which an interface counts as slipping.
 SLIP_FRACTION = 0.5
-# Minimum duration of a slip that counts, as a fraction of a cycle; a shorter slip is round-off at a stop.
+# Minimum duration of a slip, in cycles; a shorter slip is due to round-off at a stop.
 MIN_SLIP_DURATION = 1e-9
-# Fraction of the largest relative velocity of an interface, below which it counts as at rest.
+# Largest relative velocity of an interface at rest, relative to its maximum.
 REST_RATE_RATIO = 1e-9
-# Fraction of the range of an interface, below which its motion in a time interval counts as rest.
+# Largest displacement in a time interval of an interface at rest, relative to its range.
 MIN_MOTION_RATIO = 1e-13
-# Maximum time between a reversal and the end of a cycle, as a fraction of a cycle, up to which the reversal counts as
-# at that end.
+# Maximum time between a reversal and the end of a cycle, in cycles, for which the
+# reversal is assigned to that end.
 MAX_REVERSAL_DELAY = 0.003
 
 

@@ -8,8 +8,9 @@ from ...core import InterfaceLoop
 from ..integrated import mean_slip_phase
 from .positions_kernels import InterfaceMeasure, RunMeasure
 
-# Minimum angle [rad] of a free vibration during a stick that is measured. A vibration is reported from 1.5 periods on,
-# and a fit to a frequency that falls while elements yield is wrong by up to 0.05 of that angle.
+# Minimum angle of a free vibration that is measured during a stick [rad]. Vibrations
+# are reported from 1.5 periods on; while elements yield the frequency falls, and the
+# fitted angle is wrong by up to 5 %.
 MIN_VIBRATION_ANGLE = 0.95 * 3 * np.pi
 
 

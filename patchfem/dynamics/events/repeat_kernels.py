@@ -14,11 +14,13 @@ from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_INLINE
 from .positions_kernels import SEGMENT_KIND, PreviousStatus, Segment, Time
 
-# Change of the state in a cycle over the size of the motion, below which the motion counts as repeating.
+# Largest change of the state per cycle of a repeating motion, relative to the size of the motion.
 REPEAT_TOL = 1e-14
-# Change of the state in a cycle over the size of the motion, from which on the cycles of approach are counted.
+# Change of the state per cycle, relative to the size of the motion, below which the
+# cycles of approach are counted.
 APPROACH_TOL = 1e-10
-# Maximum number of cycles of approach; the remaining change of the motion is then below 1e-11 of its size.
+# Maximum number of cycles of approach; afterwards the motion changes
+# by less than 1e-11 of its size.
 MAX_APPROACH_CYCLES = 9000.0
 
 
@@ -67,9 +69,8 @@ def measure_cycle_change(run):
             or time_state.is_at_reversal[f] == 1.0
         ):
             return 1e300, size
-        row_norm = sqrt(
-            modal_system.inverse_mass[f] * modal_system.mass
-        )  # norm of the row that gives the relative displacement from the coordinates
+        # This is the norm of the row that gives the relative displacement from the coordinates.
+        row_norm = sqrt(modal_system.inverse_mass[f] * modal_system.mass)
         for k in range(memory.n_groups[f]):
             if (
                 previous_memory.group_end[f, k] != memory.group_end[f, k]

@@ -15,7 +15,8 @@ from .memory_kernels import is_sticking, next_yield_slide
 from .positions_kernels import EVENT_KIND
 from .series_kernels import EPS, NO_ROOT, SINGLE_INTEGRAL_FACTORS, find_first_root, refine_root
 
-# Fraction of the sum of the terms of a speed, below which a term is round-off and has no sign.
+# Largest term of a speed that is treated as round-off, relative to the sum
+# of the magnitudes of all terms.
 ACCELERATION_TOL = 1e-14
 
 

@@ -17,7 +17,8 @@ from ...friction.flags_kernels import NJIT_INLINE, NJIT_KERNEL
 from .memory_kernels import RIGID_STIFFNESS
 from .positions_kernels import ConstraintStatus
 
-# Maximum of duration times fastest rate of the system [1]; 28 powers are then exact to round-off.
+# Maximum product of the duration and the fastest rate of the system; 28
+# powers are then exact to round-off.
 MAX_RATE_TIME = 2.0
 # Highest power of a series.
 MAX_POWER = 28
@@ -25,26 +26,30 @@ MAX_POWER = 28
 EPS = 2.0**-52
 # Code for a polynomial without a root in [0, 1]; any value above 1 serves.
 NO_ROOT = 2.0
-# Maximum number of halvings in the search for a root; the last interval is as short as the round-off of its position.
+# Maximum number of halvings in the search for a root; the last interval is as short as
+# the round-off of its position.
 MAX_HALVINGS = 52
-# Number of columns for the Bernstein coefficients of an interval; the last column is 1 in a right half.
+# Number of columns for the Bernstein coefficients of an interval; the
+# last column is 1 in a right half.
 N_HULL_COLUMNS = MAX_POWER + 5
-# Highest power of the terms that the first search for a root evaluates.
+# Highest power in the first search for a root.
 FIRST_SEARCH_POWER = 9
 # Maximum number of Gauss points in a time interval.
 MAX_GAUSS_POINTS = 16
-# Relative error of the integral of a squared motion by Gauss points.
+# Relative error of the integral of a squared motion by Gauss quadrature.
 GAUSS_TOL = 1e-13
 
-# Largest rate times duration for which powers up to k suffice: the last term is then below EPS/4.
+# Largest product of rate and duration for which the powers up to k suffice; the
+# last term is then below EPS/4.
 _RATE_TIME_LIMITS = np.array(
     [0.0, 0.0] + [(EPS / 4 * factorial(k)) ** (1 / k) for k in range(2, MAX_POWER + 1)]
 )
-# Factors of u^k in the second integral of u^(k - 2) and in the first integral of u^(k - 1).
+# Factors of u^k in the second integral of u^(k - 2).
 DOUBLE_INTEGRAL_FACTORS = np.array(
     [0.0, 0.0] + [1 / (k * (k - 1)) for k in range(2, MAX_POWER + 2)]
 )
 SINGLE_INTEGRAL_FACTORS = np.array([0.0] + [1 / k for k in range(1, MAX_POWER + 3)])
+# Factors of u^k in the first integral of u^(k - 1).
 
 
 def _bernstein_row(degree: int, power: int) -> list:
@@ -55,7 +60,7 @@ def _bernstein_row(degree: int, power: int) -> list:
     return row
 
 
-# Bernstein coefficient i of u^k for degree d, as [d, k, i].
+# Coefficient i of u^k in the Bernstein basis of degree d, with indices [d, k, i].
 _BERNSTEIN = np.array(
     [[_bernstein_row(d, k) for k in range(MAX_POWER + 1)] for d in range(MAX_POWER + 1)]
 )
@@ -70,7 +75,7 @@ def _gauss_limit(n_points: int) -> float:
 _GAUSS_RATE_TIME_LIMITS = np.array(
     [0.0] + [_gauss_limit(g) for g in range(1, MAX_GAUSS_POINTS + 1)]
 )
-# Points and weights on [0, 1] of the Gauss rules with g points, as [g, point].
+# Nodes and weights on [0, 1] of the Gauss rules with g points, with indices [g, point].
 GAUSS_POINTS, GAUSS_WEIGHTS = np.zeros((2, MAX_GAUSS_POINTS + 1, MAX_GAUSS_POINTS))
 for _g in range(1, MAX_GAUSS_POINTS + 1):
     _points, _weights = np.polynomial.legendre.leggauss(_g)
@@ -171,7 +176,7 @@ def expand_single_mode(start, series, h, top, modal_system, spring):
     base = modal_system.base[0]
     stiff = h_squared * (modal_system.omega_squared[0] + spring * modal_system.inverse_mass[0])
     damp = h * modal_system.damping[0, 0]
-    # Coefficients k and k + 1 of the series.
+    # These are the coefficients k and k + 1 of the series.
     present = start.coordinates[0]
     following = h * start.rate[0]
     coefs[0, 0] = present
@@ -207,7 +212,7 @@ def expand_two_modes(start, series, h, top, modal_system, spring):
     face_2 = modal_system.interfaces[0, 1]
     base_1 = modal_system.base[0]
     base_2 = modal_system.base[1]
-    # The index is no constant, because a constant would not compile for one mode, for which this code is never reached.
+    # A constant index would not compile for one mode, for which this code is never reached.
     second = len(modal_system.omega_squared) - 1
     stiff_1 = h_squared * modal_system.omega_squared[0]
     stiff_2 = h_squared * modal_system.omega_squared[second]
@@ -409,7 +414,7 @@ def evaluate_polynomial(poly, low, top, u):
     -------
     float
     """
-    # Two independent sums of half the length are computed by the processor at the same time.
+    # The processor evaluates two independent sums of half the length at the same time.
     square = u * u
     even = poly[top]
     odd = 0.0
@@ -490,7 +495,7 @@ def refine_root(poly, low, top, left, right, u):
         if not left < new < right:
             new = 0.5 * (left + right)
         step = abs(new - u)
-        # The steps shrink quadratically, so the next one would be step (step/last)^2.
+        # Newton steps shrink quadratically, so the next one would be step (step/last)^2.
         if step <= 2 * EPS * u or (
             step < 0.01 * last and step * (step / last) ** 2 <= 0.1 * EPS * u
         ):
@@ -634,7 +639,7 @@ def find_first_root(poly, low, top, hulls):
     float
         NO_ROOT if there is none.
     """
-    # The indices are masked, because the compiler then knows that none is negative.
+    # The mask tells the compiler that no index is negative.
     remainder = 0.0
     low = low & 31
     top = top & 31
@@ -666,7 +671,7 @@ def find_first_root(poly, low, top, hulls):
             if k > 0 and (hull[k] < 0) != (hull[k - 1] < 0):
                 changes += 1
                 k_change = k
-        # The interval has no root, so the search continues in the part to its right that an earlier halving left.
+        # The interval has no root, so the search continues in the next part on its right.
         if lowest >= -noise:
             left += width
             depth, width = _take_right_half(hulls, depth, width, degree)
@@ -754,7 +759,7 @@ def find_largest_magnitude(poly, top, best, hulls):
                 turns += 1
                 at = k
         known = largest <= best * (1 + 1e-14) or depth == MAX_HALVINGS
-        # By Descartes' rule there is at most one extremum; the ends have been checked.
+        # By Descartes' rule there is at most one extremum, and the ends have been checked.
         if not known and turns < 2:
             if turns == 1:
                 sense = 1.0 if hull[1] > hull[0] else -1.0

@@ -18,9 +18,9 @@ from ..periodic import MappedPoint, PeriodicPoint, Shooting, bound_error
 from .elements import Memory
 from .period import PeriodMap, PeriodMapping, PoincarePoint, copy_memory
 
-# Number of periods of the run that leads to the start of Newton's method.
+# Number of periods that are integrated to obtain the start of Newton's method.
 N_APPROACH_PERIODS = 4
-# Fraction of the friction limit that may stick due to round-off where all interfaces slide.
+# Tolerance for round-off on the slipping fraction of the friction limit when all interfaces slide.
 FULL_SLIP_TOL = 1e-12
 
 

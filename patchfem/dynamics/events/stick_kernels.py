@@ -22,22 +22,24 @@ from .memory_kernels import RIGID_STIFFNESS, find_tangent, interface_force, is_s
 from .positions_kernels import ConstraintStatus
 from .series_kernels import DOUBLE_INTEGRAL_FACTORS, EPS, MotionSeries, MotionStart, expand_motion
 
-# Fraction of the sum of the magnitudes in a term, below which the term counts as round-off.
+# Largest term that is treated as round-off, relative to the sum of the
+# magnitudes from which it results.
 NOISE_TOL = 64 * EPS
-# Factor of NOISE_TOL in a second attempt, which nearly dependent interfaces need.
+# Factor on NOISE_TOL in a second attempt, which nearly dependent interfaces need.
 LOOSE_NOISE_FACTOR = 1e4
-# Number of terms of a power series that may decide between stick and slip; later terms are round-off.
+# Maximum number of power-series terms that decide between stick and
+# slip; later terms are round-off.
 MAX_DECIDING_ORDER = 8
-# Maximum number of interfaces at rest for which all combinations (at most 6561) are tried.
+# Maximum number of resting interfaces for which all combinations (at most 6561) are tried.
 MAX_ENUMERATED = 8
-# Maximum number of exchanges per interface; a solvable choice takes fewer.
+# Maximum number of exchanges per interface; solvable cases need fewer.
 MAX_EXCHANGES_PER_INTERFACE = 8
 # Maximum number of sweeps of Jacobi rotations; about five suffice.
 MAX_JACOBI_SWEEPS = 40
-# Length of an orthogonalised row over the longest one, below which it is linearly dependent.
+# Largest length of an orthogonalised row that is linearly dependent, relative to the longest row.
 DEPENDENT_TOL = 1e-10
-# Length of the remainder of an interface row after projection over that of the row, below which the other sticking
-# interfaces also prevent motion there.
+# Largest length of the projected row of an interface, relative to its full row, at which the other
+# sticking interfaces prevent its motion.
 TIED_TOL = 1e-9
 
 

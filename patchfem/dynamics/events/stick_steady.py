@@ -20,7 +20,7 @@ from ..periodic import MappedPoint, MotionGrows, Shooting
 from . import histories
 from .positions_kernels import N_COLUMNS, ROW_BEGIN, Column, Row
 
-# Maximum number of periods of the run that replaces Newton's method where it leads away from the periodic motion.
+# Maximum number of integrated periods when Newton's method leads away from the periodic motion.
 MAX_APPROACH_PERIODS = 400
 
 
@@ -180,9 +180,8 @@ class LinearPhase:
                 gradient[:n] @ v + gradient[n:] @ before - reaction_row @ modes.base * drive_rate
             )
         jump = np.zeros(2 * n)
-        if (
-            stops or static != kinetic
-        ):  # Without a difference of the limits nothing jumps at a release.
+        # Nothing jumps at a release if both limits are equal.
+        if stops or static != kinetic:
             jump[n:] = before - later.acceleration(z, v, drive)[0]
         matrix = later.stick_projection()
         if speed != 0:
@@ -200,7 +199,7 @@ def exponentiate_modal_matrix(matrix) -> np.ndarray:
     """
     n = len(matrix) // 2
     sizes = np.abs(matrix)
-    # The scale balances coordinates and rates.
+    # The scale gives coordinates and rates a similar size.
     scale = np.sqrt(max(float(sizes.max()), 1e-300) / max(float(sizes[:n].max()), 1e-300))
     weight = np.repeat([scale, 1.0], n)
     balanced = matrix * (weight[:, None] / weight)

@@ -92,7 +92,7 @@ def add_piece_sums(u, piece, run):
     work = 0.0
     loss = 0.0
     power_size = 0.0
-    for g in range(0, count, 4):  # Four points at a time fit the vector registers.
+    for g in range(0, count, 4):  # four points fill a vector register
         place = (
             u * GAUSS_POINTS[count, g],
             u * GAUSS_POINTS[count, g + 1],

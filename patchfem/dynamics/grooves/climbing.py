@@ -21,10 +21,10 @@ from ..march.varying_load import (
 from .arrays import ClimbIndex
 
 CONTACT_MODULE = "dynamics.grooves.contact_kernels"
-# bond length for points of Coulomb's law, over the tolerance times the slide at gross slip of the pieces; the force is
-# then wrong by at most 0.17 of the tolerance
+# Bond length of the points that represent Coulomb's law, relative to the tolerance times the slide
+# at gross slip; the force error is at most 0.17 of the tolerance.
 COULOMB_LENGTH_RATIO = 0.1
-# smallest bond length over the slide at gross slip, for the choice of shear modes
+# Smallest bond length for the choice of shear modes, relative to the slide at gross slip.
 MIN_LENGTH_RATIO = 1e-3
 
 
@@ -143,7 +143,7 @@ class FlankModel:
     """
 
     __slots__ = ()
-    # there are no other elements, and the compiled loop treats the load as constant
+    # A climbing contact has no other elements, and the compiled loop treats the load as constant.
     joints = ()
     laws = ()
     loading = ""

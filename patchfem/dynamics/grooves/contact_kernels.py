@@ -23,16 +23,17 @@ from ..modal_kernels import Bracket, narrow_bracket
 from . import points_kernels as points
 from .arrays import ClimbIndex, FlankIndex
 
-# outer points of the three-point Gauss rule on [-1, 1]
+# Outer node of the three-point Gauss rule on [-1, 1].
 GAUSS_POINT = sqrt(0.6)
-# phase of a groove [rad] below which sin(x)/x is evaluated by its series
+# Smallest phase [rad] at which sin(x)/x is evaluated directly; below it, a series is used.
 MIN_PHASE = 1e-4
-# residual over the tolerance, below which a step is solved
+# Largest residual of a solved step, relative to the tolerance.
 GOAL_FRACTION = 0.01
-# number of Newton iterations of a step before bisection steps are inserted, and largest number of iterations
+# Number of Newton iterations of a step before bisection steps are inserted.
 MAX_NEWTON_STEPS = 40
+# Largest number of iterations of a step.
 MAX_ITERATIONS = 200
-ROUND_OFF = 4e-16  # relative round-off error of a sum, over its largest term
+ROUND_OFF = 4e-16  # round-off error of a sum, relative to its largest term
 
 
 class FlankStep(NamedTuple):

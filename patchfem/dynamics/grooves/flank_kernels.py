@@ -16,7 +16,7 @@ from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ...friction.protocol_kernels import Reading
 from ..smooth.arrays import Turn
 
-# whether the law can hold the interface at rest (set-valued)
+# Whether the law can hold the interface at rest, as a set-valued law does.
 IS_SET_VALUED = True
 
 

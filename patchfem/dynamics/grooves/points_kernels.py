@@ -23,7 +23,7 @@ from ..interfaces.shear_solve_kernels import (
 )
 from .arrays import ClimbIndex, FlankIndex
 
-# tolerance of pieces that deform in shear, over the friction limit
+# Tolerance of the friction force for pieces that deform in shear, relative to the friction limit.
 SHEAR_GOAL = 1e-13
 
 
@@ -91,7 +91,7 @@ def solve_friction(ds, flat, end, dt, contact):
             and abs(residual) > normal_tol
             and abs(last_residual - residual) > 0.1 * abs(normal - last_normal)
         ):
-            # secant method, because every solution is expensive
+            # The secant method is used because every solution is expensive.
             set_normal_force(
                 contact,
                 max(normal - residual * (normal - last_normal) / (residual - last_residual), 0.0),

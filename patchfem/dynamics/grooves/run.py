@@ -20,12 +20,12 @@ from ..smooth import run as smooth
 from ..smooth.arrays import Counter, Scalar, Work
 from .climbing import FlankModel, GroovesRun, check_lifted_mass
 
-# Relative tolerance of an integration step; the steps of a march with grooves are as accurate.
+# Relative tolerance of an integration step, equal to that of a march with grooves.
 STEP_TOLERANCE = 1e-11
-# motion over wavelength/(2 pi), below which the step-size control counts it as rest
+# Largest displacement that the step-size control treats as rest, relative to wavelength/(2 pi).
 REST_RATIO = 1e-6
 LAW_MODULE = "dynamics.grooves.flank_kernels"
-# ledger positions of the sums that `SampledRun._read_sums` returns
+# Ledger positions of the sums that `SampledRun._read_sums` returns.
 LEDGER_SUMS = [
     Ledger.DRIVE_WORK,
     Ledger.VISCOUS_LOSS,
@@ -34,7 +34,7 @@ LEDGER_SUMS = [
     Ledger.N_ITERATIONS,
     Ledger.FRICTION_WORK,
 ]
-# status of the march for each outcome of the integrated motion
+# Status of the march for each outcome of the integrated motion.
 STATUS_OF_OUTCOME = {
     Outcome.LEAVES_GROOVES: MarchStatus.LEAVES_GROOVES,
     Outcome.NOT_CONVERGED: MarchStatus.NOT_FINITE,
@@ -182,7 +182,7 @@ class SampledRun(GroovesRun):
             motion = self.smooth_motion
         start_motion = motion.fork(self.drive)
         samples = motion.run_to(times[-1], times)
-        # a motion that ended early is sampled at its end, as the next sample
+        # A motion that ends early is sampled at its end.
         if motion.outcome is not None and len(samples) <= count:
             samples = np.concatenate([samples, motion.read_state()[0][None]])
         output = samples[:, 1 : 1 + n] @ self.modes.output
@@ -192,7 +192,8 @@ class SampledRun(GroovesRun):
         if exceeding.size:
             last = int(exceeding[0])
             status = MarchStatus.EXCEEDS_TRAVEL
-        # the motion is repeated up to the last sample, so that sums and state belong to it
+        # The motion is integrated again up to the last sample, so that sums
+        # and state belong to that sample.
         if 0 < last < len(samples) - 1:
             motion = self.smooth_motion = start_motion
             motion.run_to(times[last], times[: last + 1])

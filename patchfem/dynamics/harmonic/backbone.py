@@ -25,7 +25,7 @@ from .harmonic import (
     unpack_harmonics,
 )
 
-# largest number of times that the step between two amplitudes is halved where no motion is found
+# Largest number of times that the step between two amplitudes is halved if no solution is found.
 MAX_HALVINGS = 6
 
 
@@ -112,7 +112,7 @@ class FreeBalance:
         equations = balance.evaluate(
             np.append(x[:-2] * amplitude, [amplitude, 0.0]), omega, 0.0, self.h, linear_part
         )
-        # derivative of the dynamic stiffness with respect to zeta, times the motion
+        # This is the derivative of the dynamic stiffness with respect to zeta, times the motion.
         by_zeta = -2j * np.arange(self.h + 1)[:, None] * omega**2 * equations.modal
         slides_by_zeta = balance.faces @ np.einsum("kab,kb->ak", linear_part.inverse, by_zeta)
         residual_by_zeta = linear_part.free[0][2] @ by_zeta[1] / omega**2

@@ -7,7 +7,7 @@ from ..integrated import find_accelerations
 from .laws import Jenkins, SampledSlide, evaluate_series
 from .point import SteadyMotion, find_slip, friction_force
 
-# range of the slip over the bond length, below which bonds count as sticking
+# Largest range of slip at which bonds count as sticking, in bond lengths.
 STUCK_SLIDE_RATIO = 1e-3
 
 

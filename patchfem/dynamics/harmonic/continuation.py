@@ -15,13 +15,14 @@ from scipy.linalg.lapack import dgetrf, dgetrs
 
 from ...core import NotConverged
 
-# relative change of the unknowns below which Newton's method has converged
+# Largest relative change of the unknowns in the last Newton step.
 NEWTON_TOL = 1e-9
-# largest number of Newton steps for one point; a point that needs more is approached in shorter steps
+# Largest number of Newton steps per point; if a point needs more, the arc-length step is shortened.
 MAX_NEWTON_STEPS = 12
-# arc-length step below which the continuation stops
+# Smallest arc-length step of the continuation.
 MIN_STEP = 1e-7
-# smallest cosine of the angle (45 degrees) between a step and the tangent; a step at a larger angle has jumped
+# Smallest cosine of the angle (45 degrees) between a step and the tangent; a
+# larger angle indicates a jump.
 MIN_STEP_COSINE = 0.7
 
 
@@ -204,7 +205,7 @@ def _take_step(evaluate, point: _PathPoint, step, scales, tolerance) -> Correcte
     scaled_step = np.append(
         (corrected.x - point.x) / scales.size, (corrected.p - point.p) / scales.width
     )
-    # a step that does not follow the tangent jumps to another part of the curve
+    # A step that does not follow the tangent jumps to another part of the curve.
     if float(scaled_step @ t) <= MIN_STEP_COSINE * float(np.linalg.norm(scaled_step)):
         return None
     return corrected
@@ -302,7 +303,7 @@ def _find_folds(points: list, width: float) -> tuple:
         a = t0[-1] * h
         b = t1[-1] * h / max(float(t0 @ t1), 0.1)
         scaled_rise = (second.p - p0) / width
-        # derivative of the cubic: a + 2 s (3 rise - 2 a - b) + 3 s^2 (a + b - 2 rise)
+        # The derivative of the cubic is a + 2 s (3 rise - 2 a - b) + 3 s^2 (a + b - 2 rise).
         c = 3 * (a + b - 2 * scaled_rise)
         d = 2 * (3 * scaled_rise - 2 * a - b)
         roots = np.roots([c, d, a]) if abs(c) > 1e-9 * (abs(a) + abs(b)) else np.zeros(0)

@@ -10,7 +10,7 @@ from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ...friction.laws import stretch_kernels as law
 
-# largest number of cycles in which the memory becomes periodic
+# Largest number of cycles in the iteration to a periodic memory.
 MAX_CYCLES = 60
 
 
@@ -54,7 +54,8 @@ def solve_cycle(num, q, speed, dt, z, steps, force, slopes):
             kept *= steps[0, i]
             largest = max(largest, abs(now))
         miss = abs(now - start)
-        # the periodicity error has reached round-off or no longer decreases
+        # The iteration ends when the periodicity error has reached
+        # round-off or no longer decreases.
         if miss <= 1e-14 * largest * min(1 - kept, 1.0) or (turn > 2 and miss > 0.5 * last):
             break
         last = miss

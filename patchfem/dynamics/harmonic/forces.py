@@ -8,7 +8,8 @@ from ...core import PatchfemError, frozen_array
 from .harmonic import ContactResponse
 from .laws import Jenkins, SampledSlide, evaluate_series, find_harmonics, make_law
 
-# smallest and largest number of samples per cycle
+# Smallest number of samples per cycle.
+# Largest number of samples per cycle.
 MIN_SAMPLES = 256
 MAX_SAMPLES = 65536
 
@@ -239,7 +240,7 @@ def find_local_jacobians(k) -> np.ndarray:
     k: (i, 2 H + 1) harmonics of the local stiffness K.
     """
     h = k.shape[1] // 2
-    # complex Fourier coefficients of exp(i m theta), m = -2 H..2 H
+    # These are the complex Fourier coefficients of exp(i m theta), m = -2 H..2 H.
     coefficients = np.concatenate([k[:, :0:-1].conj() / 2, k[:, :1], k[:, 1:] / 2], axis=1)
     difference_part, sum_part = (
         coefficients[:, positions] for positions in _coefficient_positions(h)

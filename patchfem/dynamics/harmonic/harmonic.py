@@ -24,7 +24,8 @@ import numpy as np
 from ...core import ModalBasis, NotConverged, PatchfemError
 from ..periodic import solve_linear
 
-# dynamic stiffness of a mode over its scale, below which the mode has no receptance at a harmonic
+# Largest dynamic stiffness of a mode, relative to its scale, that is treated as singular;
+# the mode then has no receptance.
 SINGULAR_RATIO = 1e-10
 
 
@@ -172,7 +173,7 @@ class HarmonicBalance:
     def __init__(self, modes: ModalBasis, rows, contact):
         rows = np.asarray(rows, float)
         u, s, vt = np.linalg.svd(rows, full_matrices=False)
-        # singular values of linearly dependent rows are below this round-off limit
+        # The singular values of linearly dependent rows are below this round-off limit.
         rank = int(np.sum(s > 1e-12 * s[0])) if s[0] > 0 else 0
         if rank == 0:
             raise PatchfemError(
@@ -413,7 +414,8 @@ class HarmonicBalance:
             (slice(n_slide_unknowns, None), force_scale),
         ):
             scale = part_scale + abs(level) * float(np.linalg.norm(equations.by_level[part]))
-            # the residual of a solution is round-off; at a minimum of the residual without a root it is larger
+            # The residual of a solution is round-off; at a minimum of the residual
+            # that is not a root, it is larger.
             if float(np.linalg.norm(residual[part])) > 1e-7 * scale:
                 return False
         return True
@@ -512,8 +514,8 @@ def solve_damped(
             residual = float(np.linalg.norm(solve(trial_equations.residual)))
             if best is None or residual < best[0] or not np.isfinite(best[0]):
                 best = (residual, trial, trial_equations)
-            # natural monotonicity (Deuflhard): the next simplified step must be shorter; a tiny step is always
-            # accepted
+            # Natural monotonicity (Deuflhard) requires that the next simplified step is shorter;
+            # a tiny step is always accepted.
             if (
                 residual <= (1 - fraction / 4) * length
                 or fraction < 0.02

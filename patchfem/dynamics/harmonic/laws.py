@@ -17,7 +17,7 @@ from ...compiled import instantiate, load
 from ...core import PatchfemError, frozen_array
 from ...friction.protocol import Element
 
-# number of samples while an element passes from one friction limit to the other
+# Number of samples while an element passes from one friction limit to the other.
 SAMPLES_PER_STICK = 48
 
 
@@ -394,8 +394,8 @@ class FlowLaw(Law):
                 stretch=stretch,
                 tangent=lambda: self._compute_tangent(track, nodes),
             )
-        # dz/dq at the end of a step is the derivative of z by the slide; at its start this derivative is also divided by the
-        # fraction of z that the step keeps
+        # At the end of a step, dz/dq is the derivative of z with respect to the slide. At its
+        # start, this derivative is also divided by the fraction of z that remains after the step.
         before = np.roll(nodes.steps[1], 1)
         after = nodes.steps[1] / np.maximum(nodes.steps[0], 1e-300)
         hold = (
@@ -503,7 +503,7 @@ def make_law(model):
         return Jenkins(element.numbers[2 : 2 + count], element.numbers[2 + count :])
     if form == "speed":
         return SpeedLaw(element)
-    # bond points whose bonds neither grow nor break gradually have one stretch as their memory
+    # If bonds neither grow nor break gradually, one stretch describes the memory of a bond point.
     if form == "flow" or (form == "points" and element.numbers[3] < 0 and not element.numbers[8]):
         return FlowLaw(element)
     if model.set_valued:

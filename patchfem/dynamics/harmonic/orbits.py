@@ -11,27 +11,30 @@ import numpy as np
 
 from ..march.recording import make_mark, read_output_extremes
 
-# number of cycles from the start to the first extrapolation
+# Number of cycles before the first extrapolation.
 N_FIRST_CYCLES = 6
-# number of cycles after an extrapolation in which the memory of the contact adapts to the new state
+# Number of cycles after an extrapolation in which the memory of the
+# contact adapts to the new state.
 N_MEMORY_CYCLES = 2
-# largest number of cycles that are marched
+# Largest number of cycles that are integrated.
 MAX_CYCLES = 600
-# ratio of the changes per cycle after and before an extrapolation; above it the next one is postponed twice as long
+# Largest ratio of the changes per cycle after and before a successful extrapolation; after a
+# failure the waiting time doubles.
 MAX_CHANGE_RATIO = 0.1
-# relative change of the state in a cycle, below which the motion counts as periodic
+# Largest relative change of the state per cycle of a periodic motion.
 PERIODIC_TOL = 1e-8
-# motion over that of a free mass under the drive, below which the rig counts as at rest
+# Largest motion that counts as rest, relative to that of a free mass under the drive.
 REST_RATIO = 1e-9
-# perturbation over the largest state for the estimate of multipliers: far above round-off, yet nearly linear
+# Perturbation for the estimate of multipliers, relative to the largest state; it is far
+# above round-off, yet nearly linear.
 PERTURBATION_RATIO = 1e-6
-# number of cycles in which the memory of the contact adapts to a perturbation
+# Number of cycles in which the memory of the contact adapts to a perturbation.
 N_SETTLING_CYCLES = 2
-# number of cycles that are marched after a perturbation
+# Number of cycles that are integrated after a perturbation.
 N_PERTURBED_CYCLES = 8
-# smallest singular value of the perturbations, over the largest one, that is not round-off
+# Smallest singular value of the perturbations above round-off, relative to the largest one.
 MIN_SINGULAR_RATIO = 1e-3
-# perturbation over its initial value, below which it has decayed
+# Perturbation, relative to its initial value, below which it has decayed.
 MIN_PERTURBATION_RATIO = 1e-5
 
 
@@ -65,7 +68,7 @@ def march_to_periodic(run) -> float:
         change = _max_magnitude(states[-1] - states[-2]) / max(_max_magnitude(states[-1]), min_size)
         if change <= PERIODIC_TOL or run.outcome is not None:
             break
-        if n_waiting == 0:  # judge the last extrapolation by the cycles since
+        if n_waiting == 0:  # judge the last extrapolation by the cycles since then
             n_failures = 0 if change < MAX_CHANGE_RATIO * last else n_failures + 1
             n_waiting = 2**n_failures
         n_waiting -= 1
@@ -110,7 +113,7 @@ def estimate_multipliers(run) -> np.ndarray:
             perturbed_run.march_cycle(perturbed_run.prop.steps, 0, [])
             states.append(_scaled_state(perturbed_run))
         runs.append(states)
-    # perturbations (cycles, 2 n, 2 n) after each cycle
+    # The perturbations after each cycle have the shape (cycles, 2 n, 2 n).
     perturbations = np.moveaxis(np.array(runs[1:]) - np.array(runs[0]), 0, 2) / perturbation
     sizes = np.abs(perturbations).max(axis=(1, 2))
     last = N_SETTLING_CYCLES + int(

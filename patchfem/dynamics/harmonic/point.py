@@ -25,17 +25,18 @@ from .harmonic import (
 from .laws import Interlock, SampledSlide, evaluate_series
 from .starts import find_one_harmonic_roots
 
-# numbers of harmonics that are tried in turn, each about twice the one before
+# Numbers of harmonics that are tried in turn, each about twice the previous one.
 HARMONIC_COUNTS = (7, 15, 31, 63, 127, 255)
-# ratio of all harmonics to those that Newton's method solves for; the others follow from the force
+# Ratio of all harmonics to those that Newton's method solves for; the others follow from the force.
 ALL_HARMONICS_RATIO = 4
-# numbers of harmonics that are solved in turn where the direct solution with many harmonics fails
+# Numbers of harmonics that are solved in turn if the direct solution with many harmonics fails.
 INTERMEDIATE_HARMONIC_COUNTS = (11, 15, 23, 31, 47, 63, 95, 127, 191)
-# largest number of sweeps over the harmonics that follow from the force
+# Largest number of sweeps over the harmonics that follow from the force.
 MAX_SWEEPS = 40
-# change in the last sweep over the tolerance, so that the sweeps add no error
+# Largest change in the last sweep, relative to the tolerance, so that the
+# error of the sweeps is negligible.
 SWEEP_TOL_RATIO = 1e-5
-# relative tolerance of the sweeps where the caller gives none
+# Default relative tolerance of the sweeps.
 DEFAULT_TOLERANCE = 1e-3
 
 
@@ -105,10 +106,8 @@ class SteadyMotion:
             return ()
         k = np.arange(self.coefficients.shape[1])
         reversals = []
-        for index in (
-            np.argmin(places),
-            np.argmax(places),
-        ):  # the cycle begins at the reversal, so its first sample is the reversal
+        # The cycle begins at the reversal, so its first sample is the reversal.
+        for index in (np.argmin(places), np.argmax(places)):
             track = SampledSlide(
                 self.coefficients[0] * np.exp(1j * k * angles[index]), self.omega, self.samples
             )
@@ -604,7 +603,8 @@ def _make_steady_motion(
     error = max(changes)
     left = 0.0
     if n_harmonics > h:
-        # error of the unfinished sweeps, and of the harmonics above `top`, which decrease like k^-5/2
+        # The error of the unfinished sweeps is that of a geometric series. The harmonics above
+        # n_harmonics decrease like k^-5/2.
         ratio = 0.9
         if len(changes) > 3:
             ratio = min((changes[-2] / changes[1]) ** (1 / (len(changes) - 3)), ratio)

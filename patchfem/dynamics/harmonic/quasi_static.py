@@ -22,11 +22,11 @@ from ...friction.laws.elastic_plastic import masing_loop
 from .forces import LawGroup
 from .laws import Jenkins, SampledSlide
 
-# relative slide increment for the finite difference of the force at the tip of a loop
+# Relative increment of the slide for the finite difference of the tip force of a loop.
 RELATIVE_SLIDE_STEP = 1e-6
-# ratio of two drive frequencies at which the force of a law is compared, to detect a dependence on speed
+# Ratio of the two drive frequencies at which a law is compared to detect a dependence on speed.
 TEST_RATE_RATIO = 2.0
-# largest relative change of a force that is due to round-off
+# Largest relative change of a force that is attributed to round-off.
 FORCE_TOL = 1e-9
 SPEED_MESSAGE = "a friction force that depends on the sliding speed has no static loop"
 

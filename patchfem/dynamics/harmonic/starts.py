@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
-# number of samples per cycle, which suffices for one harmonic
+# Number of samples per cycle; it suffices for one harmonic.
 N_SAMPLES = 512
 
 

@@ -8,9 +8,9 @@ from .arrays import SolvedStep
 
 MAX_ITERATIONS = 200
 N_NEWTON_STEPS = 40  # number of Newton iterations before bisection steps are inserted
-# Enlarges the bracket, so that the solution of a contact in full slip lies inside it.
+# Factor that enlarges the bracket, so that it contains the solution of a contact in full slip.
 BOUND_MARGIN = 1.001
-ROUND_OFF = 4e-16  # relative round-off error of a sum, over its largest term
+ROUND_OFF = 4e-16  # round-off error of a sum, relative to its largest term
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -50,10 +50,11 @@ def solve_element(free, beta, step, guess, bound, goal):
         noise = ROUND_OFF * (abs(free) + abs(dq) + beta * abs(force))
         if abs(residual) <= goal * beta + noise:
             return SolvedStep(dq, force, count)
-        # a force that decreases with the slide must not reverse the direction of the Newton step
+        # The lower bound of the gain preserves the direction of the Newton step if the
+        # force decreases with the slide.
         gain = max(1 + beta * slope, 0.1)
         bracket = narrow_bracket(bracket, residual, gain, count - N_NEWTON_STEPS)
-        # a residual above round-off of the slide shows that the force jumps at this slide
+        # If the residual exceeds the round-off error of the slide, the force jumps at this slide.
         if bracket.high - bracket.low <= noise:
             is_solved = abs(residual) <= goal * beta + 8 * gain * noise
             return SolvedStep(bracket.point, force, count if is_solved else -count)

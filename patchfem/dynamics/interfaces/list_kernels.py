@@ -14,14 +14,15 @@ from ...friction.protocol_kernels import Reading
 from ..modal_kernels import Bracket, narrow_bracket
 from .arrays import SolvedStep
 
-# increment [bond lengths] below which the slope of the force is the mean of the slopes in both directions
+# Largest increment [bond lengths] for which the slope of the force is the mean of
+# the slopes in both directions.
 SLOPE_INCREMENT_RATIO = 1e-9
-# largest energy that a list may gain in short steps and offset by its next dissipation (see `commit_step`), over the
-# work of one bond length at the friction limit
+# Largest energy that a list may gain in short steps and subtract from its next dissipation (see
+# `commit_step`), relative to the work of one bond length at the friction limit.
 MAX_CARRIED_RATIO = 1e-4
 MAX_ITERATIONS = 300
 N_SECANT_STEPS = 8  # number of secant iterations before bisection steps are inserted
-ROUND_OFF = 4e-16  # relative round-off error of a sum, over its largest term
+ROUND_OFF = 4e-16  # round-off error of a sum, relative to its largest term
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)

@@ -19,7 +19,8 @@ from .arrays import PointRow, PressedIndex, SolvedStep, StepProblem
 from .shear_points_kernels import PLASTIC, POINTS, write_forces
 from .shear_solve_kernels import accept_step, minimise, set_middle_length, set_slides
 
-# tolerance of pieces that deform in shear, over that of the step, because their loss is a small difference
+# Tolerance for pieces that deform in shear, relative to that of the step; their energy loss is a
+# small difference of large terms.
 GOAL_FRACTION = 0.01
 
 

@@ -17,8 +17,8 @@ from .arrays import BondSums, FlowIndex, FullSlipRow, PointRow, SolvedStep, Step
 from .shear_points_kernels import POINTS, are_slides_short
 from .shear_solve_kernels import accept_step, minimise, set_middle_length
 
-# relative difference of the bonds of a point from those of steady full slip, below which it counts as in full slip;
-# the tolerance of their energy is 100 times as large
+# Largest relative deviation of the bonds of a point from those of steady full slip; the tolerance
+# of their energy is 100 times as large.
 FULL_SLIP_TOL = 2e-15
 
 

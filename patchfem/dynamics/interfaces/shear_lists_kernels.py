@@ -15,11 +15,12 @@ from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from .arrays import ListPointRow, PointRow
 from .list_kernels import find_mean_and_slope
 
-# accepted residual over the tolerance if it no longer decreases, because sums over bonds jump by up to 1e-8
+# Largest accepted residual relative to the tolerance, if it no longer decreases; sums
+# over bonds jump by up to 1e-8.
 GOAL_SLACK = 1e4
-# whether the force of a point may decrease with its slide
+# Whether the force of a point may decrease as its slide increases.
 FORCE_MAY_FALL = True
-# damping of a step over the stiffness of the shear modes, needed because the forces jump
+# Damping of a step relative to the stiffness of the shear modes, needed because the forces jump.
 STEP_DAMPING = 1 / 16
 
 
@@ -103,9 +104,9 @@ def start_step(dt, contact):
             )
 
 
-@njit(
-    error_model="numpy", forceinline=False, **NJIT_NO_REFCOUNT
-)  # without this option the forced inlining of the caller would extend to all functions called here
+# Without `forceinline=False`, the forced inlining of the caller would
+# extend to all functions called here.
+@njit(error_model="numpy", forceinline=False, **NJIT_NO_REFCOUNT)
 def write_forces(kind, ending, contact):
     """Write the path-mean force [N] and slope [N/m] of every point for its slide.
 
@@ -135,7 +136,8 @@ def write_forces(kind, ending, contact):
             continue
         load_list(j, contact)
         f, s = find_mean_and_slope(xi, contact, points[ListPointRow.GROWTH_SPEED, j], dt)
-        # where many bonds have the same stretch, the mean force is steeper than the slope s, so the secant is used
+        # Where many bonds have the same stretch, the mean force is steeper than the
+        # slope s, so the secant is used.
         if xi != points[ListPointRow.TRIAL_SLIDE, j]:
             steep = (f - points[ListPointRow.TRIAL_FORCE, j]) / (
                 xi - points[ListPointRow.TRIAL_SLIDE, j]

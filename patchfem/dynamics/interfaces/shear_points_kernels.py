@@ -16,10 +16,10 @@ from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ...friction.laws.elastic_plastic_kernels import spring_end, spring_mean
 from .arrays import PointRow
 
-# kinds of the law of the points: elastic-plastic springs, or bonds
+# Types of point friction law: elastic-plastic springs or bonds.
 PLASTIC = 1
 POINTS = 2
-# constants as in `shear_lists_kernels`, for forces that neither jump nor decrease
+# The constants are described in `shear_lists_kernels`; the forces here neither jump nor decrease.
 GOAL_SLACK = 100.0
 FORCE_MAY_FALL = False
 STEP_DAMPING = 0.0
@@ -31,7 +31,7 @@ def are_slides_short(contact, length):
     points = contact.points
     near = 0.0
     for j in range(int(contact.count[0])):
-        # the count is a sum, because the compiler vectorises sums but not maxima
+        # The count is a sum, because the compiler vectorises sums but not maxima.
         near += 1.0 if abs(points[PointRow.SLIDE, j]) <= MAX_SHORT_PATH * length else 0.0
     return near == contact.count[0]
 

@@ -25,13 +25,13 @@ from ..modal_kernels import choose_point_in_bracket
 from . import shear_points_kernels as law
 from .arrays import FullSlipRow, PointRow, WorkRow
 
-# largest last Newton step [bond lengths]: half its square is below the tolerance of a march, 1e-11
+# Largest last Newton step [bond lengths]; half its square is below the tolerance of a march, 1e-11.
 LAST_STEP_RATIO = 4e-6
-ROUND_OFF = 4e-16  # relative round-off error of a sum, over its largest term
+ROUND_OFF = 4e-16  # round-off error of a sum, relative to its largest term
 GOAL_SLACK = law.GOAL_SLACK
 FORCE_MAY_FALL = law.FORCE_MAY_FALL
 STEP_DAMPING = law.STEP_DAMPING
-# largest number of iterations; points that oscillate about one position take up to 100
+# Largest number of iterations; points that oscillate about one position take up to 100.
 MAX_ITERATIONS = 1000 if FORCE_MAY_FALL else 200
 
 
@@ -68,9 +68,8 @@ def set_slides(q, increments, contact):
     r = increments.size
     for j in range(count):
         points[PointRow.SLIDE, j] = q
-    for k in range(
-        0, r - 3, 4
-    ):  # four modes are processed in one pass, because each pass reads and writes every point
+    # Four modes are processed in one pass, because each pass reads and writes every point.
+    for k in range(0, r - 3, 4):
         first = increments[k]
         second = increments[k + 1]
         third = increments[k + 2]
@@ -293,9 +292,8 @@ def minimise(problem, contact, goal):
     n_stalled = 0
     for i in range(y.size):
         step[i] = 0.0
-    for count in range(
-        MAX_ITERATIONS
-    ):  # the first pass evaluates the guess, so that the gradient code appears only once
+    # The first pass evaluates the guess, so that the gradient code appears only once.
+    for count in range(MAX_ITERATIONS):
         if count > 0:
             if contact.ready[which] == 0.0:
                 write_hessian(problem, contact, hess)

@@ -54,7 +54,7 @@ def mean_force(numbers, memory, q, dq, eps, dt):
     turn = 2 * pi / numbers[3]
     half = 0.5 * turn * dq
     centre = turn * (q + 0.5 * dq)
-    # the error of the series is 1e-4^4/120 here, whereas the quotients would lose digits
+    # The error of the series is 1e-4^4/120 here, whereas the quotients would lose digits.
     if abs(half) < 1e-4:
         ratio = 1 - half * half / 6
         bend = -half / 3

@@ -35,17 +35,17 @@ from .rows_kernels import (
     RowStart,
 )
 
-# The motion is near a periodic one if a cycle changes its state by less than this fraction of the range; the map is
-# then nearly linear.
+# Largest change of the state per cycle at which the map of a cycle is nearly
+# linear, relative to the range.
 MAX_CYCLE_CHANGE = 1e-2
-# Accepted error of the predicted state at the end of the run, as a fraction of the range.
+# Accepted error of the predicted state at the end of the run, relative to the range.
 STATE_TOL = 1e-7
-# Accepted error of a predicted sum over the cycles, as a fraction of its value.
+# Accepted relative error of a predicted sum over the cycles.
 SUM_TOL = 1e-6
-# Two changes count as parallel up to this square of the sine of the angle between them; the map is then a single
-# factor.
+# Largest squared sine of the angle between two changes that count as parallel;
+# the map is then a single factor.
 PARALLEL_TOL = 1e-6
-# Numbers of a cycle in the history: its two extremes and the two parts of its phasor.
+# Number of values per cycle in the history: two extremes and two parts of the phasor.
 N_HISTORY = 4
 
 
@@ -195,7 +195,8 @@ def fit_cycle_map(lane, workspace, history, size):
         third = history[n_done - 3, n]
         older = third - history[n_done - 4, n]
         miss = max(miss, abs(last - second - a * (second - third) - b * older))
-    # The larger magnitude of the eigenvalues bounds how the error of one cycle accumulates over all later cycles.
+    # The larger magnitude of the eigenvalues determines how the error of one cycle
+    # accumulates over all later cycles.
     discriminant = a * a + 4 * b
     slow = 0.5 * (abs(a) + sqrt(discriminant)) if discriminant > 0.0 else sqrt(-b)
     fraction = (1 - slow) * (1 - slow * slow)
@@ -241,12 +242,13 @@ def extrapolate_cycles(lane, workspace, history, n_done, until):
     a, b, is_sure = fit_cycle_map(lane, workspace, history[:n_done], size)
     if not is_sure:
         return n_done
-    # The change of a number in the nth cycle from here is p times its last change plus q times the change before.
+    # A quantity changes in the nth cycle from here by p times its last change
+    # plus q times its penultimate change.
     p = 1.0
     q = 0.0
     p_before = 0.0
     q_before = 1.0
-    # The sum of those changes is c and d times these two changes, and the sum of the sums is e and f times them.
+    # The sum of these changes has the coefficients c and d, and the sum of the sums has e and f.
     c = 0.0
     d = 0.0
     e = 0.0

@@ -53,30 +53,35 @@ __all__ = [
 
 STICK_IS_RIGID = False
 EVENT_KEEPS_STICK = False
-# The friction and the mean square of the stretches follow the linear map of a cycle.
+# Number of law variables that follow the linear map of a cycle: friction
+# and mean square of the stretches.
 N_LAW_VARIABLES = 2
 
-# Maximum number of parts of a step, which has at most one reversal and a kink on either side of it.
+# Maximum number of parts of a step, which has at most one reversal and
+# one kink on either side of it.
 MAX_PARTS = 4
-# Number of Newton steps for the time of an event; a cubic across a kink has an error of second order, so two are
-# needed.
+# Number of Newton steps for the time of an event; the error of a cubic
+# across a kink is of second order.
 N_CORRECTIONS = 2
-# Maximum number of parts of a step through a regularisation layer; it bounds the cost of a step.
+# Maximum number of parts of a step through a regularisation layer, which limits the cost of a step.
 MAX_LAYER_PARTS = 64
-# Speed at the edge of a regularisation layer over the regularisation speed; beyond it the force is taken as constant.
+# Speed at the edge of a regularisation layer, relative to the regularisation speed;
+# beyond it the force is constant.
 LAYER_EDGE_RATIO = 5.0
-# Change of the speed in a part of a step, over the regularisation speed and the angle of the step.
+# Change of the speed in a part of a step, relative to the regularisation
+# speed times the angle of the step.
 LAYER_STEP_RATIO = 20.0
-# Minimum change of the speed in a part of a step, over the regularisation speed.
+# Minimum change of the speed in a part of a step, relative to the regularisation speed.
 MIN_LAYER_STEP_RATIO = 0.25
-# The speed changes monotonically while the other forces exceed the friction by this factor.
+# Ratio of the other forces to the friction above which the speed changes monotonically.
 FREE_FLIGHT_FACTOR = 2.0
-# An interface slips while more than this fraction of a change of its relative displacement is irreversible.
+# Smallest irreversible fraction of a change of the relative
+# displacement at which an interface slips.
 SLIP_FRACTION = 0.5
-N_HALVINGS = 24  # Number of bisections for the start of a slip; they leave 6e-8 of a segment.
-# Sign of the slip that is passed to a law with a regularisation layer, which does not depend on it.
+N_HALVINGS = 24  # number of bisections for the start of a slip, which leave 6e-8 of a segment
+# Sign of the slip that is passed to a law with a regularisation layer, which does not use it.
 SIGN_IN_LAYER = 1.0
-AT_START = 0  # Codes of the instants of a step, as in `observation_kernels`.
+AT_START = 0  # codes of the instants of a step, as in `observation_kernels`
 AT_END = 3
 
 
@@ -592,7 +597,7 @@ def step_to_speed(workspace, lane, state, sine, cosine, end_speed):
     third = half / 3
     fm = friction.rate_equation(numbers, z, middle, SIGN_IN_LAYER)[0]
     fe = friction.rate_equation(numbers, z, end_speed, SIGN_IN_LAYER)[0]
-    # These are the angles per speed at the stages of the Runge-Kutta method.
+    # These are the phase angles at the Runge-Kutta stages, divided by the angular speed.
     r = 1 / (drive * sine - damping * v - stiffness * x - f)
     sine1 = advance_angle(sine, cosine, half * r)[0]
     r1 = 1 / (drive * sine1 - damping * middle - stiffness * (x + half * v * r) - fm)
@@ -799,7 +804,7 @@ def resolve_layer_step(workspace, lane, step):
             place = find_hermite_root(v, v1, t * a, t * a1)
             event = (elapsed + place * t) / angle
             event_slide = hermite_cubic(state.slide, end.slide, t * v, t * v1, place)
-        # Hermite's rule gives the integrals of sin x' and of x'^2 over the part.
+        # Hermite's rule integrates sin x' and x'^2 over the part.
         work_sum += t * (s * v + s2 * v1 + t / 6 * (c * v + s * a - c2 * v1 - s2 * a1)) / 2
         loss_sum += t * (v * v + v1 * v1 + t / 3 * (v * a - v1 * a1)) / 2
         work += part.work
@@ -812,7 +817,8 @@ def resolve_layer_step(workspace, lane, step):
             break
     v = start_speed
     v1 = state.speed
-    # The trapezoidal rule over the run adds the ends of this step, and its correction the ends of the run.
+    # The trapezoidal rule over the run adds the ends of this step. Its
+    # correction adds the ends of the run.
     work_ends = angle / 12 * (step.c1 * v1 + step.s1 * a - step.c0 * v - step.s0 * start_rate)
     loss_ends = angle / 6 * (v1 * a - v * start_rate)
     workspace[RowStart.WORK_SUM + lane] += (
@@ -1069,7 +1075,7 @@ def stick_fractions(start, end, workspace, lane, angle):
         return StickReading(u if sticks else 1 - u, u if sticks else 2.0, extreme_slip)
     if sticks or not is_stuck_in_segment(start, end, numbers, angle, turnover):
         return StickReading(1.0 if sticks else 0.0, 2.0, extreme_slip)
-    # The interface slips at both ends, with stretches of opposite sign, so it may stick in between.
+    # The interface slips at both ends with stretches of opposite sign, so it may stick in between.
     release = find_stick_change(start, end, numbers, angle, turnover, 1.0)
     stick = find_stick_change(start, end, numbers, angle, 0.0, turnover)
     return StickReading(release - stick, release, extreme_slip)

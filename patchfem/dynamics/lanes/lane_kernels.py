@@ -51,7 +51,8 @@ def resolve_lane_step(workspace, lane, step):
     workspace[RowStart.SLIP_PATH + lane] += law.slip_increment(
         before.memory, outcome.event_memory, outcome.memory, workspace, lane
     )
-    # A jump of the acceleration inside the step adds this term to the error of the trapezoidal rule.
+    # A jump of the acceleration inside the step adds this term to the
+    # error of the trapezoidal rule.
     u = outcome.event
     edge = outcome.jump * step.angle * (u * (1 - u) / 2 - 1 / 12)
     workspace[RowStart.WORK_SUM + lane] += step.s1 * v1 - (step.s0 + u * (step.s1 - step.s0)) * edge

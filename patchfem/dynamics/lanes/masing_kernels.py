@@ -71,7 +71,8 @@ STICK_IS_RIGID = False
 EVENT_KEEPS_STICK = True
 
 N_LAW_VARIABLES = MAX_LAW_VARIABLES
-# Extrapolation is possible while these rows, which describe the form of the stack, are equal at the last cycle ends.
+# Rows that describe the form of the stack; the motion is extrapolated only while they
+# are equal at the last cycle ends.
 STACK_FORM_ROWS = (
     int(SliderRow.DIRECTION),
     int(SliderRow.BRANCH_SCALE),
@@ -80,19 +81,20 @@ STACK_FORM_ROWS = (
     int(SliderRow.N_REVERSALS),
 )
 
-# Smallest abscissa on the curve of the first loading, because a power needs its logarithm.
+# Smallest abscissa on the first-loading curve, because a power is computed from its logarithm.
 MIN_ABSCISSA = 1e-30
-# Last Newton step as a fraction of a step, below which an event is found; the remaining error is its square.
+# Largest last Newton step at an event, as a fraction of a step; the remaining error is its square.
 EVENT_TOL = 1e-9
 N_NEWTON = 6
-MAX_EVENTS = 32  # Maximum number of events in a step; further events are ignored.
-# Relative displacement [m] of an event that does not happen; no motion reaches it.
+MAX_EVENTS = 32  # maximum number of events in a step; further events are ignored
+# Relative displacement of an event that does not happen [m]; no motion reaches it.
 NO_EVENT_SLIDE = 1e300
-# Fraction of the branch within which a relative displacement counts as equal to that of an event.
+# Largest distance between a relative displacement and that of an event, relative to the
+# branch, at which they count as equal.
 SAME_SLIDE_TOL = 1e-9
 
-# Kinds of events in increasing order of priority; of several events in a step the kind with the largest number is
-# reported.
+# Kinds of events in increasing order of priority; the kind with the
+# largest number in a step is reported.
 NO_EVENT = 0
 CLOSING = 1
 REVERSAL = 2
@@ -359,7 +361,8 @@ def stick_fractions(start, end, workspace, lane, angle):
     StickReading
     """
     slip = irreversible_slide(end.state.slide, end.state.memory, workspace, lane)
-    # The stored fraction is that of the first segment, so it is reset after that segment has been read.
+    # The stored fraction belongs to the first segment, so it is reset
+    # after that segment has been read.
     first_fraction = workspace[SliderRowStart.STICK_FRACTION + lane]
     workspace[SliderRowStart.STICK_FRACTION + lane] = 0.0
     if start.state.slip_sign == 0.0:

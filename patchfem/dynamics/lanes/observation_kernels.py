@@ -14,7 +14,7 @@ from . import rigid_kernels as law
 from .rigid_kernels import AngleStep, LaneState, cubic_peak, drive_after
 from .rows_kernels import FIRST_READING, GROUP_BITS, LANES, N_READINGS, RowStart
 
-# Codes of the instants of a step for which `friction_rate` of a law may be evaluated.
+# Codes of the instants of a step at which `friction_rate` of a law can be evaluated.
 AT_START = 0
 BEFORE_EVENT = 1
 AFTER_EVENT = 2
@@ -107,7 +107,7 @@ def output_jerk(workspace, lane, instant, friction_rate):
         - workspace[RowStart.DAMPING + lane] * instant.acceleration
         - workspace[RowStart.STIFFNESS + lane] * instant.state.speed
     )
-    # The output of an interface that sticks rigidly moves with the base alone.
+    # The output of an interface that sticks rigidly moves only with the base.
     is_fixed = law.STICK_IS_RIGID and instant.state.slip_sign == 0.0
     gain = 0.0 if is_fixed else workspace[RowStart.OUTPUT_GAIN + lane]
     base_rate = workspace[RowStart.BASE_GAIN + lane] * instant.cosine
@@ -186,8 +186,8 @@ def observe_step(workspace, lane, step):
     last = make_instant(workspace, lane, step.s1, step.c1, end)
     slip = law.irreversible_slide(x1, tried.memory, workspace, lane)
     peaks = segment_peaks(workspace, lane, first, last, step.angle, AT_START, AT_END)
-    # All rows are read before the first one is written, because otherwise a compiler does not compute several lanes at
-    # once.
+    # All rows are read before the first one is written; otherwise the compiler
+    # does not vectorise over the lanes.
     highest = workspace[RowStart.MAX_SLIDE + lane]
     lowest = workspace[RowStart.MIN_SLIDE + lane]
     current_stick = workspace[RowStart.CURRENT_STICK + lane]
@@ -434,8 +434,8 @@ def finish_observed_cycle(lane, workspace, is_first, n_cycles, angle):
     drift = workspace[RowStart.CYCLE_START + lane] - workspace[RowStart.SLIDE + lane]
     force_at_max = workspace[RowStart.FORCE_AT_MAX + lane]
     force_at_min = workspace[RowStart.FORCE_AT_MIN + lane]
-    # The displacement of a rigid stick has an extreme at an end of the cycle without a reversal; its mean friction is
-    # 0.
+    # The displacement of a rigid stick has an extreme at an end of the cycle, but no
+    # reversal; its mean friction is 0.
     if law.STICK_IS_RIGID and size > 0.0:
         force_at_max = force_at_max if force_at_max == force_at_max else 0.0
         force_at_min = force_at_min if force_at_min == force_at_min else 0.0

@@ -13,15 +13,16 @@ from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_INLINE, NJIT_NO_REFCOUNT
 from .rows_kernels import LANES, RowStart
 
-FRACTION = 1  # Index of q in the parameters of the law; the first of them is chi + 1.
-# Maximum step over YIELD_LENGTH; the curve bends so little that no step is too long.
+FRACTION = 1  # index of q in the parameters of the law; the first parameter is chi + 1
+# Maximum step in multiples of YIELD_LENGTH; no step is too long, because the curve bends little.
 MAX_STEP = 1e300
-LOOKS_AHEAD = False  # Whether `prepare_lookup` has an effect.
-# Codes of the place where the numbers of the curve are stored; a closed form needs none, see `table_curve_kernels`.
+LOOKS_AHEAD = False  # whether `prepare_lookup` has an effect
+# Codes for where the curve data are stored; they are equal, because a closed form needs no
+# data (see `table_curve_kernels`).
 IN_TABLE = 0
 PREPARED = 0
 AT_START = 0
-# 1.5 * 2^52: after this number is added, the last bits of the sum are the nearest integer.
+# 1.5 * 2^52; if this number is added, the last bits of the sum are the nearest integer.
 ROUNDING_CONSTANT = 6755399441055744.0
 
 

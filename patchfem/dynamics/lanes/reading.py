@@ -13,8 +13,8 @@ from . import rows_kernels as rows
 from .rows_kernels import Row
 from .run import MASING_LAWS, Cases, LaneResults, has_one_stretch, law_state
 
-# Measures of an interface in `dynamics.events`, the readings of the lanes that give them, and their units; the lanes
-# have m for N, and drive angles for times.
+# Measures of an interface in `dynamics.events`, the corresponding readings of the lanes, and their
+# units; lanes use m instead of N, and drive angles instead of times.
 INTERFACE_READINGS = (
     (InterfaceMeasure.MAX_SLIP, "MAX_SLIP", "m"),
     (InterfaceMeasure.MIN_SLIP, "MIN_SLIP", "m"),

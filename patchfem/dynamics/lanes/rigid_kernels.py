@@ -15,15 +15,15 @@ from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_INLINE, NJIT_NO_REFCOUNT
 from .rows_kernels import RowStart
 
-STICK_IS_RIGID = True  # Whether nothing moves during a stick.
-EVENT_KEEPS_STICK = False  # Whether a stick may continue after an event.
-# Accepted error of an extrapolated cycle, as a fraction of its range; 0 requests no check.
+STICK_IS_RIGID = True  # whether nothing moves during a stick
+EVENT_KEEPS_STICK = False  # whether a stick may continue after an event
+# Accepted error of an extrapolated cycle, relative to its range; 0 disables the check.
 PROOF_TOL = 0.0
 # Number of law variables that follow the linear map of a cycle; Coulomb's law has none.
 N_LAW_VARIABLES = 0
-# Number of Newton steps from the secant; the cubic of a step is then solved to round-off.
+# Number of Newton steps that start from the secant; they solve the cubic of a step to round-off.
 N_NEWTON = 3
-N_NEWTON_FROM_GUESS = 4  # Number of Newton steps from a guess that is worse than the secant.
+N_NEWTON_FROM_GUESS = 4  # number of Newton steps from a guess that is worse than the secant
 
 
 class LaneState(NamedTuple):

@@ -9,10 +9,11 @@ force over the mass is in m and an energy over the mass in m^2.
 
 from enum import IntEnum
 
-LANES = 32  # Number of cases that march side by side; a compiler computes several of them at once.
-# Lanes march in groups of two to this power as long as a lane of the group has a case.
+LANES = 32  # number of cases that are integrated together; a compiler vectorises over them
+# Binary logarithm of the number of lanes in a group; a group is advanced as long
+# as one of its lanes has a case.
 GROUP_BITS = 3
-# Two cycles count as equal if their ends differ by less than this fraction of their range.
+# Largest difference between the ends of two equal cycles, relative to their range.
 PERIODIC_TOL = 1e-9
 
 
@@ -169,8 +170,9 @@ N_LAW_NUMBERS = 6
 FIRST_READING = int(Row.MAX_ACCELERATION)
 N_READINGS = Row.CASE_INDEX - Row.MAX_ACCELERATION
 
-# These rows are followed by the ends of the last cycles, the latest first. A cycle end holds STATE_ROWS, SUM_ROWS and
-# the first variables of the law, from which `extrapolation_kernels` learns how the motion settles.
+# First row of the stored cycle ends, the latest first. A cycle end holds STATE_ROWS,
+# SUM_ROWS and the first variables of the law, from which `extrapolation_kernels`
+# predicts how the motion settles.
 CYCLE_ENDS = len(Row)
 N_CYCLE_ENDS = 4
 STATE_ROWS = (int(Row.SLIDE), int(Row.SPEED), int(Row.MEMORY), int(Row.SLIP_SIGN))
@@ -191,10 +193,11 @@ class CycleEnd(IntEnum):
     LAW_STATE = 8
 
 
-MAX_LAW_VARIABLES = 38  # Maximum number of law variables in a cycle end.
+MAX_LAW_VARIABLES = 38  # maximum number of law variables in a cycle end
 CYCLE_END_SIZE = CycleEnd.LAW_STATE + MAX_LAW_VARIABLES
 
-# This is the first row of the law variables in addition to MEMORY. In a motion they follow the first N_STATE numbers.
+# First row of the law variables other than MEMORY; in a motion they
+# follow the first N_STATE numbers.
 LAW_STATE = CYCLE_ENDS + N_CYCLE_ENDS * CYCLE_END_SIZE
 
 
@@ -265,7 +268,7 @@ class SliderRow(IntEnum):
     REVERSALS = LAW_STATE + 22
 
 
-REVERSAL_SIZE = 4  # Number of quantities of a reversal on the stack.
+REVERSAL_SIZE = 4  # number of quantities per reversal on the stack
 MAX_REVERSALS = 63
 CURVE_STATE = SliderRow.REVERSALS + REVERSAL_SIZE * MAX_REVERSALS
 
@@ -304,13 +307,14 @@ class YieldColumn(IntEnum):
 
 
 N_COLUMNS = len(YieldColumn)
-N_YIELDS = 512  # Number of yields in a table; the first is at 0 and the last beyond all motions.
-# Number of equal parts of the range of the yields, which shorten the search for a yield.
+N_YIELDS = 512  # number of yields in a table; the first is at 0 and the last is beyond any motion
+# Number of equal parts of the range of the yields, which accelerate the search for a yield.
 N_PARTS = 128
-# After the yields a table holds the number of yields before each part of their range, the first yield, and the number
-# of parts per displacement.
+# Position in a table, after the yields, of the number of yields before each part of their range.
 PART_STARTS = N_COLUMNS * N_YIELDS
+# Position of the first yield in a table.
 FIRST_YIELD = PART_STARTS + N_PARTS
+# Position of the number of parts per displacement in a table.
 PARTS_PER_SLIDE = FIRST_YIELD + 1
 TABLE_SIZE = FIRST_YIELD + 2
 

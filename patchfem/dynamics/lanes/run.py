@@ -10,16 +10,16 @@ from . import rows_kernels as rows
 from .rows_kernels import Row
 
 LANES_PACKAGE = "dynamics.lanes"
-MASING_LAWS = (
-    "masing",
-    "table",
-)  # Laws of the Masing (Iwan) model, named by the form of their first-loading curve.
-# Number of terms of a Taylor series over a step; the remainder is below round-off for rates up to 2 per step.
+# Laws of the Masing (Iwan) model, named by the form of their first-loading curve.
+MASING_LAWS = ("masing", "table")
+# Number of terms of a Taylor series over a step; the remainder is below
+# round-off for rates up to 2 per step.
 N_TAYLOR_TERMS = 24
-NO_YIELD = 1e300  # Yield displacement of the unused entries of a table after its last yield.
-# Largest displacement [m]: beyond it a march with too long steps has diverged, and the energies would overflow.
+NO_YIELD = 1e300  # yield displacement of the unused table entries after the last yield
+# Largest displacement [m]; beyond it the steps of the march are too long,
+# and the energies would overflow.
 MAX_SLIDE = 1e100
-N_REPEATED_CYCLES_READ = 3  # Number of cycles that are measured of a motion that repeats.
+N_REPEATED_CYCLES_READ = 3  # number of measured cycles of a repeating motion
 
 
 class Cases(NamedTuple):
@@ -153,7 +153,8 @@ def make_curve_tables(groups) -> np.ndarray:
         ):
             after_last = np.zeros(rows.N_YIELDS - 1 - n)
             rows_of_table[1:, column] = np.append(np.cumsum(values), after_last)
-        # The slope is the stiffness of the elements that have not yielded; after the last yield it is 0.
+        # The slope is the stiffness of the elements that have not yielded,
+        # which is 0 after the last yield.
         rows_of_table[1:n, rows.YieldColumn.SLOPE] = np.cumsum(fraction[:0:-1])[::-1]
         half_force = 0.5 * rows_of_table[n, rows.YieldColumn.FORCE]
         head[2] = w[np.searchsorted(rows_of_table[1:n, rows.YieldColumn.FORCE], half_force)]
@@ -301,7 +302,7 @@ def make_drive_table(steps: int) -> np.ndarray:
     """
     angle = 2 * np.pi * np.arange(steps + 1) / steps
     waves = np.array([np.sin(angle), np.cos(angle)])
-    # Zeros are set exactly, because the round-off of a zero would make cycles differ in the last bit.
+    # Zeros are set exactly, because cycles would otherwise differ in the last bit.
     waves[np.abs(waves) < 1e-15] = 0.0
     return np.concatenate([waves, np.full((1, steps + 1), 2 * np.pi / steps)])
 

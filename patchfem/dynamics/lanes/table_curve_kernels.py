@@ -28,13 +28,14 @@ from .rows_kernels import (
     YieldColumn,
 )
 
-# Workspace index at which the table of the first lane begins.
+# Workspace index of the table of the first lane.
 TABLE_START = (CURVE_STATE + len(TableRow)) * LANES
-# Maximum step over YIELD_LENGTH; Newton's method converges badly to the end of a longer step.
+# Maximum step in multiples of YIELD_LENGTH; Newton's method converges
+# slowly to the end of a longer step.
 MAX_STEP = 0.25
-LOOKS_AHEAD = True  # Whether `prepare_lookup` has an effect.
-# Codes of the place where the numbers of the curve are: in the table, looked up by `prepare_lookup`, or stored at the
-# start of the step.
+LOOKS_AHEAD = True  # whether `prepare_lookup` has an effect
+# Codes for where the curve data are stored: in the table, looked up by `prepare_lookup`, or
+# saved at the start of the step.
 IN_TABLE = 0
 PREPARED = 1
 AT_START = 2

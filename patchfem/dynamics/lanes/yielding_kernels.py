@@ -56,11 +56,11 @@ __all__ = [
 STICK_IS_RIGID = False
 EVENT_KEEPS_STICK = False
 PROOF_TOL = 1e-7
-# Slip path of a cycle over YIELD_LENGTH, above which earlier cycles do not affect the memory.
+# Smallest slip path of a cycle, relative to YIELD_LENGTH, that erases the memory of earlier cycles.
 MIN_SLIP = 1e-3
-N_NEWTON = 4  # Number of Newton steps for the time of an event, which is then exact to round-off.
-AFTER_EVENT = 2  # Code of the instant after an event, as in `observation_kernels`.
-MIN_DIVISOR = 1e-300  # Smallest divisor; it prevents a division by 0.
+N_NEWTON = 4  # number of Newton steps for the time of an event, which is then exact to round-off
+AFTER_EVENT = 2  # code of the instant after an event, as in `observation_kernels`
+MIN_DIVISOR = 1e-300  # smallest divisor, which prevents a division by 0
 
 
 class SpeedCurve(NamedTuple):
@@ -542,7 +542,7 @@ def resolve_stick(workspace, lane, curve, end, is_reversed, reversal):
     v1 = end.speed + change.speed
     memory1 = x1 - side * length
     if turns_beyond:
-        # The slip reverses later than the stick would, or not in this step.
+        # The slip reverses later than the stick would, or it does not reverse in this step.
         is_reversed = side * v1 < 0.0
         if is_reversed:
             slip_angle = find_reversal_in_slip(event, spring, rest)

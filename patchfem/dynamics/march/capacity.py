@@ -12,7 +12,7 @@ from ...core import Missing
 from ...friction.bonds.list_rows_kernels import N_ROWS, STATUS
 from ..interfaces.arrays import FlowIndex
 
-# Largest number of entries of a list of bonds, which bounds the memory of a run.
+# Largest number of entries of a bond list, which limits the memory of a run.
 MAX_ENTRIES = 2_000_000
 ENTRY_BYTES = 8 * N_ROWS
 LONG_LIST_ADVICE = (

@@ -160,7 +160,8 @@ class LoadColumn(IntEnum):
     PITCH = 4
 
 
-# Number of sample columns of an element: those of `dynamics.ledger.SampleColumn` up to the mean force.
+# Number of sample columns of an element: those of
+# `dynamics.ledger.SampleColumn` up to the mean force.
 N_ELEMENT_COLUMNS = 5
 N_LOAD_COLUMNS = len(LoadColumn)
 

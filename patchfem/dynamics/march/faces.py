@@ -15,9 +15,9 @@ from .element_arrays import (
     SingleContact,
 )
 
-# Largest residual of a step solution over the friction limit; it is far below any time-step error.
+# Largest residual of a step relative to the friction limit, far below any time-step error.
 STEP_TOL = 1e-11
-# [N]; smallest tolerance of a spring force, so that it stays above 0 if the force scale of the model is 0
+# Smallest tolerance of a spring force [N], positive even if the force scale of the model is 0.
 TINY_FORCE = 1e-300
 
 
@@ -64,7 +64,7 @@ def make_element_arrays(model, prop, modal_system, mass: float):
     contact[ContactIndex.FORCE_TOL] = STEP_TOL * (model.patch.limit if has_contact else model.limit)
     modal = np.zeros((ModalRow.SCRATCH + 3, n))
     modal[ModalRow.COMPLIANCE] = modal_system.push[0] / mass
-    # rates of the modes per constant force
+    # These are the rates of the modes per constant force.
     rate_rows = prop.rows * prop.push[1]
     if prop.dense.size:
         rate_rows = prop.rows @ prop.dense[n:, 2 * n :]

@@ -39,23 +39,27 @@ from .element_arrays import (
 )
 from .stops_kernels import SET_VALUED
 
-# Numba leaves out the branches of flags that are False.
+# Numba omits the branches of flags that are False.
 HAS_STOPS = parts.HAS_STOPS
 HAS_SLOPES = parts.HAS_SLOPES
 HAS_CONTACT = parts.HAS_CONTACT
 IS_COUPLED = parts.IS_COUPLED
 HAS_PLANES = parts.HAS_PLANES
-# Largest number of sweeps of the block descent over all elements, after which it has failed.
+# Largest number of sweeps of the block descent over all elements; it has then failed.
 MAX_SWEEPS = 1000
-# Largest number of sweeps if stops and releases lie inside the step; the first half of the sweeps determines them.
+# Largest number of sweeps if stops and releases lie inside the step; the
+# first half determines these events.
 MAX_EVENT_SWEEPS = 60
-# tolerance of a single element solution within a sweep, over the tolerance of the element in the step
+# Tolerance of an element solution within a sweep, relative to the
+# tolerance of the element in the step.
 FORCE_GOAL_FRACTION = 0.1
-# ratio of the force changes in two successive sweeps, above which the block descent converges slowly
+# Ratio of the force changes in two successive sweeps above which the convergence is slow.
 SLOW_CONVERGENCE_RATIO = 0.2
-# Number of sweeps before the first Newton step on all forces, as fewer cost less than that step.
+# Number of sweeps before the first Newton step on all forces; up to this number,
+# sweeps cost less than that step.
 FIRST_NEWTON_SWEEP = 5
-# Smallest attainable residual, over the force and over the free slide divided by its compliance, due to round-off.
+# Smallest attainable residual due to round-off, relative to the force and to the free
+# slide divided by its compliance.
 ROUND_OFF = 4e-15
 
 

@@ -10,9 +10,9 @@ from ... import compiled
 from ..interfaces.dispatch import COULOMB_LAW, load_law
 
 PACKAGE = "dynamics.march"
-# Module of the contact of lists of bonds behind shear modes.
+# Module of the contact of bond lists that are coupled by shear modes.
 SHEARED_LISTS_MODULE = "dynamics.interfaces.shear_list_kernels"
-# Kinds of loads: constant, varying resultant on the interface, varying load on each point.
+# Types of load: constant, varying resultant on the interface, varying load on each point.
 CONSTANT_LOAD = ""
 COMMON_LOAD = "whole"
 POINT_LOADS = "points"
@@ -122,7 +122,7 @@ def march(model, *arguments) -> tuple:
         model.laws,
         model.loading,
         has_contact=has_contact,
-        # several laws of elements are combined in one loop
+        # Several laws of elements are combined in one loop.
         is_coupled=len(model.joints) + has_contact > 1 or len(model.laws) > 1,
         has_planes=any(joint.mate for joint in model.joints),
     )

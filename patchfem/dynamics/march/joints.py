@@ -83,7 +83,7 @@ class JointsModel:
     rows: np.ndarray
     scale: float
     also: tuple = ()
-    loading = ""  # the loads are constant
+    loading = ""  # constant loads
 
     def __post_init__(self):
         if self.patch is not None and self.patch.set_valued:

@@ -2,62 +2,61 @@
 
 from enum import IntEnum
 
-# Number of cases that march side by side; a multiple of the vector length of the processor.
+# Number of cases that are integrated together, a multiple of the vector length of the processor.
 LANES = 32
 N_POINTS = 6  # number of points of the interface of a case
 N_PIECE_MODES = 2  # number of shear modes of the pieces of a case
 N_RIG_MODES = 2  # number of modes of the rig
-N_UNKNOWNS = (
-    1 + N_PIECE_MODES
-)  # number of unknowns of a step: increments of the slide and of the coordinates of the pieces
+# Number of unknowns of a step: increments of the slide and of the coordinates of the pieces.
+N_UNKNOWNS = 1 + N_PIECE_MODES
 # Number of coefficients of the quadratic form of the viscous loss of a mode.
 N_LOSS_COEFFICIENTS = 6
 N_SAMPLE = 2 * N_RIG_MODES + 2  # number of values in a sample: coordinates, rates, force, slip
 
-# quantities of a case in the workspace that have several rows, with the number of these
+# Workspace quantities of a case that have several rows, and their numbers of rows.
 MULTIPLE_ROWS = {
-    # state
+    # State
     "RIG_POSITION": N_RIG_MODES,  # modal coordinates of the rig
     "RIG_RATE": N_RIG_MODES,  # rates of the modal coordinates of the rig
     "PIECE_POSITION": N_PIECE_MODES,  # coordinates of the pieces [m]
     "STRETCHES": N_POINTS,  # mean stretch of the bonds of the points [bond lengths]
     "SQUARES": N_POINTS,  # mean square of the stretch [bond lengths squared]
-    # solution of a step
+    # Solution of a step
     "INCREMENTS": N_UNKNOWNS,  # increments of slide and piece coordinates [m]
     "LAST_INCREMENTS": N_UNKNOWNS,  # increments of the last step [m]
-    "INCREMENTS_BEFORE": N_UNKNOWNS,  # increments of the step before the last [m]
+    "INCREMENTS_BEFORE": N_UNKNOWNS,  # increments of the penultimate step [m]
     "NEWTON_STEP": N_UNKNOWNS,  # last Newton step [m]
-    # numbers of the case
+    # Parameters of the case
     "POINT_LIMITS": N_POINTS,  # friction limits of the points [N]
     "SHAPES": N_PIECE_MODES * N_POINTS,  # slides of the points per coordinate of the pieces
-    "STIFFNESSES": N_PIECE_MODES,  # stiffness of the coordinates of the pieces [N/m]
+    "STIFFNESSES": N_PIECE_MODES,  # stiffnesses of the coordinates of the pieces [N/m]
     "MAX_SHAPES": N_PIECE_MODES,  # largest absolute slide of a point per coordinate
     "MEAN_SHAPES": N_PIECE_MODES,  # mean slide of the points per coordinate
 }
-# quantities with one row
+# Workspace quantities of a case that have one row.
 SINGLE_ROWS = (
-    # solution of a step
-    "DESCENT",  # decrease of the potential that the Newton step predicts
+    # Solution of a step
+    "DESCENT",  # decrease of the potential that the Newton step predicts [J]
     "IS_SOLVED",  # 1 if the step is solved
-    "FREE_SLIDE",  # increment of the slide without friction [m]
-    # sample
+    "FREE_SLIDE",  # force-free increment of the slide [m]
+    # Sample
     "FRICTION",  # friction force [N]
     "INTERFACE_ENERGY",  # energy of bonds and pieces [J]
     "SLIP",  # mean slip of the points [m]
     "OUTPUT",  # displacement of the output [m]
     "OUTPUT_RATE",  # rate of the output [m/s]
     "LAST_OUTPUT",  # output at the start of the step [m]
-    "LAST_OUTPUT_RATE",  # its rate [m/s]
+    "LAST_OUTPUT_RATE",  # rate of the output at the start of the step [m/s]
     "RIG_SLIDE",  # slide of the rig [m]
     "MEAN_FORCE",  # mean friction force of the step [N]
     "DRIVE_WORK",  # work of the drive in the step [J]
     "VISCOUS_LOSS",  # viscous loss in the step [J]
     "RATE_SQUARES",  # sum of v^2 + omega^2 z^2 of the modes
-    # numbers of the case
-    "DRIVE",  # amplitude of the drive of the case over that of the table
+    # Parameters of the case
+    "DRIVE",  # drive amplitude of the case relative to that of the table
     "BOND_LENGTH",  # bond length [m]
     "LIMIT",  # friction limit [N]
-    # sums of the run [J]
+    # Sums of the run [J]
     "WORK_IN",
     "VISCOUS_SUM",
     "DRIVE_WORK_SIZE",
@@ -68,7 +67,7 @@ SINGLE_ROWS = (
     "FRICTION_WORK_SIZE",
     "INTERFACE_LOSS",
     "INTERFACE_GAIN",
-    # extremes and phasor of the output in a cycle [m]
+    # Extremes and phasor of the output in a cycle [m]
     "MIN_OUTPUT",
     "MAX_OUTPUT",
     "COS_SUM",
@@ -76,7 +75,8 @@ SINGLE_ROWS = (
     "N_UNSOLVED",  # number of steps without a solution
     "MAX_SLIDE",  # largest slide of the run [m]
 )
-# number of rows of each quantity, in their order; the first are those that `lanes_kernels.store_samples` copies
+# Number of rows of each quantity in the order of the workspace;
+# `lanes_kernels.store_samples` copies the first ones.
 WORKSPACE_ROWS = MULTIPLE_ROWS | dict.fromkeys(SINGLE_ROWS, 1)
 N_WORKSPACE_ROWS = sum(WORKSPACE_ROWS.values())
 
@@ -91,7 +91,8 @@ def _stack_rows(row_counts: dict, row_length: int) -> dict:
     return positions
 
 
-# Position of the first number of each quantity in the flat workspace: lane i of its row k is `At.NAME + k * LANES + i`.
+# Position of the first number of each quantity in the flat workspace; lane i of its row k
+# is at `At.NAME + k * LANES + i`.
 At = IntEnum("At", _stack_rows(WORKSPACE_ROWS, LANES), module=__name__)
 
 

@@ -25,7 +25,7 @@ from .lane_rows import (
 LANES_KERNELS = "dynamics.march.lanes_kernels"
 
 
-# position in the workspace of each energy sum of a run
+# Workspace position of each energy sum of a run.
 LEDGER_POSITIONS = {
     "work_in": At.WORK_IN,
     "viscous": At.VISCOUS_SUM,
@@ -104,7 +104,7 @@ def _make_rig_rows(modes: ModalBasis, prop) -> np.ndarray:
     ):
         out[first : first + len(rows), :n] = rows
     out[RigRow.STEP] = prop.beta[0, 0], modes.mass, prop.dt
-    # the kernels apply these coefficients to forces [N] instead of accelerations
+    # The kernels apply these coefficients to forces [N] instead of accelerations.
     out[[RigRow.BY_Z, RigRow.BY_V, RigRow.LOSS + 3, RigRow.LOSS + 4]] /= modes.mass
     out[RigRow.LOSS + 5] /= modes.mass**2
     return out
@@ -128,7 +128,7 @@ def _make_step_table(modes: ModalBasis, drive, steps: int, prop) -> np.ndarray:
         out[:, k * N_RIG_MODES : k * N_RIG_MODES + n] = table[:, k * n : (k + 1) * n]
     angle = 2 * np.pi * np.arange(steps) / steps
     for forms in (StepColumn.WORK_FORMS, StepColumn.LOSS_FORMS):
-        # the kernels apply the last coefficients to forces [N] instead of accelerations
+        # The kernels apply the last coefficients to forces [N] instead of accelerations.
         out[:, forms + 2 * N_RIG_MODES : forms + 3 * N_RIG_MODES] /= modes.mass
     out[:, StepColumn.REMAINDERS : StepColumn.REMAINDERS + 2] = table[:, 8 * n : 8 * n + 2]
     out[:, StepColumn.PORT_SLIDE] = table[:, 8 * n + 3]
@@ -147,7 +147,7 @@ def _make_workspace(cases: list) -> np.ndarray:
         get_rows(lane, At.BOND_LENGTH)[:] = case.length
         get_rows(lane, At.LIMIT)[:] = case.limit.sum()
         get_rows(lane, At.POINT_LIMITS)[:n_points, 0] = case.limit
-        # unused coordinates of the pieces stay at 0 with any stiffness
+        # Unused coordinates of the pieces stay at 0 with any stiffness.
         get_rows(lane, At.STIFFNESSES)[:] = case.stiffness.max()
         get_rows(lane, At.STIFFNESSES)[:n_modes, 0] = case.stiffness
         for k, shape in enumerate(case.shape.T):

@@ -17,10 +17,11 @@ from .lane_rows import LANES, N_POINTS, N_RIG_MODES, At, RigRow, StepColumn
 
 NEWTON_TOL = 4e-6  # largest last Newton step [bond lengths], as in `shear_solve_kernels`
 MAX_SWEEPS = 60  # largest number of Newton iterations in a step
-# Neglected force change by curvature over the last Newton step, over the friction limit.
+# Largest force change neglected by the last Newton step, due to curvature,
+# relative to the friction limit.
 CURVATURE_TOL = 1e-9
-MAX_SERIES_SLIDE = 0.5  # largest slide [bond lengths] for which the series is used
-# Slide [bond lengths] beyond which exp(-x) of the bonds is below round-off.
+MAX_SERIES_SLIDE = 0.5  # largest slide for which the series is used [bond lengths]
+# Largest slide [bond lengths] at which exp(-x) of the bonds exceeds round-off.
 MAX_EXPONENTIAL_SLIDE = 40.0
 
 
@@ -157,7 +158,7 @@ def take_newton_step(workspace, lane, beta, is_long):
     done = workspace[At.IS_SOLVED + lane]
     half_stiffness1 = 0.5 * workspace[At.STIFFNESSES + lane]
     half_stiffness2 = 0.5 * workspace[At.STIFFNESSES + LANES + lane]
-    # residual g and lower half of the Hessian h of the potential of the step
+    # These are the residual g and the lower half of the Hessian h of the potential of the step.
     g0 = (y0 - workspace[At.FREE_SLIDE + lane]) / beta
     g1 = half_stiffness1 * (2 * workspace[At.PIECE_POSITION + lane] + y1)
     g2 = half_stiffness2 * (2 * workspace[At.PIECE_POSITION + LANES + lane] + y2)
@@ -167,7 +168,8 @@ def take_newton_step(workspace, lane, beta, is_long):
     h11 = half_stiffness1
     h12 = 0.0
     h22 = half_stiffness2
-    # the compiler unrolls the loop over the points, and vectorises the one over the lanes around it
+    # The compiler unrolls this loop over the points and vectorises the
+    # loop over the lanes around it.
     for j in range(N_POINTS):
         a = workspace[At.SHAPES + j * LANES + lane]
         b = workspace[At.SHAPES + (N_POINTS + j) * LANES + lane]
@@ -197,8 +199,8 @@ def take_newton_step(workspace, lane, beta, is_long):
     slopes = h00 - 1 / beta
     size = abs(n0) + max_shape1 * abs(n1) + max_shape2 * abs(n2)
     least = abs(y0) - max_shape1 * abs(y1) - max_shape2 * abs(y2)
-    # where no point reverses in this step, the curvature of the forces over it follows from their slopes, which are 0
-    # as long as all points slip
+    # If no point reverses in this step, the curvature of the forces follows from their slopes,
+    # which are 0 while all points slip.
     near = size <= NEWTON_TOL * length or (
         least > size and slopes * size * size <= CURVATURE_TOL * workspace[At.LIMIT + lane] * length
     )
@@ -303,7 +305,7 @@ def commit_step(workspace, lane, beta, is_long):
     workspace[At.INTERFACE_GAIN + lane] -= dissipated if dissipated < -noise else 0.0
     workspace[At.FRICTION + lane] = force
     workspace[At.INTERFACE_ENERGY + lane] = energy
-    # the initial guess of the next step is a quadratic extrapolation of the last three steps
+    # The initial guess of the next step is a quadratic extrapolation of the last three steps.
     for k in range(3):
         here = workspace[At.INCREMENTS + k * LANES + lane]
         last = workspace[At.LAST_INCREMENTS + k * LANES + lane]

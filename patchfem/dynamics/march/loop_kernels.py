@@ -30,12 +30,13 @@ from . import faces_kernels as coupling
 from . import parts_kernels as parts
 from . import pressing_kernels as pressing
 
-# Numba leaves out the branches of flags that are False.
+# Numba omits the branches of flags that are False.
 HAS_ELEMENTS = parts.HAS_ELEMENTS
 HAS_STOPS = parts.HAS_STOPS
 LOAD_VARIES = parts.LOAD_VARIES
 HAS_LISTS = parts.HAS_LISTS
-# Status of a march, in addition to EXCEEDS_TRAVEL and NOT_FINITE of `modal_kernels.write_interface_sample`.
+# Status codes of a march, in addition to EXCEEDS_TRAVEL and NOT_FINITE of
+# `modal_kernels.write_interface_sample`.
 FINISHED = 0
 MEMORY_FULL = 2
 NO_CONTACT_SET = 4

@@ -72,7 +72,7 @@ def warm_up(modes: ModalBasis, drive: SineDrive, model: ContactModel, say=None) 
         _LOADED_KINDS.update({kind} - {None})
 
 
-_LOADED_KINDS = set()  # kinds of contacts whose compiled code has been loaded by a march
+_LOADED_KINDS = set()  # types of contact whose compiled code has been loaded
 
 
 def start_run(
@@ -181,7 +181,8 @@ def march(
     keeps_folded = keeps_extremes and can_fold(run) and not mark_steps
     if keeps_folded:
         if not march_folded(run, before_last, samples):
-            # The march ended before its last cycles, so it is repeated cycle by cycle with all samples.
+            # The march ended before its last cycles, so it is repeated
+            # cycle by cycle with all samples.
             run = restart()
             samples = MarchSamples(samples.last)
             keeps_folded = False

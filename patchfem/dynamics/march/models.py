@@ -19,13 +19,15 @@ from ..interfaces.dispatch import COULOMB_LAW
 
 INTERFACES_FOLDER = "dynamics.interfaces"
 ELEMENT_KERNELS = f"{INTERFACES_FOLDER}.element_kernels"
-# Initial number of entries of the list of a point, in addition to those of one step.
+# Initial number of entries of the bond list of a point, in addition to those of one step.
 N_FIRST_ENTRIES = 256
-# width [bond lengths] over which the initial bonds of a point are distributed, so that their force is continuous
+# Width [bond lengths] over which the initial bonds of a point are distributed, so
+# that their force is continuous.
 FIRST_BOND_WIDTH = 1e-6
-# Number of points is padded to a multiple of this, the number that compiled loops process at once.
+# Divisor of the padded number of points, equal to the number of points that
+# compiled loops process at once.
 POINTS_MULTIPLE = 16
-# kind of an idle contact, which is never evaluated
+# Type code of an inactive contact, which is never evaluated.
 IDLE_KIND = ELEMENT_KERNELS, "friction.laws.elastic_plastic_kernels"
 
 
@@ -77,7 +79,7 @@ class ContactModel:
     element: Element | None = None
     tuple_of: type = arrays.Element
 
-    loading = ""  # the load is constant
+    loading = ""  # constant load
 
     @property
     def kind(self) -> tuple:
@@ -112,7 +114,7 @@ class ContactModel:
         if not hasattr(contact, "psi"):
             return {}
         if hasattr(contact, "bondlist"):
-            # all bonds of a point are plotted with their mean stretch
+            # All bonds of a point are plotted at their mean stretch.
             load = contact.points[PointRow.LOAD]
             share = contact.statuses[:, STATUS.force]
             here = load * point_pressures(contact)

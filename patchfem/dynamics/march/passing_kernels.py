@@ -28,8 +28,8 @@ from ..modal_kernels import (
 )
 from .folded_arrays import N_BLOCK_ROWS, BlockRow, CycleColumn, SumIndex, TraceRow
 
-# round-off level of the product of two successive rates over the square of the largest rate; at a stop it is no
-# reversal
+# Largest product of two successive rates, relative to the square of the largest rate, that is
+# attributed to round-off; it occurs at a stop without a reversal.
 RATE_TOL = 1e-12
 
 
@@ -260,7 +260,7 @@ def record_full_slip_steps(n_block, first_sample, slide, table_row, force, syste
         increment = end_slide - slide
         if direction * increment <= pieces.min_increment:
             break
-        # the modes of the pieces move forward in one step and back in the next one
+        # The modes of the pieces move forward in one step and back in the next.
         n_steps = s + 1
         sign = 1.0 if s % 2 == 0 else -1.0
         is_forward = 0.5 * (1.0 + sign)

@@ -32,21 +32,24 @@ from .element_arrays import (
     PortRow,
 )
 
-# Numba leaves out the branches of flags that are False.
+# Numba omits the branches of flags that are False.
 HAS_STOPS = parts.HAS_STOPS
 HAS_POINTS = parts.HAS_POINTS
-# Tolerance of the friction force in the coupled solution of friction and normal contact, over that of friction alone.
+# Tolerance of the friction force in the coupled solution of friction and normal contact, relative
+# to the tolerance for friction alone.
 COUPLING_TOL_FACTOR = 0.01
-# Largest number of guesses of this force in a search; the bracket closes within 60.
+# Largest number of friction-force guesses in a search; the bracket closes within 60.
 MAX_GUESSES = 80
 BISECTION_INTERVAL = 8  # number of secant steps after which one is replaced by a bisection
-MAX_ITERATIONS = 100  # largest number of residuals of heave and pitch in a step
+MAX_ITERATIONS = 100  # largest number of evaluations of the heave and pitch residual in a step
 MIN_DECREASE = 0.1  # smallest relative decrease of the residual by a full Newton step
 MIN_STEP_FRACTION = 1e-9  # smallest fraction of a Newton step in the line search
-ROUND_OFF = 4e-16  # relative round-off error of a sum, over its largest term
-# Residual over its round-off error, below which a step without decrease is the last.
+ROUND_OFF = 4e-16  # round-off error of a sum, relative to its largest term
+# Residual relative to its round-off error at which the line search stops if
+# the residual does not decrease.
 STALL_FACTOR = 64
-SHORT_STALL_FACTOR = 1e3  # the same for a step fraction below SHORT_STEP_FRACTION
+SHORT_STALL_FACTOR = 1e3  # same ratio for step fractions below SHORT_STEP_FRACTION
+# Largest step fraction for which SHORT_STALL_FACTOR applies.
 SHORT_STEP_FRACTION = 0.2
 
 
@@ -190,7 +193,7 @@ def solve_press_step(press, free):
             step_fraction *= 0.5
             is_stalled = is_at_round_off(point, best.size, step_fraction)
         is_stalled = is_stalled or n_iterations == MAX_ITERATIONS
-        # after a stall the arrays are those of the best point
+        # After a stall the arrays are those of the best point.
         fraction = 0.0 if is_stalled else step_fraction
         increments = HolderMotion(
             best.increments.heave - fraction * step.heave,

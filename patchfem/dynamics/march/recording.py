@@ -9,8 +9,8 @@ from ..checkpoint import MarchedCycle, MarchSamples
 from ..cycles import find_cycle_extremes, find_cycle_phasors, select_cycle_samples
 from ..ledger import SampleColumn
 
-# Column offset of the running sums since the start (friction work, dissipated and created energy [J]), which are
-# inserted before the friction work of the step in a recorded sample.
+# Column offset of the running sums since the start (friction work, dissipated and created energy
+# [J]), which are inserted before the friction work of the step in a recorded sample.
 FIRST_SUM = SampleColumn.STEP_WORK
 N_SUMS = 3
 
@@ -48,7 +48,7 @@ class Recorder:
         self.keeps_extremes = keeps_extremes
         self.capacity = samples.capacity
         self._n_even = n_even
-        self._picks = {}  # first step of a cycle -> indices of its selected samples
+        self._picks = {}  # indices of the selected samples of a cycle, by its first step
 
     def add(self, run, cycles: list) -> None:
         """Record successive marched cycles of equal length."""

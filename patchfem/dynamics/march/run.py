@@ -35,13 +35,13 @@ from .faces import STEP_TOL, make_element_arrays
 from .models import frictionless_model
 from .recording import FIRST_SUM, N_SUMS, Mark, make_mark, read_output_extremes
 
-# Displacement over the travel above which the motion has diverged within a step.
+# Displacement relative to the travel above which the motion has diverged within a step.
 DIVERGENCE_RATIO = 10.0
-# Largest number of steps that are marched at once, which bounds the memory for samples.
+# Largest number of steps that are integrated at once, which limits the memory for samples.
 MAX_STEPS_AT_ONCE = 8000
-MAX_CYCLES_AT_ONCE = 16  # largest number of cycles that are marched at once
+MAX_CYCLES_AT_ONCE = 16  # largest number of cycles that are integrated at once
 PERIODIC_TOL = 1e-12  # largest relative change of a periodic motion in all remaining cycles
-# Ledger positions of sums that increase from cycle to cycle.
+# Ledger positions of the sums that increase from cycle to cycle.
 SUM_POSITIONS = [
     Ledger.DRIVE_WORK,
     Ledger.VISCOUS_LOSS,
@@ -89,7 +89,7 @@ def _make_response(rows, number, dt, modes, drive) -> Response:
     """
     n = modes.omega.size
     first_sum = 2 * n + FIRST_SUM
-    # columns of friction work, stored, dissipated and created energy
+    # These columns hold friction work, stored, dissipated and created energy.
     ledger_columns = [first_sum, 2 * n + SampleColumn.ENERGY, first_sum + 1, first_sum + 2]
     return make_histories(
         modes,
@@ -155,9 +155,10 @@ class Run:
         self.outcome = None
         self.message = ""
         self.totals = np.zeros(N_SUMS)
-        # friction work from the samples, and sum of the absolute friction works of the steps [J]
+        # These are the friction work from the samples, and the sum of the absolute
+        # friction works of the steps [J].
         self.second = np.zeros(2)
-        # energy stored at the start counts as work input
+        # The energy stored at the start counts as work input.
         self.ledger[Ledger.DRIVE_WORK] = self.find_modal_energy()
         self.modal_system = make_modal_arrays(modes, self.prop)
         self.faces = make_element_arrays(model, self.prop, self.modal_system, modes.mass)
@@ -171,8 +172,8 @@ class Run:
         self.periodic = (
             self.prop.tables(drive, 0, steps_per_cycle) if isinstance(drive, SineDrive) else None
         )
-        # `is_periodic` compares with the states at the last check and one cycle before this one, their sizes, and the
-        # energy sums one cycle before.
+        # `is_periodic` compares the state with those at the last check and one cycle ago. The third
+        # row holds their sizes, and `books` holds the energy sums one cycle ago.
         self.looks = np.zeros((3, sum(map(len, self._carried_state()))))
         self.books = np.zeros(14)
         self.change = np.inf
@@ -239,7 +240,7 @@ class Run:
         previous_change = self.change
         self.change = change
         self.looks[0] = state
-        # the changes over two intervals between checks must be known
+        # The changes over two intervals between checks must be known.
         has_two_intervals = n_left > 0 and n_cycles >= 4 * FIRST_CHECK
         return (
             has_two_intervals
@@ -321,7 +322,7 @@ class Run:
         forces = columns[:, :, SampleColumn.FORCE]
         element_acceleration = -np.einsum("ke,en->kn", forces, faces.rows[ports]) / modes.mass
         if self.model.patch is None:
-            # the histories already include the force of the first element
+            # The histories already include the force of the first element.
             element_acceleration += np.outer(response.force, modes.slide) / modes.mass
         extra = response.extra | {"spring_forces": forces[:, ~(is_interface | is_second)]}
         names = ("slides", "slide_rates", "forces", "slips")
@@ -460,7 +461,7 @@ class Run:
         part_ends = np.linspace(0, size, max(min(frames, size), 1) + 1).round().astype(int)
         for part_steps in np.diff(part_ends) if size else [0]:
             rows = np.empty((part_steps + 1, self.width))
-            rows[-1] = 0.0  # the values of the step after the last sample are not known yet
+            rows[-1] = 0.0  # the step after the last sample is not known yet
             saved_state = copy_state(self.contact, *self._changing_arrays())
             saved_arrays = self._copy_for_softening_springs()
             n_steps, status = self._march_steps(int(part_steps), rows)
@@ -568,7 +569,8 @@ class Run:
         if dissipated.min(initial=0.0) == 0.0:
             energies[1] = dissipated
             return energies
-        # error of the work due to the tolerance of the step solution and to round-off of the slide
+        # This is the error of the work due to the tolerance of the step solution
+        # and to round-off of the slide.
         noise = self.model.limit * (
             1e-12 * np.abs(np.diff(rows[:, n])) + 1e-15 * np.abs(rows[:-1, n])
         )

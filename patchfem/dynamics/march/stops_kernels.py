@@ -28,16 +28,17 @@ from ..dense_kernels import factorise, solve_factorised
 from ..modal_kernels import project_modes, write_accelerations
 from .element_arrays import ComplianceRow, FaceRow, LimitRow
 
-# Number of the law in `num` of a set-valued element, which sticks without a stretch.
+# Law number of a set-valued element in `num`; such an element sticks without stretch.
 SET_VALUED = 0
 # Relative shift of the diagonal that regularises the equations of dependent faces.
 DIAGONAL_SHIFT = 1e-10
-# compliance of a face with the other faces fixed, over its compliance; below this ratio the others hold the face
+# Largest compliance of a face at which the other resting faces prevent its motion, relative to its
+# compliance when they are free.
 DEPENDENT_TOL = 1e-7
-OVERLOAD_TOL = 1e-9  # relative excess over the static friction that counts as round-off
-SAME_TIME_TOL = 1e-12  # relative speed below which faces stop at the same time
-ZERO_SLIDE_TOL = 1e-14  # relative slide increment that counts as zero, over its terms
-TINY = 1e-300  # smallest divisor, so that it stays above 0
+OVERLOAD_TOL = 1e-9  # relative excess over the static friction that is attributed to round-off
+SAME_TIME_TOL = 1e-12  # largest relative speed of faces that stop at the same time
+ZERO_SLIDE_TOL = 1e-14  # largest slide increment that counts as zero, relative to its terms
+TINY = 1e-300  # smallest divisor, which prevents a division by 0
 
 
 class StepEvent(NamedTuple):
@@ -114,7 +115,7 @@ def solve_shared_forces(which, count, stops):
         x[i] = 0.0
     if not factorise(a):
         return False
-    # the second pass removes the effect of the diagonal shift from independent faces
+    # The second pass removes the effect of the diagonal shift from independent faces.
     for _ in range(2):
         for i in range(count):
             r[i] = b[i]
@@ -192,7 +193,7 @@ def release_face(e, slip_sign, stops):
     stops : element_arrays.SetValuedElements
     """
     f = stops.field
-    # the face must not be listed among the resting faces
+    # The slip state is set first, so that the list of resting faces excludes this face.
     f[FaceRow.SLIP_STATE, e] = slip_sign
     f[FaceRow.SLIDES_ON, e] = 0.0
     count = list_resting_faces(stops)
@@ -297,7 +298,8 @@ def find_speed_rates(e, x, dt, stops):
         rise = f[FaceRow.HOLDING_END, k] - f[FaceRow.HOLDING_START, k]
         rate += g * (f[FaceRow.HOLDING_START, k] + rise * x - f[FaceRow.FORCE, k])
         half_slope += 0.5 * g * (rise - f[FaceRow.FORCE_SLOPE, k])
-    if f[FaceRow.SPEED, e] == 0.0:  # a face that was just released slides forward, up to round-off
+    # A face that was just released slides forward, except for round-off.
+    if f[FaceRow.SPEED, e] == 0.0:
         rate = f[FaceRow.SLIP_STATE, e] * max(f[FaceRow.SLIP_STATE, e] * rate, 0.0)
     return rate, half_slope
 
@@ -390,7 +392,7 @@ def advance_faces(x, distance, face, dt, stops):
         if abs(slip_state[e]) == 1.0:
             last_speed = abs(speed[e])
             speed[e] = f[FaceRow.RESIDUAL, e]
-            # equal faces stop at the same time
+            # Equal faces stop at the same time.
             smallest_speed = SAME_TIME_TOL * last_speed if last_speed > 0.0 else -1.0
             if (
                 e == face
@@ -475,7 +477,8 @@ def find_holding_forces(dt, stops):
                 return True
             if not find_face_forces(0.0, stops):
                 return False
-        # mean forces determine the slides, and forces weighted by the time to the end determine the speeds
+        # Mean forces determine the slides; forces weighted by the time
+        # to the end determine the speeds.
         if not solve_holding_forces(ComplianceRow.SLIDE, stage, count, dt, stops):
             return False
         for i in range(count):

@@ -296,7 +296,8 @@ def take_newton_step(elements, dt, known):
     count = elements.links.shape[1]
     residual = elements.state[ElementRow.RESIDUAL]
     write_force_equations(elements, dt, known)
-    # no pivoting is needed: 1 + slope beta is diagonally dominant for laws that resist the slide
+    # No pivoting is needed, because 1 + slope beta is diagonally dominant
+    # for laws that resist the slide.
     if not solve_by_elimination(elements.system, residual):
         return False
     for e in range(count):

@@ -31,9 +31,10 @@ from .march import march as run
 from .models import IDLE_KIND, Joint, element_model, nodal_load_fields, point_lists_model
 from .run import Run
 
-# Attainable residual of sums over lists of bonds, over the tolerance of other laws.
+# Attainable residual of sums over bond lists, relative to the tolerance of other laws.
 LIST_TOL_FACTOR = 1e4
-# smallest pressure of a node in the weights of the shear modes, over the mean pressure of the preload
+# Pressure added to each node in the weights of the shear modes, relative to
+# the mean pressure of the preload.
 MIN_PRESSURE_FRACTION = 1.0
 PRESS_COLUMNS = ("normal_load", "normal_moment", "normal_energy", "heave", "turn")
 
@@ -54,7 +55,7 @@ class LawKind(IntEnum):
     RATE = 4
 
 
-# kinds of laws that act at each point under its own load
+# Types of friction law that act at each point under its own load.
 POINT_LAWS = LawKind.PLASTIC, LawKind.POINTS, LawKind.LISTS
 
 
@@ -369,7 +370,8 @@ def choose_shear_modes(
     ShearModes
     """
     limit = law.static * (force + MIN_PRESSURE_FRACTION * force.sum() * weight / weight.sum())
-    # an unstable patch, which could jump without a change of the drive, is refused as under a constant load
+    # An unstable patch could jump without a change of the drive, so it is
+    # rejected as under a constant load.
     if law.growth[0] >= 0:
         shear_modes(
             compliance,
@@ -513,7 +515,7 @@ class VaryingLoadRun(Run):
         nodal = self.load.now.copy()
         contact_state = {"b": np.zeros(0), "memory": np.zeros((3, nodal.size)), "bend": 0.0}
         c = self.contact
-        # all bonds of a point are plotted with their mean stretch
+        # All bonds of a point are plotted at their mean stretch.
         if self.model.law.kind == LawKind.LISTS:
             force = self.model.law.static * c.points[PointRow.LOAD] * c.statuses[:, STATUS.force]
             law = self.model.law

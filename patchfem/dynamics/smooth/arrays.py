@@ -157,7 +157,7 @@ EVENT = StepEvents()
 STATUS = CallStatus()
 # Number of points of a part of a step at which its samples are taken.
 N_NODES = 9
-# These points as fractions of the part; they are Chebyshev points of the second kind.
+# Positions of these points as fractions of the part; they are Chebyshev points of the second kind.
 NODE_FRACTIONS = (1 - np.cos(np.pi * np.arange(N_NODES) / (N_NODES - 1))) / 2
 
 

@@ -17,24 +17,27 @@ from . import step_kernels as steps
 from . import watch_kernels as watch
 from .arrays import EVENT, STATUS, Counter, Mode, Scalar, Turn, Work
 
-# Bounds of the ratio of a step to the previous step.
+# Smallest ratio of a step to the previous step.
 MIN_STEP_FACTOR = 0.2
+# Largest ratio of a step to the previous step.
 MAX_STEP_FACTOR = 8.0
 # Safety factor of the length of the next step.
 STEP_SAFETY = 0.9
-# Value of scalars[Scalar.STAGE] where a call ended at a reversal.
+# Value of scalars[Scalar.STAGE] if a call ended at a reversal.
 AT_REVERSAL = 2.0
-# Number of cycles over which a maximum of coordinates and rates decays.
+# Number of cycles over which the recent maxima of coordinates and rates decay.
 FADING_CYCLES = 3.0
-# Maximum number of tried steps in a call; they take a tenth of a second, in which compiled code receives no signal.
+# Maximum number of tried steps in a call; they take 0.1 s, during which
+# compiled code receives no signal.
 MAX_TRIED_STEPS = 50_000
-# Minimum progress in time of MAX_TRIED_STEPS steps, over the time of the fastest motion.
+# Minimum progress in MAX_TRIED_STEPS steps, relative to the time scale of the fastest motion.
 MIN_PROGRESS = 1e-3
-# Fraction of a period within which two events count as simultaneous.
+# Largest time between two simultaneous events, in periods.
 INSTANT_FRACTION = 1e-13
-# Maximum step during stick as a fraction of a period, because no other criterion limits it.
+# Maximum step during stick, in periods; no other criterion limits it.
 MAX_STUCK_STEP = 0.02
-# States of a motion since a stop: it has moved, it is at the stop, or it is there and its direction was changed.
+# States of a motion since a stop: it has moved, it is at the stop, or its
+# direction was changed at the stop.
 NOT_AT_STOP = 0
 AT_STOP = 1
 DIRECTION_CHANGED = 2
@@ -83,7 +86,8 @@ def distance_to_event(motion, event, y, slopes, travel):
         knee = motion.turn[Turn.KNEE_VELOCITY]
         rate = side * direction * acceleration
         return EventDistance(side * (direction * v - knee), rate, 1e-12 * knee)
-    # The rates of a set-valued law hold, after its loss, the margin of its holding force and its normal force.
+    # In the rates of a set-valued law, the loss is followed by the margin of the holding
+    # force and by the normal force.
     if event >= EVENT.release:
         first = 2 * motion.modes.shape[1] + 1
         return EventDistance(slopes[first + event - EVENT.release], 0.0, 0.0)
@@ -242,8 +246,8 @@ def locate_event(motion, h, event, fraction, travel):
         else:
             longest = length
         new = length - value / rate if rate < 0 else 0.5 * (shortest + longest)
-        # A motion that leaves rest is within round-off of the event too; it must not end there, or it would rest for
-        # ever.
+        # A motion that leaves rest is also within round-off of the event; it must
+        # continue, or it would never leave.
         is_at_event = abs(value) <= noise and rate < 0
         if (
             is_at_event
@@ -354,7 +358,7 @@ def find_cubic_dip(a, p, b, r):
     """
     if p >= 0 or r <= 0 or a <= 0 or b <= 0:
         return 0.0
-    # a + p s + mid s^2 + big s^3
+    # The cubic is a + p s + mid s^2 + big s^3.
     c3 = 2 * (a - b) + p + r
     c2 = 3 * (b - a) - 2 * p - r
     root = c2 * c2 - 3 * c3 * p
@@ -590,7 +594,7 @@ def pass_event(motion, record, event):
             record_reversal(motion, record)
     elif event == EVENT.stop:
         if n == 1:
-            motion.state[1] = 0.0  # This removes the round-off of the velocity.
+            motion.state[1] = 0.0  # remove the round-off error of the velocity
         end_direction(motion, record)
         if reverse_or_continue(motion, record.counters[Counter.PERIOD]):
             record_reversal(motion, record)
@@ -739,7 +743,7 @@ def advance_motion(motion, record, until, edge, tolerance, travel):
     end = min(until, edge)
     stop_state = find_stop_state(motion)
     if motion.scalars[Scalar.SLOPE_SEGMENT] != motion.scalars[Scalar.SEGMENT]:
-        # the drive has changed
+        # The slopes are evaluated again, because the drive has changed.
         steps.write_slopes(motion, motion.scalars[Scalar.TIME], motion.state, motion.work[0])
         motion.scalars[Scalar.SLOPE_SEGMENT] = motion.scalars[Scalar.SEGMENT]
     take_samples(motion, record)
@@ -771,7 +775,7 @@ def advance_motion(motion, record, until, edge, tolerance, travel):
             and fraction * h < INSTANT_FRACTION * record.counters[Counter.PERIOD]
         )
         if is_at_stop:
-            # the motion stops in both directions, which a smooth law excludes
+            # The motion stops in both directions, which a smooth law excludes.
             if stop_state == DIRECTION_CHANGED:
                 return STATUS.no_step
             start_direction(motion, -motion.turn[Turn.DIRECTION])

@@ -15,15 +15,16 @@ from ...core import IntegratedMeasures, InterfaceLoop
 from ...structure.drive_sizes import is_sinusoidal
 from .arrays import N_NODES, NODE_FRACTIONS
 
-# Fractions of a step between which slip begins or ends at most once; two of them are close to the ends, as a stick may
-# be short.
+# Fractions of a step between which slip begins or ends at most once; two of them are close to the
+# ends, because a stick may be short.
 FINE_FRACTIONS = np.sort(np.append((1 - np.cos(np.pi * np.arange(25) / 24)) / 2, [1e-3, 1 - 1e-3]))
-# Fractions of a step among which a maximum is searched for; a parabola through three of them is right to 1e-11 of its
-# rise.
+# Fractions of a step among which a maximum is searched for; a parabola through three of them is
+# accurate to 1e-11 of its rise.
 FINEST_FRACTIONS = np.linspace(0.0, 1.0, 257)
-# Maximum number of steps, those with the largest values at FINE_FRACTIONS, in which a maximum is searched for.
+# Maximum number of steps in which a maximum is searched for, those with the
+# largest values at FINE_FRACTIONS.
 MAX_CANDIDATES = 6
-# Maximum rise of a quantity above its values at the nodes, over its range in the step.
+# Maximum rise of a quantity above its values at the nodes, relative to its range in the step.
 MAX_RISE_RATIO = 0.5
 # Gauss rule with 12 points on [0, 1].
 _GAUSS_RULE = np.polynomial.legendre.leggauss(12)
@@ -31,11 +32,13 @@ GAUSS_POINTS = (1 + _GAUSS_RULE[0]) / 2
 GAUSS_WEIGHTS = _GAUSS_RULE[1] / 2
 # Number of bisections of the interval in which slip begins or ends.
 N_BISECTIONS = 30
-# Fraction of the velocity; an interface slips where more of it is irreversible, as in `response.measures`.
+# Smallest irreversible fraction of the velocity at which an interface
+# slips, as in `response.measures`.
 SLIP_FRACTION = 0.5
-# Round-off of the change of a relative displacement in a step, over the largest displacement.
+# Round-off error of the change of a relative displacement in a step,
+# relative to the largest displacement.
 SLIDE_TOL = 1e-13
-# Relative velocity over the largest one in the step, below which the interface is at a reversal.
+# Largest relative velocity at a reversal, relative to the largest one in the step.
 REST_SPEED_RATIO = 1e-7
 
 
@@ -67,13 +70,13 @@ def transform_parts(values, matrix) -> np.ndarray:
     return np.einsum("kj,pj->kp", values, matrix)
 
 
-# Matrix from values at NODE_FRACTIONS to Chebyshev coefficients.
+# Matrix that maps values at NODE_FRACTIONS to Chebyshev coefficients.
 TO_CHEBYSHEV = np.linalg.inv(chebyshev.chebvander(2 * NODE_FRACTIONS - 1, N_NODES - 1))
-# Matrix from values at NODE_FRACTIONS to slopes over a step.
+# Matrix that maps values at NODE_FRACTIONS to slopes over a step.
 TO_SLOPES = chebyshev.chebvander(2 * NODE_FRACTIONS - 1, N_NODES - 2) @ (
     2 * chebyshev.chebder(TO_CHEBYSHEV)
 )
-# Matrix from values at NODE_FRACTIONS to coefficients of powers of (2 fraction - 1).
+# Matrix that maps values at NODE_FRACTIONS to coefficients of powers of (2 fraction - 1).
 TO_POWERS = np.linalg.inv(np.vander(2 * NODE_FRACTIONS - 1, N_NODES, increasing=True))
 TO_FINE = make_interpolation_matrix(FINE_FRACTIONS)
 TO_FINEST = make_interpolation_matrix(FINEST_FRACTIONS)
@@ -166,7 +169,7 @@ class StepParts:
         -------
         float
         """
-        # The length is bounded from below, because a step at an event has the length 0.
+        # The length is bounded from below, because a step at an event has length 0.
         length = np.maximum(self.length, 1e-300)
         starts, ends = (np.clip((edge - self.begin) / length, 0.0, 1.0) for edge in (begin, end))
         covered = np.flatnonzero(ends > starts)

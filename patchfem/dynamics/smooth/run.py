@@ -22,21 +22,24 @@ from ..periodicity import FIRST_CHECK, bound_remaining_change
 from .arrays import N_NODES, STATUS, Counter, MotionArrays, MotionRecord, Scalar, Work
 from .reader import measure_parts
 
-# rows for reversals that one call of the loop fills
+# Number of reversal rows that one call of the loop can fill.
 REVERSALS_PER_CALL = 4096
-# rows for parts of steps that one call of the loop fills
+# Number of rows for parts of steps that one call of the loop can fill.
 PARTS_PER_CALL = 1024
-# reversals that are kept from before the window
+# Largest number of stored reversals from before the window.
 MAX_KEPT_REVERSALS = 400_000
-# tolerance of the last cycles over that of the run, as they are read inside the steps, where the error is larger
+# Tolerance of the last cycles relative to that of the run; these are interpolated within the
+# steps, where the error is larger.
 LAST_TOLERANCE_RATIO = 0.01
-# windows whose phasors are kept; a steady amplitude takes five (`response.settling.extrapolate_steady_amplitudes`)
+# Number of windows whose phasors are kept; a steady amplitude needs five
+# (`response.settling.extrapolate_steady_amplitudes`).
 N_PHASOR_WINDOWS = 8
-# length of the first step over the shortest time of modes and drive
+# Length of the first step, relative to the shortest time scale of modes and drive.
 FIRST_STEP_RATIO = 1e-3
-# largest change per cycle of a motion that counts as periodic, over the tolerance of a step
+# Largest remaining change of a periodic motion, relative to the tolerance of a step.
 MAX_REPEAT_CHANGE = 10.0
-# change of the extremes between two cycles over MAX_REPEAT_CHANGE, as their steps lie at other times
+# Largest change of the extremes between two cycles, relative to MAX_REPEAT_CHANGE;
+# their steps lie at other times.
 MAX_CYCLE_RATIO = 10.0
 PACKAGE = "dynamics.smooth"
 
@@ -300,7 +303,8 @@ class Motion:
                 self.arrays, self.record, float(time), end, self.tolerance, float(self.travel)
             )
             self._collect(status)
-            # only here, because a step that is shortened for a sample would change the motion
+            # Progress is reported only here, because shortening a step for a
+            # sample would change the motion.
             if self.progress is not None:
                 self.progress(min(self.time / (self.cycles * self.drive.period), 1.0))
             if status == STATUS.finished and self.time >= time:
@@ -324,7 +328,7 @@ class Motion:
         self.run_to((first + FIRST_CHECK) * period)
         last_state = self.arrays.state.copy()
         while self.outcome is None and (first + n_cycles) * period < time:
-            # 0 marks the cycle as one whose phasor is requested
+            # The value 0 marks a cycle whose phasor is requested.
             self.record.cycles[2:, first + n_cycles - 1] = 0.0
             self.run_to((first + n_cycles - n_cycles // 4) * period)
             sums_before = self._read_sums()
@@ -510,9 +514,8 @@ class Motion:
         start_state = self.end_state()
         tolerance = self.tolerance
         self.parts = []
-        self.tolerance *= (
-            LAST_TOLERANCE_RATIO  # the extension of a step errs more than the step does
-        )
+        # The interpolation within a step has a larger error than the step itself.
+        self.tolerance *= LAST_TOLERANCE_RATIO
         self.arrays.scalars[Scalar.STEP] *= LAST_TOLERANCE_RATIO**0.125
         times = choose_sample_times(begin, end, self.drive.period)
         rows = []
@@ -603,7 +606,7 @@ def simulate(
     rows, (integrated, peak_errors) = run.run_last_cycles(
         cycles * period, window * period, shots, snapshots
     )
-    # the last cycles were not known in advance, so the run is repeated up to its end
+    # The last cycles were not known in advance, so the run is repeated up to its end.
     if run.outcome is not None and run.time > 0:
         result = simulate(
             modes,

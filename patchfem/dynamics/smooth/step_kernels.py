@@ -25,9 +25,10 @@ from ..tableau_kernels import (
 )
 from .arrays import Mode, Scalar, Turn, Work
 
-# Smallest size of a quantity, by which the error of a state at rest is measured.
+# Smallest size of a quantity to which the error of a state is relative; it is needed at rest.
 MIN_SIZE = 1e-30
-# Round-off of an acceleration over the forces per mass of mode and law that balance in it.
+# Round-off error of an acceleration, relative to the forces per mass of the mode
+# and the law that balance in it.
 ROUND_OFF_RATIO = 2e-15
 
 
@@ -284,7 +285,7 @@ def extend_step(motion, h):
     """
     t = motion.scalars[Scalar.TIME]
     size = motion.state.size
-    for c in range(size):  # This copy is needed because the stages overwrite the state.
+    for c in range(size):  # the stages overwrite the state, so it is copied
         motion.work[Work.EXTENSION + 7, c] = motion.work[Work.TRIAL, c]
     for stage in range(13, N_STAGES):
         write_stage(motion, stage, h, size - 3)

@@ -14,20 +14,21 @@ from ...friction.laws import stretch_kernels as law
 from . import step_kernels as steps
 from .arrays import NODE_FRACTIONS, Counter, Mode, Scalar, Work
 
-# Gauss rule for the part of a step in a cycle, over which the phasor of the cycle is integrated.
+# Gauss rule for the part of a step in a cycle over which the phasor is integrated.
 PHASOR_POINTS, PHASOR_WEIGHTS = np.polynomial.legendre.leggauss(4)
-# Chebyshev polynomial of the last but one degree at NODE_FRACTIONS.
+# Chebyshev polynomial of the second highest degree at NODE_FRACTIONS.
 PENULTIMATE_TERM = np.cos(
     np.pi
     * (NODE_FRACTIONS.size - 2)
     / (NODE_FRACTIONS.size - 1)
     * np.arange(NODE_FRACTIONS.size)[::-1]
 )
-# Last Chebyshev terms of the force in a part over the largest force, above which the part is halved.
+# Size of the last Chebyshev terms of the force in a part, relative to the largest force,
+# above which the part is halved.
 MAX_ROUGHNESS_RATIO = 1e-9
 # Minimum length of a part that is halved, as a fraction of a step.
 MIN_PART_FRACTION = 2.0**-14
-# Maximum number of parts of a step, for which rows must be free.
+# Maximum number of parts of a step; their rows must be free.
 MAX_PARTS = 64
 
 
@@ -141,7 +142,7 @@ def find_output_extreme(motion, record, a, b, rate):
             a = middle
         else:
             b = middle
-        if b - a < 1e-8:  # The output is flat here, so its error is the square of the interval.
+        if b - a < 1e-8:  # the output is flat here, so its error is the square of the interval
             break
     return out
 
