@@ -38,7 +38,7 @@ class BenchRun:
     - frames (f,): indices of the samples at which fields are stored.
     - tau, local (f, m): traction [Pa] and slip [m] at the nodes in each frame.
     - values: measures by name.
-    - seconds: CPU seconds.
+    - seconds: CPU time [s].
     - first: index of the sample at which the last cycle starts.
     - engine: method that computed the friction force.
     - lateral, lateral_force, yaw_moment (k,): lateral displacement [m], force [N] and yaw moment [N
@@ -126,7 +126,7 @@ def _compute_histories(task: SlideTask) -> tuple[SlideHistories, dict]:
     return rigid.slide_rigidly(task), {}
 
 
-def _compute_measures(model, time, slide, histories: SlideHistories, first: int) -> dict:
+def _compute_measures(model, time, slide, histories: SlideHistories, cycle_start: int) -> dict:
     """Compute all measures of a bench run except those of the friction loop."""
     force = histories.force
     load = histories.load
@@ -146,20 +146,23 @@ def _compute_measures(model, time, slide, histories: SlideHistories, first: int)
         "friction_force_peak": float(np.abs(force).max()),
         "friction_ratio_end": float(ratio[-1]),
         "friction_ratio_peak": float(np.abs(ratio).max()),
-        "slip_amplitude": float(histories.slip[first:].max() - histories.slip[first:].min()) / 2,
+        "slip_amplitude": float(
+            histories.slip[cycle_start:].max() - histories.slip[cycle_start:].min()
+        )
+        / 2,
         "energy_balance": balance,
         **compute_ledger_measures(histories.ledger),
     }
 
 
 def _compute_loop_measures(
-    model, time, slide, histories: SlideHistories, first: int, omega: float
+    model, time, slide, histories: SlideHistories, cycle_start: int, omega: float
 ) -> dict:
-    """Compute the measures of the friction loop in the last cycle, which starts at sample `first`."""
-    time = time[first:]
-    slide = slide[first:]
-    force = histories.force[first:]
-    work = histories.ledger[0, first:]
+    """Compute the measures of the friction loop in the last cycle, which starts at sample `cycle_start`."""
+    time = time[cycle_start:]
+    slide = slide[cycle_start:]
+    force = histories.force[cycle_start:]
+    work = histories.ledger[0, cycle_start:]
     weight = np.zeros(time.size)
     weight[1:] += np.diff(time) / 2
     weight[:-1] += np.diff(time) / 2

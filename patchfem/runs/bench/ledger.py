@@ -152,7 +152,7 @@ class SlideTask(NamedTuple):
 
     @property
     def frame_indices(self) -> np.ndarray:
-        """Indices of the samples with stored fields, without the first sample (the pressed state)."""
+        """Indices of the samples with stored fields; the initial state is not one of them."""
         if not self.frames:
             return np.zeros(0, int)
         numbers = np.linspace(0, self.slide.size - 1, self.frames + 1).round().astype(int)[1:]

@@ -205,7 +205,7 @@ def _warn_of_open_loop(model, patch, fine, steps: int) -> list:
 
 
 def _warn_of_overhang(patch_model, patch, fine) -> list:
-    """Return warnings if the upper piece slides off the pressed area or off the lower piece."""
+    """Return warnings if the upper piece leaves the loaded area or the lower piece."""
     warnings = []
     lateral = 0.0
     if fine.lateral is not None:

@@ -53,7 +53,7 @@ def slide_rigidly(task: SlideTask) -> SlideHistories:
     return SlideHistories(response.force, loads, slip, response.ledger, frames, tau, local)
 
 
-def make_climbing_model(model, load: float, patch=None, count: int | None = None):
+def make_climbing_model(model, load: float, patch=None, n_modes: int | None = None):
     """Return the contact model of a law with memory on the flanks of grooves.
 
     A bench run has no lifted mass.
@@ -65,7 +65,7 @@ def make_climbing_model(model, load: float, patch=None, count: int | None = None
         Normal load [N].
     patch : Patch, optional
         Patch whose pieces deform in shear.
-    count : int, optional
+    n_modes : int, optional
         Number of shear modes of the pieces; default: by the tolerance.
     """
     f = model.friction
@@ -82,7 +82,7 @@ def make_climbing_model(model, load: float, patch=None, count: int | None = None
     contact = flank_climbing.make_model(grooves, load, law, modes)
     if not model.partial_slip:
         return contact
-    return flank_climbing.with_shear_modes(contact, patch, count, model.accuracy.tolerance)
+    return flank_climbing.with_shear_modes(contact, patch, n_modes, model.accuracy.tolerance)
 
 
 def _make_point_model(task: SlideTask, load: float) -> ContactModel:

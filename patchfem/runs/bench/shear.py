@@ -114,7 +114,7 @@ def _slide_bond_points(task: SlideTask) -> SlideHistories:
     return response.to_slide_histories(patch.pressure.load, tau, local)
 
 
-def compute_point_shear_modes(model, patch, count: int | None = None):
+def compute_point_shear_modes(model, patch, n_modes: int | None = None):
     """Return the shear modes of the contact points of a nonlocal law.
 
     If the pressure is fixed to the lower piece, all nodes are contact points. An initially unloaded
@@ -124,22 +124,22 @@ def compute_point_shear_modes(model, patch, count: int | None = None):
     ----------
     model : Model
     patch : Patch
-    count : int, optional
+    n_modes : int, optional
         Number of modes; default: by the scene, otherwise by the tolerance.
     """
     law = model.bonds
     sigma = patch.pressure.sigma_n
     tolerance = 0.1 * model.accuracy.tolerance
-    count = count or model.accuracy.shear_modes
+    n_modes = n_modes or model.accuracy.shear_modes
     if model.side != "lower":
-        return bond_shear_modes(patch, law, count, tolerance)
+        return bond_shear_modes(patch, law, n_modes, tolerance)
     # A single mode is computed first, because this rejects a patch that could jump at constant
     # displacement.
     bond_shear_modes(patch, law, 1, 1.0)
     return bond_shear_modes(
         patch,
         law,
-        count,
+        n_modes,
         tolerance,
         sigma=np.maximum(sigma, OPEN_PRESSURE_FRACTION * mean_loaded_pressure(patch)),
     )
@@ -208,17 +208,17 @@ def make_bond_lists_with_shear(patch, law, shear, choice, force=None):
     )
 
 
-def list_coarser_element_runs(count: int, reference_run) -> CoarserRuns:
+def list_coarser_element_runs(n_meshes: int, reference_run) -> CoarserRuns:
     """List bench runs with parallel elements on coarser meshes.
 
     Parameters
     ----------
-    count : int
+    n_meshes : int
         Number of coarser meshes.
     reference_run : CoarseRun
         Run with which they are compared.
     """
-    runs = tuple(reference_run._replace(level=level) for level in range(1, count + 1))
+    runs = tuple(reference_run._replace(level=level) for level in range(1, n_meshes + 1))
     return CoarserRuns(runs, estimate_mesh_errors, reference_run, "mesh")
 
 

@@ -191,7 +191,7 @@ def _evaluate_law(
     )
 
 
-def refuse_expensive_sum(model, law, samples: int, points: int, slide) -> None:
+def refuse_expensive_sum(model, law, n_samples: int, n_points: int, slide) -> None:
     """Raise Missing if a direct sum over bonds needs too many operations.
 
     Bonds are assumed to be neglected after a path of 25 bond lengths.
@@ -200,7 +200,7 @@ def refuse_expensive_sum(model, law, samples: int, points: int, slide) -> None:
     ----------
     model : Model
     law
-    samples, points : int
+    n_samples, points : int
         Number of samples and of points.
     slide : (k,)
         [m].
@@ -209,10 +209,10 @@ def refuse_expensive_sum(model, law, samples: int, points: int, slide) -> None:
         return
     reach = 25 * model.friction.bond_length
     per_step = max(float(np.abs(np.diff(slide)).mean()), 1e-300)
-    strips = min(samples, 2 * reach / per_step + 64)
-    if 6 * strips * samples * points > MAX_STRIP_POINT_PRODUCTS:
+    strips = min(n_samples, 2 * reach / per_step + 64)
+    if 6 * strips * n_samples * n_points > MAX_STRIP_POINT_PRODUCTS:
         raise Missing(
-            f"the direct sum over bonds would need {6 * strips * samples * points:.1e} multiplications, more "
+            f"the direct sum over bonds would need {6 * strips * n_samples * n_points:.1e} multiplications, more "
             f"than the limit of {MAX_STRIP_POINT_PRODUCTS:.0e}; lower accuracy.steps_per_cycle or slide.cycles",
             "",
         )

@@ -233,13 +233,13 @@ def find_min_drive_acceleration(rig) -> float:
 
 
 def compute_holding_force(rig, acceleration: float | None = None) -> float:
-    """Return the peak force [N] on the first interface that keeps all interfaces at rest.
+    """Return the peak force [N] on the first interface that holds all interfaces at rest.
 
-    For a single mode it is mass times acceleration times base/slide at any frequency. Several modes
-    continue to vibrate while the interfaces stick, and add inertia forces. The force is inf if an
-    interface is moved by no mode, or at an undamped resonance.
+    For a single mode it is mass times acceleration times the ratio of base to slide participation,
+    at any frequency. Several modes continue to vibrate while the interfaces stick, and add inertia
+    forces. The force is inf if no mode moves an interface, or at an undamped resonance.
 
-    `acceleration` is the acceleration of the drive [m s-2]; default: the largest one.
+    `acceleration` is that of the drive [m s-2]; default: the largest one.
     """
     modes = rig.modes
     size = find_max_acceleration(rig.drive.signal) if acceleration is None else acceleration

@@ -144,7 +144,7 @@ def with_automatic_method(model):
     return replace(model, accuracy=model.accuracy.model_copy(update={"method": "auto"}))
 
 
-def compute_static_curve(modes, laws, number: int, amplitudes, samples: int) -> np.ndarray:
+def compute_static_curve(modes, laws, mode_index: int, amplitudes, samples: int) -> np.ndarray:
     """Compute amplitude, frequency, damping ratio and loss of a mode from quasi-static cycles.
 
     Parameters
@@ -152,7 +152,7 @@ def compute_static_curve(modes, laws, number: int, amplitudes, samples: int) -> 
     modes
         Modal basis.
     laws : LawGroup
-    number : int
+    mode_index : int
         Index of the mode.
     amplitudes : (k,)
         Amplitudes of the output [m].
@@ -164,7 +164,7 @@ def compute_static_curve(modes, laws, number: int, amplitudes, samples: int) -> 
     (4, k) array
         Amplitude [m], frequency [Hz], damping ratio [1], and dissipated energy per cycle [J].
     """
-    stuck_mode = modes.compute_stuck_mode(laws.rows, laws.stiffness(), number)
+    stuck_mode = modes.compute_stuck_mode(laws.rows, laws.stiffness(), mode_index)
     output_motion = float(modes.output @ stuck_mode[1])
     return tabulate_static_motions(
         modes,
@@ -247,12 +247,12 @@ def estimate_decay_mesh_errors(model, patch, coarse, amplitudes, find_mode) -> t
         return zero_errors, UNSUPPORTED_CONTACTS[moves.index(True)]
     try:
         fine = make_laws_on_mesh(model, patch)
-        number = find_mode(fine)
+        mode_index = find_mode(fine)
         error = estimate_mesh_error(
             fine,
             make_laws_on_coarse_meshes(model, coarse),
             lambda laws: compute_static_curve(
-                rig.modes, laws, number, amplitudes, balance.SAMPLES_PER_CYCLE
+                rig.modes, laws, mode_index, amplitudes, balance.SAMPLES_PER_CYCLE
             )[1:3],
         )
     except NotConverged as reason:

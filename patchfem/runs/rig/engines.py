@@ -344,7 +344,7 @@ def _estimate_bond_sum_errors(model: Model, patch, fraction: float, values: dict
 
 
 def _list_engine_errors(model: Model, numerics, patch, coarse, solution) -> list:
-    """Return the error estimates of the engine itself, in the form of comparison runs.
+    """Return the error estimates that the engine provides, in the form of comparison runs.
 
     For harmonic balance these are the residual and the change with twice the harmonics, for the
     smooth engine the errors of the samples.

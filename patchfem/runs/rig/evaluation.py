@@ -152,7 +152,7 @@ class RunEvaluator:
         )
 
     def estimate_run_errors(self, run, drive, values: dict) -> dict:
-        """Estimate the errors of the measures from the run itself, except those of ringing.
+        """Estimate the errors of the measures without coarse runs, except those of ringing.
 
         Parameters
         ----------
@@ -237,7 +237,7 @@ class RunEvaluator:
         """Return fields of the Solution that only this engine provides."""
         return {}
 
-    def make_solution(self, run, seconds: float, drive=None, **more) -> Solution:
+    def make_solution(self, run, seconds: float, drive=None, **other_fields) -> Solution:
         """Evaluate a run and return its Solution.
 
         Parameters
@@ -281,7 +281,7 @@ class RunEvaluator:
             | self.estimate_run_errors(run, drive, values)
             | self.estimate_history_sampling_errors(run, drive, values),
             extremes=run.amplitudes,
-            **(fields | more),
+            **(fields | other_fields),
         )
 
     def evaluate_level(self, level: float, run, drive=None, relative_error: float = 0.0) -> Level:

@@ -121,7 +121,7 @@ def run_event_driven(model, numerics, patch, frames: int = 0, say=None, progress
 class EventEvaluator(RunEvaluator):
     """Evaluation of the runs of the event-driven engines.
 
-    `found` are the RigidElements or YieldingElements of the run.
+    `contact_elements` are the RigidElements or YieldingElements of the run.
     """
 
     def __init__(self, model, numerics, patch, contact_elements):
@@ -172,10 +172,10 @@ class EventEvaluator(RunEvaluator):
         values = compute_event_measures(
             run.reading,
             run.ledger,
-            sine=is_sinusoidal(drive),
-            whole=bool(has_full_cycle(run.reading.span, drive)),
+            is_sine=is_sinusoidal(drive),
+            is_complete=bool(has_full_cycle(run.reading.span, drive)),
             stiffness=first_mode_stiffness(self.model, run.window),
-            size=find_max_acceleration(drive),
+            acceleration=find_max_acceleration(drive),
         )
         floats = {name: None if np.isnan(value) else float(value) for name, value in values.items()}
         names = list(floats)
@@ -504,7 +504,13 @@ def convert_to_elements(element) -> elements.Elements:
 
 
 def compute_event_measures(
-    reading: Reading, book: dict, *, sine: bool, whole: bool, stiffness, size
+    reading: Reading,
+    energies: dict,
+    *,
+    is_sine: bool,
+    is_complete: bool,
+    stiffness,
+    acceleration,
 ) -> dict:
     """Compute measures of the motion and of the first interface of event-driven runs.
 
@@ -513,16 +519,16 @@ def compute_event_measures(
     Parameters
     ----------
     reading : Reading
-    book : dict
+    energies : dict
         Energies of the run [J].
-    sine : bool
+    is_sine : bool
         Whether the drive is sinusoidal at the end of the run.
-    whole : bool
+    is_complete : bool
         Whether the evaluated cycles are complete.
     stiffness : float or (n,)
         Stiffness of the first mode referred to the contact [N/m]; 0 if the run has no damping
         ratio.
-    size : float or (n,)
+    acceleration : float or (n,)
         Acceleration amplitude of the drive [m s-2].
 
     Returns
@@ -530,33 +536,35 @@ def compute_event_measures(
     dict
         Measures by name; NaN if a run does not have a measure.
     """
-    none = np.full(np.shape(reading.output_amplitude), np.nan)[()]
-    has_waves = sine and whole
+    nan = np.full(np.shape(reading.output_amplitude), np.nan)[()]
+    valid = is_sine and is_complete
     first, third = reading.acceleration_harmonics
     loop = reading.loop()
     values = {
         "relative_displacement_amplitude": reading.output_amplitude,
         "absolute_acceleration_peak": reading.acceleration,
-        "absolute_acceleration_fundamental": first if has_waves else none,
-        "acceleration_distortion": distortion_ratio(first, third, size) if has_waves else none,
+        "absolute_acceleration_fundamental": first if valid else nan,
+        "acceleration_distortion": distortion_ratio(first, third, acceleration) if valid else nan,
         "drift_per_cycle": reading.drift,
-        "slip_start_phase": reading.start if sine else none,
-        "work_check": _compute_work_check(reading, book),
+        "slip_start_phase": reading.start if is_sine else nan,
+        "work_check": _compute_work_check(reading, energies),
         "slip_amplitude": loop.slip_range / 2,
         "friction_force_peak": loop.max_force,
         "stick_fraction": stick_fraction(loop.stuck_time, reading.span),
     }
-    return values | _compute_loop_measures(reading, stiffness, sine=sine) if whole else values
+    if not is_complete:
+        return values
+    return values | _compute_loop_measures(reading, stiffness, is_sine=is_sine)
 
 
-def _compute_loop_measures(reading: Reading, stiffness, *, sine: bool) -> dict:
+def _compute_loop_measures(reading: Reading, stiffness, *, is_sine: bool) -> dict:
     """Compute the measures of the friction loop of the first interface."""
     loop = reading.loop()
     moves = (
         reading.interface_value(InterfaceMeasure.MAX_SLIDE)
         - reading.interface_value(InterfaceMeasure.MIN_SLIDE)
         > MIN_SLIDE_RANGE
-    ) & sine
+    ) & is_sine
     half = np.where(moves, reading.interface_value(InterfaceMeasure.MEAN_RANGE) / 2, 0.0)[()]
     work = loop.work * reading.period / reading.span
     secant = np.where(moves, reading.interface_value(InterfaceMeasure.SECANT), np.nan)[()]
@@ -566,7 +574,7 @@ def _compute_loop_measures(reading: Reading, stiffness, *, sine: bool) -> dict:
     return measures | {"secant_stiffness": secant}
 
 
-def _compute_work_check(reading: Reading, book: dict):
+def _compute_work_check(reading: Reading, energies: dict):
     """Return the relative difference of the friction work from samples and from the energy balance.
 
     The samples are the ends of the time intervals, between which the trapezoidal rule is used.
@@ -574,4 +582,4 @@ def _compute_work_check(reading: Reading, book: dict):
     sampled = reading.faces[..., InterfaceMeasure.END_WORK].sum(axis=-1)
     booked = reading.faces[..., InterfaceMeasure.WORK].sum(axis=-1)
     exchanged = reading.faces[..., InterfaceMeasure.PATH_WORK].sum(axis=-1)
-    return relative_gap(sampled, booked, exchanged, book["power"] + book["peak_stored"])
+    return relative_gap(sampled, booked, exchanged, energies["power"] + energies["peak_stored"])

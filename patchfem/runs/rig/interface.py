@@ -105,12 +105,12 @@ def make_interface_elements(model: Model, meshed: tuple) -> list:
     return elements
 
 
-def _make_groove_contact(model: Model, patch, count: int | None = None):
+def _make_groove_contact(model: Model, patch, n_modes: int | None = None):
     """Return the contact model of an interface over grooves."""
     f = model.friction
     load = patch.pressure.load if patch is not None else model.point.load
     if model.partial_slip or not law_has_trait(f.law, "memoryless"):
-        return rigid.make_climbing_model(model, load, patch, count)
+        return rigid.make_climbing_model(model, load, patch, n_modes)
 
     speed = None if law_has_trait(f.law, "set-valued") else f.reference_speed
     kinetic = f.static if f.kinetic is None else f.kinetic
@@ -209,7 +209,7 @@ def _make_bond_contact(model: Model, numerics: Numerics, patch, load: float):
     return models.points_model(law, [1.0], [load])
 
 
-def _compute_shear_modes(patch, law, count: int | None, model) -> tuple:
+def _compute_shear_modes(patch, law, n_modes: int | None, model) -> tuple:
     """Return the shear modes of a patch, and the forces of its points if these are few.
 
     The forces (k,) [N] are normal forces; they are None if all nodes are points. Both are cached
@@ -218,17 +218,19 @@ def _compute_shear_modes(patch, law, count: int | None, model) -> tuple:
     cache = _SHEAR_MODE_CACHE.setdefault(patch, {})
     tolerance = model.accuracy.tolerance
     has_few_points = model.patch.mesh.can_gather_points
-    if (law, count, tolerance, has_few_points) not in cache:
+    if (law, n_modes, tolerance, has_few_points) not in cache:
         mode_tolerance = (REDUCTION_TOL_FRACTION if has_few_points else 0.1) * tolerance
-        reduced = fields.bond_shear_modes(patch, law, count, mode_tolerance, fewest=has_few_points)
+        reduced = fields.bond_shear_modes(
+            patch, law, n_modes, mode_tolerance, fewest=has_few_points
+        )
         force = None
         if has_few_points:
             reduced, force, _ = shear_modes.fewest_gauss_points(
                 reduced, patch.x[reduced.points], REDUCTION_TOL_FRACTION * tolerance
             )
             force = force / law.static
-        cache[law, count, tolerance, has_few_points] = reduced, force
-    return cache[law, count, tolerance, has_few_points]
+        cache[law, n_modes, tolerance, has_few_points] = reduced, force
+    return cache[law, n_modes, tolerance, has_few_points]
 
 
 def reduce_to_few_points(

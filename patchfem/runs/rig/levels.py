@@ -243,11 +243,11 @@ def run_levels(evaluator, integrate, state, find_end_state, progress=None) -> tu
     amplitudes = rig.drive.levels.amplitudes
     n_levels = len(amplitudes)
     for k, amplitude in enumerate(amplitudes):
-        watch = None
+        report = None
         if progress is not None:
-            watch = partial(_report_fraction, progress, k, n_levels)
+            report = partial(_report_fraction, progress, k, n_levels)
         sine = SineDrive(amplitude, omega, moving)
-        run = integrate(sine, states[-1], watch, k + 1 == n_levels)
+        run = integrate(sine, states[-1], report, k + 1 == n_levels)
         runs.append(run)
         level_results.append(evaluator.evaluate_level(amplitude, run, sine, EXACT_RELATIVE_ERROR))
         states.append(find_end_state(run))

@@ -233,22 +233,22 @@ class MarchEvaluator(RunEvaluator):
             load = first_interface_load(model, self.patch)
         return motion_inside_steps(window, make_law(interface.numbers, load), load)
 
-    def _compute_loop(self, part, drive) -> CycleLoop | None:
+    def _compute_loop(self, run, drive) -> CycleLoop | None:
         """Compute the first harmonics of displacement and friction force, and the work per cycle.
 
         If only the drive and friction act, the harmonic of the force follows from the motion
         (`friction_harmonic`).
         """
-        window = part.window
+        window = run.window
         omega = find_drive_omega(drive)
         rig = self.model.rig
-        work = getattr(part, "window_work", None)
-        work = part.work if work is None else work
+        work = getattr(run, "window_work", None)
+        work = run.work if work is None else work
         # The friction of strips that yaw does more work than follows from the mean displacement.
         together = self.contact.set_valued and not rig.friction.strips_slide_apart
         # The friction work of this interface excludes other interfaces and impacts at stops.
         if len(rig.friction.names) > 1 or together:
-            work = float(part.step_force @ np.diff(window.slide)) + lateral_work(window, 0)
+            work = float(run.step_force @ np.diff(window.slide)) + lateral_work(window, 0)
         span = window.time[-1] - window.time[0]
         work *= drive.period / span if span > 0 else 0.0
         alone = len(rig.modes.interfaces) == 1 and not (
@@ -262,7 +262,7 @@ class MarchEvaluator(RunEvaluator):
             return CycleLoop(slide, friction_harmonic(window, rig.modes, drive), work)
         force = 0j
         if span > 0:
-            force = compute_step_harmonic(window.time, part.step_force, omega)
+            force = compute_step_harmonic(window.time, run.step_force, omega)
         return compute_sampled_loop(window, drive, work, force)
 
     def _evaluate_levels(self, done) -> tuple:

@@ -75,7 +75,7 @@ def structure_stiffnesses(rig) -> dict:
     )
 
 
-def stuck_interface_stiffness(chain: dict, number: int = 0) -> float:
+def stuck_interface_stiffness(chain: dict, index: int = 0) -> float:
     """Return the tangential stiffness [N/m] of a stuck interface, whose links act in series.
 
     It is inf if all links are rigid, and 0 for a law that creeps.
@@ -84,13 +84,13 @@ def stuck_interface_stiffness(chain: dict, number: int = 0) -> float:
     ----------
     chain : dict
         Stiffness chain of a plan by name.
-    number : int
+    index : int
         Index of the interface.
     """
     links = {}
     for name, link in chain.items():
         plain_name = remove_interface_number(name)
-        is_own = name == add_interface_number(plain_name, number)
+        is_own = name == add_interface_number(plain_name, index)
         if is_own and name not in ("mode", "bonded", "grooves"):
             links[plain_name] = link
     if str(links.get("bonds", "")).startswith("none"):

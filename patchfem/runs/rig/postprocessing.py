@@ -29,7 +29,7 @@ from .solution import Solution
 class CoupledRun:
     """Run of a rig whose result is being completed.
 
-    - inputs: plan and pressed patch.
+    - inputs: plan and Patch of the run.
     - numerics, solution: settings and Solution of the engine.
     - measures: measures by name.
     - outcome: Outcome, or None before `add_outcome`.

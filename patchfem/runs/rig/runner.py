@@ -182,7 +182,7 @@ class RunProgress:
     def make_callback(self, steps: float):
         """Return the progress callback for one run with the given steps per cycle, or None.
 
-        It is None if nobody asked for the progress. The reported fraction never decreases.
+        It is None without a callback for all runs. The reported fraction never decreases.
         """
         if self.callback is None:
             return None

@@ -30,9 +30,9 @@ class Solution:
     - outcome: Outcome, or None if it is determined from the amplitudes.
     - snapshots: states of the interface in the last cycle.
     - book: energies [J] and counters by name.
-    - seconds: CPU seconds of the run.
+    - seconds: CPU time of the run [s].
     - contact: contact model of the run.
-    - prepare: CPU seconds of the preparation by name.
+    - prepare: CPU time of each part of the preparation [s].
     - message: reason of an early end.
     - levels, run_level: Level of each drive level, and a function that runs another level, see
       `levels.find_onset`.

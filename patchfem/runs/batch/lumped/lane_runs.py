@@ -90,10 +90,10 @@ def march_and_measure(law: str, cases, scales: Scales, cycles: int, steps: int) 
         values = compute_event_measures(
             run_reading,
             energies,
-            sine=True,
-            whole=True,
+            is_sine=True,
+            is_complete=True,
             stiffness=scales.stiffness,
-            size=scales.acceleration,
+            acceleration=scales.acceleration,
         )
     values |= {
         "normal_load": scales.load,

@@ -206,7 +206,12 @@ def _evaluate_runs(cases: list, finished: list, cycles: int, window: int, steady
     acceleration = np.array([find_max_acceleration(model.rig.drive.signal) for model in models])
     with np.errstate(all="ignore"):
         values = compute_event_measures(
-            reading, energies, sine=True, whole=True, stiffness=stiffness, size=acceleration
+            reading,
+            energies,
+            is_sine=True,
+            is_complete=True,
+            stiffness=stiffness,
+            acceleration=acceleration,
         )
     work = energies["friction"]
     loss = work

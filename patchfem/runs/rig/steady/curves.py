@@ -186,12 +186,13 @@ def choose_start_frequencies(modes, drive) -> np.ndarray:
     """
     space = np.geomspace if drive.logarithmic else np.linspace
     ends = sorted((drive.low, drive.high))
-    own = modes.omega / (2 * np.pi)
-    places = np.union1d(
-        space(*ends, drive.starts or N_SWEEP_POINTS), own[(own > ends[0]) & (own < ends[1])]
+    natural_frequencies = modes.omega / (2 * np.pi)
+    frequencies = np.union1d(
+        space(*ends, drive.starts or N_SWEEP_POINTS),
+        natural_frequencies[(natural_frequencies > ends[0]) & (natural_frequencies < ends[1])],
     )
-    places = places[np.append(True, np.diff(places) > 1e-9 * places[1:])]
-    return places if drive.low < drive.high else places[::-1]
+    frequencies = frequencies[np.append(True, np.diff(frequencies) > 1e-9 * frequencies[1:])]
+    return frequencies if drive.low < drive.high else frequencies[::-1]
 
 
 def sweep_around_peak(drive, curve: dict, peak_frequency: float):
@@ -214,21 +215,21 @@ def sweep_around_peak(drive, curve: dict, peak_frequency: float):
         None if another peak is nearly as high, or if the neighbourhood covers most of the sweep.
     """
     order = np.argsort(curve["frequency"], kind="stable")
-    places = curve["frequency"][order]
+    frequencies = curve["frequency"][order]
     heights = np.nan_to_num(curve["amplitude"][order])
-    best = int(np.argmin(np.abs(places - peak_frequency)))
+    best = int(np.argmin(np.abs(frequencies - peak_frequency)))
     low = heights < PEAK_END_RATIO * heights[best]
     before = np.flatnonzero(low[:best])
     after = np.flatnonzero(low[best:])
     first = before[-1] if before.size else 0
-    last = best + after[0] if after.size else len(places) - 1
+    last = best + after[0] if after.size else len(frequencies) - 1
     outside = np.delete(heights, slice(first, last + 1))
     if heights[best] <= 0 or outside.max(initial=0.0) > PEAK_END_RATIO * heights[best]:
         return None
-    a = places[first]
-    b = places[last]
-    ends = np.clip([a - (b - a) / 4, b + (b - a) / 4], places[0], places[-1])
-    if not 0 < ends[1] - ends[0] < MAX_PEAK_FRACTION * (places[-1] - places[0]):
+    a = frequencies[first]
+    b = frequencies[last]
+    ends = np.clip([a - (b - a) / 4, b + (b - a) / 4], frequencies[0], frequencies[-1])
+    if not 0 < ends[1] - ends[0] < MAX_PEAK_FRACTION * (frequencies[-1] - frequencies[0]):
         return None
     low, high = ends if drive.low < drive.high else ends[::-1]
     return replace(drive, low=float(low), high=float(high), starts=N_START_POINTS)

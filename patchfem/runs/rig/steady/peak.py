@@ -67,37 +67,39 @@ def refine_peak(points: list, finder, tolerance: float) -> RefinedPeak:
         Refined curve with at most MAX_ADDED_POINTS added points.
     """
     points = list(points)
-    for left in range(MAX_ADDED_POINTS, -1, -1):
+    for remaining in range(MAX_ADDED_POINTS, -1, -1):
         s = np.cumsum([0.0, *(finder.measure_curve_distance(a, b) for a, b in pairwise(points))])
         y = _collect_amplitudes(points)
         is_stable = np.array([point.stable for point in points])
         best = find_largest_point(points)
-        reach, at = bound_concave_curve(s, y)
-        if not y[best] > 0 or not reach.size:
+        bounds, fractions = bound_concave_curve(s, y)
+        if not y[best] > 0 or not bounds.size:
             return RefinedPeak(points, best, 0.0)
         if is_stable.any():
-            reach[~(is_stable[:-1] | is_stable[1:])] = 0.0
-            at[is_stable[:-1] != is_stable[1:]] = (
+            bounds[~(is_stable[:-1] | is_stable[1:])] = 0.0
+            fractions[is_stable[:-1] != is_stable[1:]] = (
                 0.5  # The limit of stability between two points is found by bisection.
             )
         if not np.isfinite(y[max(best - 1, 0) : best + 2]).all():
             return RefinedPeak(points, best, np.inf)
-        above = max(float(reach.max()) - y[best], 0.0)
-        reach[np.diff(s) <= IDENTICAL_POINT_TOL * s[-1]] = 0.0
-        k = int(np.argmax(reach))
-        if reach[k] <= y[best] * (1 + finder.peak_tolerances[0] * tolerance):
+        above = max(float(bounds.max()) - y[best], 0.0)
+        bounds[np.diff(s) <= IDENTICAL_POINT_TOL * s[-1]] = 0.0
+        interval = int(np.argmax(bounds))
+        if bounds[interval] <= y[best] * (1 + finder.peak_tolerances[0] * tolerance):
             share = max(finder.peak_tolerances[1] * tolerance, POSITION_TOL)
             added = _choose_added_point(s, y, best, share)
-            k = -1
+            interval = -1
             if added is not None:
-                k, at[k] = added
-        if not left or k < 0:
+                interval, fractions[interval] = added
+        if not remaining or interval < 0:
             return RefinedPeak(points, best, above)
         try:
             points.insert(
-                k + 1,
+                interval + 1,
                 finder.compute_point_between(
-                    points[k], points[k + 1], float(np.clip(at[k], 0.05, 0.95))
+                    points[interval],
+                    points[interval + 1],
+                    float(np.clip(fractions[interval], 0.05, 0.95)),
                 ),
             )
         except NotConverged:
@@ -116,19 +118,19 @@ def _choose_added_point(s, y, best: int, min_fraction: float) -> tuple | None:
     """
     if not 0 < best < len(s) - 1:
         return None
-    want = min_fraction * min(
+    max_distance = min_fraction * min(
         _measure_peak_width(y[best:], s[best:] - s[best]),
         _measure_peak_width(y[best::-1], s[best] - s[best::-1]),
     )
     before = s[best] - s[best - 1]
     after = s[best + 1] - s[best]
-    if max(before, after) <= want:
+    if max(before, after) <= max_distance:
         return None
     slopes = (y[best] - y[best - 1]) / before, (y[best + 1] - y[best]) / after
     gap = slopes[0] - slopes[1]
     off = (slopes[0] * after + slopes[1] * before) / (2 * gap) if gap > 0 else 0.0
     if abs(off) <= 0.1 * (after if off > 0 else before):
-        size = max(0.1 * max(before, after), min(0.8 * want, before, after), 2 * abs(off))
+        size = max(0.1 * max(before, after), min(0.8 * max_distance, before, after), 2 * abs(off))
         off = size if after > before else -size
     return (best, off / after) if off > 0 else (best - 1, 1 + off / before)
 
@@ -177,17 +179,17 @@ def bound_concave_curve(s, y) -> tuple:
         left = y[:-1] + rise * h
         right = y[1:] - fall * h
         # Both extrapolated chords intersect at this fraction of the interval.
-        meet = (right - y[:-1]) / (rise - fall) / h
-        inside = (meet > 0) & (meet < 1)
-        reach = np.where(inside, y[:-1] + rise * meet * h, ends)
+        intersection = (right - y[:-1]) / (rise - fall) / h
+        inside = (intersection > 0) & (intersection < 1)
+        bounds = np.where(inside, y[:-1] + rise * intersection * h, ends)
         alone = np.isnan(rise) != np.isnan(fall)
-        reach = np.where(
+        bounds = np.where(
             alone,
             np.fmax(left, right),
-            np.where(np.isnan(rise) & np.isnan(fall), ends / MIN_CONCAVE_FRACTION, reach),
+            np.where(np.isnan(rise) & np.isnan(fall), ends / MIN_CONCAVE_FRACTION, bounds),
         )
-        reach = np.where(np.isnan(ends), 0.0, np.fmax(reach, ends))
-    return reach, np.where(inside, meet, 0.5)
+        bounds = np.where(np.isnan(ends), 0.0, np.fmax(bounds, ends))
+    return bounds, np.where(inside, intersection, 0.5)
 
 
 def solve_peak(points: list, folds, finder) -> Solution:
@@ -204,11 +206,11 @@ def solve_peak(points: list, folds, finder) -> Solution:
         See `refine_peak`.
     """
     points, best, above = refine_peak(points, finder, finder.model.accuracy.tolerance)
-    top = points[best]
-    solution = finder.compute_steady_motion(top.drive, top.guess)[0]
+    peak_point = points[best]
+    solution = finder.compute_steady_motion(peak_point.drive, peak_point.guess)[0]
     errors = dict(solution.errors or {})
-    extra = {"curve": tabulate_curve(points, folds), "at": top.drive}
-    height = top.values.get(AMPLITUDE, 0.0)
+    extra = {"curve": tabulate_curve(points, folds), "at": peak_point.drive}
+    height = peak_point.values.get(AMPLITUDE, 0.0)
     y = _collect_amplitudes(points)
     if not height > 0 or AMPLITUDE not in solution.values:
         # The error None indicates that the curve has no peak.
@@ -218,33 +220,37 @@ def solve_peak(points: list, folds, finder) -> Solution:
     # The curve point was computed with fewer samples, which adds this error.
     missed = abs(replace_output_by_gauge(finder.model, solution).values[AMPLITUDE] - height)
     error = min(missed + errors.get(AMPLITUDE, 0.0), height)
-    places = np.array([point.drive.omega for point in points]) / (2 * np.pi)
-    off = 0.0
+    frequencies = np.array([point.drive.omega for point in points]) / (2 * np.pi)
+    max_position_error = 0.0
     position_errors = dict.fromkeys(solution.values, 0.0)
     for direction in (-1, 1):
         heights = y[best::direction]
-        away = np.abs(places[best::direction] - places[best])
+        distances = np.abs(frequencies[best::direction] - frequencies[best])
         if heights.size < 2:
             continue
         # At these points the curve is certainly below its maximum.
         low = ~(heights >= height - min(above, height) - 2 * error)
         number = int(np.argmax(low)) if low.any() else heights.size - 1
-        far = float(away[: number + 1].max())
+        far = float(distances[: number + 1].max())
         position_error = min(
             far,
-            float(away[1])
-            + ERROR_SHIFT_FACTOR * error / height * _measure_peak_width(heights, away),
+            float(distances[1])
+            + ERROR_SHIFT_FACTOR * error / height * _measure_peak_width(heights, distances),
         )
-        off = max(off, position_error)
-        for name, gap in _compute_neighbour_differences(
+        max_position_error = max(max_position_error, position_error)
+        for name, difference in _compute_neighbour_differences(
             finder, points[best + direction * number], solution
         ).items():
             position_errors[name] = max(
-                position_errors[name], gap * position_error / far if far else gap
+                position_errors[name], difference * position_error / far if far else difference
             )
     position_errors[AMPLITUDE] = min(above, solution.values[AMPLITUDE]) + missed
     errors = {name: error + position_errors.get(name, 0.0) for name, error in errors.items()}
-    return replace(solution, errors=errors, extra=solution.extra | extra | {"at_error": float(off)})
+    return replace(
+        solution,
+        errors=errors,
+        extra=solution.extra | extra | {"at_error": float(max_position_error)},
+    )
 
 
 def _compute_neighbour_differences(finder, neighbour, solution: Solution) -> dict:
