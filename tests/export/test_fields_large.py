@@ -101,7 +101,13 @@ def large_series(tmp_path_factory):
         seconds = []
         for _ in range(3):
             begin = process_time()
-            whole = SimpleNamespace(patch=pressed.patch, plan=pressed.plan, fields=fields, extra={})
+            whole = SimpleNamespace(
+                patch=pressed.patch,
+                plan=pressed.plan,
+                fields=fields,
+                measures=pressed.measures,
+                extra={},
+            )
             bodies.write_fields(whole, folder / NAME)
             seconds.append([process_time() - begin])
             begin = process_time()
