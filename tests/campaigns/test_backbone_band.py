@@ -170,6 +170,56 @@ def test_exact_predicted_ring_down_agrees_with_duffing_oscillator(cubic, start):
     assert backbone[::-1] == pytest.approx(damping[:12:4], rel=5e-3)
 
 
+def march_decay(start: float) -> tuple:
+    """Return mean amplitudes [m] and damping ratios of the cycles of a released elastic-plastic oscillator.
+
+    1 kg at 100 Hz with a damping ratio of 0.01, on a slider of 4e4 N/m that slips at 30 N. The damping ratio
+    follows from the logarithmic decrement of each cycle, from a peak to the next one of the same sign.
+    """
+    omega = 2 * np.pi * 100
+    dt = 0.01 / 2000
+    position = start
+    velocity = 0.0
+    force = 30.0
+    peaks = []
+    for _ in range(60000):
+        acceleration = -(omega**2) * position - 0.02 * omega * velocity - force
+        faster = velocity + dt * acceleration
+        if faster * velocity < 0:
+            peaks.append(abs(position))
+        velocity = faster
+        position += dt * velocity
+        force = min(max(force + 4e4 * dt * velocity, -30.0), 30.0)
+    peaks = np.array(peaks)
+    decrement = np.log(peaks[:-2] / peaks[2:]) / (2 * np.pi)
+    return np.sqrt(peaks[:-2] * peaks[2:]), decrement / np.hypot(1, decrement)
+
+
+@pytest.mark.parametrize("ratio", [1.01, 1.06, 1.2])
+def test_band_beside_onset_of_slip_does_not_depend_on_other_amplitudes(ratio):
+    """The band at an amplitude contains the decrement of a decay, whichever other amplitudes are given.
+
+    The slider slips from 750 um. The motions from which the ring-down is predicted were once at amplitudes
+    that depended on the given ones and blurred the onset of slip.
+    """
+    amplitude = ratio * 750e-6
+    law = LAW.replace("60 um", "750 um")
+    scene = law + DUFFING.replace("damping = 0.02", "damping = 0.01")
+    others = ([], [0.3 * amplitude, 4 * amplitude], np.geomspace(284e-6, 2.84e-3, 60))
+    limits = []
+    for given in others:
+        amplitudes = np.unique(np.append(amplitude, given))
+        backbone = compute_backbone(pf.build(scene), "", amplitudes, ("balance",))
+        band = backbone.answer.band
+        k = np.searchsorted(amplitudes, amplitude)
+        limits.append([band.damping_low[k], band.damping_high[k]])
+    assert limits[1:] == pytest.approx(np.array([limits[0], limits[0]]), rel=2e-3)
+    low, high = limits[0]
+    amplitudes, damping = march_decay(1.4 * amplitude)
+    decrement = np.interp(-amplitude, -amplitudes, damping)
+    assert low <= decrement <= high < 1.15 * decrement
+
+
 def test_quasi_static_curve_tends_to_free_frequency():
     """The quasi-static frequency tends to the stuck and the free frequency at the ends, within 1e-3."""
     backbone = pf.backbone(LAW + STRUCTURE, amplitudes=[1e-6, 1.0], method="quasi-static")
@@ -207,6 +257,8 @@ def test_new_joint_scene_has_a_backbone(tmp_path, monkeypatch, capsys):
         assert "dissipates nothing" not in answer["advice"]
         assert any("[slide] is ignored" in note for note in answer["notes"])
         assert any("`slide` is assumed such" in note for note in answer["notes"])
+        has_two_modes = bool(options)
+        assert has_two_modes == any("assumed `slide` is positive" in n for n in answer["notes"])
 
 
 @pytest.mark.parametrize(

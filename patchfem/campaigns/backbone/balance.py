@@ -102,7 +102,7 @@ def _read_motions(
 
 
 def find_free_motions(
-    group: LawGroup, joint: Joint, amplitudes, harmonics: int, *, exact: bool = True
+    group: LawGroup, joint: Joint, amplitudes, harmonics: int, amplitude_tol=ROUND_OFF_ERROR
 ) -> list:
     """Find the free motions at amplitudes (k,) [m] of the output by harmonic balance.
 
@@ -119,16 +119,16 @@ def find_free_motions(
     amplitudes : (k,) array
         Increasing [m].
     harmonics : int
-    exact : bool
-        Whether the motions have these amplitudes; without, they have amplitudes near these, in a
-        fraction of the time.
+    amplitude_tol : float
+        Largest relative difference of the amplitude of a motion from the requested one. A larger
+        tolerance saves most of the time.
 
     Returns
     -------
-    list of Free or None
+    list of FreeMotion or None
         `dynamics.harmonic.backbone.FreeMotion`; None if no motion is found.
     """
-    search = _FreeMotionSearch(group, joint, amplitudes, harmonics, exact=exact)
+    search = _FreeMotionSearch(group, joint, amplitudes, harmonics, amplitude_tol)
     out: list = [None] * len(amplitudes)
     for k, amplitude in enumerate(amplitudes):
         before = out[k - 1] if k else None
@@ -151,12 +151,14 @@ class _FreeMotionSearch:
     amplitudes : (k,) array
         Increasing, at the output [m].
     harmonics : int
-    exact : bool
+    amplitude_tol : float
         See `find_free_motions`.
     """
 
-    def __init__(self, group: LawGroup, joint: Joint, amplitudes, harmonics: int, *, exact: bool):
-        self.max_steps = MAX_STEPS if exact else 1
+    def __init__(
+        self, group: LawGroup, joint: Joint, amplitudes, harmonics: int, amplitude_tol: float
+    ):
+        self.amplitude_tol = amplitude_tol
         modes = joint.modes
         omega, shape = modes.compute_stuck_mode(group.rows, group.stiffness(), joint.mode)
         self.joint = joint
@@ -177,6 +179,11 @@ class _FreeMotionSearch:
         if neighbour is None:
             return None
         here = amplitude / neighbour.reach
+        try:
+            return self._reach_amplitude(neighbour.unknowns, here, amplitude)
+        except NotConverged:
+            # The amplitudes are too far apart for a single step.
+            pass
         try:
             x = self.equations.follow_to_amplitude(
                 neighbour.unknowns, neighbour.free.amplitude, here
@@ -203,7 +210,8 @@ class _FreeMotionSearch:
     def _reach_amplitude(self, x, coordinate_amplitude: float, amplitude: float) -> FreeMotion:
         """Find the free motion of a given output amplitude [m] by secant steps.
 
-        The steps end at ROUND_OFF_ERROR, or at AMPLITUDE_TOL if they lead no further.
+        The steps end at the tolerance of the amplitude. If they lead no further, a difference up to
+        AMPLITUDE_TOL is accepted.
 
         Parameters
         ----------
@@ -223,7 +231,7 @@ class _FreeMotionSearch:
         before = None
         best = None
         best_distance = np.inf
-        for _ in range(self.max_steps):
+        for _ in range(MAX_STEPS):
             try:
                 x, free = self.equations.solve(x, coordinate_amplitude)
             except NotConverged:
@@ -234,10 +242,10 @@ class _FreeMotionSearch:
             distance = float(np.log(largest / amplitude))
             if best is not None and abs(distance) >= best_distance:
                 break
-            if abs(distance) < AMPLITUDE_TOL or self.max_steps == 1:
+            if abs(distance) < max(AMPLITUDE_TOL, self.amplitude_tol):
                 best_distance = abs(distance)
                 best = FreeMotion(free, x, amplitude / coordinate_amplitude)
-            if abs(distance) < ROUND_OFF_ERROR:
+            if abs(distance) < self.amplitude_tol:
                 break
             if before is not None:
                 last_here, last_distance = before

@@ -3,6 +3,9 @@
 The recommended curve is that of `balance` where it exists: a steady vibration in phase resonance. The band around it
 contains its numerical error, the curve of a ring-down (computed, or predicted by `ring_down`), the quasi-static curve,
 and the effect of the other modes that a force at a single place excites.
+
+The band at an amplitude does not depend on the other given amplitudes. Between amplitudes that are far apart beside
+the onset of slip, linear interpolation of the band is less accurate than the band itself.
 """
 
 from typing import NamedTuple
@@ -25,8 +28,6 @@ RELEASE_EXCITATION = 1e-3
 FORCED_MODE_FACTOR = 1.2
 # Fall of the frequency of a ring-down over frequency and damping ratio squared: 1/2 and terms of higher order.
 VISCOUS_FALL = 0.6
-# Largest ratio of successive amplitudes between which a reader interpolates; the band covers the chord there.
-MAX_INTERPOLATED_RATIO = 1.6
 
 
 class Band(NamedTuple):
@@ -62,28 +63,6 @@ class _Limits:
         self.low = value - error
         self.high = value + error
 
-    def cover_chords(self, value, amplitude) -> None:
-        """Widen the limits by the error of linear interpolation between close amplitudes (k,) [m].
-
-        A kink halfway between two points lies off their chord by half the distance of a point from the
-        chord of its neighbours.
-        No limit leaves the range of the limits at the point and its neighbours: between two points the
-        curve is monotonic.
-        """
-        x = np.log(amplitude)
-        if x.size < 3:
-            return
-        steps = np.diff(x)
-        chord = (value[:-2] * steps[1:] + value[2:] * steps[:-1]) / (steps[1:] + steps[:-1])
-        is_close = np.maximum(steps[1:], steps[:-1]) <= np.log(MAX_INTERPOLATED_RATIO)
-        bend = np.zeros(x.size)
-        bend[1:-1] = np.where(is_close, np.abs(value[1:-1] - chord) / 2, 0.0)
-        bend = _stack_neighbours(bend).max(axis=0)
-        lowest = _stack_neighbours(self.low).min(axis=0)
-        highest = _stack_neighbours(self.high).max(axis=0)
-        self.low = np.maximum(self.low - bend, lowest)
-        self.high = np.minimum(self.high + bend, highest)
-
     def include(self, points, value, error) -> None:
         """Widen the limits to contain values with their errors; NaN changes nothing.
 
@@ -96,13 +75,6 @@ class _Limits:
         """
         self.low[points] = np.fmin(self.low[points], value - error)
         self.high[points] = np.fmax(self.high[points], value + error)
-
-
-def _stack_neighbours(values: np.ndarray) -> np.ndarray:
-    """Return (3, k) values: those of the points, of the points before and of those after; an end is its own neighbour."""
-    return np.stack(
-        [values, np.append(values[:1], values[:-1]), np.append(values[1:], values[-1:])]
-    )
 
 
 def make_band(joint: Joint, curves: dict) -> Band | None:
@@ -128,8 +100,6 @@ def make_band(joint: Joint, curves: dict) -> Band | None:
         _include_forced_modes(joint, frequency, damping, curve)
     if ring_down is not None:
         _include_ring_down(joint, frequency, damping, curve, ring_down)
-    frequency.cover_chords(curve.frequency, curve.amplitude)
-    damping.cover_chords(curve.damping, curve.amplitude)
     return Band(
         method=method,
         amplitude=curve.amplitude,
@@ -158,8 +128,7 @@ def _include_ring_down(
     # Other modes of the relative motion e change the ratio of successive half cycles by up to 2 e.
     others = np.zeros(curve.amplitude.size)
     if joint.modes.omega.size > 1:
-        change = largest_from_above(ring_down.shape_change)
-        others = RELEASE_EXCITATION + SHAPE_EXCITATION * change
+        others = RELEASE_EXCITATION + SHAPE_EXCITATION * ring_down.shape_change
     margin += others / np.pi
     margin += np.abs(ring_down.damping - ring_down.slow_damping)
     damping.include(every, ring_down.damping, margin + curve.damping_error)
@@ -168,14 +137,6 @@ def _include_ring_down(
     # Viscous damping lowers the frequency by the fraction zeta^2/2, and constant friction leaves it.
     margin += VISCOUS_FALL * ring_down.damping**2 * curve.frequency
     frequency.include(every, ring_down.frequency, margin)
-
-
-def largest_from_above(values) -> np.ndarray:
-    """Return the largest of the values (k,) at each amplitude and all larger ones.
-
-    What a ring-down excites at large amplitudes is still there at small ones.
-    """
-    return np.maximum.accumulate(np.nan_to_num(values)[::-1])[::-1]
 
 
 def _include_forced_modes(joint: Joint, frequency: _Limits, damping: _Limits, curve: Curve) -> None:

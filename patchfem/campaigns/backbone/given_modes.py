@@ -17,6 +17,11 @@ from ...scene.backbone_scene import ASSUMED_MASS, BackboneTables, GivenMode, par
 ASSUMED_JOINT_FRACTION = 0.1
 MAX_JOINT_FRACTION = 0.5  # Largest sum of these fractions over all modes.
 IGNORED_TABLES_NOTE = "{tables} {verb} ignored: a backbone is the motion of a mode at every amplitude, without a drive"
+ASSUMED_SIGNS_NOTE = (
+    "every assumed `slide` is positive, so these modes are assumed to move the contact in the same direction when they "
+    "move the output in the same direction; the curves of all methods depend on this assumption, so give the signs of "
+    "`slide` if you know them, as 170 Hz:0.02:-0.02"
+)
 
 
 class PreparedModel(NamedTuple):
@@ -58,6 +63,8 @@ def prepare_model(build: Callable, modes: str | Iterable = "") -> PreparedModel:
         )
     if any(mode.slide is None for mode in given_modes):
         notes += _note_slides(len(given_modes), stiffness)
+        if len(given_modes) > 1:
+            notes += (ASSUMED_SIGNS_NOTE,)
     return PreparedModel(model, notes)
 
 

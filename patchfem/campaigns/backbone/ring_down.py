@@ -5,23 +5,32 @@ loses L(a). A half cycle from a to b therefore satisfies E(a) - E(b) = L((a + b)
 a - b. The damping ratio of `balance` is L over 2 pi m omega^2 Z^2, whereas the amplitude of a ring-down
 falls by L/(a E'(a)) per cycle. Both agree only where E grows as the square of the amplitude: a joint that
 stiffens as the amplitude falls makes a ring-down faster.
+
+The damping ratio of a ring-down is the logarithmic decrement of one cycle, from three half cycles around
+the amplitude. E and L are therefore computed at free motions within these half cycles, whose width follows
+from the damping ratio itself. The prediction at an amplitude does not depend on the other given amplitudes.
 """
 
+from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
-from ...core import NotConverged
+from ...dynamics.harmonic.forces import LawGroup
 from .balance import HARMONIC_COUNTS, find_free_motions, half_range
 from .joint import Joint
 from .records import Curve
 
-POINTS_PER_DECADE = 12  # Number of free motions per decade; fewer blur the onset of slip.
-# Ratio of the last amplitude of the free motions to the last one of the curve, and of the first ones:
-# three half cycles around an amplitude reach so far with a damping ratio of 0.1.
-MARGIN_FACTOR = 1.8
+N_SIDE_HALF_CYCLES = 1.5  # Half cycles on either side of an amplitude that give its decrement.
+# Amplitudes of the free motions around an amplitude, in half cycles before or after it. Three suffice for a
+# smooth contact; seven, at all reversals and middles of the half cycles, resolve an onset of slip.
+SMOOTH_OFFSETS = N_SIDE_HALF_CYCLES * np.linspace(-1, 1, 3)
+FINE_OFFSETS = N_SIDE_HALF_CYCLES * np.linspace(-1, 1, 7)
+# Largest difference of a free motion from its requested amplitude, over the smallest range of the half cycles.
+OFFSET_TOL = 0.05
 MAX_HALF_CYCLE_LOSS = 1.5  # Largest fall of the logarithm of the amplitude in half a cycle.
 
 
@@ -35,7 +44,8 @@ class RingDown(NamedTuple):
     slow_damping : (k,) array
         Damping ratio of the limit of an infinitely small loss per cycle.
     shape_change : (k,) array
-        Relative change of output over modal amplitude while one cycle lowers the amplitude.
+        Relative change of output over modal amplitude while one cycle lowers the amplitude; the
+        largest at this amplitude and the default ones above it, 0 if it is not known.
     """
 
     frequency: np.ndarray
@@ -59,8 +69,37 @@ class _MotionTable(NamedTuple):
     high: float
 
 
+class _MotionRows(NamedTuple):
+    """Properties of free motions, each (k, m) for m amplitudes around each of k amplitudes; NaN where not known.
+
+    Attributes
+    ----------
+    x : array
+        Log amplitude at the output.
+    energy, loss : array
+        Log of the energy at a reversal and of the loss per cycle [J].
+    frequency : array
+        [Hz]
+    modal : array
+        Log of the modal amplitude [m].
+    damping : array
+        Damping ratio.
+    """
+
+    x: np.ndarray
+    energy: np.ndarray
+    loss: np.ndarray
+    frequency: np.ndarray
+    modal: np.ndarray
+    damping: np.ndarray
+
+    def at(self, points) -> "_MotionRows":
+        """Return the motions around some of the k amplitudes."""
+        return _MotionRows(*(column[points] for column in self))
+
+
 def predict_ring_down(joint: Joint, curve: Curve) -> RingDown | None:
-    """Predict the ring-down that belongs to a curve by balance; None if it is not known.
+    """Predict the ring-down that belongs to a curve by balance; None if it is known at no amplitude.
 
     Parameters
     ----------
@@ -68,77 +107,131 @@ def predict_ring_down(joint: Joint, curve: Curve) -> RingDown | None:
     curve : Curve
         By balance.
     """
-    try:
-        table = _tabulate_motions(joint, curve)
-    except NotConverged:
-        return None
-    columns = [_read_half_cycles(table, float(x)) for x in np.log(curve.amplitude)]
-    return RingDown(*np.array(columns).T)
-
-
-def _tabulate_motions(joint: Joint, curve: Curve) -> _MotionTable:
-    """Tabulate energy and loss of the free motions around the amplitudes of a curve."""
-    low = curve.amplitude[0] / MARGIN_FACTOR
-    high = curve.amplitude[-1] * MARGIN_FACTOR
+    defaults = np.empty(0)
     if joint.is_rigid or joint.is_linear:
-        return _tabulate_rigid_motions(joint, curve, low, high)
-    count = 2 + int(np.ceil(POINTS_PER_DECADE * np.log10(high / low)))
-    amplitudes = np.geomspace(low, high, count)
-    motions = find_free_motions(
-        joint.steady_laws(), joint, amplitudes, HARMONIC_COUNTS[0], exact=False
-    )
-    x = []
-    rows = []
-    for motion in motions:
-        row = None if motion is None else _measure_motion(joint, motion)
-        amplitude = 0.0 if row is None else half_range(motion.modal @ joint.modes.output)
-        if row is not None and (not x or np.log(amplitude) > x[-1]):
-            x.append(np.log(amplitude))
-            rows.append(row)
-    return _interpolate_table(np.array(x), rows)
+        compute = partial(_compute_rigid_motions, joint, curve)
+    else:
+        compute = partial(_compute_free_motions, joint, joint.steady_laws())
+        if joint.modes.omega.size > 1:
+            defaults = joint.default_amplitudes()
+    amplitudes = np.union1d(curve.amplitude, defaults)
+    is_given = np.isin(amplitudes, curve.amplitude)
+    damping = np.full(amplitudes.size, np.nan)
+    damping[is_given] = curve.damping
+    if not is_given.all():
+        others = np.log(amplitudes[~is_given])
+        damping[~is_given] = compute(others[:, None], OFFSET_TOL).damping[:, 0]
+    ring_down = _predict_at_amplitudes(joint, compute, np.log(amplitudes), damping)
+    # Other modes that a ring-down from a large amplitude excites still move at a small one.
+    change = np.nan_to_num(ring_down.shape_change)
+    is_default = np.isin(amplitudes, defaults)
+    from_above = np.maximum.accumulate(np.where(is_default, change, 0.0)[::-1])[::-1]
+    ring_down = ring_down._replace(shape_change=np.maximum(change, from_above))
+    ring_down = RingDown(*(column[is_given] for column in ring_down))
+    return ring_down if np.isfinite(ring_down.slow_damping).any() else None
 
 
-def _interpolate_table(x, rows: list) -> _MotionTable:
-    """Return the interpolants of rows (energy, loss, frequency, modal amplitude) over x (k,)."""
-    if len(rows) < 2:
-        raise NotConverged("too few free motions were found")
-    energy, loss, frequency, modal = np.array(rows).T
-    return _MotionTable(
-        PchipInterpolator(x, np.log(energy)),
-        PchipInterpolator(x, np.log(loss)),
-        PchipInterpolator(x, frequency),
-        PchipInterpolator(x, np.log(modal)),
-        low=float(x[0]),
-        high=float(x[-1]),
-    )
+def _predict_at_amplitudes(joint: Joint, compute: Callable, x, damping) -> RingDown:
+    """Predict the ring-down at log amplitudes x (k,) from free motions around each of them.
+
+    compute: maps log amplitudes (k, m) and their tolerance to `_MotionRows`; damping: approximate damping ratio (k,).
+    """
+    columns = np.full((len(RingDown._fields), x.size), np.nan)
+    known = np.flatnonzero(damping > 0)
+    if not known.size:
+        return RingDown(*columns)
+    rows = _compute_around(compute, x[known], damping[known], SMOOTH_OFFSETS)
+    columns[:, known] = _read_ring_downs(rows, x[known])
+    # Motions between the ends of the half cycles are needed where a slope changes within them.
+    bent = known[_interpolation_error(rows) > joint.model.accuracy.tolerance]
+    if bent.size:
+        finer_damping = np.fmax(columns[1, bent], damping[bent])
+        rows = _compute_around(compute, x[bent], finer_damping, FINE_OFFSETS)
+        columns[:, bent] = _read_ring_downs(rows, x[bent])
+    return RingDown(*columns)
 
 
-def _tabulate_rigid_motions(joint: Joint, curve: Curve, low: float, high: float) -> _MotionTable:
-    """Tabulate motions of a rig whose contact stores no energy, from its curve by balance.
+def _compute_around(compute: Callable, x, damping, offsets) -> _MotionRows:
+    """Compute free motions around log amplitudes x (k,), at offsets (m,) in half cycles.
+
+    compute: see `_predict_at_amplitudes`; damping: ratio (k,).
+    """
+    fall = _half_cycle_fall(damping)
+    return compute(x[:, None] + fall[:, None] * offsets, OFFSET_TOL * float(fall.min()))
+
+
+def _half_cycle_fall(damping) -> np.ndarray:
+    """Return the fall of the log amplitude in half a cycle with a damping ratio (k,), limited to the largest."""
+    damping = np.minimum(damping, 1.0)
+    with np.errstate(divide="ignore"):
+        fall = np.pi * damping / np.sqrt(1 - damping**2)
+    return np.minimum(fall, MAX_HALF_CYCLE_LOSS)
+
+
+def _interpolation_error(rows: _MotionRows) -> np.ndarray:
+    """Return the largest relative error (k,) of a ring-down damping interpolated between three motions.
+
+    Log energy and log loss have a change of slope s between the motions, which are w apart. If it happens in a
+    single point, linear interpolation is wrong by up to s w/4. A motion that is not known gives inf.
+    """
+    steps = np.diff(rows.x, axis=1)
+    # Steps are 0 where a motion is not known, or where the damping is below round-off.
+    with np.errstate(invalid="ignore", divide="ignore"):
+        energy_slope = np.diff(rows.energy, axis=1) / steps
+        loss_slope = np.diff(rows.loss, axis=1) / steps
+    width = steps.max(axis=1)
+    energy_error = np.abs(np.diff(energy_slope, axis=1)[:, 0]) * width / 4
+    loss_error = np.abs(np.diff(loss_slope, axis=1)[:, 0]) * width / 4
+    # The energy falls by this fraction in half a cycle.
+    fall = np.abs(energy_slope).max(axis=1) * width / N_SIDE_HALF_CYCLES
+    error = energy_error / fall + loss_error
+    return np.where(np.isfinite(error), error, np.inf)
+
+
+def _compute_free_motions(joint: Joint, laws: LawGroup, x, tolerance: float) -> _MotionRows:
+    """Compute the free motions near log amplitudes x (k, m) by harmonic balance."""
+    targets, places = np.unique(x, return_inverse=True)
+    motions = find_free_motions(laws, joint, np.exp(targets), HARMONIC_COUNTS[0], tolerance)
+    rows = np.full((targets.size, len(_MotionRows._fields)), np.nan)
+    rows[:, 0] = targets
+    for row, motion in zip(rows, motions):
+        measures = None if motion is None else _measure_motion(joint, motion)
+        if measures is not None:
+            row[0] = np.log(half_range(motion.modal @ joint.modes.output))
+            row[1:] = measures
+    return _MotionRows(*np.moveaxis(rows[places.reshape(x.shape)], -1, 0))
+
+
+def _compute_rigid_motions(joint: Joint, curve: Curve, x, tolerance: float) -> _MotionRows:
+    """Compute motions of a rig whose contact stores no energy, from its curve by balance.
 
     Constant friction does not change the length of a half cycle, which is that of the free mode.
     """
     free = joint.modes.omega[joint.mode] or joint.omega
-    amplitude = np.unique([low, *curve.amplitude, high])
-    values = curve.interpolate(amplitude)
-    # Damping times amplitude is linear in the amplitude for rigid friction, also beyond the curve.
-    force = curve.damping * curve.amplitude
-    slope = 0.0
-    if curve.amplitude.size > 1:
-        slope = (force[-1] - force[0]) / np.ptp(curve.amplitude)
-    damping = (force[0] + slope * (amplitude - curve.amplitude[0])) / amplitude
-    omega = 2 * np.pi * values["frequency"]
-    energy = 0.5 * free**2 * amplitude**2
+    amplitude = np.exp(x)
+    omega = 2 * np.pi * np.interp(amplitude, curve.amplitude, curve.frequency)
+    # The damping ratio by rigid friction is inversely proportional to the amplitude, that of the structure constant.
+    structure = curve.damping
+    if not joint.is_linear:
+        structure = joint.modes.damping_matrix[joint.mode, joint.mode] / (
+            4 * np.pi * curve.frequency
+        )
+    friction = (curve.damping - structure) * curve.amplitude
+    damping = np.interp(amplitude, curve.amplitude, friction) / amplitude
+    damping += np.interp(amplitude, curve.amplitude, structure)
     loss = 2 * np.pi * damping * omega**2 * amplitude**2
-    if not (loss > 0).all():
-        raise NotConverged("the motion gains energy")
-    free_frequency = np.full(amplitude.size, free / (2 * np.pi))
-    rows = np.column_stack([energy, loss, free_frequency, amplitude])
-    return _interpolate_table(np.log(amplitude), list(rows))
+    return _MotionRows(
+        x=x,
+        energy=np.log(0.5 * free**2 * amplitude**2),
+        loss=np.log(np.where(loss > 0, loss, np.nan)),
+        frequency=np.full(x.shape, free / (2 * np.pi)),
+        modal=x,
+        damping=damping,
+    )
 
 
 def _measure_motion(joint: Joint, motion) -> np.ndarray | None:
-    """Return energy [J], loss [J], frequency [Hz] and modal amplitude [m] of a free motion.
+    """Return log energy [J], log loss [J], frequency [Hz], log modal amplitude [m] and damping ratio.
 
     The energy that elastic-plastic elements store at a reversal is half of tip displacement times tip
     force less an eighth of the loop area (Masing). It is None for a motion that gains energy.
@@ -162,15 +255,36 @@ def _measure_motion(joint: Joint, motion) -> np.ndarray | None:
     loss = 2 * np.pi * kinetic * motion.zeta
     if not (energy > 0 and loss > 0):
         return None
-    return np.array([energy, loss, motion.omega / (2 * np.pi), np.sqrt(squares.sum())])
+    amplitude = np.sqrt(squares.sum())
+    frequency = motion.omega / (2 * np.pi)
+    return np.array([np.log(energy), np.log(loss), frequency, np.log(amplitude), motion.zeta])
 
 
-def _read_half_cycles(table: _MotionTable, x: float) -> RingDown:
+def _read_ring_downs(rows: _MotionRows, x) -> np.ndarray:
+    """Return the fields of the ring-down (4, k) at log amplitudes x (k,) from the motions around them."""
+    return np.transpose(
+        [_read_half_cycles(_interpolate(rows.at(k)), float(x[k])) for k in range(x.size)]
+    )
+
+
+def _interpolate(rows: _MotionRows) -> _MotionTable | None:
+    """Return the interpolants of the motions around an amplitude; None if fewer than two are known."""
+    known = np.isfinite(rows.loss)
+    known[known] = np.diff(rows.x[known], prepend=-np.inf) > 0
+    if known.sum() < 2:
+        return None
+    x = rows.x[known]
+    columns = (rows.energy, rows.loss, rows.frequency, rows.modal)
+    interpolants = [PchipInterpolator(x, column[known]) for column in columns]
+    return _MotionTable(*interpolants, low=float(x[0]), high=float(x[-1]))
+
+
+def _read_half_cycles(table: _MotionTable | None, x: float) -> RingDown:
     """Read a ring-down around the log amplitude x.
 
     The three half cycles have their middle at the amplitude. They are NaN if the motion stops before.
     """
-    if not table.low <= x <= table.high:
+    if table is None:
         return RingDown(*[np.nan] * len(RingDown._fields))
     loss = np.exp(table.loss(x))
     slope = float(np.exp(table.energy(x)) * table.energy(x, 1))
