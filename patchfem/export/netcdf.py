@@ -423,7 +423,7 @@ def add_spectra(data: Contents, spectra) -> Contents:
         ),
         "relative_displacement_spectrum": (
             "m2 Hz-1",
-            spectra.place,
+            spectra.displacement,
             "one-sided spectral density of the displacement of the output",
         ),
         "absolute_acceleration_spectrum": (

@@ -301,7 +301,7 @@ def compute_decay_curve(values: dict, begin: float | None = None) -> tuple:
             f"{np.count_nonzero(~is_certain)} of {is_certain.size} amplitudes are left out: the interval "
             f"of the damping ratio is wider than {MAX_ERROR_RATIO:g} times its value there"
         )
-        curve = curve.at(is_certain)
+        curve = curve.select(is_certain)
     reason = describe_missing_samples_at_end(time, half_cycles)
     if reason:
         notes.append(f"the decay is followed up to {half_cycles.middle[-1]:.4g} s only: {reason}")

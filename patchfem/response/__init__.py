@@ -1,13 +1,13 @@
-"""Compute measures from a run: numbers with names, units and errors.
+"""Computation of the measures of a run: values with names, units and errors.
 
-In: histories of a run, and the measures that an engine integrated over the last cycles itself
-(`dynamics.integrated`). Out: measures by name with their errors from coarse runs, the outcome,
-the events of stick and slip, and the ringing. Read `rows` first: every row of its table reads a
-`LastCycles`, and takes the value of the engine before the value from the samples. `measures` has the
+In: histories of a run, and measures that its engine integrated over the last cycles
+(`dynamics.integrated`). Out: measures by name with errors from coarse runs, the outcome, the
+stick-slip events, and the ringing. Read `rows` first: each row of its table evaluates a
+`LastCycles`. A value that the engine integrated replaces the value from samples. `measures` has the
 functions that evaluate samples.
 """
 
-# This table lists the names that other folders use, by module.
+# Names that other folders use, by module.
 PUBLIC = {
     "coarser": (
         "CoarserRuns",
@@ -33,7 +33,7 @@ PUBLIC = {
         "SUM_ROUND_OFF",
         "absolute_change",
         "add_errors",
-        "add_stated_errors",
+        "add_run_error_estimates",
         "coarser_errors",
         "convergence_error",
         "convergence_errors",
@@ -47,7 +47,7 @@ PUBLIC = {
         "total_error",
     ),
     "events": ("EVENT_KIND_NAMES",),
-    "inside_steps": ("motion_inside_steps",),
+    "inside_steps": ("add_substep_samples",),
     "levels": (
         "LEVEL_MEASURES",
         "Level",
@@ -63,7 +63,7 @@ PUBLIC = {
         "interface_loop",
         "interface_loops",
         "mean_half_range",
-        "reversal_evaluation",
+        "reversal_force_rule",
         "secant_stiffness",
     ),
     "measures": (

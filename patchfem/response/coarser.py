@@ -1,9 +1,9 @@
-"""Error estimates from coarser runs of the same model, equal for every engine.
+"""Error estimates from coarser runs of the same model, for all engines.
 
-In: a ladder, i.e. the list of `CoarserRuns` of an engine (coarser in time, in space, in modes
-or in the sum over bonds), and a function that solves a variant. Each `CoarserRuns` names its
-runs and the rule that turns their measures into an error (`errors`). A run that several of them
-need is solved once. Out: what is coarser, with errors by measure name.
+In: a list of `CoarserRuns` of an engine (coarser in time, in space, in modes or in the sum over bonds),
+and a function that computes a run with given settings. Each `CoarserRuns` contains the settings of its
+runs and the rule that estimates errors from their measures (`errors`). Each run is computed only once.
+Out: errors by source and measure name.
 """
 
 from collections.abc import Callable
@@ -15,27 +15,27 @@ from .errors import coarser_errors
 
 
 class CoarserRuns(NamedTuple):
-    """Coarser runs of one kind, with the rule that estimates errors from their measures.
+    """Coarser runs for one source of error, with the rule that estimates errors from them.
 
-    - runs: variants (hashable arguments of `solve`), from fine to coarse.
-    - rule: function (values of the reference run, *values of the coarse runs) -> error by measure
-      name.
-    - beside: variant of the reference run with which they are compared; None: the run itself.
-    - of: what is coarser: "steps", "mesh", "modes", "bonds" or "cells"; "own" for anything that no
-      key of a scene sets.
+    - runs: settings of the runs (hashable arguments of `solve`), from fine to coarse.
+    - rule: function (values of the reference run, *values of the coarse runs) that returns errors by
+      measure name.
+    - reference: settings of the reference run to which they are compared; None: the fine run.
+    - source: source of the error, i.e. what is coarser: "steps", "mesh", "modes", "bonds" or "cells";
+      "own" if no key of a scene sets it.
     """
 
     runs: tuple
     rule: Callable
-    beside: object = None
-    of: str = "own"
+    reference: object = None
+    source: str = "own"
 
 
 class StepRun(NamedTuple):
-    """Run of a motion at some number of time steps.
+    """Run with a given number of time steps per cycle.
 
     - steps: steps per cycle.
-    - seconds: CPU seconds.
+    - seconds: CPU time [s].
     - values: measures by name.
     """
 
@@ -44,52 +44,54 @@ class StepRun(NamedTuple):
     values: dict
 
 
-def estimate_errors(solve: Callable, fine: dict, ladder, solved_runs: dict) -> tuple:
-    """Solve coarser runs, and estimate from them the errors of the measures by kind of run.
+def estimate_errors(solve: Callable, fine: dict, coarse_runs, solved_runs: dict) -> tuple:
+    """Compute coarser runs, and estimate the errors of the measures by source.
 
     Parameters
     ----------
     solve : callable
-        Returns the run of a variant; a run has `values`.
+        Function of the settings that returns a run with the attribute `values`.
     fine : dict
-        Measures of the run itself by name.
-    ladder : sequence of CoarserRuns
+        Measures of the fine run by name.
+    coarse_runs : sequence of CoarserRuns
     solved_runs : dict
-        Runs by variant that are solved already; the new ones are added.
+        Known runs by settings; new runs are added.
 
     Returns
     -------
     errors : list of (str, dict)
-        What is coarser, and errors by measure name, for each entry of the ladder.
+        Source of the error and errors by measure name, for each of the CoarserRuns.
     seconds : float
     """
     begin = perf_counter()
 
-    def solve_values(variant) -> dict:
-        """Return the measures with given settings, solving them on the first call."""
-        if variant not in solved_runs:
-            solved_runs[variant] = solve(variant)
-        return solved_runs[variant].values
+    def solve_values(settings) -> dict:
+        """Return the measures of a run with given settings, which is computed only once."""
+        if settings not in solved_runs:
+            solved_runs[settings] = solve(settings)
+        return solved_runs[settings].values
 
     errors = []
-    for coarser in ladder:
-        reference = fine if coarser.beside is None else solve_values(coarser.beside)
-        errors.append((coarser.of, coarser.rule(reference, *map(solve_values, coarser.runs))))
+    for coarser in coarse_runs:
+        reference_values = fine if coarser.reference is None else solve_values(coarser.reference)
+        errors.append(
+            (coarser.source, coarser.rule(reference_values, *map(solve_values, coarser.runs)))
+        )
     return errors, perf_counter() - begin
 
 
-def make_spatial_coarsening(coarser, beside=None, of: str = "mesh") -> CoarserRuns:
-    """Return the rule that estimates second-order errors from a run on a coarser mesh.
+def make_spatial_coarsening(settings, reference=None, source: str = "mesh") -> CoarserRuns:
+    """Return the CoarserRuns of a coarser mesh with second-order convergence.
 
     Parameters
     ----------
-    coarser : hashable
-        Variant of that run.
-    beside, of
+    settings : hashable
+        Settings of the run on the coarser mesh.
+    reference, source
         Fields of `CoarserRuns`.
 
     Returns
     -------
     CoarserRuns
     """
-    return CoarserRuns((coarser,), partial(coarser_errors, order=2.0), beside, of)
+    return CoarserRuns((settings,), partial(coarser_errors, order=2.0), reference, source)

@@ -1,14 +1,14 @@
 """Frequency and damping ratio of a decay against its amplitude, with 95 % intervals.
 
-In: the half cycles of a decay, i.e. the motion from one reversal to the next. The turning
-points of a computed motion come from the cubic between samples (`locate_reversals`), the half cycles of a
-measured one from a sinusoid fitted to each (`identify.half_cycles`). Out: a `DecayCurve`.
+In: the half cycles of a decay, i.e. the motion from one reversal to the next. The reversals of a computed
+motion follow from the cubics between samples (`locate_reversals`). The half cycles of a measured motion
+follow from fitted sinusoids (`identify.half_cycles`). Out: a `DecayCurve`.
 
-Half cycle k has a middle t_k and a size S_k. Over 2 m + 1 half cycles, the slope of ln S_k is
-the logarithmic decrement of half a cycle, pi zeta/(1 - zeta^2)^(1/2), and the slope of t_k is
-half a period. Both are exact for a viscous decay and any m, and are means over the span for any
-other decay. The error due to noise falls with m^(-3/2), that due to the curvature grows with m^2:
-the span is the longest one whose slope agrees with those of all shorter ones (Lepski, 1991).
+Half cycle k has a midpoint t_k and a peak-to-peak value S_k. Over 2 m + 1 half cycles, the slope of ln S_k
+is the logarithmic decrement per half cycle, -pi zeta/(1 - zeta^2)^(1/2), and the slope of t_k is half a
+period. Both are exact for viscous damping; otherwise they are mean values over the span. The error due to
+noise decreases as m^(-3/2), and the error due to curvature increases as m^2. The span is therefore the
+longest one whose slope agrees with those of all shorter spans (Lepski, 1991).
 """
 
 from typing import NamedTuple
@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-# Numbers of half cycles on both sides of a point that are tried as spans of a fit.
+# Candidate spans of a fit: number of half cycles on either side of a point.
 SPAN_LENGTHS = (
     1,
     2,
@@ -36,29 +36,29 @@ SPAN_LENGTHS = (
     256,
 )
 MAX_SLOPE_DIFFERENCE = 2.0  # Largest difference of the slopes of two spans, in standard deviations.
-# Standard deviations of a 95 % interval, widened because the data choose the span.
+# Half-width of a 95 % interval in standard deviations, increased because the data determine the span.
 INTERVAL_DEVIATIONS = 2.5
-# Number of half cycles on both sides whose third differences estimate the noise.
+# Number of half cycles on either side for the estimate of the noise by third differences.
 NOISE_HALF_WIDTH = 8
-# Number of points on both sides over which the largest sampling error is taken.
+# Number of points on either side over which the maximum of the sampling error is taken.
 SAMPLING_HALF_WIDTH = 4
-N_NEWTON_STEPS = 3  # Number of Newton steps with which the time of a reversal is refined.
+N_NEWTON_STEPS = 3  # Number of Newton steps for the time of a reversal.
 VALUE_ROUND_OFF = 1e-12  # Relative round-off error of a value.
-# Ratio of the speed to the largest speed below which a sample is itself a reversal.
+# Largest speed of a sample that counts as a reversal, relative to the largest speed.
 REST_SPEED_TOL = 1e-12
-MIN_HALF_CYCLE = 1e-9  # A half cycle smaller than this fraction of the largest one is round-off.
-STEP_END_TOL = 1e-9  # fraction of a step by which round-off may move a reversal outside the step
+MIN_HALF_CYCLE = 1e-9  # Smallest half cycle above round-off, relative to the largest one.
+STEP_END_TOL = 1e-9  # largest distance of a reversal from its step due to round-off, in steps
 # Largest reversal, relative to the range in one period, that is attributed to a faster mode.
 MAX_RIPPLE = 0.25
-RANGE_TOL = 1e-6  # Relative distance beyond its end points up to which a curve is evaluated.
+RANGE_TOL = 1e-6  # Relative distance to which a curve is extrapolated beyond its ends.
 
 
 class HalfCycles(NamedTuple):
-    """Half cycles of a decaying motion, each from a reversal to the next.
+    """Half cycles of a decaying motion, each from one reversal to the next.
 
-    - middle (k,): time of the middle [s].
+    - middle (k,): time of the midpoint [s].
     - size (k,): distance between the two reversals [m].
-    - middle_noise, size_noise (k,): standard deviations of both by noise [s], [m]; 0 for a computed
+    - middle_noise, size_noise (k,): standard deviations of both due to noise [s], [m]; 0 for a computed
       motion.
     """
 
@@ -69,10 +69,10 @@ class HalfCycles(NamedTuple):
 
 
 class DecayCurve(NamedTuple):
-    """Frequency and damping ratio of a decay against amplitude, from large to small amplitudes.
+    """Frequency and damping ratio of a decay as functions of amplitude, from large to small amplitudes.
 
-    - time (k,): [s].
-    - amplitude (k,): [m].
+    - time (k,): time [s].
+    - amplitude (k,): amplitude [m].
     - frequency (k,): frequency of the damped motion [Hz].
     - damping (k,): damping ratio [1].
     - frequency_error, damping_error (k,): half-widths of the 95 % intervals [Hz], [1].
@@ -85,88 +85,93 @@ class DecayCurve(NamedTuple):
     damping: np.ndarray
     damping_error: np.ndarray
 
-    def at(self, selection) -> "DecayCurve":
-        """Return the points of the curve at given indices."""
-        return DecayCurve(*(part[selection] for part in self))
+    def select(self, selection) -> "DecayCurve":
+        """Return the curve at selected points."""
+        return DecayCurve(*(column[selection] for column in self))
 
     def interpolate(self, amplitudes) -> "DecayCurve":
         """Interpolate the curve at given amplitudes (k,) [m]; NaN outside its range.
 
-        Monotone cubics over the logarithm of the amplitude are used. Their difference from linear
+        Monotone cubics in the logarithm of the amplitude are used. Their difference from linear
         interpolation is added to the errors.
         """
         if not self.amplitude.size:
             return DecayCurve(*np.full((6, len(amplitudes)), np.nan))._replace(
                 amplitude=np.asarray(amplitudes)
             )
-        knots, first = np.unique(np.log(self.amplitude), return_index=True)
+        knots, indices = np.unique(np.log(self.amplitude), return_index=True)
         x = np.log(amplitudes)
-        curve = self.at(first)
+        curve = self.select(indices)
         inside = (x > knots[0] - RANGE_TOL) & (x < knots[-1] + RANGE_TOL)
-        out = {name: np.interp(x, knots, getattr(curve, name)) for name in DecayCurve._fields}
+        columns = {name: np.interp(x, knots, getattr(curve, name)) for name in DecayCurve._fields}
         for name in ("frequency", "damping"):
-            linear = out[name]
-            out[name] = _interpolate_monotone(x, knots, getattr(curve, name))
-            out[f"{name}_error"] = out[f"{name}_error"] + np.abs(out[name] - linear)
+            linear = columns[name]
+            columns[name] = _interpolate_monotone(x, knots, getattr(curve, name))
+            columns[f"{name}_error"] = columns[f"{name}_error"] + np.abs(columns[name] - linear)
         return DecayCurve(
-            **{name: np.where(inside, part, np.nan) for name, part in out.items()}
+            **{name: np.where(inside, column, np.nan) for name, column in columns.items()}
         )._replace(amplitude=np.asarray(amplitudes))
 
     def add_sampling_error(self, other: "DecayCurve") -> "DecayCurve":
-        """Widen the errors of the curve by the error due to sampling the motion.
+        """Return the curve with errors increased by the error due to sampling the motion.
 
-        The added error is the largest difference from the curve of
-        `find_reversals_by_extrapolation` at the neighbouring points.
+        Parameters
+        ----------
+        other : DecayCurve
+            Curve from the reversals of `find_reversals_by_extrapolation`. The largest difference from
+            it at neighbouring points is added to the errors.
         """
         if not self.amplitude.size:
             return self
-        outside = other.interpolate(self.amplitude)
-        out = {}
+        interpolated = other.interpolate(self.amplitude)
+        errors = {}
         for name in ("frequency", "damping"):
-            change = np.nan_to_num(np.abs(getattr(self, name) - getattr(outside, name)))
+            change = np.nan_to_num(np.abs(getattr(self, name) - getattr(interpolated, name)))
             padded = np.pad(change, SAMPLING_HALF_WIDTH)
-            around = sliding_window_view(padded, 2 * SAMPLING_HALF_WIDTH + 1)
-            out[f"{name}_error"] = getattr(self, f"{name}_error") + around.max(axis=1)
-        return self._replace(**out)
+            neighbourhoods = sliding_window_view(padded, 2 * SAMPLING_HALF_WIDTH + 1)
+            errors[f"{name}_error"] = getattr(self, f"{name}_error") + neighbourhoods.max(axis=1)
+        return self._replace(**errors)
 
     def add_difference(self, first_curve: "DecayCurve", second_curve: "DecayCurve") -> "DecayCurve":
-        """Widen the errors of the curve by the difference of two other curves.
+        """Return the curve with errors increased by the difference of two other curves.
 
-        An error is infinite where either of these curves has no value.
+        The error is infinite where either curve has no value.
         """
 
-        def wider(name: str) -> np.ndarray:
-            """Return the error of one column, widened by the difference of the two curves."""
+        def increased_error(name: str) -> np.ndarray:
+            """Return the error of a column plus the difference of the two curves."""
             change = np.abs(getattr(first_curve, name) - getattr(second_curve, name))
             return getattr(self, f"{name}_error") + np.where(np.isnan(change), np.inf, change)
 
-        return self._replace(frequency_error=wider("frequency"), damping_error=wider("damping"))
+        return self._replace(
+            frequency_error=increased_error("frequency"), damping_error=increased_error("damping")
+        )
 
 
 def locate_reversals(time, position, speed) -> tuple:
-    """Return the times (k,) [s] and positions (k,) [m] at which a motion reverses.
+    """Return the times (k,) [s] and positions (k,) [m] of the reversals of a motion.
 
     They are computed on the cubics through the samples on both sides.
 
     Parameters
     ----------
     time, position, speed : (n,)
-        Samples of time [s], position [m] and speed [m/s] at any spacing, with every reversal at a
-        sample or alone between two of them.
+        Samples of time [s], position [m] and speed [m/s] at any spacing, with at most one reversal
+        between two samples.
     """
     speed = np.where(np.abs(speed) <= REST_SPEED_TOL * np.abs(speed).max(initial=0.0), 0.0, speed)
-    still = np.flatnonzero(speed == 0)
+    resting_samples = np.flatnonzero(speed == 0)
     k = np.flatnonzero(speed[:-1] * speed[1:] < 0)
     span = time[k + 1] - time[k]
     positions = (position[k], position[k + 1])
     speeds = speed[k] * span, speed[k + 1] * span
     fraction = _find_reversal_fraction(positions, speeds)
-    times = np.concatenate([time[still], time[k] + fraction * span])
+    times = np.concatenate([time[resting_samples], time[k] + fraction * span])
     reversal_positions = np.concatenate(
-        [position[still], _evaluate_cubic(positions, speeds, fraction)]
+        [position[resting_samples], _evaluate_cubic(positions, speeds, fraction)]
     )
     order = np.lexsort((reversal_positions, times))
-    # The samples before and after a jump of the force at a reversal have the same time.
+    # a reversal with a jump of the force has two samples at the same time
     min_interval = VALUE_ROUND_OFF * float(np.ptp(time))
     order = order[np.diff(times[order], prepend=-np.inf) > min_interval]
     return times[order], reversal_positions[order]
@@ -175,8 +180,8 @@ def locate_reversals(time, position, speed) -> tuple:
 def measure_last_cycle_amplitude(time, position, speed, period: float) -> float | None:
     """Return half the peak-to-peak value [m] of the last complete cycle of a motion.
 
-    The cycle reaches from a reversal to the next but one. A reversal smaller than MAX_RIPPLE times
-    the range in the last period belongs to a faster mode and is ignored.
+    A cycle has three reversals. Motions between reversals that are smaller than MAX_RIPPLE times the range
+    in the last period are attributed to a faster mode and ignored.
 
     Parameters
     ----------
@@ -194,8 +199,8 @@ def measure_last_cycle_amplitude(time, position, speed, period: float) -> float 
     last_range = float(np.ptp(position[time >= time[-1] - period * (1 + STEP_END_TOL)]))
     if last_range <= MIN_HALF_CYCLE * np.ptp(position):
         return last_range / 2
-    # Going back from the end of the motion, the loop collects reversals and tracks the direction
-    # and the farthest position since the last one.
+    # The loop runs backwards from the end of the motion. It collects reversals, and tracks the direction and
+    # the extreme position since the last one.
     reversal_positions = []
     direction = 0
     farthest = float(position[-1])
@@ -222,12 +227,11 @@ def measure_last_cycle_amplitude(time, position, speed, period: float) -> float 
 
 
 def find_reversals_by_extrapolation(time, position, speed) -> tuple:
-    """Find the reversals of a motion from cubics that are extrapolated from adjacent steps.
+    """Locate the reversals of a motion by extrapolation from the adjacent steps.
 
-    The times between two samples are the means of the zeros of the speed on the extrapolated cubics
-    of the steps before and after. If the force of a law reverses with the speed within less than a
-    step, it does so at the reversal: each of these cubics contains the force on its own side,
-    whereas the cubic between the two samples is distorted by the jump.
+    The time of a reversal is the mean of the zeros of the speed on the cubics of the preceding and the
+    following step. If the friction force changes sign at the reversal within less than a step, these cubics
+    are smooth, whereas the cubic of the step itself is distorted by the jump.
 
     Parameters
     ----------
@@ -239,40 +243,42 @@ def find_reversals_by_extrapolation(time, position, speed) -> tuple:
     fraction = speed[k] / (speed[k] - speed[k + 1])
 
     def find_zero(step, guess):
-        """Find by Newton's method the time [s] of zero speed on the extrapolated cubic of a step.
+        """Return the time [s] of zero speed on the extrapolated cubic of a step (Newton's method).
 
-        near: initial guess as a fraction of the step, outside 0 to 1.
+        guess: initial guess as a fraction of the step, outside 0 to 1.
         """
         span = time[step + 1] - time[step]
-        a = position[step]
-        b = position[step + 1]
-        c = speed[step] * span
-        d = speed[step + 1] * span
-        two = 2 * (3 * (b - a) - 2 * c - d)
-        three = 3 * (2 * (a - b) + c + d)
+        start_position = position[step]
+        end_position = position[step + 1]
+        start_speed = speed[step] * span
+        end_speed = speed[step + 1] * span
+        quadratic = 2 * (3 * (end_position - start_position) - 2 * start_speed - end_speed)
+        cubic = 3 * (2 * (start_position - end_position) + start_speed + end_speed)
         for _ in range(N_NEWTON_STEPS):
-            guess = guess - (c + guess * (two + guess * three)) / (two + 2 * guess * three)
+            guess = guess - (start_speed + guess * (quadratic + guess * cubic)) / (
+                quadratic + 2 * guess * cubic
+            )
         return time[step] + guess * span
 
     reversal_times = (find_zero(k - 1, 1 + fraction) + find_zero(k + 1, fraction - 1)) / 2
-    # Round-off may move a reversal to the sample before it.
+    # round-off may move a reversal to the preceding sample
     is_inside = (reversal_times >= time[k]) & (reversal_times <= time[k + 1])
     times[np.searchsorted(times, time[k])[is_inside]] = reversal_times[is_inside]
     return times, positions
 
 
 def make_half_cycles(times, positions, size=None) -> HalfCycles:
-    """Return the half cycles between the reversals of a computed decaying motion.
+    """Return the half cycles between the reversals of a computed decay.
 
-    They end before the first half cycle that is not smaller than its predecessor or that is round-
-    off of the largest.
+    The sequence ends before the first half cycle that is not smaller than its predecessor, or that is
+    within the round-off of the largest one.
 
     Parameters
     ----------
     times, positions : (k,)
         Reversals: times [s] and positions [m].
     size : (k - 1,), optional
-        Sizes of the half cycles at another point of the structure [m]; None: distances of
+        Sizes of the half cycles at another point of the structure [m]; None: distances between
         `positions`.
     """
     distances = np.abs(np.diff(positions))
@@ -291,188 +297,190 @@ def make_half_cycles(times, positions, size=None) -> HalfCycles:
 
 
 def fit_decay_curve(half_cycles: HalfCycles) -> DecayCurve:
-    """Compute frequency and damping ratio against amplitude from half cycles of a decay.
+    """Compute frequency and damping ratio against amplitude from the half cycles of a decay.
 
-    A computed decay has a point at each inner half cycle, a measured one at half cycles whose spans
-    overlap by half. Fewer than three half cycles give no point.
+    The curve of a computed decay has a point at each inner half cycle. That of a measured decay has points
+    whose spans overlap by half. With fewer than three half cycles, the curve is empty.
     """
     if half_cycles.size.size < 3:
         return DecayCurve(*np.empty((6, 0)))
-    log = np.log(half_cycles.size)
-    fall = fit_slopes(log, _limit_noise(half_cycles.size_noise / half_cycles.size, log))
+    log_sizes = np.log(half_cycles.size)
+    decrements = fit_slopes(
+        log_sizes, _limit_noise(half_cycles.size_noise / half_cycles.size, log_sizes)
+    )
     noise = _limit_noise(half_cycles.middle_noise, half_cycles.middle)
-    half = fit_slopes(half_cycles.middle, noise)
-    selected = np.arange(half.span.size)
+    half_periods = fit_slopes(half_cycles.middle, noise)
+    selected = np.arange(half_periods.span.size)
     if noise.any():
-        selected = _overlap_spans(np.minimum(half.span, fall.span))
-    half = half.at(selected)
-    fall = fall.at(selected)
-    decay_per_radian = np.hypot(np.pi, fall.slope)
+        selected = _select_overlapping_spans(np.minimum(half_periods.span, decrements.span))
+    half_periods = half_periods.select(selected)
+    decrements = decrements.select(selected)
+    decay_per_radian = np.hypot(np.pi, decrements.slope)
     curve = DecayCurve(
         time=half_cycles.middle[1 + selected],
-        amplitude=np.exp(_smooth_values(log, 1 + selected, fall.span)) / 2,
-        frequency=0.5 / half.slope,
-        frequency_error=0.5 * half.error / half.slope**2,
-        damping=-fall.slope / decay_per_radian,
-        damping_error=fall.error * np.pi**2 / decay_per_radian**3,
+        amplitude=np.exp(_smooth_values(log_sizes, 1 + selected, decrements.span)) / 2,
+        frequency=0.5 / half_periods.slope,
+        frequency_error=0.5 * half_periods.error / half_periods.slope**2,
+        damping=-decrements.slope / decay_per_radian,
+        damping_error=decrements.error * np.pi**2 / decay_per_radian**3,
     )
-    return _add_sampling_error(curve) if curve.time.size > 1 else curve
+    return _add_damping_error(curve) if curve.time.size > 1 else curve
 
 
-def _overlap_spans(span) -> np.ndarray:
-    """Select inner half cycles such that the spans (n,) around them overlap by half."""
-    out = [0]
-    while (place := out[-1] + max(1, int(span[out[-1]]))) < span.size:
-        out.append(place)
-    return np.array(out)
+def _select_overlapping_spans(span) -> np.ndarray:
+    """Return indices of inner half cycles whose spans (n,) overlap by half."""
+    selected = [0]
+    while (next_index := selected[-1] + max(1, int(span[selected[-1]]))) < span.size:
+        selected.append(next_index)
+    return np.array(selected)
 
 
 def _smooth_values(values, indices, span) -> np.ndarray:
-    """Fit parabolas to values over moving spans, and evaluate them at the midpoints."""
-    out = np.empty(indices.size)
+    """Return the midpoint values of parabolas that are fitted over moving spans."""
+    smoothed = np.empty(indices.size)
     for m in np.unique(span):
         has_span = span == m
-        out[has_span] = sliding_window_view(values, 2 * m + 1)[
+        smoothed[has_span] = sliding_window_view(values, 2 * m + 1)[
             indices[has_span] - m
         ] @ _parabola_weights(m)
-    return out
+    return smoothed
 
 
 class Slopes(NamedTuple):
-    """Slopes of a quantity per half cycle, with confidence half-widths and fit spans.
+    """Slopes of a quantity per half cycle, with confidence half-widths and spans.
 
-    All are (k,); a span is its number of half cycles on either side.
+    All arrays are (k,). A span is the number of half cycles on either side of a point.
     """
 
     slope: np.ndarray
     error: np.ndarray
     span: np.ndarray
 
-    def at(self, selection) -> "Slopes":
-        """Return the slopes at given indices."""
-        return Slopes(*(part[selection] for part in self))
+    def select(self, selection) -> "Slopes":
+        """Return the slopes at selected points."""
+        return Slopes(*(column[selection] for column in self))
 
 
 def fit_slopes(values, noise) -> Slopes:
-    """Fit the slope at each inner point over the longest span consistent with shorter ones.
+    """Fit the slope at each inner point over the longest span consistent with all shorter spans.
 
-    Spans grow until the slope differs from that of a shorter span by more than the noise of both
-    allows (Lepski, 1991). The error is the sum of two parts: the noise, and the bias of a mean. The
-    bias is estimated from the change over the next longer span m', multiplied by (m/m')^2; near the
-    ends, from the change over the next shorter span.
+    The span is increased until the slope differs from that of a shorter span by more than the noise (Lepski,
+    1991). The error is the sum of the noise and the bias due to curvature. The bias is estimated from the
+    change to the next longer span, scaled by the squared ratio of the spans; near the ends, from the change
+    from the next shorter span.
 
     Parameters
     ----------
     values : (n,) array
         Values at successive half cycles.
     noise : (n,) array
-        Their standard deviations; 0 for a computed motion.
+        Standard deviations of the values; 0 for a computed motion.
 
     Returns
     -------
     Slopes
-        At the n - 2 inner points.
+        Slopes at the n - 2 inner points.
     """
     count = values.size - 2
     slope = np.empty(count)
     spread = np.zeros(count)
     bias = np.full(count, np.nan)
-    # Change of the slope from the next shorter fit span to the current one, minus its noise.
+    # change of the slope from the next shorter span to the current one, minus its noise
     shorter_change = np.full(count, np.nan)
     span = np.zeros(count, int)
-    grows = np.ones(count, bool)
-    tried: list = []
+    is_growing = np.ones(count, bool)
+    shorter_fits: list = []
     for m in SPAN_LENGTHS:
-        if 2 * m >= values.size or not grows.any():
+        if 2 * m >= values.size or not is_growing.any():
             break
         weight = np.arange(-m, m + 1) / np.sum(np.arange(-m, m + 1) ** 2)
         inside = slice(m - 1, count - m + 1)
-        wide, wide_spread = np.full((2, count), np.nan)
-        wide[inside] = np.correlate(values, weight, "valid")
-        wide_spread[inside] = np.sqrt(np.correlate(noise**2, weight**2, "valid"))
-        reached = grows & ~np.isnan(wide)
-        agrees = reached.copy()
-        for other, other_spread in tried:
-            excess = np.sqrt(np.maximum(other_spread**2 - wide_spread**2, 0.0))
-            limit = MAX_SLOPE_DIFFERENCE * excess + VALUE_ROUND_OFF * np.abs(other)
-            agrees &= ~(np.abs(wide - other) > limit)
-        change = np.abs(wide - slope)
-        ends = reached & ~agrees
-        bias[ends] = change[ends]
-        is_longer = agrees & (span > 0)
+        candidate, candidate_noise = np.full((2, count), np.nan)
+        candidate[inside] = np.correlate(values, weight, "valid")
+        candidate_noise[inside] = np.sqrt(np.correlate(noise**2, weight**2, "valid"))
+        exists = is_growing & ~np.isnan(candidate)
+        is_consistent = exists.copy()
+        for shorter_slope, shorter_noise in shorter_fits:
+            excess = np.sqrt(np.maximum(shorter_noise**2 - candidate_noise**2, 0.0))
+            limit = MAX_SLOPE_DIFFERENCE * excess + VALUE_ROUND_OFF * np.abs(shorter_slope)
+            is_consistent &= ~(np.abs(candidate - shorter_slope) > limit)
+        change = np.abs(candidate - slope)
+        stops = exists & ~is_consistent
+        bias[stops] = change[stops]
+        is_longer = is_consistent & (span > 0)
         shorter_change[is_longer] = np.maximum(change - spread, 0.0)[is_longer]
-        still = ends & (spread > 0)
-        bias[still] /= (m / span[still]) ** 2 - 1
-        slope[agrees] = wide[agrees]
-        spread[agrees] = wide_spread[agrees]
-        span[agrees] = m
-        grows = agrees
-        tried.append((wide, wide_spread))
-    at_end = np.isnan(bias)
-    bias[at_end] = shorter_change[at_end]
-    # Only the shortest span fits at the first and the last inner point. There the second difference
-    # estimates the bias if the values have no noise.
-    only = np.isnan(bias)
-    bend = np.abs(np.diff(values, 2)) / 2
-    bias[only] = np.where(spread > 0, 0.0, bend)[only]
+        is_noisy = stops & (spread > 0)
+        bias[is_noisy] /= (m / span[is_noisy]) ** 2 - 1
+        slope[is_consistent] = candidate[is_consistent]
+        spread[is_consistent] = candidate_noise[is_consistent]
+        span[is_consistent] = m
+        is_growing = is_consistent
+        shorter_fits.append((candidate, candidate_noise))
+    lacks_longer_span = np.isnan(bias)
+    bias[lacks_longer_span] = shorter_change[lacks_longer_span]
+    # At the first and the last inner point, only the shortest span exists. There, the bias of values without
+    # noise is estimated from the second difference.
+    is_unknown = np.isnan(bias)
+    curvature = np.abs(np.diff(values, 2)) / 2
+    bias[is_unknown] = np.where(spread > 0, 0.0, curvature)[is_unknown]
     return Slopes(
         slope, INTERVAL_DEVIATIONS * spread + bias + VALUE_ROUND_OFF * np.abs(slope), span
     )
 
 
-def _add_sampling_error(curve: DecayCurve) -> DecayCurve:
-    """Widen the errors of a decay curve by the effect of damping within a half cycle.
+def _add_damping_error(curve: DecayCurve) -> DecayCurve:
+    """Add the error due to the decay within a half cycle to the errors of a curve.
 
-    Half of a half cycle is cosh(delta/2) times the amplitude at its middle, where delta is the
-    logarithmic decrement over half a cycle. The errors are the changes of the curve over this
-    fraction of the amplitude.
+    Half the size of a half cycle is cosh(delta/2) times the amplitude at its midpoint, where delta is the
+    logarithmic decrement per half cycle. The error is the change of the curve over this difference of
+    amplitude.
     """
     delta = np.pi * curve.damping / np.sqrt(np.maximum(1 - curve.damping**2, VALUE_ROUND_OFF))
     decrement = np.abs(np.gradient(np.log(curve.amplitude)))
     min_decrement = np.maximum(np.abs(delta), VALUE_ROUND_OFF)
     fraction = delta**2 / 8 / np.maximum(decrement, min_decrement)
-    out = {}
+    errors = {}
     for name in ("frequency", "damping"):
         change = fraction * np.abs(np.gradient(getattr(curve, name)))
-        out[f"{name}_error"] = getattr(curve, f"{name}_error") + change
-    return curve._replace(**out)
+        errors[f"{name}_error"] = getattr(curve, f"{name}_error") + change
+    return curve._replace(**errors)
 
 
 def smooth_slopes(values, noise) -> np.ndarray:
-    """Return the fitted slopes (n,) of values per half cycle; both ends repeat their neighbour."""
+    """Return the fitted slopes (n,) of values per half cycle; end values repeat their neighbours."""
     slope = fit_slopes(values, noise).slope
     return np.concatenate([slope[:1], slope, slope[-1:]])
 
 
 def _limit_noise(noise, values) -> np.ndarray:
-    """Raise standard deviations (n,) to at least an estimate from third differences.
+    """Return standard deviations (n,) that are at least an estimate from third differences.
 
-    Third differences of a parabola vanish, those of white noise have 20 times its variance. Values
-    without noise keep 0.
+    The third differences of a parabola vanish; those of white noise have 20 times its variance. Values without
+    noise are not changed.
     """
     if not noise.any() or values.size < 4:
         return noise
     variance = np.diff(values, 3) ** 2 / 20
     middle = np.arange(values.size) - 1
-    low = np.clip(middle - NOISE_HALF_WIDTH, 0, variance.size)
-    high = np.clip(middle + NOISE_HALF_WIDTH, 0, variance.size)
+    first = np.clip(middle - NOISE_HALF_WIDTH, 0, variance.size)
+    last = np.clip(middle + NOISE_HALF_WIDTH, 0, variance.size)
     sums = np.concatenate([[0.0], np.cumsum(variance)])
-    return np.sqrt(np.maximum(noise**2, (sums[high] - sums[low]) / np.maximum(high - low, 1)))
+    return np.sqrt(np.maximum(noise**2, (sums[last] - sums[first]) / np.maximum(last - first, 1)))
 
 
-def _parabola_weights(m: int) -> np.ndarray:
-    """Return the weights (2 m + 1,) of the midpoint value of a least-squares parabola."""
-    x = np.arange(-m, m + 1)
-    if m <= 1:
+def _parabola_weights(half_width: int) -> np.ndarray:
+    """Return the weights (2 m + 1,) for the midpoint value of a least-squares parabola."""
+    x = np.arange(-half_width, half_width + 1)
+    if half_width <= 1:
         return (x == 0) * 1.0
     x2 = x**2
     return (np.sum(x2**2) - np.sum(x2) * x2) / (x.size * np.sum(x2**2) - np.sum(x2) ** 2)
 
 
 def _interpolate_monotone(x, knots, values) -> np.ndarray:
-    """Interpolate values (n,) at increasing knots (n,) to positions x (k,) by monotone cubics.
+    """Interpolate values (n,) at knots (n,) to positions x (k,) by monotone cubics.
 
-    Fritsch and Butland (1984); x is clipped to the range of the knots.
+    The method is that of Fritsch and Butland (1984); x is clipped to the range of the knots.
     """
     from scipy.interpolate import PchipInterpolator
 
@@ -483,8 +491,8 @@ def _interpolate_monotone(x, knots, values) -> np.ndarray:
 def _evaluate_cubic(position, speed, fraction):
     """Evaluate Hermite cubics at given fractions (k,) of their steps.
 
-    position, speed: values at both ends of the steps; the speeds are multiplied by the durations of
-    the steps.
+    position, speed: pairs of values at both ends of the steps; speeds are multiplied by the durations
+    of the steps.
     """
     a, b = position
     c, d = speed
@@ -493,18 +501,19 @@ def _evaluate_cubic(position, speed, fraction):
 
 
 def _find_reversal_fraction(position, speed) -> np.ndarray:
-    """Return the fraction (k,) of each step at which the position on a cubic reverses.
+    """Return the time of the reversal on a cubic as a fraction (k,) of the step.
 
-    The speeds at both ends have opposite signs.
+    The speeds at both ends of a step must have opposite signs.
     """
     a, b = position
     c, d = speed
-    two = 2 * (3 * (b - a) - 2 * c - d)
-    three = 3 * (2 * (a - b) + c + d)
-    both = -(two + np.copysign(np.sqrt(np.maximum(two**2 - 4 * three * c, 0.0)), two)) / 2
+    quadratic = 2 * (3 * (b - a) - 2 * c - d)
+    cubic = 3 * (2 * (a - b) + c + d)
+    discriminant_root = np.sqrt(np.maximum(quadratic**2 - 4 * cubic * c, 0.0))
+    scaled_root = -(quadratic + np.copysign(discriminant_root, quadratic)) / 2
     with np.errstate(divide="ignore", invalid="ignore"):
-        first_root = c / both
-        second_root = both / three
+        first_root = c / scaled_root
+        second_root = scaled_root / cubic
     return np.clip(
         np.where(np.abs(first_root - 0.5) <= 0.5 + STEP_END_TOL, first_root, second_root), 0.0, 1.0
     )

@@ -1,8 +1,7 @@
-"""Table of stick-slip events of a run, detected in samples, and the stick intervals between.
+"""Stick-slip events of a run, detected in samples, and the stick intervals between them.
 
-In: samples of slip and slide, or rows of a log. Out: `Events`, and intervals of stick. Samples
-are those of a march or of a comparison method; the log of the exact engine is read in
-`run_events`.
+In: samples of slip and slide, or event rows. Out: `Events`, and stick intervals. `run_events`
+converts the log of the exact engine.
 """
 
 from dataclasses import dataclass
@@ -24,15 +23,15 @@ MAX_EVENTS = 100_000
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Events:
-    """Last events of a run in order of time, at most MAX_EVENTS of them.
+    """Last events of a run in chronological order, at most MAX_EVENTS.
 
-    - time (k,): [s].
-    - interface (k,): number of the interface from 1; 0 for the border between two segments of the
+    - time (k,): time [s].
+    - interface (k,): number of the interface, from 1; 0 for the border between two segments of the
       drive.
     - kind (k,): index of EVENT_KIND_NAMES; "up" means towards positive slip.
     - slide (k,): relative displacement [m].
     - count: number of all events of the run.
-    - source: sentence on how the events were found.
+    - source: sentence about the detection of the events.
     """
 
     time: np.ndarray
@@ -44,16 +43,16 @@ class Events:
 
 
 def sort_events(rows, count: int | None = None, source: str = "") -> Events:
-    """Sort event rows (time [s], interface, kind, displacement [m]) by time into Events.
+    """Return event rows (time [s], interface, kind, displacement [m]) as Events, sorted by time.
 
     Parameters
     ----------
     rows : sequence
-        Rows; the last MAX_EVENTS of them in time are kept.
+        Event rows; only the last MAX_EVENTS are used.
     count : int, optional
-        Number of all events of the run; None: that of the rows.
+        Number of all events of the run; None: number of rows.
     source : str
-        Sentence on how the events were found.
+        Sentence about the detection of the events.
     """
     rows = np.array(rows, float).reshape(-1, 4)
     rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
@@ -74,8 +73,8 @@ def detect_events(
 ) -> Events:
     """Detect stops, releases, reversals and segment borders in the samples of a run.
 
-    A stop or a release is where the slip speed passes 1e-2 of its peak in the cycle, a reversal
-    where it changes sign without a stop between two samples.
+    At a stop or a release, the slip speed passes 1e-2 times its peak in the cycle. At a reversal, it changes
+    sign between two samples without a stop.
 
     Parameters
     ----------
@@ -86,11 +85,13 @@ def detect_events(
     period : float
         Period of the drive [s].
     max_stick_slip : float
-        Slip in a cycle [m] below which the interface sticks in it.
+        Largest range of the slip of a sticking interface in a cycle [m].
     borders : sequence of float
-        Times [s] at which a segment of the drive ends and the next one starts.
+        Times of the borders between segments of the drive [s].
     """
-    rows = [(at, 0, SEGMENT_BORDER, np.nan) for at in borders if time[0] < at < time[-1]]
+    rows = [
+        (border, 0, SEGMENT_BORDER, np.nan) for border in borders if time[0] < border < time[-1]
+    ]
     for number in range(slips.shape[1]):
         rows += _detect_interface_events(
             time, slips[:, number], slides[:, number], period, max_stick_slip, number + 1
@@ -114,91 +115,98 @@ def compute_slip_states(time, slip, period: float, max_stick_slip: float = 0.0) 
     period : float
         Period of the drive [s].
     max_stick_slip : float
-        Slip in a cycle [m] below which the interface sticks in it.
+        Largest range of the slip of a sticking interface in a cycle [m].
 
     Returns
     -------
     tuple
-        Slip speed over its peak in the cycle, and the state: +1 or -1 for slip in this direction, 0
-        for stick.
+        Slip speed relative to its peak in the cycle, and the state: +1 or -1 for slip in this direction,
+        0 for stick.
     """
     step = np.diff(time)
     rate = np.divide(np.diff(slip), step, out=np.zeros(step.size), where=step > 0)
-    # 1e-6 of a cycle allows for round-off of the times.
+    # the offset of 1e-6 cycles allows for round-off of the times
     cycle = np.floor((time[:-1] - time[0]) / period + 1e-6).astype(int)
     peak, low, high = (np.full(cycle.max(initial=0) + 1, start) for start in (0.0, np.inf, -np.inf))
     np.maximum.at(peak, cycle, np.abs(rate))
-    for side in (slip[:-1], slip[1:]):
-        np.minimum.at(low, cycle, side)
-        np.maximum.at(high, cycle, side)
+    for samples in (slip[:-1], slip[1:]):
+        np.minimum.at(low, cycle, samples)
+        np.maximum.at(high, cycle, samples)
     peak[high - low <= max_stick_slip] = np.inf
-    share = rate / np.where(peak > 0, peak, np.inf)[cycle]
-    return share, np.where(np.abs(share) >= STICK_SPEED_RATIO, np.sign(share), 0).astype(int)
+    relative_speed = rate / np.where(peak > 0, peak, np.inf)[cycle]
+    return relative_speed, np.where(
+        np.abs(relative_speed) >= STICK_SPEED_RATIO, np.sign(relative_speed), 0
+    ).astype(int)
 
 
 def _detect_interface_events(
     time, slip, slide, period: float, max_stick_slip: float, number: int
 ) -> list:
     """Return the event rows of a single interface, detected in its samples."""
-    share, state = compute_slip_states(time, slip, period, max_stick_slip)
+    relative_speed, state = compute_slip_states(time, slip, period, max_stick_slip)
     k = np.flatnonzero(state[1:] != state[:-1])
-    at = (time[1:] + time[:-1]) / 2
+    midpoints = (time[1:] + time[:-1]) / 2
     before = state[k]
     after = state[k + 1]
-    low = share[k]
-    rise = share[k + 1] - share[k]
-    turns = (before != 0) & (after != 0)
-    way = np.where(before != 0, before, after)
+    speed_before = relative_speed[k]
+    rise = relative_speed[k + 1] - relative_speed[k]
+    is_reversal = (before != 0) & (after != 0)
+    direction = np.where(before != 0, before, after)
     kind = np.where(
         after > 0,
-        np.where(turns, REVERSAL_UP, RELEASE_UP),
-        np.where(turns, REVERSAL_DOWN, RELEASE_DOWN),
+        np.where(is_reversal, REVERSAL_UP, RELEASE_UP),
+        np.where(is_reversal, REVERSAL_DOWN, RELEASE_DOWN),
     )
     kind = np.where(after == 0, STOP, kind)
-    part = np.clip(
-        (np.where(turns, 0.0, way * STICK_SPEED_RATIO) - low) / np.where(rise != 0, rise, 1.0), 0, 1
+    fraction = np.clip(
+        (np.where(is_reversal, 0.0, direction * STICK_SPEED_RATIO) - speed_before)
+        / np.where(rise != 0, rise, 1.0),
+        0,
+        1,
     )
-    when = at[k] + np.where(rise != 0, part, 0.5) * (at[k + 1] - at[k])
-    return [*zip(when, [number] * k.size, kind, np.interp(when, time, slide))]
+    times = midpoints[k] + np.where(rise != 0, fraction, 0.5) * (midpoints[k + 1] - midpoints[k])
+    return [*zip(times, [number] * k.size, kind, np.interp(times, time, slide))]
 
 
-def find_stick_spans(events: Events, begin: float, end: float, moves) -> list:
-    """Return the intervals [(start, end)] [s] between events in which an interface sticks.
+def find_stick_spans(events: Events, begin: float, end: float, always_slips) -> list:
+    """Return the intervals [(start, end)] [s] between events in which the first interface sticks.
 
-    If other interfaces stick during some of them only, the intervals with the combination of states
-    that lasts longest in total are taken.
+    With several interfaces, only the intervals with the same states of all other interfaces are returned,
+    for the states that last longest in total.
 
     Parameters
     ----------
     events : Events
     begin, end : float
-        Time span that is searched [s].
-    moves : (i,) of bool
-        Whether an interface without any event slips all the time.
+        Start and end of the window [s].
+    always_slips : (i,) of bool
+        Whether an interface without events slips all the time.
     """
-    count = len(moves)
-    sliding = [bool(m) for m in moves]
+    count = len(always_slips)
+    sliding = [bool(slips) for slips in always_slips]
     for number in range(count):
-        mine = events.kind[events.interface == number + 1]
-        if mine.size:
-            sliding[number] = mine[0] not in (RELEASE_UP, RELEASE_DOWN)
-    # Of the events before `begin`, only the last one of each interface decides its state.
+        kinds = events.kind[events.interface == number + 1]
+        if kinds.size:
+            sliding[number] = kinds[0] not in (RELEASE_UP, RELEASE_DOWN)
+    # the last event of each interface before `begin` determines its initial state
     first = int(np.searchsorted(events.time, begin))
     for number in range(count):
-        mine = events.kind[:first][events.interface[:first] == number + 1]
-        if mine.size:
-            sliding[number] = bool(mine[-1] != STOP)
-    found = {}
-    last = -np.inf
+        kinds = events.kind[:first][events.interface[:first] == number + 1]
+        if kinds.size:
+            sliding[number] = bool(kinds[-1] != STOP)
+    intervals = {}
+    last_time = -np.inf
     rows = zip(
         *(column[first:].tolist() for column in (events.time, events.interface, events.kind))
     )
-    for when, number, kind in [*rows, (np.inf, 0, SEGMENT_BORDER)]:
-        a = max(last, begin)
-        b = min(when, end)
-        if b > a and not sliding[0]:
-            found.setdefault(tuple(sliding), []).append((float(a), float(b)))
+    for time, number, kind in [*rows, (np.inf, 0, SEGMENT_BORDER)]:
+        start = max(last_time, begin)
+        stop = min(time, end)
+        if stop > start and not sliding[0]:
+            intervals.setdefault(tuple(sliding), []).append((float(start), float(stop)))
         if number:
             sliding[number - 1] = kind != STOP
-        last = when
-    return max(found.values(), key=lambda spans: sum(b - a for a, b in spans), default=[])
+        last_time = time
+    return max(
+        intervals.values(), key=lambda spans: sum(stop - start for start, stop in spans), default=[]
+    )

@@ -1,11 +1,10 @@
-"""Motion of an interface within time steps, for a friction force that changes in a step.
+"""Friction force of the LuGre law within time steps.
 
-In: samples at the ends of steps, and the LuGre law. Out: the window with samples inside the
-steps. The force of the LuGre law exceeds its kinetic limit while the slide reverses. If the
-slide is many times the length over which the stretch relaxes, this takes less than a step and
-is not visible at the ends of the steps. Here the law is integrated along the cubic through
-slides and rates: every step is divided into N_SUBSTEPS parts, and a reversal of the slide is the end
-of a part.
+In: samples at the ends of steps, and the LuGre law. Out: the window with samples at the ends of
+substeps. The LuGre force has a peak above the kinetic limit at each reversal. For a large slide, the
+peak is shorter than a time step and is not visible at the ends of the steps. The law is therefore
+integrated along the cubics through slides and rates, with N_SUBSTEPS substeps per step, and with each
+reversal at the end of a substep.
 """
 
 from dataclasses import replace
@@ -17,20 +16,20 @@ from ..core import Response
 from ..friction.laws.lugre import LuGre
 from .measures import find_reversal_steps
 
-# Number of substeps per step; with 16, the error in peaks of 60 rigs is below the time-step error.
+# Number of substeps per step; with 16, the error of the peaks in 60 rigs is below the time-step error.
 N_SUBSTEPS = 16
 
 
 class Steps(NamedTuple):
-    """Times [s], displacements [m] and speeds [m/s] at the ends of all substeps."""
+    """Times [s], slides [m] and speeds [m/s] at the ends of substeps."""
 
     time: np.ndarray
     slide: np.ndarray
     speed: np.ndarray
 
 
-def motion_inside_steps(window: Response, law: LuGre, load: float) -> Response:
-    """Add the ends of all substeps to the samples of an interface in a window.
+def add_substep_samples(window: Response, law: LuGre, load: float) -> Response:
+    """Return a window with samples of slide, slip and force at the ends of all substeps.
 
     Parameters
     ----------
@@ -43,37 +42,39 @@ def motion_inside_steps(window: Response, law: LuGre, load: float) -> Response:
     Returns
     -------
     Response
-        time, slide, slide_rate, force and slip have (k - 1) N_SUBSTEPS + 1 samples; all other fields are
-        those of the window.
+        Window whose time, slide, slide_rate, force and slip have (k - 1) N_SUBSTEPS + 1 samples; other
+        fields are unchanged.
     """
-    parts = divide_steps(window.time, window.slide, window.slide_rate)
+    substeps = divide_steps(window.time, window.slide, window.slide_rate)
     time, slide, speed = (
         np.append(first, inside.ravel())
-        for first, inside in zip((window.time[0], window.slide[0], window.slide_rate[0]), parts)
+        for first, inside in zip((window.time[0], window.slide[0], window.slide_rate[0]), substeps)
     )
     duration = np.diff(time)
     increment = np.diff(slide)
     mean_speed = np.divide(increment, duration, out=np.zeros_like(increment), where=duration > 0)
     length = law.limit(mean_speed) / law.stiffness
-    kept = np.exp(-np.abs(increment) / length)
+    decay_factor = np.exp(-np.abs(increment) / length)
     stretch = evaluate_recursion(
         window.slide[0] - window.slip[0],
-        kept.reshape(-1, N_SUBSTEPS),
-        ((1 - kept) * np.sign(increment) * length).reshape(-1, N_SUBSTEPS),
+        decay_factor.reshape(-1, N_SUBSTEPS),
+        ((1 - decay_factor) * np.sign(increment) * length).reshape(-1, N_SUBSTEPS),
     )
-    rate = speed - law.stiffness * np.abs(speed) * stretch / law.limit(speed)
-    force = load * (law.stiffness * stretch + law.micro_damping * rate + law.viscous * speed)
+    stretch_rate = speed - law.stiffness * np.abs(speed) * stretch / law.limit(speed)
+    force = load * (
+        law.stiffness * stretch + law.micro_damping * stretch_rate + law.viscous * speed
+    )
     return replace(
         window, time=time, slide=slide, slide_rate=speed, slip=slide - stretch, force=force
     )
 
 
 def divide_steps(time, slide, speed) -> Steps:
-    """Divide the steps between samples into substeps, on cubics of the displacement.
+    """Divide time steps into substeps, on the cubics through slides and speeds.
 
-    If the speed changes sign in a step, half of its substeps lie before the reversal. A reversal
-    that is closer to a sample than a substep stays inside one of the substeps there, because
-    shorter substeps would have displacements of the size of round-off.
+    If the speed changes sign in a step, half of the substeps lie before the reversal. A reversal closer to
+    a sample than one substep is not separated, because the displacements in shorter substeps would be
+    dominated by round-off.
 
     Parameters
     ----------
@@ -85,26 +86,28 @@ def divide_steps(time, slide, speed) -> Steps:
     Steps
     """
     step = np.diff(time)
-    share = np.tile(np.arange(1, N_SUBSTEPS + 1) / N_SUBSTEPS, (step.size, 1))
-    turns, at, _ = find_reversal_steps(time, slide, speed)
-    middle = np.clip(at, 1 / N_SUBSTEPS, 1 - 1 / N_SUBSTEPS)[:, None]
+    fractions = np.tile(np.arange(1, N_SUBSTEPS + 1) / N_SUBSTEPS, (step.size, 1))
+    reversal_steps, reversal_fraction, _ = find_reversal_steps(time, slide, speed)
+    middle = np.clip(reversal_fraction, 1 / N_SUBSTEPS, 1 - 1 / N_SUBSTEPS)[:, None]
     half = np.arange(1, N_SUBSTEPS // 2 + 1) / (N_SUBSTEPS // 2)
-    share[turns] = np.column_stack([middle * half, middle + (1 - middle) * half])
+    fractions[reversal_steps] = np.column_stack([middle * half, middle + (1 - middle) * half])
     begin = speed[:-1] * step
     end = speed[1:] * step
     rise = np.diff(slide)
-    two = 3 * rise - 2 * begin - end
-    three = begin + end - 2 * rise
-    begin, two, three, first, step = (one[:, None] for one in (begin, two, three, slide[:-1], step))
-    inside = Steps(
-        time[:-1, None] + step * share,
-        first + share * (begin + share * (two + share * three)),
-        (begin + share * (2 * two + 3 * share * three)) / step,
+    quadratic = 3 * rise - 2 * begin - end
+    cubic = begin + end - 2 * rise
+    begin, quadratic, cubic, first, step = (
+        column[:, None] for column in (begin, quadratic, cubic, slide[:-1], step)
     )
-    inside.slide[:, -1] = slide[1:]
-    inside.speed[:, -1] = speed[1:]
-    inside.time[:, -1] = time[1:]
-    return inside
+    substeps = Steps(
+        time[:-1, None] + step * fractions,
+        first + fractions * (begin + fractions * (quadratic + fractions * cubic)),
+        (begin + fractions * (2 * quadratic + 3 * fractions * cubic)) / step,
+    )
+    substeps.slide[:, -1] = slide[1:]
+    substeps.speed[:, -1] = speed[1:]
+    substeps.time[:, -1] = time[1:]
+    return substeps
 
 
 def evaluate_recursion(start: float, factor, increment) -> np.ndarray:
@@ -113,14 +116,14 @@ def evaluate_recursion(start: float, factor, increment) -> np.ndarray:
     Parameters
     ----------
     start : float
-        First value.
+        Initial value.
     factor, increment : (k, p)
         Factor and increment of each substep.
     """
     product = np.cumprod(factor, axis=1)
     term = increment.copy()
-    for part in range(1, factor.shape[1]):
-        term[:, part] += factor[:, part] * term[:, part - 1]
+    for substep in range(1, factor.shape[1]):
+        term[:, substep] += factor[:, substep] * term[:, substep - 1]
     starts = [start]
     for total_factor, total_increment in zip(product[:-1, -1].tolist(), term[:-1, -1].tolist()):
         starts.append(total_factor * starts[-1] + total_increment)

@@ -1,7 +1,7 @@
 """Measures of a run whose drive level changes in steps: onset of slip, jump, hysteresis.
 
-In: the `Level` at the end of each level of the drive, in order. Out: the bracket of the onset
-of slip, the largest jump of the amplitude, and the hysteresis between increasing and decreasing
+In: a `Level` record for each drive level, in chronological order. Out: the two levels that bracket the
+onset of slip, the largest jump of the amplitude, and the hysteresis between increasing and decreasing
 levels.
 """
 
@@ -28,22 +28,22 @@ LEVEL_MEASURES = (
     "equivalent_damping",
 )
 AMPLITUDE_MEASURE = LEVEL_MEASURES[0]
-# Ratio of third to first acceleration harmonic [1] above which distortion is visible in the curve.
+# Smallest ratio of third to first acceleration harmonic at which the distortion is visible.
 MIN_DISTORTION = 0.03
-# Smallest factor of a jump between neighbouring levels, relative to the factor of the drive [1].
+# Smallest factor of a jump between neighbouring levels, relative to the ratio of the drive levels.
 MIN_JUMP_FACTOR = 1.5
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Level:
-    """State and measures of a run at the end of one level of the drive.
+    """Measures and state of a run at the end of one drive level.
 
-    - drive: acceleration [m s-2]; for a force drive the force over the modal mass, or the force [N]
-      if `unit` says so.
-    - stuck: nothing slipped.
-    - values, errors: measures and their errors by name, as far as they are known.
-    - outcome: how the motion ended under this level; "" if only the outcome of the last level is
-      computed.
+    - drive: acceleration amplitude [m s-2]; for a force drive, force over modal mass [m s-2] or force
+      [N], depending on `unit`.
+    - stuck: whether no interface slips.
+    - values, errors: known measures and their errors by name.
+    - unit: unit of `drive`.
+    - outcome: outcome of the motion at this level; "" if it was not computed.
     """
 
     drive: float
@@ -55,50 +55,52 @@ class Level:
 
 
 def make_onset_test(kind: str, length: float | None = None) -> Callable[[Level], bool]:
-    """Return a function that decides whether slip has started at a drive level.
+    """Return a function that decides whether a drive level lies above the onset of slip.
 
-    A motion that grows without bound lies above every onset.
+    A motion that grows without bound counts as slip.
 
     Parameters
     ----------
     kind : str
-        "slip": some slip occurs; "distortion": H3/H1 of the acceleration exceeds MIN_DISTORTION;
-        "gauge": half peak-to-peak at the output exceeds `length`.
+        "slip": an interface slips; "distortion": H3/H1 of the acceleration exceeds MIN_DISTORTION;
+        "gauge": the amplitude at the output (half peak-to-peak) exceeds `length`.
     length : float, optional
-        Amplitude for "gauge" [m].
+        Limit of the amplitude for "gauge" [m].
     """
-    beyond = {
+    exceeds_onset = {
         "slip": lambda level: not level.stuck,
         "gauge": lambda level: level.values[AMPLITUDE_MEASURE] > length,
     }.get(kind, lambda level: level.values.get("acceleration_distortion", 0.0) > MIN_DISTORTION)
-    return lambda level: level.outcome == Outcome.GROWS or beyond(level)
+    return lambda level: level.outcome == Outcome.GROWS or exceeds_onset(level)
 
 
 def make_no_onset_reason(kind: str, length: float | None = None) -> str:
-    """Return the reason why a sequence of drive levels has no onset."""
-    far = f"has an amplitude of more than {format_length(length)} at the output" if length else ""
-    what = {"slip": "slips", "gauge": far}.get(
+    """Return the reason why a sequence of drive levels has no onset of slip."""
+    amplitude_text = (
+        f"has an amplitude of more than {format_length(length)} at the output" if length else ""
+    )
+    event = {"slip": "slips", "gauge": amplitude_text}.get(
         kind,
         f"has an acceleration whose third harmonic is more than {MIN_DISTORTION:g} of its first harmonic",
     )
-    return f"no level of the increasing sequence {what}"
+    return f"no level of the increasing sequence {event}"
 
 
 def bracket_onset(levels, is_above_onset: Callable[[Level], bool]) -> tuple | None:
     """Return the indices of the drive levels just below and just above the onset of slip.
 
-    Only the levels before the first decrease count.
+    Only the levels before the first decrease are considered.
 
     Parameters
     ----------
     levels : sequence of Level
     is_above_onset : callable
-        Decides whether a level lies above the onset (see `make_onset_test`).
+        Function that returns whether a level lies above the onset (see `make_onset_test`).
 
     Returns
     -------
     tuple or None
-        Two indices, the first of which is -1 for the start of the run; None if no level lies above
+        Two indices; the first is -1 if the first level lies above the onset. None if no level lies above
         the onset.
     """
     for k, level in enumerate(levels):
@@ -112,27 +114,32 @@ def bracket_onset(levels, is_above_onset: Callable[[Level], bool]) -> tuple | No
 def largest_jump(levels, name: str = AMPLITUDE_MEASURE) -> tuple | None:
     """Return the largest relative jump of a measure between successive drive levels.
 
-    The factor of the measure is divided by the factor of the drive.
+    The jump is the ratio of the measures divided by the ratio of the drive levels.
 
     Parameters
     ----------
     levels : sequence of Level
     name : str
-        Measure.
+        Name of the measure.
 
     Returns
     -------
     tuple or None
         Drive of the level after the jump, factor [1], and distance between the two levels in the
-        unit of the drive; None if no factor reaches MIN_JUMP_FACTOR, up or down.
+        unit of the drive; None if no factor, upwards or downwards,
+        reaches MIN_JUMP_FACTOR.
     """
-    found = []
-    for a, b in pairwise(levels):
-        sizes = a.drive, b.drive, a.values[name], b.values[name]
-        if all(0 < size < np.inf for size in sizes) and not (a.stuck or b.stuck):
-            factor = (b.values[name] / a.values[name]) / (b.drive / a.drive)
-            found.append((abs(np.log(factor)), b.drive, factor, abs(b.drive - a.drive)))
-    return max(found)[1:] if found and max(found)[0] >= np.log(MIN_JUMP_FACTOR) else None
+    jumps = []
+    for level, next_level in pairwise(levels):
+        amounts = level.drive, next_level.drive, level.values[name], next_level.values[name]
+        if all(0 < size < np.inf for size in amounts) and not (level.stuck or next_level.stuck):
+            factor = (next_level.values[name] / level.values[name]) / (
+                next_level.drive / level.drive
+            )
+            jumps.append(
+                (abs(np.log(factor)), next_level.drive, factor, abs(next_level.drive - level.drive))
+            )
+    return max(jumps)[1:] if jumps and max(jumps)[0] >= np.log(MIN_JUMP_FACTOR) else None
 
 
 def largest_hysteresis(levels, name: str = AMPLITUDE_MEASURE) -> tuple | None:
@@ -142,25 +149,30 @@ def largest_hysteresis(levels, name: str = AMPLITUDE_MEASURE) -> tuple | None:
     ----------
     levels : sequence of Level
     name : str
-        Measure.
+        Name of the measure.
 
     Returns
     -------
     tuple or None
-        Difference at one drive, and its error; None if no drive occurs in both directions.
+        Difference at equal drive, and its error; None if no drive level occurs in both directions.
     """
     drives = np.array([level.drive for level in levels])
-    top = int(np.argmax(drives))
-    back = {round(level.drive, 9): level for level in levels[top + 1 :]}
+    highest = int(np.argmax(drives))
+    decreasing_levels = {round(level.drive, 9): level for level in levels[highest + 1 :]}
     pairs = [
-        (level, back[round(level.drive, 9)])
-        for level in levels[:top]
-        if round(level.drive, 9) in back
+        (level, decreasing_levels[round(level.drive, 9)])
+        for level in levels[:highest]
+        if round(level.drive, 9) in decreasing_levels
     ]
     if not pairs:
         return None
-    gaps = [
-        (abs(a.values[name] - b.values[name]), a.errors.get(name, 0.0) + b.errors.get(name, 0.0))
-        for a, b in pairs
+    differences = [
+        (
+            abs(rising.values[name] - falling.values[name]),
+            rising.errors.get(name, 0.0) + falling.errors.get(name, 0.0),
+        )
+        for rising, falling in pairs
     ]
-    return max((gap for gap in gaps if np.isfinite(gap[0])), default=None)
+    return max(
+        (difference for difference in differences if np.isfinite(difference[0])), default=None
+    )

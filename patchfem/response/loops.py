@@ -1,10 +1,9 @@
 """Friction loop of the last cycles: displacement range, stiffness, damping and drift.
 
-In: samples of slide, its rate and force, at any spacing; those of an exact run contain both
-sides of every event. Out: reversals, secant stiffness, the measures of the loop, and the drift
-per cycle. Values and rates define a cubic between samples. For a law with memory the force
-reverses at a sample: between the two samples at a reversal it may change by its full range, so
-the force is not interpolated there.
+In: samples of slide, slide rate and force at any spacing, with two samples at each event of an exact
+run. Out: reversals, secant stiffness, the measures of the loop, and the drift per cycle. The slide is
+interpolated by cubics. The force is not interpolated at a reversal if it may change by its full range
+between two samples there.
 """
 
 from typing import NamedTuple
@@ -14,17 +13,16 @@ import numpy as np
 from ..effects import law_has_trait
 from .measures import COORDINATE_ROUND_OFF
 
-EVENT_TIME_TOL = 1e-9  # Fraction of a period below which two samples are the two sides of an event.
-REST_RATE_TOL = 1e-9  # Ratio of the rate to the largest rate below which the interface is at rest.
-# Ratio of a displacement step to the largest one above which a rest ends, because round-off is smaller.
+EVENT_TIME_TOL = 1e-9  # Largest time between the two samples at an event, in periods.
+REST_RATE_TOL = 1e-9  # Largest rate of an interface at rest, relative to the largest rate.
+# Largest displacement step at rest, relative to the largest step.
 MIN_REST_END_STEP = 1e-3
 
 
 class Reversal(NamedTuple):
-    """Displacement [m] at an extreme of a cycle, and the friction force [N] there.
+    """Displacement [m] at a reversal, and the friction force [N] there.
 
-    force is None if the displacement rests at this value over an end of the window, so that one
-    side of a jump is not known.
+    The force is None if it is unknown, e.g. if the interface is at rest at an end of the window.
     """
 
     slide: float
@@ -32,9 +30,9 @@ class Reversal(NamedTuple):
 
 
 def cycle_spans(time, period: float) -> list:
-    """Return the complete cycles [(start, end)] [s] that sampled times (k,) cover, oldest first.
+    """Return the complete cycles [(start, end)] [s] in sampled times (k,), oldest first.
 
-    They are measured from the end, so that a partial cycle at the start is left out.
+    Cycles are counted from the end, so that an incomplete cycle at the start is omitted.
     """
     count = int((time[-1] - time[0]) / period * (1 + 1e-9) + 1e-6)
     return [
@@ -42,21 +40,23 @@ def cycle_spans(time, period: float) -> list:
     ]
 
 
-def reversal_evaluation(model) -> str:
-    """Return the name of the rule by which the friction force at a reversal is evaluated."""
+def reversal_force_rule(model) -> str:
+    """Return the name of the rule for the friction force at a reversal."""
     law = model.friction.law
-    soft = model.partial_slip or (
+    partial = model.partial_slip or (
         model.rig is not None and model.rig.friction.interfaces[0].partial_slip
     )
-    if law_has_trait(law, "memoryless") and not soft:
+    if law_has_trait(law, "memoryless") and not partial:
         return "jumps"
     return (
-        "slide" if soft or law_has_trait(law, "timeless") or law_has_trait(law, "bonds") else "rate"
+        "slide"
+        if partial or law_has_trait(law, "timeless") or law_has_trait(law, "bonds")
+        else "rate"
     )
 
 
-def find_reversals(time, slide, rate, force, period: float, by: str = "rate") -> list:
-    """Return the smallest and the largest `Reversal` of the displacement in every cycle.
+def find_reversals(time, slide, rate, force, period: float, rule: str = "rate") -> list:
+    """Return the smallest and the largest `Reversal` of the slide in each cycle.
 
     Parameters
     ----------
@@ -64,43 +64,44 @@ def find_reversals(time, slide, rate, force, period: float, by: str = "rate") ->
         Samples [s], [m], [m/s], [N].
     period : float
         Period [s].
-    by : str
-        Force at the reversal. "jumps": mean of the forces before and after the rest; "slide": force
-        at the sample of the largest slide, extrapolated linearly in the slide; "rate": interpolated
-        linearly in time. It is None if the slide is largest at an end of the cycle and the reversal
-        is more than one sample away, because the force there is not that of a reversal.
+    rule : str
+        Rule for the force at a reversal. "jumps": mean of the forces before and after the rest;
+        "slide": force at the sample with the largest slide, extrapolated linearly in the slide; "rate":
+        interpolated linearly in time. The force is None if the slide is largest at an end of the cycle
+        and does not reverse within one step of it.
     """
-    out = []
-    near = EVENT_TIME_TOL * period
+    reversals = []
+    time_tolerance = EVENT_TIME_TOL * period
     for begin, end in cycle_spans(time, period):
-        part = slice(*np.searchsorted(time, [begin - near, end + near]))
+        cycle = slice(*np.searchsorted(time, [begin - time_tolerance, end + time_tolerance]))
         pair = []
         for sign in (-1, 1):
-            sample, value, share = _find_largest(
-                time[part], sign * slide[part], sign * rate[part], near
+            sample, value, fraction = _find_largest(
+                time[cycle], sign * slide[cycle], sign * rate[cycle], time_tolerance
             )
-            sample += part.start
-            if by != "jumps" and share == 0.0 and sample in (part.start, part.stop - 1):
-                sample, share = _find_rate_zero(sign * rate, sample, first=sample == part.start)
+            sample += cycle.start
+            if rule != "jumps" and fraction == 0.0 and sample in (cycle.start, cycle.stop - 1):
+                sample, fraction = _find_velocity_zero(
+                    sign * rate, sample, first=sample == cycle.start
+                )
             force_there = None
             if sample is not None:
-                force_there = _force_at_reversal(sign * slide, force, sample, share, value, by)
+                force_there = _force_at_reversal(sign * slide, force, sample, fraction, value, rule)
             pair.append(Reversal(sign * value, force_there))
-        out.append(tuple(pair))
-    return out
+        reversals.append(tuple(pair))
+    return reversals
 
 
 def _find_largest(time, y, v, time_tolerance: float) -> tuple:
-    """Find the maximum of a sampled quantity on the cubics through its values and rates.
+    """Find the maximum of a quantity on the cubics through its values and rates.
 
-    Returns the index of the sample before it, its value, and the fraction of the step to the next
-    sample.
+    Returns the index of the preceding sample, the maximum, and its position as a fraction of the step.
     """
-    top = int(np.argmax(y))
-    best = (top, float(y[top]), 0.0)
+    peak = int(np.argmax(y))
+    best = (peak, float(y[peak]), 0.0)
     step = np.diff(time)
-    # The maximum may lie on the cubic on either side of the largest sample.
-    for k in (top - 1, top):
+    # the maximum may lie on the cubic before or after the largest sample
+    for k in (peak - 1, peak):
         if not 0 <= k < step.size or step[k] <= time_tolerance or v[k] <= 0 or v[k + 1] >= 0:
             continue
         a = y[k]
@@ -117,13 +118,11 @@ def _find_largest(time, y, v, time_tolerance: float) -> tuple:
     return best
 
 
-def _find_rate_zero(v, sample: int, *, first: bool) -> tuple:
-    """Find the zero of a decreasing sampled rate (k,) next to a given sample.
+def _find_velocity_zero(v, sample: int, *, first: bool) -> tuple:
+    """Find the zero of a decreasing sampled velocity (k,) next to a given sample.
 
-    The step before the sample `at` is used if `first`, else the step after it.
-
-    Returns the index of a sample and the fraction of the step to the next one; (None, 0) if there
-    is no such point.
+    The zero is sought in the step before the sample if `first`, else in the step after it. Returns the index
+    of the preceding sample and the position as a fraction of the step; (None, 0) without a zero.
     """
     k = sample - 1 if first else sample
     if abs(v[sample]) <= REST_RATE_TOL * np.abs(v).max(initial=0.0):
@@ -134,42 +133,42 @@ def _find_rate_zero(v, sample: int, *, first: bool) -> tuple:
 
 
 def _force_at_reversal(
-    slide, force, sample: int, fraction: float, value: float, by: str
+    slide, force, sample: int, fraction: float, value: float, rule: str
 ) -> float | None:
-    """Return the friction force [N] at the largest displacement; None if it is unknown.
+    """Return the friction force [N] at the largest slide; None if it is unknown.
 
-    The largest slide lies at the fraction `share` of the step after sample `at`; `by` as in
+    The largest slide `value` lies at the fraction `fraction` of the step after a sample; the rule is as in
     `find_reversals`.
     """
-    if by == "rate":
+    if rule == "rate":
         return float(
             force[sample] + fraction * (force[min(sample + 1, len(force) - 1)] - force[sample])
         )
-    top = sample + int(fraction > 0 and slide[sample + 1] > slide[sample])
-    if by == "jumps":
-        return _force_around_rest(slide, force, top, value)
-    rise = slide[top] - slide[sample - 1] if fraction > 0 and sample > 0 else 0.0
+    peak = sample + int(fraction > 0 and slide[sample + 1] > slide[sample])
+    if rule == "jumps":
+        return _force_around_rest(slide, force, peak, value)
+    rise = slide[peak] - slide[sample - 1] if fraction > 0 and sample > 0 else 0.0
     if rise <= 0:
-        return float(force[top])
-    return float(force[top] + (force[top] - force[sample - 1]) * (value - slide[top]) / rise)
+        return float(force[peak])
+    return float(force[peak] + (force[peak] - force[sample - 1]) * (value - slide[peak]) / rise)
 
 
 def _force_around_rest(slide, force, sample: int, value: float) -> float | None:
-    """Return the mean friction force [N] before and after an interval of rest; None if unknown."""
+    """Return the mean of the friction forces [N] before and after an interval of rest, or None."""
     step = np.abs(np.diff(slide))
-    moves = step > MIN_REST_END_STEP * step.max(initial=0.0)
-    moves &= np.maximum(
+    is_moving = step > MIN_REST_END_STEP * step.max(initial=0.0)
+    is_moving &= np.maximum(
         np.abs(slide[1:] - value), np.abs(slide[:-1] - value)
     ) > COORDINATE_ROUND_OFF * np.abs(slide).max(initial=0.0)
-    before = np.flatnonzero(moves[:sample])
-    after = np.flatnonzero(moves[sample:])
+    before = np.flatnonzero(is_moving[:sample])
+    after = np.flatnonzero(is_moving[sample:])
     if not before.size or not after.size:
         return None
     return float(force[before[-1]] + force[sample + after[0] + 1]) / 2
 
 
 def mean_half_range(reversals) -> float:
-    """Return half the range of the displacement [m], averaged over the cycles."""
+    """Return half the range of the slide [m], averaged over the cycles."""
     if not reversals:
         return 0.0
     return float(np.mean([high.slide - low.slide for low, high in reversals])) / 2
@@ -178,7 +177,7 @@ def mean_half_range(reversals) -> float:
 def secant_stiffness(reversals) -> float | None:
     """Return the secant stiffness (F(q_max) - F(q_min))/2A [N/m], averaged over the cycles.
 
-    It is None if the displacement changes in no cycle, or if no cycle has both forces.
+    The result is None if the interface is at rest in all cycles, or if no cycle has both forces.
     """
     stiffnesses = []
     for low, high in reversals:
@@ -190,7 +189,7 @@ def secant_stiffness(reversals) -> float | None:
 def interface_loop(amplitude: float, q: complex, f: complex, work: float, stiffness: float) -> dict:
     """Return loop area, equivalent stiffness and equivalent damping of an interface as a dict.
 
-    The stiffness Re(F1/q1) refers to the first harmonic of the slide, as in harmonic balance.
+    The equivalent stiffness is Re(F1/q1), as in harmonic balance.
 
     Parameters
     ----------
@@ -201,17 +200,17 @@ def interface_loop(amplitude: float, q: complex, f: complex, work: float, stiffn
     work : float
         Friction work W per cycle [J].
     stiffness : float
-        K = moving_mass omega_1^2/slide_1^2 of the first mode as seen by the contact [N/m]; 0 omits
-        the damping.
+        Stiffness K = moving_mass omega_1^2/slide_1^2 of the first mode at the contact [N/m]; 0 if no
+        damping is computed.
 
     Returns
     -------
     dict
         "loop_area" [J], "equivalent_stiffness" [N/m] and "equivalent_damping" W/(2 pi K A^2) [1];
-        only those that have a value.
+        without measures that have no value.
     """
-    found = interface_loops(amplitude, q, f, work, stiffness)
-    return {name: float(value) for name, value in found.items() if not np.isnan(value)}
+    measures = interface_loops(amplitude, q, f, work, stiffness)
+    return {name: float(value) for name, value in measures.items() if not np.isnan(value)}
 
 
 def interface_loops(amplitude, q, f, work, stiffness) -> dict:
@@ -220,25 +219,25 @@ def interface_loops(amplitude, q, f, work, stiffness) -> dict:
     Parameters
     ----------
     amplitude, q, f, work, stiffness
-        See `interface_loop`; numbers or (n,).
+        Numbers or (n,); see `interface_loop`.
     """
-    moves = (np.asarray(amplitude) > 0) & (np.abs(q) > 0)
+    is_moving = (np.asarray(amplitude) > 0) & (np.abs(q) > 0)
     energy = 2 * np.pi * stiffness * np.square(amplitude)
-    has_damping = moves & (np.asarray(stiffness) > 0)
+    has_damping = is_moving & (np.asarray(stiffness) > 0)
     damping = np.where(has_damping, work / np.where(has_damping, energy, 1.0), np.nan)
     return {
         "loop_area": work,
-        "equivalent_stiffness": np.where(moves, (f / np.where(moves, q, 1.0)).real, np.nan),
+        "equivalent_stiffness": np.where(is_moving, (f / np.where(is_moving, q, 1.0)).real, np.nan),
         "equivalent_damping": damping,
     }
 
 
 def mean_drift(time, slide, rate, period: float) -> float:
-    """Return the displacement per cycle [m] by which the mean position moves in a window.
+    """Return the drift of the mean position per cycle [m].
 
-    It is the difference between the time means of the last and the first cycle, divided by the
-    number of cycles between them; below 1.5 cycles, the motion between the ends of the window per
-    cycle.
+    The drift is the difference between the time means of the last and the first cycle, divided by the number
+    of cycles between them. For windows below 1.5 cycles, it is the displacement between the ends of the
+    window, per cycle.
 
     Parameters
     ----------
@@ -259,9 +258,9 @@ def mean_drift(time, slide, rate, period: float) -> float:
 
 
 def time_mean(time, value, rate, begin: float, end: float) -> float:
-    """Return the time average of a quantity from cubics through its values and rates.
+    """Return the time average of a quantity on the cubics through its values and rates.
 
-    Each step contributes h (y0 + y1)/2 + h^2 (v0 - v1)/12, of fourth order at any spacing.
+    Each step contributes h (y0 + y1)/2 + h^2 (v0 - v1)/12, which is of fourth order at any spacing.
 
     Parameters
     ----------
@@ -270,18 +269,18 @@ def time_mean(time, value, rate, begin: float, end: float) -> float:
     begin, end : float
         Time span [s].
     """
-    near = EVENT_TIME_TOL * (end - begin)
-    part = slice(
-        np.searchsorted(time, begin - near), np.searchsorted(time, end + near, side="right")
+    time_tolerance = EVENT_TIME_TOL * (end - begin)
+    span = slice(
+        np.searchsorted(time, begin - time_tolerance),
+        np.searchsorted(time, end + time_tolerance, side="right"),
     )
-    t = time[part]
-    y = value[part]
-    v = rate[part]
+    t = time[span]
+    y = value[span]
+    v = rate[span]
     step = np.diff(t)
-    middle = t[0]
+    first_time = t[0]
     y = y - y[0]
     area = float(np.sum(step * (y[1:] + y[:-1]) / 2 + step**2 * (v[:-1] - v[1:]) / 12))
-    # The gaps between the ends of the span and the nearest samples have the values of these
-    # samples.
-    area += float(y[-1]) * (end - t[-1]) + float(y[0]) * (middle - begin)
-    return float(value[part][0]) + area / (end - begin)
+    # between the ends of the span and the nearest samples, the value is that of the samples
+    area += float(y[-1]) * (end - t[-1]) + float(y[0]) * (first_time - begin)
+    return float(value[span][0]) + area / (end - begin)

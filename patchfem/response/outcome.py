@@ -1,9 +1,8 @@
-"""Outcome of a coupled run, and the estimate of its steady amplitude.
+"""Outcome and steady amplitude of a coupled run.
 
-In: a Solution with the amplitudes and extremes of its cycles, its measures, the tolerance and
-the drive. Out: the outcome (`judge_outcome`), the steady amplitude with its error as a measure, and
-warnings. The kind of drive decides what steady means; `settling` has the criteria for many
-motions at once.
+In: a Solution with the amplitudes and extremes of its cycles, its measures, the tolerance and the
+drive. Out: the outcome (`judge_outcome`), the steady amplitude as a measure, and warnings. The
+definition of a steady motion depends on the kind of drive. `settling` has the vectorized criteria.
 """
 
 from dataclasses import replace
@@ -25,32 +24,36 @@ from .settling import (
     window_amplitude_means,
 )
 
-# Fraction of the tolerance; if the amplitude will still change by more, the page states the steady
-# estimate.
+# Smallest remaining change of the amplitude, as a fraction of the tolerance, at which the steady estimate is
+# reported.
 ESTIMATE_TOL = 0.02
 NOT_SETTLED_WARNING = "the interface sticks, but the amplitude has not settled"
 OPEN_LOOP = "the friction loop of the last cycle does not close"
-# Safety factor on the cycles that the decay needs, because the last amplitudes may beat.
+# Safety factor on the number of cycles for a decay, because the last amplitudes may beat.
 CYCLES_SAFETY_FACTOR = 1.5
 MAX_PROPOSED_CYCLES = 1e6  # Largest number of cycles that a message proposes.
-# Ratio of the change of the amplitude to the displacement a/omega^2 of the drive below which it is round-off.
+# Round-off of an amplitude relative to the displacement a/omega^2 of the drive.
 AMPLITUDE_ROUND_OFF = 1e-12
 
 
 def judge_outcome(
-    raw, measures: dict, tolerance: float, drive, level_cycles: float = 0.0, slowest: float = 0.0
+    solution,
+    measures: dict,
+    tolerance: float,
+    drive,
+    level_cycles: float = 0.0,
+    min_decay_rate: float = 0.0,
 ) -> tuple:
     """Classify the motion of a run, and add the steady amplitude to its measures.
 
-    - Periodic drive, and the last level of a drive in levels: the amplitudes of successive windows
-      decide (`classify_periodic`), and the free motion that remains in them (`remaining_free_motion`). A motion that is
-      steady to the tolerance, but will still change by more than ESTIMATE_TOL of it, has a steady estimate
-      as well. If a bounded motion is known to exist (`raw.bounded`), an increasing amplitude is not
-      GROWS.
-    - Release or step: steady once it is at rest, to the floor of its amplitude; else the same
-      amplitudes decide, but a release grows only if a mode gains energy.
-    - Sweep or recorded signal: it changes until the end, so the outcome is TRANSIENT without a
-      steady estimate, unless the interface sticks.
+    - Periodic drive, or last level of a drive in levels: the outcome follows from the amplitudes of
+      successive windows (`classify_periodic`) and the remaining free motion (`remaining_free_motion`). If a
+      steady motion will still change by more than ESTIMATE_TOL times the tolerance, the steady estimate is
+      added. If a bounded motion is known to exist (`solution.bounded`), an increasing amplitude is
+      TRANSIENT, not GROWS.
+    - Release or step: STEADY at rest, within the floor of the amplitude; otherwise as above, but a release
+      grows only if a mode gains energy.
+    - Sweep or recorded signal: TRANSIENT without a steady estimate, unless the interface sticks.
     - Random drive: DONE if both halves of the record have the same mean square.
 
     A motion whose midpoint drifts is not steady (`is_drifting`), nor is a stuck interface whose
@@ -58,42 +61,42 @@ def judge_outcome(
 
     Parameters
     ----------
-    raw : Solution
+    solution : Solution
     measures : dict
         Measures by name.
     tolerance : float
         Relative tolerance of the scene.
     drive
     level_cycles : float
-        Cycles of each level; 0 without levels.
-    slowest : float
-        Rate at which the slowest mode decays [1/s]; negative if a mode gains energy.
+        Number of cycles per level; 0 without levels.
+    min_decay_rate : float
+        Smallest decay rate of a mode [1/s]; negative if a mode gains energy.
     """
     if (
-        raw.outcome is Outcome.STUCK
+        solution.outcome is Outcome.STUCK
         and not hasattr(drive, "band")
-        and is_still_loading(raw.window, drive.period, tolerance)
+        and is_still_loading(solution.window, drive.period, tolerance)
     ):
         return Outcome.TRANSIENT, measures
-    if raw.outcome is not None:
-        return raw.outcome, measures
+    if solution.outcome is not None:
+        return solution.outcome, measures
     if hasattr(drive, "band"):
-        is_stationary = stationary.is_steady(raw.window, drive)
+        is_stationary = stationary.is_stationary(solution.window, drive)
         return Outcome.DONE if is_stationary else Outcome.TRANSIENT, measures
     if not drive.segments and drive_sizes.count_repeat_cycles(drive) is None:
         return Outcome.TRANSIENT, measures
-    # several tones, of which each window contains whole beats
+    # for several tones, each window contains whole beats
     floor = (
         AMPLITUDE_ROUND_OFF
         * drive_sizes.find_max_acceleration(drive)
         / drive_sizes.find_drive_omega(drive) ** 2
     )
     if not drive.segments and not drive_sizes.is_periodic(drive):
-        outcome = classify(raw.amplitudes, tolerance, floor)
+        outcome = classify(solution.amplitudes, tolerance, floor)
         return outcome, remove_errors(measures) if outcome is Outcome.GROWS else measures
-    amplitudes = raw.amplitudes
-    extremes = raw.extremes
-    window = max(1, round((raw.window.time[-1] - raw.window.time[0]) / drive.period))
+    amplitudes = solution.amplitudes
+    extremes = solution.extremes
+    window = max(1, round((solution.window.time[-1] - solution.window.time[0]) / drive.period))
     if level_cycles:
         amplitudes = amplitudes[-max(1, int(level_cycles / window)) :]
         extremes = None if extremes is None else extremes[-int(level_cycles) :]
@@ -103,7 +106,7 @@ def judge_outcome(
             outcome = classify(amplitudes, tolerance, floor)
             drift = _midpoint_drift(extremes, window)
             outcome = _reject_drifting(outcome, measures, tolerance, drift)
-        if outcome is Outcome.GROWS and not drive.segments[-1].constant and slowest >= 0:
+        if outcome is Outcome.GROWS and not drive.segments[-1].constant and min_decay_rate >= 0:
             outcome = Outcome.TRANSIENT
         return outcome, remove_errors(measures) if outcome is Outcome.GROWS else measures
     number, steady, error = (
@@ -112,9 +115,9 @@ def judge_outcome(
             np.asarray(amplitudes, float)[None],
             None if extremes is None else np.asarray(extremes)[None],
             window,
-            [np.array([np.nan if one is None else one]) for one in raw.steady],
-            (tolerance, floor, max(slowest, 0.0) * window * drive.period),
-            raw.bounded,
+            [np.array([np.nan if one is None else one]) for one in solution.steady],
+            (tolerance, floor, max(min_decay_rate, 0.0) * window * drive.period),
+            solution.bounded,
         )
     )
     outcome = _reject_drifting(CLASSES[number], measures, tolerance)
@@ -134,32 +137,39 @@ def judge_outcome(
 
 
 def is_drifting(drift, error, amplitude, tolerance, floor) -> np.ndarray:
-    """Return whether the midpoint of a motion moves by more than the tolerance in a cycle.
+    """Return whether the midpoint of a motion drifts by more than the tolerance per cycle.
 
     Parameters
     ----------
     drift, error : float or (n,)
-        Motion of the midpoint per cycle and its error [m].
+        Drift of the midpoint per cycle and its error [m].
     amplitude : float or (n,)
-        Amplitude [m], of which the tolerance is a fraction.
+        Amplitude to which the tolerance refers [m].
     tolerance : float
     floor : float or (n,)
-        Smallest drift that counts [m].
+        Largest drift that is round-off [m].
     """
     return np.abs(drift) > tolerance * np.abs(amplitude) + error + floor
 
 
 def _midpoint_drift(extremes, window: int) -> float:
-    """Return the displacement per cycle [m] of the midpoint of the motion in the last windows.
+    """Return the drift per cycle [m] of the midpoint of the motion in the last two windows.
 
-    It is inf if they are not known. For a belt, a window contains whole stick-slip cycles, whereas
-    a cycle of the drive does not. extremes: (c, 2) [m] per cycle.
+    On a belt, a window contains complete stick-slip cycles, whereas a cycle of the drive does not. The
+    result is inf with fewer than two windows.
+
+    Parameters
+    ----------
+    extremes : (c, 2)
+        Smallest and largest output of each cycle [m].
+    window : int
+        Number of cycles per window.
     """
     if extremes is None or len(extremes) < 2 * window:
         return np.inf
-    part = np.asarray(extremes)[-2 * window :].reshape(2, window, 2)
-    middle = (part[..., 0].min(axis=1) + part[..., 1].max(axis=1)) / 2
-    return float(middle[1] - middle[0]) / window
+    windows = np.asarray(extremes)[-2 * window :].reshape(2, window, 2)
+    midpoints = (windows[..., 0].min(axis=1) + windows[..., 1].max(axis=1)) / 2
+    return float(midpoints[1] - midpoints[0]) / window
 
 
 def _reject_drifting(
@@ -167,49 +177,49 @@ def _reject_drifting(
 ) -> Outcome:
     """Return TRANSIENT instead of STEADY if the midpoint of the motion drifts.
 
-    It must move both from cycle to cycle (`drift_per_cycle`) and from window to window (`middle`
-    [m] per cycle).
+    It drifts if both the drift from cycle to cycle (`drift_per_cycle`) and the drift from window to window
+    (`window_drift`, [m] per cycle) exceed the tolerance.
     """
     drift = measures.get("drift_per_cycle")
     amplitude = measures["relative_displacement_amplitude"]
     if outcome is not Outcome.STEADY or drift is None or drift.value is None:
         return outcome
-    moves = is_drifting(
+    drifts = is_drifting(
         min(abs(drift.value), abs(window_drift)),
         drift.error or 0.0,
         amplitude.value,
         tolerance,
         drift.floor,
     )
-    return Outcome.TRANSIENT if moves else outcome
+    return Outcome.TRANSIENT if drifts else outcome
 
 
 def remove_errors(measures: dict) -> dict:
-    """Remove the errors of the measures of a growing motion, whose later values differ anyway."""
-    return {name: replace(one, error=None) for name, one in measures.items()}
+    """Return the measures of a growing motion without errors, because later values differ anyway."""
+    return {name: replace(measure, error=None) for name, measure in measures.items()}
 
 
 def classify_periodic(
     amplitudes, extremes, window: int, steady, limits: tuple, bounded=False
 ) -> tuple:
-    """Classify motions under periodic drives and estimate their steady amplitudes.
+    """Classify n motions under periodic drives, and estimate their steady amplitudes.
 
-    A motion is steady only if the change to its steady estimate and the free motion that remains in
-    it are both within the tolerance: near a maximum of its beat the amplitude hardly changes from
-    window to window, although it is far from steady.
+    A motion is steady only if both the difference from its steady estimate and the remaining free motion are
+    within the tolerance. The change from window to window alone is no criterion, because it is small near the
+    maximum of a beat.
 
     Parameters
     ----------
     amplitudes : (n, w)
         Amplitudes of successive windows [m].
     extremes : (n, c, 2) or None
-        Smallest and largest output of each cycle [m]; None if not known.
+        Smallest and largest output of each cycle [m]; None if unknown.
     window : int
-        Cycles of a window.
+        Number of cycles per window.
     steady : tuple
         Values and errors (n,) [m] of `settling.extrapolate_steady_amplitudes`; NaN for none.
     limits : tuple
-        Tolerance, floor [m], and decay of the slowest mode over a window [1]; numbers or (n,).
+        Tolerance, floor [m], and logarithmic decay of the slowest mode over a window [1]; numbers or (n,).
     bounded : bool or (n,)
         Whether a bounded motion is known to exist (see `Solution`).
 
@@ -233,8 +243,7 @@ def classify_periodic(
         mean, mean_error = beat_mean_amplitudes(extremes, window)
         value = np.where(is_unknown, mean, value)
         error = np.where(is_unknown, mean_error, error)
-        # Without a visible transient, the steady amplitude is the mean over the cycles of the last
-        # window.
+        # without a visible transient, the steady amplitude is the mean over the cycles of the last window
         is_unknown = np.isnan(value) & (classes == STEADY_CLASS)
         value = np.where(is_unknown, window_amplitude_means(extremes, window)[1][:, -1], value)
         error = np.where(is_unknown, free_motion + np.abs(last - value), error)
@@ -242,14 +251,14 @@ def classify_periodic(
 
 
 def is_still_changing(steady, error, amplitude, tolerance) -> np.ndarray:
-    """Return whether a motion will still change noticeably although it meets the tolerance.
+    """Return whether a motion that meets the tolerance will still change noticeably.
 
-    The limit is the fraction ESTIMATE_TOL of the tolerance.
+    The limit is ESTIMATE_TOL times the tolerance.
 
     Parameters
     ----------
     steady, error : float or (n,)
-        Steady estimate and its error [m].
+        Steady amplitude and its error [m].
     amplitude : float or (n,)
         Amplitude of the last cycles [m].
     tolerance : float
@@ -263,19 +272,19 @@ def steady_estimate_error(steady, error, amplitude, amplitude_error):
     Parameters
     ----------
     steady, error : float or (n,)
-        Steady estimate and its error by extrapolation [m].
+        Steady amplitude and its error by extrapolation [m].
     amplitude, amplitude_error : float or (n,)
-        Amplitude of the last cycles and its error [m], which is scaled by the ratio of both
-        amplitudes.
+        Amplitude of the last cycles and its error [m]; the relative error is the same for the steady
+        amplitude.
     """
     return error + amplitude_error * steady / np.maximum(np.abs(amplitude), 1e-300)
 
 
 def is_still_loading(window, period: float, tolerance: float) -> bool:
-    """Return whether the friction force of a sticking interface still increases, as on a belt.
+    """Return whether the friction force of a stuck interface still increases, as on a belt.
 
-    The mean of the last cycle must exceed that of the first by more than the tolerance times the
-    largest force. In a window of one cycle, the force must increase throughout.
+    The mean force of the last cycle must exceed that of the first by more than the tolerance times the
+    largest force. In a window of one cycle, the force must increase monotonically.
 
     Parameters
     ----------
@@ -293,10 +302,12 @@ def is_still_loading(window, period: float, tolerance: float) -> bool:
     )
     largest_force = np.abs(forces).max(axis=0)
     if time[-1] - time[0] < 1.5 * period:
-        size = np.abs(forces)
-        rises = np.all(np.diff(size, axis=0) >= -1e-9 * largest_force, axis=0)
-        return bool(np.any(rises & (size[-1] - size[0] > tolerance * largest_force)))
-    # Without this factor, round-off at the end of a cycle would leave out a step.
+        magnitude = np.abs(forces)
+        is_increasing = np.all(np.diff(magnitude, axis=0) >= -1e-9 * largest_force, axis=0)
+        return bool(
+            np.any(is_increasing & (magnitude[-1] - magnitude[0] > tolerance * largest_force))
+        )
+    # this factor includes a step whose end lies at the end of a cycle within round-off
     near = period * (1 + 1e-9)
     first = time <= time[0] + near
     last = time >= time[-1] - near
@@ -311,16 +322,14 @@ def check_piece_length(
 ) -> Outcome | None:
     """Return LEAVES_CONTACT if the displacement exceeds the piece length, else the outcome.
 
-    From that instant on nothing overlaps, so this outcome replaces any later one: steady, growing,
-    or at the stop of the flexure, which would have ended the run earlier if it were nearer. A
-    motion that grows without having passed the end of the piece remains GROWS. NOT_CONVERGED is
-    kept, because its slide means nothing.
+    Beyond this displacement, the pieces do not overlap, so that the outcome of the later motion has no
+    meaning. NOT_CONVERGED is not replaced, because its displacement has no meaning either.
 
     Parameters
     ----------
     outcome : Outcome or None
     max_displacement : float
-        Largest |slide| of the run [m].
+        Largest absolute slide of the run [m].
     length : float
         Length of the piece [m].
     """
@@ -329,69 +338,70 @@ def check_piece_length(
     return outcome
 
 
-def warn_if_ringing(raw, measures: dict, limits: tuple, drive, cycles: float) -> list:
-    """Return a warning, as a list, if the interface sticks but the amplitude still decays.
+def warn_if_ringing(solution, measures: dict, limits: tuple, drive, cycles: float) -> list:
+    """Return a list with a warning if the interface sticks but the amplitude still decays.
 
-    The warning states by how much the amplitude of the last window will change, and after how many
-    cycles a free motion with the slowest decay is below the tolerance.
+    The warning contains the remaining change of the amplitude, and the number of cycles after which a free
+    motion of the slowest mode is below the tolerance.
 
     Parameters
     ----------
-    raw : Solution
+    solution : Solution
     measures : dict
+        Measure by name.
     limits : tuple
-        Tolerance, and rate at which the slowest mode decays [1/s].
+        Tolerance, and decay rate of the slowest mode [1/s].
     drive
     cycles : float
-        Cycles of the run.
+        Number of cycles of the run.
     """
-    tolerance, slowest = limits
+    tolerance, min_decay_rate = limits
     amplitude = measures["relative_displacement_amplitude"]
-    if raw.outcome is not Outcome.STUCK or raw.extremes is None:
+    if solution.outcome is not Outcome.STUCK or solution.extremes is None:
         return []
     if not drive_sizes.is_periodic(drive) or not amplitude.value:
         return []
-    window = max(1, round((raw.window.time[-1] - raw.window.time[0]) / drive.period))
-    decay = slowest * drive.period
-    free_vibration = float(remaining_ringing(np.asarray(raw.extremes), window, decay))
+    window = max(1, round((solution.window.time[-1] - solution.window.time[0]) / drive.period))
+    decay = min_decay_rate * drive.period
+    free_vibration = float(remaining_ringing(np.asarray(solution.extremes), window, decay))
     sizes = (amplitude.value, amplitude.floor)
     return warn_of_ringing(free_vibration, sizes, (tolerance, decay), cycles)
 
 
 def remaining_ringing(extremes, window: int, decay):
-    """Return the part [m] of the amplitude that is free vibration while the interface sticks.
+    """Return the part of the amplitude [m] that is free vibration of a stuck interface.
 
-    It is `remaining_free_motion`, but not less than the change of the last window.
+    The result is `remaining_free_motion`, but at least the change of the amplitude in the last window.
 
     Parameters
     ----------
     extremes : (..., c, 2)
         Smallest and largest output of each cycle [m].
     window : int
-        Cycles of a window.
+        Number of cycles per window.
     decay : (...)
-        Decay of the slowest mode over a cycle [1].
+        Logarithmic decay of the slowest mode over a cycle [1].
     """
-    ends = window_amplitude_means(extremes, window)[0]
+    amplitudes = window_amplitude_means(extremes, window)[0]
     free_motion = remaining_free_motion(extremes, window, np.maximum(decay, 0.0) * window)
-    if ends.shape[-1] < 2:
+    if amplitudes.shape[-1] < 2:
         return free_motion
-    return np.maximum(free_motion, np.abs(ends[..., -1] - ends[..., -2]))
+    return np.maximum(free_motion, np.abs(amplitudes[..., -1] - amplitudes[..., -2]))
 
 
 def warn_of_ringing(free_vibration: float, sizes: tuple, limits: tuple, cycles: float) -> list:
-    """Return a warning, as a list, on the free vibration of a sticking interface.
+    """Return a list with a warning on the free vibration of a stuck interface, if it is large.
 
     Parameters
     ----------
     free_vibration : float
-        Free vibration in the amplitude [m] (see `remaining_ringing`).
+        Part of the amplitude that is free vibration [m] (see `remaining_ringing`).
     sizes : tuple
         Amplitude and its floor [m].
     limits : tuple
-        Tolerance, and decay of the slowest mode over a cycle [1].
+        Tolerance, and logarithmic decay of the slowest mode over a cycle [1].
     cycles : float
-        Cycles of the run.
+        Number of cycles of the run.
     """
     amplitude, floor = sizes
     tolerance, decay = limits
@@ -399,21 +409,21 @@ def warn_of_ringing(free_vibration: float, sizes: tuple, limits: tuple, cycles: 
         return []
     ratio = free_vibration / amplitude
     more_cycles = np.log(ratio / tolerance) / decay if decay > 0 else np.inf
-    remedy = 'set accuracy.method = "harmonic" for the steady motion'
+    advice = 'set accuracy.method = "harmonic" for the steady motion'
     if more_cycles < MAX_PROPOSED_CYCLES:
         proposed = float(f"{cycles + CYCLES_SAFETY_FACTOR * more_cycles:.2g}")
-        remedy = f"set drive.cycles = {proposed:g}"
+        advice = f"set drive.cycles = {proposed:g}"
     return [
         f"{NOT_SETTLED_WARNING}: by up to {100 * free_vibration / amplitude:.2g} % (limit "
         f"{100 * tolerance:g} %) it is free vibration that will decay, so "
-        f"relative_displacement_amplitude is that of a transient; {remedy}"
+        f"relative_displacement_amplitude is that of a transient; {advice}"
     ]
 
 
 def note_on_changing_drive(outcome: Outcome, drive) -> list:
-    """Return a note, as a list, on measures under a drive that changes until the end.
+    """Return a list with a note if the drive changes until the end of the run.
 
-    The list is empty for other drives.
+    The list is empty for all other drives.
     """
     if (
         outcome is not Outcome.TRANSIENT
@@ -430,9 +440,9 @@ def note_on_changing_drive(outcome: Outcome, drive) -> list:
 def estimate_steady(drive, amplitudes, phasors) -> tuple:
     """Return the steady amplitude [m] and its error; (None, None) without a periodic drive.
 
-    A released or struck rig comes to rest, so its amplitudes are not extrapolated. Under a drive
-    that is not sinusoidal the motion may have no first harmonic, so the amplitudes are extrapolated
-    instead of the phasors.
+    The amplitudes of a released or struck rig are not extrapolated, because it comes to rest. Under a drive
+    that is not sinusoidal, the amplitudes are extrapolated instead of the phasors, because the motion may
+    have no first harmonic.
 
     Parameters
     ----------

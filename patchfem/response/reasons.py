@@ -1,7 +1,7 @@
-"""Reasons why a run has no value of a measure: sentences that replace the value.
+"""Reasons why a run has no value of a measure.
 
-In: the measures that a run has, its window and its drive. Out: measures without a value by
-name, each with its reason.
+In: the measures of a run, its window and its drive. Out: measures without a value by name, each with
+the reason as a sentence.
 """
 
 from dataclasses import replace
@@ -15,7 +15,7 @@ from .measures import lateral_history
 from .rows import TABLE
 
 ACCELERATIONS = ("absolute_acceleration_fundamental", "acceleration_distortion")
-# Displacement fraction of other modes [1] above which the damping ratio is not that of mode 1.
+# Largest fraction of other modes in the slide at which the damping ratio belongs to mode 1.
 MAX_OTHER_MODES_FRACTION = 0.05
 IN_PLANE_REASON = (
     "the interface slides in a plane, but this measure is defined only for one direction"
@@ -50,41 +50,50 @@ OPEN_LOOP_REASON = (
 def find_missing(
     values, window, drive, has_loaded_interface: bool, other_modes_fraction: float = 0.0
 ) -> dict:
-    """Return the measures of a run that have no value, each with the reason, as a dict.
+    """Return the measures without a value of a run, each with the reason, by name.
 
     Parameters
     ----------
     values : dict
-        Value or Measure by name of those that the run has.
+        Values or Measures of the run by name.
     window : Response
         Last cycles.
     drive
     has_loaded_interface : bool
         Whether an interface carries a load.
     other_modes_fraction : float
-        Fraction of the slide that modes other than the first carry [1].
+        Fraction of the slide due to modes other than the first [1].
     """
-    lacking = {}
+    reasons = {}
     for name in CYCLE_MEASURES if has_loaded_interface else ACCELERATIONS:
-        lacking[name] = _reason_for_missing_cycle_value(
+        reasons[name] = _reason_for_missing_cycle_value(
             name, values, window, drive, other_modes_fraction
         )
     if hasattr(drive, "band"):
-        lacking |= dict.fromkeys(
+        reasons |= dict.fromkeys(
             ("response_frequency", "response_damping"),
             "the frequency response (H1) has no peak within the frequency band of the drive",
         )
     if has_loaded_interface:
-        lacking["slip_start_phase"] = _reason_for_missing_phase(values, drive)
-    names = [name for name in lacking if name not in values]
-    return {name: _make_missing_measure(name, lacking[name]) for name in names}
+        reasons["slip_start_phase"] = _reason_for_missing_phase(values, drive)
+    names = [name for name in reasons if name not in values]
+    return {name: _make_missing_measure(name, reasons[name]) for name in names}
 
 
 def find_missing_secant(values) -> dict:
     """Return the secant stiffness without a value if the friction force is not unique.
 
-    The force of rigid friction takes many values if the interface sticks at the largest slide.
-    values: Measure by name. The result is a dict by name; {} if the value remains.
+    The force of rigid friction is undetermined if the interface sticks at the largest slide.
+
+    Parameters
+    ----------
+    values : dict
+        Measure by name.
+
+    Returns
+    -------
+    dict
+        Measure by name; {} if the value remains valid.
     """
     secant = values.get("secant_stiffness")
     stick_fraction = values.get("stick_fraction")
@@ -96,7 +105,7 @@ def find_missing_secant(values) -> dict:
 
 
 def find_missing_steady(values, outcome: Outcome, drive) -> dict:
-    """Return the steady amplitude without a value if a transient hides it.
+    """Return the steady amplitude without a value if a transient cannot be extrapolated.
 
     Parameters
     ----------
@@ -108,7 +117,7 @@ def find_missing_steady(values, outcome: Outcome, drive) -> dict:
     Returns
     -------
     dict
-        Measure by name; {} for a drive that is not periodic.
+        Measure by name; {} if the value exists or the drive is not periodic.
     """
     is_known = STEADY_AMPLITUDE in values
     if is_known or outcome is not Outcome.TRANSIENT or not is_periodic(drive):
@@ -117,21 +126,31 @@ def find_missing_steady(values, outcome: Outcome, drive) -> dict:
 
 
 def _make_missing_measure(name: str, reason: str) -> Measure:
-    """Return a measure that has no value but a reason for this."""
+    """Return a measure without a value, with the reason."""
     row = TABLE[name]
     return Measure(None, row.unit, None, row.floor, reason=reason)
 
 
 def _remove_value(measure: Measure, reason: str) -> Measure:
-    """Return a measure whose value is replaced by the reason why there is none."""
+    """Return a measure with a reason in place of its value."""
     return replace(measure, value=None, error=None, reason=reason)
 
 
 def find_missing_drift(values, drive) -> dict:
     """Return the drift without a value if the drive is not periodic.
 
-    Means over time spans other than a period differ without any drift. values: Measure by name.
-    The result is a dict by name; {} if the value remains.
+    Without a period, mean values differ even if there is no drift.
+
+    Parameters
+    ----------
+    values : dict
+        Measure by name.
+    drive
+
+    Returns
+    -------
+    dict
+        Measure by name; {} if the value remains valid.
     """
     drift = values.get("drift_per_cycle")
     if drift is None or is_periodic(drive):
@@ -141,7 +160,7 @@ def find_missing_drift(values, drive) -> dict:
 
 
 def find_missing_unbounded(values) -> dict:
-    """Return all measures except the load without values if no bounded motion exists."""
+    """Return all measures except the load without values, for a motion without a bound."""
     out = {name: _remove_value(measure, UNBOUNDED_REASON) for name, measure in values.items()}
     if "normal_load" in values:
         out["normal_load"] = replace(values["normal_load"], error=None)
@@ -151,11 +170,11 @@ def find_missing_unbounded(values) -> dict:
 def find_missing_loops(values, window, drive) -> dict:
     """Return the areas of friction loops without values if the loops do not close.
 
-    The result is {} if all loops close. The work per cycle is reported as a loss. If nothing forces
-    the motion to repeat, as after a release, the interface also returns or stores energy: if this
-    exceeds the dissipation, the work is not a loss. The energies of several interfaces are known
-    only in sum: a loop does not close if its interface returns more than it takes while none
-    creates energy.
+    The area of a closed loop is the dissipated energy. In a motion that is not periodic, as after a
+    release, the interface also stores or returns energy. If this exceeds the dissipation, the area has no
+    meaning. For several interfaces, only the sum of the energies is known: a loop does not close if its
+    interface returns more energy than it takes although no energy is created. If all loops close, the
+    result is {}.
 
     Parameters
     ----------
@@ -169,14 +188,14 @@ def find_missing_loops(values, window, drive) -> dict:
     loop = values.get("loop_area")
     if ledger is None or loop is None or is_periodic(drive):
         return {}
-    _, stored, lost, created = np.abs(ledger[:, -1] - ledger[:, 0])
+    _, stored, dissipated, created = np.abs(ledger[:, -1] - ledger[:, 0])
     names = [name for name in values if name.startswith("loop_area")]
     open_names = []
     if len(names) == 1:
         cycles = (window.time[-1] - window.time[0]) / drive.period
-        if stored > max(lost, loop.floor * cycles):
+        if stored > max(dissipated, loop.floor * cycles):
             open_names = names
-    elif created <= 1e-9 * (stored + lost):
+    elif created <= 1e-9 * (stored + dissipated):
         for name in names:
             area = values[name]
             if area.value < -max(area.error or 0.0, area.floor):
@@ -185,13 +204,13 @@ def find_missing_loops(values, window, drive) -> dict:
 
 
 def _reason_for_missing_phase(values, drive) -> str:
-    """Return the reason why the phase at the start of slip has no value."""
+    """Return the reason why the phase of slip onset has no value."""
     if not is_sinusoidal(drive):
         return "the drive is not a sine at the end of the run, so the start of slip has no phase"
-    stuck = getattr(values.get("stick_fraction"), "value", values.get("stick_fraction"))
-    if stuck == 1.0:
+    stick_fraction = getattr(values.get("stick_fraction"), "value", values.get("stick_fraction"))
+    if stick_fraction == 1.0:
         return f"{ALWAYS_STICKS_REASON}, so no slip starts"
-    if stuck:
+    if stick_fraction:
         return "slip does not start at one phase of the half cycles: it starts several times, or not in all of them"
     return "the interface never sticks in the last cycles, so slip never starts after stick"
 
@@ -199,7 +218,7 @@ def _reason_for_missing_phase(values, drive) -> str:
 def _reason_for_missing_cycle_value(
     name: str, values, window, drive, other_modes_fraction: float
 ) -> str:
-    """Return the reason why a cycle measure has no value under sinusoidal drive."""
+    """Return the reason why a cycle measure has no value."""
     if not is_sinusoidal(drive):
         return "this measure exists only for a drive that is a sine at the end of the run"
     if not has_full_cycle(window.time[-1] - window.time[0], drive):

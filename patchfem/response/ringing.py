@@ -1,9 +1,9 @@
-"""Free vibration of a rig while an interface sticks, fitted as decaying sinusoids.
+"""Free vibration (ringing) of a rig during stick, fitted by decaying sinusoids.
 
 In: a signal during the stick intervals of a window. Out: `ring_frequency`, `ring_damping` and their
-errors. The model is a sum of decaying sinusoids, the forced sine and a constant. Frequency and
-decay enter nonlinearly, all else linearly (variable projection, Golub and Pereyra, 1973). Up to
-three sinusoids are fitted together, and the one with the most energy is kept. Without a sinusoid,
+errors. The model is a sum of decaying sinusoids, a forced sine and a constant. It is nonlinear only in
+the frequencies and decay rates (variable projection, Golub and Pereyra, 1973). Up to three sinusoids
+are fitted, and the one with the largest energy is the ringing. Without a sinusoidal drive,
 `compute_stuck_vibration` computes the sinusoids from the eigenvalues of the rig.
 """
 
@@ -15,38 +15,38 @@ import numpy as np
 
 from .. import compiled
 
-# Smallest number of ringing periods in a stick interval; with fewer, frequency and decay correlate.
+# Smallest number of ringing periods in a stick interval; with fewer, frequency and decay are correlated.
 MIN_PERIODS = 1.5
 MIN_SAMPLES = 16
-MAX_SAMPLES = 600  # Largest number of samples of a fit; more take longer and change nothing.
-MAX_STICKS = 20  # Largest number of stick intervals that are fitted; the longest ones are used.
+MAX_SAMPLES = 600  # Largest number of samples of a fit; more do not change the result.
+MAX_STICKS = 20  # Largest number of fitted stick intervals; the last ones are used.
 MAX_SINUSOIDS = 3  # Largest number of decaying sinusoids of a fit.
-SAMPLES_PER_PERIOD = 24  # Number of samples per ringing period that are sufficient for a fit.
-# Ratio of the sinusoid to the largest value of the signal below which there is no ringing.
+SAMPLES_PER_PERIOD = 24  # Sufficient number of samples per ringing period for a fit.
+# Smallest amplitude of ringing relative to the largest value of the signal.
 MIN_SINUSOID = 1e-6
 MAX_RESIDUAL = 0.1  # Largest ratio of the rms residual to the rms ringing [1].
 MAX_DAMPING_RATIO = 0.5  # Largest damping ratio that counts as ringing [1].
-# Ratio of the residual to the signal without the forced sinusoid below which no other start is tried.
+# Largest relative residual of a fit at which no other initial guess is tried.
 EXACT_RESIDUAL = 1e-9
 FLOAT_EPSILON = float(np.finfo(float).eps)
-# CPU time [s] of a fit evaluation in Python per sample and squared number of columns.
+# CPU time of a residual evaluation in Python per sample and squared number of columns [s].
 SECONDS_PER_TERM = 8e-7
-EVALUATIONS_PER_FIT = 2.0  # Number of evaluations of a fit, for the estimate of its cost.
+EVALUATIONS_PER_FIT = 2.0  # Number of evaluations per fit in the cost estimate.
 KERNELS_MODULE = "response.ringing_kernels"
 MAX_STEPS = 60  # Largest number of iteration steps of a fit.
-# Fraction of MIN_PERIODS; a shorter fit with a residual below EXACT_RESIDUAL is refused, so it is
-# not refined.
+# Smallest number of periods of a sinusoid that is refined to round-off, relative to MIN_PERIODS; a slower one
+# is not accepted as ringing.
 MIN_REFINED_FRACTION = 0.9
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Ringing:
-    """Decaying sinusoid of the free vibration while the interface sticks.
+    """Decaying sinusoid of the free vibration during stick.
 
     - frequency: frequency of the damped motion [Hz].
     - damping: damping ratio [1].
     - amplitude: amplitude at the start [unit of the signal].
-    - errors: errors of frequency [Hz] and damping [1].
+    - errors: errors of frequency [Hz] and damping ratio [1].
     """
 
     frequency: float
@@ -56,9 +56,9 @@ class Ringing:
 
 
 def fit_ringing(time, value, omega: float = 0.0, size: float | None = None) -> Ringing | None:
-    """Fit the free vibration of a signal in a stick interval; None if there is none.
+    """Fit the free vibration of a signal in a stick interval; None without ringing.
 
-    A line at a harmonic of the drive that does not decay is forced motion and no ringing.
+    An undamped line at a harmonic of the drive is forced motion and does not count as ringing.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def fit_ringing(time, value, omega: float = 0.0, size: float | None = None) -> R
     omega : float
         Angular frequency of a forced sine [rad/s]; 0 for none.
     size : float, optional
-        Largest value of the signal in the rest of the window.
+        Largest absolute value of the signal in the whole window.
     """
     if np.size(time) < MIN_SAMPLES:
         return None
@@ -76,71 +76,76 @@ def fit_ringing(time, value, omega: float = 0.0, size: float | None = None) -> R
     if time.size < MIN_SAMPLES or size == 0:
         return None
     columns = _make_forced_columns(time, omega)
-    rest = value - columns @ np.linalg.lstsq(columns, value, rcond=1e-12)[0]
-    if np.abs(rest).max() <= MIN_SINUSOID * size:
+    unforced = value - columns @ np.linalg.lstsq(columns, value, rcond=1e-12)[0]
+    if np.abs(unforced).max() <= MIN_SINUSOID * size:
         return None
-    # The first part of a long stick interval is used, because the ringing decays.
+    # of a long stick interval, the beginning is used, because the ringing decays
     if time.size > MAX_SAMPLES:
-        # A stride keeps no more samples per period than the ringing needs.
+        # the stride reduces the samples to SAMPLES_PER_PERIOD per ringing period
         stride = max(
             1,
             int(
                 2
                 * np.pi
-                / _find_largest_line(time, rest)
+                / _find_largest_line(time, unforced)
                 / (time[1] - time[0])
                 / SAMPLES_PER_PERIOD
             ),
         )
-        time, value, columns, rest = (
-            part[::stride][:MAX_SAMPLES].copy() for part in (time, value, columns, rest)
+        time, value, columns, unforced = (
+            part[::stride][:MAX_SAMPLES].copy() for part in (time, value, columns, unforced)
         )
     span = time[-1]
-    found = _fit_all_sinusoids(time, value, columns, rest)
-    if found is None:
+    fit = _fit_all_sinusoids(time, value, columns, unforced)
+    if fit is None:
         return None
-    poles, sigma, _ = found
-    left, shares = _subtract_sinusoids(time, value, columns, poles)
-    k = int(np.argmax([np.sum(part**2) for part in shares]))
-    own, rate = poles[2 * k : 2 * k + 2]
-    amplitude = float(np.abs(shares[k]).max())
-    damping = float(rate / np.hypot(rate, own))
-    seen = span * own >= 2 * np.pi * MIN_PERIODS and own * np.diff(time).max() < np.pi / 2
-    steady = (
+    poles, sigma, _ = fit
+    residual, sinusoids = _subtract_sinusoids(time, value, columns, poles)
+    k = int(np.argmax([np.sum(part**2) for part in sinusoids]))
+    ring_omega, rate = poles[2 * k : 2 * k + 2]
+    amplitude = float(np.abs(sinusoids[k]).max())
+    damping = float(rate / np.hypot(rate, ring_omega))
+    is_resolved = (
+        span * ring_omega >= 2 * np.pi * MIN_PERIODS
+        and ring_omega * np.diff(time).max() < np.pi / 2
+    )
+    is_forced = (
         omega > 0
         and span * omega > 3 * np.pi
         and abs(damping) < 1e-3
-        and abs(own / omega - round(own / omega)) < 1e-2
+        and abs(ring_omega / omega - round(ring_omega / omega)) < 1e-2
     )
     if (
-        not seen
-        or steady
+        not is_resolved
+        or is_forced
         or amplitude <= MIN_SINUSOID * size
         or not -0.02 < damping < MAX_DAMPING_RATIO
-        or np.sqrt(np.mean(left**2)) > MAX_RESIDUAL * np.sqrt(np.mean(shares[k] ** 2))
+        or np.sqrt(np.mean(residual**2)) > MAX_RESIDUAL * np.sqrt(np.mean(sinusoids[k] ** 2))
     ):
         return None
-    few = poles
+    thinned_poles = poles
     if time.size >= 2 * MIN_SAMPLES:
-        few = _refine_poles(time[::2].copy(), value[::2].copy(), columns[::2], poles).poles
-    apart = np.abs(few - poles)[2 * k : 2 * k + 2] + 2 * sigma[2 * k : 2 * k + 2]
+        thinned_poles = _refine_poles(
+            time[::2].copy(), value[::2].copy(), columns[::2], poles
+        ).poles
+    pole_errors = np.abs(thinned_poles - poles)[2 * k : 2 * k + 2] + 2 * sigma[2 * k : 2 * k + 2]
     return Ringing(
-        float(own / (2 * np.pi)),
+        float(ring_omega / (2 * np.pi)),
         damping,
         amplitude,
-        (float(apart[0] / (2 * np.pi)), float(apart[1] / own)),
+        (float(pole_errors[0] / (2 * np.pi)), float(pole_errors[1] / ring_omega)),
     )
 
 
 def make_ringing_measures(
     amplitude: float, omega: float, damping: float, largest_acceleration: float
 ) -> dict:
-    """Return the ringing measures (frequency [Hz], damping ratio [1]) of a known sinusoid.
+    """Return the ringing measures of a known decaying sinusoid, by name.
 
     Parameters
     ----------
     amplitude : float
-        Its largest acceleration [m s-2]; 0 if nothing rings.
+        Acceleration amplitude of the sinusoid [m s-2]; 0 without ringing.
     omega : float
         Angular frequency [rad/s].
     damping : float
@@ -151,7 +156,7 @@ def make_ringing_measures(
     Returns
     -------
     dict
-        {} if the amplitude is below MIN_SINUSOID of the size.
+        Measures by name; {} if the amplitude is below MIN_SINUSOID times the largest acceleration.
     """
     if not amplitude > MIN_SINUSOID * largest_acceleration:
         return {}
@@ -159,12 +164,12 @@ def make_ringing_measures(
 
 
 class VibratingMode(NamedTuple):
-    """Free vibration of a mode while every interface sticks.
+    """Free vibration of a mode while all interfaces stick.
 
     - begin, end: start and end of the stick interval [s].
     - frequency: frequency of the damped motion [Hz].
     - damping: damping ratio [1].
-    - displacement, acceleration: amplitudes at the output at `begin` [m], [m s-2].
+    - displacement, acceleration: amplitudes at the output at the time `begin` [m], [m s-2].
     """
 
     begin: float
@@ -176,61 +181,57 @@ class VibratingMode(NamedTuple):
 
 
 def compute_stuck_vibration(modes, stiffness, motion) -> list:
-    """Return the free vibration of each mode while every interface sticks.
+    """Return the free vibration of each mode while all interfaces stick.
 
     The motion must not contain a response to a sinusoidal drive.
 
-    Each stuck interface is a spring, and the modes are eigenvectors of the rig with these springs.
-    Two states that are h apart differ by c (exp(lambda h) - 1) in every mode, whatever the
-    equilibrium is, so that they determine each amplitude c.
+    Each stuck interface is a spring, and the modes are eigenvectors of the rig with these springs. In each
+    mode, two states at a time distance h differ by c (exp(lambda h) - 1), independently of the equilibrium.
+    This determines the amplitude c.
 
     Parameters
     ----------
     modes
         Modal basis of the rig.
     stiffness : (i,)
-        Stiffness of the interfaces [N/m].
+        Stiffness of each interface [N/m].
     motion : Response
         Samples of the stick interval.
     """
     n = modes.omega.size
     rows = modes.interfaces
-    whole = np.diag(modes.omega**2) + rows.T * stiffness @ rows / modes.mass
-    matrix = np.block([[np.zeros((n, n)), np.eye(n)], [-whole, -modes.damping_matrix]])
+    stiffness_matrix = np.diag(modes.omega**2) + rows.T * stiffness @ rows / modes.mass
+    matrix = np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness_matrix, -modes.damping_matrix]])
     values, shapes = np.linalg.eig(matrix)
     state = np.concatenate([motion.modal[:2], motion.modal_rate[:2]], axis=1)
-    turned = np.expm1(values * (motion.time[1] - motion.time[0]))
-    told = (values.imag > 0) & (np.abs(turned) > MIN_SINUSOID)
-    sizes = np.linalg.solve(shapes, (state[1] - state[0]).astype(complex))[told] / turned[told]
-    # A pair of conjugate eigenvalues gives one real sinusoid.
-    out = 2 * np.abs(modes.output @ shapes[:n, told] * sizes)
+    growth = np.expm1(values * (motion.time[1] - motion.time[0]))
+    known = (values.imag > 0) & (np.abs(growth) > MIN_SINUSOID)
+    sizes = np.linalg.solve(shapes, (state[1] - state[0]).astype(complex))[known] / growth[known]
+    # a pair of conjugate eigenvalues corresponds to one real sinusoid
+    amplitudes = 2 * np.abs(modes.output @ shapes[:n, known] * sizes)
     return [
         VibratingMode(
             float(motion.time[0]),
             float(motion.time[-1]),
-            one.imag / (2 * np.pi),
-            -one.real / abs(one),
-            float(size),
-            float(size * abs(one) ** 2),
+            eigenvalue.imag / (2 * np.pi),
+            -eigenvalue.real / abs(eigenvalue),
+            float(amplitude),
+            float(amplitude * abs(eigenvalue) ** 2),
         )
-        for one, size in zip(values[told], out)
+        for eigenvalue, amplitude in zip(values[known], amplitudes)
     ]
 
 
 def select_strongest(modes: list, kind: str) -> VibratingMode:
-    """Select the mode with the largest vibration energy in the stick interval.
+    """Return the mode with the largest vibration energy in the stick interval.
 
-    Energy is the time integral of the square of its "displacement" or "acceleration", as `kind`
-    says.
+    The energy is the time integral of the squared "displacement" or "acceleration", given by `kind`.
     """
 
     def energy(mode: VibratingMode) -> float:
-        """Return the mean square of a decaying sinusoid over the stick interval.
-
-        Its amplitude is the field of this `kind`.
-        """
-        fall = 4 * np.pi * mode.damping * mode.frequency * (mode.end - mode.begin)
-        return getattr(mode, kind) ** 2 * (-np.expm1(-fall) / fall if fall else 1.0)
+        """Return the mean square of a decaying sinusoid, whose amplitude is the field `kind`."""
+        decay = 4 * np.pi * mode.damping * mode.frequency * (mode.end - mode.begin)
+        return getattr(mode, kind) ** 2 * (-np.expm1(-decay) / decay if decay else 1.0)
 
     return max(modes, key=energy)
 
@@ -250,63 +251,64 @@ def measure_ringing(time, value, sticks, omega: float = 0.0) -> tuple:
     Returns
     -------
     tuple
-        ring_frequency [Hz] and ring_damping [1] by name, and their errors by name; ({}, {}) if
-        nothing rings. An error is twice the standard error of the median, plus the median error of
-        the fits.
+        ring_frequency [Hz] and ring_damping [1] by name, and their errors by name; ({}, {}) without
+        ringing. An error is twice the standard error of the median plus the median error of the fits.
     """
     size = float(np.abs(value).max(initial=0.0))
-    found = []
+    fits = []
     for begin, end in sticks[-MAX_STICKS:]:
-        part = slice(
+        interval = slice(
             np.searchsorted(time, begin, side="left"), np.searchsorted(time, end, side="right")
         )
-        one = fit_ringing(time[part], value[part], omega, size)
-        if one is not None:
-            found.append(one)
-    if not found:
+        fit = fit_ringing(time[interval], value[interval], omega, size)
+        if fit is not None:
+            fits.append(fit)
+    if not fits:
         return {}, {}
     values = {}
     errors = {}
     for k, name in enumerate(("frequency", "damping")):
-        each = np.array([getattr(one, name) for one in found])
-        own = np.array([one.errors[k] for one in found])
-        middle = float(np.median(each))
-        spread = 1.4826 * float(np.median(np.abs(each - middle))) / np.sqrt(each.size)
-        values[f"ring_{name}"] = middle
-        errors[f"ring_{name}"] = 2 * spread + float(np.median(own))
+        fitted_values = np.array([getattr(fit, name) for fit in fits])
+        fit_errors = np.array([fit.errors[k] for fit in fits])
+        median = float(np.median(fitted_values))
+        standard_error = (
+            1.4826 * float(np.median(np.abs(fitted_values - median))) / np.sqrt(fitted_values.size)
+        )
+        values[f"ring_{name}"] = median
+        errors[f"ring_{name}"] = 2 * standard_error + float(np.median(fit_errors))
     return values, errors
 
 
 def _resample(time, value) -> tuple:
-    """Select equally spaced samples of a signal, with times from 0.
+    """Return the equally spaced samples of a signal, with times from 0.
 
-    Other samples, such as the second one on an event, are left out.
+    Other samples, such as the second sample at an event, are omitted.
     """
     if time.size < 3:
         return time, value
     step = float(np.median(np.diff(time)))
     number = np.round((time - time[np.argmin(np.abs(np.diff(time) - step))]) / step)
     offset = time - number * step
-    on = np.abs(offset - np.median(offset)) < 1e-6 * step
-    if on.sum() < MIN_SAMPLES:
+    is_on_grid = np.abs(offset - np.median(offset)) < 1e-6 * step
+    if is_on_grid.sum() < MIN_SAMPLES:
         return np.empty(0), np.empty(0)
-    time = time[on]
-    value = value[on]
+    time = time[is_on_grid]
+    value = value[is_on_grid]
     return time - time[0], value
 
 
 def _make_forced_columns(time, omega: float) -> np.ndarray:
-    """Return the columns of a fit for the constant and the forced part of a signal."""
-    parts = [np.ones(time.size)]
+    """Return the design-matrix columns of the constant and the forced part of a signal."""
+    columns = [np.ones(time.size)]
     if omega > 0:
-        parts += [np.cos(omega * time), np.sin(omega * time)]
-    return np.stack(parts, axis=1)
+        columns += [np.cos(omega * time), np.sin(omega * time)]
+    return np.stack(columns, axis=1)
 
 
 class _Fit(NamedTuple):
     """Fit of decaying sinusoids to a signal.
 
-    - poles (2 r,): angular frequency [rad/s] and decay rate [1/s] of each.
+    - poles (2 r,): angular frequency [rad/s] and decay rate [1/s] of each sinusoid.
     - sigma (2 r,): standard errors of the poles.
     - rms: root mean square of the residual.
     """
@@ -319,25 +321,23 @@ class _Fit(NamedTuple):
 def _fit_poles(time, value, forced, poles, *ends) -> tuple:
     """Fit the poles (2 r,) of decaying sinusoids to a signal, or evaluate their residual.
 
-    The poles are overwritten by the best ones. Without `ends`, the residual is evaluated at the
-    given poles.
-
-    Returns the number of evaluations, the sum of squares of the best residual, and the workspace of
+    The poles are changed in place to the best ones. Without termination limits `ends`, only the residual is
+    evaluated. Returns the number of evaluations, the sum of squares of the residual, and the workspace of
     `ringing_kernels.fit_sinusoids`, which is valid until the next call.
     """
-    room = _fit_workspace(forced.shape[1] + poles.size, poles.size, time.size)
-    room[0][0, : forced.shape[1]] = forced.T
+    workspace = _fit_workspace(forced.shape[1] + poles.size, poles.size, time.size)
+    workspace[0][0, : forced.shape[1]] = forced.T
     fit = compiled.get_kernel_module(KERNELS_MODULE).fit_sinusoids
     fit.add_python_cost(
         EVALUATIONS_PER_FIT * SECONDS_PER_TERM * time.size * (forced.shape[1] + poles.size) ** 2
     )
     ends = np.array([*ends, MAX_STEPS] if ends else [0.0] * 4)
-    return *fit(time, value, poles, np.abs(poles) + 1 / time[-1], ends, room), room
+    return *fit(time, value, poles, np.abs(poles) + 1 / time[-1], ends, workspace), workspace
 
 
 @lru_cache(maxsize=16)
 def _fit_workspace(count: int, n_sinusoids: int, samples: int) -> tuple:
-    """Return the cached arrays for a fit with a given number of poles."""
+    """Return the cached workspace for a fit with a given number of poles."""
     return (
         np.empty((3, count, samples)),
         np.empty((count + 2, count)),
@@ -348,37 +348,37 @@ def _fit_workspace(count: int, n_sinusoids: int, samples: int) -> tuple:
 
 
 def _subtract_sinusoids(time, value, forced, poles) -> tuple:
-    """Return the residual and the fitted sinusoids (k,) for given poles."""
+    """Return the residual of a signal and the fitted sinusoids (k,) for given poles."""
     n = forced.shape[1]
-    columns, few, *_ = _fit_poles(time, value, forced, poles)[2]
+    columns, coefficients, *_ = _fit_poles(time, value, forced, poles)[2]
     return columns[2, 0].copy(), [
-        few[-1, at : at + 2] @ columns[0, at : at + 2] for at in range(n, n + poles.size, 2)
+        coefficients[-1, k : k + 2] @ columns[0, k : k + 2] for k in range(n, n + poles.size, 2)
     ]
 
 
 def _fit_all_sinusoids(time, value, forced, signal) -> _Fit | None:
-    """Add decaying sinusoids to the fit of a signal while each of them halves the residual.
+    """Fit sinusoids to a signal, whose number is increased while the residual is halved.
 
-    Sinusoids are added one after the other while each of them at least halves the residual.
+    Each sinusoid is fitted from several initial guesses, together with the previous ones.
     """
-    scale = last = np.sqrt(np.mean(signal**2))
+    scale = last_rms = np.sqrt(np.mean(signal**2))
     best = None
     for _ in range(MAX_SINUSOIDS):
         poles = best.poles if best is not None else np.empty(0)
-        tries = []
+        fits = []
         for start in _initial_guesses(time, value, forced, poles, signal):
-            tries.append(
+            fits.append(
                 _refine_poles(time, value, forced, np.append(poles, start), EXACT_RESIDUAL * scale)
             )
-            if tries[-1].rms < EXACT_RESIDUAL * scale:
+            if fits[-1].rms < EXACT_RESIDUAL * scale:
                 break
-        new = min(tries, key=lambda one: one.rms)
-        # A smaller reduction of the residual is noise.
-        if not np.isfinite(new.rms) or new.rms > last / 2:
+        best_fit = min(fits, key=lambda fit: fit.rms)
+        # a smaller reduction of the residual is attributed to noise
+        if not np.isfinite(best_fit.rms) or best_fit.rms > last_rms / 2:
             break
-        best = new
-        last = new.rms
-        if last < 1e-6 * scale or time.size < 8 * (len(best.poles) + 2):
+        best = best_fit
+        last_rms = best_fit.rms
+        if last_rms < 1e-6 * scale or time.size < 8 * (len(best.poles) + 2):
             break
         signal = _subtract_sinusoids(time, value, forced, best.poles)[0]
     return best
@@ -394,40 +394,39 @@ def _find_largest_line(time, residual) -> float:
 
 
 def _initial_guesses(time, value, forced, poles, residual) -> list:
-    """Return two initial guesses of a further sinusoid, with different decay rates.
+    """Return two initial guesses for the poles of a further sinusoid.
 
-    The frequency is the best one, by projection, around the highest line of the residual.
+    The frequency is the one with the smallest projected residual near the highest spectral line.
     """
     span = time[-1]
-    top = _find_largest_line(time, residual)
-    near = [own for own in top + np.linspace(-1.2, 1.2, 7) * 2 * np.pi / span if own > np.pi / span]
-    sizes = [
-        _fit_poles(time, value, forced, np.append(poles, (own, 0.5 / span)))[1] for own in near
+    line = _find_largest_line(time, residual)
+    near = [w for w in line + np.linspace(-1.2, 1.2, 7) * 2 * np.pi / span if w > np.pi / span]
+    residuals = [
+        _fit_poles(time, value, forced, np.append(poles, (omega, 0.5 / span)))[1] for omega in near
     ]
-    own = near[int(np.argmin(sizes))] if near else top
-    return [np.array([own, decay / span]) for decay in (0.1, 2.0)]
+    omega = near[int(np.argmin(residuals))] if near else line
+    return [np.array([omega, decay / span]) for decay in (0.1, 2.0)]
 
 
 def _refine_poles(time, value, forced, poles, max_slow_rms: float = 0.0) -> _Fit:
-    """Fit decaying sinusoids from given poles by Levenberg-Marquardt on the projected residual.
+    """Fit decaying sinusoids from given poles by the Levenberg-Marquardt method.
 
-    It ends when the residual is round-off of the signal, when a step reduces the sum of squares by
-    less than its round-off, or when the rms of the residual is below `whole` with sinusoids that
-    are too slow to be ringing.
+    The iteration ends if the residual or its reduction in a step is round-off, or if the rms of the residual
+    is below `max_slow_rms` and the sinusoids are too slow to be ringing.
     """
     scale = np.abs(poles) + 1 / time[-1]
     poles = poles.copy()
-    short = MIN_REFINED_FRACTION * 2 * np.pi * MIN_PERIODS / time[-1]
-    _, size, (*_, normal, _) = _fit_poles(
+    min_omega = MIN_REFINED_FRACTION * 2 * np.pi * MIN_PERIODS / time[-1]
+    _, sum_of_squares, (*_, normal, _) = _fit_poles(
         time,
         value,
         forced,
         poles,
         (4 * FLOAT_EPSILON) ** 2 * (value @ value),
         time.size * max_slow_rms**2,
-        short,
+        min_omega,
     )
-    rms = float(np.sqrt(size / time.size))
+    rms = float(np.sqrt(sum_of_squares / time.size))
     return _Fit(
         poles, np.sqrt(np.maximum(np.diag(np.linalg.pinv(normal[:, :-1])), 0)) * rms * scale, rms
     )

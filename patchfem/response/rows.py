@@ -1,9 +1,9 @@
-"""Table of the measures of a motion, applied to the solutions of all engines alike.
+"""Table of the measures of a motion, for the solutions of all engines.
 
 In: a `LastCycles`, i.e. the last cycles of a run with the values that its engine integrated. Out:
-values by name, and for any name its definition, floor and larger term. A row has a name, a
-unit, the absolute floor of its error, a definition in one sentence, and the function that
-computes it from a `LastCycles`. A new measure is a new row of SINGLE_RUN_ROWS.
+values by name, and the definition, floor and larger term of each measure. A row has a name, a unit,
+the absolute floor of the error, a definition in one sentence, and a function of a `LastCycles`. A new
+measure is a new row of SINGLE_RUN_ROWS.
 """
 
 from collections.abc import Callable
@@ -37,47 +37,47 @@ from .spectrum import MIN_HARMONIC, harmonic_measures, odd_harmonics
 
 @dataclass(frozen=True, eq=False)
 class LastCycles:
-    """Last cycles of a run, from which the measures are evaluated.
+    """Last cycles of a run, from which the measures are computed.
 
-    - window: histories.
+    - window: histories of the last cycles.
     - drive: drive of the run.
-    - extremes (c, 2): smallest and largest output in every cycle of the window [m].
-    - book: energies of the whole run by name [J].
+    - extremes (c, 2): smallest and largest output in each cycle of the window [m].
+    - run_energies: energies of the whole run by name [J].
     - load: normal load [N]; None without friction.
-    - stiffness: K of the first mode as seen by the contact [N/m]; 0 if no damping ratio refers to
-      it.
-    - sine: whether the drive is sinusoidal at the end of the run.
-    - integrated: measures that the engine integrated itself.
-    - loop: first harmonics of slide [m] and force [N] and work per cycle [J], if they do not come
-      from `integrated`; None if the window contains no whole cycle.
+    - stiffness: stiffness of the first mode at the contact [N/m]; 0 if the damping ratio is not
+      computed.
+    - is_sine: whether the drive is sinusoidal at the end of the run.
+    - integrated: measures that the engine integrated.
+    - loop: first harmonics of slide [m] and force [N] and work per cycle [J], if they are not in
+      `integrated`; None if the window contains no complete cycle.
     - ledger (4, k): friction work and energies [J], or None.
-    - by: how the force at a reversal of the slide is evaluated (see `loops.find_reversals`).
-    - still: half range of the slide [m] up to which it is round-off.
-    - even: equally spaced samples of the window; None if its own samples are.
-    - inside: function (window, number) that returns the window of an interface with samples inside
-      the steps; None if those at the ends of the steps suffice.
-    - together: whether the interfaces are parts of a single one, so that there are no others.
-    - number: index of the interface.
-    - run: histories of the whole run from t = 0, at equally spaced samples and every reversal; None
-      if they are not kept.
+    - reversal_rule: rule for the force at a reversal of the slide (see `loops.find_reversals`).
+    - slide_round_off: largest half range of the slide that is round-off [m].
+    - uniform_window: equally spaced samples of the window; None if `window` has such samples.
+    - add_substeps: function (window, index of the interface) that returns the window with samples
+      inside the time steps; None if these are not needed.
+    - is_single_interface: whether the interfaces are parts of a single one.
+    - interface: index of the interface.
+    - run: histories of the whole run from t = 0, at equally spaced times and each reversal; None if
+      they were not stored.
     """
 
     window: Response
     drive: object
     extremes: np.ndarray
-    book: dict
+    run_energies: dict
     load: float | None
     stiffness: float
-    sine: bool
+    is_sine: bool
     integrated: IntegratedMeasures = field(default_factory=IntegratedMeasures)
     loop: tuple | None = None
     ledger: np.ndarray | None = None
-    by: str = "rate"
-    still: float = 0.0
-    even: Response | None = None
-    inside: Callable | None = None
-    together: bool = False
-    number: int = 0
+    reversal_rule: str = "rate"
+    slide_round_off: float = 0.0
+    uniform_window: Response | None = None
+    add_substeps: Callable | None = None
+    is_single_interface: bool = False
+    interface: int = 0
     run: Response | None = None
 
     @cached_property
@@ -87,8 +87,9 @@ class LastCycles:
 
     @cached_property
     def samples(self) -> Response:
-        """Samples of the window, with samples inside the time steps if the engine has them."""
-        return self.window if self.inside is None else self.inside(self.window, self.number)
+        """Samples of the window, including samples inside the time steps if the engine has them."""
+        window = self.window
+        return window if self.add_substeps is None else self.add_substeps(window, self.interface)
 
     @cached_property
     def has_full_cycle(self) -> bool:
@@ -96,41 +97,45 @@ class LastCycles:
         return drive_sizes.has_full_cycle(self.span, self.drive)
 
     @cached_property
-    def slip(self) -> dict:
-        """Slip amplitude [m], stick fraction [1] and phase of the slip start [rad] as a dict."""
+    def slip_measures(self) -> dict:
+        """Slip amplitude [m], stick fraction [1] and phase of slip onset [rad] as a dict."""
         if self.load is None:
             return {}
         first = self.integrated.loops[0] if self.integrated.loops else None
         if first is None or first.stuck_time is None:
-            window = self.even or self.samples
+            window = self.uniform_window or self.samples
             steps = max(1, round((window.time.size - 1) * self.drive.period / self.span))
-            found = compute_slip_measures(
+            values = compute_slip_measures(
                 window,
                 self.drive,
                 steps,
-                [lateral_history(window, one, self.number) for one in ("slides", "slips")],
+                [lateral_history(window, name, self.interface) for name in ("slides", "slips")],
             )
         else:
-            starts = self.integrated.slip_start_phases
-            found = {"stick_fraction": stick_fraction(first.stuck_time, self.span)} | (
-                {} if starts is None else slip_start_measure(np.asarray(starts))
+            phases = self.integrated.slip_start_phases
+            values = {"stick_fraction": stick_fraction(first.stuck_time, self.span)} | (
+                {} if phases is None else slip_start_measure(np.asarray(phases))
             )
-        found |= {} if first is None else {"slip_amplitude": first.slip_range / 2}
-        return found if self.sine else {k: v for k, v in found.items() if k != "slip_start_phase"}
+        values |= {} if first is None else {"slip_amplitude": first.slip_range / 2}
+        return (
+            values if self.is_sine else {k: v for k, v in values.items() if k != "slip_start_phase"}
+        )
 
     @cached_property
-    def turns(self) -> list:
-        """Smallest and largest `Reversal` of the displacement in every complete cycle."""
+    def reversals(self) -> list:
+        """Smallest and largest `Reversal` of the slide in each complete cycle."""
         if self.integrated.reversals:
-            return [tuple(Reversal(*one) for one in pair) for pair in self.integrated.reversals]
+            return [tuple(Reversal(*end) for end in pair) for pair in self.integrated.reversals]
         w = self.samples
-        return find_reversals(w.time, w.slide, w.slide_rate, w.force, self.drive.period, self.by)
+        return find_reversals(
+            w.time, w.slide, w.slide_rate, w.force, self.drive.period, self.reversal_rule
+        )
 
     @cached_property
-    def harmonics(self) -> tuple | None:
-        """First harmonics of displacement and force, and work per cycle [J].
+    def loop_harmonics(self) -> tuple | None:
+        """First harmonics of slide and force, and work per cycle [J].
 
-        It is None without a complete cycle.
+        None without a complete cycle.
         """
         if self.loop is not None or not self.integrated.loops or not self.has_full_cycle:
             return self.loop
@@ -142,32 +147,34 @@ class LastCycles:
         )
 
     @cached_property
-    def cycle(self) -> dict:
-        """Measures of the friction loop as a dict, empty without friction or a complete cycle.
+    def loop_measures(self) -> dict:
+        """Measures of the friction loop as a dict; empty without friction or a complete cycle.
 
         loop_area [J]; under sinusoidal drive also equivalent_stiffness and secant_stiffness [N/m]
         and equivalent_damping [1].
         """
-        if self.harmonics is None or self.load is None:
+        if self.loop_harmonics is None or self.load is None:
             return {}
-        moves = (
-            self.sine
-            and self.lateral("slides") is None
-            and np.ptp(self.window.slide) > max(2 * self.still, MIN_SLIDE_RANGE)
+        is_moving = (
+            self.is_sine
+            and self.lateral_history("slides") is None
+            and np.ptp(self.window.slide) > max(2 * self.slide_round_off, MIN_SLIDE_RANGE)
         )
-        if not moves:
-            return interface_loop(0.0, *self.harmonics, self.stiffness)
-        found = interface_loop(mean_half_range(self.turns), *self.harmonics, self.stiffness)
-        return found | {"secant_stiffness": secant_stiffness(self.turns)}
+        if not is_moving:
+            return interface_loop(0.0, *self.loop_harmonics, self.stiffness)
+        measures = interface_loop(
+            mean_half_range(self.reversals), *self.loop_harmonics, self.stiffness
+        )
+        return measures | {"secant_stiffness": secant_stiffness(self.reversals)}
 
     @cached_property
-    def waves(self) -> dict:
-        """Harmonics of the acceleration as a dict, empty unless the drive ends as a sinusoid.
+    def acceleration_measures(self) -> dict:
+        """Harmonic measures of the acceleration as a dict; empty unless the drive ends as a sinusoid.
 
         absolute_acceleration_fundamental [m s-2] and, if there is an acceleration,
         acceleration_distortion [1].
         """
-        if not (self.sine and self.has_full_cycle):
+        if not (self.is_sine and self.has_full_cycle):
             return {}
         if self.integrated.acceleration_harmonics is None:
             return harmonic_measures(*odd_harmonics(self.window, self.drive))
@@ -176,8 +183,8 @@ class LastCycles:
         )
 
     @cached_property
-    def energies(self) -> dict:
-        """Work and energies [J] at the end of the run as a dict, empty if they are not recorded."""
+    def final_energies(self) -> dict:
+        """Friction work and energies [J] at the end of the run as a dict; empty if not recorded."""
         return {} if self.ledger is None else compute_ledger_measures(self.ledger)
 
     @cached_property
@@ -185,24 +192,24 @@ class LastCycles:
         """Measures of the response to a stationary random drive as a dict."""
         if not hasattr(self.drive, "band"):
             return {}
-        found = stationary.random_response_measures(self.window, self.drive)
+        measures = stationary.random_response_measures(self.window, self.drive)
         if self.load is None:
-            names = [name for name in found if name.startswith("friction_power")]
+            names = [name for name in measures if name.startswith("friction_power")]
             for name in names:
-                del found[name]
-        return found
+                del measures[name]
+        return measures
 
     def further_interfaces(self) -> list:
         """Return the LastCycles of each interface after the first one.
 
-        The work of an interface comes from `integrated.loops` or, without them, from the samples.
+        The work of an interface is taken from `integrated.loops` if they exist, else from the samples.
         """
         extra = self.window.extra
-        if self.load is None or self.together or "slides" not in extra:
+        if self.load is None or self.is_single_interface or "slides" not in extra:
             return []
         slips = extra.get("slips", extra["slides"])
         count = extra["slides"].shape[1]
-        out = []
+        interfaces = []
         for k in range(1, count):
             window = replace(
                 self.window,
@@ -215,68 +222,78 @@ class LastCycles:
             work = loops[0].work if loops else float(np.trapezoid(window.force, window.slide))
             if not loops:
                 work += lateral_work(self.window, k)
-            out.append(
+            interfaces.append(
                 replace(
                     self,
                     window=window,
                     integrated=IntegratedMeasures(loops=loops),
-                    sine=False,
-                    number=k,
+                    is_sine=False,
+                    interface=k,
                     loop=(0j, 0j, work * self.drive.period / max(self.span, 1e-300)),
                 )
             )
-        return out
+        return interfaces
 
-    def lateral(self, name: str):
-        """Return a history of the interface in the direction perpendicular to sliding."""
-        return lateral_history(self.window, name, self.number)
+    def lateral_history(self, name: str):
+        """Return a history of the interface in the lateral direction, or None."""
+        return lateral_history(self.window, name, self.interface)
 
-    def evaluate_load(self, value: Callable) -> float | None:
-        """Apply a function to the history of the normal load (k,) [N]; None if it is constant.
+    def evaluate_load(self, function: Callable) -> float | None:
+        """Return a function of the history of the normal load (k,) [N]; None for a constant load.
 
-        value: function of the load history in the window.
+        function: function of the load history in the window.
         """
         load = self.window.extra.get("normal_load")
-        return None if load is None or self.load is None else float(value(load))
+        return None if load is None or self.load is None else float(function(load))
 
 
 def lateral_work(window, number: int) -> float:
-    """Return the friction work [J] in a window due to motion perpendicular to the drive.
+    """Return the friction work [J] of the lateral motion of an interface in a window.
 
-    The trapezoidal rule is used; the work is 0 if the interface slides along a line.
+    The work is computed by the trapezoidal rule; it is 0 if the interface slides along a line.
     """
     force, slide = (lateral_history(window, name, number) for name in ("forces", "slides"))
     return 0.0 if force is None or slide is None else float(np.trapezoid(force, slide))
 
 
-def resultant_peak(force, across) -> float:
-    """Return the largest magnitude [N] of a force or of its resultant with a lateral force."""
-    return float((np.abs(force) if across is None else np.hypot(force, across)).max())
+def resultant_peak(force, lateral_force) -> float:
+    """Return the largest magnitude [N] of a force, or of its resultant with a lateral force."""
+    return float((np.abs(force) if lateral_force is None else np.hypot(force, lateral_force)).max())
 
 
-def compute_drift(s: LastCycles) -> float:
-    """Return the drift of the relative displacement per cycle [m] of an interface.
+def compute_drift(last_cycles: LastCycles) -> float:
+    """Return the drift of the slide per cycle [m] of an interface.
 
-    If the interface slides in a plane, it is the magnitude of the drift vector.
+    If the interface slides in a plane, the result is the magnitude of the drift vector.
     """
-    w = s.window
-    across = s.lateral("slides")
-    drift_along = mean_drift(w.time, w.slide, w.slide_rate, s.drive.period)
-    if across is None:
+    w = last_cycles.window
+    lateral_slide = last_cycles.lateral_history("slides")
+    drift_along = mean_drift(w.time, w.slide, w.slide_rate, last_cycles.drive.period)
+    if lateral_slide is None:
         return drift_along
     return float(
         np.hypot(
             drift_along,
-            mean_drift(w.time, across, w.extra["lateral_slide_rates"][:, s.number], s.drive.period),
+            mean_drift(
+                w.time,
+                lateral_slide,
+                w.extra["lateral_slide_rates"][:, last_cycles.interface],
+                last_cycles.drive.period,
+            ),
         )
     )
 
 
-def first_harmonic(values: dict):
-    """Return the ratio [N/m] of the first harmonics of friction force and displacement.
+def harmonic_force_ratio(values: dict):
+    """Return the magnitude [N/m] of the ratio of the first harmonics of friction force and slide.
 
-    The part in phase is the equivalent stiffness; the other part is W/(pi A^2), often many times as
-    large. values: measures of one run, or (n,) of many.
+    The in-phase part is the equivalent stiffness; the quadrature part is W/(pi A^2), with the loop area W
+    and the slip amplitude A.
+
+    Parameters
+    ----------
+    values : dict
+        Measures of one run, or (n,) of n runs.
     """
     in_phase = np.abs(values["equivalent_stiffness"])
     slip_amplitude = np.asarray(values.get("slip_amplitude", 0.0), float)
@@ -288,21 +305,32 @@ def first_harmonic(values: dict):
 
 
 def _drift_scale(values: dict):
-    """Return the amplitude [m] with which the drift of an interface is compared.
+    """Return the amplitude [m] to which the drift of an interface is compared.
 
-    It is the amplitude of the slip; without slip, that of the motion. values: as in
-    `first_harmonic`.
+    The scale is the slip amplitude, or without slip the amplitude of the motion.
+
+    Parameters
+    ----------
+    values : dict
+        Measures of one run, or (n,) of n runs.
     """
     slip = np.abs(np.nan_to_num(np.asarray(values.get("slip_amplitude", 0.0), float)))
     return np.where(slip > 0, slip, np.abs(values.get("relative_displacement_amplitude", 0.0)))
 
 
-def _random_rows(name: str, unit: str, floor: float, words: str, group: str = "motion") -> tuple:
+def _random_rows(
+    name: str, unit: str, floor: float, definition: str, group: str = "motion"
+) -> tuple:
     """Return the definitions of a measure under random drive and of its statistical scatter."""
     scatter = f"{name}_scatter"
     return (
         MeasureDefinition(
-            name, unit, floor, words, lambda s: s.random_response_measures.get(name), group=group
+            name,
+            unit,
+            floor,
+            definition,
+            lambda s: s.random_response_measures.get(name),
+            group=group,
         ),
         MeasureDefinition(
             scatter,
@@ -317,10 +345,10 @@ def _random_rows(name: str, unit: str, floor: float, words: str, group: str = "m
     )
 
 
-# This table has measures that only single runs compute. If there are any, a sweep runs each case of
-# a rig by itself, because its batches compute only the shipped measures.
+# Measures that only single runs compute. If there are any, a sweep computes the cases of a rig one by one,
+# because batches compute only the measures of this package.
 SINGLE_RUN_ROWS: tuple[MeasureDefinition, ...] = ()
-CUBIC_CONVERGENCE_ORDER = 4.0  # Convergence order of a value on cubics between samples.
+CUBIC_CONVERGENCE_ORDER = 4.0  # Order of convergence of values on cubics between samples.
 ROWS = (
     MeasureDefinition(
         "relative_displacement_amplitude",
@@ -349,7 +377,7 @@ ROWS = (
             if s.load is None
             else s.integrated.loops[0].max_force
             if s.integrated.loops
-            else resultant_peak(s.samples.force, s.lateral("forces"))
+            else resultant_peak(s.samples.force, s.lateral_history("forces"))
         ),
         group="friction",
     ),
@@ -359,7 +387,7 @@ ROWS = (
         1e-8,
         "error of the energy balance over the run: work minus stored energy minus dissipated energy, divided by the "
         "sum of the exchanged energy and the largest stored energy",
-        lambda s: energy_balance(s.book),
+        lambda s: energy_balance(s.run_energies),
         group="energy",
         larger_term=("1", lambda _: 1.0),
     ),
@@ -368,7 +396,7 @@ ROWS = (
         "m s-2",
         MIN_HARMONIC,
         "first harmonic of the acceleration at the output, base motion included",
-        lambda s: s.waves.get("absolute_acceleration_fundamental"),
+        lambda s: s.acceleration_measures.get("absolute_acceleration_fundamental"),
     ),
     MeasureDefinition(
         "acceleration_distortion",
@@ -376,7 +404,7 @@ ROWS = (
         1e-6,
         "third harmonic of the acceleration at the output, base motion included, divided by the first harmonic; null "
         "if the output does not move",
-        lambda s: s.waves.get("acceleration_distortion"),
+        lambda s: s.acceleration_measures.get("acceleration_distortion"),
     ),
     MeasureDefinition(
         "drift_per_cycle",
@@ -396,7 +424,7 @@ ROWS = (
         "half the peak-to-peak value of the irreversible part of the slide; for a patch, the mean over its points, "
         "weighted by the pressure; for law 'iwan', the mean over the sliders, weighted by their slip forces; if the "
         "interface slides in a plane, half the largest distance between two points of the path of irreversible slide",
-        lambda s: s.slip.get("slip_amplitude"),
+        lambda s: s.slip_measures.get("slip_amplitude"),
         group="friction",
     ),
     MeasureDefinition(
@@ -407,7 +435,7 @@ ROWS = (
         "as a "
         "whole while more than half of the change of the slide (weighted as in `slip_amplitude`) is elastic; part of a "
         "patch, or some sliders of law 'iwan', may slip during this time",
-        lambda s: s.slip.get("stick_fraction"),
+        lambda s: s.slip_measures.get("stick_fraction"),
         0.35,
         group="friction",
         larger_term=("1", lambda _: 1.0),
@@ -419,7 +447,7 @@ ROWS = (
         "phase of the drive (of the base displacement, or of the force) at which slip starts after stick, modulo pi; "
         "slip is the weighted mean defined under `slip_amplitude`; the phase is printed in degrees; null if slip "
         "starts at different phases of a half cycle",
-        lambda s: s.slip.get("slip_start_phase"),
+        lambda s: s.slip_measures.get("slip_start_phase"),
         1.0,
         group="friction",
         larger_term=("pi", lambda _: np.pi),
@@ -439,7 +467,7 @@ ROWS = (
         "friction work per cycle in this interface alone (the energy dissipated, if the loop closes), in both "
         "directions if the interface slides in a plane; null if the drive is not periodic and the friction loop does "
         "not close, because the interface then stores or returns more energy than it dissipates",
-        lambda s: s.cycle.get("loop_area"),
+        lambda s: s.loop_measures.get("loop_area"),
         group="energy",
     ),
     MeasureDefinition(
@@ -448,9 +476,12 @@ ROWS = (
         1.0,
         "part of the first harmonic of the friction force that is in phase with the slide, divided by the first "
         "harmonic of the slide; negative if friction keeps the spring of the structure deflected during stick",
-        lambda s: s.cycle.get("equivalent_stiffness"),
+        lambda s: s.loop_measures.get("equivalent_stiffness"),
         group="friction",
-        larger_term=("magnitude of the complex ratio of the two first harmonics", first_harmonic),
+        larger_term=(
+            "magnitude of the complex ratio of the two first harmonics",
+            harmonic_force_ratio,
+        ),
     ),
     MeasureDefinition(
         "secant_stiffness",
@@ -459,7 +490,7 @@ ROWS = (
         "friction force at the largest slide of a cycle minus friction force at the smallest slide, divided by the "
         "range of the slide; if the force jumps at the largest or the smallest slide, the mean of the forces "
         "before and after the jump is used; null if rigid friction sticks there, where the force takes many values",
-        lambda s: s.cycle.get("secant_stiffness"),
+        lambda s: s.loop_measures.get("secant_stiffness"),
         group="friction",
         order=CUBIC_CONVERGENCE_ORDER,
     ),
@@ -470,7 +501,7 @@ ROWS = (
         "equivalent damping ratio of friction in the first mode that is not rigid, averaged over the last cycles: "
         "loop_area/(2 pi K A^2), where K = moving_mass omega_1^2 and A = (half the range of the slide in a "
         "cycle)/(value of the key `slide` of this mode); null if other modes contribute more than 5 % of the slide",
-        lambda s: s.cycle.get("equivalent_damping"),
+        lambda s: s.loop_measures.get("equivalent_damping"),
         group="friction",
         order=CUBIC_CONVERGENCE_ORDER,
     ),
@@ -480,7 +511,7 @@ ROWS = (
         1e-10,
         "work done on all interfaces together over the whole run; with method `harmonic`, "
         "over two cycles",
-        lambda s: s.energies.get("friction_work"),
+        lambda s: s.final_energies.get("friction_work"),
         group="energy",
     ),
     MeasureDefinition(
@@ -497,7 +528,7 @@ ROWS = (
         1e-10,
         "energy dissipated by friction in all interfaces over the whole run; with "
         "method `harmonic`, over two cycles",
-        lambda s: s.energies.get("energy_dissipated"),
+        lambda s: s.final_energies.get("energy_dissipated"),
         group="energy",
     ),
     MeasureDefinition(
@@ -506,7 +537,7 @@ ROWS = (
         1e-10,
         "energy created over the whole run by a law that is not passive, such as equation 2.17 as printed in the "
         "report; with method `harmonic`, over two cycles",
-        lambda s: s.energies.get("energy_created"),
+        lambda s: s.final_energies.get("energy_created"),
         group="energy",
     ),
     MeasureDefinition(
@@ -645,7 +676,7 @@ ROWS = (
 )
 ROWS_NEEDING_RUN = tuple(row for row in ROWS if row.needs_run)
 TABLE = {row.name: row for row in ROWS}
-# These measures exist for every interface.
+# Measures of each interface.
 INTERFACE_MEASURES = (
     "slip_amplitude",
     "stick_fraction",
@@ -658,59 +689,58 @@ DISPLACEMENT_MEASURES = (
     "slip_amplitude",
     "drift_per_cycle",
 )
-# Largest floor of a displacement error relative to the displacement of the drive.
+# Largest floor of a displacement error, relative to the displacement caused by the drive alone.
 MAX_DISPLACEMENT_FLOOR = 1e-5
 
 
 def compute_measures(last_cycles: LastCycles) -> dict:
     """Compute the measures of a run from its last cycles as a dict, in SI units.
 
-    Measures without a value are left out. The INTERFACE_MEASURES are repeated for every further
-    interface, with its number after the name. A value of the engine replaces the one computed from
-    samples.
+    Measures without a value are omitted. The INTERFACE_MEASURES of further interfaces have the number of the
+    interface after the name. A value that the engine integrated replaces the value from samples.
     """
     known = last_cycles.integrated.values
-    out = {}
+    values = {}
     for row in ROWS:
         if row.name in known:
-            out[row.name] = known[row.name]
+            values[row.name] = known[row.name]
         elif row.function is not None and (last_cycles.run is not None or not row.needs_run):
-            out[row.name] = row.function(last_cycles)
+            values[row.name] = row.function(last_cycles)
     for number, interface in enumerate(last_cycles.further_interfaces(), 1):
         for name in INTERFACE_MEASURES:
-            out[add_interface_number(name, number)] = TABLE[name].function(interface)
-    return {name: value for name, value in (out | known).items() if value is not None}
+            values[add_interface_number(name, number)] = TABLE[name].function(interface)
+    return {name: value for name, value in (values | known).items() if value is not None}
 
 
-def stick_fraction(stuck, span):
-    """Return the ratio of the stick time to a time span.
+def stick_fraction(stick_time, span):
+    """Return the ratio of the stick time to the duration of a window.
 
-    A fraction that differs from 1 only by the round-off of the sum of its parts is set to 1.
+    A fraction that differs from 1 only by round-off is set to 1.
     """
-    return np.where(stuck >= span * (1 - 1e-12), 1.0, stuck / span)[()]
+    return np.where(stick_time >= span * (1 - 1e-12), 1.0, stick_time / span)[()]
 
 
 def remove_interface_number(name: str) -> str:
-    """Remove the interface number from a measure name, such as "_2" of slip_amplitude_2."""
+    """Return the name of a measure without the number of an interface, such as "_2"."""
     head, _, number = name.rpartition("_")
     return head if number.isdigit() else name
 
 
 def add_interface_number(name: str, number: int) -> str:
-    """Append an interface number to the name of a measure, except for the first interface."""
+    """Return the name of a measure with the number of an interface, except for the first one."""
     return f"{name}_{number + 1}" if number else name
 
 
 def error_floor(name: str, size=np.inf):
-    """Return the floor of the error of a measure of any interface, in its unit.
+    """Return the floor of the error of a measure of any interface, in the unit of the measure.
 
-    The floor of a displacement is at most the fraction MAX_DISPLACEMENT_FLOOR of `size`.
+    The floor of a displacement is at most MAX_DISPLACEMENT_FLOOR times `size`.
 
     Parameters
     ----------
     name : str
     size : float or (n,)
-        Displacement that the drive alone causes [m]; 0 or inf if no drive moves anything.
+        Displacement caused by the drive alone [m]; 0 or inf without a drive.
     """
     floor = find_definition(name).floor
     if remove_interface_number(name) not in DISPLACEMENT_MEASURES:
@@ -721,18 +751,18 @@ def error_floor(name: str, size=np.inf):
 
 
 def larger_term(name: str, values: dict):
-    """Return the size of the terms whose difference a measure is, in its unit.
+    """Return the size of the terms whose difference a measure is, in the unit of the measure.
 
     Parameters
     ----------
     name : str
     values : dict
-        Values by name of one run, or (n,) of many; those of the same interface are used.
+        Values by name of one run, or (n,) of n runs; those of the same interface are used.
 
     Returns
     -------
     float or (n,)
-        0 if the measure is not a difference.
+        Size of the terms; 0 if the measure is not a difference.
     """
     row = find_definition(name)
     number = name[len(remove_interface_number(name)) :]
@@ -746,17 +776,17 @@ def larger_term(name: str, values: dict):
 
 
 def set_final_floors(measures: dict, tolerance: float) -> dict:
-    """Raise the error floors of measures that are differences of much larger terms."""
+    """Return measures with error floors raised for differences of much larger terms."""
     values = {
         name: measure.value for name, measure in measures.items() if measure.value is not None
     }
-    out = dict(measures)
+    updated = dict(measures)
     for name in values:
         if remove_interface_number(name) in TABLE:
             floor = tolerance * float(larger_term(name, values))
             if floor > measures[name].floor:
-                out[name] = replace(measures[name], floor=floor)
-    return out
+                updated[name] = replace(measures[name], floor=floor)
+    return updated
 
 
 def find_definition(name: str) -> MeasureDefinition:

@@ -1,7 +1,7 @@
-"""Events of a coupled run, from the log of the exact engine or from samples, and ringing.
+"""Stick-slip events of a coupled run, from an event log or from samples, and its ringing.
 
-In: the window of a run, its drive, and the EventLog of the exact engine if there is one. Out:
-`Events`, stick intervals, and the ringing during stick.
+In: the window of a run, its drive, and the EventLog if the exact engine recorded one. Out: `Events`,
+stick intervals, and the ringing during stick.
 """
 
 import numpy as np
@@ -33,7 +33,7 @@ KIND_BY_LOG_NUMBER = {
 LOG_OFFSET = -min(KIND_BY_LOG_NUMBER)
 KIND_BY_SHIFTED_LOG_NUMBER = np.full(
     LOG_OFFSET + max(KIND_BY_LOG_NUMBER) + 1, np.nan
-)  # This array gives the kind of an event by its number in a log.
+)  # kind of an event, by its number in a log plus LOG_OFFSET
 KIND_BY_SHIFTED_LOG_NUMBER[np.array(list(KIND_BY_LOG_NUMBER)) + LOG_OFFSET] = list(
     KIND_BY_LOG_NUMBER.values()
 )
@@ -41,17 +41,17 @@ EXACT_SOURCE = "the times of stick and slip are those of the exact solution"
 
 
 def slips_and_displacements(response) -> tuple:
-    """Return slip and relative displacement (k, i) [m] of every interface in a Response.
+    """Return slip and relative displacement (k, i) [m] of each interface in a Response.
 
-    For an interface that slides in a plane, the slip is the path length, which only grows, and the
-    slide is that in the first direction.
+    If an interface slides in a plane, the slip is the accumulated path length, and the displacement is that
+    in the main direction.
     """
     extra = response.extra
     if "lateral_slips" in extra:
         slips = extra["slips"].copy()
         for k in range(slips.shape[1]):
-            if (second := lateral_history(response, "slips", k)) is not None:
-                slips[1:, k] = slips[0, k] + np.cumsum(path_increments(slips[:, k], second))
+            if (lateral_slip := lateral_history(response, "slips", k)) is not None:
+                slips[1:, k] = slips[0, k] + np.cumsum(path_increments(slips[:, k], lateral_slip))
         return slips, extra["slides"]
     if "slides" in extra:
         return extra.get("slips", extra["slides"]), extra["slides"]
@@ -64,19 +64,19 @@ def find_segment_borders(drive) -> list:
 
 
 def convert_event_log(log) -> Events:
-    """Convert the event log of an exact engine to an Events table."""
-    part = slice(-MAX_EVENTS, None)
-    kind = KIND_BY_SHIFTED_LOG_NUMBER[log.kind[part] + LOG_OFFSET]
-    slide = np.where(kind == SEGMENT_BORDER, np.nan, log.slide[part])
+    """Return the events in the log of an exact engine."""
+    last_events = slice(-MAX_EVENTS, None)
+    kind = KIND_BY_SHIFTED_LOG_NUMBER[log.kind[last_events] + LOG_OFFSET]
+    slide = np.where(kind == SEGMENT_BORDER, np.nan, log.slide[last_events])
     return sort_events(
-        np.stack([log.time[part], log.interface[part] + 1.0, kind, slide], axis=1),
+        np.stack([log.time[last_events], log.interface[last_events] + 1.0, kind, slide], axis=1),
         log.count,
         EXACT_SOURCE,
     )
 
 
 def list_events(window, drive, log=None, max_stick_slip: float = 0.0) -> Events:
-    """Return the events of a run from its log, or else detected in the last cycles.
+    """Return the events of a run from its log, or if there is none, detected in the last cycles.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def list_events(window, drive, log=None, max_stick_slip: float = 0.0) -> Events:
     drive
     log : EventLog, optional
     max_stick_slip : float
-        Slip in a cycle [m] below which the interface sticks in it.
+        Largest slip amplitude of a sticking interface in a cycle [m].
     """
     if log is not None:
         return convert_event_log(log)
@@ -100,7 +100,7 @@ def list_events(window, drive, log=None, max_stick_slip: float = 0.0) -> Events:
 
 
 def list_slipping_interfaces(window, drive, log=None, max_stick_slip: float = 0.0) -> list:
-    """Return for each interface whether it slips in a window.
+    """Return a list of whether each interface slips in a window.
 
     Parameters
     ----------
@@ -109,10 +109,10 @@ def list_slipping_interfaces(window, drive, log=None, max_stick_slip: float = 0.
     log : array, optional
         Events that the engine recorded, as in `list_events`.
     max_stick_slip : float
-        Change of slip up to which an interface sticks [m].
+        Largest range of the slip of a sticking interface [m].
     """
     max_stick_slip = max(max_stick_slip, slip_round_off(window))
-    out = []
+    slipping = []
     for slip in slips_and_displacements(window)[0].T:
         if log is None:
             is_slipping = compute_slip_states(window.time, slip, drive.period, max_stick_slip)[
@@ -120,8 +120,8 @@ def list_slipping_interfaces(window, drive, log=None, max_stick_slip: float = 0.
             ].any()
         else:
             is_slipping = np.ptp(slip) > 0
-        out.append(bool(is_slipping))
-    return out
+        slipping.append(bool(is_slipping))
+    return slipping
 
 
 def find_stick_intervals(window, drive, log=None, max_stick_slip: float = 0.0) -> list:
@@ -134,7 +134,7 @@ def find_stick_intervals(window, drive, log=None, max_stick_slip: float = 0.0) -
     log : array, optional
         Events that the engine recorded, as in `list_events`.
     max_stick_slip : float
-        Change of slip up to which an interface sticks [m].
+        Largest range of the slip of a sticking interface [m].
     """
     return find_stick_spans(
         list_events(window, drive, log, max_stick_slip),
@@ -145,9 +145,9 @@ def find_stick_intervals(window, drive, log=None, max_stick_slip: float = 0.0) -
 
 
 def select_last_cycle(spans, end: float, period: float) -> list:
-    """Select the stick intervals that belong to the last cycle of a periodic motion.
+    """Return the stick intervals that belong to the last complete cycle of a periodic motion.
 
-    They begin in the last cycle but one and end before `end`. The list is empty if the interface
+    These intervals begin in the second last cycle and end before `end`. The list is empty if the interface
     always sticks.
 
     Parameters
@@ -159,17 +159,20 @@ def select_last_cycle(spans, end: float, period: float) -> list:
     period : float
         Period of the drive [s].
     """
-    return [(a, b) for a, b in spans if end - 2 * period <= a < end - period and b < end]
+    return [
+        (begin, stop)
+        for begin, stop in spans
+        if end - 2 * period <= begin < end - period and stop < end
+    ]
 
 
 def measure_ringing_in_sticks(
     window, modes, drive, log=None, max_stick_slip: float = 0.0, repeats: bool = False
 ) -> tuple:
-    """Return frequency [Hz] and damping ratio [1] of the free vibration in stick intervals.
+    """Return the ringing measures of the stick intervals in a window, and their errors.
 
-    They are computed from the acceleration at the output. The result is ({}, {}) if nothing rings,
-    if the drive has no frequency (sweep, recorded signal), or if the samples do not resolve the
-    fastest mode.
+    The fit uses the acceleration at the output. The result is ({}, {}) without ringing, for a drive without
+    a frequency (sweep, recorded signal), or if the samples do not resolve the fastest mode.
 
     Parameters
     ----------
@@ -178,10 +181,10 @@ def measure_ringing_in_sticks(
     drive
     log : EventLog, optional
     max_stick_slip : float
-        Slip in a cycle [m] below which the interface sticks in it.
+        Largest range of the slip of a sticking interface in a cycle [m].
     repeats : bool
-        Whether the motion is periodic, so that the stick intervals of one cycle represent all. A
-        stick that outlasts the cycle is left out, because nothing decays in it.
+        Whether the motion is periodic, so that one cycle represents all. Stick intervals longer than a
+        cycle are ignored, because the free vibration has decayed in them.
     """
     if not drive.segments or window.time.size < 8:
         return {}, {}
@@ -201,7 +204,7 @@ def measure_ringing_in_sticks(
 def is_all_stuck(window, max_stick_slip: float) -> bool:
     """Return whether no interface or strip slips by more than a given distance [m] in a window.
 
-    The limit applies to half the range of the slip and is not below its round-off.
+    The limit applies to half the range of the slip, and is at least its round-off.
     """
     slips = slips_and_displacements(window)[0]
     slips = np.column_stack([*([] if "lateral_slips" in window.extra else [window.slip]), slips])
@@ -211,7 +214,7 @@ def is_all_stuck(window, max_stick_slip: float) -> bool:
 def join_logs(logs, shifts) -> object:
     """Join the event logs of successive runs, with a segment border between them.
 
-    shifts: times [s] by which the runs start later than the first one.
+    shifts: start times of the runs relative to the first one [s].
     """
     first = logs[0]
     columns = {name: [] for name in ("time", "phase", "interface", "kind", "slide")}

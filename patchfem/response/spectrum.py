@@ -1,26 +1,26 @@
-"""Harmonics of the motion of the last cycles, distortion, and instrument readings.
+"""Harmonics of the last cycles, distortion, and readings of instruments.
 
 In: a window of a run under a drive that ends as a sinusoid. Out: Fourier coefficients of motion,
-acceleration and friction; the distortion of the acceleration; and its reading by an instrument,
-which acts on the computed motion and never on the model.
+acceleration and friction force, the distortion of the acceleration, and the acceleration that an
+instrument indicates. An instrument evaluates the computed motion and does not change the model.
 """
 
 import numpy as np
 
 ACCELERATION_ROUND_OFF = 1e-12  # Round-off error relative to the largest acceleration of the drive.
-MIN_HARMONIC = 1e-4  # Smallest first harmonic [m s-2]; below it the output is at rest.
+MIN_HARMONIC = 1e-4  # Smallest first harmonic of a moving output [m s-2].
 READINGS = ("peak", "fundamental", "rms", "lowpass")
-N_FILTER_HARMONICS = 64  # Number of harmonics that pass through the low-pass filter.
-N_FILTER_SAMPLES = 1024  # Number of samples of a cycle after the filter.
+N_FILTER_HARMONICS = 64  # Number of harmonics of the filtered signal.
+N_FILTER_SAMPLES = 1024  # Number of samples per cycle of the filtered signal.
 _GAUSS_RULE = np.polynomial.legendre.leggauss(4)
 GAUSS_POINTS = (1 + _GAUSS_RULE[0]) / 2  # Positions of the Gauss points in a step of length 1.
 GAUSS_WEIGHTS = _GAUSS_RULE[1] / 2  # Weights of the Gauss points in a step of length 1.
 
 
 def harmonic_weights(time, omega: float) -> list:
-    """Return the Fourier weights of a motion at the Gauss points of its steps.
+    """Return the quadrature weights and phase factors for a Fourier coefficient.
 
-    `motion_harmonic` spends most of its time on them, so that several motions share them.
+    Several motions use the same weights, whose computation takes most of the time of `motion_harmonic`.
 
     Parameters
     ----------
@@ -32,53 +32,57 @@ def harmonic_weights(time, omega: float) -> list:
     Returns
     -------
     list
-        Weights (k - 1,) [s] and waves exp(-i omega t) (k - 1,) of each of four Gauss points.
+        Weights (k - 1,) [s] and phase factors exp(-i omega t) (k - 1,) for each of the four Gauss points.
     """
     step = np.diff(time)
-    waves = np.exp(-1j * omega * time[:-1])
-    # At equal steps, one wave times a constant phase serves all four points.
-    even = step.size and np.ptp(step) <= 1e-15 * abs(time[-1])
-    turns = [np.exp(-1j * omega * s * (step.mean() if even else step)) for s in GAUSS_POINTS]
-    return [(weight * step, waves * turn) for turn, weight in zip(turns, GAUSS_WEIGHTS)]
+    phase_factors = np.exp(-1j * omega * time[:-1])
+    # for equal steps, the phase factors of the Gauss points differ by constant factors
+    is_uniform = step.size and np.ptp(step) <= 1e-15 * abs(time[-1])
+    factors = [
+        np.exp(-1j * omega * s * (step.mean() if is_uniform else step)) for s in GAUSS_POINTS
+    ]
+    return [
+        (weight * step, phase_factors * factor) for factor, weight in zip(factors, GAUSS_WEIGHTS)
+    ]
 
 
-def motion_harmonic(time, value, rate, omega: float, known: list | None = None) -> complex:
+def motion_harmonic(time, value, rate, omega: float, weights: list | None = None) -> complex:
     """Return a Fourier coefficient of the piecewise cubic motion through samples.
 
-    Four Gauss points per step are used, so that only the cubic is approximate: h^4/384 of the
-    fourth derivative.
+    With four Gauss points per step, the only error is that of the cubic: h^4/384 times the fourth
+    derivative.
 
     Parameters
     ----------
     time : (k,)
         Times [s], at any spacing.
     value, rate : (k,)
-        Samples of y and its rate.
+        Samples of the motion and its rate.
     omega : float
         Angular frequency [rad/s].
-    known : list, optional
+    weights : list, optional
         `harmonic_weights` of the same times and frequency.
     """
     step = np.diff(time)
-    rise = np.diff(value)
+    increment = np.diff(value)
     p = rate[:-1] * step
     q = rate[1:] * step
-    mid = 3 * rise - 2 * p - q
-    big = p + q - 2 * rise
+    quadratic = 3 * increment - 2 * p - q
+    cubic = p + q - 2 * increment
     total = 0j
-    for s, (weight, wave) in zip(
-        GAUSS_POINTS, harmonic_weights(time, omega) if known is None else known
+    for s, (weight, phase_factor) in zip(
+        GAUSS_POINTS, harmonic_weights(time, omega) if weights is None else weights
     ):
-        y = value[:-1] + s * (p + s * (mid + s * big))
-        total += np.sum(weight * y * wave)
+        y = value[:-1] + s * (p + s * (quadratic + s * cubic))
+        total += np.sum(weight * y * phase_factor)
     return complex(2 / (time[-1] - time[0]) * total)
 
 
 def acceleration_harmonic(time, value, rate, omega: float) -> complex:
     """Return a Fourier coefficient [m s-2] of the acceleration from displacement and velocity.
 
-    The acceleration of a rig with friction jumps, but its motion does not, so that a jump causes no
-    error.
+    Integration by parts is used: the acceleration jumps due to friction, whereas displacement and velocity
+    are continuous.
 
     Parameters
     ----------
@@ -87,33 +91,38 @@ def acceleration_harmonic(time, value, rate, omega: float) -> complex:
     omega : float
         Angular frequency [rad/s].
     """
-    return _integrate_by_parts(time, value, rate, omega, motion_harmonic(time, value, rate, omega))
+    return _convert_to_acceleration(
+        time, value, rate, omega, motion_harmonic(time, value, rate, omega)
+    )
 
 
-def _integrate_by_parts(time, value, rate, omega: float, first: complex) -> complex:
-    """Return the harmonic of the acceleration from that of the displacement."""
+def _convert_to_acceleration(
+    time, value, rate, omega: float, displacement_harmonic: complex
+) -> complex:
+    """Return the Fourier coefficient of the acceleration from that of the displacement."""
     span = time[-1] - time[0]
-    wave = np.exp(-1j * omega * time[[0, -1]])
-    border = (rate[-1] + 1j * omega * value[-1]) * wave[1] - (
+    phase_factors = np.exp(-1j * omega * time[[0, -1]])
+    boundary_term = (rate[-1] + 1j * omega * value[-1]) * phase_factors[1] - (
         rate[0] + 1j * omega * value[0]
-    ) * wave[0]
-    return complex(2 / span * border - omega**2 * first)
+    ) * phase_factors[0]
+    return complex(2 / span * boundary_term - omega**2 * displacement_harmonic)
 
 
 def odd_harmonics(window, drive) -> tuple:
-    """Return the magnitudes [m s-2] of the first and third harmonic of the acceleration.
+    """Return the magnitudes [m s-2] of the first and third harmonic of the absolute acceleration.
 
     window: Response over complete cycles of a drive that ends as a sinusoid.
     """
-    last = [part for part in drive.segments if part.start < window.time[-1]][-1]
+    segment = [part for part in drive.segments if part.start < window.time[-1]][-1]
     first, third = (
-        acceleration_harmonic(window.time, window.output, window.output_rate, n * last.omega)
+        acceleration_harmonic(window.time, window.output, window.output_rate, n * segment.omega)
         for n in (1, 3)
     )
-    # The Fourier coefficient of the base, a sin(omega (t - start) + phase), is -i a exp(i (phase -
-    # omega start)).
+    # the Fourier coefficient of a sin(omega (t - start) + phase) is -i a exp(i (phase - omega start))
     if drive.moving:
-        first += -1j * last.amplitude * np.exp(1j * (last.phase - last.omega * last.start))
+        first += (
+            -1j * segment.amplitude * np.exp(1j * (segment.phase - segment.omega * segment.start))
+        )
     return float(abs(first)), float(abs(third))
 
 
@@ -127,7 +136,7 @@ def harmonic_measures(
     first_harmonic, third_harmonic : float
         Magnitudes of the first and the third harmonic [m s-2].
     drive_acceleration : float
-        Acceleration of the drive [m s-2]; the distortion is None if `distortion_ratio` has no value.
+        Acceleration amplitude of the drive [m s-2], which determines the round-off.
     """
     ratio = distortion_ratio(first_harmonic, third_harmonic, drive_acceleration)
     return {
@@ -139,65 +148,81 @@ def harmonic_measures(
 def distortion_ratio(first_harmonic, third_harmonic, drive_acceleration):
     """Return the ratio of the third to the first harmonic of an acceleration.
 
-    It is NaN if the first harmonic is below its floor or the round-off of the drive.
+    The ratio is NaN if the first harmonic is below its floor or within the round-off of the drive.
 
     Parameters
     ----------
     first_harmonic, third_harmonic : float or (n,)
         Magnitudes of the harmonics [m s-2].
     drive_acceleration : float or (n,)
-        Acceleration of the drive [m s-2].
+        Acceleration amplitude of the drive [m s-2].
     """
-    there = np.asarray(first_harmonic) > np.maximum(
+    is_moving = np.asarray(first_harmonic) > np.maximum(
         ACCELERATION_ROUND_OFF * np.asarray(drive_acceleration), MIN_HARMONIC
     )
-    return np.where(there, third_harmonic / np.where(there, first_harmonic, 1.0), np.nan)[()]
+    return np.where(is_moving, third_harmonic / np.where(is_moving, first_harmonic, 1.0), np.nan)[
+        ()
+    ]
 
 
 def friction_harmonic(window, modes, drive) -> complex:
-    """Return the Fourier coefficient [N] of the friction force from the equation of motion.
+    """Return the Fourier coefficient [N] of the friction force from the equations of motion.
 
-    F1 = m sum_i s_i r_i / sum_i s_i^2, where r = -base a1 - (z'')1 - D (z')1 - omega^2 z1 (3.4) and
-    s_i is the participation of the slide. It contains impulses within a step, such as the one that
-    ends a slip.
+    With equation 3.4, F1 = m sum_i s_i r_i / sum_i s_i^2, where r = -base a1 - (z'')1 - D (z')1 - omega^2 z1
+    and s_i is the participation of mode i in the slide. The result includes impulses within a step, e.g. at
+    the end of slip.
 
     Parameters
     ----------
     window : Response
-        Whole cycles of a drive that ends as a sinusoid, with no other forces than drive and friction.
+        Complete cycles of a drive that ends as a sinusoid, without forces other than drive and friction.
     modes
         Modal basis with one interface.
     drive
     """
-    last = [part for part in drive.segments if part.start < window.time[-1]][-1]
+    segment = [part for part in drive.segments if part.start < window.time[-1]][-1]
     time = window.time
-    omega = last.omega
-    known = harmonic_weights(time, omega)
+    omega = segment.omega
+    weights = harmonic_weights(time, omega)
     motions = list(zip(window.modal.T, window.modal_rate.T))
-    wave = np.exp(-1j * omega * time[[0, -1]])
-    first = np.array([motion_harmonic(time, z, v, omega, known) for z, v in motions])
-    ends = 2 / (time[-1] - time[0]) * (window.modal[-1] * wave[1] - window.modal[0] * wave[0])
-    rates = ends + 1j * omega * first
-    gains = np.array(
-        [_integrate_by_parts(time, z, v, omega, one) for (z, v), one in zip(motions, first)]
+    phase_factors = np.exp(-1j * omega * time[[0, -1]])
+    displacement_harmonics = np.array(
+        [motion_harmonic(time, z, v, omega, weights) for z, v in motions]
     )
-    push = -1j * last.amplitude * np.exp(1j * (last.phase - omega * last.start))
-    rest = -modes.base * push - gains - modes.damping_matrix @ rates - modes.omega**2 * first
-    return complex(modes.mass * (modes.slide @ rest) / (modes.slide @ modes.slide))
+    end_changes = (
+        2
+        / (time[-1] - time[0])
+        * (window.modal[-1] * phase_factors[1] - window.modal[0] * phase_factors[0])
+    )
+    velocity_harmonics = end_changes + 1j * omega * displacement_harmonics
+    acceleration_harmonics = np.array(
+        [
+            _convert_to_acceleration(time, z, v, omega, harmonic)
+            for (z, v), harmonic in zip(motions, displacement_harmonics)
+        ]
+    )
+    drive_harmonic = -1j * segment.amplitude * np.exp(1j * (segment.phase - omega * segment.start))
+    residual = (
+        -modes.base * drive_harmonic
+        - acceleration_harmonics
+        - modes.damping_matrix @ velocity_harmonics
+        - modes.omega**2 * displacement_harmonics
+    )
+    return complex(modes.mass * (modes.slide @ residual) / (modes.slide @ modes.slide))
 
 
 def read_instrument(
     window, drive, peak: float, kind: str = "peak", cutoff: float | None = None
 ) -> float:
-    """Return the absolute acceleration [m s-2] of a window as its sensor measures it.
+    """Return the absolute acceleration [m s-2] that an instrument indicates for a window.
 
     Parameters
     ----------
     window : Response
-        Whole cycles of the drive.
+        Complete cycles of the drive.
     drive : core.SineDrive
     peak : float
-        Largest acceleration [m s-2].
+        Peak acceleration [m s-2].
     kind : str
         "peak": `peak`; "fundamental": |a_1|, the amplitude at the drive frequency; "rms": sqrt(mean
         a^2); "lowpass": largest acceleration after a Butterworth low-pass filter of second order,
@@ -214,10 +239,10 @@ def read_instrument(
         return peak
     if kind == "rms":
         step = np.diff(window.time)
-        square = window.acceleration**2
+        squared = window.acceleration**2
         return float(
             np.sqrt(
-                np.sum(step * (square[1:] + square[:-1]) / 2) / (window.time[-1] - window.time[0])
+                np.sum(step * (squared[1:] + squared[:-1]) / 2) / (window.time[-1] - window.time[0])
             )
         )
     if kind == "fundamental":
@@ -226,22 +251,22 @@ def read_instrument(
         raise ValueError(f"reading '{kind}' is not possible; use one of {', '.join(READINGS)}")
     n = np.arange(1, N_FILTER_HARMONICS + 1)
     s = 1j * n * drive.omega / (2 * np.pi * cutoff)
-    passed = np.array([_acceleration_harmonic_n(window, drive, k) for k in n]) / (
+    filtered_harmonics = np.array([_acceleration_harmonic_n(window, drive, k) for k in n]) / (
         1 + np.sqrt(2) * s + s**2
     )
     spectrum = np.zeros(N_FILTER_SAMPLES // 2 + 1, complex)
-    spectrum[1 : N_FILTER_HARMONICS + 1] = passed * N_FILTER_SAMPLES / 2
+    spectrum[1 : N_FILTER_HARMONICS + 1] = filtered_harmonics * N_FILTER_SAMPLES / 2
     return float(np.abs(np.fft.irfft(spectrum, N_FILTER_SAMPLES)).max())
 
 
 def _acceleration_harmonic_n(window, drive, n: int) -> complex:
-    """Return the complex n-th harmonic [m s-2] of the absolute acceleration.
+    """Return the complex n-th harmonic [m s-2] of the absolute acceleration at the sensor.
 
-    Integration by parts is used, so that a jump of the acceleration causes no error.
+    Integration by parts avoids an error due to jumps of the acceleration.
     """
-    place, rate = (
-        window.extra.get(name, own)
-        for name, own in (("sensor", window.output), ("sensor_rate", window.output_rate))
+    displacement, rate = (
+        window.extra.get(name, default)
+        for name, default in (("sensor", window.output), ("sensor_rate", window.output_rate))
     )
-    found = acceleration_harmonic(window.time, place, rate, n * drive.omega)
-    return found - 1j * drive.acceleration if n == 1 and drive.moving else found
+    harmonic = acceleration_harmonic(window.time, displacement, rate, n * drive.omega)
+    return harmonic - 1j * drive.acceleration if n == 1 and drive.moving else harmonic

@@ -1,14 +1,14 @@
 """Measures under a stationary random drive: root mean squares, spectra, frequency response.
 
-In: the window of a run and its drive. Out: measures by name, each with its scatter between
-records (half-width of the 95 % interval by Student's t).
+In: the window of a run and its drive. Out: measures by name, each with its statistical scatter
+(half-width of the 95 % interval by Student's t).
 
-Segments of 1/16 of the record overlap by half and have Hann's window (Welch, 1967). The
-expected value of their H1 = G_ax/G_aa is the transform of the response h(t) times the
-correlation r(t) of the window (Bendat and Piersol, Random Data, ch. 9 and 11). Therefore h r of
-a mode is fitted to the largest peak, so that the window does not widen it. The scatter of a
-mean square is estimated from parts of the record, that of the fit by leaving out parts
-(jackknife).
+Spectra are averaged over half-overlapping segments of 1/16 of the record with a Hann window (Welch,
+1967). The expected value of the estimate H1 = G_ax/G_aa is the Fourier transform of the impulse response
+h(t) times the autocorrelation r(t) of the window (Bendat and Piersol, Random Data, ch. 9 and 11). The
+transform of h r for a single mode is fitted to the largest peak, so that the window does not increase the
+damping. The scatter of a mean square follows from parts of the record, that of the fit from the
+jackknife.
 """
 
 from typing import NamedTuple
@@ -21,11 +21,10 @@ from scipy.special import stdtrit
 from .welch import CrossDensities, Segments, average_segments, transform_segments
 
 SEGMENTS_PER_RECORD = 16  # Ratio of the record length to the segment length.
-# Number of parts of the record from which the scatter is estimated; they are groups of segments,
-# each left out once.
+# Number of parts of the record for the estimate of the scatter; in the jackknife, groups of segments.
 N_GROUPS = 10
-FIT_BAND = 6.0, 8.0  # Half-width of the band of a fit, in half-power widths and in spectral lines.
-# Smallest length of a record in decay times of the mode; the parts of a shorter one are correlated.
+FIT_BAND = 6.0, 8.0  # Half-width of the fitted band, in half-power widths and in spectral lines.
+# Smallest record length in decay times of the mode; parts of a shorter record are correlated.
 MIN_DECAY_TIMES = 50.0
 MIN_SEGMENT_SAMPLES = 64  # Smallest number of samples of a segment.
 
@@ -35,13 +34,13 @@ class Record(NamedTuple):
 
     - step: time step [s].
     - drive (k,): acceleration of the drive [m s-2].
-    - place (k,): displacement of the output [m].
+    - displacement (k,): displacement of the output [m].
     - acceleration (k,): acceleration of the output [m s-2].
     """
 
     step: float
     drive: np.ndarray
-    place: np.ndarray
+    displacement: np.ndarray
     acceleration: np.ndarray
 
 
@@ -51,55 +50,57 @@ class Spectra(NamedTuple):
     - frequency (q,): [Hz].
     - drive, acceleration (q,): spectral densities of the drive and of the acceleration of the
       output [m2 s-3].
-    - place (q,): spectral density of the displacement of the output [m2 Hz-1].
-    - gain (q,): complex H1 of the displacement over the drive [s2].
-    - coherence (q,): of displacement and drive [1].
+    - displacement (q,): spectral density of the displacement of the output [m2 Hz-1].
+    - gain (q,): complex H1 estimate of displacement over drive [s2].
+    - coherence (q,): coherence of displacement and drive [1].
     """
 
     frequency: np.ndarray
     drive: np.ndarray
-    place: np.ndarray
+    displacement: np.ndarray
     acceleration: np.ndarray
     gain: np.ndarray
     coherence: np.ndarray
 
 
 def make_record(window, drive) -> Record:
-    """Sample the drive and output of a window at the sampling rate of its drive.
+    """Return equally spaced samples of drive and output in a window.
 
-    The displacement comes from cubics through positions and rates.
+    The displacement is interpolated by cubics through positions and rates.
     """
-    kept = np.append(True, np.diff(window.time) > 1e-9 * drive.time[1])
-    time = window.time[kept]
+    is_new = np.append(True, np.diff(window.time) > 1e-9 * drive.time[1])
+    time = window.time[is_new]
     step = float(drive.time[1])
     grid = time[0] + step * np.arange(int((time[-1] - time[0]) / step * (1 + 1e-12)))
-    place = CubicHermiteSpline(time, window.output[kept], window.output_rate[kept])(grid)
-    return Record(step, drive.values(grid), place, np.interp(grid, time, window.acceleration[kept]))
+    displacement = CubicHermiteSpline(time, window.output[is_new], window.output_rate[is_new])(grid)
+    return Record(
+        step, drive.values(grid), displacement, np.interp(grid, time, window.acceleration[is_new])
+    )
 
 
 def random_response_measures(window, drive) -> dict:
-    """Return the measures of the response to a stationary random drive as a dict."""
+    """Return the measures of the response to a stationary random drive, by name."""
     record = make_record(window, drive)
-    out = {}
-    for name, values, even in (
-        ("relative_displacement_rms", window.output, record.place),
+    measures = {}
+    for name, values, samples in (
+        ("relative_displacement_rms", window.output, record.displacement),
         ("absolute_acceleration_rms", window.acceleration, record.acceleration),
     ):
-        out[name] = compute_rms(window.time, values)
-        out[f"{name}_scatter"] = rms_scatter(even)
-    found = fit_peak(record, drive.band)
-    if found is not None:
-        for name, value, scatter in zip(("response_frequency", "response_damping"), *found):
-            out |= {name: value, f"{name}_scatter": scatter}
+        measures[name] = compute_rms(window.time, values)
+        measures[f"{name}_scatter"] = rms_scatter(samples)
+    fit = fit_peak(record, drive.band)
+    if fit is not None:
+        for name, value, scatter in zip(("response_frequency", "response_damping"), *fit):
+            measures |= {name: value, f"{name}_scatter": scatter}
     if "ledger" in window.extra:
-        out["friction_power"], out["friction_power_scatter"] = mean_power(
+        measures["friction_power"], measures["friction_power_scatter"] = mean_power(
             window.time, window.extra["ledger"][0]
         )
-    return {name: float(value) for name, value in out.items() if np.isfinite(value)}
+    return {name: float(value) for name, value in measures.items() if np.isfinite(value)}
 
 
 def warn_if_short(measures: dict, window) -> list:
-    """Return a warning, as a list, if a record is short compared with the decay of its mode.
+    """Return a list with a warning if the record is short relative to the decay time of the mode.
 
     Parameters
     ----------
@@ -110,13 +111,13 @@ def warn_if_short(measures: dict, window) -> list:
     names = "response_frequency", "response_damping"
     if any(name not in measures or not measures[name].value for name in names):
         return []
-    at, zeta = (measures[name].value for name in names)
+    frequency, zeta = (measures[name].value for name in names)
     span = float(window.time[-1] - window.time[0])
-    decay = 1 / (2 * np.pi * at * zeta)
+    decay = 1 / (2 * np.pi * frequency * zeta)
     if span >= MIN_DECAY_TIMES * decay:
         return []
     return [
-        f"the response lasts only {span / decay:.2g} decay times of the mode at {at:.4g} Hz, too short for a "
+        f"the response lasts only {span / decay:.2g} decay times of the mode at {frequency:.4g} Hz, too short for a "
         f"reliable scatter between random drives; set drive.duration = '{1.5 * MIN_DECAY_TIMES * decay:.2g} s'"
     ]
 
@@ -134,8 +135,8 @@ def compute_rms(time, values) -> float:
 def rms_scatter(values) -> float:
     """Return the confidence half-width of the root mean square of equally spaced samples.
 
-    It comes from the mean squares of N_GROUPS parts. The interval is one of the logarithm of the mean
-    square, because few oscillations have a skewed distribution; its upper half counts.
+    The interval follows from the mean squares of N_GROUPS parts. It is computed for the logarithm of the
+    mean square, because the distribution is skewed for few oscillations; its upper half is returned.
     """
     if values.size < N_GROUPS:
         return np.nan
@@ -144,12 +145,14 @@ def rms_scatter(values) -> float:
     mean = square.mean()
     if not mean > 0:
         return 0.0
-    share = stdtrit(N_GROUPS - 1, 0.975) * parts.std(ddof=1) / np.sqrt(N_GROUPS) / mean
-    return float(np.sqrt(mean) * np.expm1(share / 2))
+    relative_half_width = (
+        stdtrit(N_GROUPS - 1, 0.975) * parts.std(ddof=1) / np.sqrt(N_GROUPS) / mean
+    )
+    return float(np.sqrt(mean) * np.expm1(relative_half_width / 2))
 
 
 def mean_power(time, work) -> tuple:
-    """Return the mean power [W] and its confidence half-width [W] from cumulative work.
+    """Return the mean power [W] and its confidence half-width [W] from the cumulative work.
 
     The half-width comes from the means over N_GROUPS parts of equal length.
 
@@ -165,39 +168,50 @@ def mean_power(time, work) -> tuple:
     return parts.mean(), stdtrit(N_GROUPS - 1, 0.975) * parts.std(ddof=1) / np.sqrt(N_GROUPS)
 
 
-def is_steady(window, drive) -> bool:
+def is_stationary(window, drive) -> bool:
     """Return whether both halves of a window have the same root mean square within scatter."""
-    place = make_record(window, drive).place
-    half = place.size // 2
-    first = place[:half]
-    last = place[half:]
-    # The half-widths are 2 standard errors, so a difference of up to 4 standard errors is accepted.
+    displacement = make_record(window, drive).displacement
+    half = displacement.size // 2
+    first = displacement[:half]
+    last = displacement[half:]
+    # half-widths are 2 standard errors, so that 4 standard errors are accepted
     return bool(
         abs(first.std() - last.std()) <= 2 * np.hypot(rms_scatter(first), rms_scatter(last))
     )
 
 
 def transform_record(record: Record) -> Segments:
-    """Transform drive, displacement and acceleration in overlapping segments of a record."""
+    """Return the transforms of drive, displacement and acceleration in segments of a record."""
     size = max(
-        min(MIN_SEGMENT_SAMPLES, record.place.size),
-        2 * (record.place.size // (2 * SEGMENTS_PER_RECORD)),
+        min(MIN_SEGMENT_SAMPLES, record.displacement.size),
+        2 * (record.displacement.size // (2 * SEGMENTS_PER_RECORD)),
     )
     return transform_segments(record.step, record[1:], size)
 
 
 def compute_spectra(window, drive) -> Spectra:
     """Compute the spectra of a window, up to twice the highest frequency of the drive."""
-    frequency, (push, place, acceleration) = transform_record(make_record(window, drive))
+    frequency, (drive_transforms, displacement_transforms, acceleration_transforms) = (
+        transform_record(make_record(window, drive))
+    )
     low, high = drive.band
-    shown = (frequency > 0) & (frequency <= 2 * high)
-    found = CrossDensities(*(part[shown] for part in average_segments(push, place)))
-    far = average_segments(push, acceleration).output[shown]
-    frequency = frequency[shown]
-    driven = (frequency >= low) & (frequency <= high)
-    gain = np.where(driven, found.cross / np.where(driven, found.input, np.inf), np.nan)
-    coherence = np.where(driven, found.coherence(), np.nan)
-    return Spectra(frequency, found.input, found.output, far, gain, coherence)
+    in_range = (frequency > 0) & (frequency <= 2 * high)
+    densities = CrossDensities(
+        *(
+            density[in_range]
+            for density in average_segments(drive_transforms, displacement_transforms)
+        )
+    )
+    acceleration_density = average_segments(drive_transforms, acceleration_transforms).output[
+        in_range
+    ]
+    frequency = frequency[in_range]
+    in_band = (frequency >= low) & (frequency <= high)
+    gain = np.where(in_band, densities.cross / np.where(in_band, densities.input, np.inf), np.nan)
+    coherence = np.where(in_band, densities.coherence(), np.nan)
+    return Spectra(
+        frequency, densities.input, densities.output, acceleration_density, gain, coherence
+    )
 
 
 def fit_peak(record: Record, band: tuple) -> tuple | None:
@@ -212,55 +226,57 @@ def fit_peak(record: Record, band: tuple) -> tuple | None:
     Returns
     -------
     tuple or None
-        (frequency, damping ratio) and the half-widths of both. None if the band contains no peak:
-        the largest value is at an end of the band, no mode fits, or the record is too short.
+        (frequency, damping ratio), and the half-widths of both. None without a peak, i.e. if the maximum
+        lies at an end of the band, if no mode fits, or if the record is too short.
     """
-    if record.place.size < 2 * MIN_SEGMENT_SAMPLES:
+    if record.displacement.size < 2 * MIN_SEGMENT_SAMPLES:
         return None
-    frequency, (push, place, _) = transform_record(record)
+    frequency, (drive_transforms, displacement_transforms, _) = transform_record(record)
     span = 1 / (frequency[1])
     line = frequency[1]
     inside = np.flatnonzero((frequency >= band[0] + 2 * line) & (frequency <= band[1] - 2 * line))
-    if inside.size < 5 or len(push) < N_GROUPS:
+    if inside.size < 5 or len(drive_transforms) < N_GROUPS:
         return None
-    own = (np.abs(push) ** 2)[:, inside]
-    cross = (push.conj() * place)[:, inside]
+    drive_powers = (np.abs(drive_transforms) ** 2)[:, inside]
+    cross = (drive_transforms.conj() * displacement_transforms)[:, inside]
     f = frequency[inside]
-    gain = cross.sum(axis=0) / own.sum(axis=0)
-    top = int(np.argmax(np.abs(gain)))
-    if top in (0, f.size - 1) or not np.abs(gain[top]) > 0:
+    gain = cross.sum(axis=0) / drive_powers.sum(axis=0)
+    peak = int(np.argmax(np.abs(gain)))
+    if peak in (0, f.size - 1) or not np.abs(gain[peak]) > 0:
         return None
-    high = np.flatnonzero(np.abs(gain) < np.abs(gain[top]) / np.sqrt(2))
-    left = high[high < top].max(initial=0)
-    right = high[high > top].min(initial=f.size - 1)
+    outside_peak = np.flatnonzero(np.abs(gain) < np.abs(gain[peak]) / np.sqrt(2))
+    left = outside_peak[outside_peak < peak].max(initial=0)
+    right = outside_peak[outside_peak > peak].min(initial=f.size - 1)
     width = float(f[right] - f[left])
-    theta = np.log([2 * np.pi * f[top], max(0.3 * width, 0.05 * line) / (2 * f[top])])
-    for _ in range(3):  # The band of the fit follows the width of the peak.
-        at = np.exp(theta[0]) / (2 * np.pi)
-        half = np.exp(theta.sum()) / (2 * np.pi)
-        near = np.abs(f - at) <= max(FIT_BAND[0] * half, FIT_BAND[1] * line)
-        theta = _fit_mode(f[near], gain[near], span, theta)
+    theta = np.log([2 * np.pi * f[peak], max(0.3 * width, 0.05 * line) / (2 * f[peak])])
+    for _ in range(3):  # the fitted band is adapted to the width of the peak
+        frequency_fit = np.exp(theta[0]) / (2 * np.pi)
+        half_width = np.exp(theta.sum()) / (2 * np.pi)
+        in_fit_band = np.abs(f - frequency_fit) <= max(FIT_BAND[0] * half_width, FIT_BAND[1] * line)
+        theta = _fit_mode(f[in_fit_band], gain[in_fit_band], span, theta)
     if (
-        near.sum() < 5
-        or not abs(f[top] - np.exp(theta[0]) / (2 * np.pi)) < max(width, 2 * line)
+        in_fit_band.sum() < 5
+        or not abs(f[peak] - np.exp(theta[0]) / (2 * np.pi)) < max(width, 2 * line)
         or theta[1] > 0
     ):
         return None
-    which = np.arange(len(push)) * N_GROUPS // len(push)
-    others = []
+    group_of_segment = np.arange(len(drive_transforms)) * N_GROUPS // len(drive_transforms)
+    estimates = []
     for group in range(N_GROUPS):
-        left_in = which != group
-        part = cross[left_in][:, near].sum(axis=0) / own[left_in][:, near].sum(axis=0)
-        others.append(np.exp(_fit_mode(f[near], part, span, theta)))
+        is_used = group_of_segment != group
+        partial_gain = cross[is_used][:, in_fit_band].sum(axis=0) / drive_powers[is_used][
+            :, in_fit_band
+        ].sum(axis=0)
+        estimates.append(np.exp(_fit_mode(f[in_fit_band], partial_gain, span, theta)))
     scale = np.array([1 / (2 * np.pi), 1.0])
-    spread = np.sqrt((N_GROUPS - 1) * np.var(others, axis=0)) * stdtrit(N_GROUPS - 1, 0.975)
-    return np.exp(theta) * scale, spread * scale
+    half_widths = np.sqrt((N_GROUPS - 1) * np.var(estimates, axis=0)) * stdtrit(N_GROUPS - 1, 0.975)
+    return np.exp(theta) * scale, half_widths * scale
 
 
 def _fit_mode(f, gain, span: float, theta) -> np.ndarray:
-    """Fit natural frequency and damping ratio of the mode that reproduces H1.
+    """Fit the logarithms of natural frequency and damping ratio of one mode to H1.
 
-    A complex constant is fitted as well, for the other modes.
+    A complex constant represents the other modes.
 
     Parameters
     ----------
@@ -274,7 +290,7 @@ def _fit_mode(f, gain, span: float, theta) -> np.ndarray:
     size = np.abs(gain).max()
 
     def compute_residual(theta):
-        """Return the relative residual of H1 after a linear least-squares fit."""
+        """Return the relative residual of H1, with optimal amplitude and constant."""
         response = expected_response(f, *np.exp(theta), span)
         columns = np.stack([response, np.ones(f.size, complex), 1j * np.ones(f.size)], axis=1)
         design = np.concatenate([columns.real, columns.imag])
@@ -282,17 +298,21 @@ def _fit_mode(f, gain, span: float, theta) -> np.ndarray:
         target = np.concatenate([gain.real, gain.imag]) / size
         return design / norms @ np.linalg.lstsq(design / norms, target, rcond=1e-12)[0] - target
 
-    reach = np.array([0.5, 7.0])
+    max_change = np.array([0.5, 7.0])
     return least_squares(
-        compute_residual, theta, bounds=(theta - reach, theta + reach), xtol=1e-10, ftol=1e-10
+        compute_residual,
+        theta,
+        bounds=(theta - max_change, theta + max_change),
+        xtol=1e-10,
+        ftol=1e-10,
     ).x
 
 
 def expected_response(f, omega: float, zeta: float, span: float) -> np.ndarray:
-    """Return the H1 estimate [s2] that Hann-windowed segments give for a mode, in closed form.
+    """Return the expected H1 estimate [s2] of a mode from Hann-windowed segments, in closed form.
 
-    int_0^span h(t) r(t) exp(-2 pi i f t) dt, where h is the response of x'' + 2 zeta omega x' +
-    omega^2 x = a and r the correlation of the window.
+    The result is int_0^span h(t) r(t) exp(-2 pi i f t) dt, where h is the impulse response of
+    x'' + 2 zeta omega x' + omega^2 x = a, and r is the autocorrelation of the window.
 
     Parameters
     ----------
@@ -303,16 +323,21 @@ def expected_response(f, omega: float, zeta: float, span: float) -> np.ndarray:
     span : float
         Duration of a segment [s].
     """
-    own = omega * np.sqrt(complex(1 - zeta * zeta))
-    turn = 2j * np.pi / span
-    out = 0.0
-    for pole, sign in ((-zeta * omega + 1j * own, 1), (-zeta * omega - 1j * own, -1)):
+    damped_omega = omega * np.sqrt(complex(1 - zeta * zeta))
+    line_step = 2j * np.pi / span
+    response = 0.0
+    for pole, sign in (
+        (-zeta * omega + 1j * damped_omega, 1),
+        (-zeta * omega - 1j * damped_omega, -1),
+    ):
         q = pole - 2j * np.pi * f
-        # Since exp(turn span) = 1, the result is the same at q +- turn.
+        # exp(s span) is the same at s = q and s = q +- turn, because exp(turn span) = 1
         late = np.exp(q * span) - 1
         ramp = sum(
-            share * (late / s - span) / (s * span)
-            for share, s in ((2 / 3, q), (1 / 6, q + turn), (1 / 6, q - turn))
+            weight * (late / s - span) / (s * span)
+            for weight, s in ((2 / 3, q), (1 / 6, q + line_step), (1 / 6, q - line_step))
         )
-        out = out + sign * (ramp + late * (1 / (q + turn) - 1 / (q - turn)) / (4j * np.pi))
-    return out / (2j * own)
+        response = response + sign * (
+            ramp + late * (1 / (q + line_step) - 1 / (q - line_step)) / (4j * np.pi)
+        )
+    return response / (2j * damped_omega)

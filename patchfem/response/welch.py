@@ -1,7 +1,6 @@
 """Spectral densities of records from transforms of overlapping segments (Welch, 1967).
 
-In: records at equal time steps. Out: `Segments` of their transforms, and `CrossDensities` of
-two of them.
+In: equally sampled records. Out: `Segments` with their transforms, and `CrossDensities` of two records.
 """
 
 from typing import NamedTuple
@@ -10,11 +9,11 @@ import numpy as np
 
 
 class Segments(NamedTuple):
-    """Fourier transforms of the overlapping segments of a record.
+    """Fourier transforms of the overlapping segments of records.
 
-    - frequency (q,): [Hz].
-    - transforms (r, m, q): of r records over m segments, scaled so that 2 |X|^2 is a one-sided
-      spectral density.
+    - frequency (q,): frequencies of the spectral lines [Hz].
+    - transforms (r, m, q): transforms X of m segments of r records, scaled such that 2 |X|^2 is a
+      one-sided spectral density.
     """
 
     frequency: np.ndarray
@@ -22,7 +21,7 @@ class Segments(NamedTuple):
 
 
 class CrossDensities(NamedTuple):
-    """One-sided spectral densities of input and output with their cross density, (q,) each."""
+    """One-sided spectral densities of input and output, and their cross density, (q,) each."""
 
     input: np.ndarray
     output: np.ndarray
@@ -30,12 +29,14 @@ class CrossDensities(NamedTuple):
 
     def coherence(self) -> np.ndarray:
         """Return the coherence (q,): the fraction of the output that depends linearly on the input."""
-        size = np.abs(self.cross)
-        return (size / np.maximum(self.input, 1e-300)) * (size / np.maximum(self.output, 1e-300))
+        magnitude = np.abs(self.cross)
+        return (magnitude / np.maximum(self.input, 1e-300)) * (
+            magnitude / np.maximum(self.output, 1e-300)
+        )
 
 
 def transform_segments(step: float, records, size: int, *, has_window: bool = True) -> Segments:
-    """Compute the Fourier transforms of record segments that overlap by half.
+    """Return the Fourier transforms of the segments of records, which overlap by half.
 
     Parameters
     ----------
@@ -44,9 +45,9 @@ def transform_segments(step: float, records, size: int, *, has_window: bool = Tr
     records : (r, k) array
         Equally spaced samples.
     size : int
-        Samples of a segment.
+        Number of samples per segment.
     has_window : bool
-        Whether each segment is tapered by Hann's window, about its own mean.
+        Whether a Hann window is applied to each segment after its mean is removed.
 
     Returns
     -------
@@ -57,16 +58,16 @@ def transform_segments(step: float, records, size: int, *, has_window: bool = Tr
     segments = records[:, starts[:, None] + np.arange(size)]
     taper = np.ones(size)
     if has_window:
-        taper = np.sin(np.pi * np.arange(size) / size) ** 2  # This is Hann's window, periodic.
+        taper = np.sin(np.pi * np.arange(size) / size) ** 2  # periodic Hann window
         segments = (segments - segments.mean(axis=2, keepdims=True)) * taper
     transforms = np.fft.rfft(segments) * np.sqrt(step / np.sum(taper**2))
     return Segments(np.fft.rfftfreq(size, step), transforms)
 
 
-def average_segments(driven, response) -> CrossDensities:
-    """Average products of segment transforms to spectral densities."""
+def average_segments(input_transforms, output_transforms) -> CrossDensities:
+    """Return spectral densities averaged over the segments of an input and an output."""
     return CrossDensities(
-        input=2 * np.mean(np.abs(driven) ** 2, axis=0),
-        output=2 * np.mean(np.abs(response) ** 2, axis=0),
-        cross=2 * np.mean(driven.conj() * response, axis=0),
+        input=2 * np.mean(np.abs(input_transforms) ** 2, axis=0),
+        output=2 * np.mean(np.abs(output_transforms) ** 2, axis=0),
+        cross=2 * np.mean(input_transforms.conj() * output_transforms, axis=0),
     )

@@ -39,7 +39,7 @@ class AccuracyCurve(NamedTuple):
       error.
     - limiting_measure: measure with the largest error for twice the steps.
     - cause: kind of coarsening, other than the steps, that contributes most to this error, as in
-      `CoarserRuns.of`; "" if there is none.
+      `CoarserRuns.source`; "" if there is none.
     - tolerance: tolerance of the scene.
     """
 

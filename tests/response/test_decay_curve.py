@@ -118,7 +118,7 @@ def test_always_decay_intervals_cover_nonlinear_damping():
                 atol=1e-12,
             ).y[0]
         )
-        found = fit_decay_curve(make_half_cycles(np.pi * k, (-1.0) ** k * a)).at(slice(1, -1))
+        found = fit_decay_curve(make_half_cycles(np.pi * k, (-1.0) ** k * a)).select(slice(1, -1))
         true = fall(found.amplitude)
         held.append(np.abs(found.damping - true / np.hypot(np.pi, true)) <= found.damping_error)
     assert np.concatenate(held).mean() > 0.95

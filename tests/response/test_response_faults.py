@@ -5,7 +5,7 @@ import pytest
 
 from patchfem.core import Outcome, Response
 from patchfem.friction import LuGre
-from patchfem.response import compute_step_harmonic, motion_inside_steps, settling
+from patchfem.response import add_substep_samples, compute_step_harmonic, settling
 from patchfem.response.inside_steps import N_SUBSTEPS, divide_steps
 
 
@@ -47,7 +47,7 @@ def test_exact_lugre_force_inside_step():
         output=none, output_rate=none, acceleration=none, base_acceleration=none, force=none,
         slip=none,
     )  # fmt: skip
-    inside = motion_inside_steps(window, law, load)
+    inside = add_substep_samples(window, law, load)
     assert inside.time.size == 2 * N_SUBSTEPS + 1
     limit = 0.4 + 0.2 * np.exp(-0.25)
     fraction = np.exp(-speed * inside.time * law.stiffness / limit)

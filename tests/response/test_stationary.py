@@ -16,16 +16,19 @@ def test_exact_spectra_agree_with_scipy():
     window, drive = simulate_random_response(100.0, 0.02, 4.0, 3)
     record = stationary.make_record(window, drive)
     found = stationary.compute_spectra(window, drive)
-    size = 2 * (record.place.size // (2 * stationary.SEGMENTS_PER_RECORD))
+    size = 2 * (record.displacement.size // (2 * stationary.SEGMENTS_PER_RECORD))
     asked = {"fs": 1 / record.step, "nperseg": size, "noverlap": size // 2, "detrend": "constant"}
     f, push = welch(record.drive, **asked)
     kept = (f > 0) & (f <= 2 * drive.band[1])
     assert found.frequency == pytest.approx(f[kept], rel=1e-12) and found.drive == pytest.approx(
         push[kept], rel=1e-9
     )
-    for mine, values in ((found.place, record.place), (found.acceleration, record.acceleration)):
+    for mine, values in (
+        (found.displacement, record.displacement),
+        (found.acceleration, record.acceleration),
+    ):
         assert mine == pytest.approx(welch(values, **asked)[1][kept], rel=1e-9)
-    gain = (csd(record.drive, record.place, **asked)[1] / push)[kept]
+    gain = (csd(record.drive, record.displacement, **asked)[1] / push)[kept]
     inside = ~np.isnan(found.coherence)
     assert found.gain[inside] == pytest.approx(gain[inside], rel=1e-9) and np.all(
         found.coherence[inside] <= 1 + 1e-12

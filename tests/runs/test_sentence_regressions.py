@@ -110,8 +110,8 @@ def test_exact_motion_of_round_off_has_no_slip_or_loop():
     last_cycles = LastCycles(
         window, SimpleNamespace(period=72.0), None, {}, 12.9, 2e5, True, loop=(1e-22, 3.9, 0.0)
     )
-    assert last_cycles.slip == {
+    assert last_cycles.slip_measures == {
         "slip_amplitude": 0.0,
         "stick_fraction": 1.0,
-    } and last_cycles.cycle == {"loop_area": 0.0}
+    } and last_cycles.loop_measures == {"loop_area": 0.0}
     assert relative_gap(1e-22, 2e-22, 2e-22) == 0 < relative_gap(1e-12, 2e-12, 2e-12)

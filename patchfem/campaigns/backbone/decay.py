@@ -193,8 +193,8 @@ class _ReleaseVariants:
 
     def change(self, coarsening, value) -> np.ndarray:
         """Return the change (2, k) of frequency and damping by a given kind of coarsening."""
-        base = value if coarsening.beside is None else self.curve(coarsening.beside)
-        runs = coarsening.runs if coarsening.of == "cells" else coarsening.runs[:1]
+        base = value if coarsening.reference is None else self.curve(coarsening.reference)
+        runs = coarsening.runs if coarsening.source == "cells" else coarsening.runs[:1]
         return np.max([np.abs(self.curve(run) - base) for run in runs], axis=0)
 
 

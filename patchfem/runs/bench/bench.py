@@ -13,7 +13,7 @@ from ...response.loops import (
     find_reversals,
     interface_loop,
     mean_half_range,
-    reversal_evaluation,
+    reversal_force_rule,
     secant_stiffness,
 )
 from ...response.measures import (
@@ -100,7 +100,7 @@ def run_bench(
     loops = [(slide, histories.force)]
     if lateral:
         loops.append((lateral["lateral"], lateral["lateral_force"]))
-    jumps = reversal_evaluation(model) == "jumps"
+    jumps = reversal_force_rule(model) == "jumps"
     values = _compute_measures(model, time, slide, histories, first)
     values |= _compute_loop_measures(model, time, slide, histories, first, omega) if omega else {}
     values["work_check"] = work_difference(histories.ledger[0], loops, jumps)
@@ -175,7 +175,7 @@ def _compute_loop_measures(
         np.zeros(time.size),
         force,
         time[-1] - time[0],
-        reversal_evaluation(model),
+        reversal_force_rule(model),
     )
     measures = interface_loop(
         mean_half_range(reversals),

@@ -129,7 +129,7 @@ def list_coarser_runs(model, patches: list, fine_run, steps: int) -> list:
     rule = (
         convergence_errors if uses_parallel_elements(model) else partial(step_errors, steps=steps)
     )
-    out = [CoarserRuns((halved, quarter), rule, of="steps")]
+    out = [CoarserRuns((halved, quarter), rule, source="steps")]
     has_coarser_mesh = len(patches) > 1
     patch = patches[0]
     if has_coarser_mesh and uses_parallel_elements(model):

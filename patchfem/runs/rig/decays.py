@@ -57,7 +57,7 @@ def compute_decay_curve(solution: Solution) -> DecayCurve | None:
     known = (curve.frequency_error <= MAX_POINT_ERROR * curve.frequency) & (
         curve.damping_error <= MAX_POINT_ERROR * np.abs(curve.damping)
     )
-    return curve.at(known) if known.any() else None
+    return curve.select(known) if known.any() else None
 
 
 def _add_coarse_changes(curve: DecayCurve, solution: Solution) -> DecayCurve:
@@ -88,8 +88,8 @@ def _measure_decay_curve(run: Solution) -> DecayCurve:
     amplitude = mode.displacement * np.exp(-rate * (time - mode.begin))
     zero = np.zeros(time.size)
     ringing = DecayCurve(time, amplitude, zero + mode.frequency, zero, zero + mode.damping, zero)
-    ringing = ringing.at(amplitude > MIN_HALF_CYCLE * np.abs(motion.output).max())
-    slipping = half_cycles.at(half_cycles.time < mode.begin)
+    ringing = ringing.select(amplitude > MIN_HALF_CYCLE * np.abs(motion.output).max())
+    slipping = half_cycles.select(half_cycles.time < mode.begin)
     return DecayCurve(*map(np.concatenate, zip(slipping, ringing)))
 
 
@@ -307,7 +307,7 @@ def describe_unknown_mesh_errors(reasons: dict, coarser_runs) -> list:
     for reason in dict.fromkeys(filter(None, reasons.values())):
         names = " and of ".join(name for name, cause in reasons.items() if cause == reason)
         lacks = "no error of the mesh"
-        if any(kind.of == "mesh" for kind in coarser_runs()):
+        if any(kind.source == "mesh" for kind in coarser_runs()):
             lacks = (
                 "the change on a coarser mesh, but not the energy that is lost in slip too small "
                 "for either mesh to resolve"

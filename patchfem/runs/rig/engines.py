@@ -240,11 +240,11 @@ def _list_element_space_runs(model: Model, numerics, patch, coarse, solution) ->
     meshes = _list_coarse_mesh_numerics(model, numerics)
     if coarse is not None and model.partial_slip:
         meshes = [replace(numerics, coarse_patch=True), *meshes]
-    coarser_runs = [CoarserRuns((mesh,), coarser_errors, of="mesh") for mesh in meshes]
+    coarser_runs = [CoarserRuns((mesh,), coarser_errors, source="mesh") for mesh in meshes]
     laws = [interface.numbers.law for interface in model.rig.friction.interfaces]
     if any(law_has_trait(law, "cells") for law in laws):
         merged = tuple(replace(numerics, joined=cells) for cells in CELL_MERGES)
-        coarser_runs.append(CoarserRuns(merged, merged_cell_errors, of="cells"))
+        coarser_runs.append(CoarserRuns(merged, merged_cell_errors, source="cells"))
     return coarser_runs
 
 
@@ -264,7 +264,7 @@ def _divide_steps(numerics, divisor: int):
 def _list_march_time_runs(model: Model, numerics) -> list:
     """List the comparison runs of a march with half and with a quarter of its steps."""
     runs = (_divide_steps(numerics, 2), _divide_steps(numerics, 4))
-    return [CoarserRuns(runs, partial(step_errors, steps=numerics.steps), of="steps")]
+    return [CoarserRuns(runs, partial(step_errors, steps=numerics.steps), source="steps")]
 
 
 def _list_march_space_runs(model: Model, numerics, patch, coarse, solution) -> list:
@@ -313,7 +313,7 @@ def _list_bond_sum_runs(model: Model, quarter, patch, solution) -> list:
         CoarserRuns(
             (),
             lambda fine: _estimate_bond_sum_errors(model, patch, choice.error, fine, solution),
-            of="bonds",
+            source="bonds",
         )
     ]
     if choice.merge > 0 or choice.tail > MAX_UNCHECKED_TAIL_RATIO * model.accuracy.tolerance:

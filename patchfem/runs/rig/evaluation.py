@@ -14,7 +14,7 @@ from ...friction import path_work
 from ...response import run_events
 from ...response.errors import ERROR_MEASURES, absolute_change, error_of_change
 from ...response.levels import LEVEL_MEASURES, Level
-from ...response.loops import reversal_evaluation
+from ...response.loops import reversal_force_rule
 from ...response.measures import (
     relative_gap,
     slip_round_off,
@@ -111,12 +111,12 @@ class RunEvaluator:
         drive = drive or model.rig.drive.signal
         fields = {
             "window": run.window,
-            "book": run.ledger,
+            "run_energies": run.ledger,
             "integrated": self.compute_integrated_measures(run, drive, stuck=stuck),
             "run": self.find_uniform_histories(run, drive),
         }
         if self.has_friction:
-            fields |= {"by": reversal_evaluation(model), "ledger": ledger}
+            fields |= {"reversal_rule": reversal_force_rule(model), "ledger": ledger}
         fields |= self.collect_cycle_data(run, drive, stuck=stuck)
         window = fields["window"]
         n_cycles = min(self.numerics.window, len(run.amplitudes))
@@ -125,7 +125,7 @@ class RunEvaluator:
             extremes=run.amplitudes[-n_cycles:],
             load=first_interface_load(model, self.patch),
             stiffness=first_mode_stiffness(model, window),
-            sine=is_sinusoidal(drive),
+            is_sine=is_sinusoidal(drive),
             **fields,
         )
         values = compute_measures(last_cycles)

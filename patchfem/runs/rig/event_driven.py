@@ -205,7 +205,7 @@ class EventEvaluator(RunEvaluator):
         lost = run.ledger["friction"]
         return {
             "ledger": np.array([[lost], [0.0], [lost], [0.0]]),
-            "together": self.strips_slide_independently,
+            "is_single_interface": self.strips_slide_independently,
         }
 
     def measure_ringing(self, run, drive) -> tuple:

@@ -52,8 +52,8 @@ def add_level_errors(levels, coarser_runs: list, solutions: dict) -> tuple:
         parts = []
         for kind in coarser_runs:
             reference = level.values
-            if kind.beside is not None:
-                reference = _find_level_values(solutions[kind.beside], number)
+            if kind.reference is not None:
+                reference = _find_level_values(solutions[kind.reference], number)
             coarse_values = [_find_level_values(solutions[run], number) for run in kind.runs]
             parts.append(kind.rule(reference, *coarse_values))
         errors = {}

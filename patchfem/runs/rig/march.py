@@ -14,7 +14,7 @@ from ...dynamics.march import march as engine
 from ...effects import law_has_trait
 from ...friction.record import make_law
 from ...response.ends import estimate_window_error
-from ...response.inside_steps import motion_inside_steps
+from ...response.inside_steps import add_substep_samples
 from ...response.measures import compute_step_harmonic, peak_sampling_errors
 from ...response.rows import ROWS_NEEDING_RUN, lateral_work
 from ...response.spectrum import friction_harmonic, motion_harmonic
@@ -204,11 +204,11 @@ class MarchEvaluator(RunEvaluator):
         if not self.has_friction:
             return {}
         return {
-            "book": self._compute_energies(run, drive, stuck=stuck),
+            "run_energies": self._compute_energies(run, drive, stuck=stuck),
             "loop": self._compute_loop(run, drive),
-            "still": self.stick_tolerance if self.contact.set_valued else 0.0,
-            "together": self.model.rig.friction.strips_slide_apart,
-            "inside": self.add_samples_inside_steps,
+            "slide_round_off": self.stick_tolerance if self.contact.set_valued else 0.0,
+            "is_single_interface": self.model.rig.friction.strips_slide_apart,
+            "add_substeps": self.add_samples_inside_steps,
         }
 
     def add_samples_inside_steps(self, window, number: int):
@@ -231,7 +231,7 @@ class MarchEvaluator(RunEvaluator):
         load = interface.load
         if load is None:
             load = first_interface_load(model, self.patch)
-        return motion_inside_steps(window, make_law(interface.numbers, load), load)
+        return add_substep_samples(window, make_law(interface.numbers, load), load)
 
     def _compute_loop(self, run, drive) -> CycleLoop | None:
         """Compute the first harmonics of displacement and friction force, and the work per cycle.

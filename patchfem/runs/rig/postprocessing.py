@@ -13,7 +13,7 @@ from ...effects import law_has_trait
 from ...model.rig import MAX_TRAVEL
 from ...response import reasons, run_events, stationary
 from ...response.decay_curve import DecayCurve
-from ...response.errors import add_stated_errors
+from ...response.errors import add_run_error_estimates
 from ...response.outcome import judge_outcome, remove_errors
 from ...structure.drive_sizes import find_decay_rate
 from ..patch import faces
@@ -104,7 +104,7 @@ def add_outcome(run: CoupledRun) -> CoupledRun:
         run = replace(run, solution=solution)
     rig = run.model.rig
     end_errors = solution.extra.get("late", {})
-    measures = add_stated_errors(run.measures, solution.run_errors, end_errors)
+    measures = add_run_error_estimates(run.measures, solution.run_errors, end_errors)
     if not run.has_errors:
         measures = remove_errors(measures)
     outcome, measures = judge_outcome(

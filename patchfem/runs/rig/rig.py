@@ -229,7 +229,7 @@ def _add_level_errors(solution: Solution, coarser_runs: list, solutions: dict) -
     for kind in used_runs:
         # Runs with another bond summation are not used for the errors of decay curves and onsets.
         if kind.runs and kind.runs[0].choice is None:
-            pairs.append((solutions[kind.runs[0]], kind.beside and solutions[kind.beside]))
+            pairs.append((solutions[kind.runs[0]], kind.reference and solutions[kind.reference]))
     level_results = ()
     if solution.levels:
         level_results = levels.add_level_errors(solution.levels, used_runs, solutions)

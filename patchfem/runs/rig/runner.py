@@ -107,7 +107,7 @@ class Runner:
         list of StepRun
         """
         pairs = [(numerics, solution)]
-        if coarser_runs and coarser_runs[0].of == "steps":
+        if coarser_runs and coarser_runs[0].source == "steps":
             pairs += [(run, self.solutions[run]) for run in coarser_runs[0].runs]
         step_runs = []
         for settings, run in pairs:

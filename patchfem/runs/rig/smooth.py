@@ -96,7 +96,7 @@ class SmoothEvaluator(RunEvaluator):
         run, drive, stuck
             See `RunEvaluator.collect_cycle_data`.
         """
-        return {"window": run.with_reversals, "even": run.window, "by": "rate"}
+        return {"window": run.with_reversals, "uniform_window": run.window, "reversal_rule": "rate"}
 
     def thin_run(self, run):
         """Return a run without every second sample of its window."""
