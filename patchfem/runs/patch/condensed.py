@@ -84,7 +84,7 @@ def assemble_piece(body, layers: Layers):
     return substructure.Substructure(body, layers)
 
 
-def get_interface_compliance(body, piece, ignore_cache: bool) -> InterfaceCompliance:
+def piece_compliance(body, piece, ignore_cache: bool) -> InterfaceCompliance:
     """Return the interface compliance of a piece, from the disk cache if it is there.
 
     It has the normal, tangential and coupling parts nn, tt and nt.
@@ -136,11 +136,9 @@ def condense(patch_model, grid, upper_grid=None, ignore_cache: bool = False) -> 
         upper = assemble_piece(
             upper_grid, make_elastic_layers(patch_model, patch_model.pieces.upper)
         )
-    lower_compliance = get_interface_compliance(grid, piece, ignore_cache)
+    lower_compliance = piece_compliance(grid, piece, ignore_cache)
     upper_compliance = (
-        lower_compliance
-        if upper is piece
-        else get_interface_compliance(upper_grid, upper, ignore_cache)
+        lower_compliance if upper is piece else piece_compliance(upper_grid, upper, ignore_cache)
     )
     joint = None
     x = grid.x

@@ -160,18 +160,14 @@ def solve_faces_with_slip_fields(model, snapshots) -> tuple:
     """
     out = []
     for face in solve_interface_patches(model):
-        interface = model.rig.friction.interfaces[face.number]
+        law = model.rig.friction.interfaces[face.number]
         fields = collect_rest_frame(face.patch)
         jenkins_set = (
-            make_patch_elements(interface, model.accuracy.tolerance)[2]
-            if face.partial_slip
-            else None
+            make_patch_elements(law, model.accuracy.tolerance)[2] if face.partial_slip else None
         )
         if jenkins_set is not None and snapshots:
             states = [snapshot["faces"][face.number] for snapshot in snapshots]
-            length = (
-                record.make_law(interface.numbers, interface.load).element(interface.load).length
-            )
+            length = record.make_law(law.numbers, law.load).element(law.load).length
             tau, local = slip_fields.element_fields(face.patch, jenkins_set, states, length)
             fields = make_interface_frames(
                 face.patch,
@@ -179,7 +175,7 @@ def solve_faces_with_slip_fields(model, snapshots) -> tuple:
                 tau,
                 local,
                 np.array([slide for slide, _ in states]),
-                SlipRule(interface.numbers.static * face.patch.pressure.sigma_n),
+                SlipRule(law.numbers.static * face.patch.pressure.sigma_n),
             )
         out.append(face._replace(fields=fields))
     return tuple(out)

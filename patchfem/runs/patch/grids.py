@@ -243,7 +243,7 @@ def make_column_layout(patch_model, extents: list) -> Layout:
     half = length / 2
     span = (min(extent.span[0] for extent in extents), max(extent.span[1] for extent in extents))
     width = min(extent.width for extent in extents)
-    coating_thickness = _min_coating_thickness(patch_model)
+    coating = _min_coating_thickness(patch_model)
     # The third mesh, whose cells are a quarter as long, has to resolve the waves.
     max_cell = min(length / 12, 4 * _max_wave_cell(patch_model))
     if max(len(extent.places) for extent in extents) > MAX_CONTACT_ENDS:
@@ -255,13 +255,9 @@ def make_column_layout(patch_model, extents: list) -> Layout:
     n_contact_cells = N_SMALL_CONTACT_CELLS
     if np.isfinite(max(extent.cell for extent in extents)):
         n_contact_cells = EDGE_CELLS[patch_model.mesh.is_static]
-    # A band of short cells along the path of a moving edge would change the contact set in many
-    # steps.
-    coating_cell = (
-        coating_thickness / 4
-        if coating_thickness and patch_model.mesh.edge_motion != "load"
-        else np.inf
-    )
+    # A band along the path of a moving edge would need many cells, each of which changes the
+    # contact set.
+    coating_cell = coating / 4 if coating and patch_model.mesh.edge_motion != "load" else np.inf
     min_cell = max(min(width / n_contact_cells, coating_cell), MIN_CELL_RATIO * length)
     bands = _make_edge_bands([extent.places for extent in extents], min_cell)
     # A node is placed on each step of the gap; the quantities there converge at first order in the
@@ -286,7 +282,7 @@ def make_column_layout(patch_model, extents: list) -> Layout:
     )
     corner_cell = max(
         min(
-            coating_thickness / 16 if coating_thickness else np.inf,
+            coating / 16 if coating else np.inf,
             width / EDGE_CELLS[patch_model.mesh.is_static] / corner_factor,
         ),
         MIN_CELL_RATIO * length,
