@@ -9,9 +9,11 @@ carry the remainder.
 
 A choice obeys the law if every sticking interface is below its limit, or at it with a decreasing
 reaction, and every other one starts to move in the direction of its slip. The first term of the
-power series that is not round-off decides. `choose_sticks` exchanges
-single interfaces by the rule of least index (Murty 1974), from the guess on; where that finds
-none, it tries all choices of up to eight interfaces.
+power series that is not round-off decides. Several choices may obey the law if kinetic friction is
+below static friction. `choose_sticks` keeps the guess if it obeys the law. Otherwise it takes the
+choice with the fewest slipping interfaces, as long as at most four are at rest. Among more it
+exchanges single interfaces by the rule of least index (Murty 1974), starting with the guess; where
+that finds none, it tries all choices of up to eight interfaces.
 """
 
 from math import sqrt
@@ -30,6 +32,8 @@ LOOSE_NOISE_FACTOR = 1e4
 # Maximum number of power-series terms that decide between stick and
 # slip; later terms are round-off.
 MAX_DECIDING_ORDER = 8
+# Maximum number of resting interfaces for which all combinations (at most 81) are tried before exchanges.
+MAX_ENUMERATED_FIRST = 4
 # Maximum number of resting interfaces for which all combinations (at most 6561) are tried.
 MAX_ENUMERATED = 8
 # Maximum number of exchanges per interface; solvable cases need fewer.
@@ -527,7 +531,9 @@ def choose_sticks(h, run):
     for noise in (NOISE_TOL, LOOSE_NOISE_FACTOR * NOISE_TOL):
         for f in range(n_interfaces):
             choice.guess[f] = choice.slip_signs[f]
-        if choose_by_exchange(noise, h, run):
+        if find_violation(noise, h, run)[0] < 0:
+            return True
+        if count > MAX_ENUMERATED_FIRST and choose_by_exchange(noise, h, run):
             return True
         if count <= MAX_ENUMERATED and choose_by_enumeration(noise, h, run):
             return True
