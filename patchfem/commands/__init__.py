@@ -7,7 +7,7 @@ return at once. `shared` has the options and refusals of several commands.
 Read `run` first.
 """
 
-# names that other folders use, by module
+# Names that other folders use, by module.
 PUBLIC = {
     "shared": (
         "CommandExit",

@@ -132,7 +132,7 @@ def compare(
         )
     folders = before.is_dir(), after.is_dir()
     if any(folders) and len(files) == 2 and not all(folders):
-        worn_runs.compare_runs(before, after)  # raises the error for a pair of a file and a folder
+        worn_runs.compare_runs(before, after)  # raises the error for a file and a folder
     if any(folders):
         _refuse_surface_options(
             {

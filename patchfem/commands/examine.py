@@ -17,8 +17,8 @@ plotter = pyvista.Plotter(off_screen=True, window_size=(32, 32))
 plotter.add_mesh(pyvista.Sphere())
 assert plotter.screenshot(None, return_img=True).std() > 0
 """
-MAX_PICTURE_SECONDS = 60  # [s] for a first picture from a slow disk
-# Packages that pyproject.toml requires; an older installation does not know of new ones.
+MAX_PICTURE_SECONDS = 60  # time limit of the test picture [s], for a slow disk
+# Packages that pyproject.toml requires; an older installation may lack new ones.
 REQUIRED_PACKAGES = (
     "numpy",
     "scipy",
@@ -98,7 +98,7 @@ def _threads() -> Finding:
     """Return the number of cores that can be used."""
     try:
         cores = len(os.sched_getaffinity(0))
-    except AttributeError:  # not available on every system
+    except AttributeError:  # this function does not exist on every system
         cores = os.cpu_count() or 1
     return Finding(
         "threads",
@@ -118,9 +118,8 @@ def _window() -> Finding:
             timeout=MAX_PICTURE_SECONDS,
         )
         last_line = (process.stderr.strip().splitlines() or ["it crashed"])[-1]
-        reason = re.sub(r"^.*\b(?:WARN|ERR)\| ", "", last_line)[
-            :100
-        ]  # VTK begins the line with its time
+        # VTK begins the line with its time.
+        reason = re.sub(r"^.*\b(?:WARN|ERR)\| ", "", last_line)[:100]
         is_drawn = process.returncode == 0
     except (OSError, subprocess.TimeoutExpired) as error:
         is_drawn = False

@@ -35,8 +35,8 @@ from .shared import (
     text_option,
 )
 
-# Tables [contact.profile] and [contact.asperities] of a scene, each up to the next table and the
-# comments above it.
+# Tables [contact.profile] and [contact.asperities] of a scene; each match ends before the
+# comments above the next table.
 SPLIT_TABLES = re.compile(
     r"^[ \t]*\[contact\.(?:profile|asperities)\].*?(?=(?:^[ \t]*(?:#[^\n]*)?\n)*^[ \t]*\[|\Z)",
     re.MULTILINE | re.DOTALL,

@@ -93,9 +93,8 @@ def run(
         )
         raise CommandExit(130) from None
     if run_summary["outcome"] == "not_converged":
-        for text in (
-            run_summary["warnings"] if quiet else ()
-        ):  # a quiet run prints only these warnings
+        # A quiet run prints only these warnings.
+        for text in run_summary["warnings"] if quiet else ():
             print_message(f"warning: {text}")
         raise NotConvergedExit
 

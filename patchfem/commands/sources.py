@@ -43,8 +43,8 @@ def _article(
 
 
 APPLIED_MECHANICS = "Journal of Applied Mechanics"
-# Effects, as in `effects.EFFECTS`, and their source; "friction.law=iwan" also counts for
-# interfaces.
+# Effects, named as in `effects.EFFECTS`, and their source; "friction.law=iwan" also
+# matches interfaces with this law.
 SOURCES = (
     (
         ("contact",),

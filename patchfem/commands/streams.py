@@ -5,7 +5,8 @@ import re
 import sys
 import warnings
 
-# longer than any path that a person would read; a key or a value may have megabytes
+# Word of more than 400 characters, longer than any readable path; a key or a value
+# can be megabytes long.
 LONG = re.compile(r"\S{401,}")
 
 
@@ -22,7 +23,8 @@ def prepare_streams() -> None:
         try:
             os.fstat(number)
         except OSError:
-            # The null device gets the lowest free file descriptor, which is that of the closed stream.
+            # The null device gets the lowest free file descriptor,
+            # which is that of the closed stream.
             os.open(os.devnull, os.O_RDWR)
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
@@ -32,7 +34,8 @@ def prepare_streams() -> None:
             stream.reconfigure(errors="backslashreplace")
     if not sys.warnoptions:
         warnings.simplefilter("ignore")
-        os.environ["PYTHONWARNINGS"] = "ignore"  # for processes that a sweep starts
+        # The processes that a sweep starts inherit this setting.
+        os.environ["PYTHONWARNINGS"] = "ignore"
 
 
 def make_printable(text: str) -> str:

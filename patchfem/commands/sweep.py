@@ -33,8 +33,8 @@ from .shared import (
     text_option,
 )
 
-FIRST = 5  # messages of failed cases that are printed
-TABLE = 1000  # bytes of a lumped case in sweep.csv and sweep.nc
+FIRST = 5  # largest number of messages of failed cases that are printed
+TABLE = 1000  # size of a lumped case in sweep.csv and sweep.nc [bytes]
 
 
 @Parameter(name="*")
@@ -184,7 +184,7 @@ def sweep(
     if not (by.collect or part or keep not in (None, "none")):
         request_words = (what or CaseOptions()).words(*set_, f"page={not no_page}")
         request_hash = manifest.hash_request(scene, request_words, what and what.cases)
-    if resume and (answer := manifest.read_manifest(target, request_hash)):  # all of it is there
+    if resume and (answer := manifest.read_manifest(target, request_hash)):  # the sweep is complete
         _print_results(answer["cases"]["count"], {}, answer, output)
         return
     sweep_scene, cases = parse_request.read_sweep(scene, set_, (what or CaseOptions()).request())

@@ -27,7 +27,7 @@ In: a `Result`. Out: files. A module imports only entries of this list that come
 Read `folder` first.
 """
 
-# names that other folders use, by module
+# Names that other folders use, by module.
 PUBLIC = {
     "backbone": (
         "COLUMNS",

@@ -45,16 +45,17 @@ BAND_VARIABLES = {  # unit and description of each variable of the band in backb
     "damping_low": ("1", "lower limit of the damping ratio"),
     "damping_high": ("1", "upper limit of the damping ratio"),
 }
-BOLD_WIDTH = 3.2  # width of the line of the recommended curve
-THIN_WIDTH = 1.0  # width of the lines of the other curves
+BOLD_WIDTH = 3.2  # line width of the recommended curve
+THIN_WIDTH = 1.0  # line width of the other curves
 COLOURS = {"balance": "accent", "decay": "warm", "quasi-static": "#2f9e63"}
 LEFT_OUT_NOTE = (
     " Frequencies with errors larger than the frequency itself are left out of the picture, not "
     "of the table."
 )
-MAX_LISTED_AMPLITUDES = 25  # largest number of amplitudes that the terminal lists in full
-N_LISTED_AMPLITUDES = 9  # number of amplitudes of a longer curve that the screen lists
-BAR_FLOOR_FACTOR = 0.1  # lower end of an error bar on a logarithmic axis / smallest value
+MAX_LISTED_AMPLITUDES = 25  # largest number of amplitudes that are listed completely
+N_LISTED_AMPLITUDES = 9  # number of amplitudes that are listed of a longer curve
+# Lower end of an error bar on a logarithmic axis, relative to the smallest value.
+BAR_FLOOR_FACTOR = 0.1
 
 
 def backbone_data(backbone: Backbone) -> dict:

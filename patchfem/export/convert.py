@@ -117,7 +117,7 @@ def _create_parent_folder(out: Path | None) -> Iterator[None]:
             _make_folder(new_folders[0], out)
         yield
     finally:
-        with suppress(OSError):  # the folder contains what was written
+        with suppress(OSError):  # folders with files are kept
             for folder in new_folders:
                 folder.rmdir()
 

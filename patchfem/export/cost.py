@@ -26,7 +26,7 @@ AXES = {
     "shear_modes": "shear modes",
     "jumps": "jumps over the cycles of wear",
 }
-# Measures of the detailed table, if the setting changes them.
+# Measures that the detailed table lists first, if the setting changes them.
 MAIN_MEASURES = (
     "worn_depth_max",
     "relative_displacement_amplitude",
@@ -40,15 +40,16 @@ MAIN_MEASURES = (
     "normal_stiffness",
     "tangential_stiffness",
 )
-ROUND_OFF = 1e-12  # relative error below which an error is round-off
-LABEL_HEIGHT = 0.06  # smallest distance of two labels / height of the axes
+ROUND_OFF = 1e-12  # relative error below which a result counts as exact
+LABEL_HEIGHT = 0.06  # smallest distance of two labels, relative to the height of the axes
 HEIGHT = 210.0  # height of the axes [points]
 TALL = 4.2  # height of the picture [inch]
-# fraction of the width beyond which a label does not fit to the right of its point
+# Position along the axis, relative to its width, beyond which a label
+# stands to the left of its point.
 LABEL_LEFT_FRACTION = 0.6
-# Margin on both sides of a logarithmic axis / logarithm of the range of its values.
+# Margin on both sides of a logarithmic axis, relative to the logarithm of the range of its values.
 AXIS_MARGIN = 0.15
-# smallest ratio of the ends of the time axis, for runs that take equally long
+# Smallest ratio of the ends of the time axis, for runs with equal times.
 MIN_SECONDS_RATIO = 2.0
 MIN_ERROR_RATIO = 10.0  # smallest ratio of the ends of the error axis, for equal errors
 

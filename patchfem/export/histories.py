@@ -114,8 +114,7 @@ def collect_histories(result: Result) -> tuple:
             "friction_force": response.force,
             "normal_load": response.extra.get("normal_load", constant_load),
         }
-        # If modes move the interface differently from the output, the slide is a separate
-        # history.
+        # If modes move the interface and the output differently, the slide has its own history.
         if not np.array_equal(response.slide, response.output):
             histories["slide"] = response.slide
     return histories, (

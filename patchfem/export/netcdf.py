@@ -15,8 +15,9 @@ import numpy as np
 
 from ..disk.atomic_write import open_lossy, write_atomically, write_bytes
 
-MAX_VALUES_IN_MEMORY = 10_000_000  # number of values above which a file is written to disk directly
-CACHE_BYTES = 1 << 18  # bytes of each variable that stay in memory until its file is closed
+# Number of values above which a file is created on disk instead of in memory.
+MAX_VALUES_IN_MEMORY = 10_000_000
+CACHE_BYTES = 1 << 18  # size of the chunk cache of each variable [bytes]
 
 VARIABLES = {
     "relative_displacement": ("m", "displacement of the output relative to the base"),
@@ -303,7 +304,7 @@ def add_events(
     )
 
 
-# Columns of a curve of steady motions: unit and text.
+# Unit and description of each column of a curve of steady motions.
 CURVE_COLUMNS = {
     "amplitude": ("m", "half the peak-to-peak motion at the output"),
     "acceleration_peak": ("m s-2", "largest absolute acceleration"),
@@ -620,7 +621,7 @@ class _CachingFile(h5py.File):
         return self.known[name]
 
     def __delitem__(self, name):
-        # a dimension is replaced by its coordinate, which has the same name
+        # A coordinate variable replaces the dimension of the same name.
         self.known = {
             path: item for path, item in self.known.items() if path.strip("/") != name.strip("/")
         }

@@ -253,7 +253,8 @@ def _patch(result: Result) -> PressedPatch:
     if result.patch is None:
         return PressedPatch(fields=result.fields, faces=faces)
     fields = result.fields
-    if "wear" in result.extra:  # The frames after the states of the wear show the worn patch.
+    # The first frames show the states of the wear, later ones the worn patch.
+    if "wear" in result.extra:
         count = result.extra["wear_shown"]["states"]
         fields = {name: rows[count:] for name, rows in fields.items()}
         fields["time"] = fields["time"] - fields["time"][0]
@@ -311,7 +312,7 @@ def _read_recorded_loop(folder: Path, slide: dict, response) -> tuple | None:
     try:
         recorded_loop = loops.read_loop(folder / slide["file"])
     except PatchfemError:
-        # The file has no loop; mistakes in its path were reported when the path was read.
+        # The file contains no loop; errors in its path were reported when the path was read.
         return None
     if recorded_loop.time is None:
         return None

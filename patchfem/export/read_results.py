@@ -12,8 +12,8 @@ import numpy as np
 
 from ..core import PatchfemError
 
-MAX_NUMBER = 1e100  # largest number; the squares of larger ones overflow
-# Coordinates, which contain finite numbers along the dimension of the same name.
+MAX_NUMBER = 1e100  # upper bound of valid numbers, whose squares do not overflow
+# Coordinates, which must contain finite numbers along the dimension of the same name.
 COORDINATES = (
     "time",
     "frame_time",
@@ -41,7 +41,7 @@ def reading_errors(path: Path, form: str) -> Iterator[None]:
         yield
     except PatchfemError:
         raise
-    except Exception as fault:  # a damaged file can fail in many ways
+    except Exception as fault:  # a damaged file can raise exceptions of many classes
         reason = " ".join(str(fault).split())[:200]
         raise PatchfemError(
             f"{path}: cannot be read as {form}: {reason or type(fault).__name__}"

@@ -31,8 +31,8 @@ from .results import MAX_INTERFACES
 
 SETTLED_OUTCOMES = ("steady", "stuck", "done")
 EN_DASH = "&ndash;"
-# Characters that the numbers of all charts may take; with library and player the page stays below 3
-# MB.
+# Largest number of characters for the numbers of all charts; with library and
+# player, the page stays below 3 MB.
 MAX_CHART_CHARACTERS = 700_000
 RESULT_FILES = (
     (
@@ -63,7 +63,7 @@ def page_html(data: RunData) -> str:
     """Return the HTML page of a run."""
     summary = data.verdict.summary
     title = summary["title"] or data.source.name or "patchfem run"
-    # The title of the scene refers to the values before keys were set.
+    # The title of a scene may not describe the values that were set by the user.
     scene_text = f"Scene: {escape(title)} &middot; " if data.source.sets else ""
     title = list_changed_keys(data.source.sets) if scene_text else title
     motion = f" &middot; {escape(data.source.driven)}" if data.source.driven else ""
@@ -439,8 +439,7 @@ def _histories_picture(data: RunData) -> Picture | None:
             remark = "reversals were kept, drawn as a band from the lowest to the highest value of each cycle."
         unit, scale = formatting.choose_axis_unit(history["time"], "s")
         caption += f" Before {first_complete * scale:.4g} {unit} only {remark}"
-    # A decaying swing has no band per cycle: its reversals are stored, and the line through them
-    # shows it.
+    # A decay has no envelope per cycle: its stored reversals are joined by lines.
     return Picture(charts.history_charts, (history, window, period, title, swings), caption)
 
 
@@ -498,7 +497,7 @@ def _accuracy_picture(data: RunData) -> Picture | None:
     return Picture(accuracy.accuracy_charts, (curve,), accuracy.accuracy_caption(curve))
 
 
-# The keys are in the order of the page.
+# Drawing functions by picture name, in the order of the page.
 PICTURES = {
     "wear": _wear_picture,
     "worn": _worn_map_picture,

@@ -15,8 +15,8 @@ from ..disk.exchange import defer_signals, make_old_folder_path, replace_folder,
 from ..disk.lock import FolderLock
 
 PAGE = "report.html"
-INTERFACES_FOLDER = "interfaces"  # folder with the fields of interfaces that have a patch
-MAX_INTERFACES = 6  # fields of more interfaces are not written
+INTERFACES_FOLDER = "interfaces"  # folder with the fields of all interfaces that have a patch
+MAX_INTERFACES = 6  # largest number of interfaces whose fields are written
 FILES = (
     "summary.json",
     "result.nc",
@@ -52,7 +52,7 @@ FILES = (
     "backbone.svg",
 )
 LOCK = ".writer"
-# States of an interrupted run or fit, from which it can continue.
+# Files with the state from which an interrupted run or fit continues.
 STATE = "wear.npz"
 STARTS = "starts.json"
 STATES = re.compile(r"wear\.npz|starts\.json|march_\d+\.npz")

@@ -16,8 +16,7 @@ from ..runs.patch import values
 from ..runs.results.result import Result, collect_used_settings, measure_engines
 from ..runs.rig import plan as rig_plan
 
-# Smallest ratio of a stiffness to its error for which other quantities are divided by the
-# stiffness.
+# Ratio of a stiffness to its error above which the loss factor is computed.
 MIN_STIFFNESS_ERRORS = 10.0
 PACKAGES = ("numpy", "scipy", "scikit-fem", "numba", "xarray", "h5netcdf", "matplotlib")
 
@@ -102,7 +101,7 @@ def read_summary(path: Path) -> dict:
         return json.loads(text, parse_int=_parse_int)
     except RecursionError:
         raise ValueError("nested deeper than a summary is") from None
-    except ValueError as fault:  # an error of pydantic has many lines
+    except ValueError as fault:  # a pydantic error has many lines, of which the first is reported
         if not hasattr(fault, "errors"):
             raise
         first = fault.errors(include_url=False)[0]

@@ -6,7 +6,7 @@ from ..core import compute_allowed_error
 from ..formatting import format_number, format_quantity
 from .written import measure_label
 
-# Main measures, which are named before others that miss the tolerance by more.
+# Main measures, which are named before others with larger errors.
 FIRST_MEASURES = (
     "relative_displacement_amplitude",
     "absolute_acceleration_peak",
@@ -15,11 +15,11 @@ FIRST_MEASURES = (
     "pressure_peak",
     "contact_fraction",
 )
-# Text for a measure whose label is not clear in a sentence.
+# Text for a measure whose label is unclear in a sentence.
 LONG_NAMES = {
     "relative_displacement_amplitude_steady": "the displacement amplitude to which the motion would settle"
 }
-ZERO_ERROR_RATIO = 10.0  # error / value above which a value counts as 0
+ZERO_ERROR_RATIO = 10.0  # ratio of error to value above which the value counts as 0
 
 
 def is_over_tolerance(measure: dict, tolerance) -> np.ndarray:
@@ -37,7 +37,7 @@ def is_over_tolerance(measure: dict, tolerance) -> np.ndarray:
     values, errors = (np.asarray(measure[name], float) for name in ("values", "errors"))
     floors = np.nan_to_num(np.asarray(measure.get("floors", 0.0), float))
     with np.errstate(invalid="ignore"):
-        # comparisons with NaN are False
+        # Comparisons with NaN are false.
         return errors > compute_allowed_error(tolerance, values, floors)
 
 

@@ -5,10 +5,9 @@ import re
 from ..formatting import format_number
 
 NUMBER_PATTERN = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*)?\Z")
-MIN_LONG_NUMBER = 9  # characters of a number from which it comes from a range, not from a person
-MAX_DIGITS = 6  # largest number of digits of a shortened number
-# Distance to the nearest other value, of which this fraction is the largest error of a shortened
-# value.
+MIN_LONG_NUMBER = 9  # smallest number of characters of a number that counts as computed, not typed
+MAX_DIGITS = 6  # largest number of significant digits of a shortened number
+# Largest error of a shortened number, relative to the distance to the nearest other value.
 MAX_ERROR_FRACTION = 0.05
 
 

@@ -4,7 +4,7 @@ from ...formatting import format_number
 from ...runs.accuracy_curve import STEPS_KEY, AccuracyCurve, StepSetting
 from . import charts
 
-# room on both sides of a logarithmic axis, as a factor
+# Factor by which a logarithmic axis extends beyond its smallest and its largest value.
 AXIS_ROOM = 1.6
 CAUSES = {
     "mesh": "the mesh of the pieces",

@@ -15,18 +15,18 @@ import numpy as np
 from ...core import G_N
 from ...formatting import choose_axis_unit, format_number, needs_log_scale
 
-MAX_LINE_POINTS = 6000  # A line with more points is reduced to this number.
-MIN_LINE_POINTS = 200  # A reduced line keeps at least this number of points.
-MAX_FRAMES = 24  # number of frames of the shear stress that are drawn faintly
-FAINT_FRAME_POINTS = 400  # number of points of a frame that is drawn faintly
-GRID = 6000  # cells of a piece in a picture
-CHARACTERS_PER_NUMBER = 13  # characters of a number in a page
+MAX_LINE_POINTS = 6000  # largest number of points of a drawn line; longer lines are thinned to it
+MIN_LINE_POINTS = 200  # smallest number of points that thinning leaves of a line
+MAX_FRAMES = 24  # largest number of frames whose shear stress is drawn in the background
+FAINT_FRAME_POINTS = 400  # largest number of points of such a background line
+GRID = 6000  # approximate number of cells per piece in a picture; finer grids are averaged
+CHARACTERS_PER_NUMBER = 13  # estimated number of characters per number in a page
 REGIMES = {"stable": "solid", "stuck": "solid", "unstable": "dashed", "unbounded": "dotted"}
 COLOURS = ("accent", "warm", "#2f9e63", "#8e5fc2", "#b08a12", "#c14a86")
 MIL = 25.4e-6
-MIN_SAMPLES_PER_CYCLE = 20  # A line through fewer samples per cycle does not show the motion.
-MAX_ENVELOPE_CYCLES = 1500  # An envelope over more cycles joins neighbouring cycles.
-# Measures over the cycles of wear, and their labels.
+MIN_SAMPLES_PER_CYCLE = 20  # smallest number of samples per cycle whose line shows the motion
+MAX_ENVELOPE_CYCLES = 1500  # largest number of bins of an envelope; more cycles share bins
+# Labels of the measures that are charted over the wear cycles.
 WEAR_LABELS = {
     "pressure_peak": "peak pressure",
     "contact_fraction": "contact fraction",
@@ -34,9 +34,9 @@ WEAR_LABELS = {
     "loop_area": "loop area",
     "relative_displacement_amplitude": "amplitude",
 }
-PROFILES = 6  # number of profiles of a patch that wears
-MIN_COHERENCE = 0.5  # coherence above which H1 is drawn as known
-# Size [px] of a frame in which both axes have the same scale.
+PROFILES = 6  # largest number of wear cycles whose pressure and depth profiles are drawn
+MIN_COHERENCE = 0.5  # smallest coherence at which H1 is drawn as reliable
+# Height and largest width [px] of a frame with equal scales on both axes.
 FRAME_HEIGHT = 270
 MAX_FRAME_WIDTH = 300
 
@@ -144,7 +144,7 @@ def sample_indices(x, y, max_points: int) -> np.ndarray:
     padded = np.full((2, first.size * size), np.nan)
     padded[:, : x.size] = x, y
     stretches = np.where(np.isnan(padded), 0.0, padded).reshape(2, -1, size)
-    # The last stretch may be shorter than the others.
+    # The last stretch may be shorter and is padded with its first point.
     stretches[:, -1, x.size - first[-1] :] = stretches[:, -1, :1]
     ends = np.concatenate(
         [stretches.argmin(axis=2).ravel(), stretches.argmax(axis=2).ravel()]
@@ -317,14 +317,14 @@ def stress_charts(x, depths, mises, sigma) -> list:
         cells = [
             part[i.start : i.stop - 1, : row.size - 1] * scale for part, row in zip(mises, rows)
         ]
-        # The part around the contact comes first and determines the colours.
+        # The contact region comes first, so that it sets the colour scale of both charts.
         colour_limit = colour_limit or float(
             np.quantile(np.concatenate([part.ravel() for part in cells]), 0.998)
         )
         marks = []
         for side, row, part in zip((-1, 1), rows, cells):
             x_lines, depth_lines, means = reduce_grid(x[i], row, part, GRID)
-            # four digits suffice, because the values are shown as colours
+            # Four digits suffice for values that are shown as colours.
             values = np.array([float(f"{v:.4g}") for v in means.ravel().tolist()]).reshape(
                 means.shape
             )
@@ -734,7 +734,7 @@ def curve_charts(curve: dict) -> list:
         for first, last in np.flatnonzero(np.diff(is_unbounded)).reshape(-1, 2)
     ]
     for regime, first, last in parts:
-        end = min(last + 1, x_axis.size)  # up to the next stretch, so the line has no gap
+        end = min(last + 1, x_axis.size)  # the stretches share a point, so that the line has no gap
         marks.append(
             make_line(
                 x_axis[first:end],
@@ -786,7 +786,7 @@ def spectra_charts(spectra, frequency: float | None) -> list:
     frequency : float or None
         Frequency [Hz] of the mode that was fitted to the peak of H1.
     """
-    # outside the band of the drive the spectrum is only leakage
+    # Outside the frequency band of the drive, the spectrum contains only leakage.
     has_drive = np.isfinite(spectra.coherence)
     drawn_charts = []
     spectra = type(spectra)(*(column[has_drive] for column in spectra))
@@ -904,7 +904,7 @@ def levels_chart(rows: list) -> list:
     log = needs_log_scale(amplitude)
     is_drawn = y > 0 if log else np.isfinite(y)
     marks = []
-    # Lower end of error bars that would extend below 0.
+    # On a logarithmic axis, error bars that would extend below 0 end at this value.
     style = {"floor": 0.1 * float(y[is_drawn].min())} if log else {}
     for k, (a, b) in enumerate(pairwise(drive)):
         is_raised = b >= a

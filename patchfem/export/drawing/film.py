@@ -23,10 +23,10 @@ from .panels import find_contact_window, make_panels, round_down_factor, upper_p
 
 FILM_EXTENSIONS = (".gif", ".mp4")
 FRAME_SIZE = (12.0, 6.8)  # width and height of a frame [inch]
-DPI = 100  # pixels per inch; with FRAME_SIZE an even number of pixels, which video formats require
+DPI = 100  # resolution [pixels per inch]; video formats require an even number of pixels per side
 BIT_RATE = 4000  # bit rate of a video [kbit/s]
-SLIDE_LABEL = 0.03  # largest slide as drawn / length of the pieces
-# Duration of a cycle [s], unless MIN_FRAME_SECONDS or MAX_FRAME_SECONDS limits it.
+SLIDE_LABEL = 0.03  # largest slide as drawn, relative to the length of the pieces
+# Duration of a cycle [s], subject to the limits on the duration of a frame.
 CYCLE_SECONDS = 2.4
 MIN_FRAME_SECONDS = 0.04  # shortest duration of a frame [s]
 MAX_FRAME_SECONDS = 0.3  # longest duration of a frame [s]
@@ -203,7 +203,7 @@ def write_film(series: Series, head: str, magnify: float | None, out: Path) -> s
                 picture.show(frame, text, panels)
             try:
                 writer.grab_frame()
-            except BrokenPipeError:  # ffmpeg has ended early; `finish` gives the reason
+            except BrokenPipeError:  # ffmpeg has ended early; `_finish_file` reports the reason
                 break
         _finish_file(writer, out)
     first, last = series.times[list(film.numbers)][[0, -1]]
@@ -239,7 +239,7 @@ def _movie_writer(out: Path, seconds: float):
         return GifWriter(fps=1 / seconds)
     from matplotlib import animation
 
-    # `_finish_file` reports what ffmpeg prints
+    # The log would repeat what `_finish_file` reports about ffmpeg.
     logging.getLogger(animation.__name__).setLevel(logging.ERROR)
     matplotlib.rcParams["animation.ffmpeg_path"] = _find_ffmpeg(out)
     return animation.FFMpegWriter(fps=1 / seconds, codec="h264", bitrate=BIT_RATE)

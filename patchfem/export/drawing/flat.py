@@ -122,7 +122,8 @@ class _Bodies:
         self.scale = choose_axis_unit([panel.top], "Pa")[1]
         self.axes = axes
         self.edges = outer_edges(frame, panel.cells)
-        self.cells = []  # (selection, corners, collection) of triangles and of quadrilaterals
+        # (cell selection, corners, collection) of the triangles and of the quadrilaterals.
+        self.cells = []
         size = np.diff(frame.offsets)
         for count in np.unique(size[panel.cells]):
             is_drawn = panel.cells & (size == count)

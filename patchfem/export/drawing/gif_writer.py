@@ -10,9 +10,9 @@ from PIL import Image
 
 from .pictures import BLUE, ORANGE
 
-N_SCALE = 184  # colours of the scale of stresses; with the greys and tints 256
-N_GREYS = 40  # greys from black to white, for the soft edges of text and lines
-N_TINTS = 16  # tints of each curve from white to its colour
+N_SCALE = 184  # number of colours for stresses; together with greys and tints 256
+N_GREYS = 40  # number of greys from black to white, for the smooth edges of text and lines
+N_TINTS = 16  # number of tints per curve, from white to its full colour
 
 
 class GifWriter(AbstractMovieWriter):

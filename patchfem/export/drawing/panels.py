@@ -7,13 +7,14 @@ import numpy as np
 from ...formatting import choose_axis_unit
 from ..fields.series import Frame
 
-COLOURED_AREA = 0.995  # fraction of the area of a panel whose stresses the colours distinguish
-# Ratio of that stress to the largest one, above which the colours cover the whole range.
+# Fraction of the area of a panel that the colour scale covers if it omits stress peaks.
+COLOURED_AREA = 0.995
+# Ratio of the stress at COLOURED_AREA to the largest one; at or above it, the scale is not cut.
 MIN_PEAK_RATIO = 0.8
-# Fraction of the largest motion that is round-off: fields are stored in single precision, and a
-# slide is a difference.
+# Round-off error of a slide, relative to the largest motion: a slide is a difference of values that
+# are stored in single precision.
 ROUND_OFF = 1e-5
-DRAWN_MOTION_FRACTION = 0.05  # Largest motion or gap as drawn / height of a panel.
+DRAWN_MOTION_FRACTION = 0.05  # largest motion or gap as drawn, relative to the height of a panel
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -109,7 +110,7 @@ def make_panels(
     inside = [_stressed_cells(frame, window) for window in windows]
     mises = frame.cell_data["von_mises"]
     area = cell_areas(frame)
-    # Panels side by side have the same scale.
+    # Panels side by side have the same colour scale.
     colour_limit = max(_colour_limit(mises[cells], area[cells]) for cells in inside)
     return tuple(
         _make_panel(frame, motion, *panel_settings, colour_limit)
@@ -240,7 +241,7 @@ def upper_piece_slides(points, moves) -> np.ndarray:
     height = points[:, 1].max()
     is_far_face = points[:, 1] >= height * (1 - 1e-9)
     x_from_centre = points[is_far_face, 0] - points[is_far_face, 0].mean()
-    # The far face is rigid, so its slope is its rotation.
+    # The far face is rigid, so that its slope is the rotation of the piece.
     rotation = moves[:, is_far_face, 1] @ x_from_centre / (x_from_centre @ x_from_centre)
     slide = moves[:, is_far_face, 0].mean(axis=1) + rotation * height
     return np.where(np.abs(slide) > ROUND_OFF * np.abs(moves).max(axis=(1, 2)), slide, 0.0)

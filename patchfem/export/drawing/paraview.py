@@ -19,10 +19,10 @@ from .film import Film, make_film
 from .panels import drawn_displacement, upper_piece_slide, upper_points
 
 MPA = 1e-6
-# Fraction of the cells whose stress the colours of a component cover; the others are peaks in
-# corners.
+# Fraction of the stress values that the colour scale covers; the larger ones are peaks in corners.
 MAX_SHARPNESS = 0.998
-# name -> (title, index in the stored stress xx, yy, zz, xy, yz, xz; None for a separate array)
+# Title of each component, and its index in the stored stress (xx, yy, zz, xy, yz, xz), or None if
+# it is stored as a separate array.
 STRESSES = {
     "von_mises": ("von Mises stress", None),
     "sigma_xx": ("stress sigma_xx", 0),
@@ -31,7 +31,7 @@ STRESSES = {
     "tau_xy": ("shear stress tau_xy", 3),
 }
 
-STATUS = "status"  # state of the interface: 0 open, 1 sticks, 2 slips
+STATUS = "status"  # name of the array with the contact state: 0 open, 1 stick, 2 slip
 
 SCRIPT = '''\
 """Show the last cycle (of a bench: the whole slide): {title} in both pieces, contact pressure on their interface.

@@ -9,7 +9,7 @@ from ...formatting import format_number
 BLUE = "#1f5f99"
 ORANGE = "#c8551b"
 GREY = "#8a8a8a"
-WIDTH = 9.6  # inches; the page scales a picture to the width of its text
+WIDTH = 9.6  # width of a figure [inch], which the page scales to the width of its text
 STYLE = {
     "svg.hashsalt": "patchfem",
     "svg.fonttype": "none",
@@ -27,10 +27,10 @@ STYLE = {
     "figure.constrained_layout.use": True,
     "lines.linewidth": 1.4,
 }
-COLOURS = {"accent": BLUE, "warm": ORANGE, "soft": GREY}  # colours of a chart by name
+COLOURS = {"accent": BLUE, "warm": ORANGE, "soft": GREY}  # colours by the name of their role
 SHAPES = {"circle": "o", "square": "s", "diamond": "D", "triangle": "^"}
 HEIGHT = 3.6  # height of a chart [inch]
-# Ratio of the ends of a logarithmic axis up to which three numbers per decade fit.
+# Ratio of the ends of a logarithmic axis below which three numbers per decade are printed.
 MAX_PLAIN_RATIO = 1e3
 
 
@@ -95,7 +95,7 @@ def returns_svg(draw):
 
         with matplotlib.rc_context(STYLE):
             drawn = draw(*args, **kwargs)
-        if kwargs.get("axes_to_use") is None:  # otherwise the caller owns the figure
+        if kwargs.get("axes_to_use") is None:  # otherwise the figure belongs to the caller
             for element in (drawn, *drawn.axes):
                 element._repr_svg_ = partial(_figure_svg, drawn)
         return drawn

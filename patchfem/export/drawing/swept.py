@@ -9,9 +9,9 @@ from ..tolerance_misses import is_over_tolerance
 from ..written import measure_label
 from . import charts
 
-# Largest / smallest value of a key, all positive, above which its axis is logarithmic.
+# Smallest ratio of the largest to the smallest value of a key that selects a logarithmic axis.
 MIN_KEY_RATIO = 10.0
-MIN_MEASURE_RATIO = 100.0  # The same for the values of the measure.
+MIN_MEASURE_RATIO = 100.0  # the same ratio for the values of the measure
 
 
 def sweep_chart(dataset, measure: str) -> dict:

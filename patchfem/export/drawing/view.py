@@ -20,7 +20,7 @@ from . import film, flat
 from .panels import Panel, interface_curves, make_panels, outer_edges
 
 PICTURE_EXTENSIONS = (".png", ".svg", ".pdf")
-# [s] for the child process; to start pyvista and draw takes 6 s to 9 s on a busy machine
+# Time limit [s] of the test picture; starting PyVista takes up to 9 s on a busy machine.
 MAX_PROBE_SECONDS = 60
 PROBE = """\
 import pyvista
@@ -151,7 +151,7 @@ def make_plotter(frame: Frame, head: str, magnify: float | None, off_screen: boo
     import pyvista as pv
     from vtkmodules.vtkCommonCore import vtkLogger
 
-    # it would report every display that it does not find
+    # VTK would report every display that it does not find.
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
     plotter = pv.Plotter(
         off_screen=off_screen,
@@ -189,7 +189,7 @@ def _draw_pieces(plotter, frame: Frame, panel: Panel, text: str, has_colour_bar:
         lighting=False,
         show_scalar_bar=False,
     )
-    if has_colour_bar:  # the other panel has the same colours
+    if has_colour_bar:  # the other panel has the same colour scale
         plotter.add_scalar_bar(
             f"von Mises\n[{unit}]\n",
             mapper=plotter.mapper,
@@ -226,7 +226,7 @@ def _draw_pieces(plotter, frame: Frame, panel: Panel, text: str, has_colour_bar:
         show_zlabels=False,
     )
     plotter.reset_camera(bounds=(*panel.window, 0, 0))
-    plotter.camera.zoom(0.95)  # leaves space for the colour bar beside the pieces
+    plotter.camera.zoom(0.95)  # leaves space for the colour bar
 
 
 def _draw_stresses(plotter, frame: Frame) -> None:

@@ -4,12 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-# Cell types of VTK.
+# Codes of the cell types of VTK.
 LINE = 3
 TRIANGLE = 5
 QUAD = 9
 NAMES = ("lower", "upper", "interface")
-# The last part is that of a patch that wears in strips; the index of a name is its code in `part`.
+# Parts of the mesh in the order of their codes in `part`; strips exist only
+# in a patch that wears in strips.
 PARTS = (
     *NAMES,
     "strips",
@@ -131,7 +132,7 @@ def _strips_block(x, width: float, areal: dict) -> Block:
     """
     count, k = next(iter(areal.values())).shape[1:]
     edges = np.linspace(-width / 2, width / 2, count + 1)
-    sides = np.stack([edges[:-1], edges[1:]], axis=1).ravel()  # edges of each strip in turn
+    sides = np.stack([edges[:-1], edges[1:]], axis=1).ravel()  # the edges of all strips, in pairs
     low = (np.arange(count)[:, None] * 2 * k + np.arange(k - 1)).ravel()
     block = make_block(
         np.column_stack([np.tile(x, 2 * count), np.zeros(2 * count * k)]),

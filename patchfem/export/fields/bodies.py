@@ -41,15 +41,14 @@ UNITS = {
     f"{name}_{side}": "Pa" for name in ("normal_bond", "shear_bond") for side in ("lower", "upper")
 }
 
-# Error that rounding may add, as a fraction of the estimated error of the stress: sqrt(1 + 1/16) is
-# 3 % more.
+# Largest rounding error relative to the estimated error of the stress; it
+# increases the total error by 3 %.
 ROUNDING_FRACTION = 0.25
-FRAMES_PER_PASS = 8  # frames that are processed together
-MIN_STEP_FRACTION = (
-    2.0**-10
-)  # rounding step / largest value; such a step is invisible in any colour scale
-# Rounding step / largest displacement of a piece in its holder, whose discretisation error is about
-# 1e-4.
+FRAMES_PER_PASS = 8  # number of frames that are processed together
+# Smallest rounding step relative to the largest stress; such a step is
+# invisible in any colour scale.
+MIN_STEP_FRACTION = 2.0**-10
+# Rounding step relative to the largest displacement; the discretization error is about 1e-4.
 DISPLACEMENT_STEP_FRACTION = 2.0**-14
 
 
@@ -250,7 +249,7 @@ def _collect_piece_fields(patch, fields: dict, x, side: str, piece_fields: _Piec
     )
     bond = {name: rows[:1] + rows[1:] for name, rows in bond.items()}
     if bond:
-        # positive along +x on the lower piece, like the shear stress of the interface
+        # Like the shear stress of the interface, it is positive along +x on the lower piece.
         bond["shear_bond"] *= -sign
     blocks = [block if not lower else block[:, ::-1] for block in piece_fields.blocks]
     finest = min(

@@ -13,7 +13,7 @@ from .series import Frame, Series
 from .vtkhdf import NAME
 
 PASCALS_PER_MEGAPASCAL = np.float32(1e6)
-# array that pyvista colours unless another one is chosen
+# Array of each part that PyVista colours by default.
 ACTIVE_ARRAYS = {"lower": "von_mises", "upper": "von_mises", "interface": "normal_stress"}
 
 

@@ -11,19 +11,20 @@ from ..read_results import MAX_NUMBER, is_real, reading_errors, require_valid
 from .blocks import NAMES, PARTS, Block, merge_blocks
 from .vtkhdf import NAME
 
-TAILS = {"displacement": (3,), "stress": (6,)}  # shape of arrays with several values at a point
+# Trailing dimensions of arrays with several values per point.
+TAILS = {"displacement": (3,), "stress": (6,)}
 BODY = {"PointData": ("displacement",), "CellData": ("material", "stress", "von_mises")}
 LINE = {"PointData": ("displacement", "gap", "normal_stress"), "CellData": ()}
-# Arrays that a reader needs.
+# Names of the arrays that a reader requires, by part and kind.
 REQUIRED_ARRAYS = {
     "lower": BODY,
     "upper": BODY,
     "interface": LINE,
     "strips": {"PointData": (), "CellData": ()},
 }
-MAX_CELL_NODES = 4  # largest number of nodes of a cell
-# Ratio to the usual step between frames; a longer step separates the pressed state from the last
-# cycle.
+MAX_CELL_NODES = 4  # largest number of nodes per cell
+# Ratio to the median interval between frames above which an interval separates the
+# pressed state from the last cycle.
 MIN_STEP_RATIO = 3.0
 
 
@@ -141,7 +142,7 @@ class Series:
         points, nodes, ends, types = (
             group[one][:] for one in ("Points", "Connectivity", "Offsets", "Types")
         )
-        # the comparison is False for NaN
+        # Comparisons with NaN are false.
         require_valid(
             points.ndim == 2
             and points.shape[1] == 3
@@ -240,7 +241,7 @@ class Series:
         rows = group[f"{kind}/{name}"]
         size = len(group["Points" if kind == "PointData" else "Types"])
         first = group[f"Steps/{kind}Offsets/{name}"][:][numbers]
-        if np.all(np.diff(first) == size):  # consecutive frames need a single read
+        if np.all(np.diff(first) == size):  # consecutive frames are read at once
             consecutive = rows[int(first[0]) : int(first[-1]) + size]
             return consecutive.reshape(len(numbers), size, *consecutive.shape[1:])
         return np.stack([rows[int(start) : int(start) + size] for start in first])

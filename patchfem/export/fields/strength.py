@@ -13,8 +13,8 @@ from ...runs.patch.strength import (
     yield_strength,
 )
 
-# Fraction of the height of a piece near its fixed far face, where stress increases as elements
-# shrink (test_strength).
+# Height of the region at the fixed far face that is left out, relative to the height of the piece;
+# the stress there grows with mesh refinement.
 FIXED_REGION_FRACTION = 0.2
 
 

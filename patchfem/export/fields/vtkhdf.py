@@ -27,17 +27,18 @@ from ...disk.atomic_write import open_lossy, write_atomically
 from .blocks import CODES, MEANINGS, Block
 
 NAME = "fields.vtkhdf"
-# version of the format; later versions add nothing that is used here
+# Version of the VTKHDF format; the writer needs nothing from later versions.
 VERSION = np.array([2, 2], np.int64)
-MIN_COMPRESSED_BYTES = (
-    1 << 22
-)  # bytes of all arrays: the shipped rig keeps 2.8 of 9.6 MB, which takes .06 s more
-MIN_FRAMEWISE_BYTES = (
-    1 << 28
-)  # bytes of all arrays above which frames are written one after the other
-# Bits of 23 after the leading one that are kept; the estimated error is accurate to some 10 %.
+# Size of the varying arrays [bytes] above which they are compressed: from 9.6 MB to 2.8 MB
+# in 0.06 s for the shipped rig.
+MIN_COMPRESSED_BYTES = 1 << 22
+# Size of the varying arrays [bytes] above which the file is written frame by frame.
+MIN_FRAMEWISE_BYTES = 1 << 28
+# Number of mantissa bits (of 23) that are kept, by array; the estimated error is accurate to
+# about 10 %.
 BITS = {"stress_error": 5}
-# Mantissa bits of arrays without a rounding step: an error of 3e-5 of a value, far below the discretisation error.
+# Number of mantissa bits that are kept of other arrays that have no rounding step: a relative
+# error of 3e-5, far below the discretization error.
 MOST_BITS = 14
 EMPTY = Block(
     np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros(1, np.int64), np.zeros(0, np.uint8), {}, {}
@@ -145,7 +146,7 @@ def _write_frame(dataset, values, nearest, number: int) -> None:
     size = values.shape[1]
     for place, part in enumerate(nearest(values[number]).reshape(size, -1).T):
         if part.any():
-            # after the shuffle this strategy takes 3/4 of the time of all matches
+            # On shuffled bytes, run-length matching takes 3/4 of the time of the default strategy.
             packer = zlib.compressobj(1, strategy=zlib.Z_RLE)
             raw = np.ascontiguousarray(part).view(np.uint8).reshape(size, -1).T.tobytes()
             dataset.id.write_direct_chunk(
@@ -188,7 +189,7 @@ def round_to_step(values, step: float) -> np.ndarray:
     """
     values = np.asarray(values, np.float32)
     step, steps_per_unit = np.float32(step), np.float32(1 / step)
-    # The comparison is False if there is a NaN.
+    # Comparisons with NaN are false.
     if max(values.max(initial=0.0), -values.min(initial=0.0)) < step * np.float32(1 << 23):
         return np.rint(values * steps_per_unit) * step
     with np.errstate(over="ignore"):
@@ -300,8 +301,8 @@ def _write_arrays(group, steps, kind: str, data: dict, settings: tuple) -> None:
     for name, values in data.items():
         size = values.shape[1]
         if rounding is not None and values.dtype == np.float32 and len(values) == count:
-            # A chunk has one component: neighbours in it are neighbours in space, which compress to
-            # three quarters.
+            # Each chunk has a single component: neighbours in it are neighbours in space and
+            # compress to three quarters of the size.
             dataset = target.create_dataset(
                 name,
                 (count * size, *values.shape[2:]),

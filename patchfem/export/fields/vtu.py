@@ -25,8 +25,8 @@ from ...disk.atomic_write import explain_write_error, is_partial_name, write_ato
 from .blocks import CODES, PARTS, Block
 from .series import Frame, Series
 
-BLOCK = 1 << 20  # bytes of a block before compression
-# Settings for numbers of four bytes.
+BLOCK = 1 << 20  # size of a block before compression [bytes]
+# LZMA filter settings for values of four bytes.
 PACKING = {
     "id": lzma.FILTER_LZMA2,
     "preset": 0,
@@ -42,7 +42,8 @@ TYPES = {
     "i8": "Int64",
     "u1": "UInt8",
 }
-FRAME = re.compile(rf"frame_\d+(\.vtm|(_({'|'.join(PARTS)}))?\.vtu)")  # files of a .pvd
+# File names of the frames of a .pvd file.
+FRAME = re.compile(rf"frame_\d+(\.vtm|(_({'|'.join(PARTS)}))?\.vtu)")
 ENDINGS = (".pvd", ".vtu", ".csv", ".vtkhdf")
 
 

@@ -144,8 +144,7 @@ def fitted_scene_text(keys: FittedKeys, measured: str, folder: Path) -> str:
         if np.isfinite(ends).all():
             interval = f", 95 % in [{ends[0]!r}, {ends[1]!r}]"
         comments.append(f"# {bound.key} fitted to {measured}: {value!r} {bound.unit}{interval}")
-    model = build(
-        scene
-    )  # built before the scene moves, because its file names are relative to its folder
+    # The model is built before the scene moves, because its file names are relative to its folder.
+    model = build(scene)
     text = write_resolved(move_scene(scene, folder / FITTED_SCENE), model)
     return "\n".join(comments) + "\n\n" + text

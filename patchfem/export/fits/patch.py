@@ -23,7 +23,7 @@ from .files import FITTED_SCENE, FitFiles, describe_measurement
 COMPARED_QUANTITIES = ("stiffness", "dissipation")
 COLOURS = dict(zip(FITTED_LAWS, ("accent", "warm", "soft"), strict=True))
 PATCH_COLOUR = "#000000"
-Y_MARGIN = 1.05  # upper end of the axis of stiffness / largest stiffness
+Y_MARGIN = 1.05  # upper end of the stiffness axis, relative to the largest stiffness
 
 
 def describe_patch_fit(fit: FittedPatch, folder: Path) -> FitFiles:

@@ -26,7 +26,7 @@ from .patch import describe_patch_fit
 from .rows import SearchCheckpoint, describe_rows_fit
 from .wear import describe_wear_fit
 
-DEFAULT_ROW_STARTS = 8  # number of random starting points of a fit to rows
+DEFAULT_ROW_STARTS = 8  # default number of random starting points of a fit to rows
 LOOP_OPTIONS = ("offset", "warm_up")
 ROW_OPTIONS = ("leave_out", "seed", "unstable", "placebo", "resume")
 OPTIONS_BY_KIND = {

@@ -26,10 +26,12 @@ from .files import (
 )
 from .text import format_values
 
-MIL = 25.4e-6  # One thousandth of an inch, the unit of displacement readings [m].
+MIL = 25.4e-6  # thousandth of an inch, the unit of displacement readings [m]
 SCORED_GROUPS = ("fitted", "held_out", "left_out")
-KEY_WIDTH = 28  # characters of the longest key of a rig, which aligns the printed values
-AXIS_MARGIN = 1.1  # end of the line of equal values / largest value of a point
+# Number of characters of the longest key of a rig, to which the printed values are aligned.
+KEY_WIDTH = 28
+# Factor by which the line of equal values extends beyond the smallest and the largest value.
+AXIS_MARGIN = 1.1
 
 
 class SearchCheckpoint:

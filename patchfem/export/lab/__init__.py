@@ -9,4 +9,4 @@ Read `series` first.
 
 UNIVERSAL = (".uff", ".unv", ".uf", ".58")
 ENDINGS = (*UNIVERSAL, ".mat", ".csv")
-FIELDS = "fields.vtkhdf"  # file of a results folder that has fields in addition to histories
+FIELDS = "fields.vtkhdf"  # name of the file that contains the fields in a results folder

@@ -16,7 +16,7 @@ from ...structure import universal as universal_modes
 from . import modes as mode_lines
 from . import write
 
-# Names of columns in files of `patchfem export`.
+# Columns of an exported file that can be its displacement, in order of preference.
 OUTPUT = {"displacement": ("output_displacement", "relative_displacement", "slide")}
 
 

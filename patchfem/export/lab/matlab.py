@@ -6,7 +6,7 @@ import numpy as np
 
 from .series import Histories, program_name
 
-MAX_NAME_LENGTH = 63  # largest number of characters of a name in MATLAB
+MAX_NAME_LENGTH = 63  # largest length of a MATLAB variable name, in characters
 
 
 def write_arrays(path: Path, histories: Histories) -> None:

@@ -7,13 +7,13 @@ import numpy as np
 from .series import program_name
 from .universal import SI_UNITS, write_sets
 
-# Data types of dataset 58.
+# Codes of the data types of universal dataset 58.
 ACCELERATION = 12
 FORCE = 13
 FREQUENCY = 18
 RESPONSE_TYPES = {"displacement": (8, "m"), "velocity": (11, "m/s"), "acceleration": (12, "m/s^2")}
 OVER = {"force": (FORCE, "N"), "base_acceleration": (ACCELERATION, "m/s^2")}
-# Function types of dataset 58.
+# Codes of the function types of universal dataset 58.
 RESPONSE_FUNCTION = 4
 COHERENCE_FUNCTION = 6
 

@@ -13,7 +13,7 @@ from ...inputs.columns import read_columns
 from ...inputs.units import FORCE_UNITS, SLIDE_UNITS
 from ..read_results import is_real, read_variables
 
-# Names of slide and resistance. The first pair that exists in a folder is used.
+# Pairs of variables that form a friction loop; the first pair that a folder contains is used.
 LOOPS = (
     ("slide", "friction_force"),
     ("relative_displacement", "friction_force"),

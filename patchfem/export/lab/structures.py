@@ -27,9 +27,10 @@ from ...runs.rig import costs, engines, event_driven, numerics
 from ...scene.rules import methods
 
 ENDINGS = (".mat", ".npz")
-# Smallest / largest singular value of the slides, below which they depend on one another.
+# Ratio of the smallest to the largest singular value of the slides below which the
+# slides are linearly dependent.
 DEPENDENCE_TOL = 1e-6
-# Features that matrices can describe if friction is a function of the speed only.
+# Features that the exported matrices support if the friction force depends on the speed only.
 SPEED_LAW_SUPPORT = methods.EngineSupport("", "no-law faces levels")
 NLVIB = {"elements": "elasticDryFriction", "tanh": "tanhDryFriction"}
 

@@ -12,13 +12,13 @@ import numpy as np
 from ...core import Missing, PatchfemError
 from .series import Column, Histories, program_name
 
-# Data types of dataset 58.
+# Codes of the data types of universal dataset 58.
 GENERAL = 1
 DISPLACEMENT = 8
 TIME = 17
-TYPES = {"m": 8, "m s-1": 11, "m s-2": 12, "N": 13}  # data type by unit; all others are general
-HISTORY_FUNCTION = 1  # function type: time response
-LOOP_FUNCTION = 0  # function type: general
+TYPES = {"m": 8, "m s-1": 11, "m s-2": 12, "N": 13}  # data type by unit; GENERAL for other units
+HISTORY_FUNCTION = 1  # function type "time response"
+LOOP_FUNCTION = 0  # function type "general"
 LABELS = {"m s-1": "m/s", "m s-2": "m/s^2"}
 SI_UNITS = {
     "type": 164,
@@ -116,7 +116,7 @@ def _write_byte_count(path: Path, start: int, size: int) -> None:
     with open(path, "r+b") as file:
         file.seek(start)
         head = file.read(200)
-        # The number follows the byte order, the float format and the number of lines of text.
+        # The byte count follows the byte order, the float format and the number of text lines.
         at = head.index(b"b", head.index(b"    58")) + 1 + 6 + 6 + 12
         file.seek(start + at)
         file.write(b"%12d" % size)

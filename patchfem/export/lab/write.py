@@ -11,9 +11,10 @@ from ...structure.drive_sizes import MAX_STORED_SAMPLES, MIN_SAMPLES_PER_CYCLE
 from . import ENDINGS, matlab, modes, table, universal
 from .series import read_histories
 
-# Below this number of rows between reversals, only the reversals are stored.
+# Smallest number of rows between two reversals if all samples are stored; fewer rows show
+# that only reversals are stored.
 MIN_ROWS_PER_SWING = 5
-# columns of a decay without the prefix "decay_"
+# Unit of each column of a decay, by the name of the variable without its prefix "decay_".
 DECAY = {
     "time": "s",
     "amplitude": "m",

@@ -11,17 +11,18 @@ import numpy as np
 
 from . import library
 
-DIGITS = 9  # digits of the numbers in a page: a figure shows four, a value under the pointer seven
+# Number of significant digits in a page: a figure shows four, the value under the pointer seven.
+DIGITS = 9
 NUMBER_FORMAT = f"%.{DIGITS}g,"
 OLD_BROWSER_NOTE = (
     "The pictures of this page are packed, and this browser cannot unpack them: it has no DecompressionStream, "
     "which browsers have had since 2023. Texts and tables are complete."
 )
 NOT_FINITE = re.compile("nan|-?inf")
-# Keys of a scene and words of a command are set in backquotes inside a sentence.
+# Scene key or command word that a sentence encloses in backquotes.
 QUOTED_WORD = re.compile(r"`([^`\s](?:[^`\n]*[^`\s])?)`")
-# Colours of `drawing.pictures`, and the colours of the page that replace them in the light and the
-# dark theme.
+# Role of each colour of `drawing.pictures`, which the light and the dark theme of a
+# page replace by their own colours.
 PAGE_COLOURS = {
     "#ffffff": "paper",
     "#000000": "ink",
@@ -198,7 +199,7 @@ def to_json(value) -> str:
     if isinstance(value, np.ndarray):
         value = list(value) if value.ndim > 1 else value.tolist()
     if isinstance(value, list | tuple):
-        # To encode the elements one by one would take six times as long.
+        # Encoding the elements one by one would take six times as long.
         kinds = set(map(type, value))
         if kinds == {float}:
             text = NUMBER_FORMAT * len(value) % tuple(value)

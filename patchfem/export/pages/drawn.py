@@ -10,11 +10,11 @@ import numpy as np
 
 from .document import to_json
 
-# Bytes of the data that are drawn; packed with the library, a page then stays below 1.5 MB.
+# Largest size of the drawn data [bytes]; packed with the library, a page then stays below 1.5 MB.
 MAX_BYTES = 1_200_000
-MIN_CASES = 64  # At least this number of cases is drawn.
-N_SAMPLED_CASES = 32  # number of cases from which the bytes per case are measured
-# Significant digits in a page that does not draw all cases.
+MIN_CASES = 64  # smallest number of cases that are drawn, whatever their size
+N_SAMPLED_CASES = 32  # number of cases from which the size per case is estimated
+# Numbers of significant digits of values and errors in a page that does not draw all cases.
 VALUE_DIGITS = 7
 ERROR_DIGITS = 3
 

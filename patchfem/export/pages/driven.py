@@ -51,7 +51,7 @@ def _describe_waveform(keys: dict) -> str:
     values = _drive_values(keys)
     try:
         return waveform.phrase.format_map(values) or _describe_by_level(waveform.name, values)
-    except KeyError:  # the scene does not set a key that the phrase needs
+    except KeyError:  # the scene does not set a key that the phrase contains
         return _describe_by_level(waveform.name, values)
 
 

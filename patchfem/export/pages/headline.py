@@ -16,12 +16,12 @@ from .key_lines import is_varied
 from .limits import Limits
 from .sentences import format_pair, format_zero, join_sentences
 
-# relative error up to which no error is stated, because values are shown with four digits
+# Relative error above which a headline states the error of a value.
 MIN_STATED_ERROR = 1e-6
-EQUAL_FREQUENCY_TOL = 1e-9  # relative difference up to which two frequencies are equal
+EQUAL_FREQUENCY_TOL = 1e-9  # largest relative difference of frequencies that are treated as equal
 EMPTY = MappingProxyType({})
 SETTLED_OUTCOMES = ranked.FINAL_OUTCOMES
-# Outcomes of cases that still change when their run ends.
+# Outcomes of cases whose motion still changes at the end of the run.
 CHANGING_OUTCOMES = (
     Outcome.TRANSIENT.value,
     Outcome.GROWS.value,
@@ -103,7 +103,7 @@ class SweepHeadline(NamedTuple):
         They are the answer, whether all cases meet the tolerance, and all others.
         """
         sentences = self.said
-        # The limits of a grid give more information than the ranking.
+        # The limits of a grid are more informative than the ranking.
         rank = (
             sentences.rank if sentences.scatter or not (sentences.limit or sentences.peak) else ""
         )
@@ -177,7 +177,7 @@ def summarise_sweep(table: dict) -> SweepHeadline:
     key_limits = Limits()
     if not table.get("drawn"):
         key_limits = limits.find_limits(keys, values, trusted, table["grid"], table.get("patch"))
-    if key_limits.key is not None:  # All sentences show values of the key in the same unit.
+    if key_limits.key is not None:  # all sentences state values of the key in the same unit
         keys = [key_limits.key if key["name"] == key_limits.key["name"] else key for key in keys]
 
     def where(case: int) -> str:
@@ -396,7 +396,7 @@ def span_sentence(
             range_text = f"ranges from {low} to {high}"
         elif is_included.sum() > 1:  # a single case has no range
             range_text = f"is {high} throughout"
-        # A value of 0 is known absolutely.
+        # The value 0 has no relative error.
         has_error = np.isfinite(errors) & (errors > 0) & (np.abs(values) > format_zero(name))
         has_error &= ~within_floor[name][0][is_included] if name in within_floor else True
         largest_error = (

@@ -21,9 +21,10 @@ from . import document
 from .key_lines import group_cases_along_key, key_formatter
 from .sentences import format_measure, format_zero, measure_link
 
-# Relative change at which a measure reaches its limit; engineers call a change of 5 % negligible.
+# Relative change at which a measure reaches its limit; a change of 5 %
+# is commonly called negligible.
 LARGEST_CHANGE = 0.05
-DOUBLING = 1.0  # relative change at which the peak pressure reaches its limit, twice its value
+DOUBLING = 1.0  # relative change at which the peak pressure reaches its limit, a doubling
 MOTION_MEASURES = (
     "relative_displacement_amplitude",
     "absolute_acceleration_peak",
@@ -38,7 +39,7 @@ CHANGE_AT_LIMIT = {
     **dict.fromkeys((*MOTION_MEASURES, *STIFFNESS_MEASURES, "contact_fraction"), LARGEST_CHANGE),
     "pressure_peak": DOUBLING,
 }
-# Keys that drive the motion, or that change no result.
+# Beginnings of keys that drive the motion or change no result, so that they have no limit.
 KEYS_WITHOUT_LIMIT = (
     "drive.",
     "slide.",
@@ -47,10 +48,10 @@ KEYS_WITHOUT_LIMIT = (
 )
 GAP_OF_ANGLE = {"contact.tilt.angle": ("Tilt", "length"), "contact.strips.roll": ("Roll", "width")}
 ANGLE_UNITS = [name for name, _ in UNIT_LADDERS["rad"]]
-# A value below this number is written in the next smaller unit: 0.011 mrad, but 10 urad.
+# Number above which a value needs no smaller unit: 0.011 mrad is kept, 0.01 mrad becomes 10 urad.
 MIN_NUMBER = 0.0101
-MAX_NUMBER = 1e4  # the next larger unit is used for larger numbers of a key
-# Relative change of a measure below which it is round-off.
+MAX_NUMBER = 1e4  # number below which a value needs no larger unit
+# Relative change of a measure below which it is attributed to round-off.
 ROUND_OFF_CHANGE = 1e-8
 
 
@@ -162,7 +163,8 @@ def find_limits(
         values, errors = (
             np.asarray(column, float) for column in measures.get(name, ([np.nan], [np.nan]))[:2]
         )
-        if not np.any(np.abs(values) > format_zero(name)):  # no case has a value above round-off
+        # The measure is zero within round-off in all cases.
+        if not np.any(np.abs(values) > format_zero(name)):
             continue
         values = np.where(trusted[name], values, np.nan)
         limits_of_lines = [
@@ -203,7 +205,7 @@ def _limit_along_line(
     largest = CHANGE_AT_LIMIT[name]
     change = (values[valid] - values[0]) / abs(values[0])
     error = (errors[valid] + errors[0]) / abs(values[0])
-    # A pressure can be twice its first value only if it increases along the key.
+    # Only a pressure that increases along the key can double.
     size = np.abs(change) if largest < DOUBLING else change
     open_or_beyond = np.flatnonzero(size[1:] + error[1:] > largest)
     inside = int(open_or_beyond[0]) if open_or_beyond.size else valid.size - 1
@@ -228,7 +230,7 @@ def _limit_along_line(
     grown_by_factors = bool(key["log"] and sizes[case] > 0)
     values_along = np.array([change[inside], change_at_limit, change[beyond]])
     if grown_by_factors and largest >= DOUBLING:
-        # A power of the key is a straight line in both logarithms.
+        # A power law of the key is a straight line in logarithmic coordinates.
         values_along = np.log1p(values_along)
     fraction = (values_along[1] - values_along[0]) / (values_along[2] - values_along[0])
     value = _interpolate(
@@ -403,7 +405,7 @@ def _count_digits(limits: Limits, limit: KeyLimit) -> int:
     if limit.beyond is None or not limit.value:
         return 2
     spacing = limits.sizes()[limit.beyond] - limits.sizes()[limit.inside]
-    if not spacing:  # the same value of the key, with another value of a second key
+    if not spacing:  # neighbouring cases differ in a second key only
         return 2
     return max(2, 1 + ceil(log10(abs(limit.value) / spacing)))
 

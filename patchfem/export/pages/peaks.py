@@ -17,12 +17,13 @@ from .sentences import format_zero, measure_link
 
 KEYS = ("drive.frequency",)
 HEIGHTS = ("relative_displacement_amplitude", "absolute_acceleration_peak")
-MIN_FREQUENCIES = 5  # smallest number of frequencies that show a peak
-ERROR_FACTOR = 3.0  # error / difference between the polynomials, a safety factor
-# Newton steps from the vertex of a parabola, or from the crossing of a straight line.
+MIN_FREQUENCIES = 5  # smallest number of frequencies in which a peak is sought
+# Safety factor by which the differences between interpolating polynomials are multiplied.
+ERROR_FACTOR = 3.0
+# Number of Newton steps to a maximum or a crossing of the interpolating polynomial.
 N_NEWTON_STEPS = 30
 OPEN = "not resolved by these cases"
-# Largest relative error with which a steady-state estimate is used as the height of the curve in a case.
+# Largest relative error at which a steady-state estimate is used as the height of the curve.
 MAX_STEADY_ERROR = 0.01
 
 
@@ -181,7 +182,7 @@ def _find_swept_peak(
     agreeing = [result for result in other_estimates if result]
     peak_squares = np.sqrt(x[peak_index] ** 2 + np.array([at, *(place for place, _ in agreeing)]))
     heights = y[peak_index] * np.array([minimum, *(value for _, value in agreeing)]) ** -0.5
-    # The polynomial through more cases has no maximum in this interval.
+    # A polynomial through other cases has no maximum in this interval.
     unchecked = len(agreeing) < len(other_estimates) or not other_estimates
     peak = float(heights[0])
     height_error = ERROR_FACTOR * float(np.ptp(heights))
@@ -201,7 +202,7 @@ def _find_swept_peak(
     width = float(above.value - below.value)
     fallen = frequency[height <= peak / 2**0.5]
     falls = bool(np.isnan(width) and fallen.size and fallen.min() < x[peak_index] < fallen.max())
-    # A crossing moves by this fraction of the width on each side.
+    # The errors of the heights shift each crossing by this fraction of the width.
     slack = case_error + height_error / peak
     frequency_error += slack * (width if np.isfinite(width) else spacing)
     return SweptPeak(

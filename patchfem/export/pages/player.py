@@ -20,10 +20,10 @@ from .library import read_file
 from .thinned import reduce_mesh, select_lines
 
 MAX_FRAMES = 24
-MAX_CELLS = 5000  # largest number of cells of a piece
+MAX_CELLS = 5000  # largest number of cells per piece
 MAX_POSITIONS = 400  # largest number of positions along the interface
-MAX_PLAYER_BYTES = 520_000  # bytes of all frames before they are encoded as text
-# Quantities of a cell, and whether they have a sign.
+MAX_PLAYER_BYTES = 520_000  # largest size of all frames before they are encoded as text [bytes]
+# Label of each stress component, and whether it can be negative.
 STRESS_COMPONENTS = (
     ("von Mises stress", False),
     ("stress along x", True),
@@ -36,8 +36,8 @@ CURVES = (
     ("gap", "gap"),
     ("slip", "slide"),
 )
-# If the contact is shorter than this fraction of the interface, the view has twice the length of the
-# contact.
+# Largest ratio of contact length to interface length at which the view is limited to
+# twice the contact length.
 MAX_CONTACT_FRACTION = 0.25
 MM_PER_M = 1e3
 
@@ -205,7 +205,8 @@ def _read_piece(
     rows = np.stack(
         [series.stack(side, "CellData", "von_mises", numbers), *(stress[..., k] for k in (0, 1, 3))]
     )
-    means = mesh.means(np.nan_to_num(rows).reshape(-1, len(cells)).T).T  # one sum for all frames
+    # A single summation for all frames.
+    means = mesh.means(np.nan_to_num(rows).reshape(-1, len(cells)).T).T
     colours = means.reshape(*rows.shape[:2], -1)
     return {
         "points": points,

@@ -33,16 +33,18 @@ SCATTER_MEASURES = (
     "pressure_peak",
 )
 QUANTILE_LEVELS = 0.05, 0.5, 0.95
-MIN_RANDOM_CASES = 20  # random cases, below which a statement on 90 % of them is not possible
-# Fraction of the random cases; with fewer values, those that are missing may be the largest.
+MIN_RANDOM_CASES = 20  # smallest number of random cases for a statement about 90 % of them
+# Smallest fraction of the random cases that must have a result; otherwise the
+# missing values may be the largest.
 MIN_SETTLED_FRACTION = 0.95
 FINAL_OUTCOMES = "steady", "stuck", "done", "no_contact"  # outcomes of cases whose result is final
-MAX_NAMED_KEYS = 3  # number of keys in the sentence
-# Text for a measure whose label does not say that it is a ratio.
+MAX_NAMED_KEYS = 3  # largest number of keys that a sentence names
+# Names of measures whose label does not show that they are ratios.
 MEASURE_LABELS = {"equivalent_damping": "equivalent damping ratio"}
-# Groups of the random cases by the value of a key, between which a trend is determined.
+# Number of groups of random cases, in the order of a key, between which a trend is determined.
 N_TREND_GROUPS = 5
-# Number of standard errors of a median (1.25 times that of a mean) by which two groups must differ.
+# Smallest significant difference of two groups, in standard errors of the median
+# (1.25 times those of the mean).
 TREND_ERROR_FACTOR = 2.5
 
 

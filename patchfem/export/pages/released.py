@@ -5,14 +5,14 @@ import numpy as np
 from ...formatting import format_length, format_quantity, format_value
 from ...runs.results.result import Result
 
-# Fraction of the final position, which is printed with three digits; an output that moves by less
-# is at rest.
+# Largest deviation of an output at rest from its final position, relative to this position, which
+# is printed with three digits.
 REST_FRACTION = 5e-3
 # Smallest number of amplitudes of a decay for which frequency and damping are printed.
 MIN_AMPLITUDES = 5
-# Fraction of the largest output; a smaller change between samples is round-off.
+# Largest change between samples that is attributed to round-off, relative to the largest output.
 ROUND_OFF_FRACTION = 1e-13
-# Fraction of the largest output; a final position closer to 0 is the remainder of a decay to 0.
+# Largest final position that counts as 0, relative to the largest output: the remainder of a decay.
 ZERO_FRACTION = 1e-9
 
 

@@ -24,7 +24,7 @@ from .document import sentence_html
 
 G = 9.80665  # standard gravity [m/s^2]
 LBF = 4.4482216152605  # pound-force [N]
-INCH = 0.0254  # [m]
+INCH = 0.0254  # inch [m]
 DEG = ("deg", 180 / pi)
 IMPERIAL_UNITS = {  # imperial units in the form of formatting.UNIT_LADDERS
     "m": (("mil", 1e3 / INCH), ("in", 1 / INCH)),
@@ -37,16 +37,15 @@ IMPERIAL_UNITS = {  # imperial units in the form of formatting.UNIT_LADDERS
     "N m-1": (("lbf/in", INCH / LBF), ("klbf/in", 1e-3 * INCH / LBF)),
 }
 GROUPS = ("motion", "friction", "energy", "patch", "wear")
-# Relative difference of the fraction in contact and the positions of the contact up to which they
-# agree.
+# Largest relative difference of two values of the contact fraction that are treated as equal.
 EQUAL_FRACTION_TOL = 2e-3
-MAX_LISTED = 3  # number of interfaces or stretches up to which each is listed
-NO_SLIP = 1e-15  # [m], the last digits of a slide
+MAX_LISTED = 3  # largest number of interfaces or contact regions that are listed one by one
+NO_SLIP = 1e-15  # largest slide that is attributed to round-off [m]
 WHOLE_RUN = "over the whole run"
 LOOPS = "over the two stored cycles of the steady motion"
-PERIOD_BY_ENGINE = {"harmonic": LOOPS}  # period to which energies refer, by engine
+PERIOD_BY_ENGINE = {"harmonic": LOOPS}  # period to which energies refer, by method
 OVER_MOTION_CYCLES = "over the cycles of the motion, not those of wear"
-QUALIFIERS = {  # Added to a value that would otherwise be mistaken for another quantity.
+QUALIFIERS = {  # addition to a value that could be mistaken for another quantity
     "loop_area": "per cycle",
     "friction_work": WHOLE_RUN,
     "energy_dissipated": WHOLE_RUN,
@@ -54,7 +53,7 @@ QUALIFIERS = {  # Added to a value that would otherwise be mistaken for another 
     "stick_fraction": "of the interface as a whole",
     "equivalent_damping": "a damping ratio of mode 1",
 }
-# Suffix of the measure that states how much a result of a random drive differs between records.
+# Suffix of the measure that states the scatter of a result between records of a random drive.
 SCATTER = "_scatter"
 RANDOM_MEASURES = {
     "relative_displacement_rms": "the displacement of the output is {} rms",
@@ -62,7 +61,7 @@ RANDOM_MEASURES = {
     "response_frequency": "the frequency response H1 peaks at {}",
     "response_damping": "the damping ratio of that peak is {}",
 }
-POWER = "friction_power"  # Measure of a random drive, which has no cycle.
+POWER = "friction_power"  # measure of a random drive, which has no cycle
 UNFINISHED_DECAY = (
     "The run ended before the motion came to rest; raise drive.cycles to see more of the decay."
 )
@@ -70,12 +69,13 @@ GROWING_MOTION = (
     "The motion still grows at the end of the run, after {}: the measures describe its last cycles and have no "
     "error estimate."
 )
-CHANGING_OUTCOMES = ("transient", "grows")  # outcomes of a motion whose last cycles differ
-LEVEL_MEASURES = (
-    "jump_level",
-)  # lies between two drive levels of the scene, whatever the tolerance
-RANGES = {"fraction": 1.0, "phase": pi}  # range of a measure [SI], by the end of its name
-# Fraction of the friction force times the motion; a smaller work is round-off.
+# Outcomes of a motion that still changes in its last cycles.
+CHANGING_OUTCOMES = ("transient", "grows")
+# Measures that are only known to lie between two drive levels of the scene, whatever the tolerance.
+LEVEL_MEASURES = ("jump_level",)
+RANGES = {"fraction": 1.0, "phase": pi}  # range of a measure [SI], by the last word of its name
+# Largest work that is attributed to round-off, relative to the
+# product of friction force and motion.
 ROUND_OFF_FRACTION = 1e-12
 NONE = MappingProxyType({})
 UNKNOWN = " (error unknown)"
@@ -105,7 +105,7 @@ def display_units(name: str, value: float, unit: str, error: float | None = None
     """
     if is_share(name):
         return [("%", 100.0)]
-    # the phase of an interface after the first has a number in its name
+    # The names of further interfaces end in a number.
     if re.sub(r"_\d+$", "", name).endswith("phase"):
         return [DEG]
     if unit == "m s-2":
@@ -559,7 +559,7 @@ def describe_contact(contact: dict | None, fraction: float | None = None) -> str
     shortest_length = min(
         [1e-3 * (last - first), *(1e-2 * (end - start) for start, end in stretches if end > start)]
     )
-    # This many digits distinguish both ends of the shortest stretch.
+    # With these digits, the two ends of the shortest region differ.
     digits = max(0, -floor(log10(shortest_length * scale)))
 
     def number(position: float) -> str:

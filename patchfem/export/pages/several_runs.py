@@ -18,10 +18,11 @@ from .document import Section, document_html, sentence_html, table_html
 from .sentences import format_with_error, measure_link, measure_meaning
 
 CHART_HEIGHT = 410  # height of a figure [px]
-MAX_LINE_POINTS = 4000  # points of a line in a figure
-MIN_FACTOR = 10.0  # ratio to the first value; a larger change is written as a factor
-N_SHOWN_CYCLES = 2.0  # last cycles that are shown; result.nc stores this many completely
-# title, x: (variable, label), y: (variable, label); of variables over time only the last cycles
+MAX_LINE_POINTS = 4000  # largest number of points of a line in a figure
+MIN_FACTOR = 10.0  # smallest ratio to the value of the first run that is written as a factor
+N_SHOWN_CYCLES = 2.0  # number of last cycles that are shown, as many as result.nc stores completely
+# Title, x (variable, label) and y (variable, label) of each chart; charts over
+# time show only the last cycles.
 CHARTS = (
     ("Pressure", ("x", "place"), ("normal_stress", "normal stress")),
     (
@@ -369,4 +370,4 @@ def _format_change(value: float, first: dict) -> str:
     factor = value / first["value"]
     if abs(factor) < MIN_FACTOR:
         return f"{(value - first['value']) / abs(first['value']):+.2%}"
-    return f"&times; {float(f'{factor:.2g}'):.7g}"  # two digits, and without an exponent: 150
+    return f"&times; {float(f'{factor:.2g}'):.7g}"  # two digits without an exponent, such as 150

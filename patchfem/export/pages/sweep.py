@@ -23,14 +23,14 @@ from .headline import (
 )
 from .sentences import format_zero, is_share, measure_link
 
-# Largest number of columns of the table of cases that fits a wide screen.
+# Largest number of measures in the table of cases, which then fits a wide screen.
 MAX_MEASURES = 6
 MAX_COLUMNS = 8  # largest number of keys and measures together
-# Files of a case.
+# Files of a case to which the table links.
 PAGE = "report.html"
 SUMMARY = "summary.json"
-MAX_LISTED_CASES = 400  # the table has at most this number of cases, sweep.csv has all of them
-MIN_SCROLLED_ROWS = 24  # A table with more rows scrolls in its frame.
+MAX_LISTED_CASES = 400  # largest number of cases in the table; sweep.csv contains all cases
+MIN_SCROLLED_ROWS = 24  # largest number of rows of a table that does not scroll
 
 
 def page_html(table: dict, summary: SweepHeadline | None = None) -> str:

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..drawing.panels import quadrilateral_areas
 
-COLUMNS_PER_ROW = 3.0  # ratio of columns to rows, if there are enough lines of both
+COLUMNS_PER_ROW = 3.0  # ratio of columns to rows, if the mesh has enough lines of both
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -74,7 +74,8 @@ def reduce_mesh(
     bins, heights = _line_bins(points, cells, material, max_cells, fine_range)
     key = bins[0] * heights + bins[1]
     corner_distance = np.abs(points[:, 0] - points[:, 0].min()) + np.abs(points[:, 1])
-    # The first point of a box is the one nearest to its corner; in a grid it is this corner.
+    # Each box is represented by its point nearest to the corner; in a
+    # grid, it is the corner itself.
     by_key = np.lexsort((corner_distance, key))
     _, first, number = np.unique(key[by_key], return_index=True, return_inverse=True)
     stand_in = np.empty(len(points), int)
@@ -101,7 +102,7 @@ def _line_bins(points, cells, material, max_cells: int, fine_range: tuple | None
     x = points[:, 0]
     depth = np.abs(points[:, 1])
     columns, rows = (np.unique(coordinate) for coordinate in (x, depth))
-    # not a grid: a box between lines needs two triangles
+    # If the mesh is not a grid, a box between lines needs two triangles.
     if columns.size * rows.size > len(points):
         max_cells //= 2
     n_rows = min(
@@ -135,7 +136,9 @@ def select_lines(lines, count: int, fine_range: tuple | None = None) -> np.ndarr
     weight = np.ones(lines.size - 1)
     if fine_range is not None:
         inside = (lines[1:] > fine_range[0]) & (lines[:-1] < fine_range[1])
-        fraction = min(inside.sum() / count, 0.5)  # fraction of all lines that are kept
+        fraction = min(
+            inside.sum() / count, 0.5
+        )  # fraction of the kept lines that lie in fine_range
         if 0 < fraction < 1 and inside.sum() < fraction * inside.size:
             weight[inside] = fraction * (~inside).sum() / ((1 - fraction) * inside.sum())
     cumulative_weight = np.concatenate([[0.0], np.cumsum(weight)])

@@ -12,7 +12,8 @@ import numpy as np
 from ... import __version__
 from ...disk.atomic_write import write_bytes, write_text
 
-# Largest number of heights of a text file; more take seconds to write and to read.
+# Largest number of heights that are written as text; larger files would
+# take seconds to write and to read.
 MAX_TEXT_ROWS = 1_000_000
 _MAIN_XML = """<?xml version="1.0" encoding="UTF-8"?>
 <p:ISO5436_2 xmlns:p="http://www.opengps.eu/2008/ISO5436_2" xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance">

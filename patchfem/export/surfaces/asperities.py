@@ -13,7 +13,7 @@ from ...surface.roughness.peaks import (
     persson_stiffness,
 )
 
-# pressure / combined modulus at which stiffnesses are stated; 1.2 MPa on steel
+# Pressure at which stiffnesses are stated, relative to the combined modulus; 1.2 MPa for steel.
 PRESSURE_FRACTION = 1e-5
 
 
@@ -47,7 +47,7 @@ def asperity_data(moments: TraceMoments | None, cutoff: float | None) -> dict | 
         try:
             out["stiffness_half_sampled"] = _stiffness_ratio(gaussian_peaks(moments.coarse))
         except PatchfemError:
-            pass  # None states that no surface fits every second sample
+            pass  # the value stays None if no surface fits every second sample
     return out
 
 

@@ -81,7 +81,7 @@ QUANTITY_LABELS = {
 ROUGHNESS_NAMES = ("Ra", "Rq", "slope")
 TABLE_HEADS = ("quantity", "value", "95 %", "unit")
 SIDES = ("before", "after")
-# Largest number of heights of a histogram or Abbott curve; larger scans are thinned.
+# Largest number of heights in a histogram or an Abbott curve; larger scans are thinned.
 MAX_DRAWN_HEIGHTS = 1_000_000
 PAGE_NOTE = (
     "All intervals are 95 % intervals. The intervals of shift, depth and area hold for the "

@@ -22,8 +22,8 @@ from .pictures import PairsPanel, draw_pairs
 from .quantities import UNITS, QuantityTable, Row, csv_columns, format_quantity
 from .worn_runs import compare_runs
 
-TRACE_QUANTITIES = ("worn_depth_mean", "amplitude_ratio")  # main quantities of two traces
-SCAN_QUANTITIES = ("worn_volume", "worn_depth_mean")  # main quantities of two scans or runs
+TRACE_QUANTITIES = ("worn_depth_mean", "amplitude_ratio")  # main quantities of a pair of traces
+SCAN_QUANTITIES = ("worn_volume", "worn_depth_mean")  # main quantities of a pair of scans or runs
 MEANS_NOTE = (
     "The mean is taken over the pairs that have a value, each with equal weight. The interval is "
     "the 95 % interval of the mean, by Student's t from the scatter of the pairs, or from the "

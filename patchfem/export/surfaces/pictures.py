@@ -12,12 +12,14 @@ from ...surface.roughness.spectrum import Spectrum
 from ..drawing.charts import make_axis, make_chart, make_line, make_mark
 from ..drawing.pictures import BLUE, draw_charts, make_figure, returns_svg
 
-MAX_POINTS = 2400  # points of a drawn line, eight for each pixel column of the page
-MAX_SPECTRUM_POINTS = 400  # points of a drawn spectrum, evenly spaced on the logarithmic axis
-N_BINS = 120  # classes of a histogram
-MAX_PIXELS = 400  # heights of a drawn map along each axis, which the width of a page can show
-MIN_DETAIL_SAMPLES = 400  # samples of the enlarged part of two traces
-MAX_SECTION_RULES = 60  # sections of a roughness profile; lines between more of them cover it
+MAX_POINTS = 2400  # largest number of points of a line, eight per pixel column of the page
+# Largest number of points of a spectrum, evenly spaced on the logarithmic axis.
+MAX_SPECTRUM_POINTS = 400
+N_BINS = 120  # number of bins of a histogram
+MAX_PIXELS = 400  # largest number of heights of a map along each axis, as many as the page can show
+MIN_DETAIL_SAMPLES = 400  # smallest number of samples in the enlarged part, both traces together
+# Number of sections of a roughness profile from which their limits are not drawn.
+MAX_SECTION_RULES = 60
 COLOUR_QUANTILES = (0.002, 0.998)  # quantiles of the heights at the ends of the colour scale
 UM3_PER_M3 = 1e18  # number of cubic micrometres in a cubic metre
 GREY = "#4d4d4d"

@@ -11,11 +11,11 @@ from ...surface.compare.reference import NO_LIMIT
 from ...surface.quantity import Quantity
 from ..pages.document import sentence_html, table_html
 
-MAX_PLAIN_NUMBER = 1e6  # larger numbers are written with a power of ten
-MIN_DIGITS = 3  # number of digits of a value with a wide interval
-MAX_DIGITS = 6  # number of digits of a value with a narrow interval
-DIGITS_WITHOUT_INTERVAL = 5  # digits of a value without an interval
-MISSING = "-"  # shown for a quantity without a value
+MAX_PLAIN_NUMBER = 1e6  # upper limit of numbers that are written without a power of ten
+MIN_DIGITS = 3  # smallest number of significant digits, for a wide interval
+MAX_DIGITS = 6  # largest number of significant digits, for a narrow interval
+DIGITS_WITHOUT_INTERVAL = 5  # number of significant digits of a value without an interval
+MISSING = "-"  # text in place of a missing value
 UNITS = {**UNIT_LADDERS, "m2": (("um^2", 1e12),), "1": (("", 1.0),)}
 
 

@@ -26,7 +26,7 @@ from .areal import write_columns, write_profile, write_x3p
 from .pictures import Picture
 from .quantities import QuantityTable, Row, csv_columns, format_quantity
 
-# Lengths along the surface; all other parameters are heights.
+# Parameters that are lengths along the surface; all other lengths are heights.
 LATERAL_PARAMETERS = (
     "PSm",
     "RSm",
@@ -108,7 +108,7 @@ def describe_surface(report: RoughnessReport) -> str:
     if treatment.cutoff is not None:
         cutoff = f"Gaussian filter at {format_length(treatment.cutoff)}, half this length trimmed at each end"
         return f"{text}; {cutoff}, {s_filter or 'no filter for short waves'}"
-    # A trace has one step per sample.
+    # The trace is longer than its last position by one sampling interval.
     fitting = fitting_cutoff(size.length + size.step, size.step)
     advice = "; no standard cut-off fits five times into the trace once half of it is trimmed at each end"
     if fitting:

@@ -34,10 +34,14 @@ MEASURES = (
     "friction_force_peak",
 )
 HEADLINE_MEASURES = ("contact_fraction", "pressure_peak", "loop_area")
-MAX_PARTIAL_WEAR = 0.999  # worn fraction of the area; above it the headline names no worn part
-MIN_HIDDEN_RATIO = 0.01  # hidden wear / mean depth above which the headline states the hidden wear
-EVEN_RATIO = 0.8  # smallest / largest hidden depth above which the wear is called uniform
-WEDGE_RATIO = 0.2  # smallest / largest hidden depth below which the wear is called a wedge
+# Worn fraction of the area above which the headline does not name a worn part.
+MAX_PARTIAL_WEAR = 0.999
+# Ratio of hidden wear to mean depth above which the headline states the hidden wear.
+MIN_HIDDEN_RATIO = 0.01
+# Ratio of the smallest to the largest hidden depth above which the wear is called uniform.
+EVEN_RATIO = 0.8
+# Ratio of the smallest to the largest hidden depth below which the wear is called a wedge.
+WEDGE_RATIO = 0.2
 RUN_LABELS = QUANTITY_LABELS | {
     "from": "worn part from",
     "to": "worn part to",

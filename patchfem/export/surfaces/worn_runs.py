@@ -15,7 +15,7 @@ from ...surface.quantity import Quantity, make_unknown
 from ..pages import several_runs
 from ..read_results import is_real, read_variables, reading_errors, require_valid
 
-REQUIRED_VARIABLES = {  # possible numbers of dimensions by variable
+REQUIRED_VARIABLES = {  # possible numbers of dimensions of each required variable
     "x": (1,),
     "weight": (1,),
     "unloaded_gap": (1, 2),
@@ -30,13 +30,15 @@ OPTIONAL_VARIABLES = (
     "friction_force",
     "wear_cycle",
 )
-# Width of the worn part / width of its floor, the deepest fifth, as for measured tracks.
+# Ratio of the width of the worn part to that of its floor, the deepest
+# fifth, as for measured tracks.
 FLOOR_PARTS = 5
-# Number of points of the floor of the worn part; more points change it by less than the error of
-# the run.
+# Number of points on the floor of the worn part; more points change its depth by
+# less than the error of the run.
 FLOOR_POINTS = 100
-MIN_WORN_FRACTION = 1e-3  # depth / largest depth below which a node counts as unworn
-MIN_ROUGHNESS = 1e-12  # [m] standard deviation below which an unworn surface counts as flat
+MIN_WORN_FRACTION = 1e-3  # smallest depth of a worn node, relative to the largest depth
+# Standard deviation of the heights below which an unworn surface counts as flat [m].
+MIN_ROUGHNESS = 1e-12
 TEXTS = {
     "worn_volume": ("m3", "material lost over the whole patch, both pieces together"),
     "worn_depth_max": ("m", "largest worn depth"),

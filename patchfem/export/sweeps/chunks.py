@@ -25,7 +25,7 @@ from ...runs.batch.case_results import CaseResults
 
 CHUNKS = "chunks"
 CHUNK_SUFFIX = ".h5"
-MAX_CASES_PER_FILE = 4096  # maximum number of cases of a file
+MAX_CASES_PER_FILE = 4096  # largest number of cases per file
 PARTS = ("values", "errors", "floors")
 
 
@@ -194,7 +194,7 @@ class Chunks:
 
     def look(self) -> None:
         """Find the files that the folder contains now."""
-        # A case may occur twice in a sweep.
+        # The cases of a sweep are not always distinct.
         distinct_names, position_of_name = np.unique(self.names, return_inverse=True)
         file_of_name = np.full(distinct_names.size, -1, np.int32)
         entries = [
@@ -202,7 +202,7 @@ class Chunks:
             for entry in os.scandir(self.folder)
             if entry.name.endswith(CHUNK_SUFFIX) and not entry.name.startswith(".")
         ]
-        # If two files contain a case, the later one counts.
+        # If two files contain the same case, the newer file takes precedence.
         entries.sort(key=lambda entry: (entry.stat().st_mtime_ns, entry.name))
         self.files, others = [Path(entry.path) for entry in entries], [self.names[:0]]
         for file_number, path in enumerate(self.files):

@@ -38,7 +38,8 @@ from . import chunks
 from .answer import read_answer
 from .chunks import CHUNKS
 
-KEEP = ("none", "summaries", "results", "pages")  # what is stored for each case besides its columns
+# Choices of the files that are stored for each case in addition to its columns.
+KEEP = ("none", "summaries", "results", "pages")
 CASES = "cases"
 SUMMARY = "summary.json"
 TABLES = ("sweep.csv", "sweep.nc", "sweep.json", "report.html")
@@ -149,7 +150,7 @@ class Writer:
             if is_accessible:
                 self.put(numbers, results, texts)
             return is_accessible
-        except Missing:  # the process that requested the case reports this
+        except Missing:  # the process that requested the cases writes them and reports the error
             return False
 
     def put(self, numbers: Sequence[int], results: CaseResults, texts: Sequence[str]) -> None:
@@ -169,7 +170,7 @@ class Writer:
             If a case cannot be written.
         """
         for case, (number, text) in enumerate(zip(numbers, texts)):
-            # Other cases have a results folder already.
+            # The other cases already have a results folder.
             if self.keep == "summaries" or case in results.messages:
                 self._put(self.target / CASES / case_folder_name(self.names[number]), text)
         try:
@@ -291,7 +292,8 @@ class Folder:
     def _remove_empty(self) -> None:
         """Remove the folders of the sweep that are empty."""
         for place in (self.target / CASES, self.target / CHUNKS, self.target):
-            with suppress(OSError):  # the folder contains older files or results of this sweep
+            # Folders with older files or with results of this sweep are kept.
+            with suppress(OSError):
                 place.rmdir()
 
     def is_complete(self) -> bool:
@@ -362,7 +364,7 @@ class Folder:
         """Fill in the results of all cases that have any, and return `total`."""
         self.chunks.look()
         for at, part in self.chunks.parts(np.arange(len(total))):
-            part.reasons.clear()  # no table contains the reasons
+            part.reasons.clear()  # the reasons appear in no table
             total.insert(at, part)
         return total
 
@@ -375,7 +377,7 @@ class Folder:
     def unfinish(self) -> None:
         """Rename the tables of an older sweep while cases are computed, because they do not match."""
         for name in TABLES:
-            with suppress(FileNotFoundError):  # there is none, or another shard has renamed it
+            with suppress(FileNotFoundError):  # there is no table, or another shard has renamed it
                 os.replace(self.target / name, self.target / f"{name}.partial")
 
     def tidy(self, others: bool, keep: str = "") -> None:
@@ -404,9 +406,9 @@ class Folder:
                 ):
                     if entry.is_dir(follow_symlinks=False):
                         shutil.rmtree(entry.path, ignore_errors=True)
-                    else:  # the lock file of a process that was killed while it wrote a case
+                    else:  # lock file of a process that was killed while it wrote a case
                         Path(entry.path).unlink(missing_ok=True)
-            with suppress(OSError):  # cases/ is not empty
+            with suppress(OSError):  # the folder may still contain cases
                 (self.target / CASES).rmdir()
         self.finish()
 

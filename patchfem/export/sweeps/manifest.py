@@ -37,7 +37,8 @@ def hash_request(path: Path, words: Sequence[str], cases: Path | None = None) ->
     """
     try:
         text = path.read_bytes().decode()
-        if cases is not None and not cases.is_file():  # a pipe can be read only once, by the sweep
+        # A pipe can be read only once, and the sweep reads it.
+        if cases is not None and not cases.is_file():
             return ""
         cells = [] if cases is None else [cases.read_text("utf-8-sig")]
         files = hash_named_files(

@@ -26,8 +26,9 @@ from ..read_results import MAX_NUMBER, require_valid
 from ..written import NUMBER_PATTERN
 from .tables import FACTS, shared_facts, sort_measures
 
-REPEAT_WORDS = "--cases", "sweep.csv"  # arguments for cases in rows whose command is not known
-# Files that a click on a case opens: its page if there is one, else its summary.
+# Words of the repeat command for a table of cases whose command is unknown.
+REPEAT_WORDS = "--cases", "sweep.csv"
+# Files that a click on a case opens: its page or, if there is none, its summary.
 FULL_PAGE = "report.html"
 SHORT_SUMMARY = "summary.json"
 
@@ -229,7 +230,7 @@ def read_table(folder: Path) -> dict:
     except FileNotFoundError as fault:
         name = Path(fault.filename).name if fault.filename else "sweep.nc"
         raise PatchfemError(f"{folder}: not the folder of a sweep: it has no {name}") from None
-    except Exception as fault:  # damaged files can fail in many ways
+    except Exception as fault:  # a damaged file can raise exceptions of many classes
         reason = " ".join(str(fault).split())[:200]
         raise PatchfemError(
             f"{folder}: the sweep in this folder cannot be read: {reason or type(fault).__name__}"
@@ -362,9 +363,8 @@ def join_tables(tables: list, names: list) -> dict:
             next(one for one in table["keys"] if one["name"] == key) for table in tables
         ]
         texts = [text for one in keys_of_tables for text in one["texts"]]
-        words = not any(
-            map(NUMBER_PATTERN.match, texts)
-        )  # each table numbers the words in another order
+        # The numbering of words differs between tables.
+        words = not any(map(NUMBER_PATTERN.match, texts))
         columns.append(
             {
                 "name": key,

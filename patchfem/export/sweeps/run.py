@@ -221,7 +221,7 @@ def _compute_cases(
     for chunk, results, texts, seconds in iterate_chunks(work, numbers.tolist(), executor, say):
         if texts is None:
             dead_cases.append((chunk, results))
-        elif results is not None:  # The worker has no access to the folder, or found it full.
+        elif results is not None:  # the worker has no access to the folder, or the disk is full
             writer.put(chunk, results, texts)
         seconds_left = clock(len(chunk), seconds)
         if report_progress is not None:
@@ -253,7 +253,8 @@ def compute_in_memory(
     for numbers, results, *_ in iterate_chunks(
         Work(sweep_scene, cases, estimate=estimate), range(len(cases)), executor, say
     ):
-        for part in (results.warnings, results.notes, results.numerics):  # no table contains these
+        # These texts appear in no table.
+        for part in (results.warnings, results.notes, results.numerics):
             part.clear()
         total.insert(numbers, results)
     return total
@@ -376,7 +377,7 @@ def write_tables(
         write_page(table, lead, folder.target)
     else:
         (folder.target / FULL_PAGE).unlink(missing_ok=True)
-    # This file comes last, because it contains the hash of the others.
+    # This file is written last, because it contains the hash of the others.
     write_answer(
         sweep_summary(lead, table["outcome"], sign, sweep_identity(sweep_scene, cases)),
         folder.target / "sweep.json",

@@ -26,8 +26,9 @@ from ...scene.keys.lookup import find_key
 from .. import netcdf
 from ..summary import package_versions
 
-CASES_PER_BLOCK = 4000  # cases whose strings are in memory at the same time
-# Maximum number of cases to read until one is valid, for the facts that all cases share.
+CASES_PER_BLOCK = 4000  # number of cases whose strings are in memory at the same time
+# Largest number of cases that are tried until one is valid; it provides
+# the facts that all cases share.
 MAX_CASES_TRIED = 3
 MEASURE_ORDER = {name: place for place, name in enumerate((*STATIC, *rows.TABLE))}
 FACTS = {
@@ -108,9 +109,8 @@ def csv_lines(cases: Cases, results: CaseResults, keys: Sequence[str] = ()) -> I
     columns = [
         column for name in sort_measures(results) for column in measure_columns(results, name)
     ]
-    for first in range(
-        0, len(cases), CASES_PER_BLOCK
-    ):  # the strings of all cases would fill the memory
+    # The strings of all cases together would fill the memory.
+    for first in range(0, len(cases), CASES_PER_BLOCK):
         numbers = range(first, min(first + CASES_PER_BLOCK, len(cases)))
         block = [
             [
@@ -242,7 +242,7 @@ def shared_facts(sweep_scene: SweepScene, cases: Cases) -> dict:
         try:
             tables = tomllib.loads(sweep_scene.read_scene(cases.assignments(number)).resolved())
             break
-        except PatchfemError:  # this case has no model
+        except PatchfemError:  # the case is invalid
             continue
     else:
         return {}
