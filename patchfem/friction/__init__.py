@@ -6,7 +6,7 @@ the step (`protocol`). `laws/` has one law per file, `bonds/` the sum over bonds
 `path_work` computes the friction work of samples. Read `protocol` first, then `laws/elastic_plastic`.
 """
 
-# names that other folders use, by module
+# Names that other folders use, by module
 PUBLIC = {
     "bonds.engines": (
         "RequestedEngine",
@@ -30,12 +30,12 @@ PUBLIC = {
         "gamma_table",
         "law_numbers",
         "list_capacity",
-        "make_clocks",
+        "make_path_state",
         "make_status",
         "sum_form",
     ),
     "bonds.list_rows_kernels": (
-        "CLOCK",
+        "PATH",
         "LAW",
         "N_ROWS",
         "STATUS",

@@ -1,12 +1,12 @@
-"""Flags of compiled code: fast-math is limited to what keeps NaN and infinity meaningful."""
+"""Flags of compiled code: fast-math is limited to options under which NaN and infinity keep their meaning."""
 
 from ..compiled.jit import NJIT_INTERNAL, NJIT_NO_REFCOUNT
 
 FASTMATH_FLAGS = {"reassoc", "contract", "arcp"}
 
-# Options of a kernel that allocates nothing and divides by zero as NumPy does.
+# Compiler options of a kernel that allocates nothing and divides by zero as NumPy does
 NJIT_KERNEL = {"error_model": "numpy", "fastmath": FASTMATH_FLAGS, **NJIT_NO_REFCOUNT}
-# The same for a kernel that is compiled into its callers, so that a loop over lanes can take several lanes at once.
+# The same options for a kernel that is inlined into its callers, so that loops over cases vectorize
 NJIT_INLINE = NJIT_KERNEL | {"forceinline": True}
 
 __all__ = [

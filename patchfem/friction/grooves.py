@@ -19,10 +19,10 @@ from math import inf, pi
 
 import numpy as np
 
-# Maximum of mu t for which the friction loss is computed as a power series, because the closed form suffers from
-# cancellation.
+# Largest product of friction coefficient and slope for which the friction loss is computed as a
+# power series; the closed form suffers from cancellation there
 MAX_SERIES_SLOPE = 0.1
-N_SERIES_TERMS = 18  # Number of terms of this series; 0.1^18 is round-off.
+N_SERIES_TERMS = 18  # number of terms of this series; 0.1^18 is below round-off
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +52,7 @@ class Grooves:
         return self.amplitude * self.wave_number
 
     def after_wear(self, depth: float, upper_share: float) -> "Grooves | None":
-        """Return the grooves after wear of both pieces, None once they are flat.
+        """Return the grooves after wear of both pieces; None once they are flat.
 
         Both pieces carry the grooves. A point of a piece wears in proportion to its height above the valleys, so the
         piece keeps a cosine with the same valleys. Above the valleys it has the volume A per area, so a mean worn depth
@@ -128,7 +128,7 @@ class Grooves:
         return 2 * self.amplitude * np.sin(mean_angle) * np.sin(half_difference)
 
     def friction_loss(self, q0, q1, friction: float):
-        """Return the energy / vertical force [J/N] that friction dissipates from q0 to q1 [m].
+        """Return the energy per vertical force [J/N] that friction dissipates from q0 to q1 [m].
 
         It is the integral of mu (1 + t^2)/(1 - mu t sgn dq) |dq|, for either direction.
 
@@ -171,7 +171,8 @@ class Grooves:
         n_turns = np.trunc(angle / (2 * pi))
         half = 0.5 * (angle - 2 * pi * n_turns)
         middle = 0.5 * (start + end) - pi * n_turns
-        # half of the integral of root/(1 - b sin theta), by the tangent half-angle substitution
+        # This is half the integral of root/(1 - b sin theta), by the tangent half-angle
+        # substitution.
         arc = np.arctan2(root * np.sin(half), np.cos(half) - b * np.sin(middle)) + pi * n_turns
         sine_integral = 2 * np.sin(0.5 * angle) * np.sin(0.5 * (start + end))
         total = (
@@ -184,7 +185,7 @@ class Grooves:
 
         Where it is negative, its product with the lifted mass reduces the mass that the interface moves.
         """
-        # the derivative is zero where mu t^2 + 2 t - mu = 0
+        # The derivative is zero where mu t^2 + 2 t - mu = 0.
         slope = (np.sqrt(1 + friction**2) - 1) / friction if friction > 0 else 0.0
         slope = min(slope, self.max_slope)
         return slope * (slope - friction) / (1 + friction * slope)

@@ -45,7 +45,7 @@ class LastTraction:
     """
 
     __slots__ = ()
-    can_change_load = True  # Whether the load may change within a step of the motion.
+    can_change_load = True  # whether the load may change within a step
 
     def start(self, sigma):
         """Return the traction before any motion, which is 0."""

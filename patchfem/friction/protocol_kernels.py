@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 from ..compiled.jit import NJIT_NO_REFCOUNT, njit
 
-IS_SET_VALUED = False  # Whether the law sticks without any elastic stretch, as Coulomb's law does.
-HAS_ZERO_KINK = False  # Whether the rate equation has a kink at zero stretch.
-# Whether the stretch depends on the path alone and is given by `integrate_stretch`.
+IS_SET_VALUED = False  # whether the law sticks without any elastic stretch, as Coulomb's law does
+HAS_ZERO_KINK = False  # whether the rate equation has a kink at zero stretch
+# Whether the stretch depends on the path alone and is given by `integrate_stretch`
 IS_RATE_INDEPENDENT = False
-# Whether the force changes steeply over a narrow range of velocities around 0.
+# Whether the force changes steeply over a narrow range of velocities around 0
 HAS_SPEED_LAYER = False
 
 

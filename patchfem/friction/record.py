@@ -41,7 +41,7 @@ def stick_stiffness(friction, load: float) -> float:
 
 
 def steady_loop(friction, load: float, amplitude: float) -> SteadyLoop | None:
-    """Return the steady friction loop of a law in closed form, or None without one.
+    """Return the steady friction loop of a law in closed form; None if it has no closed form.
 
     Parameters
     ----------

@@ -11,7 +11,7 @@ from patchfem.friction import (
     gamma_table,
     growth_numbers,
     law_numbers,
-    make_clocks,
+    make_path_state,
     make_status,
 )
 from patchfem.friction.bonds import list_kernels
@@ -36,11 +36,11 @@ class ListHistory(NamedTuple):
 def make_empty_list(law, tail=0.0, merge=0.0, capacity=60_000):
     """Return a list of bonds before any displacement, as the functions of `list_kernels` take it."""
     numbers = law_numbers(law, cutoff_age(law.order, tail) if tail else np.inf, merge)
-    clocks = make_clocks(law)
+    path_state = make_path_state(law)
     return BondList(
         np.ones(1),
         np.zeros((N_ROWS, capacity)),
-        clocks,
+        path_state,
         make_status(capacity),
         numbers,
         gamma_table(law),

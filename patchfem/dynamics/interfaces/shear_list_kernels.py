@@ -8,7 +8,7 @@ every contact.
 
 from ...compiled.jit import njit
 from ...friction.bonds.list_kernels import list_step
-from ...friction.bonds.list_rows_kernels import CLOCK, LAW, STATUS
+from ...friction.bonds.list_rows_kernels import LAW, PATH, STATUS
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ...friction.protocol_kernels import Reading
 from . import shear_solve_kernels as solver
@@ -91,7 +91,7 @@ def commit_step(dq, force, start, end_velocity, contact):
         speed = abs(xi) / start.dt
         has_room = list_step(xi, contact, speed, speed, start.dt) and has_room
         if changes:
-            contact.nows[j, CLOCK.displacement] = contact.now[CLOCK.displacement]
+            contact.nows[j, PATH.displacement] = contact.now[PATH.displacement]
             if find_pressure(j, contact) <= 0.0:
                 break_bonds(contact.status)
         add_list_energies(points[PointRow.FORCE, j] * xi, energy, contact.weight[j], contact)
@@ -149,7 +149,7 @@ def read_state(contact, rel_disp, velocity):
         for j in range(int(contact.count[0])):
             load = contact.weight[j] * find_pressure(j, contact)
             force += contact.weight[j] * contact.statuses[j, STATUS.force]
-            slip += load * contact.nows[j, CLOCK.displacement]
+            slip += load * contact.nows[j, PATH.displacement]
             total += load
         slip = (slip - contact.law[LAW.length] * force) / total if total > 0 else rel_disp
         return Reading(force, stored_energy(contact), slip)

@@ -10,7 +10,7 @@ velocity. Its weight is its friction limit [N]. The tests compare with
 import numpy as np
 
 from ...compiled.jit import njit
-from ...friction.bonds.list_rows_kernels import CLOCK, STATUS
+from ...friction.bonds.list_rows_kernels import PATH, STATUS
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from .arrays import ListPointRow, PointRow
 from .list_kernels import find_mean_and_slope
@@ -71,7 +71,7 @@ def find_pressure(j, contact):
     """Return the relative pressure of point j, at the end of the step under a varying load."""
     if contact.pattern.shape[1] > 0:
         return interpolate_pressure(
-            contact.places[j] + contact.nows[j, CLOCK.displacement], contact.pattern
+            contact.places[j] + contact.nows[j, PATH.displacement], contact.pattern
         )
     if contact.pressed.shape[1] > 0:
         return contact.pressed[1, j] / contact.points[PointRow.LOAD, j]
@@ -91,7 +91,7 @@ def start_step(dt, contact):
         for j in range(int(contact.count[0])):
             contact.statuses[j, STATUS.pressure] = interpolate_pressure(
                 contact.places[j]
-                + contact.nows[j, CLOCK.displacement]
+                + contact.nows[j, PATH.displacement]
                 + 0.5 * contact.points[PointRow.SLIDE, j],
                 contact.pattern,
             )

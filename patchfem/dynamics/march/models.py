@@ -8,7 +8,7 @@ import numpy as np
 
 from ...compiled import load
 from ...friction.bonds import list_numbers as numbers
-from ...friction.bonds.list_rows_kernels import CLOCK, N_ROWS, STATUS
+from ...friction.bonds.list_rows_kernels import N_ROWS, PATH, STATUS
 from ...friction.laws.coulomb import Coulomb
 from ...friction.laws.elastic_plastic import parallel_element
 from ...friction.laws.stretch import growth_numbers, points_element, unpack_bonds
@@ -124,7 +124,7 @@ class ContactModel:
                         here,
                         self.length * load * share,
                         share,
-                        contact.nows[:, CLOCK.displacement],
+                        contact.nows[:, PATH.displacement],
                         0 * share,
                     ]
                 ),
@@ -288,8 +288,8 @@ def point_lists_model(
         "status": numbers.make_status(capacity),
         "time": np.ones(1),
         "statuses": numbers.make_status(capacity, limit.size),
-        "now": numbers.make_clocks(law),
-        "nows": np.tile(numbers.make_clocks(law), (limit.size, 1)),
+        "now": numbers.make_path_state(law),
+        "nows": np.tile(numbers.make_path_state(law), (limit.size, 1)),
         "table": numbers.gamma_table(law),
         "law": numbers.law_numbers(law, reach, merge, FIRST_BOND_WIDTH),
         "pressed": np.zeros((2, 0)),
@@ -350,7 +350,7 @@ def point_pressures(contact) -> np.ndarray:
     if contact.pattern.size:
         x, pressure = contact.pattern
         return np.interp(
-            contact.places + contact.nows[:, CLOCK.displacement], x, pressure, left=0.0, right=0.0
+            contact.places + contact.nows[:, PATH.displacement], x, pressure, left=0.0, right=0.0
         )
     if contact.pressed.size:
         return contact.pressed[1] / contact.points[PointRow.LOAD]
@@ -380,7 +380,7 @@ def bond_list_model(law, limit: float, reach: float, merge: float) -> ContactMod
     fields = {
         "force": [limit],
         "bondlist": np.zeros((N_ROWS, capacity)),
-        "now": numbers.make_clocks(law),
+        "now": numbers.make_path_state(law),
         "status": numbers.make_status(capacity),
         "law": numbers.law_numbers(law, reach, merge),
         "table": numbers.gamma_table(law),

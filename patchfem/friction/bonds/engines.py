@@ -21,24 +21,29 @@ from .list_forms_kernels import (
 from .list_numbers import MAX_DAMAGE, cutoff_age, sum_form
 from .parameters import Bonds
 
-LIST_SETTINGS = {  # settings of a list: whether it drops old strips, whether it merges strips
+# Settings of a list, by engine: whether it drops old strips, whether it merges strips
+LIST_SETTINGS = {
     "direct": (False, False),
     "truncated": (True, False),
     "merged": (True, True),
 }
 ENGINES = (*LIST_SETTINGS, "recursion")
-# upper bounds of the error of merging / square of the merge width, which test_merge_bounds measures
-MERGE_ERROR_CONSTANT = 0.25  # for a constant bond length
-MERGE_ERROR_GROWING = 1.0  # for reading="stretch" with growing bonds
-MERGE_ERROR_REPORT_GROWING = 6.0  # for reading="report" with growing bonds
-# for reading="report" with a constant bond length and an order below 1
+# Upper bounds of the error of merging, divided by the square of the merge width (measured by
+# test_merge_bounds)
+MERGE_ERROR_CONSTANT = 0.25  # bound for a constant bond length
+MERGE_ERROR_GROWING = 1.0  # bound for reading="stretch" with growing bonds
+MERGE_ERROR_REPORT_GROWING = 6.0  # bound for reading="report" with growing bonds
+# Bound for reading="report" with a constant bond length and an order below 1
 MERGE_ERROR_REPORT_FRACTIONAL = 1.0
-# error of merging growing bonds with p < 0 at any width, which bonds that form at a reversal cause
+# Error that merging adds at any merge width for growing bonds with p < 0; it is due to bonds that
+# form at a reversal
 NEGATIVE_ORDER_ERROR = 3e-4
-# number of evaluations of the list per step of a rig: three for each of two or three trial increments
+# Number of evaluations of the list per step of a rig: three for each of two or three trial
+# increments
 N_PASSES_PER_STEP = 9
-MAX_TAIL = 1e-6  # largest fraction of the friction limit by which the cut-off may change the force
-MAX_MERGE_WIDTH = 0.02  # largest width of a merged strip in bond lengths
+# Largest change of the force due to the cut-off, as a fraction of the friction limit
+MAX_TAIL = 1e-6
+MAX_MERGE_WIDTH = 0.02  # largest merge width in bond lengths
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,11 +66,11 @@ class EngineChoice:
     seconds: float
 
     def reach(self, order: float) -> float:
-        """Return the age [bond lengths] beyond which bonds are dropped; inf if none are."""
+        """Return the age [bond lengths] beyond which bonds are dropped; inf if none are dropped."""
         return cutoff_age(order, self.tail) if self.tail > 0 else inf
 
     def describe(self) -> str:
-        """Describe engine, list length, cost per step, settings and error bound in a line."""
+        """Describe engine, list length, cost per step, settings and error bound in one line."""
         if self.engine == "recursion":
             return f"recursion, exact, computing time {1e6 * self.seconds:.2g} us per time step"
         parts = [
@@ -166,7 +171,7 @@ def choose_engine(
 
 
 def _merge_error_factor(law: Bonds) -> float:
-    """Return the error bound of merging / square of the merge width."""
+    """Return the error bound of merging, divided by the square of the merge width."""
     form = sum_form(law)
     if form == FORM_REPORT_GROWING:
         return MERGE_ERROR_REPORT_GROWING
@@ -180,14 +185,15 @@ def _merge_error_factor(law: Bonds) -> float:
 def _estimate(
     law: Bonds, name: str, tail: float, merge: float, stroke: float, steps: float
 ) -> EngineChoice:
-    """Estimate length, cost and error of a list with these settings; 0 switches a setting off."""
+    """Estimate length, cost and error of a list with given settings; 0 switches a setting off."""
     increment = stroke / max(steps, 1)
-    strips = _expected_strips(law, tail, merge, stroke, increment)
+    strips = _estimate_strip_count(law, tail, merge, stroke, increment)
     seconds_per_strip = cost_model.STRIP_SECONDS[int(sum_form(law))]
     if sum_form(law) in (FORM_POWER, FORM_REPORT) and law.order not in (0, 1, 2):
         seconds_per_strip = cost_model.ANY_ORDER_STRIP_SECONDS
     panels = 1 if increment <= 1 else 2 + ceil(increment).bit_length()
-    # a long increment takes five Gauss points per panel instead of the two values of Simpson's rule
+    # A long increment takes five Gauss points per panel instead of the two values of Simpson's
+    # rule.
     factor = 1 if increment <= 0.1 else 5 / 2 * panels
     pass_seconds = cost_model.PASS_SECONDS + seconds_per_strip * strips
     seconds = cost_model.LIST_STEP_SECONDS + N_PASSES_PER_STEP * pass_seconds * factor
@@ -199,7 +205,7 @@ def _estimate(
     return EngineChoice(name, tail, merge, error, strips, seconds)
 
 
-def _expected_strips(
+def _estimate_strip_count(
     law: Bonds, tail: float, merge: float, stroke: float, increment: float
 ) -> float:
     """Estimate the number of strips in a list, for strokes and increments in bond lengths."""

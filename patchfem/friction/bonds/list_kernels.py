@@ -31,10 +31,10 @@ from .list_forms_kernels import (
 from .list_math_kernels import bond_gammainc, fast_exp, fast_log
 from .list_merge_kernels import merge_strips
 from .list_rows_kernels import (
-    CLOCK,
     GROWING_ROW,
     LAW,
     MOMENT,
+    PATH,
     POWER_ROW,
     REPORT_ROW,
     STATUS,
@@ -55,33 +55,39 @@ from .list_sum_kernels import (
 )
 from .point_kernels import bond_mean, grow
 
-# two Gauss points per strip then sum growing bonds to 1e-6 (test_exact_direct_growing_bonds_equal_hand_sum)
-MAX_STRIP_GROWTH = 0.5  # largest growth J in a strip of growing bonds
-# largest number of strips into which growth alone divides an increment, as J has no bound after a long rest
+# Largest growth J within a strip of growing bonds; with it, two Gauss points per strip sum growing
+# bonds to 1e-6 (test_exact_direct_growing_bonds_equal_hand_sum)
+MAX_STRIP_GROWTH = 0.5
+# Largest number of strips into which growth alone divides an increment; J has no bound after a long
+# rest
 MAX_GROWTH_STRIPS = 16
-# error / friction limit of growing bonds that form on an increment; it falls with the fourth power of the number of
-# strips
+# Largest error, relative to the friction limit, of the growing bonds that form on an increment; it
+# falls with the fourth power of the number of strips
 NEW_BOND_TOL = 1e-9
-# distance of an increment from displacement 0 / its length, below which it touches the initial bonds
+# Largest distance of an increment from displacement 0, relative to the length of the increment, at
+# which it still counts as passing the kink of the initial bonds
 TOUCH_TOL = 1e-6
-# Increment in bond lengths; below it, a difference of energies has more round-off than the force.
+# Smallest increment in bond lengths for which the mean force is computed from energies; for smaller
+# increments their difference is less accurate than the force
 MIN_ENERGY_STEP = 1e-3
-# same limit if the initial bonds are distributed, because solvers then rely on a force without jumps
+# The same limit for distributed initial bonds, because solvers rely on a force without jumps
 MIN_ENERGY_STEP_SPREAD = 1e-6
-MAX_SIMPSON_STEP = 0.1  # increment in bond lengths up to which Simpson's rule is accurate enough
-MAX_SIMPSON_STEP_FRACTIONAL = 0.03  # same limit for an order below 1
-MAX_PANEL_LENGTH = 0.5  # longest first panel of five Gauss points, in bond lengths
-# Exponent beyond which the scaled numbers are rescaled; exp(709) is the largest floating-point
-# number.
+# Largest increment in bond lengths for which Simpson's rule is accurate enough
+MAX_SIMPSON_STEP = 0.1
+MAX_SIMPSON_STEP_FRACTIONAL = 0.03  # the same limit for an order below 1
+MAX_PANEL_LENGTH = 0.5  # largest length of the first panel of five Gauss points, in bond lengths
+# Largest exponent of the scaled numbers before they are rescaled; exp(709) is the largest
+# floating-point number
 MAX_EXPONENT = 300.0
-# path in bond lengths; below it, the moments of new bonds are computed by power series
+# Largest path in bond lengths for which the moments of new bonds are computed by power series
 MAX_SERIES_PATH = 1e-2
-# number of strips, in addition to a fifth of the list, by which a list grows before it is merged again
+# Number of strips, in addition to a fifth of the list, by which the list grows before it is merged
+# again
 MIN_STRIPS_BETWEEN_MERGES = 12
 
 
-class ClockValues(NamedTuple):
-    """Clocks of a list after an increment, and the bond length [m] in its middle."""
+class PathValues(NamedTuple):
+    """Path state of a list after an increment, and the bond length [m] in the middle of it."""
 
     displacement: float
     path: float
@@ -95,14 +101,14 @@ class Formation(NamedTuple):
     """Straight increment on which bonds form.
 
     - increment: [m]
-    - before, after: clocks at its ends
+    - before, after: path state at its ends
     - pressure: relative pressure
     - reference: reference of the scaled numbers
     """
 
     increment: float
-    before: ClockValues
-    after: ClockValues
+    before: PathValues
+    after: PathValues
     pressure: float
     reference: float
 
@@ -130,17 +136,17 @@ class StripMoments(NamedTuple):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _advance_clocks(increment, clocks, growth, v0, v1, dt):
-    """Return the clocks of a bond list after an increment at velocities from v0 to v1."""
+def _advance_path_state(increment, path_state, growth, v0, v1, dt):
+    """Return the path state of a bond list after an increment at velocities from v0 to v1."""
     path = abs(increment)
-    before = clocks[CLOCK.length]
+    before = path_state[PATH.length]
     length, exponent = grow(before, v0, v1, path, dt, growth)
     middle, _ = grow(before, v0, (v0 + v1) / 2, path / 2, dt / 2, growth)
-    return ClockValues(
-        clocks[CLOCK.displacement] + increment,
-        clocks[CLOCK.path] + path,
-        clocks[CLOCK.damage] + path / middle,
-        clocks[CLOCK.growth] + exponent,
+    return PathValues(
+        path_state[PATH.displacement] + increment,
+        path_state[PATH.path] + path,
+        path_state[PATH.damage] + path / middle,
+        path_state[PATH.growth] + exponent,
         length,
         middle,
     )
@@ -172,15 +178,15 @@ def _count_strips(path, eps, growth, law):
         needed = (limit / NEW_BOND_TOL) ** 0.25
         count = max(count, min(growth / MAX_STRIP_GROWTH, MAX_GROWTH_STRIPS, needed))
     count = np.ceil(count)
-    clock = path / eps if law[LAW.form] < FORM_REPORT else path
-    return StripCount(count, min(count, 1 + np.ceil(count * (law[LAW.cutoff] / clock))))
+    age_measure = path / eps if law[LAW.form] < FORM_REPORT else path
+    return StripCount(count, min(count, 1 + np.ceil(count * (law[LAW.cutoff] / age_measure))))
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _formed_growing_force(path, before, after, law):
-    """Return the force [1] of the growing bonds that form on an increment between two clocks."""
-    growth = after.growth - before[CLOCK.growth]
-    target = target_length(before[CLOCK.length], after.length, growth)
+    """Return the force [1] of the growing bonds that form on an increment between two path states."""
+    growth = after.growth - before[PATH.growth]
+    target = target_length(before[PATH.length], after.length, growth)
     pieces = _count_strips(path, after.middle_length, growth, law)
     total = 0.0
     for piece in range(int(pieces.kept)):
@@ -209,7 +215,7 @@ def sum_list(increment, bond_list, v0, dt):
     BondSum
         Force [1] and energy [m] per friction limit.
     """
-    after = _advance_clocks(increment, bond_list.now, bond_list.growth, v0, v0, dt)
+    after = _advance_path_state(increment, bond_list.now, bond_list.growth, v0, v0, dt)
     initial = sum_initial(after.displacement, after.path, after.damage, bond_list.law)
     formed = _sum_strips(increment, bond_list, v0, dt)
     pressure = bond_list.status[STATUS.initial_pressure]
@@ -220,17 +226,17 @@ def sum_list(increment, bond_list, v0, dt):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _sum_strips(increment, bond_list, v0, dt):
-    """Return force and stored energy of a bond list without its initial bonds."""
+    """Return force and stored energy of a bond list, excluding its initial bonds."""
     bonds = bond_list.bondlist
     status = bond_list.status
-    clocks = bond_list.now
+    path_state = bond_list.now
     law = bond_list.law
     form = law[LAW.form]
-    after = _advance_clocks(increment, clocks, bond_list.growth, v0, v0, dt)
+    after = _advance_path_state(increment, path_state, bond_list.growth, v0, v0, dt)
     head = int(status[STATUS.head])
     strips = StripRange(head, head + int(status[STATUS.n_spread]), int(status[STATUS.end]))
     eps0 = law[LAW.length]
-    reference = clocks[CLOCK.reference]
+    reference = path_state[PATH.reference]
     force = 0.0
     energy = 0.0
     if form == FORM_MOMENTS:
@@ -257,7 +263,7 @@ def _sum_strips(increment, bond_list, v0, dt):
     formed = 0.0
     if path > 0:
         if form == FORM_REPORT_GROWING:
-            formed = _formed_growing_force(path, clocks, after, law)
+            formed = _formed_growing_force(path, path_state, after, law)
         else:
             formed = formed_force(path, after.middle_length if form <= FORM_POWER else eps0, law)
     return BondSum(force + np.copysign(status[STATUS.pressure] * formed, increment), energy)
@@ -297,7 +303,7 @@ def list_energy(increment, bond_list, v0, dt):
     float
     """
     law = bond_list.law
-    eps = _advance_clocks(increment, bond_list.now, bond_list.growth, v0, v0, dt).middle_length
+    eps = _advance_path_state(increment, bond_list.now, bond_list.growth, v0, v0, dt).middle_length
     formed = eps * eps / law[LAW.length] * bond_gammainc(law[LAW.order] + 1, abs(increment) / eps)
     return (
         bond_list.status[STATUS.pressure] * formed + sum_list(increment, bond_list, v0, dt).energy
@@ -336,7 +342,7 @@ def list_mean(increment, bond_list, v0, dt):
     float
     """
     status = bond_list.status
-    clocks = bond_list.now
+    path_state = bond_list.now
     law = bond_list.law
     form = law[LAW.form]
     if increment == 0:
@@ -353,7 +359,7 @@ def list_mean(increment, bond_list, v0, dt):
         mean = _average_by_gauss(False, increment, bond_list, v0, dt)
     if form == FORM_POWER:
         return mean
-    initial = average_initial(increment, clocks[CLOCK.displacement], clocks[CLOCK.path], law)
+    initial = average_initial(increment, path_state[PATH.displacement], path_state[PATH.path], law)
     return mean + status[STATUS.initial_pressure] * initial
 
 
@@ -365,10 +371,10 @@ def _suits_simpson(increment, bond_list):
     bonds may jump, and its value there is that of neither side.
     """
     status = bond_list.status
-    clocks = bond_list.now
+    path_state = bond_list.now
     law = bond_list.law
     p = law[LAW.order]
-    start = clocks[CLOCK.displacement]
+    start = path_state[PATH.displacement]
     low = min(start, start + increment)
     high = max(start, start + increment)
     margin = TOUCH_TOL * abs(increment)
@@ -378,9 +384,9 @@ def _suits_simpson(increment, bond_list):
     limit = MAX_SIMPSON_STEP if p >= 1 else MAX_SIMPSON_STEP_FRACTIONAL
     return (
         status[STATUS.end] > status[STATUS.head]
-        and abs(increment) / clocks[CLOCK.length] <= limit
+        and abs(increment) / path_state[PATH.length] <= limit
         and p >= 0
-        # the choice of the rule must not depend on the position of distributed bonds
+        # The choice of the rule must not depend on the position of distributed bonds.
         and not ((touches_zero and has_jump) or has_steep_range)
     )
 
@@ -391,14 +397,14 @@ def _needs_energy_balance(increment, bond_list):
 
     Round-off forbids it for a tiny increment, unless the increment crosses a jump of the initial bonds.
     """
-    clocks = bond_list.now
+    path_state = bond_list.now
     law = bond_list.law
-    start = clocks[CLOCK.displacement]
+    start = path_state[PATH.displacement]
     end = start + increment
     crosses_zero = min(start, end) <= 0.0 <= max(start, end)
     has_jump = law[LAW.initial] > 0 and law[LAW.order] < 1
     smallest = MIN_ENERGY_STEP if law[LAW.half_width] == 0 else MIN_ENERGY_STEP_SPREAD
-    is_large = abs(increment) / clocks[CLOCK.length] > smallest
+    is_large = abs(increment) / path_state[PATH.length] > smallest
     return is_large or (crosses_zero and has_jump)
 
 
@@ -407,7 +413,7 @@ def _mean_from_energy(is_short, increment, bond_list, v0, dt):
     """Return the path-mean force of a bond list from its energy balance."""
     last = list_energy(increment, bond_list, v0, dt)
     gain = last - bond_list.status[STATUS.energy]
-    eps = _advance_clocks(increment, bond_list.now, bond_list.growth, v0, v0, dt).middle_length
+    eps = _advance_path_state(increment, bond_list.now, bond_list.growth, v0, v0, dt).middle_length
     if is_short:
         stored = _average_by_simpson(True, last, increment, bond_list, v0, dt)
     else:
@@ -426,14 +432,14 @@ def _average_by_simpson(is_energy, last, increment, bond_list, v0, dt):
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _average_by_gauss(is_energy, increment, bond_list, v0, dt):
     """Average energy or force of a bond list over an increment by panels of Gauss points."""
-    path = abs(increment) / bond_list.now[CLOCK.length]
+    path = abs(increment) / bond_list.now[PATH.length]
     if path <= MAX_PANEL_LENGTH:
         return _integrate_panel(is_energy, (0.0, 1.0), increment, bond_list, v0, dt)
     low = 0.0
     high = MAX_PANEL_LENGTH / path
     total = 0.0
     while low < 1:
-        # the last two panels are merged into one
+        # The last two panels are merged into one, so that no panel is much shorter than the others.
         high = 1.0 if high > 0.75 else high
         total += _integrate_panel(is_energy, (low, high), increment, bond_list, v0, dt)
         low = high
@@ -445,13 +451,13 @@ def _average_by_gauss(is_energy, increment, bond_list, v0, dt):
 def _first_integrand(is_energy, bond_list):
     """Return the energy or force of a bond list in its present state."""
     status = bond_list.status
-    clocks = bond_list.now
+    path_state = bond_list.now
     if is_energy:
         return status[STATUS.energy]
     if bond_list.law[LAW.form] < FORM_REPORT:
         return status[STATUS.force]
     initial = sum_initial(
-        clocks[CLOCK.displacement], clocks[CLOCK.path], clocks[CLOCK.damage], bond_list.law
+        path_state[PATH.displacement], path_state[PATH.path], path_state[PATH.damage], bond_list.law
     )
     return status[STATUS.force] - status[STATUS.initial_pressure] * initial.force
 
@@ -482,17 +488,17 @@ def list_slope(increment, bond_list, v0, dt):
     MeanForce
     """
     status = bond_list.status
-    clocks = bond_list.now
+    path_state = bond_list.now
     law = bond_list.law
-    displacement = clocks[CLOCK.displacement]
-    damage = clocks[CLOCK.damage]
+    displacement = path_state[PATH.displacement]
+    damage = path_state[PATH.damage]
     head = int(status[STATUS.head])
     strips = StripRange(head, head, int(status[STATUS.end]))
-    scale = exp(clocks[CLOCK.reference] - damage)
+    scale = exp(path_state[PATH.reference] - damage)
     moments = sum_moments(displacement, scale, bond_list.bondlist, strips)
     initial = status[STATUS.initial_pressure] * law[LAW.initial] * exp(-damage)
     path = abs(increment)
-    middle, _ = grow(clocks[CLOCK.length], v0, v0, path / 2, dt / 2, bond_list.growth)
+    middle, _ = grow(path_state[PATH.length], v0, v0, path / 2, dt / 2, bond_list.growth)
     mean, slope = bond_mean(
         moments.m + initial,
         moments.z + initial * displacement,
@@ -527,36 +533,36 @@ def list_step(increment, bond_list, v0, v1, dt):
     """
     bonds = bond_list.bondlist
     status = bond_list.status
-    clocks = bond_list.now
+    path_state = bond_list.now
     law = bond_list.law
-    before = ClockValues(
-        clocks[CLOCK.displacement],
-        clocks[CLOCK.path],
-        clocks[CLOCK.damage],
-        clocks[CLOCK.growth],
-        clocks[CLOCK.length],
+    before = PathValues(
+        path_state[PATH.displacement],
+        path_state[PATH.path],
+        path_state[PATH.damage],
+        path_state[PATH.growth],
+        path_state[PATH.length],
         0.0,
     )
-    after = _advance_clocks(increment, clocks, bond_list.growth, v0, v1, dt)
-    clocks[CLOCK.displacement] = after.displacement
-    clocks[CLOCK.path] = after.path
-    clocks[CLOCK.damage] = after.damage
-    clocks[CLOCK.growth] = after.growth
-    clocks[CLOCK.length] = after.length
-    _move_reference(bonds, status, clocks, law)
+    after = _advance_path_state(increment, path_state, bond_list.growth, v0, v1, dt)
+    path_state[PATH.displacement] = after.displacement
+    path_state[PATH.path] = after.path
+    path_state[PATH.damage] = after.damage
+    path_state[PATH.growth] = after.growth
+    path_state[PATH.length] = after.length
+    _move_reference(bonds, status, path_state, law)
     has_room = True
     if increment != 0 and status[STATUS.pressure] > 0:
         formation = Formation(
-            increment, before, after, status[STATUS.pressure], clocks[CLOCK.reference]
+            increment, before, after, status[STATUS.pressure], path_state[PATH.reference]
         )
         has_room = _append_strip(formation, bond_list)
     if increment != 0:
-        _drop_old_strips(bonds, status, clocks, law)
+        _drop_old_strips(bonds, status, path_state, law)
         n_strips = status[STATUS.end] - status[STATUS.head]
-        # a merge visits the whole list, so it waits until the list has grown by a fifth
+        # A merge visits the whole list, so it waits until the list has grown by a fifth.
         has_grown = n_strips > 1.2 * status[STATUS.n_after_merge] + MIN_STRIPS_BETWEEN_MERGES
         if law[LAW.merge_width] > 0 and has_grown:
-            merge_strips(bonds, status, clocks, law)
+            merge_strips(bonds, status, path_state, law)
     total = sum_list(0.0, bond_list, 0.0, 0.0)
     status[STATUS.force] = total.force
     status[STATUS.energy] = total.energy
@@ -566,15 +572,17 @@ def list_step(increment, bond_list, v0, v1, dt):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _move_reference(bonds, status, clocks, law):
-    """Move the reference of the scaled numbers to the present clock before the numbers overflow."""
+def _move_reference(bonds, status, path_state, law):
+    """Move the reference of the scaled numbers to the present damage or growth before they overflow."""
     form = law[LAW.form]
     if form == FORM_REPORT:
         return
-    clock = clocks[CLOCK.growth] if form == FORM_REPORT_GROWING else clocks[CLOCK.damage]
-    if clock - clocks[CLOCK.reference] < MAX_EXPONENT:
+    age_measure = (
+        path_state[PATH.growth] if form == FORM_REPORT_GROWING else path_state[PATH.damage]
+    )
+    if age_measure - path_state[PATH.reference] < MAX_EXPONENT:
         return
-    factor = exp(clocks[CLOCK.reference] - clock)
+    factor = exp(path_state[PATH.reference] - age_measure)
     for k in range(int(status[STATUS.head]), int(status[STATUS.end])):
         if form == FORM_MOMENTS:
             bonds[MOMENT.weight, k] *= factor
@@ -584,7 +592,7 @@ def _move_reference(bonds, status, clocks, law):
         else:
             bonds[GROWING_ROW.length_1, k] *= factor
             bonds[GROWING_ROW.length_2, k] *= factor
-    clocks[CLOCK.reference] = clock
+    path_state[PATH.reference] = age_measure
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -616,8 +624,8 @@ def _append_strip(formation, bond_list):
         bonds[STRIP.end, end] = after.displacement - near * increment
         bonds[STRIP.covered, end] = path / count
         bonds[STRIP.path, end] = after.path - near * path
-        bonds[STRIP.clock, end] = bonds[STRIP.path, end]
-        bonds[STRIP.clock_width, end] = bonds[STRIP.covered, end]
+        bonds[STRIP.age_measure, end] = bonds[STRIP.path, end]
+        bonds[STRIP.age_width, end] = bonds[STRIP.covered, end]
         bonds[STRIP.weight, end] = pressure * bonds[STRIP.covered, end]
         if form == FORM_MOMENTS:
             _write_moments(formation, bonds, end)
@@ -647,11 +655,11 @@ def _extend_last_strip(formation, bonds, status):
     if not (has_same_direction and is_adjacent and bonds[REPORT_ROW.pressure, k] == pressure):
         return False
     bonds[STRIP.end, k] = after.displacement
-    bonds[STRIP.clock, k] = after.path
+    bonds[STRIP.age_measure, k] = after.path
     bonds[STRIP.path, k] = after.path
-    bonds[STRIP.clock_width, k] += abs(increment)
-    bonds[STRIP.covered, k] = bonds[STRIP.clock_width, k]
-    bonds[STRIP.weight, k] = pressure * bonds[STRIP.clock_width, k]
+    bonds[STRIP.age_width, k] += abs(increment)
+    bonds[STRIP.covered, k] = bonds[STRIP.age_width, k]
+    bonds[STRIP.weight, k] = pressure * bonds[STRIP.age_width, k]
     return True
 
 
@@ -663,14 +671,18 @@ def _write_powers(near, count, formation, p, bonds, k):
     """
     increment, before, after, pressure, reference = formation
     damage = after.damage - before.damage
-    clock = after.damage - near * damage
+    age_measure = after.damage - near * damage
     width = damage / count
     weight = pressure * (abs(increment) / count * after.middle_length ** (-p))
-    bonds[STRIP.clock, k] = clock
-    bonds[STRIP.clock_width, k] = width
+    bonds[STRIP.age_measure, k] = age_measure
+    bonds[STRIP.age_width, k] = width
     bonds[STRIP.weight, k] = weight
-    bonds[POWER_ROW.weight_1, k] = 0.5 * weight * exp(clock - GAUSS_POINT_1 * width - reference)
-    bonds[POWER_ROW.weight_2, k] = 0.5 * weight * exp(clock - GAUSS_POINT_2 * width - reference)
+    bonds[POWER_ROW.weight_1, k] = (
+        0.5 * weight * exp(age_measure - GAUSS_POINT_1 * width - reference)
+    )
+    bonds[POWER_ROW.weight_2, k] = (
+        0.5 * weight * exp(age_measure - GAUSS_POINT_2 * width - reference)
+    )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -694,7 +706,7 @@ def _write_start_lengths(piece, count, formation, bonds, k):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _write_moments(formation, bonds, k):
-    """Write centre, variance and scaled weight of the bonds of an increment that survive it."""
+    """Write centre, variance and scaled weight of the bonds that form on an increment and survive it."""
     increment, _, after, pressure, reference = formation
     eps = after.middle_length
     direction = np.copysign(1.0, increment)
@@ -721,17 +733,17 @@ def _surviving_moments(x):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _drop_old_strips(bonds, status, clocks, law):
+def _drop_old_strips(bonds, status, path_state, law):
     """Advance the head of the list beyond the strips that are older than the cut-off."""
     form = law[LAW.form]
     head = int(status[STATUS.head])
     end = int(status[STATUS.end])
     while head < end:
-        path = clocks[CLOCK.path] - bonds[STRIP.path, head]
+        path = path_state[PATH.path] - bonds[STRIP.path, head]
         if form == FORM_MOMENTS:
             age = path / law[LAW.length]
         elif form == FORM_POWER:
-            age = clocks[CLOCK.damage] - bonds[STRIP.clock, head]
+            age = path_state[PATH.damage] - bonds[STRIP.age_measure, head]
         else:
             age = path
         if age <= law[LAW.cutoff]:

@@ -12,7 +12,7 @@ from ...compiled.jit import njit
 from ..flags_kernels import NJIT_NO_REFCOUNT
 from .list_forms_kernels import N_TABLE_STEPS
 
-MAX_TABLE_ARGUMENT = 1e6  # argument x beyond which P(p + 1, x) is 1 for every order
+MAX_TABLE_ARGUMENT = 1e6  # smallest argument x at which P(p + 1, x) is set to 1 for every order
 
 
 @njit(error_model="numpy", fastmath={"contract"}, **NJIT_NO_REFCOUNT)

@@ -1,4 +1,4 @@
-"""Merging of neighbouring strips of bonds that are narrow for their age.
+"""Merging of neighbouring strips of bonds whose joint width is small for their age.
 
 It bounds the length of the list for runs, strokes and steps of any size. First moments are conserved, so the error falls
 with the square of the width.
@@ -18,10 +18,10 @@ from .list_forms_kernels import (
 )
 from .list_math_kernels import fast_exp, fast_log
 from .list_rows_kernels import (
-    CLOCK,
     GROWING_ROW,
     LAW,
     MOMENT,
+    PATH,
     POWER_ROW,
     REPORT_ROW,
     STATUS,
@@ -29,19 +29,20 @@ from .list_rows_kernels import (
 )
 from .list_sum_kernels import interpolate_start_length
 
-# starting length / bond length of growing bonds; below it, the bonds count as fully grown
+# Largest starting length of fully grown bonds, relative to their present length
 MAX_START_LENGTH_RATIO = 1e-8
-MAX_GROWTH_SPAN = 0.1  # largest range of the growth J of a merged strip of growing bonds
-# largest fraction by which the last bond of a merged strip is shorter than its first
+MAX_GROWTH_SPAN = 0.1  # largest range of the growth J within a merged strip of growing bonds
+# Largest relative decrease of the bond length from the first to the last bond of a merged strip
 MAX_SHORTENING = 0.1
-MAX_RANGE_MISMATCH = 1e-3  # mismatch / width; below it, two ranges count as the same
-# Age in bond lengths beyond which the permitted width no longer grows, which keeps it finite.
+# Largest mismatch of two ranges that count as the same, relative to their width
+MAX_RANGE_MISMATCH = 1e-3
+# Largest age in bond lengths at which the merge width still grows; the limit keeps it finite
 MAX_AGE = 200.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def merge_strips(bonds, status, clocks, law):
-    """Merge neighbouring strips that together are narrow for their age.
+def merge_strips(bonds, status, path_state, law):
+    """Merge neighbouring strips whose joint width is small for their age.
 
     The largest width is merge_width eps_0 exp(R/(3 eps_0)) at the path R since the bonds formed. Two strips of one pass
     are joined end to end. Strips of several passes over the same range become a spread strip, the oldest first.
@@ -50,8 +51,8 @@ def merge_strips(bonds, status, clocks, law):
     ----------
     bonds : (N_ROWS, capacity) array
         Array of strips, changed in place.
-    status, clocks, law : (16,), (6,), (24,) array
-        As `STATUS`, `CLOCK` and `LAW` name them; the status is changed in place.
+    status, path_state, law : (16,), (6,), (24,) array
+        As `STATUS`, `PATH` and `LAW` name them; the status is changed in place.
     """
     head = int(status[STATUS.head])
     n_spread_before = int(status[STATUS.n_spread])
@@ -63,24 +64,24 @@ def merge_strips(bonds, status, clocks, law):
             last = out - 1
             is_last_spread = last < head + n_spread
             is_first_unspread = last == head + n_spread
-            width = _max_width(k, bonds, clocks, law)
+            width = _max_width(k, bonds, path_state, law)
             is_narrow = bonds[STRIP.covered, last] + bonds[STRIP.covered, k] <= width
             if law[LAW.form] == FORM_REPORT_GROWING:
-                is_narrow = is_narrow and _have_similar_lengths(bonds, last, k, clocks)
+                is_narrow = is_narrow and _have_similar_lengths(bonds, last, k, path_state)
             if is_narrow and law[LAW.form] == FORM_MOMENTS:
                 _join_moments(bonds, last, k)
                 continue
             can_join_ends = is_narrow and not was_spread and not is_last_spread
             if can_join_ends and _are_end_to_end(bonds, last, k, width, law):
-                _join_ends(bonds, last, k, clocks, law)
+                _join_ends(bonds, last, k, path_state, law)
                 continue
-            is_uniform = _is_uniformly_weighted(bonds, last, k, clocks, law)
+            is_uniform = _is_uniformly_weighted(bonds, last, k, path_state, law)
             can_spread = is_narrow and is_uniform and (is_last_spread or is_first_unspread)
-            if can_spread and _have_same_range(bonds, last, k, clocks, law, status):
+            if can_spread and _have_same_range(bonds, last, k, path_state, law, status):
                 if is_first_unspread:
                     _spread_strip(bonds, last, law)
                     n_spread += 1
-                _join_to_spread_strip(bonds, last, k, was_spread, clocks, law)
+                _join_to_spread_strip(bonds, last, k, was_spread, path_state, law)
                 continue
             if (
                 is_first_unspread
@@ -101,9 +102,9 @@ def merge_strips(bonds, status, clocks, law):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _max_width(k, bonds, clocks, law):
+def _max_width(k, bonds, path_state, law):
     """Return the largest width [m] of a merged strip that ends with strip k."""
-    age = (clocks[CLOCK.path] - bonds[STRIP.path, k]) / law[LAW.length]
+    age = (path_state[PATH.path] - bonds[STRIP.path, k]) / law[LAW.length]
     return law[LAW.merge_width] * law[LAW.length] * exp(min(age / 3, MAX_AGE))
 
 
@@ -115,7 +116,7 @@ def _signed_width(bonds, k):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _are_end_to_end(bonds, i, k, width, law):
-    """Return whether two strips are adjacent, of one direction, and similar enough to be joined."""
+    """Return whether two strips are adjacent, have the same direction and are similar enough to be joined."""
     form = law[LAW.form]
     if (
         bonds[STRIP.end, i] != bonds[STRIP.start, k]
@@ -141,17 +142,17 @@ def _is_narrow_before_reversal(bonds, i, k, width, law):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _is_fully_grown(bonds, k, clocks):
+def _is_fully_grown(bonds, k, path_state):
     """Return whether the starting lengths of the bonds of a strip no longer matter."""
     start = interpolate_start_length(
         0.0, bonds[GROWING_ROW.length_1, k], bonds[GROWING_ROW.length_2, k]
     )
-    scale = exp(clocks[CLOCK.reference] - clocks[CLOCK.growth])
-    return scale * start <= MAX_START_LENGTH_RATIO * clocks[CLOCK.length]
+    scale = exp(path_state[PATH.reference] - path_state[PATH.growth])
+    return scale * start <= MAX_START_LENGTH_RATIO * path_state[PATH.length]
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _is_uniformly_weighted(bonds, i, k, clocks, law):
+def _is_uniformly_weighted(bonds, i, k, path_state, law):
     """Return whether the weight of two strips is uniform over them, or too small to matter.
 
     With a fractional order the weight R^p of young bonds is not uniform. Two strips cover the paths from R = near to
@@ -160,12 +161,12 @@ def _is_uniformly_weighted(bonds, i, k, clocks, law):
     """
     p = law[LAW.order]
     form = law[LAW.form]
-    if form == FORM_REPORT_GROWING and not _is_fully_grown(bonds, k, clocks):
+    if form == FORM_REPORT_GROWING and not _is_fully_grown(bonds, k, path_state):
         return False
     depends_on_path = form == FORM_REPORT or (form == FORM_REPORT_GROWING and p < 1)
     if not depends_on_path or p == 0.0:
         return True
-    near = (clocks[CLOCK.path] - bonds[STRIP.path, k]) / law[LAW.length]
+    near = (path_state[PATH.path] - bonds[STRIP.path, k]) / law[LAW.length]
     joint = (bonds[STRIP.covered, i] + bonds[STRIP.covered, k]) / law[LAW.length]
     far = near + joint
     part = law[LAW.inverse_gamma] * (
@@ -189,9 +190,9 @@ def _have_similar_density(bonds, i, k, width, eps0):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _have_similar_lengths(bonds, i, k, clocks):
+def _have_similar_lengths(bonds, i, k, path_state):
     """Return whether the growing bonds of two strips have similar lengths or are fully grown."""
-    if _is_fully_grown(bonds, k, clocks):
+    if _is_fully_grown(bonds, k, path_state):
         return True
     young = interpolate_start_length(
         0.0, bonds[GROWING_ROW.length_1, k], bonds[GROWING_ROW.length_2, k]
@@ -199,15 +200,15 @@ def _have_similar_lengths(bonds, i, k, clocks):
     old = interpolate_start_length(
         1.0, bonds[GROWING_ROW.length_1, i], bonds[GROWING_ROW.length_2, i]
     )
-    scale = exp(clocks[CLOCK.reference] - clocks[CLOCK.growth])
-    young_length = clocks[CLOCK.length] - scale * young
-    old_length = clocks[CLOCK.length] - scale * old
+    scale = exp(path_state[PATH.reference] - path_state[PATH.growth])
+    young_length = path_state[PATH.length] - scale * young
+    old_length = path_state[PATH.length] - scale * old
     return young <= exp(MAX_GROWTH_SPAN) * old and young_length >= (1 - MAX_SHORTENING) * old_length
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _have_same_range(bonds, i, k, clocks, law, status):
-    """Return whether two strips cover nearly the same range, so that both can be spread over a mean range."""
+def _have_same_range(bonds, i, k, path_state, law, status):
+    """Return whether two strips cover nearly the same range, so that both can be distributed over a mean range."""
     low_i = min(bonds[STRIP.start, i], bonds[STRIP.end, i])
     high_i = max(bonds[STRIP.start, i], bonds[STRIP.end, i])
     low_k = min(bonds[STRIP.start, k], bonds[STRIP.end, k])
@@ -218,7 +219,7 @@ def _have_same_range(bonds, i, k, clocks, law, status):
         return True
     joint = bonds[STRIP.covered, i] + bonds[STRIP.covered, k]
     merge_width = law[LAW.merge_width]
-    age = (clocks[CLOCK.path] - bonds[STRIP.path, k]) / law[LAW.length]
+    age = (path_state[PATH.path] - bonds[STRIP.path, k]) / law[LAW.length]
     cubic = merge_width * merge_width * merge_width * law[LAW.length] * exp(min(age, MAX_AGE))
     if joint * mismatch <= cubic * width:
         status[STATUS.n_unlike] += 1
@@ -240,49 +241,49 @@ def _join_moments(bonds, i, k):
         bonds[MOMENT.variance, i] = within + weight_i * weight_k * gap * gap / (total * total)
         bonds[MOMENT.centre, i] += weight_k / total * gap
     bonds[MOMENT.weight, i] = total
-    _join_clocks(bonds, i, k)
+    _extend_strip(bonds, i, k)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _join_clocks(bonds, i, k):
+def _extend_strip(bonds, i, k):
     """Add weight and path of strip k to the older strip i, which takes over its end."""
-    bonds[STRIP.clock_width, i] += bonds[STRIP.clock_width, k]
+    bonds[STRIP.age_width, i] += bonds[STRIP.age_width, k]
     bonds[STRIP.weight, i] += bonds[STRIP.weight, k]
     bonds[STRIP.covered, i] += bonds[STRIP.covered, k]
-    bonds[STRIP.clock, i] = bonds[STRIP.clock, k]
+    bonds[STRIP.age_measure, i] = bonds[STRIP.age_measure, k]
     bonds[STRIP.path, i] = bonds[STRIP.path, k]
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _join_ends(bonds, i, k, clocks, law):
-    """Join two adjacent strips of a single pass; their first moments are conserved."""
+def _join_ends(bonds, i, k, path_state, law):
+    """Join two adjacent strips that formed in the same pass; their first moments are conserved."""
     form = law[LAW.form]
     if form == FORM_REPORT_GROWING:
-        length_1 = _joint_start_length(GAUSS_POINT_1, bonds, i, k, clocks)
-        length_2 = _joint_start_length(GAUSS_POINT_2, bonds, i, k, clocks)
+        length_1 = _joint_start_length(GAUSS_POINT_1, bonds, i, k, path_state)
+        length_2 = _joint_start_length(GAUSS_POINT_2, bonds, i, k, path_state)
     bonds[STRIP.end, i] = bonds[STRIP.end, k]
-    _join_clocks(bonds, i, k)
+    _extend_strip(bonds, i, k)
     if form == FORM_REPORT_GROWING:
         bonds[GROWING_ROW.length_1, i] = length_1
         bonds[GROWING_ROW.length_2, i] = length_2
     elif form == FORM_REPORT:
-        bonds[REPORT_ROW.pressure, i] = bonds[STRIP.weight, i] / bonds[STRIP.clock_width, i]
+        bonds[REPORT_ROW.pressure, i] = bonds[STRIP.weight, i] / bonds[STRIP.age_width, i]
     else:
         weight = 0.5 * bonds[STRIP.weight, i]
-        clock = bonds[STRIP.clock, i]
-        width = bonds[STRIP.clock_width, i]
-        reference = clocks[CLOCK.reference]
-        bonds[POWER_ROW.weight_1, i] = weight * exp(clock - GAUSS_POINT_1 * width - reference)
-        bonds[POWER_ROW.weight_2, i] = weight * exp(clock - GAUSS_POINT_2 * width - reference)
+        age_measure = bonds[STRIP.age_measure, i]
+        width = bonds[STRIP.age_width, i]
+        reference = path_state[PATH.reference]
+        bonds[POWER_ROW.weight_1, i] = weight * exp(age_measure - GAUSS_POINT_1 * width - reference)
+        bonds[POWER_ROW.weight_2, i] = weight * exp(age_measure - GAUSS_POINT_2 * width - reference)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _joint_start_length(gauss, bonds, i, k, clocks):
+def _joint_start_length(gauss, bonds, i, k, path_state):
     """Return the scaled initial bond length at a Gauss point of the joined strips i and k."""
-    if _is_fully_grown(bonds, k, clocks):
+    if _is_fully_grown(bonds, k, path_state):
         return 0.0
-    width_i = bonds[STRIP.clock_width, i]
-    width_k = bonds[STRIP.clock_width, k]
+    width_i = bonds[STRIP.age_width, i]
+    width_k = bonds[STRIP.age_width, k]
     position = gauss * (width_i + width_k)
     j = k if position <= width_k else i
     fraction = position / width_k if position <= width_k else (position - width_k) / width_i
@@ -293,7 +294,7 @@ def _joint_start_length(gauss, bonds, i, k, clocks):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _spread_strip(bonds, k, law):
-    """Turn a strip of a single pass into a spread strip over its range."""
+    """Convert a strip that formed in a single pass into one distributed over its range of positions."""
     low = min(bonds[STRIP.start, k], bonds[STRIP.end, k])
     high = max(bonds[STRIP.start, k], bonds[STRIP.end, k])
     bonds[STRIP.start, k] = low
@@ -304,8 +305,8 @@ def _spread_strip(bonds, k, law):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _join_to_spread_strip(bonds, i, k, was_spread, clocks, law):
-    """Add strip k to strip i, whose bonds are spread over its range.
+def _join_to_spread_strip(bonds, i, k, was_spread, path_state, law):
+    """Add strip k to strip i, whose bonds are distributed over its range.
 
     The range of the sum is the mean of both ranges, weighted by the paths that both cover.
     """
@@ -321,10 +322,10 @@ def _join_to_spread_strip(bonds, i, k, was_spread, clocks, law):
         second = 0.0 if was_spread else bonds[POWER_ROW.weight_2, k]
         bonds[POWER_ROW.weight_1, i] += bonds[POWER_ROW.weight_1, k] + second
     elif form == FORM_REPORT_GROWING:
-        length_1 = _joint_start_length(GAUSS_POINT_1, bonds, i, k, clocks)
-        length_2 = _joint_start_length(GAUSS_POINT_2, bonds, i, k, clocks)
+        length_1 = _joint_start_length(GAUSS_POINT_1, bonds, i, k, path_state)
+        length_2 = _joint_start_length(GAUSS_POINT_2, bonds, i, k, path_state)
         bonds[GROWING_ROW.length_1, i] = length_1
         bonds[GROWING_ROW.length_2, i] = length_2
-    _join_clocks(bonds, i, k)
+    _extend_strip(bonds, i, k)
     if form == FORM_REPORT:
-        bonds[REPORT_ROW.pressure, i] = bonds[STRIP.weight, i] / bonds[STRIP.clock_width, i]
+        bonds[REPORT_ROW.pressure, i] = bonds[STRIP.weight, i] / bonds[STRIP.age_width, i]

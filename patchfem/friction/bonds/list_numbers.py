@@ -1,4 +1,4 @@
-"""Arrays of a compiled list of bonds: law, clocks, status, table (see `list_rows_kernels`)."""
+"""Arrays of a compiled list of bonds: law, path state, status, table (see `list_rows_kernels`)."""
 
 from math import ceil, gamma
 
@@ -14,12 +14,13 @@ from .list_forms_kernels import (
 from .list_rows_kernels import LAW, STATUS, ListStatus
 from .parameters import Bonds
 
-MAX_DAMAGE = 745.0  # damage beyond which exp(-damage) is zero
+MAX_DAMAGE = 745.0  # damage from which exp(-damage) underflows to zero
 MAX_STRIPS_PER_LENGTH = 4  # largest number of strips of an increment per bond length
-N_JACOBI_POINTS = 4  # Gauss-Jacobi points of the form POWER
-N_LAW_NUMBERS = 24  # numbers of a law, with the points and weights of two powers
-N_WORK_STRIPS = 64  # strips of workspace in addition to those of an increment
-UNMERGED_CAPACITY = 20_000  # initial capacity of a list whose strips are not merged
+N_JACOBI_POINTS = 4  # number of Gauss-Jacobi points in the form FORM_POWER
+# Number of entries of a law array, including the Gauss-Jacobi points and weights of two powers
+N_LAW_NUMBERS = 24
+N_WORK_STRIPS = 64  # number of strips of workspace in addition to those of an increment
+UNMERGED_CAPACITY = 20_000  # initial capacity, in strips, of a list whose strips are not merged
 
 
 def sum_form(law: Bonds) -> float:
@@ -104,8 +105,8 @@ def make_status(capacity: int, count: int | None = None) -> np.ndarray:
     return status if count else status[0]
 
 
-def make_clocks(law: Bonds) -> np.ndarray:
-    """Return the clocks (6,) of a bond list before any motion."""
+def make_path_state(law: Bonds) -> np.ndarray:
+    """Return the initial path state (6,) of a bond list, before any motion."""
     return np.array([0.0, 0.0, 0.0, 0.0, law.length, 0.0])
 
 

@@ -5,9 +5,9 @@ the array of strips depend on the form of the sum (`list_forms_kernels`): `MOMEN
 known by its moments; `POWER_ROW`, `REPORT_ROW` and `GROWING_ROW` name what the other forms keep beside the rows of
 `STRIP`.
 
-The clock of a form is the quantity by which a bond ages: the damage int dR/eps for reading="stretch", and the path R [m]
-for reading="report". A scaled number contains the factor exp(clock - reference), so that ageing multiplies the sum over
-all strips by a single number. A relative pressure is a pressure / pressure of the friction limit.
+The age measure of a form is the quantity by which bonds age: the damage int dR/eps for reading="stretch", and the path
+R [m] for reading="report". A scaled number contains the factor exp(age measure - reference), so that ageing multiplies the
+sum over all strips by a single number. A relative pressure is relative to the pressure of the friction limit.
 """
 
 from typing import NamedTuple
@@ -18,15 +18,15 @@ class StripRows(NamedTuple):
 
     - start, end: relative displacement [m] at the start and at the end of the strip; of a spread strip, which
       represents several passes over the same range, the lower and the upper end of this range
-    - clock, clock_width: clock at the end of the strip, and the part of it that the strip covers
+    - age_measure, age_width: age measure at the end of the strip, and its change along the strip
     - weight: path/eps^p in the form FORM_POWER, else the path [m]; times the relative pressure
     - covered, path: path [m] that the strip covers, and the path at its end
     """
 
     start: int = 0
     end: int = 1
-    clock: int = 2
-    clock_width: int = 3
+    age_measure: int = 2
+    age_width: int = 3
     weight: int = 4
     covered: int = 7
     path: int = 8
@@ -57,7 +57,7 @@ class ReportRows(NamedTuple):
 
 
 class GrowingRows(NamedTuple):
-    """Rows that a strip has besides the common ones, where the bond length grows (report reading).
+    """Additional rows of a strip of growing bonds, for friction.reading = "report".
 
     They hold the scaled starting lengths [m] of the bonds at both Gauss points; `FORM_REPORT_GROWING` is this form.
     """
@@ -73,7 +73,7 @@ class LawNumbers(NamedTuple):
     - length, initial: bond length eps_0 [m], density m_0 of the initial bonds [1]
     - inverse_gamma: 1/Gamma(p + 1)
     - merge_width: largest width of a merged strip of age 0 [bond lengths]; 0 merges nothing
-    - cutoff: age on the clock beyond which strips are dropped
+    - cutoff: increase of the age measure since formation beyond which strips are dropped
     - half_width: half the width [m] over which the initial bonds are distributed; 0 puts all at one displacement
     - nodes: first of 16 numbers: four Gauss-Jacobi points and weights for |u|^p, and four for |u|^(p + 1)
     """
@@ -89,14 +89,14 @@ class LawNumbers(NamedTuple):
     nodes: int = 8
 
 
-class Clocks(NamedTuple):
-    """Indices of the clocks of a bond list.
+class PathRows(NamedTuple):
+    """Indices of the path state of a bond list.
 
     - displacement, path: relative displacement and path [m] since the start
     - damage: int dR/eps, with the bond length of each step
     - growth: exponent J of the growth of bonds (eq. 2.10)
     - length: length [m] of mature bonds
-    - reference: clock to which the scaled numbers refer
+    - reference: age measure to which the scaled numbers refer
     """
 
     displacement: int = 0
@@ -148,6 +148,6 @@ POWER_ROW = PowerRows()
 REPORT_ROW = ReportRows()
 GROWING_ROW = GrowingRows()
 LAW = LawNumbers()
-CLOCK = Clocks()
+PATH = PathRows()
 STATUS = ListStatus()
-N_ROWS = 9  # rows of the array of strips
+N_ROWS = 9  # number of rows of the array of strips

@@ -22,13 +22,15 @@ from .list_math_kernels import (
 )
 from .list_rows_kernels import GROWING_ROW, LAW, MOMENT, POWER_ROW, REPORT_ROW, STRIP
 
-# last / first bond length of a strip; below it, all bonds of the strip are growing
+# Smallest ratio of the last to the first bond length of a strip that can contain fully grown bonds
 MIN_GROWING_RATIO = 0.05
-UNSTRESSED_TOL = 1e-14  # displacement / path; below it, the initial bonds count as unstressed
-# smallest length of a growing bond / that of mature bonds, which keeps R/length finite
+# Largest displacement, relative to the path, at which the initial bonds count as unstressed
+UNSTRESSED_TOL = 1e-14
+# Smallest length of a growing bond relative to that of mature bonds; it keeps R/length finite
 MIN_LENGTH_RATIO = 1e-9
-MIN_PATH = 1e-300  # smallest path [m] since a bond formed, which keeps its logarithm finite
-# width / distance; below it, a spread strip acts as if concentrated at one position
+MIN_PATH = 1e-300  # smallest path [m] since a bond formed; it keeps the logarithm finite
+# Smallest width of a spread strip, relative to its distance from the present position, that is not
+# neglected
 MIN_SPREAD_RATIO = 1e-4
 
 
@@ -48,7 +50,7 @@ class Moments(NamedTuple):
 
 
 class MatureBonds(NamedTuple):
-    """Present length [m] of mature bonds, and factor exp(reference - J) of scaled starting lengths."""
+    """Present length [m] of mature (fully grown) bonds, and factor exp(reference - J) of scaled starting lengths."""
 
     length: float
     scale: float
@@ -108,7 +110,7 @@ def _gauss_stretches(displacement, bonds, k):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def _sum_gauss_powers(displacement, bonds, first, end, p):
-    """Sum w |u|^p sgn u and w |u|^(p + 1) over both Gauss points of strips of one pass."""
+    """Sum w |u|^p sgn u and w |u|^(p + 1) over both Gauss points of strips that formed in a single pass."""
     force = 0.0
     energy = 0.0
     if p == 0.0:
@@ -155,7 +157,7 @@ def _integrate_power_strip(displacement, bonds, k, p, nodes, is_force):
     start = bonds[STRIP.start, k]
     end = bonds[STRIP.end, k]
     step = end - start
-    slope = bonds[STRIP.clock_width, k] / step
+    slope = bonds[STRIP.age_width, k] / step
     low = min(start, end)
     high = max(start, end)
     below = _integrate_jacobi(displacement - low, -slope, nodes, p)
@@ -226,7 +228,7 @@ def sum_linear_density(displacement, start, end, weights, p):
     v = displacement - start
     power_u = fast_exp((p + 1) * fast_log(abs(u)))
     power_v = fast_exp((p + 1) * fast_log(abs(v)))
-    # averages of |u|^p sgn u, of |u|^(p + 1) and of |u|^(p + 1) u
+    # These are averages of |u|^p sgn u, |u|^(p + 1) and |u|^(p + 1) u over the strip.
     odd = (power_v - power_u) / ((p + 1) * step)
     even = (power_v * v - power_u * u) / ((p + 2) * step)
     third = (power_v * v * v - power_u * u * u) / ((p + 3) * step)
@@ -263,7 +265,7 @@ def sum_powers(displacement, damage, bonds, strips, law):
     force = total.force
     energy = total.energy
     is_polynomial = p == 3.0
-    # fractional powers are singular at u = 0, which also affects Gauss points in strips close to it
+    # Fractional powers are singular at u = 0, which also affects Gauss points in strips nearby.
     reach = 1.0 if p == 0.0 or p == 2.0 else 5.0
     for k in range(strips.end if is_polynomial else strips.first, strips.end):
         start = bonds[STRIP.start, k]
@@ -271,7 +273,7 @@ def sum_powers(displacement, damage, bonds, strips, law):
         width = abs(end - start)
         if abs(2 * displacement - start - end) > reach * width:
             continue
-        is_narrow = width <= merge_width * fast_exp((damage - bonds[STRIP.clock, k]) / 3)
+        is_narrow = width <= merge_width * fast_exp((damage - bonds[STRIP.age_measure, k]) / 3)
         if is_narrow and p >= 1:
             continue
         gauss = _sum_gauss_powers(displacement, bonds, k, k + 1, p)
@@ -304,7 +306,7 @@ def _sum_report_closed(displacement, path, bonds, strips, law):
     eps0 = law[LAW.length]
     force = 0.0
     energy = 0.0
-    # coefficients of S(x) = (1 + linear x (1 + quadratic x)) exp(-x) and of x phi(x)
+    # These are the coefficients of S(x) = (1 + linear x (1 + quadratic x)) exp(-x) and of x phi(x).
     linear = min(p, 1.0)
     quadratic = max(p - 1, 0.0) * 0.5
     phi_0 = 1.0 - linear
@@ -314,9 +316,10 @@ def _sum_report_closed(displacement, path, bonds, strips, law):
         end = bonds[STRIP.end, k]
         step = end - bonds[STRIP.start, k]
         direction = np.copysign(1.0, step)
-        near = path - bonds[STRIP.clock, k]
+        near = path - bonds[STRIP.age_measure, k]
         turn = min(max(direction * (end - displacement), 0.0), abs(step))
-        # path / eps_0 since bonds formed: at the end of the strip, at u = 0 and at its start
+        # The path in bond lengths since bonds formed is x at the end of the strip, y at u = 0 and z
+        # at the start.
         x = near / eps0
         y = (near + turn) / eps0
         z = (near + abs(step)) / eps0
@@ -340,7 +343,7 @@ def _sum_report_closed(displacement, path, bonds, strips, law):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _sum_report_table(displacement, path, bonds, strips, law, table):
-    """Sum strips for friction.reading = "report" at constant bond length by the table of P(p + 1, x).
+    """Sum strips for friction.reading = "report" at a constant bond length, with a table of P(p + 1, x).
 
     It holds for any order p and strips that have been passed only once.
     """
@@ -349,14 +352,15 @@ def _sum_report_table(displacement, path, bonds, strips, law, table):
     inverse_gamma = law[LAW.inverse_gamma]
     force = 0.0
     energy = 0.0
-    # values at the start of a strip equal those at the end of the preceding one, which is visited next
+    # The values at the start of a strip are those at the end of the preceding one, which is visited
+    # next.
     last = -1.0
     last_lever = 0.0
     for k in range(strips.end - 1, strips.first - 1, -1):
         end = bonds[STRIP.end, k]
         step = end - bonds[STRIP.start, k]
         direction = np.copysign(1.0, step)
-        near = path - bonds[STRIP.clock, k]
+        near = path - bonds[STRIP.age_measure, k]
         turn = min(max(direction * (end - displacement), 0.0), abs(step))
         x = near / eps0
         z = (near + abs(step)) / eps0
@@ -384,7 +388,7 @@ def _sum_report_table(displacement, path, bonds, strips, law, table):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def sum_report(displacement, path, bonds, strips, law, table):
-    """Sum strips for friction.reading = "report" at a constant bond length (eq. 2.17), exactly.
+    """Compute the exact sum of strips for friction.reading = "report" at a constant bond length (eq. 2.17).
 
     A strip of one pass is split where u changes its sign.
 
@@ -414,10 +418,10 @@ def sum_report(displacement, path, bonds, strips, law, table):
     force = total.force
     energy = total.energy
     for k in range(strips.head, strips.first):
-        near = path - bonds[STRIP.clock, k]
+        near = path - bonds[STRIP.age_measure, k]
         average = average_spread(displacement, bonds[STRIP.start, k], bonds[STRIP.end, k], 0.0)
         older = interpolate_gammainc(
-            p, (near + bonds[STRIP.clock_width, k]) / eps0, table, inverse_gamma
+            p, (near + bonds[STRIP.age_width, k]) / eps0, table, inverse_gamma
         )
         younger = interpolate_gammainc(p, near / eps0, table, inverse_gamma)
         carried = bonds[REPORT_ROW.pressure, k] * (older - younger)
@@ -440,8 +444,8 @@ def _integrate_lever(p, x, gamma_p, inverse_gamma):
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def _gauss_path_ratios(path, mature, bonds, k):
     """Return the path / bond length R/eps of growing bonds at both Gauss points of a strip."""
-    near = path - bonds[STRIP.clock, k]
-    width = bonds[STRIP.clock_width, k]
+    near = path - bonds[STRIP.age_measure, k]
+    width = bonds[STRIP.age_width, k]
     min_length = MIN_LENGTH_RATIO * mature.length
     length_1 = max(mature.length - mature.scale * bonds[GROWING_ROW.length_1, k], min_length)
     length_2 = max(mature.length - mature.scale * bonds[GROWING_ROW.length_2, k], min_length)
@@ -497,7 +501,7 @@ def interpolate_start_length(fraction, length_1, length_2):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _bond_length(fraction, mature, bonds, k):
-    """Return the bond length [m] at a position of a strip, which tends to that of mature bonds."""
+    """Return the bond length [m] at a position within a strip; it approaches the length of fully grown bonds."""
     start = interpolate_start_length(
         fraction, bonds[GROWING_ROW.length_1, k], bonds[GROWING_ROW.length_2, k]
     )
@@ -506,7 +510,7 @@ def _bond_length(fraction, mature, bonds, k):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _is_steep(p):
-    """Return whether two Gauss points do not suffice for R^p, which is too steep near R = 0."""
+    """Return whether R^p is so steep near R = 0 that two Gauss points do not suffice."""
     return p < 2 and p != np.floor(p)
 
 
@@ -519,9 +523,9 @@ def _integrate_growing_strip(displacement, path, mature, bonds, k, p):
     """
     start = bonds[STRIP.start, k]
     end = bonds[STRIP.end, k]
-    width = bonds[STRIP.clock_width, k]
+    width = bonds[STRIP.age_width, k]
     step = end - start
-    near = max(path - bonds[STRIP.clock, k], 0.0)
+    near = max(path - bonds[STRIP.age_measure, k], 0.0)
     force = 0.0
     energy = 0.0
     turn = min(max((end - displacement) / step, 0.0), 1.0)
@@ -557,12 +561,13 @@ def _integrate_growing_strip(displacement, path, mature, bonds, k, p):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _spread_growing_strip(displacement, path, mature, bonds, k, p):
-    """Sum a strip of growing bonds as if spread uniformly over its range; each bond keeps its age."""
+    """Sum a strip of growing bonds that are distributed uniformly over its range; each bond keeps its age."""
     low = min(bonds[STRIP.start, k], bonds[STRIP.end, k])
     high = max(bonds[STRIP.start, k], bonds[STRIP.end, k])
     average = average_spread(displacement, low, high, 0.0)
-    # outside the strip all bonds have the same direction, so the sum is what they carry
-    beyond = high + bonds[STRIP.clock_width, k]
+    # At a position outside the strip all bonds pull in one direction, so their sum there is the
+    # force that they can carry.
+    beyond = high + bonds[STRIP.age_width, k]
     carried = _sum_gauss_growing(beyond, path, mature, bonds, StripRange(k, k, k + 1), p).force
     return BondSum(average.force * carried, average.energy * carried)
 
@@ -595,8 +600,8 @@ def sum_growing(displacement, path, mature, bonds, strips, law):
     for k in range(strips.first, strips.end):
         from_start = displacement - bonds[STRIP.start, k]
         from_end = displacement - bonds[STRIP.end, k]
-        near = path - bonds[STRIP.clock, k]
-        width = bonds[STRIP.clock_width, k]
+        near = path - bonds[STRIP.age_measure, k]
+        width = bonds[STRIP.age_width, k]
         is_young = _is_steep(p) and near <= 3 * width
         if from_start * from_end >= 0 and not is_young:
             continue
@@ -665,7 +670,7 @@ def sum_initial(displacement, path, damage, law):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def average_initial(increment, displacement, path, law):
-    """Average the force of the initial bonds for friction.reading = "report" over an increment, exactly.
+    """Return the exact mean force of the initial bonds over an increment, for friction.reading = "report".
 
     The force jumps at displacement 0, or changes its sign over the width over which the bonds are distributed.
 
@@ -688,7 +693,8 @@ def average_initial(increment, displacement, path, law):
     if law[LAW.initial] == 0:
         return 0.0
     direction = np.copysign(1.0, increment)
-    # lengths of the increment before it enters and before it leaves the range of the bonds
+    # These are the lengths of the increment before it enters and before it leaves the range of the
+    # bonds.
     enter = min(max(-direction * displacement - half_width, 0.0), size)
     leave = min(max(-direction * displacement + half_width, 0.0), size)
     p_start = bond_gammainc(p, path / eps0)

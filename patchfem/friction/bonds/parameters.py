@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-MAX_EXPONENT = 1e100  # exponent of growth beyond which the bond length no longer changes
+MAX_EXPONENT = 1e100  # exponent of growth from which the bond length no longer changes
 MAX_LIST_SECONDS = 600.0  # largest estimated CPU time [s] of a run with a list of bonds
-# relative difference of two speeds below which their mean is used, to avoid cancellation
+# Largest relative difference of two speeds for which their mean is used; it avoids cancellation
 SAME_SPEED_TOL = 1e-6
-MAX_LINEAR_GROWTH = 1e-9  # growth J of a step up to which the growth along it counts as linear
+MAX_LINEAR_GROWTH = 1e-9  # largest growth J of a step along which the growth is treated as linear
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +77,7 @@ def grown_fraction(growth, back):
 
 
 def growth_path_ratio(law: Bonds, speed: float) -> float:
-    """Return the growth path of a new bond (2.10) / its steady length (2.11) at a speed [m/s].
+    """Return the growth path of a new bond (eq. 2.10) divided by its steady length (eq. 2.11) at a speed [m/s].
 
     With this ratio a, the friction for reading="report" is mu (eps/eps_0) G(a; p). Eqs. 2.18 to 2.21 hold for small a,
     within 1.5 % up to 0.1 for p = 0 and 1; for a above 1 the friction itself vanishes.

@@ -14,15 +14,18 @@ import numpy as np
 from ...compiled.jit import njit
 from ..flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 
-MAX_SHORT_PATH = 0.5  # path in bond lengths up to which the power series are exact to round-off
-# path in bond lengths; below it, half of the terms of the first series suffice
+# Largest path in bond lengths for which the power series are exact to round-off
+MAX_SHORT_PATH = 0.5
+# Largest path in bond lengths for which half of the terms of SHAPE_SERIES suffice
 MAX_SERIES_PATH = 0.03
-# coefficients of (exp(-x) - 1 + x)/x^2 and of the integral of y^3 exp(-y) over x^4, both as series in -x
+# Coefficients of the series of (exp(-x) - 1 + x)/x^2 in powers of -x
 SHAPE_SERIES = np.array([1 / factorial(k + 2) for k in range(13)])
+# Coefficients of the series of the integral of y^3 exp(-y) from 0 to x, divided by x^4, in powers
+# of -x
 MOMENT_SERIES = np.array([1 / (factorial(k) * (k + 4)) for k in range(13)])
 N_SHORT_TERMS = 7  # number of terms of SHAPE_SERIES for paths up to MAX_SERIES_PATH
-MAX_EXPONENT = 1e100  # exponent of growth beyond which the bond length no longer changes
-# relative difference of two speeds below which their mean is used, to avoid cancellation
+MAX_EXPONENT = 1e100  # exponent of growth from which the bond length no longer changes
+# Largest relative difference of two speeds for which their mean is used; it avoids cancellation
 SAME_SPEED_TOL = 1e-6
 
 
@@ -75,7 +78,7 @@ def _short_shape_functions(x):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def _integrate_powers(x, decay):
-    """Return the integrals of y exp(-y) and y^2 exp(-y) from 0 to x, and that of the latter."""
+    """Return the integrals from 0 to x of y exp(-y) and y^2 exp(-y), and the integral of the second one over x."""
     if x < MAX_SHORT_PATH:
         return _integrate_short_powers(x, decay)
     return _powers_from_cubic(x, decay, 6 - decay * (x * x * x + 3 * x * x + 6 * x + 6))
@@ -230,9 +233,8 @@ def elastic_bond_mean(m, z, play, half, increment, sigma, eps):
     """
     elastic = _split_elastic(play, increment, half)[0]
     damaging = increment - elastic
-    if (
-        damaging == 0.0 or abs(increment) < 1e-280
-    ):  # a quotient by a smaller increment would overflow
+    # A quotient by a smaller increment would overflow.
+    if damaging == 0.0 or abs(increment) < 1e-280:
         return z + 0.5 * m * increment, 0.5 * m
     if elastic == 0.0:
         return bond_mean(m, z, increment, sigma, eps)

@@ -32,11 +32,11 @@ from .parameters import Bonds, grow, growth_exponents, split_elastic
 from .recursion import BondState, length_and_direction, move_bonds, press_bonds, refuse_directions
 from .strips import PathState, Strip, Strips, strip_weights, surviving_density
 
-N_POINTS = 5  # number of Gauss points of a panel of a step
-# ends of the panels of a step in bond lengths; the force changes most in the first bond length
+N_POINTS = 5  # number of Gauss points in a panel of a step
+# Ends of the panels of a step in bond lengths; the force changes most in the first bond length
 PANEL_ENDS = (0, 1, 2, 4, 8, 16, 32)
-# smallest number of strips, in addition to half of all, that the cut-off removes; removing fewer costs more than it
-# saves
+# Smallest number of strips, in addition to half of all strips, that the cut-off removes at once;
+# removing fewer costs more time than it saves
 MIN_DROPPED = 64
 
 
@@ -156,7 +156,7 @@ class Quadrature:
         else:
             gain_before_loss = gain
             if not (s1 > 0).all():
-                # bonds that are lost at the end of the step still act during the step
+                # Bonds that are lost at the end of the step still act during the step.
                 positive = np.maximum(s1, np.finfo(float).tiny)
                 before_loss = self.advance(state, dq, s0, positive, dt, forming=(s0 + s1) / 2)
                 gain_before_loss = self.stored_energy(before_loss) - stored
@@ -217,7 +217,7 @@ class Quadrature:
         return _StepIntegrals(mean, dissipated)
 
     def press(self, state: Strips, s0, s1) -> Step:
-        """Change the pressure on the bonds linearly at rest.
+        """Change the pressure on resting bonds linearly.
 
         For reading="report" a bond keeps the pressure at which it formed, and none forms at rest. For reading="stretch"
         and p = 1 the rule is that of `recursion.press_bonds`; with another order, the last-formed bonds are lost first.
@@ -247,7 +247,7 @@ class Quadrature:
         )
 
     def _release_by_moments(self, state: Strips, s0, s1) -> _Release:
-        """Return the change of the bonds at rest for which the moments obey their closed form.
+        """Return the change of the bonds at rest, computed from the closed-form solution for their moments.
 
         A negative density removes unstretched bonds.
         """
@@ -279,7 +279,7 @@ class Quadrature:
 
     @property
     def _has_moments(self) -> bool:
-        """Whether the sum follows from the moments m, z, s2 of `recursion`."""
+        """Whether the sum can be computed from the moments m, z, s2 of `recursion`."""
         return self.law.order == 1 and self.law.reading == "stretch"
 
     def _moments(self, state: Strips) -> np.ndarray:
@@ -319,7 +319,7 @@ class Quadrature:
             growth=now.growth + growth,
             mature_length=grow(law, now.mature_length, speed, speed, path, dt),
         )
-        # bonds are lost where the pressure vanishes
+        # Bonds are lost where the pressure vanishes.
         n_strips = len(state.strips.length) + (part.length != 0)
         first_active = np.where(s1 > 0, state.first_active, n_strips)
         after = replace(state, now=end, play=part.play, first_active=first_active)

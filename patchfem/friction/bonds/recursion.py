@@ -36,11 +36,11 @@ from ...effects import describe_unsupported
 from ..protocol import Step
 from .parameters import Bonds, grow, split_elastic
 
-# path in bond lengths; below it, the shape functions are computed by power series
+# Largest path in bond lengths for which the shape functions are computed by power series
 MAX_SERIES_PATH = 0.03
-# path in bond lengths; below it, the integrals of powers are computed by power series
+# Largest path in bond lengths for which the integrals of powers are computed by power series
 MAX_POWER_SERIES_PATH = 0.5
-MIN_DIVISOR = 1e-300  # divisor that keeps quotients finite where no bonds are left
+MIN_DIVISOR = 1e-300  # smallest divisor; it keeps quotients finite where no bonds are left
 
 
 class BondState(NamedTuple):
@@ -68,7 +68,7 @@ class ShapeFunctions(NamedTuple):
 
 
 class PowerIntegrals(NamedTuple):
-    """Integrals from 0 to x of y exp(-y) and of y^2 exp(-y), and the integral of the latter."""
+    """Integrals from 0 to x of y exp(-y) and y^2 exp(-y), and the integral of the second one over x."""
 
     first: np.ndarray
     second: np.ndarray
@@ -157,7 +157,7 @@ def advance_bonds(bonds, increment, sigma, eps) -> LineIncrement:
         powers = integrate_powers(x, decay)
     mean = z * f1 + sign * eps * x * (sigma * f2 - missing * (f1 - f2))
     slope = sign * z * (f2 - f1) / eps + sigma * (f1 - f2) - missing * (f2 - x * (f1 - f2))
-    # without motion the slope is the mean of both directions
+    # Without motion, the slope is the mean of those for both directions.
     slope = np.where(path > 0, slope, m / 2)
     after = np.stack(
         [
@@ -259,7 +259,7 @@ def refuse_directions(law: Bonds, directions: int) -> None:
 
 @dataclass(frozen=True, slots=True)
 class FirstOrderBonds:
-    """Bonds of order p = 1 in the stretch reading, advanced from increment to increment.
+    """Bonds of order p = 1 for friction.reading = "stretch", updated incrementally.
 
     The pressure may vary within an increment and from one increment to the next.
 
@@ -314,7 +314,7 @@ class FirstOrderBonds:
         return Step(scale * moved.mean, dissipated, BondState(bonds, end, moved.play))
 
     def press(self, state: BondState, s0, s1) -> Step:
-        """Change the pressure on the bonds linearly at rest, by the rule of `press_bonds`.
+        """Change the pressure on resting bonds linearly, by the rule of `press_bonds`.
 
         Energy that is no longer stored is lost.
 

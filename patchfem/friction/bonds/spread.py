@@ -16,5 +16,5 @@ def carried_fraction(width: float, spread: float) -> float:
     """
     x = width / spread
     if x < 1e-8:
-        return x / sqrt(2 * pi)  # the square of x is lost there
+        return x / sqrt(2 * pi)  # the term with x^2 is below round-off here
     return erf(x / sqrt(2)) + sqrt(2 / pi) * expm1(-x * x / 2) / x

@@ -31,14 +31,17 @@ from scipy.special import gammainc, gammaln, roots_jacobi
 from .parameters import Bonds, grown_fraction
 
 N_GAUSS_POINTS = 8  # number of Gauss points of a piece
-MAX_PIECE_LENGTH = 0.25  # longest piece in bond lengths
-MAX_GROWTH_PIECES = 16  # largest number of pieces of a strip due to growth, one per unit of J
-FULL_GROWTH = 36.0  # growth J after which the starting length of a bond does not matter
-# relative displacement since a cohort formed / path since then; below it, the cohort counts as unstressed
+MAX_PIECE_LENGTH = 0.25  # largest length of a piece in bond lengths
+# Largest number of pieces of a strip due to growth, with one piece per unit of J
+MAX_GROWTH_PIECES = 16
+FULL_GROWTH = 36.0  # growth J from which the starting length of a bond does not matter
+# Largest displacement of an unstressed cohort since it formed, relative to the path since then
 UNSTRESSED_TOL = 1e-14
-# distance of u = 0 from a cut / length of the strip; below it, u = 0 lies at the cut
+# Largest distance of the point u = 0 from a cut that counts as lying at u = 0, relative to the
+# length of the strip
 REVERSAL_TOL = 1e-9
-MIN_PIECE_FRACTION = 1e-15  # length of the shortest piece / length of the part that is cut
+# Smallest length of a piece, relative to the length of the part that is divided
+MIN_PIECE_FRACTION = 1e-15
 MIN_POSITIVE = 1e-300  # smallest argument of a logarithm and smallest divisor
 
 
@@ -133,7 +136,7 @@ class _StripParts(NamedTuple):
 
 
 class _SingularityDistances(NamedTuple):
-    """Distances (n,) [m] of parts from points where the integrand is not smooth, inf without them.
+    """Distances (n,) [m] of parts from points where the integrand is not smooth; inf if there are none.
 
     - nearest: distance of the part from the nearest point of any kind
     - origin: distance of R = 0 from the end of the strip
@@ -226,7 +229,7 @@ def _weight_function(law: Bonds, x, damage) -> np.ndarray:
     return np.exp(law.order * log_x - damage - gammaln(law.order + 1))
 
 
-def _energy_divisor(law: Bonds) -> float:
+def _work_to_energy_ratio(law: Bonds) -> float:
     """Return the ratio of force times stretch of a bond to its stored energy."""
     return law.order + 1 if law.reading == "stretch" else 1.0
 
@@ -240,10 +243,10 @@ def _cohort_weights(cohorts: Strip, now: PathState, law: Bonds) -> np.ndarray:
         force = _weight_function(law, size / law.length, now.damage - cohorts.end.damage)
     else:
         force = _weight_function(law, path / law.length, path / law.length)
-    # the force jumps where the stretch changes its sign; the mean of both sides is 0
+    # The force jumps where the stretch changes sign; the mean of both sides is 0.
     force = np.where(size <= UNSTRESSED_TOL * path, 0.0, force)
     unit = stretch / np.where(size > 0, size, 1.0)[:, None]
-    return np.column_stack([force[:, None] * unit, force * size / _energy_divisor(law)])
+    return np.column_stack([force[:, None] * unit, force * size / _work_to_energy_ratio(law)])
 
 
 def _linear_weights(strips: Strip, now: PathState, law: Bonds) -> np.ndarray:
@@ -252,7 +255,7 @@ def _linear_weights(strips: Strip, now: PathState, law: Bonds) -> np.ndarray:
     eps = strips.bond_length
     x = strips.length / eps
     decay = np.exp(-x)
-    # integrals of exp(-y), y exp(-y) and y^2 exp(-y) from 0 to x
+    # These are the integrals of exp(-y), y exp(-y) and y^2 exp(-y) from 0 to x.
     zeroth = -np.expm1(-x)
     first = 1 - decay * (1 + x)
     second = 2 - decay * (x * x + 2 * x + 2)
@@ -279,7 +282,7 @@ def _report_weights(strips: Strip, now: PathState, law: Bonds) -> np.ndarray:
     p_end, p_cut, p_start = (gammainc(law.order + 1, x) for x in borders)
     scale = law.length * (law.order + 1)
     q_end, q_cut, q_start = (scale * gammainc(law.order + 2, x) for x in borders)
-    # integrals of phi sgn(u) dR/eps and of phi R sgn(u) dR/eps
+    # These are the integrals of phi sgn(u) dR/eps and of phi R sgn(u) dR/eps.
     signed = p_end - p_cut + (p_start - p_cut)
     moment = q_end - q_cut + (q_start - q_cut)
     energy = (along - path) * signed + moment
@@ -318,7 +321,7 @@ def _sum_points(strips: Strip, now: PathState, distance, weight, law: Bonds) -> 
     with np.errstate(under="ignore"):
         force = weight / law.length * _weight_function(law, x, damage)
     unit = stretch / np.maximum(size, MIN_POSITIVE)[..., None]
-    energy = (size * force).sum(axis=1) / _energy_divisor(law)
+    energy = (size * force).sum(axis=1) / _work_to_energy_ratio(law)
     return np.column_stack([(unit * force[..., None]).sum(axis=1), energy])
 
 
@@ -341,7 +344,7 @@ def _divide_strips(strips: Strip, now: PathState, law: Bonds) -> _IntegrationPie
     distances = _singularity_distances(strips, now, law, stretch, parts)
     eps = strips.bond_length[parts.strip]
     growth = _active_growth(strips, now, law, parts)
-    # for reading="report" the integrand only changes its sign at u = 0
+    # For reading="report" the integrand only changes sign at u = 0.
     is_steep = law.reading == "stretch"
     starts_steep = parts.is_zero_at_start & is_steep
     ends_steep = parts.is_zero_at_end & is_steep
@@ -393,7 +396,7 @@ def _split_at_zero_stretch(strips: Strip, stretch: _StretchComponents) -> _Strip
     strip = strip[has_length]
     start = start[has_length]
     length = length[has_length]
-    # u = 0 lies at this cut, which may also be an end of the strip
+    # The cut of these strips is at u = 0; it may also be an end of the strip.
     has_zero = is_straight & (np.abs(cut + stretch.along) <= REVERSAL_TOL * strips.length)
     return _StripParts(
         strip,
@@ -405,7 +408,7 @@ def _split_at_zero_stretch(strips: Strip, stretch: _StretchComponents) -> _Strip
 
 
 def _active_growth(strips: Strip, now: PathState, law: Bonds, parts: _StripParts) -> np.ndarray:
-    """Return the growth J (n,) over parts, without that of bonds that are fully grown."""
+    """Return the growth J (n,) over parts, excluding that of fully grown bonds."""
     if law.reading != "report":
         return np.zeros(parts.strip.size)
     remaining = FULL_GROWTH - (now.growth - strips.end.growth[parts.strip])

@@ -1,4 +1,4 @@
-"""Growth of bonds on a warm surface (eq. 2.13), and its frictional heating.
+"""Growth of bonds on a warm surface (eq. 2.13), and frictional heating of the surface.
 
 The report states a_s = a_0 exp(-T_a/T_s) and l_k = l_0 exp(T_l/T_s). Here both are referred to a temperature T_ref at
 which a_s and l_k are known, so that a surface at this temperature changes nothing:
@@ -16,7 +16,8 @@ import numpy as np
 
 from ...core import PatchfemError
 
-MAX_EXP_ARGUMENT = 600.0  # argument up to which exp neither overflows nor underflows
+# Largest argument at which exp neither overflows nor underflows, for both signs
+MAX_EXP_ARGUMENT = 600.0
 
 
 class GrowthRates(NamedTuple):

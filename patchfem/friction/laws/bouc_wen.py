@@ -18,10 +18,10 @@ from ..protocol import Element, SteadyLoop
 
 N_GAUSS_POINTS = 20  # number of Gauss points of a piece
 N_INTEGRATION_PIECES = 10  # number of pieces for the integrals over a half-loop
-# value of w = -ln(1 - y) beyond which 1 - y is below 1e-13 and dw/dx is n to round-off
+# Value of w = -ln(1 - y) from which 1 - y is below 1e-13 and dw/dx equals n to round-off
 MAX_W = 30.0
-MAX_NEWTON_STEPS = 200  # iterations of Newton's method for the tip of a loop
-NEWTON_TOL = 1e-14  # change of w / (1 + w) at which Newton's method has converged
+MAX_NEWTON_STEPS = 200  # largest number of Newton iterations for the tip of a loop
+NEWTON_TOL = 1e-14  # largest change of w, relative to 1 + w, at which Newton's method has converged
 
 
 class _HalfLoop(NamedTuple):

@@ -25,17 +25,19 @@ from ..protocol_kernels import (
 from .exponential_kernels import exp_minus
 
 NUMBER_UNITS = "N m 1 1"  # units of `numbers`, for batches that scale time and force
-HAS_ZERO_KINK = True  # the slope over the path jumps between loading and unloading
-IS_RATE_INDEPENDENT = True  # z depends on the path alone
+HAS_ZERO_KINK = True  # whether the slope over the path jumps between loading and unloading
+IS_RATE_INDEPENDENT = True  # whether z depends on the path alone
 
-GAUSS_POINTS = np.polynomial.legendre.leggauss(8)[0]  # Gauss points in (-1, 1) of a piece
+GAUSS_POINTS = np.polynomial.legendre.leggauss(8)[0]  # Gauss points of a piece in (-1, 1)
 GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(8)[1]  # weights of these points
-MAX_PIECE_LENGTH = 0.25  # longest interval of the Gauss rule in |y| or w
-FIRST_PIECE_LENGTH = 0.05  # longest interval at zero, where a fractional power is not smooth
-MAX_W = 36.0  # value of w beyond which y rounds to 1
-# residual / path at which Newton's method stops; the error is then the square of it
+MAX_PIECE_LENGTH = 0.25  # largest interval of the Gauss rule in |y| or w
+# Largest interval of the Gauss rule that begins at zero, where a fractional power is not smooth
+FIRST_PIECE_LENGTH = 0.05
+MAX_W = 36.0  # value of w from which y rounds to 1
+# Largest residual, relative to the path, at which Newton's method stops; the error is then its
+# square
 NEWTON_TOL = 1e-8
-MAX_NEWTON_STEPS = 40  # iterations of Newton's method
+MAX_NEWTON_STEPS = 40  # largest number of Newton iterations
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -50,7 +52,7 @@ def _loading_rate(w, n):
         for _ in range(int(n) - 1):
             total = 1 + y * total
         return total
-    if w < 1e-300:  # the rate is 1 at y = 0, which has no logarithm
+    if w < 1e-300:  # the rate is 1 at y = 0, where the power would need the logarithm of 0
         return 1.0
     if w > MAX_W:
         return n
@@ -60,7 +62,7 @@ def _loading_rate(w, n):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _integrand(u, n, unloading, is_loading):
-    """Return the rates of displacement and |y| for the integration variable u."""
+    """Return the rates of displacement and |y| with respect to the integration variable u."""
     if is_loading:
         return 1 / _loading_rate(u, n), -expm1(-u)
     return 1 / (1 - unloading * u**n), u
@@ -158,7 +160,7 @@ def _follow_path(y, x, n, s):
         y, x, area = _unload(y, x, n, 1 - 2 * s)
         if x <= 0:
             return y, area
-    start = -log1p(-y) if y < 1 - 1e-15 else MAX_W  # at the limit w has no bound
+    start = -log1p(-y) if y < 1 - 1e-15 else MAX_W  # w is unbounded at the friction limit
     w = start + x * _loading_rate(start, n)
     for _ in range(MAX_NEWTON_STEPS):
         residual = _integrate_path(start, w, n, 0.0, True)[0] - x
@@ -171,7 +173,7 @@ def _follow_path(y, x, n, s):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def _z_slope(y, n, s):
-    """Return dy/dx at y: 1 - y^n on loading, 1 - (1 - 2 s) |y|^n on unloading."""
+    """Return dy/dx at y: 1 - y^n in loading, 1 - (1 - 2 s) |y|^n in unloading."""
     return 1 - (1.0 if y >= 0 else 1 - 2 * s) * abs(y) ** n
 
 
@@ -300,14 +302,14 @@ def relax_stretch(numbers, stretch, increment, dt):
     end = _follow_path(start, abs(increment) / length, n, numbers[4])[0]
     rise = _z_slope(end, n, numbers[4])
     first = _z_slope(start, n, numbers[4])
-    # both derivatives vanish at the limit
+    # Both derivatives vanish at the friction limit, so their quotient is replaced by its limit.
     by_stretch = rise / first if first > 1e-8 else exp(-n * abs(increment) / length)
     return RelaxedStretch(direction * length * end, by_stretch, rise, 0.0)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def start_motion(numbers, memory, direction, states):
-    """Set the state z; on unloading, the rate has a kink at z = 0.
+    """Set the state z; in unloading, the rate has a kink at z = 0.
 
     Returns
     -------

@@ -21,9 +21,10 @@ from scipy.special import gammainc, gammainccinv
 
 from ..protocol import Step
 
-# number of positions that are averaged at a time, so that nodes beyond their cut-off can be left out
+# Number of positions that are averaged at a time; nodes beyond the cut-off of the whole block are
+# left out
 N_POSITIONS_PER_BLOCK = 64
-# weight in the average that the nodes beyond the cut-off have, below round-off
+# Largest weight of a node beyond the cut-off in an average; it is below round-off
 CUTOFF_WEIGHT = 1e-20
 
 
@@ -70,12 +71,14 @@ def _node_weights(positions, nodes, is_bare, length: float, order: float) -> np.
     """
     distance = positions[:, None] - nodes
     x = np.maximum(distance, 0.0) / length
-    # integrals of phi and of phi s over each segment; the pressure is linear between its two nodes
+    # These are the integrals of phi and of phi s over each segment; the pressure is linear between
+    # its two nodes.
     zeroth = -np.diff(_bond_gammainc(order, x), axis=1)
     first = -(order + 1) * length * np.diff(_bond_gammainc(order + 1, x), axis=1)
     second_node = (distance[:, :-1] * zeroth - first) / np.diff(nodes)
     segment = np.clip(np.searchsorted(nodes, positions) - 1, 0, nodes.size - 2)
-    # segments between two bare ones are an island; only the island of a position is averaged
+    # Segments without pressure divide the interface into islands; only the island of a position
+    # contributes to its average.
     island = np.concatenate([[0], np.cumsum(is_bare[1:] != is_bare[:-1])])
     is_beyond = positions > nodes[-1]
     is_averaged = (island == island[segment][:, None]) & ~is_bare & ~is_beyond[:, None]
@@ -88,7 +91,7 @@ def _node_weights(positions, nodes, is_bare, length: float, order: float) -> np.
 def average_pressure(
     positions, nodes, sigma, direction: float, length: float, order: float
 ) -> np.ndarray:
-    """Average the pressure behind positions with the weight phi, as in the equation of the module.
+    """Average the pressure behind positions with the weight phi, as in the equation of the module docstring.
 
     Parameters
     ----------
@@ -173,7 +176,7 @@ class Convolution:
         return ConvolutionState(np.zeros_like(sigma), 0.0, 0.0)
 
     def limit_fraction(self, dq, dt):
-        """Return the friction force over its limit in increments dq [m]; 0 at rest."""
+        """Return the ratio of the friction force to its limit for increments dq [m]; 0 at rest."""
         return np.sign(dq)
 
     def limit(self, sigma, direction: float):
@@ -214,7 +217,7 @@ class Convolution:
         return Step(mean, mean * dq, ConvolutionState(end, displacement, direction))
 
     def press(self, state: ConvolutionState, s0, s1) -> Step:
-        """Change the pressure at rest; a traction above its new limit falls to this limit.
+        """Change the pressure at rest; a traction beyond the new limit is reduced to it.
 
         Parameters
         ----------

@@ -33,7 +33,7 @@ class Coulomb(LastTraction):
         return Element("", np.array([0.0, limit, self.kinetic * load]), np.zeros(1), limit)
 
     def limit_fraction(self, dq, dt):
-        """Return the friction force over its limit in increments dq [m]; 0 at rest."""
+        """Return the ratio of the friction force to its limit for increments dq [m]; 0 at rest."""
         return np.sign(dq)
 
     def limit(self, sigma, direction: float):

@@ -1,4 +1,4 @@
-"""The elastic-plastic law of eq. 3.12 with its reversal.
+"""The elastic-plastic law of eq. 3.12, extended to reversals.
 
 As printed, eq. 3.12 sets dF/dt = 0 for |F| > mu N and so never unloads; here dF/dt is zero only while slip continues.
 """
@@ -88,7 +88,7 @@ class ElasticPlastic:
         )
 
     def _limit_traction(self, state, sigma):
-        """Return traction/mu and density of springs under a changed pressure, 0 without pressure."""
+        """Return traction/mu and density of springs under a changed pressure; 0 where the pressure is zero."""
         y, springs = state
         return np.clip(y, -sigma, sigma), np.where(sigma > 0, np.maximum(springs, sigma), 0.0)
 
@@ -104,7 +104,7 @@ class ElasticPlastic:
 
 
 def parallel_element(stiffness, yield_displacement) -> Element:
-    """Return the Element of parallel elastic-plastic elements (eq. 3.12 with reversal).
+    """Return the Element of parallel elastic-plastic elements (eq. 3.12, extended to reversals).
 
     Parameters
     ----------

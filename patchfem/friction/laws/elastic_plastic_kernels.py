@@ -14,7 +14,7 @@ from ...compiled.jit import njit
 from ..flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ..protocol_kernels import Reading, StepSolution, step_bond_length
 
-MIN_INCREMENT = 1e-290  # increment below which a quotient by it would overflow
+MIN_INCREMENT = 1e-290  # smallest increment [m] by which a quotient does not overflow
 
 
 class Stretch(NamedTuple):
@@ -96,7 +96,7 @@ def solve_step(numbers, memory, free, compliance):
     linear = direction * free - soft * limit
     missing = limit - direction * start
     root = sqrt(linear * linear + 2 * soft * missing * missing)
-    # this root has no cancellation; the other one follows from their product
+    # This root is free of cancellation; the other one follows from the product of both.
     if linear > 0:
         path = 0.5 * (linear + root)
     else:

@@ -3,7 +3,7 @@
 from ...compiled.jit import njit
 from ..flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 
-MAX_EXP_ARGUMENT = 36.0  # argument y beyond which 1 - exp(-y) rounds to 1
+MAX_EXP_ARGUMENT = 36.0  # argument y from which 1 - exp(-y) rounds to 1
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)

@@ -19,12 +19,12 @@ from ...core import frozen_array
 from ..protocol import Element, SteadyLoop
 from .elastic_plastic import parallel_element
 
-# number of cells of the power law, each a Jenkins element; forces are exact to 1e-6 of F_S
-
+# Number of cells of the power law, each a Jenkins element; forces are exact to 1e-6 of F_S
 N_SLIDER_CELLS = 768
-# yield displacement / phi_max of the smallest slider that has a cell of its own
+# Smallest yield displacement of a slider with a cell of its own, relative to phi_max
 MIN_CELL_RATIO = 1e-5
-LOG_CELL_FRACTION = 0.25  # fraction of the cells that is uniform in log(phi), for small cycles
+# Fraction of the cells that is spaced uniformly in log(phi), for small cycles
+LOG_CELL_FRACTION = 0.25
 
 
 class Sliders(NamedTuple):
@@ -71,7 +71,7 @@ def max_yield_displacement(force: float, stiffness: float, chi: float, beta: flo
 
 
 def slider_cells(force: float, stiffness: float, chi: float, beta: float) -> Sliders:
-    """Return the sliders that represent the cells of the power law, and the last slider.
+    """Return the sliders that represent the cells of the power law, and the slider that yields last.
 
     Each cell keeps the stiffness and the slip force of its part of the density, so the sums over all cells are exact, as
     is the force of first loading at every border of a cell. The width of the cells follows the square root of the
@@ -119,7 +119,7 @@ def from_keys(friction, load: float) -> Iwan:
 
 
 def loop_from_keys(friction, load: float, amplitude) -> SteadyLoop:
-    """Return the steady loops of the Iwan law without cells, by Masing's rule.
+    """Return the steady loops of the continuous Iwan law, which has no cells, by Masing's rule.
 
     The curve of first loading is Segalman's eq. 22.
 
@@ -143,7 +143,8 @@ def loop_from_keys(friction, load: float, amplitude) -> SteadyLoop:
     scale = limit / (beta + (chi + 1) / (chi + 2))
     x = np.minimum(amplitude / phi_max, 1.0)
     force = scale * ((beta + 1) * x - x ** (chi + 2) / (chi + 2))
-    # work of first loading; by Masing's rule a loop has 8 times this work, less that of its diagonal
+    # By Masing's rule, a loop has 8 times the work of first loading, minus the area of its
+    # diagonal.
     work = (beta + 1) * x**2 / 2 - x ** (chi + 3) / ((chi + 2) * (chi + 3))
     work = scale * phi_max * work + limit * np.maximum(amplitude - phi_max, 0.0)
     return SteadyLoop(force, 8 * work - 4 * amplitude * force)

@@ -50,7 +50,7 @@ class LuGre:
         )
 
     def limit(self, speed):
-        """Return g/N [1] at a speed [m/s], the steady friction force / load.
+        """Return the steady friction force divided by the load, g/N [1], at a speed [m/s].
 
         It is at least 1e-9 mu_s, because the rate of z divides by it.
         """

@@ -25,11 +25,13 @@ from ..protocol_kernels import (
 )
 from .exponential_kernels import exp_minus
 
-# units of `numbers`, for batches that scale time and force
+# Units of `numbers`, for batches that scale time and force
 NUMBER_UNITS = "N/m N N m/s N_s/m N_s/m"
-# ratio of the velocity to v_s beyond which the limit is the kinetic force, since exp(-36) rounds off
+# Ratio of the velocity to v_s from which the limit is the kinetic force; exp(-36) is below
+# round-off
 MAX_STRIBECK_RATIO = 6.0
-# Smallest limit over the static force; z relaxes over limit/stiffness, which must not be 0.
+# Smallest friction limit relative to the static force; z relaxes over limit/stiffness, which must
+# not be 0
 MIN_LIMIT_RATIO = 1e-9
 
 

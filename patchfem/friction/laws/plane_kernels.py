@@ -14,9 +14,11 @@ from ...compiled.jit import njit
 from ..flags_kernels import NJIT_NO_REFCOUNT
 
 MAX_ITERATIONS = 100  # largest number of Newton iterations; a step that needs more has failed
-MIN_PATH = 1e-150  # shorter increments have no direction: their square underflows
-ROUND_OFF_RATIO = 4e-16  # rounding error of a residual / its largest terms
-MIN_DAMPING = 1e-3  # factor of a Newton step below which a larger residual is accepted
+# Smallest increment [m] that has a direction; the square of a smaller one underflows
+MIN_PATH = 1e-150
+ROUND_OFF_RATIO = 4e-16  # rounding error of a residual relative to its largest terms
+# Smallest damping factor for which a Newton step must lower the residual
+MIN_DAMPING = 1e-3
 
 
 class ForceDerivatives(NamedTuple):
@@ -43,7 +45,7 @@ class PlaneIncrement(NamedTuple):
 
 
 class PlaneStep(NamedTuple):
-    """Solved step of an element: increment [m], mean force [N], iterations (below 0: failed)."""
+    """Solved step of an element: increment [m], mean force [N] and number of iterations (negative if it failed)."""
 
     increment_x: float
     increment_y: float
@@ -90,16 +92,17 @@ def advance_straight(spring, stretch, increment):
         return PlaneIncrement(mean_x, mean_y, elastic_slope, sx + dx, sy + dy, 0.0)
     slip = path - elastic
     decay = exp(-slip / w)
-    start = across / (w * (1 + cosine))  # tan(psi/2) where the element yields
+    start = across / (w * (1 + cosine))  # tan(psi/2) at the start of slip
     end = start * decay
     square = 1 + end * end
     lost = w * (slip - w * log1p(-start * start * expm1(-2 * slip / w) / square))
-    # integrals of the stretch over the path, along and across the increment
+    # These are the integrals of the stretch over the path, along and across the increment.
     u = elastic * (along + 0.5 * elastic) + lost
     v = elastic * across + 2 * w * w * atan(-start * expm1(-slip / w) / (1 + start * end))
     end_u = w * (1 - end * end) / square
     end_v = 2 * w * end / square
-    # derivatives of both with respect to `along` and `across`, which change as the increment turns
+    # These are the derivatives of both with respect to `along` and `across`, which change as the
+    # increment turns.
     u_across = (2 * w * end * decay / square - across) * cosine / (1 + cosine)
     v_across = elastic + w * cosine * (1 - 2 * decay / ((1 + cosine) * square))
     uu = (end_u - u / path) / path

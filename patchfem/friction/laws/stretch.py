@@ -5,8 +5,8 @@ import numpy as np
 from ..bonds.parameters import Bonds
 from ..protocol import Element
 
-N_HEADER_NUMBERS = 9  # number of values of an element before those of its points
-CONSTANT_LENGTH_FLAG = -1.0  # value of a_s that marks a constant bond length
+N_HEADER_NUMBERS = 9  # number of entries of an element that precede those of its points
+CONSTANT_LENGTH_FLAG = -1.0  # value in place of a_s that marks a constant bond length
 
 
 def growth_numbers(law: Bonds) -> np.ndarray:

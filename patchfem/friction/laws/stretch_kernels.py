@@ -33,11 +33,12 @@ from ..protocol_kernels import (
 from .exponential_kernels import exp_minus
 
 NUMBER_UNITS = "N/m m"  # units of `numbers`, for batches that scale time and force
-IS_RATE_INDEPENDENT = True  # the stretch depends on the path alone if the bond length is constant
-# index in `numbers` where the growth begins: a_s, l_k, v_h, eps_0, eps_k, breakaway
+# Whether the stretch depends on the path alone, as it does for a constant bond length
+IS_RATE_INDEPENDENT = True
+# Index in `numbers` of the first growth parameter: a_s, l_k, v_h, eps_0, eps_k, breakaway
 GROWTH_INDEX = 3
 BREAKAWAY_INDEX = 8  # index of the fraction of the bond length that stretches without damage
-FIRST_POINT_INDEX = 9  # index where the numbers of the points begin
+FIRST_POINT_INDEX = 9  # index of the first number of the points
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -118,7 +119,7 @@ def relax_stretch(numbers, stretch, increment, dt):
     length = numbers[2]
     end = length if increment > 0 else -length
     decay = exp(-abs(increment) / length)
-    # expm1 keeps the digits of increments far below the bond length
+    # With expm1, increments far below the bond length keep their digits.
     after = stretch * decay - end * expm1(-abs(increment) / length)
     return RelaxedStretch(after, decay, (1 - stretch / end) * decay, 0.0)
 
@@ -194,7 +195,7 @@ def _stretch_after(memory, motion, increment):
     if motion[1] < inf:
         return z + m * increment
     x = motion[0] * increment / memory[0]
-    broken = -expm1(-x)  # keeps the digits of increments far below the bond length
+    broken = -expm1(-x)  # expm1 keeps the digits of increments far below the bond length
     decay = 1 - broken
     return z * decay + motion[0] * memory[0] * (broken - (1 - m) * x * decay)
 
@@ -214,7 +215,7 @@ def state_rates(numbers, memory, motion, increment, velocity, states, rates):
     z = states[2]
     speed = motion[0] * velocity
     floor = numbers[GROWTH_INDEX + 2]
-    # a Runge-Kutta stage above the kink may overshoot to below the floor
+    # A Runge-Kutta stage above the kink may overshoot to a speed below the floor.
     healing_speed = max(speed, 0.5 * floor) if motion[2] > 0 else floor
     healing = numbers[GROWTH_INDEX] / healing_speed * (numbers[GROWTH_INDEX + 3] - eps)
     breaking = speed / eps

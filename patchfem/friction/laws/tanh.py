@@ -34,7 +34,7 @@ class TanhLaw(LastTraction):
         )
 
     def limit_fraction(self, dq, dt):
-        """Return the friction force over its limit in increments dq [m] during dt [s].
+        """Return the ratio of the friction force to its limit for increments dq [m] during dt [s].
 
         For dt = 0 it is the sign of dq, because the velocity is infinite.
         """

@@ -19,8 +19,8 @@ from ..protocol_kernels import (
 )
 
 NUMBER_UNITS = "N s/m"  # units of `numbers`, for batches that scale time and force
-HAS_SPEED_LAYER = True  # the force changes at speeds of the order of v_0
-MAX_TANH_ARGUMENT = 15.0  # argument beyond which tanh is 1 to within 2e-13
+HAS_SPEED_LAYER = True  # whether the force changes steeply at speeds of the order of v_0
+MAX_TANH_ARGUMENT = 15.0  # largest argument of tanh; beyond it, tanh is 1 to within 2e-13
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
