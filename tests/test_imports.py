@@ -162,6 +162,7 @@ def modules_of_run(text: str) -> set:
         return modules_after(FROM_PYTHON, path)
 
 
+@pytest.mark.share(0, 1, 3, 6, 7)
 @pytest.mark.parametrize("name", MODULES_OF_SCENES)
 def test_exact_run_loads_modules_of_its_keys(name):
     """A run from Python loads the modules of the keys in its scene, and not those of absent keys."""

@@ -194,7 +194,7 @@ def stop_at_time_loop(monkeypatch):
 @pytest.mark.parametrize("name", RUNS)
 def test_always_accepted_combinations_run(name, law):
     """A part of the combinations of each law with effects and engines runs if `check` accepts it."""
-    assert_combinations_run(name, law, 9)
+    assert_combinations_run(name, law, 18)
 
 
 @pytest.mark.usefixtures("stop_at_time_loop")

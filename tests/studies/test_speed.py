@@ -24,7 +24,7 @@ def test_always_lanes_are_faster_than_dop853_and_cover_their_errors():
     "name, count, least",
     [
         ("elastic-plastic", 64, 20),
-        ("static: load x tilt", 128, 20),
+        pytest.param("static: load x tilt", 128, 20, marks=pytest.mark.slow),
         pytest.param("shipped rig: tilt x friction", 8, 0.5, marks=pytest.mark.slow),
     ],
 )

@@ -13,7 +13,7 @@ from patchfem.__main__ import run_command
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="a trial is a forked process")
 ALWAYS = {
-    "grammar": 0.001,
+    "grammar": 0.0005,
     "bytes": 0.001,
     "words": 0.003,
     "energy": 0.003,
@@ -23,7 +23,7 @@ ALWAYS = {
     "rows": 0.002,
     "loops": 0.002,
     "universal": 0.001,
-    "hostile": 0.008,
+    "hostile": 0.004,
 }
 SEED = 4
 SEEDS = {"energy": 25}  # this seed draws only laws whose loops other tests compile as well

@@ -168,8 +168,6 @@ def test_exact_quantiles_include_cases_that_miss_tolerance():
     """Quantiles are computed over all cases with a value, also those that miss the tolerance.
 
     Without the 12 smallest of 40 values the 5 % quantile was 2.3 times as large.
-
-    Without the 12 smallest of 40 values the 5 % quantile was 2.3 times as large.
     """
     values = np.append(np.arange(1.0, 41), np.nan)
     loop = make_sweep_measure(values, np.where(values < 13, 0.5 * values, 0.0), "J")
@@ -334,8 +332,6 @@ def test_exact_too_few_steady_cases_give_no_ranking():
 
 def test_exact_maxima_at_range_ends_are_counted():
     """The answer states that three of five curves have their maximum at an end of the swept frequencies.
-
-    A case without motion is not counted.
 
     A case without motion is not counted.
     """

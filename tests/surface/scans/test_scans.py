@@ -192,8 +192,6 @@ def test_always_half_worn_scan_leaves_open_wear_or_growth(sign, half):
     """If a flat floor covers about half of the scan, wear of this part and growth of the rest are both possible.
 
     The interval of the volume covers the truth in either case.
-
-    The volume of the first reading covers the truth.
     """
 
     def floor_depth(x, y, z):
