@@ -7,7 +7,7 @@ from scipy.integrate import solve_ivp
 
 import patchfem as pf
 from patchfem.campaigns import compute_backbone
-from patchfem.campaigns.backbone.bench_loops import run_loop, settle_loop
+from patchfem.campaigns.backbone.bench_loops import compute_steady_loop, run_friction_loop
 from patchfem.campaigns.backbone.joint import build_joint
 from patchfem.response import error_of_change
 
@@ -622,9 +622,10 @@ def test_loop_of_law_with_memory_is_evaluated_in_steady_state():
     bonds = 'law = "nonlocal"\nreading = "stretch"\norder = 2\nbond_length = "1 um"'
     joint = build_joint(build_block(bonds), "")
     few, many = (
-        run_loop(joint.model, joint.patch, 3e-7, 400.0, cycles).run.values for cycles in (3.0, 96.0)
+        run_friction_loop(joint.model, joint.patch, 3e-7, 400.0, cycles).run.values
+        for cycles in (3.0, 96.0)
     )
-    backbone = settle_loop(joint.model, joint.patch, 3e-7, 400.0)
+    backbone = compute_steady_loop(joint.model, joint.patch, 3e-7, 400.0)
     name = "secant_stiffness"
     assert abs(few[name] / many[name] - 1) > 1e-3
     assert abs(backbone.run.values[name] / many[name] - 1) < 2e-3

@@ -9,9 +9,9 @@ from .joint import Joint
 from .notes import REPORT_OTHER_MODES
 from .records import ROUND_OFF_ERROR, match_amplitudes
 
-AGREEMENT = 0.02  # Relative difference of the damping below which two methods agree.
-MIN_STATED_LOSS = 0.05  # Fall of the amplitude per cycle from which it is stated.
-MIN_STATED_RATIO = 0.05  # Motion of other modes from which their coupling is stated.
+AGREEMENT = 0.02  # Largest relative difference of the damping at which two methods agree.
+MIN_REPORTED_LOSS = 0.05  # Smallest fall of the amplitude per cycle that is reported.
+MIN_REPORTED_RATIO = 0.05  # Smallest relative motion of other modes that is reported.
 PURPOSES = {
     "balance": "it is the steady vibration in resonance, such as a test in phase resonance or a response near its peak",
     "quasi-static": "no curve of the steady vibration is known here, and in micro-slip both agree",
@@ -20,7 +20,7 @@ PURPOSES = {
 
 
 def write_advice(joint: Joint, band: Band | None, curves: dict, missing: dict) -> tuple:
-    """Write the sentences on the curve to use, its band, and where the methods hold.
+    """Write the advice on which curve to use, its band, and the ranges of validity of the methods.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def write_advice(joint: Joint, band: Band | None, curves: dict, missing: dict) -
 
 
 def _describe_slip(joint: Joint, curve) -> list:
-    """State the amplitude at which friction would reach its limit, and up to which it dissipates nothing.
+    """Describe at which amplitude friction would reach its limit, and up to which it dissipates nothing.
 
     The first amplitude follows from the stiffness of the sticking contact.
     """
@@ -80,7 +80,7 @@ def _describe_slip(joint: Joint, curve) -> list:
 
 
 def _describe_width(band: Band, curve) -> str:
-    """Say at which amplitude the band of the damping ratio is widest, and how far the frequency may deviate."""
+    """Describe where the band of the damping ratio is widest, and the largest deviation of the frequency."""
     frequency = _largest_distance(curve.frequency, band.frequency_low, band.frequency_high)
     damping = _largest_distance(curve.damping, band.damping_low, band.damping_high)
     k = int(np.argmax(damping))
@@ -96,12 +96,12 @@ def _describe_width(band: Band, curve) -> str:
 
 
 def _largest_distance(value, low, high) -> np.ndarray:
-    """Return the distance (k,) of a value from the farther limit of its band, relative to the value."""
+    """Return the largest relative deviation (k,) of a value from the limits of its band."""
     return np.maximum(high - value, value - low) / np.maximum(np.abs(value), 1e-300)
 
 
 def _describe_agreement(band: Band, curves: dict) -> list:
-    """Describe up to which amplitude the methods agree but for the numerical error."""
+    """Describe up to which amplitude the methods agree within the numerical error."""
     if band.ring_down is None:
         return []
     curve = curves[band.method]
@@ -119,7 +119,7 @@ def _describe_agreement(band: Band, curves: dict) -> list:
 
 
 def _describe_ring_down(joint: Joint, band: Band, curves: dict, has_failed: bool) -> list:
-    """Describe how the damping of a ring-down, computed or predicted, differs from that of the curve, and why.
+    """Describe how the damping of a ring-down differs from that of the curve, and why.
 
     has_failed: whether method decay was tried and has no curve.
     """
@@ -151,7 +151,7 @@ def _describe_ring_down(joint: Joint, band: Band, curves: dict, has_failed: bool
             "the joint stiffens as the amplitude falls, so the amplitude loses more than the energy"
         )
     lost_fraction = -np.expm1(-2 * np.pi * damping[k])
-    if lost_fraction > MIN_STATED_LOSS:
+    if lost_fraction > MIN_REPORTED_LOSS:
         reasons.append(
             f"a cycle takes {100 * lost_fraction:.2g} % of the amplitude, so the decay gives means over unequal motions"
         )
@@ -215,7 +215,7 @@ def _describe_coupling(joint: Joint, band: Band, curve) -> list:
     others = np.delete(modes.omega, joint.mode)
     nearest = others[np.argmin(np.abs(others - omega))] / (2 * np.pi)
     name = format_quantity(float(nearest), "Hz", 4)
-    if max(ratio.max(), change) < MIN_STATED_RATIO:
+    if max(ratio.max(), change) < MIN_REPORTED_RATIO:
         return [f"The coupling with the other modes (nearest: {name} without the contact) is weak."]
     size = f"by up to {100 * ratio.max():.2g} % of its motion"
     if ratio.max() >= 1:

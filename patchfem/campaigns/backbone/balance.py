@@ -48,19 +48,19 @@ def compute_balance_curve(joint: Joint, amplitudes) -> Curve:
         return _compute_rigid_curve(joint, amplitudes)
     laws = joint.steady_laws()
     tolerance = joint.model.accuracy.tolerance
-    values = _read_motions(laws, joint, amplitudes, HARMONIC_COUNTS[0])
+    values = _tabulate_free_motions(laws, joint, amplitudes, HARMONIC_COUNTS[0])
     for harmonics in HARMONIC_COUNTS[1:]:
         count = 1 + int(np.isfinite(values[0]).nonzero()[0].max(initial=-1))
         if not count:
             raise NotConverged("no free motion of these amplitudes was found")
-        better = _read_motions(laws, joint, amplitudes, harmonics, count)
+        better = _tabulate_free_motions(laws, joint, amplitudes, harmonics, count)
         error = error_of_change(better - values) + ROUND_OFF_ERROR * np.abs(better)
         values = better
         known = np.isfinite(error[0])
         if (error[:2] <= tolerance * np.abs(values[:2]))[:, known].all():
             break
     error += joint.spatial_discretization_errors(
-        lambda group: _read_motions(group, joint, amplitudes, HARMONIC_COUNTS[0])
+        lambda group: _tabulate_free_motions(group, joint, amplitudes, HARMONIC_COUNTS[0])
     )
     known = np.isfinite(values + error).all(axis=0)
     if not known.any():
@@ -73,7 +73,7 @@ def compute_balance_curve(joint: Joint, amplitudes) -> Curve:
     return make_curve(amplitudes, values, error).at(oscillates)
 
 
-def _read_motions(
+def _tabulate_free_motions(
     group: LawGroup, joint: Joint, amplitudes, harmonics: int, count=None
 ) -> np.ndarray:
     """Return frequency [Hz], damping ratio and energy loss [J] (3, k) of free motions.
@@ -132,16 +132,16 @@ def find_free_motions(
     out: list = [None] * len(amplitudes)
     for k, amplitude in enumerate(amplitudes):
         before = out[k - 1] if k else None
-        out[k] = search.continue_motion(before, amplitude)
+        out[k] = search.solve_from_neighbour(before, amplitude)
         if out[k] is None:
-            out[k] = search.start_motion(amplitude, is_first=not any(out))
+            out[k] = search.solve_from_stuck_mode(amplitude, is_first=not any(out))
     for k in range(len(amplitudes) - 2, -1, -1):
-        out[k] = out[k] or search.continue_motion(out[k + 1], amplitudes[k])
+        out[k] = out[k] or search.solve_from_neighbour(out[k + 1], amplitudes[k])
     return [motion and motion.free for motion in out]
 
 
 class _FreeMotionSearch:
-    """Solver of the free motions of a mode, with the stuck mode as its fallback start.
+    """Solver of the free motions of a mode that can start from the stuck mode.
 
     Parameters
     ----------
@@ -174,13 +174,15 @@ class _FreeMotionSearch:
         self.first = np.append(pack_harmonics(faces), [1.0, 0.0])
         self.small = MIN_AMPLITUDE_FACTOR * float(joint.slip_amplitude) / self.reach
 
-    def continue_motion(self, neighbour: FreeMotion | None, amplitude: float) -> FreeMotion | None:
+    def solve_from_neighbour(
+        self, neighbour: FreeMotion | None, amplitude: float
+    ) -> FreeMotion | None:
         """Solve for the motion at an amplitude [m] from a neighbouring motion; None if it fails."""
         if neighbour is None:
             return None
         here = amplitude / neighbour.reach
         try:
-            return self._reach_amplitude(neighbour.unknowns, here, amplitude)
+            return self._solve_at_output_amplitude(neighbour.unknowns, here, amplitude)
         except NotConverged:
             # The amplitudes are too far apart for a single step.
             pass
@@ -188,11 +190,11 @@ class _FreeMotionSearch:
             x = self.equations.follow_to_amplitude(
                 neighbour.unknowns, neighbour.free.amplitude, here
             )
-            return self._reach_amplitude(x, here, amplitude)
+            return self._solve_at_output_amplitude(x, here, amplitude)
         except NotConverged:
             return None
 
-    def start_motion(self, amplitude: float, *, is_first: bool) -> FreeMotion | None:
+    def solve_from_stuck_mode(self, amplitude: float, *, is_first: bool) -> FreeMotion | None:
         """Solve for the motion at an amplitude [m] from the stuck mode; None if it fails.
 
         is_first: whether a search via a small amplitude is tried as well.
@@ -200,15 +202,17 @@ class _FreeMotionSearch:
         here = amplitude / self.reach
         try:
             if is_first:
-                x = _solve_from_stuck(self.equations, self.first, self.small, here)
+                x = _follow_from_stuck_mode(self.equations, self.first, self.small, here)
             else:
                 x = self.equations.solve(self.first, here)[0]
-            return self._reach_amplitude(x, here, amplitude)
+            return self._solve_at_output_amplitude(x, here, amplitude)
         except NotConverged:
             return None
 
-    def _reach_amplitude(self, x, coordinate_amplitude: float, amplitude: float) -> FreeMotion:
-        """Find the free motion of a given output amplitude [m] by secant steps.
+    def _solve_at_output_amplitude(
+        self, x, coordinate_amplitude: float, amplitude: float
+    ) -> FreeMotion:
+        """Solve for the free motion at an amplitude of the output [m] by secant steps.
 
         The steps end at the tolerance of the amplitude. If they lead no further, a difference up to
         AMPLITUDE_TOL is accepted.
@@ -238,7 +242,7 @@ class _FreeMotionSearch:
                 if best is None:
                     raise
                 break
-            largest = half_range(free.modal @ self.joint.modes.output)
+            largest = half_peak_to_peak(free.modal @ self.joint.modes.output)
             distance = float(np.log(largest / amplitude))
             if best is not None and abs(distance) >= best_distance:
                 break
@@ -260,7 +264,7 @@ class _FreeMotionSearch:
         )
 
 
-def _solve_from_stuck(equations: FreeBalance, first, small: float, here: float) -> np.ndarray:
+def _follow_from_stuck_mode(equations: FreeBalance, first, small: float, here: float) -> np.ndarray:
     """Solve for the free motion at a coordinate amplitude [m] from the stuck mode.
 
     If this fails, solve first at the amplitude `small` [m] and continue from there.
@@ -273,8 +277,8 @@ def _solve_from_stuck(equations: FreeBalance, first, small: float, here: float) 
         return equations.follow_to_amplitude(equations.solve(first, small)[0], small, here)
 
 
-def half_range(harmonics) -> float:
-    """Return half the peak-to-peak value of a motion with harmonics (H + 1,)."""
+def half_peak_to_peak(harmonics) -> float:
+    """Return half the peak-to-peak value of a motion given by its harmonics (H + 1,)."""
     motion = evaluate_series(harmonics, N_SAMPLES)
     return (find_peak(motion) + find_peak(-motion)) / 2
 

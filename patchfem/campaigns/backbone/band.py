@@ -31,7 +31,7 @@ VISCOUS_FALL = 0.6
 
 
 class Band(NamedTuple):
-    """Recommended curve of a backbone with the band of what tests measure.
+    """Recommended curve of a backbone with a band that contains the results of tests.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class Band(NamedTuple):
 
 
 class _Limits:
-    """Lower and upper limits of a quantity at the amplitudes of a curve, which further values widen."""
+    """Lower and upper limits of a quantity at the amplitudes of a curve."""
 
     def __init__(self, value, error):
         self.low = value - error
@@ -78,7 +78,7 @@ class _Limits:
 
 
 def make_band(joint: Joint, curves: dict) -> Band | None:
-    """Make the band of the recommended curve; None without a curve.
+    """Compute the band of the recommended curve; None without a curve.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def make_band(joint: Joint, curves: dict) -> Band | None:
 
 
 def _include_curve(frequency: _Limits, damping: _Limits, curve: Curve, other: Curve) -> None:
-    """Widen the limits around a curve to contain another curve with its errors."""
+    """Widen the limits of a curve to contain another curve with its errors."""
     here, there = match_amplitudes(curve, other)
     other = other.at(there)
     frequency.include(here, other.frequency, other.frequency_error)
@@ -122,7 +122,7 @@ def _include_curve(frequency: _Limits, damping: _Limits, curve: Curve, other: Cu
 def _include_ring_down(
     joint: Joint, frequency: _Limits, damping: _Limits, curve: Curve, ring_down: RingDown
 ) -> None:
-    """Widen the limits around a curve to contain a predicted ring-down."""
+    """Widen the limits of a curve to contain a predicted ring-down."""
     every = slice(None)
     margin = RING_DOWN_MARGIN * np.abs(ring_down.damping - curve.damping)
     # Other modes of the relative motion e change the ratio of successive half cycles by up to 2 e.
@@ -140,7 +140,7 @@ def _include_ring_down(
 
 
 def _include_forced_modes(joint: Joint, frequency: _Limits, damping: _Limits, curve: Curve) -> None:
-    """Widen the limits by the other modes that a force at the output excites beside the resonance.
+    """Widen the limits by the motion of other modes under a harmonic force at the output.
 
     They move in phase with the force, by the ratio r to the resonant motion at the output. This shifts the phase
     resonance by the fraction r zeta of the frequency, and increases the loss of a cycle by r^2.
@@ -152,7 +152,7 @@ def _include_forced_modes(joint: Joint, frequency: _Limits, damping: _Limits, cu
 
 
 def forced_mode_ratio(joint: Joint, curve: Curve) -> np.ndarray:
-    """Return the motion (k,) of other modes over that of the mode, under a force at the output.
+    """Return the ratio (k,) of the motion of other modes to that of the mode under a force at the output.
 
     The force acts at the output and the friction at the contact, so each of them moves the other modes.
     """

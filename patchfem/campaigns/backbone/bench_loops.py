@@ -16,14 +16,14 @@ LOOP_MEASURES = ("secant_stiffness", "loop_area")
 
 
 class BenchLoop(NamedTuple):
-    """Run of a contact under a sinusoidal displacement, with its model and step number."""
+    """Run of a contact under a sinusoidal displacement, with its model and number of steps."""
 
     run: object
     model: Model
     steps: int
 
 
-class SettledLoop(NamedTuple):
+class SteadyLoop(NamedTuple):
     """Steady run of a contact under a sinusoidal displacement.
 
     It has its model and its number of steps.
@@ -37,7 +37,9 @@ class SettledLoop(NamedTuple):
     change: list
 
 
-def run_loop(model: Model, patch, slide: float, frequency: float, cycles: float) -> BenchLoop:
+def run_friction_loop(
+    model: Model, patch, slide: float, frequency: float, cycles: float
+) -> BenchLoop:
     """Compute the friction loop of a contact under a sinusoidal displacement.
 
     Parameters
@@ -62,8 +64,8 @@ def run_loop(model: Model, patch, slide: float, frequency: float, cycles: float)
     return BenchLoop(bench.run_bench(contact, patch, steps), contact, steps)
 
 
-def settle_loop(model: Model, patch, slide: float, frequency: float) -> SettledLoop:
-    """Double the number of cycles until the friction loop is steady within the tolerance.
+def compute_steady_loop(model: Model, patch, slide: float, frequency: float) -> SteadyLoop:
+    """Compute a friction loop with a doubled number of cycles until it is steady within the tolerance.
 
     Parameters
     ----------
@@ -78,18 +80,18 @@ def settle_loop(model: Model, patch, slide: float, frequency: float) -> SettledL
 
     Returns
     -------
-    SettledLoop
+    SteadyLoop
     """
     tolerance = model.accuracy.tolerance
     cycles = FIRST_CYCLES
-    loop = run_loop(model, patch, slide, frequency, cycles)
+    loop = run_friction_loop(model, patch, slide, frequency, cycles)
     while True:
         cycles *= 2
         before = loop.run.values
-        loop = run_loop(model, patch, slide, frequency, cycles)
+        loop = run_friction_loop(model, patch, slide, frequency, cycles)
         values = loop.run.values
         change = [abs(values[name] - before[name]) for name in LOOP_MEASURES]
         limits = [tolerance * abs(values[name]) for name in LOOP_MEASURES]
         is_steady = all(step <= limit for step, limit in zip(change, limits))
         if cycles >= MAX_CYCLES or is_steady:
-            return SettledLoop(*loop, change)
+            return SteadyLoop(*loop, change)

@@ -18,7 +18,7 @@ from .balance import compute_balance_curve
 from .band import make_band
 from .decay import compute_decay_curve
 from .joint import Joint, build_joint
-from .linear import compute_level_curve
+from .linear import compute_constant_curve
 from .quasi_static import compute_static_curve
 from .records import (
     AMPLITUDE_TOL,
@@ -38,7 +38,7 @@ FLUTTER_TOL = 1e-8  # Relative error of the flutter amplitude, below the digits 
 
 
 def choose_methods(method: str | None) -> tuple:
-    """Return the methods of a request: a name, "all", or the default ones for "" and None.
+    """Return the methods for a name, for "all", or the default ones for "" and None.
 
     Raises
     ------
@@ -65,7 +65,7 @@ def compute_backbone(
     *,
     errors: bool = True,
 ) -> Backbone:
-    """Compute frequency and damping of a rig mode against amplitude.
+    """Compute frequency and damping of a mode of a rig against amplitude.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def compute_backbone(
     amplitudes : (k,) array, optional
         Increasing, at the output [m]. By default from a hundredth of the amplitude at which the
         complete contact slips to 15 times this amplitude, or to the amplitude at which the mode
-        moves as if it were free.
+        moves nearly freely.
     methods : sequence of str
         From METHODS.
     progress : callable, optional
@@ -125,7 +125,7 @@ def compute_backbone(
         if errors:
             band = make_band(joint, curves)
             answer = Answer(band, write_advice(joint, band, curves, missing))
-    return _make_backbone(joint, amplitudes, curves, missing)._replace(answer=answer)
+    return _assemble_backbone(joint, amplitudes, curves, missing)._replace(answer=answer)
 
 
 def compute_curve(joint: Joint, amplitudes, method: str, progress=None) -> Curve:
@@ -151,7 +151,7 @@ def compute_curve(joint: Joint, amplitudes, method: str, progress=None) -> Curve
         If there is no curve.
     """
     if joint.is_linear:
-        return compute_level_curve(joint, amplitudes, method)
+        return compute_constant_curve(joint, amplitudes, method)
     if method == "decay":
         return compute_decay_curve(joint, amplitudes, progress)
     if method == "balance":
@@ -160,7 +160,7 @@ def compute_curve(joint: Joint, amplitudes, method: str, progress=None) -> Curve
 
 
 def _widen_by_missing_modes(curve: Curve, richer: Curve) -> Curve:
-    """Widen the errors of a curve by the effect of modes that a reduced structure lacks.
+    """Widen the errors of a curve by the effect of the modes that a reduced structure omits.
 
     richer: the curve of the structure with more modes.
     """
@@ -179,7 +179,7 @@ def _widen_by_missing_modes(curve: Curve, richer: Curve) -> Curve:
     )
 
 
-def _make_backbone(joint: Joint, amplitudes, curves: dict, missing: dict) -> Backbone:
+def _assemble_backbone(joint: Joint, amplitudes, curves: dict, missing: dict) -> Backbone:
     """Assemble the backbone from its curves at the requested amplitudes (k,) [m]."""
     exponents = LossExponents()
     first = curves.get("quasi-static", curves.get("balance"))
@@ -210,7 +210,7 @@ def _make_backbone(joint: Joint, amplitudes, curves: dict, missing: dict) -> Bac
 
 
 def _main_mode_name(joint: Joint) -> str:
-    """Return the name of the structural mode that dominates the coordinate."""
+    """Return the name of the structural mode with the largest component in the coordinate."""
     modes = joint.modes
     if not joint.model.rig.structure.lists_modes:
         return f"{joint.mode + 1}"
@@ -246,7 +246,7 @@ def _mode_frequencies(joint: Joint) -> ModeFrequencies:
 
 
 def _stuck_frequency(joint: Joint, stiffness: float) -> float:
-    """Return the frequency [Hz] of a mode with a sticking contact of a stiffness [N/m]."""
+    """Return the frequency [Hz] of a mode with a sticking contact of a given stiffness [N/m]."""
     modes = joint.modes
     omega, _ = modes.compute_stuck_mode(modes.interfaces, np.array([stiffness]), joint.mode)
     return omega / (2 * np.pi)
@@ -275,7 +275,7 @@ def _fit_exponents(joint: Joint, curve: Curve | None) -> LossExponents:
 
 
 def _loss_slope(curve: Curve, points) -> float | None:
-    """Return the log-log slope of the loss between the ends of a point range.
+    """Return the log-log slope of the loss between the first and the last of the given points.
 
     It is None for fewer than two points.
     """

@@ -10,28 +10,28 @@ from ...formatting import format_length
 from ...response.decay_curve import find_reversals_by_extrapolation
 from ...runs.rig import decays, solve
 from ...runs.rig.engines import ENGINES, SMOOTH
-from .decay_reading import measure_other_modes, read_decay
+from .decay_identification import identify_decay, measure_other_modes
 from .joint import Joint
 from .records import ROUND_OFF_ERROR, Curve, make_curve
 from .release import Release, release_from_largest_decaying, run_release
 
 MAX_DOUBLINGS = 3  # Largest number of times that the time steps are halved.
-# Motion of other modes over amplitude above which the decay is not that of a single mode.
+# Largest motion of other modes over amplitude at which the decay counts as that of a single mode.
 MAX_OTHER_MODES = 0.1
 
 
-class DecayReading(NamedTuple):
-    """Frequency [Hz] and damping ratio (2, k) identified from a decay, with errors (2, k).
+class IdentifiedDecay(NamedTuple):
+    """Frequency [Hz] and damping ratio (2, k) identified from a decay, with error estimates (2, k).
 
-    reading_error: of the evaluation from reversal to reversal; run_error: from coarser runs.
+    evaluation_error: of the evaluation from reversal to reversal; run_error: from coarser runs.
     """
 
     value: np.ndarray
-    reading_error: np.ndarray
+    evaluation_error: np.ndarray
     run_error: np.ndarray
 
     def known_amplitudes(self) -> np.ndarray:
-        """Return a mask (k,) of the amplitudes at which values and errors are known."""
+        """Return a mask (k,) of the amplitudes with known values and errors."""
         return np.isfinite(self.value + self.run_error).all(axis=0)
 
 
@@ -56,8 +56,8 @@ def compute_decay_curve(joint: Joint, amplitudes, progress=None) -> Curve:
         If no amplitude has a value.
     """
     n_decaying, release = release_from_largest_decaying(joint, amplitudes, progress)
-    release, reading = _refine_release(joint, release, amplitudes)
-    known = reading.known_amplitudes()
+    release, identified = _refine_time_steps(joint, release, amplitudes)
+    known = identified.known_amplitudes()
     if not known.any():
         raise NotConverged("the free decay gave no frequency and damping at these amplitudes")
     motion = release.solution.response
@@ -73,7 +73,7 @@ def compute_decay_curve(joint: Joint, amplitudes, progress=None) -> Curve:
     mesh_error, reason = decays.estimate_decay_mesh_errors(
         joint.model, joint.patch, joint.coarse, amplitudes, lambda laws: joint.mode
     )
-    error = np.fmax(reading.run_error, mesh_error) + reading.reading_error
+    error = np.fmax(identified.run_error, mesh_error) + identified.evaluation_error
     notes = [
         *decays.describe_unknown_mesh_errors(
             {"method decay": reason}, lambda: _list_spatial_coarsenings(joint, release)
@@ -83,7 +83,7 @@ def compute_decay_curve(joint: Joint, amplitudes, progress=None) -> Curve:
         *_note_unknown_modes(joint, known, other_modes),
     ]
     curve = make_curve(
-        amplitudes, reading.value, error, notes=tuple(notes), other_modes=other_modes
+        amplitudes, identified.value, error, notes=tuple(notes), other_modes=other_modes
     )
     return curve.at(known)
 
@@ -97,7 +97,7 @@ def _list_spatial_coarsenings(joint: Joint, release: Release) -> list:
 
 
 def _note_other_modes(amplitudes) -> list:
-    """Return a note on amplitudes (k,) [m] of a decay at which other modes move too much."""
+    """Return a note on amplitudes (k,) [m] at which other modes move too much in a decay."""
     count = amplitudes.size
     if not count:
         return []
@@ -141,10 +141,10 @@ class RefinedRelease(NamedTuple):
     """
 
     release: Release
-    reading: DecayReading
+    identified: IdentifiedDecay
 
 
-def _refine_release(joint: Joint, release: Release, amplitudes) -> RefinedRelease:
+def _refine_time_steps(joint: Joint, release: Release, amplitudes) -> RefinedRelease:
     """Halve the time steps of a release until its estimated errors meet the tolerance."""
     model, choice, _ = release
     engine = ENGINES[choice.engine]
@@ -153,20 +153,20 @@ def _refine_release(joint: Joint, release: Release, amplitudes) -> RefinedReleas
         engine.coarser_in_time(model, choice)
     )
     for doublings in range(MAX_DOUBLINGS + 1):
-        reading = _read_with_errors(joint, release, amplitudes)
-        known = reading.known_amplitudes()
-        limit = np.maximum(tolerance * np.abs(reading.value), reading.reading_error)
-        is_small = (reading.run_error <= limit).all(axis=0)
+        identified = _identify_with_errors(joint, release, amplitudes)
+        known = identified.known_amplitudes()
+        limit = np.maximum(tolerance * np.abs(identified.value), identified.evaluation_error)
+        is_small = (identified.run_error <= limit).all(axis=0)
         is_met = known.any() and is_small[known].all()
         if is_met or doublings == MAX_DOUBLINGS or not has_steps:
             break
         choice = choice.finer()
         release = run_release(joint, model, choice)
-    return RefinedRelease(release, reading)
+    return RefinedRelease(release, identified)
 
 
-class _ReleaseVariants:
-    """Cache of frequency [Hz] and damping (2, k) of coarser runs of a release.
+class _CoarserReleases:
+    """Frequency [Hz] and damping (2, k) of coarser runs of a release, each computed once.
 
     Parameters
     ----------
@@ -182,36 +182,36 @@ class _ReleaseVariants:
         self.amplitudes = amplitudes
         self.computed: dict = {}
 
-    def curve(self, settings) -> np.ndarray:
+    def evaluate_run(self, settings) -> np.ndarray:
         """Return frequency and damping of a coarser run; NaN at amplitudes it does not reach."""
         if settings not in self.computed:
             patch = self.joint.coarse if settings.coarse_patch else self.joint.patch
             solution = solve.solve_rig(self.release.model, replace(settings, whole=True), patch)
-            decay = read_decay(self.joint, solution.response).interpolate(self.amplitudes)
+            decay = identify_decay(self.joint, solution.response).interpolate(self.amplitudes)
             self.computed[settings] = np.array([decay.frequency, decay.damping])
         return self.computed[settings]
 
-    def change(self, coarsening, value) -> np.ndarray:
+    def compute_change(self, coarsening, value) -> np.ndarray:
         """Return the change (2, k) of frequency and damping by a given kind of coarsening."""
-        base = value if coarsening.reference is None else self.curve(coarsening.reference)
+        base = value if coarsening.reference is None else self.evaluate_run(coarsening.reference)
         runs = coarsening.runs if coarsening.source == "cells" else coarsening.runs[:1]
-        return np.max([np.abs(self.curve(run) - base) for run in runs], axis=0)
+        return np.max([np.abs(self.evaluate_run(run) - base) for run in runs], axis=0)
 
 
-def _read_with_errors(joint: Joint, release: Release, amplitudes) -> DecayReading:
+def _identify_with_errors(joint: Joint, release: Release, amplitudes) -> IdentifiedDecay:
     """Identify frequency and damping at amplitudes (k,) [m] from a release, with errors."""
     model, choice, solution = release
-    decay = read_decay(joint, solution.response)
+    decay = identify_decay(joint, solution.response)
     if choice.engine == SMOOTH.name:
-        other = read_decay(joint, solution.response, find_reversals_by_extrapolation)
+        other = identify_decay(joint, solution.response, find_reversals_by_extrapolation)
         decay = decay.add_sampling_error(other)
     decay = decay.interpolate(amplitudes)
     value = np.array([decay.frequency, decay.damping])
-    reading_error = np.array([decay.frequency_error, decay.damping_error])
+    evaluation_error = np.array([decay.frequency_error, decay.damping_error])
     error = ROUND_OFF_ERROR * np.abs(value)
     in_time = ENGINES[choice.engine].coarser_in_time(model, choice)
-    variants = _ReleaseVariants(joint, release, amplitudes)
+    coarser_releases = _CoarserReleases(joint, release, amplitudes)
     for coarsening in [*in_time, *_list_spatial_coarsenings(joint, release)]:
         if coarsening.runs:
-            error += variants.change(coarsening, value)
-    return DecayReading(value, reading_error, error)
+            error += coarser_releases.compute_change(coarsening, value)
+    return IdentifiedDecay(value, evaluation_error, error)

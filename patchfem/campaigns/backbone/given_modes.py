@@ -49,7 +49,7 @@ def prepare_model(build: Callable, modes: str | Iterable = "") -> PreparedModel:
     notes = _note_ignored_tables(tables.ignored)
     if not tables.modes:
         return PreparedModel(joint.remove_joint(model), notes)
-    patch, stiffness = _find_sticking_stiffness(model)
+    patch, stiffness = _press_contact(model)
     given_modes = tables.modes
     used_modes = given_modes
     if stiffness is not None:
@@ -69,14 +69,14 @@ def prepare_model(build: Callable, modes: str | Iterable = "") -> PreparedModel:
 
 
 class StickingContact(NamedTuple):
-    """Pressed patch, or None, and tangential stiffness [N/m] of a sticking contact, None if rigid."""
+    """Patch in contact, or None, and its tangential stiffness [N/m] while it sticks, None if rigid."""
 
     patch: object
     stiffness: float | None
 
 
-def _find_sticking_stiffness(model: Model) -> StickingContact:
-    """Press the contact of a rig with a single interface and find its stiffness while it sticks."""
+def _press_contact(model: Model) -> StickingContact:
+    """Solve the contact of a rig with a single interface and return its stiffness while it sticks."""
     interfaces = model.rig.friction.interfaces
     if len(interfaces) != 1 or model.friction is None:
         return StickingContact(None, None)
@@ -92,7 +92,7 @@ def _find_sticking_stiffness(model: Model) -> StickingContact:
 
 
 def _assume_slides(modes: tuple, stiffness_per_mass: float) -> tuple:
-    """Return the modes, those without `slide` with the one of the assumed stiffness of the joint.
+    """Return the modes with `slide` assumed where it is not given.
 
     stiffness_per_mass: stiffness of the sticking contact over the modal mass [1/s2].
     """
@@ -108,7 +108,7 @@ def _assume_slides(modes: tuple, stiffness_per_mass: float) -> tuple:
 
 
 def _assumed_fraction(n_modes: int) -> float:
-    """Return the fraction of the stiffness of each mode that the joint is assumed to contribute."""
+    """Return the fraction of the stiffness of each mode that is assumed to be due to the joint."""
     return min(ASSUMED_JOINT_FRACTION, MAX_JOINT_FRACTION / n_modes)
 
 
@@ -121,7 +121,7 @@ def _note_ignored_tables(names: list) -> tuple:
 
 
 def _note_modes(modes: tuple, *, is_assumed: bool, is_stuck: bool) -> tuple:
-    """Return notes on modes that do not stand in the scene."""
+    """Return notes on modes that are not given in the scene."""
     names = ", ".join(_describe_mode(mode) for mode in modes)
     place = "with the contact stuck" if is_stuck else "without the contact"
     if not is_assumed:

@@ -16,7 +16,7 @@ from ...runs.patch import result as patch_result
 from ...runs.plan import plan
 from ...runs.rig import decays
 from ...runs.rig.plan import stuck_stiffnesses
-from .bench_loops import settle_loop
+from .bench_loops import compute_steady_loop
 
 AMPLITUDES_PER_DECADE = 8  # Number of default amplitudes per decade.
 # Smallest default amplitude over the amplitude at which the complete contact slips.
@@ -35,7 +35,7 @@ RELEASE_FACTOR = 1.15
 LINEAR_AMPLITUDES = (1e-6, 1e-3, 4)
 # Fraction of the amplitude at which the complete contact slips; at it nothing slips.
 STUCK_FRACTION = 1e-5
-ALL_METHODS_CURE = "; use --method quasi-static"
+QUASI_STATIC_ADVICE = "; use --method quasi-static"
 NO_CLOSED_FORM = (
     "the friction loop of bonds has a closed form only with reading = "
     '"stretch", order = 1, a constant bond length, breakaway = 0 and pieces that are rigid in shear'
@@ -155,7 +155,7 @@ class Joint(NamedTuple):
 
     @property
     def deflection(self) -> float:
-        """Relative displacement [m] of the free mode under the friction limit as a static force."""
+        """Static relative displacement [m] of the free mode under the friction limit."""
         return self.friction_limit * self.face_slide**2 / self.spring
 
     @property
@@ -184,7 +184,7 @@ class Joint(NamedTuple):
         return self.output_amplitude(self.slip_displacement)
 
     def default_amplitudes(self) -> np.ndarray:
-        """Return amplitudes (k,) [m] from a stuck contact to a mode that moves as if free."""
+        """Return amplitudes (k,) [m] from full stick to nearly free motion of the mode."""
         rig = self.model.rig
         if self.is_linear:
             return np.geomspace(*LINEAR_AMPLITUDES) * min(
@@ -206,7 +206,7 @@ class Joint(NamedTuple):
         return MIN_RIGID_FACTOR * deflection, MAX_AMPLITUDE_FACTOR**2 * deflection
 
     def _max_amplitude(self) -> float:
-        """Return the largest default amplitude [m] that the stop and a cubic spring allow."""
+        """Return the largest default amplitude [m], limited by the stop and by a cubic spring."""
         rig = self.model.rig
         modes = self.modes
         travel = rig.springs.travel / RELEASE_FACTOR
@@ -227,11 +227,11 @@ class Joint(NamedTuple):
         except PatchfemError:
             rig = self.model.rig
             has_bench = not rig.springs.is_nonlinear and len(rig.friction.interfaces) < 2
-            cure = ALL_METHODS_CURE if has_bench else ""
-            raise PatchfemError(NO_CLOSED_FORM + cure) from None
+            advice = QUASI_STATIC_ADVICE if has_bench else ""
+            raise PatchfemError(NO_CLOSED_FORM + advice) from None
 
     def require_steady_loops(self, method: str) -> None:
-        """Raise PatchfemError if steady loops of the contact do not determine its free motion."""
+        """Raise PatchfemError if the free motion does not follow from steady friction loops."""
         model = self.model
         reason = ""
         if model.grooves is not None:
@@ -246,7 +246,7 @@ class Joint(NamedTuple):
             raise PatchfemError(f"{method} cannot be computed {reason}")
 
     def spatial_discretization_errors(self, compute: Callable) -> np.ndarray | float:
-        """Return the errors of a quantity due to the mesh and to the discrete sliders of a law.
+        """Return the error estimates of a quantity for the mesh and the discrete sliders of a law.
 
         `compute` maps a LawGroup to the quantity.
         """
@@ -273,7 +273,7 @@ class Joint(NamedTuple):
 
 
 def build_joint(model: Model, name: str) -> Joint:
-    """Solve the contact of a rig and return it with one of its modes.
+    """Solve the contact of a rig and combine it with one of its modes.
 
     Parameters
     ----------
@@ -310,12 +310,12 @@ def build_joint(model: Model, name: str) -> Joint:
         stiffness = _stuck_stiffness(planned)
         stuck_mode = modes.compute_stuck_mode(modes.interfaces, stiffness, number)
         joint = joint._replace(stuck_mode=StuckMode(*stuck_mode), stiffness=stiffness)
-    _refuse_mode(joint)
+    _check_mode(joint)
     return joint
 
 
-def _refuse_mode(joint: Joint) -> None:
-    """Raise PatchfemError for a mode that has no backbone."""
+def _check_mode(joint: Joint) -> None:
+    """Raise PatchfemError if a mode has no backbone."""
     model = joint.model
     modes = joint.modes
     rig = model.rig
@@ -368,7 +368,7 @@ def _find_mode(rig, name: str) -> int:
 
 
 def _stuck_stiffness(joint: Joint) -> np.ndarray:
-    """Return the tangential stiffness (i,) [N/m] of each interface while nothing slips.
+    """Return the tangential stiffness (i,) [N/m] of each interface without slip.
 
     It is that of the loops of the laws if they have a closed form, that of a small loop on a bench
     if there is one interface, else the one of the plan (`joint.stiffness`).
@@ -386,5 +386,5 @@ def _stuck_stiffness(joint: Joint) -> np.ndarray:
         if planned.size > 1:
             return planned
         small = STUCK_FRACTION * joint.friction_limit / planned[0]
-        loop = settle_loop(model, joint.patch, small, model.rig.first_mode.frequency)
+        loop = compute_steady_loop(model, joint.patch, small, model.rig.first_mode.frequency)
         return np.array([loop.run.values["secant_stiffness"]])

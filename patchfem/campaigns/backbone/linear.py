@@ -10,8 +10,8 @@ from .records import ROUND_OFF_ERROR, Curve, make_curve
 N_STEPS = 8
 
 
-def compute_level_curve(joint: Joint, amplitudes, method: str) -> Curve:
-    """Return the constant frequency and damping curve of a mode in a linear rig.
+def compute_constant_curve(joint: Joint, amplitudes, method: str) -> Curve:
+    """Return frequency and damping of a mode of a linear rig, the same at all amplitudes.
 
     By decay, frequency and damping ratio are those of the damped mode. For the other methods, a
     negative damping g of every coordinate maintains the motion: the frequency is that of this
@@ -27,9 +27,9 @@ def compute_level_curve(joint: Joint, amplitudes, method: str) -> Curve:
     """
     negative_damping = 0.0
     for _ in range(N_STEPS):
-        negative_damping -= 2 * _find_root(joint, negative_damping).real
-    omega = abs(_find_root(joint, negative_damping))
-    damped_root = _find_root(joint, 0.0)
+        negative_damping -= 2 * _find_mode_eigenvalue(joint, negative_damping).real
+    omega = abs(_find_mode_eigenvalue(joint, negative_damping))
+    damped_root = _find_mode_eigenvalue(joint, 0.0)
     if not (damped_root.imag and negative_damping < 2 * omega):
         raise NotConverged("the mode does not oscillate: its damping ratio is 1 or more")
     damping = negative_damping / (2 * omega)
@@ -40,7 +40,7 @@ def compute_level_curve(joint: Joint, amplitudes, method: str) -> Curve:
     return make_curve(amplitudes, values, ROUND_OFF_ERROR * np.abs(values))
 
 
-def _find_root(joint: Joint, negative_damping: float) -> complex:
+def _find_mode_eigenvalue(joint: Joint, negative_damping: float) -> complex:
     """Return the eigenvalue of z'' + (D - g) z' + Omega^2 z = 0 that belongs to the mode.
 
     Its eigenvector has the largest component of the mode.

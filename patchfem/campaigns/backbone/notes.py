@@ -13,9 +13,9 @@ MAX_MICRO_SLIP_RATIO = 0.3
 # Smallest ratio of a loss to its error with which the loss counts for an exponent.
 MIN_LOSS_RATIO = 4.0
 MAX_LISTED_AMPLITUDES = 6  # Largest number of amplitudes that a sentence lists individually.
-REPORT_OTHER_MODES = 1e-3  # Motion of other modes over amplitude above which a sentence states it.
-# Ratio of two values above which a sentence gives the ratio and not a percentage.
-MIN_STATED_RATIO = 2.0
+REPORT_OTHER_MODES = 1e-3  # Smallest motion of other modes over amplitude that is reported.
+# Smallest ratio of two values that is reported as a ratio and not as a percentage.
+MIN_REPORTED_RATIO = 2.0
 MISSING_ERRORS = (
     "the errors of the curves do not account for the mesh, because no coarser mesh was computed: "
 )
@@ -35,7 +35,7 @@ REASONS_OF_DIFFERENCES = {
 
 
 def note_linear_rig(joint: Joint) -> list:
-    """Return a note on a rig whose scene has friction although no friction acts."""
+    """Return a list of notes if the scene has friction but no friction acts."""
     has_friction = joint.model.friction is not None or joint.model.rig.friction.interfaces
     if joint.is_linear and has_friction:
         return ["no friction acts, so frequency and damping are the same at all amplitudes"]
@@ -43,26 +43,26 @@ def note_linear_rig(joint: Joint) -> list:
 
 
 def note_wear(model: Model) -> list:
-    """Return a note that the backbone of a scene with wear neglects the wear."""
+    """Return a list of notes on wear, which a backbone neglects."""
     return [] if model.wear is None else ["these curves are for unworn pieces: [wear] is ignored"]
 
 
 def note_missing_mesh(joint: Joint) -> list:
-    """Return a note on a contact with partial slip that has no coarser mesh."""
+    """Return a list of notes on a contact with partial slip and without a coarser mesh."""
     model = joint.model
     if joint.is_linear:
         return []
     if not model.partial_slip or joint.coarse is not None:
         has_errors = not model.rig.friction.has_partial_slip or faces.has_error_meshes(model)
         return [] if has_errors else [MISSING_ERRORS + faces.NO_ERROR_ESTIMATE]
-    cure = "leave out contact.element_size"
+    advice = "leave out contact.element_size"
     if model.patch.mesh.file is not None:
-        cure = "split the elements of contact.mesh"
-    return [f"{MISSING_ERRORS}the interface has too few elements for a coarser mesh; {cure}"]
+        advice = "split the elements of contact.mesh"
+    return [f"{MISSING_ERRORS}the interface has too few elements for a coarser mesh; {advice}"]
 
 
 def note_micro_slip(joint: Joint, amplitudes) -> list:
-    """Return a note on amplitudes (k,) [m] that do not determine the micro-slip exponent."""
+    """Return a list of notes on why the exponent of micro-slip is not determined."""
     edge = MAX_MICRO_SLIP_RATIO * joint.slip_amplitude
     if amplitudes[0] > edge:
         begin = format_length(MIN_AMPLITUDE_FACTOR / MAX_MICRO_SLIP_RATIO * edge, 2)
@@ -80,7 +80,7 @@ def note_micro_slip(joint: Joint, amplitudes) -> list:
 
 
 def note_gaps(amplitudes, curves: dict) -> list:
-    """Return notes on the requested amplitudes (k,) [m] at which a curve has no value."""
+    """Return a list of notes on the amplitudes (k,) [m] at which a curve has no value."""
     out = []
     for method, curve in curves.items():
         missing = amplitudes[~np.isin(amplitudes, curve.amplitude)]
@@ -100,7 +100,7 @@ def note_gaps(amplitudes, curves: dict) -> list:
 
 
 def note_secant_stiffness(joint: Joint, amplitudes, curves: dict) -> list:
-    """Return a note on the secant stiffness of a quasi-static curve in slip.
+    """Return a list of notes on the secant stiffness of a quasi-static curve with slip.
 
     It is given if no curve by harmonic balance exists.
 
@@ -126,7 +126,7 @@ def note_secant_stiffness(joint: Joint, amplitudes, curves: dict) -> list:
 
 
 def note_differences(curves: dict) -> list:
-    """Return notes on curves that differ from harmonic balance by more than both errors."""
+    """Return a list of notes on curves that differ from harmonic balance by more than the errors of both."""
     if "balance" not in curves:
         return []
     balance = curves["balance"]
@@ -145,7 +145,7 @@ def note_differences(curves: dict) -> list:
 def _note_largest_difference(
     method: str, name: str, curve: Curve, balance: Curve, reason: str
 ) -> list:
-    """Return a note on the largest difference of two curves at the same amplitudes.
+    """Return a list of notes on the largest difference between two curves at equal amplitudes.
 
     Parameters
     ----------
@@ -166,7 +166,7 @@ def _note_largest_difference(
     k = int(np.argmax(relative))
     ratio = value[k] / balance_value[k]
     size = f"by {100 * relative[k]:.2g} %"
-    if ratio >= MIN_STATED_RATIO:
+    if ratio >= MIN_REPORTED_RATIO:
         size = f"where the value by {method} is {ratio:.2g} times the value by balance"
     others = ""
     if curve.other_modes is not None and curve.other_modes[k] > REPORT_OTHER_MODES:

@@ -8,7 +8,7 @@ from ...friction.record import steady_loop
 from ...response.errors import add_errors
 from ...runs.bench.errors import estimate_bench_errors
 from ...runs.rig import decays
-from .bench_loops import LOOP_MEASURES, settle_loop
+from .bench_loops import LOOP_MEASURES, compute_steady_loop
 from .joint import Joint
 from .records import AMPLITUDE_TOL, ROUND_OFF_ERROR, Curve, make_curve
 
@@ -39,20 +39,20 @@ def compute_static_curve(joint: Joint, amplitudes) -> Curve:
             raise
         return _compute_from_bench_loops(joint, amplitudes)
 
-    def read(group, samples: int) -> np.ndarray:
+    def tabulate(group, samples: int) -> np.ndarray:
         """Return amplitude, frequency, damping and loss (4, k) from the loops of a LawGroup."""
         return decays.compute_static_curve(joint.modes, group, joint.mode, amplitudes, samples)
 
-    best = read(laws, N_SAMPLES)
-    is_wanted = np.abs(best[0] / amplitudes - 1) < AMPLITUDE_TOL
-    best[0] = np.where(is_wanted, amplitudes, best[0])
-    error = np.abs(best - read(laws, N_SAMPLES // 2)) + ROUND_OFF_ERROR * np.abs(best)
-    error += joint.spatial_discretization_errors(lambda group: read(group, N_SAMPLES))
+    best = tabulate(laws, N_SAMPLES)
+    has_amplitude = np.abs(best[0] / amplitudes - 1) < AMPLITUDE_TOL
+    best[0] = np.where(has_amplitude, amplitudes, best[0])
+    error = np.abs(best - tabulate(laws, N_SAMPLES // 2)) + ROUND_OFF_ERROR * np.abs(best)
+    error += joint.spatial_discretization_errors(lambda group: tabulate(group, N_SAMPLES))
     return _select_rising_part(best, error)
 
 
 def _select_rising_part(best, error) -> Curve:
-    """Select the part of a quasi-static curve on which the force increases.
+    """Return the part of a quasi-static curve on which the force increases.
 
     Beyond this part no equilibrium is stable.
 
@@ -87,21 +87,23 @@ def _compute_in_closed_form(joint: Joint, amplitudes) -> Curve | None:
         loops = [steady_loop(model.friction, load, float(slide)) for slide in slides]
         if None in loops:
             return None
-        best = _read_loops(joint, slides, [quasi_static.StaticLoops(*loop) for loop in loops])
-        is_wanted = np.abs(best[0] / amplitudes - 1) < AMPLITUDE_TOL
-        if is_wanted.all():
+        best = _compute_from_loops(
+            joint, slides, [quasi_static.StaticLoops(*loop) for loop in loops]
+        )
+        has_amplitude = np.abs(best[0] / amplitudes - 1) < AMPLITUDE_TOL
+        if has_amplitude.all():
             break
         # The shape at the output differs from that of the stuck mode.
         slides = slides * amplitudes / best[0]
-    is_wanted = np.abs(best[0] / amplitudes - 1) < AMPLITUDE_TOL
-    best = np.where(is_wanted, best, np.nan)
+    has_amplitude = np.abs(best[0] / amplitudes - 1) < AMPLITUDE_TOL
+    best = np.where(has_amplitude, best, np.nan)
     best[0] = amplitudes
     relative = ROUND_OFF_ERROR + (AMPLITUDE_TOL if modes.omega.size > 1 else 0.0)
     return _select_rising_part(best, relative * np.abs(best))
 
 
-def _read_loops(joint: Joint, slides, loops: list) -> np.ndarray:
-    """Return amplitude, frequency, damping and loss (4, k) from given loops.
+def _compute_from_loops(joint: Joint, slides, loops: list) -> np.ndarray:
+    """Compute amplitude, frequency, damping and loss (4, k) from hysteresis loops.
 
     The loops have displacement amplitudes (k,) [m].
     """
@@ -113,28 +115,28 @@ def _read_loops(joint: Joint, slides, loops: list) -> np.ndarray:
 
 
 def _compute_from_bench_loops(joint: Joint, amplitudes) -> Curve:
-    """Compute the curve from bench loops of the contact at the frequency of the mode."""
+    """Compute the curve from steady bench loops of the contact at the frequency of the mode."""
     slides = np.abs(joint.modes.interfaces[0] @ joint.shape) * amplitudes / joint.reach
     patches = [joint.patch]
     if joint.coarse is not None:
         patches.append(joint.coarse)
     frequency = joint.stuck_mode.omega / (2 * np.pi)
     loops = []
-    moved_tips = []
-    moved_areas = []
+    loops_with_tip_error = []
+    loops_with_area_error = []
     for slide in slides:
-        settled = settle_loop(joint.model, joint.patch, float(slide), frequency)
-        changes = estimate_bench_errors(settled.model, patches, settled.run, settled.steps)
-        measures = add_errors(settled.run.values, changes.errors, min_relative_error=MIN_FLOOR)
-        stiffness, area = (settled.run.values[name] for name in LOOP_MEASURES)
+        steady = compute_steady_loop(joint.model, joint.patch, float(slide), frequency)
+        changes = estimate_bench_errors(steady.model, patches, steady.run, steady.steps)
+        measures = add_errors(steady.run.values, changes.errors, min_relative_error=MIN_FLOOR)
+        stiffness, area = (steady.run.values[name] for name in LOOP_MEASURES)
         errors = [measures[name].error for name in LOOP_MEASURES]
-        stiffness_error, area_error = np.add(errors, settled.change)
+        stiffness_error, area_error = np.add(errors, steady.change)
         loop = quasi_static.StaticLoops(stiffness * slide, area)
         loops.append(loop)
-        moved_tips.append(loop._replace(tip=loop.tip + stiffness_error * slide))
-        moved_areas.append(loop._replace(area=loop.area + area_error))
-    best = _read_loops(joint, slides, loops)
+        loops_with_tip_error.append(loop._replace(tip=loop.tip + stiffness_error * slide))
+        loops_with_area_error.append(loop._replace(area=loop.area + area_error))
+    best = _compute_from_loops(joint, slides, loops)
     error = ROUND_OFF_ERROR * np.abs(best)
-    for moved in (moved_tips, moved_areas):
-        error += np.abs(_read_loops(joint, slides, moved) - best)
+    for moved in (loops_with_tip_error, loops_with_area_error):
+        error += np.abs(_compute_from_loops(joint, slides, moved) - best)
     return _select_rising_part(best, error)

@@ -8,7 +8,7 @@ METHODS = ("balance", "decay", "quasi-static")
 # Methods that are computed by default: the recommended one, and another that costs little beside it.
 DEFAULT_METHODS = ("balance", "quasi-static")
 ROUND_OFF_ERROR = 1e-9  # Relative round-off error of a computed value.
-AMPLITUDE_TOL = 1e-7  # Relative difference below which two amplitudes are equal.
+AMPLITUDE_TOL = 1e-7  # Largest relative difference of equal amplitudes.
 COLUMNS = ("amplitude", "frequency", "frequency_error", "damping", "damping_error", "loss")
 
 
@@ -41,20 +41,20 @@ class Curve(NamedTuple):
     other_modes: np.ndarray | None = None
 
     def at(self, points) -> "Curve":
-        """Return the points of the curve selected by bools (k,), indices or a slice."""
+        """Return the curve at selected points, given by bools (k,), indices or a slice."""
         columns = {name: getattr(self, name)[points] for name in COLUMNS}
         if self.other_modes is not None:
             columns["other_modes"] = self.other_modes[points]
         return self._replace(**columns)
 
     def interpolate(self, amplitudes) -> dict:
-        """Interpolate frequency and damping at given amplitudes (k,) [m], by name."""
+        """Return frequency and damping at amplitudes (k,) [m] by linear interpolation, by name."""
         names = ("frequency", "damping")
         return {name: np.interp(amplitudes, self.amplitude, getattr(self, name)) for name in names}
 
 
 def match_amplitudes(curve: Curve, other: Curve) -> tuple:
-    """Return the indices of the amplitudes that two curves share, in each of them."""
+    """Return the indices of the common amplitudes of two curves, for each of them."""
     distance = np.abs(np.log(curve.amplitude[:, None] / other.amplitude[None]))
     return np.nonzero(distance < AMPLITUDE_TOL)
 
@@ -120,7 +120,7 @@ class Answer(NamedTuple):
 
     @property
     def advice(self) -> str:
-        """All sentences as one text."""
+        """All sentences joined into one text."""
         return " ".join(self.sentences)
 
 
@@ -153,5 +153,5 @@ class Backbone(NamedTuple):
     answer: Answer = Answer()
 
     def add_notes(self, notes) -> "Backbone":
-        """Return the backbone with further notes before its own ones."""
+        """Return the backbone with further notes placed first."""
         return self._replace(notes=(*notes, *self.notes))

@@ -16,7 +16,7 @@ from ...runs.rig.engines import PIECES
 from ...structure import drives
 from ...structure.drive_sizes import find_decay_rate
 from .balance import HARMONIC_COUNTS, find_free_motions
-from .decay_reading import read_decay
+from .decay_identification import identify_decay
 from .joint import MIN_AMPLITUDE_FACTOR, RELEASE_FACTOR, Joint
 
 # Number of cycles of the first decay; longer ones follow until the amplitude is small enough.
@@ -34,7 +34,7 @@ MAX_RAISE_FACTOR = 8.0  # Largest ratio of the amplitudes of two successive rele
 FINAL_AMPLITUDE_FACTOR = 0.8
 # Number of periods of the free mode within which the first half cycles of a decay appear.
 N_FREE_CYCLES = 3.0
-ANNOUNCED_SECONDS = 20.0  # CPU time [s] of a decay above which it is announced.
+ANNOUNCED_SECONDS = 20.0  # Smallest expected CPU time [s] of a decay that is announced.
 COARSER_RUNS_FACTOR = 2.0  # CPU time of a decay with its coarser runs over that without them.
 
 
@@ -47,7 +47,7 @@ class Release(NamedTuple):
 
 
 class DecayingRelease(NamedTuple):
-    """Release whose motion does not grow, with the number of amplitudes up to its own."""
+    """Release whose motion decays, with the number of amplitudes up to the released one."""
 
     n_amplitudes: int
     release: Release
@@ -79,7 +79,7 @@ def run_release(joint: Joint, model: Model, choice) -> Release:
 
 
 def release_from_largest_decaying(joint: Joint, amplitudes, progress=None) -> DecayingRelease:
-    """Release the mode at the largest amplitude from which its motion does not grow.
+    """Release the mode at the largest amplitude from which its motion decays.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def _release_to_smallest(joint: Joint, amplitudes, progress=None) -> Release:
     free_swings = N_FREE_CYCLES * 2 * np.pi / free_omega if free_omega else np.inf
     lowest = FINAL_AMPLITUDE_FACTOR * amplitudes[0]
     while True:
-        model, choice = _choose_numerics(joint, begin, cycles)
+        model, choice = _prepare_release(joint, begin, cycles)
         max_cycles = _max_cycles(joint, choice.engine)
         expected = COARSER_RUNS_FACTOR * seconds_per_cycle * cycles
         if progress is not None and expected > ANNOUNCED_SECONDS:
@@ -148,7 +148,7 @@ def _release_to_smallest(joint: Joint, amplitudes, progress=None) -> Release:
         seconds_per_cycle = release.solution.seconds / cycles
         if _is_growing(joint, motion):
             raise _GrowingRelease("the release grows")
-        decay = read_decay(joint, motion)
+        decay = identify_decay(joint, motion)
         end = motion.time[-1]
         if not decay.time.size:
             if cycles >= max_cycles or end >= free_swings:
@@ -161,7 +161,7 @@ def _release_to_smallest(joint: Joint, amplitudes, progress=None) -> Release:
         low = decay.amplitude[-1]
         stops = decay.time[-1] < end - 3 / decay.frequency[-1]
         if high < amplitudes[-1] and begin < travel and n_raised < MAX_RAISED:
-            begin = _raise_release(joint, begin, high, amplitudes[-1])
+            begin = _raise_release_amplitude(joint, begin, high, amplitudes[-1])
             n_raised += 1
         elif low <= lowest or cycles >= max_cycles or stops:
             return release
@@ -178,8 +178,8 @@ def _max_cycles(joint: Joint, engine: str) -> int:
     return MAX_CYCLES_TURNS if engine == PIECES.name else MAX_CYCLES_ONE_MODE
 
 
-def _choose_numerics(joint: Joint, amplitude: float, cycles: int) -> tuple:
-    """Return the model of a release at a given amplitude [m], and its numerical settings."""
+def _prepare_release(joint: Joint, amplitude: float, cycles: int) -> tuple:
+    """Return the model and the numerical settings of a release at an amplitude [m]."""
     model = release_model(joint, amplitude)
     drive = replace(model.rig.drive, cycles=float(cycles))
     model = replace(model, rig=replace(model.rig, drive=drive))
@@ -190,17 +190,17 @@ def _choose_numerics(joint: Joint, amplitude: float, cycles: int) -> tuple:
     return model, choice
 
 
-def _raise_release(
-    joint: Joint, release_amplitude: float, first_reading: float, largest: float
+def _raise_release_amplitude(
+    joint: Joint, release_amplitude: float, first_amplitude: float, largest: float
 ) -> float:
-    """Return a higher release amplitude [m] after a first reading below `largest`.
+    """Return a larger release amplitude [m] if the first amplitude of the decay is too small.
 
     Parameters
     ----------
     joint : Joint
     release_amplitude : float
         Amplitude of the release so far [m].
-    first_reading : float
+    first_amplitude : float
         Its first reading [m].
     largest : float
         Amplitude [m] that the first reading must exceed.
@@ -210,7 +210,7 @@ def _raise_release(
     limit = max(
         MAX_RAISE_FACTOR * release_amplitude, RELEASE_FACTOR * (release_amplitude + 2 * deflection)
     )
-    raised = release_amplitude * RELEASE_FACTOR * largest / first_reading
+    raised = release_amplitude * RELEASE_FACTOR * largest / first_amplitude
     return min(raised, limit, joint.model.rig.springs.travel)
 
 
@@ -226,11 +226,11 @@ def release_model(joint: Joint, amplitude: float) -> Model:
         force=None,
         levels=DriveLevels(),
     )
-    rig = replace(rig, start=_start_release(joint, amplitude))
+    rig = replace(rig, start=_initial_state(joint, amplitude))
     return replace(model, rig=rig)
 
 
-def _start_release(joint: Joint, amplitude: float) -> InitialState:
+def _initial_state(joint: Joint, amplitude: float) -> InitialState:
     """Return the initial state of a mode released at an output amplitude [m].
 
     It is the free motion by harmonic balance, in which no other mode is excited. If this is not

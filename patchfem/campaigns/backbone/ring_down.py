@@ -20,7 +20,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
 from ...dynamics.harmonic.forces import LawGroup
-from .balance import HARMONIC_COUNTS, find_free_motions, half_range
+from .balance import HARMONIC_COUNTS, find_free_motions, half_peak_to_peak
 from .joint import Joint
 from .records import Curve
 
@@ -55,7 +55,7 @@ class RingDown(NamedTuple):
 
 
 class _MotionTable(NamedTuple):
-    """Free motions against log amplitude x at the output.
+    """Interpolants of the free motions around an amplitude, over the log amplitude x at the output.
 
     Each column is an interpolant: log energy [J], log loss per cycle [J], frequency [Hz], and log of the modal
     amplitude [m]; low and high are the limits of x.
@@ -70,7 +70,7 @@ class _MotionTable(NamedTuple):
 
 
 class _MotionRows(NamedTuple):
-    """Properties of free motions, each (k, m) for m amplitudes around each of k amplitudes; NaN where not known.
+    """Properties (k, m) of free motions at m amplitudes around each of k amplitudes; NaN where not known.
 
     Attributes
     ----------
@@ -99,7 +99,7 @@ class _MotionRows(NamedTuple):
 
 
 def predict_ring_down(joint: Joint, curve: Curve) -> RingDown | None:
-    """Predict the ring-down that belongs to a curve by balance; None if it is known at no amplitude.
+    """Predict the ring-down for a curve by balance; None if it is known at no amplitude.
 
     Parameters
     ----------
@@ -141,13 +141,13 @@ def _predict_at_amplitudes(joint: Joint, compute: Callable, x, damping) -> RingD
     if not known.size:
         return RingDown(*columns)
     rows = _compute_around(compute, x[known], damping[known], SMOOTH_OFFSETS)
-    columns[:, known] = _read_ring_downs(rows, x[known])
+    columns[:, known] = _predict_from_motions(rows, x[known])
     # Motions between the ends of the half cycles are needed where a slope changes within them.
     bent = known[_interpolation_error(rows) > joint.model.accuracy.tolerance]
     if bent.size:
         finer_damping = np.fmax(columns[1, bent], damping[bent])
         rows = _compute_around(compute, x[bent], finer_damping, FINE_OFFSETS)
-        columns[:, bent] = _read_ring_downs(rows, x[bent])
+        columns[:, bent] = _predict_from_motions(rows, x[bent])
     return RingDown(*columns)
 
 
@@ -161,7 +161,7 @@ def _compute_around(compute: Callable, x, damping, offsets) -> _MotionRows:
 
 
 def _half_cycle_fall(damping) -> np.ndarray:
-    """Return the fall of the log amplitude in half a cycle with a damping ratio (k,), limited to the largest."""
+    """Return the fall (k,) of the log amplitude in half a cycle, at most MAX_HALF_CYCLE_LOSS."""
     damping = np.minimum(damping, 1.0)
     with np.errstate(divide="ignore"):
         fall = np.pi * damping / np.sqrt(1 - damping**2)
@@ -169,7 +169,7 @@ def _half_cycle_fall(damping) -> np.ndarray:
 
 
 def _interpolation_error(rows: _MotionRows) -> np.ndarray:
-    """Return the largest relative error (k,) of a ring-down damping interpolated between three motions.
+    """Return a bound (k,) of the relative damping error by interpolation between three motions.
 
     Log energy and log loss have a change of slope s between the motions, which are w apart. If it happens in a
     single point, linear interpolation is wrong by up to s w/4. A motion that is not known gives inf.
@@ -197,7 +197,7 @@ def _compute_free_motions(joint: Joint, laws: LawGroup, x, tolerance: float) -> 
     for row, motion in zip(rows, motions):
         measures = None if motion is None else _measure_motion(joint, motion)
         if measures is not None:
-            row[0] = np.log(half_range(motion.modal @ joint.modes.output))
+            row[0] = np.log(half_peak_to_peak(motion.modal @ joint.modes.output))
             row[1:] = measures
     return _MotionRows(*np.moveaxis(rows[places.reshape(x.shape)], -1, 0))
 
@@ -260,15 +260,14 @@ def _measure_motion(joint: Joint, motion) -> np.ndarray | None:
     return np.array([np.log(energy), np.log(loss), frequency, np.log(amplitude), motion.zeta])
 
 
-def _read_ring_downs(rows: _MotionRows, x) -> np.ndarray:
-    """Return the fields of the ring-down (4, k) at log amplitudes x (k,) from the motions around them."""
-    return np.transpose(
-        [_read_half_cycles(_interpolate(rows.at(k)), float(x[k])) for k in range(x.size)]
-    )
+def _predict_from_motions(rows: _MotionRows, x) -> np.ndarray:
+    """Predict the fields of the ring-down (4, k) at log amplitudes x (k,) from the motions around them."""
+    tables = [_make_motion_table(rows.at(k)) for k in range(x.size)]
+    return np.transpose([_predict_from_half_cycles(*pair) for pair in zip(tables, x)])
 
 
-def _interpolate(rows: _MotionRows) -> _MotionTable | None:
-    """Return the interpolants of the motions around an amplitude; None if fewer than two are known."""
+def _make_motion_table(rows: _MotionRows) -> _MotionTable | None:
+    """Return interpolants of the motions around an amplitude; None if fewer than two are known."""
     known = np.isfinite(rows.loss)
     known[known] = np.diff(rows.x[known], prepend=-np.inf) > 0
     if known.sum() < 2:
@@ -279,8 +278,8 @@ def _interpolate(rows: _MotionRows) -> _MotionTable | None:
     return _MotionTable(*interpolants, low=float(x[0]), high=float(x[-1]))
 
 
-def _read_half_cycles(table: _MotionTable | None, x: float) -> RingDown:
-    """Read a ring-down around the log amplitude x.
+def _predict_from_half_cycles(table: _MotionTable | None, x: float) -> RingDown:
+    """Predict the ring-down at the log amplitude x from three half cycles around it.
 
     The three half cycles have their middle at the amplitude. They are NaN if the motion stops before.
     """
@@ -304,7 +303,7 @@ def _read_half_cycles(table: _MotionTable | None, x: float) -> RingDown:
 
 
 def _solve_half_cycle(table: _MotionTable, ends: tuple, directions: tuple) -> float:
-    """Return half the fall of the log amplitude in a half cycle; ValueError if there is none.
+    """Solve for half the fall of the log amplitude in a half cycle; ValueError if there is no solution.
 
     ends: log amplitudes at the begin and at the end for a fall of 0; directions: their changes per half the fall.
     """
@@ -324,6 +323,6 @@ def _solve_half_cycle(table: _MotionTable, ends: tuple, directions: tuple) -> fl
 
 
 def _extend_energy(table: _MotionTable, x: float) -> float:
-    """Return the log energy at a log amplitude, beyond the table with a slope of 2."""
+    """Return the log energy at a log amplitude; beyond the table it has a slope of 2."""
     inside = min(max(x, table.low), table.high)
     return float(table.energy(inside)) + 2 * (x - inside)

@@ -19,12 +19,12 @@ from .joint import Joint
 N_SAMPLES = 4096  # Number of samples of a cycle of a free motion.
 # Number of half cycles on either side over which the largest effect of other modes is taken.
 N_BEAT_HALF_CYCLES = 8
-EQUAL_HALF_CYCLES_TOL = 1e-7  # Relative difference of two half cycles below which nothing slips.
-STUCK_FRACTION = 0.999  # Stiffness over the stiffness without slip above which a contact sticks.
+EQUAL_HALF_CYCLES_TOL = 1e-7  # Largest relative difference of two half cycles without slip.
+STUCK_FRACTION = 0.999  # Smallest stiffness over that without slip at which a contact sticks.
 
 
-def read_decay(joint: Joint, motion: Response, find_reversals=locate_reversals) -> DecayCurve:
-    """Identify frequency and damping of a decaying motion from reversal to reversal.
+def identify_decay(joint: Joint, motion: Response, find_reversals=locate_reversals) -> DecayCurve:
+    """Identify frequency and damping of a decaying motion from its half cycles.
 
     With several modes, the reversals are those of the motion along the shape of the stuck mode, in
     which other modes move least. Where consecutive half cycles last equally long, nothing slips:
@@ -100,7 +100,7 @@ def measure_other_modes(joint: Joint, motion: Response, amplitudes) -> np.ndarra
     except (NotConverged, PatchfemError):
         return out
     max_stuck = _max_stuck_displacements(group, free_motions)
-    decay = read_decay(joint, motion)
+    decay = identify_decay(joint, motion)
     times, _ = locate_reversals(motion.time, motion.modal @ shape, motion.modal_rate @ shape)
     for column, free in zip(columns, free_motions):
         if free is None:
@@ -123,7 +123,7 @@ def measure_other_modes(joint: Joint, motion: Response, amplitudes) -> np.ndarra
 
 
 def _max_stuck_displacements(group: LawGroup, free_motions: list) -> np.ndarray:
-    """Return the largest displacement (i,) of each interface at which free motion does not slip."""
+    """Return the largest displacement (i,) of each interface in free motion without slip."""
     largest = np.zeros(len(group.rows))
     for free in free_motions:
         if free is not None:
@@ -133,7 +133,7 @@ def _max_stuck_displacements(group: LawGroup, free_motions: list) -> np.ndarray:
 
 
 def _distance_to_free_motion(free, shape, modal, scaled_rate) -> float:
-    """Return the distance of a modal state from a free motion, relative to the mode shape.
+    """Return the distance between a modal state and a free motion, both scaled along the mode shape.
 
     The state consists of coordinates (n,) and rates / omega (n,).
 
@@ -154,7 +154,7 @@ def _distance_to_free_motion(free, shape, modal, scaled_rate) -> float:
 
 
 def _is_stuck(group: LawGroup, free) -> np.ndarray:
-    """Return whether each interface (i,) has its stick stiffness in a free motion."""
+    """Return whether the stiffness of each interface (i,) in a free motion is that without slip."""
     force = free.forces[:, 1]
     slide = free.slides[:, 1]
     stiffness = STUCK_FRACTION * group.stiffness()
