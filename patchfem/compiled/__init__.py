@@ -63,7 +63,7 @@ TUPLE_MODULES = (
     "dynamics/interfaces/arrays.py",
     "dynamics/ledger.py",
     "dynamics/march/element_arrays.py",
-    "dynamics/march/folded_arrays.py",
+    "dynamics/march/cycle_sum_arrays.py",
     "dynamics/march/lane_rows.py",
     "dynamics/smooth/arrays.py",
     "dynamics/events/modal_system.py",

@@ -94,9 +94,9 @@ PUBLIC = {
     ),
     "harmonic.point": (
         "find_peak",
-        "find_point",
+        "find_steady_motion",
         "make_balance",
-        "refine_point",
+        "refine_steady_motion",
     ),
     "harmonic.quasi_static": (
         "StaticLoops",
@@ -109,7 +109,7 @@ PUBLIC = {
         "mean_slip_phase",
     ),
     "lanes.reading": (
-        "reading_of_runs",
+        "measure_runs",
         "run_energies",
     ),
     "lanes.rows_kernels": ("Row",),

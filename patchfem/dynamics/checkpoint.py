@@ -102,7 +102,7 @@ class MarchSamples:
 
     @property
     def capacity(self) -> int:
-        """Remaining number of samples from before the last cycles that may be kept."""
+        """Number of further samples from before the last cycles that can be kept."""
         return MAX_EARLY_SAMPLES - sum(map(len, self.early_numbers))
 
     def keep_early(self, rows, numbers) -> None:
@@ -167,7 +167,7 @@ def _cycles_from_arrays(name: str, arrays: dict) -> tuple:
 
 
 class MarchCheckpoint:
-    """Writer of the checkpoint file of one march; it stores nothing without a path."""
+    """Writer of the checkpoint file of one march; it writes nothing if the path is None."""
 
     def __init__(self, path: Path | None, key: str):
         self.path = path
@@ -175,7 +175,7 @@ class MarchCheckpoint:
         self.next_write = perf_counter() + MIN_WRITE_INTERVAL
 
     def write_if_due(self, run, samples: MarchSamples) -> None:
-        """Write a checkpoint of a march between two cycles if the time since the last one suffices.
+        """Write a checkpoint between two cycles if enough time has passed since the last one.
 
         A failure to write, as on a full disk, ends the checkpoints of this march.
 

@@ -39,8 +39,8 @@ def sample_adaptively(
     abscissas : sequence of float
         Initial points in increasing or decreasing order; all of them are kept.
     tolerance : float, optional
-        Largest error of linear interpolation between two points, over the larger of their values or over
-        MIN_VALUE_RATIO of the largest value.
+        Largest error of linear interpolation between two points, relative to the larger of their values
+        or to MIN_VALUE_RATIO of the largest value.
     max_points : int, optional
         Largest number of points.
 

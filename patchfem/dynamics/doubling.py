@@ -1,4 +1,4 @@
-"""Exact step of modes that are much faster than the step, by doubling of a short step.
+"""Exact time step of modes whose periods are much shorter than the step, by repeated doubling.
 
 Numerical integration over a step does not resolve a motion that decays in a millionth of it. Over a
 short step it is exact to round-off. Two successive steps make a step of twice the length, whose motion

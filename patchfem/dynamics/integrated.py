@@ -17,7 +17,7 @@ MIN_ALIGNMENT = 0.95
 def mean_slip_phase(count, cosine, sine):
     """Return the mean phase [rad] modulo pi of the slip onsets of one run or of (n,) runs.
 
-    It is NaN without an onset, and where the onsets differ by more than MIN_ALIGNMENT allows: the
+    It is NaN if there is no onset, and if the onsets differ by more than MIN_ALIGNMENT allows: the
     mean of several slip phases in a half cycle is the phase of none.
 
     Parameters

@@ -29,7 +29,7 @@ class Ledger(IntEnum):
 class SampleColumn(IntEnum):
     """Columns of a march sample for the first interface, after the modal coordinates and rates.
 
-    They belong to the contact, or to the first element of a rig without a contact.
+    They belong to the contact, or to the first element if the rig has no contact.
 
     - SLIDE, SPEED: slide [m] and its speed [m/s]
     - FORCE: friction force [N]

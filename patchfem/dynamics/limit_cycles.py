@@ -238,7 +238,7 @@ def _free_motion_matrices(modes: ModalBasis, t) -> np.ndarray:
 def _reversal_speed_ratios(modes: ModalBasis, row, force: float, half_periods) -> np.ndarray:
     """Return the relative slide velocity (k,) at the reversal for assumed half periods.
 
-    It is the velocity times the half period over the slide; see `_find_reversal`.
+    It is the velocity times the half period, divided by the slide; see `_find_reversal`.
     """
     n = modes.omega.size
     eye = np.eye(2 * modes.omega.size)
@@ -251,7 +251,8 @@ def _reversal_speed_ratios(modes: ModalBasis, row, force: float, half_periods) -
 def _find_reversal(modes: ModalBasis, row, force: float, half_period: float) -> tuple:
     """Return the state of a periodic motion at its reversal, for an assumed half period.
 
-    Also returns the slide velocity there times the half period over the slide, and the equilibrium.
+    Also returns the slide velocity there, times the half period and divided by the slide, and the
+    equilibrium.
     half_period: assumed half period [s].
     """
     n = modes.omega.size

@@ -66,7 +66,7 @@ def project_modes(row, values):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def free_increment(motion, modal_system, port, table, i):
-    """Return the slide increment [m] of a port in a step without interface forces.
+    """Return the force-free slide increment [m] of a port in a step.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def free_increment(motion, modal_system, port, table, i):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def free_rate(motion, slide_row, modal_system, table, i):
-    """Return the slide speed [m/s] at the end of a step without interface forces.
+    """Return the force-free slide speed [m/s] at the end of a step.
 
     Parameters
     ----------
@@ -378,7 +378,7 @@ def count_iterations(n_iterations, work, ledger):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def write_end_state(motion, modal_system, table, row_index, accel, end):
-    """Write the modal coordinates and rates at the end of a step without taking the step.
+    """Write the modal coordinates and rates at the end of a step, but do not take the step.
 
     The motion and the ledger do not change.
 

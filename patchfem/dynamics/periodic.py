@@ -2,7 +2,7 @@
 
 A motion with the numbers x at phase 0 of the drive is periodic where P(x) = x, with the map P over
 a period, or over half a period with the sign changed. Newton's step solves (P' - 1) dx = x - P(x)
-with every number over its size, and is shortened until the residual decreases. Where no fraction
+with every number divided by its size, and is shortened until the residual decreases. Where no fraction
 of the step reduces it, the engine integrates the motion further, longer every time, and the search continues from the end
 of the run. The eigenvalues of P' are the Floquet multipliers: the factors by which a period
 multiplies a small disturbance.
@@ -47,7 +47,7 @@ class MappedPoint:
     - slope: (m, m) derivative of the numbers at the end with respect to those at the start
     - scale: (m,) sizes of the numbers
     - residual: (m,) numbers at the start minus those at the end, over `scale`
-    - size: size of the motion over the motion of a free mass under the drive
+    - size: size of the motion, relative to that of a free mass under the drive
     - has_same_numbers: whether start and end have the same numbers; if not, `residual` belongs to
       the common numbers, and `slope` gives no Newton step
     - has_same_elements: whether start and end also have the same state of their elements
@@ -174,7 +174,7 @@ class Shooting:
         n_periods : tuple, optional
             Number of periods of the first and of the longest integration after a failed Newton step.
         tolerance : float, optional
-            Largest residual over the size of the motion.
+            Largest residual relative to the size of the motion.
 
         Returns
         -------
@@ -212,9 +212,9 @@ class Shooting:
         )
 
     def _damped_newton_step(self, mapped_point: MappedPoint, fractions) -> MappedPoint | None:
-        """Return the mapped point after the largest fraction of a Newton step that helps.
+        """Return the mapped point after the largest fraction of a Newton step that reduces the residual.
 
-        The result is None if no fraction reduces the residual.
+        The result is None if no fraction does.
 
         """
         if not mapped_point.has_same_numbers:

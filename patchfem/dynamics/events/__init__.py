@@ -1,4 +1,4 @@
-"""Event engine: exact motion of modes behind rigid (Coulomb) and elastic-plastic elements.
+"""Event engine: exact motion of modes with rigid (Coulomb) and elastic-plastic elements.
 
 Equation. Between two events the system is linear. With modal coordinates z, the drive a(t) and the
 friction forces F of the interfaces,
@@ -19,7 +19,7 @@ In: `core.ModalBasis`, a drive in closed form, `elements.Elements` of every inte
 cycles (`reading`). It refuses friction laws that are not piecewise linear, because `runs` gives it
 none.
 
-Cost: 0.2 to 0.5 us per piece of one mode behind one interface; a cycle takes about (period times
+Cost: 0.2 to 0.5 us per piece of one mode with one interface; a cycle takes about (period times
 fastest rate)/2 pieces and one for each event.
 
 | to read | module |

@@ -23,7 +23,7 @@ YIELD_TOL = 1e-14
 class Elements:
     """Parallel friction elements of one interface, with force F = sum k_j e_j.
 
-    The stretches obey |e_j| <= y_j. A rigid element (Coulomb friction) may act beside them.
+    The stretches obey |e_j| <= y_j. A rigid element (Coulomb friction) may act in parallel.
 
     - stiffness: (t,) k_j [N/m]
     - yield_displacement: (t,) y_j [m], in increasing order
@@ -243,8 +243,8 @@ class Memory(NamedTuple):
     rigid_state: np.ndarray
 
 
-def unstretched_memory(table: ElementTable, slide) -> Memory:
-    """Return the memory of unstretched friction elements at relative displacements (i,) [m]."""
+def make_unstretched_memory(table: ElementTable, slide) -> Memory:
+    """Return the memory of friction elements with zero stretch at relative displacements (i,) [m]."""
     n_interfaces, n_sums = table.stiffness_sum.shape
     shape = n_interfaces, n_sums + 1
     group_end = np.zeros(shape, np.int64)

@@ -23,17 +23,17 @@ from .elements import (
     element_stretches,
     make_coulomb_elements,
     make_element_table,
-    unstretched_memory,
+    make_unstretched_memory,
 )
 from .event_list import DRIVE_CHANGE, MAX_EVENTS, RELEASE, REVERSAL, STOP, EventLog
 from .modal_system import (
     RunArrays,
     clear_workspace,
     copy_into,
+    make_initial_time_state,
     make_modal_system,
     make_previous_cycle,
     make_run_sums,
-    make_time_state,
     make_workspace,
     split_time,
 )
@@ -140,7 +140,7 @@ def load_event_kernels(say=None) -> tuple:
 def announce_runs(
     modes: ModalBasis, drive, groups, cycles: float, window: int, runs: int = 1
 ) -> None:
-    """Announce the cost of coming runs to the kernels, which decide by it whether to compile.
+    """Report the cost of coming runs to the kernels, which decide from it whether to compile.
 
     Parameters
     ----------
@@ -181,9 +181,9 @@ def is_loop_cached(modes: ModalBasis, drive) -> bool:
         modal_system,
         table,
         np.zeros((2, modes.omega.size)),
-        unstretched_memory(table, np.zeros(len(modal_system.interfaces))),
+        make_unstretched_memory(table, np.zeros(len(modal_system.interfaces))),
         make_previous_cycle(modal_system, table),
-        make_time_state(drive, len(modal_system.interfaces)),
+        make_initial_time_state(drive, len(modal_system.interfaces)),
         make_run_sums(1, np.zeros(1)),
         make_workspace(modal_system),
     )
@@ -201,7 +201,7 @@ def start_event_run(
     start: InitialState | None = None,
     memory=None,
 ) -> "_EventRun":
-    """Set up an event-driven run at its initial state without computing any motion.
+    """Set up an event-driven run at its initial state, but compute no motion.
 
     The parameters are those of `simulate`.
 
@@ -285,7 +285,7 @@ def simulate(
 
 
 def simulate_batch(cases, cycles: int, window: int) -> list:
-    """Run many cases without histories and events, in a tenth of the time of `simulate`.
+    """Run many cases and omit histories and events, in a tenth of the time of `simulate`.
 
     Parameters
     ----------
@@ -364,7 +364,7 @@ class _EventRun:
                 "structure.mode.slide: no mode moves the interface, so friction cannot act"
             )
         motion = np.zeros((2, n)) if start is None else np.array([start.z, start.v], float)
-        unstretched_state = unstretched_memory(table, self.modal_system.interfaces @ motion[0])
+        unstretched_state = make_unstretched_memory(table, self.modal_system.interfaces @ motion[0])
         memory = (
             unstretched_state
             if memory is None
@@ -377,7 +377,7 @@ class _EventRun:
             table,
             memory,
             make_previous_cycle(self.modal_system, table),
-            make_time_state(drive, len(self.groups)),
+            make_initial_time_state(drive, len(self.groups)),
             make_run_sums(count, is_phasor_wanted, travel),
         )
         self.reusable_arrays = tuple(map(copy_into, old, new))
@@ -442,8 +442,8 @@ class _EventRun:
     def run_to(self, cycles: float, keep=None, progress=None) -> None:
         """March the run up to a time given in cycles.
 
-        Where the motion repeats and the rows are not needed one by one, the last cycle is counted
-        for the cycles that remain.
+        If the motion repeats and not every row is needed, the last cycle stands for the
+        remaining cycles.
 
         Parameters
         ----------
@@ -547,7 +547,7 @@ class _EventRun:
         return keep
 
     def _skip_repeating_cycles(self, end: int, rows) -> None:
-        """Compute one cycle of a repeating motion, and count it for the cycles that follow.
+        """Compute one cycle of a repeating motion and let it stand for the following cycles.
 
         The last cycle is number `end`, or the one before the next segment of the drive. The
         cycles are computed one by one where that cycle needs more than `rows`.
@@ -705,9 +705,9 @@ class _EventRun:
         return self._make_result(early_rows, self._append_end_row(window_rows))
 
     def run_without_histories(self) -> EventRunResult:
-        """March the run to its end and return the result without histories and events.
+        """March the run to its end and return its measures only, no histories or events.
 
-        Few cycles are read where the motion repeats.
+        If the motion repeats, only a few cycles are measured.
         """
         end = self.cycles
         window_rows = []
@@ -773,7 +773,7 @@ class _EventRun:
         }
 
     def _summarise(self, rows) -> EventRunResult:
-        """Return the result of the run without histories, measured from the rows of the window."""
+        """Return the measures of the run, computed from the rows of the window, without histories."""
         start_time = rows[0, Row.TIME]
         end_time = rows[-1, Row.TIME]
         n_interfaces = len(self.groups)

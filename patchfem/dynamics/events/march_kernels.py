@@ -545,8 +545,8 @@ def find_travel_crossing(travel, u, top, run):
 def choose_duration(rate, remaining, run):
     """Return the duration of the next time interval of the march [s].
 
-    The piece ends just after the next yield that the present speeds predict, but lasts at least
-    MIN_DURATION_FRACTION of the longest piece.
+    The interval ends just after the next yield predicted from the present speeds, but lasts at least
+    MIN_DURATION_FRACTION of the longest interval.
 
     Parameters
     ----------
@@ -643,7 +643,7 @@ def reaches_breakpoint(piece, u, now):
 
 @njit(**NJIT_INLINE)
 def reset_forces(run):
-    """Recompute the friction forces of all interfaces from their memory, without round-off sums.
+    """Recompute all friction forces from the memory of the elements, to remove round-off.
 
     Parameters
     ----------
@@ -708,7 +708,7 @@ def is_before(now, stop):
 
 @njit(**NJIT_INLINE)
 def is_idle(progress, run):
-    """Count successive events without progress in time, and report too many of them.
+    """Count successive events without progress in time; return whether there are too many.
 
     Parameters
     ----------
@@ -731,7 +731,7 @@ def is_idle(progress, run):
 
 @njit(**NJIT_INLINE)
 def choose_row_begin(kind, changes_stick, drive_changes):
-    """Return the code of the reason for which a time interval begins after an event.
+    """Return the code that states why a time interval begins after an event.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ class Tangent(NamedTuple):
     """Tangent stiffness and slipping part of the friction elements of an interface.
 
     - stiffness: of the elements that stick [N/m], RIGID_STIFFNESS while a rigid element sticks
-    - slipping: fraction of the friction limit that slips; 1 without elements
+    - slipping: fraction of the friction limit that slips; 1 if there are no elements
     - limit: friction limit of the elements that slip [N]
     """
 
@@ -68,7 +68,7 @@ def next_yield_slide(interface, direction, table, memory):
 
 @njit(**NJIT_INLINE)
 def release_next_element(interface, direction, table, memory):
-    """Let the next friction element of an interface slip in a direction.
+    """Start the slip of the next friction element of an interface in a direction.
 
     If the innermost group slipped in this direction before, the whole group slips.
 
@@ -150,7 +150,7 @@ def rigid_friction_force(interface, table, memory):
 
 @njit(**NJIT_INLINE)
 def interface_force(interface, table, memory):
-    """Return the friction force [N] of an interface without the reaction of its rigid element.
+    """Return the friction force [N] of an interface, excluding the reaction of its rigid element.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Arrays that the compiled event engine works on: modes, time, sums and workspace."""
+"""Arrays of the compiled event engine: modes, time, sums and workspace."""
 
 from typing import NamedTuple
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from ...compiled import get_kernel_module
 from ...core import ModalBasis, PatchfemError
-from .elements import ElementTable, Memory, unstretched_memory
+from .elements import ElementTable, Memory, make_unstretched_memory
 from .positions_kernels import (
     SEGMENT_KIND,
     ConstraintStatus,
@@ -31,7 +31,7 @@ class ModalSystem(NamedTuple):
     """Modal matrices and participations as arrays for the kernels.
 
     The kernels take the number of modes from the length of `omega_squared`, and that of interfaces
-    from `inverse_mass`. Of one mode behind one interface both are tuples: their length is then part
+    from `inverse_mass`. Of one mode with one interface both are tuples: their length is then part
     of their type, and the same text is compiled for one of each, which is three times as fast.
 
     - omega_squared: (n,) squares of the natural frequencies [1/s2]
@@ -106,7 +106,7 @@ class TimeState(NamedTuple):
     is_at_reversal: np.ndarray
 
 
-def make_time_state(drive, n_interfaces: int) -> TimeState:
+def make_initial_time_state(drive, n_interfaces: int) -> TimeState:
     """Return the time state of a run at t = 0.
 
     Parameters
@@ -145,7 +145,7 @@ def drive_segments(drive) -> np.ndarray:
 def split_time(time: float, period: float) -> tuple:
     """Split a time [s] into the number of its cycle and the time [s] since that cycle began.
 
-    A time within a last digit of the end of a cycle is that end.
+    A time within round-off of the end of a cycle counts as that end.
     """
     cycles = time / period
     nearest = round(cycles)
@@ -274,7 +274,7 @@ def _has_same_shapes(old, new) -> bool:
 
 
 class PreviousCycle(NamedTuple):
-    """State at the end of the previous cycle, by which a repeating motion is recognised.
+    """State at the end of the previous cycle, for the detection of a repeating motion.
 
     - status: (3,) see `PreviousStatus`
     - motion: (2, n) modal coordinates [m] and rates [m/s]
@@ -293,7 +293,7 @@ def make_previous_cycle(modal_system: ModalSystem, table: ElementTable) -> Previ
     return PreviousCycle(
         status,
         np.zeros((2, len(modal_system.omega_squared))),
-        unstretched_memory(table, np.zeros(len(modal_system.inverse_mass))),
+        make_unstretched_memory(table, np.zeros(len(modal_system.inverse_mass))),
     )
 
 
@@ -351,7 +351,7 @@ class Workspace(NamedTuple):
     - coefficients: (terms, n) series of the modal coordinates [m]
     - drive: (3, terms) series of the drive [m s-2], and workspace for it
     - polynomials: (i + 3, terms) series of the speeds of the interfaces, and workspace
-    - friction_accel: (i,) friction forces over the modal mass [m s-2]
+    - friction_accel: (i,) friction forces divided by the modal mass [m s-2]
     - stiffness: (i,) stiffness of the interfaces [N/m]
     - rates: (n, 4) modal rates at four Gauss points
     - hulls: Bernstein coefficients of the intervals in which a root is searched for
@@ -431,7 +431,7 @@ class RunSums(NamedTuple):
 
 
 class RunArrays(NamedTuple):
-    """All arrays that the kernels of a run work on.
+    """All arrays of a run, as arguments of the kernels.
 
     - modal_system: modes, which do not change
     - table: elements of the interfaces, which do not change

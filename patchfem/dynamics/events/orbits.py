@@ -1,4 +1,4 @@
-"""Antisymmetric periodic motions under sinusoidal drives, as instruments measure them."""
+"""Antisymmetric periodic motions under sinusoidal drives, and their measured quantities."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -21,7 +21,7 @@ INITIAL_ROWS = 256
 
 
 class PeriodicMotion(NamedTuple):
-    """Measures of a periodic motion as instruments record them.
+    """Measured quantities of a periodic motion.
 
     - point: state at phase 0 of the drive
     - acceleration: largest absolute acceleration of the output [m s-2]

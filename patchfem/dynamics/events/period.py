@@ -11,14 +11,14 @@ import numpy as np
 from ...compiled import load
 from ...core import ModalBasis, NotConverged, PatchfemError
 from .cost import estimate_cycle_time
-from .elements import Memory, make_element_table, sorted_stretches, unstretched_memory
+from .elements import Memory, make_element_table, make_unstretched_memory, sorted_stretches
 from .modal_system import (
     RunArrays,
     TimeState,
+    make_initial_time_state,
     make_modal_system,
     make_previous_cycle,
     make_run_sums,
-    make_time_state,
     make_workspace,
     split_time,
 )
@@ -137,7 +137,7 @@ class PeriodMap:
         self.table = make_element_table(groups)
         self.faces = self.modal_system.interfaces
         self.argument_cache = {}
-        self.rest_memory = unstretched_memory(self.table, np.zeros(len(self.groups)))
+        self.rest_memory = make_unstretched_memory(self.table, np.zeros(len(self.groups)))
 
     def replace_system(self, modes: ModalBasis, groups) -> bool:
         """Replace the modes and the friction elements if their numbers stay the same.
@@ -232,7 +232,11 @@ class PeriodMap:
             seconds = estimate_cycle_time(
                 self.modes, drive, stiff, int(self.table.n_elements.sum())
             )
-            self.time_states[id(drive)] = drive, make_time_state(drive, len(self.groups)), seconds
+            self.time_states[id(drive)] = (
+                drive,
+                make_initial_time_state(drive, len(self.groups)),
+                seconds,
+            )
         _, time_state, self.python_time = self.time_states[id(drive)]
         if self.time_state is None:
             self.time_state = TimeState(*(part.copy() for part in time_state))

@@ -94,7 +94,7 @@ class Column(IntEnum):
 
 
 class RowBegins(NamedTuple):
-    """Codes of the reason for which a time interval begins, in increasing order of importance.
+    """Codes that state why a time interval begins, in increasing order of importance.
 
     They are the values of `Row.BEGIN`.
     """
@@ -107,7 +107,7 @@ class RowBegins(NamedTuple):
 
 
 class MarchStatus(NamedTuple):
-    """Codes of the reasons for which the march from event to event stops.
+    """Codes that state why the march from event to event stops.
 
     - done: the time is reached
     - full: no row is free; the next call goes on
@@ -226,7 +226,7 @@ class RunMeasure(IntEnum):
       and of its third harmonic [m s-1]
     - N_RELEASES, RELEASE_COS, RELEASE_SIN: releases of the first interface, and sums of the cosine
       and the sine of twice their phases
-    - RING, RING_ANGLE: of one mode behind one interface, the largest acceleration [m s-2] of the
+    - RING, RING_ANGLE: of one mode with one interface, the largest acceleration [m s-2] of the
       free vibration while the interface sticks, and the largest angle [rad] by which it turns in
       one stick
     """

@@ -1,4 +1,4 @@
-"""Amplitudes, energies and slip of the last cycles of event-driven runs, from the sums that `read_kernels` computes."""
+"""Amplitudes, energies and slip of the last cycles of event-driven runs."""
 
 from dataclasses import dataclass
 
@@ -32,7 +32,7 @@ class Reading:
     def interface_value(self, measure: int, interface: int = 0):
         """Return a measure of an interface.
 
-        `place` is a member of `InterfaceMeasure`.
+        `measure` is a member of `InterfaceMeasure`.
         """
         return self.faces[..., interface, measure]
 
@@ -72,7 +72,7 @@ class Reading:
         """Drift of the relative displacement of the first interface per cycle [m].
 
         It is the difference of the mean relative displacements of the last and the first cycle
-        over the cycles between them; in fewer than 1.5 cycles the difference between both ends.
+        divided by the number of cycles between them; for fewer than 1.5 cycles it is the difference between both ends.
         """
         cycles = np.asarray(self.span / self.period)
         means = (
@@ -107,7 +107,7 @@ class Reading:
     def _fourier_integral(self, cosine_measure: int, interface: int):
         """Return the integral of an interface quantity times exp(-i omega t).
 
-        `place` is the index of its integral with the cosine, which that with the sine follows.
+        `cosine_measure` is the index of the integral with the cosine; that with the sine follows it.
         """
         cosine = self.interface_value(cosine_measure, interface)
         return cosine - 1j * self.interface_value(cosine_measure + 1, interface)

@@ -1,9 +1,9 @@
 """Detection of a motion that repeats bit by bit, which ends the transient (compiled).
 
-A settled motion would go on to differ from cycle to cycle by rounding alone. Where the state at
+A steady motion would continue to differ from cycle to cycle by round-off alone. Where the state at
 the end of a cycle equals that of the cycle before within REPEAT_TOL, it takes the digits of that
 state. From there on every cycle is the same bit by bit, so a caller may count cycles instead of
-computing them. How fast the motion approached bounds what it would still change by: states that
+computing them. The rate of approach bounds the remaining change: states that
 came from APPROACH_TOL to REPEAT_TOL of each other in n cycles change by at most REPEAT_TOL
 n/ln(APPROACH_TOL/REPEAT_TOL) more.
 """
@@ -92,7 +92,7 @@ def clear_previous_cycle(previous):
 
 @njit(**NJIT_INLINE)
 def detect_repeat(run):
-    """Return whether the motion begins to repeat at this end of a cycle.
+    """Return whether the motion begins to repeat at the present cycle end.
 
     It does where the state equals that of the previous cycle to round-off for the first time.
 

@@ -38,7 +38,7 @@ class NextEvent(NamedTuple):
 
 @njit(**NJIT_INLINE)
 def find_initial_direction(poly, top, is_at_rest):
-    """Return order and sign of the first term of a velocity series that is above round-off.
+    """Return the order and sign of the first term of a velocity series above round-off.
 
     rests: whether the speed is zero at the start, so that the term of order 0 does not count.
 

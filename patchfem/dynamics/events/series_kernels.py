@@ -134,7 +134,7 @@ def count_gauss_points(x):
 def bound_fastest_rate(modal_system, springs):
     """Return an upper bound [1/s] of the rates of modes with springs (i,) [N/m] at interfaces.
 
-    Interfaces that are held only remove motions, so they do not count.
+    Sticking interfaces only remove motions, so they do not count.
     """
     square = modal_system.max_omega_squared
     for f in range(len(modal_system.inverse_mass)):
@@ -159,7 +159,7 @@ def bound_modal_rate(modal_system, workspace):
 def expand_single_mode(start, series, h, top, modal_system, spring):
     """Expand the motion of one mode with one interface as a power series.
 
-    It does what `expand_motion` does for any system.
+    It is the special case of `expand_motion`.
 
     It takes a third of the time.
 
@@ -197,7 +197,7 @@ def expand_single_mode(start, series, h, top, modal_system, spring):
 def expand_two_modes(start, series, h, top, modal_system, spring):
     """Expand the motion of two uncoupled modes with one interface as power series.
 
-    It does what `expand_motion` does for any system.
+    It is the special case of `expand_motion`.
 
     Parameters
     ----------
@@ -327,7 +327,7 @@ def expand_motion(start, series, h, top, modal_system, workspace):
     """Expand the modal motion and the reactions of sticking interfaces as power series.
 
     The equation is z'' = -D z' - omega^2 z - base a - interfaces^T (force + springs slide)/mass.
-    Interfaces with infinite springs are held; workspace.constraint.reactions (i, >= top - 1) are
+    Interfaces with infinite springs are fixed; workspace.constraint.reactions (i, >= top - 1) are
     the forces [N] that hold them.
 
     Parameters
@@ -529,7 +529,7 @@ def fill_bernstein(poly, low, top, hull):
 
 @njit(**NJIT_INLINE)
 def find_possible_root(poly, low, top, hull):
-    """Estimate where the first root of a polynomial in [0, 1] may lie.
+    """Estimate the position of the first root of a polynomial in [0, 1].
 
     The Bernstein coefficients of the first terms are compared with the sum of the magnitudes of the
     other terms.

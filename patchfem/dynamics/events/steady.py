@@ -29,7 +29,7 @@ class SteadyState:
     """Periodic motion of modes with elastic-plastic friction elements.
 
     - point, start, memory: state at phase 0 of the drive
-    - residual: |state after a period - start| over the size of the motion
+    - residual: |state after a period - start| relative to the size of the motion
     - multipliers: (m,) complex Floquet multipliers of motion and reversal displacements, the largest first;
       the motion is stable where all magnitudes are below 1
     - amplitude: half the range of the output [m]
@@ -149,7 +149,7 @@ def find_antisymmetric_motion(
 class YieldShooting(Shooting):
     """Shooting method for periodic motions of elastic-plastic friction elements.
 
-    Where `half` is set, it is the map over half of one with the sign changed.
+    If `half` is set, the map covers half a period and changes the sign.
 
     The unknowns of a PoincarePoint are its motion and its reversal displacements; they match those of another point
     whose reversal displacements are of the same kind. Every group has the elements that it has at the end
@@ -168,7 +168,7 @@ class YieldShooting(Shooting):
         self.rows = np.maximum(np.abs(period_map.faces).sum(axis=1), 1e-300)
 
     def map_point(self, point: PoincarePoint) -> MappedPoint:
-        """Map a state over the period; raise NotConverged where events accumulate."""
+        """Map a state over the period; raise NotConverged if events accumulate."""
         mapping = self.period_map(self.drive, point, self.half)
         n = self.period_map.n
         omega = self.drive.segments[0].omega
@@ -197,7 +197,7 @@ class YieldShooting(Shooting):
         )
 
     def move_by_newton_step(self, mapped_point: MappedPoint, step) -> PoincarePoint:
-        """Return the state after a Newton step, with the element groups at the end of the map."""
+        """Return the state after a Newton step; the element groups are those at the end of the period."""
         return mapped_point.image.end.with_unknowns(mapped_point.point.unknowns + step)
 
     def march_periods(self, mapped_point: MappedPoint, n_periods: int) -> PoincarePoint:

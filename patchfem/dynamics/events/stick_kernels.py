@@ -360,7 +360,7 @@ def find_leading_margin_term(interface, side, noise, limit, workspace):
 
 @njit(**NJIT_KERNEL)
 def find_violation(noise, h, run):
-    """Return the first interface that violates Coulomb's law under the guess, and how.
+    """Return the first interface whose guess violates Coulomb's law, and the kind of violation.
 
     Interfaces in choice.is_resting have no velocity. The memory, force and stiffness are left as
     they are under the guess, and choice.orders as the search for the next event needs them.
@@ -426,9 +426,9 @@ def find_violation(noise, h, run):
 
 @njit(**NJIT_KERNEL)
 def choose_by_exchange(noise, h, run):
-    """Choose the sticking interfaces by exchanging the first one that violates Coulomb's law.
+    """Choose the sticking interfaces by repeatedly exchanging the first that violates Coulomb's law.
 
-    It ends when none violates the law.
+    The iteration ends when no interface violates the law.
 
     This is the rule of least index (Murty, Opsearch 11, 148, 1974). It ends with the only solution
     wherever the complementarity problem has a P-matrix, also over power series in time, which are

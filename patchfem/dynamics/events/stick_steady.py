@@ -1,4 +1,4 @@
-"""Periodic motion under Coulomb friction or without friction, by shooting.
+"""Periodic motion of a rig with Coulomb friction or no friction, by shooting.
 
 Newton's method finds the fixed point of the map over a period.
 
@@ -29,7 +29,7 @@ class CoulombSteadyState:
     """Periodic motion under Coulomb friction.
 
     - start: state at phase 0 of the drive
-    - residual: |state after a period - start| over the size of the motion
+    - residual: |state after a period - start| relative to the size of the motion
     - multipliers: (2n,) complex Floquet multipliers, the largest first; the motion is stable where
       all magnitudes are below 1; a stuck interface that may rest anywhere in a range keeps a 1
     - amplitude: half the range of the output [m]
@@ -121,7 +121,7 @@ class LinearPhase:
         return projection
 
     def acceleration(self, z, v, drive: float) -> tuple:
-        """Return the modal accelerations with and without the reactions of sticking interfaces.
+        """Return the modal accelerations, first with and then without the reactions of sticking interfaces.
 
         Parameters
         ----------

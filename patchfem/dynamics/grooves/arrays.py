@@ -37,7 +37,7 @@ class ClimbIndex(IntEnum):
     - MEAN_FORCE, STIFFNESS: mean force opposing the relative displacement [N] and its derivative
     [N/m]
     - ALONG_FORCE: mean force along the flank [N]
-    - MEAN_SLOPE, PATH_RATIO: height and path along the flank over the relative displacement [1]
+    - MEAN_SLOPE, PATH_RATIO: height and path along the flank per relative displacement [1]
     - TRIAL_VERTICAL: mean vertical force [N]
     - END_NORMAL: normal force at the end of the step [N]
     """

@@ -54,7 +54,7 @@ def check_lifted_mass(grooves: Grooves, static: float, modes) -> None:
 
 
 def lift_message(grooves: Grooves, time: float) -> str:
-    """Return the error message for a lifted mass that loses contact with its grooves at a given time [s]."""
+    """Return the error message for a lifted mass that leaves its grooves at a given time [s]."""
     return (
         f"the lifted mass of {grooves.lifted_mass:.3g} kg leaves the grooves at {time:.6g} s: the inertia of this "
         f"mass takes all of the load; lower {grooves.key}.lifted_mass or the drive, or raise the load"
@@ -96,9 +96,9 @@ def with_shear_modes(
 ) -> "ClimbingModel":
     """Return a copy of the model with the points and shear modes of a solved patch.
 
-    Points of Coulomb's law behind pieces of the shear stiffness K_t become elastic-plastic ones
+    Coulomb points on pieces of the shear stiffness K_t become elastic-plastic ones
     with a bond length COULOMB_LENGTH_RATIO tolerance mu N/K_t: on flat ground the force is then
-    wrong by at most 0.17 of the tolerance, over the friction limit, compared with exact elements
+    wrong by at most 0.17 of the tolerance, relative to the friction limit, compared with exact elements
     (`slip.shear_modes.jenkins_set`).
 
     Parameters
@@ -155,11 +155,11 @@ class FlankModel:
 
     @property
     def reduction(self):
-        """Shear modes of the pieces behind the contact; None if they are rigid in shear."""
+        """Shear modes of the pieces in contact; None if they are rigid in shear."""
 
     @property
     def set_valued(self) -> bool:
-        """Whether the law sticks without any stretch; always False for a law with memory."""
+        """Whether the law sticks rigidly (set-valued); always False for a law with memory."""
         return False
 
     def get_plot_fields(self, contact) -> dict:
@@ -205,7 +205,7 @@ class ClimbingModel(FlankModel):
         """Class that integrates a motion with this contact in time."""
         return ClimbingRun
 
-    def build(self) -> ClimbingPoints:
+    def allocate_contact(self) -> ClimbingPoints:
         """Allocate the contact arrays at rest, at zero relative displacement."""
         g = self.grooves
         share = np.array(self.share, float)

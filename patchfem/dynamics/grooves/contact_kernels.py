@@ -40,7 +40,7 @@ class FlankStep(NamedTuple):
     """Trial step along a flank.
 
     - path: path along the flank [m]
-    - normal: normal force at the end without friction [N]
+    - normal: normal force at the end in the absence of friction [N]
     - slope: slope at the end [1]
 
     """
@@ -152,7 +152,7 @@ def climb_flank(dq, start, flank, climb):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def write_resistance(friction, friction_slope, middle, dt, flank, climb):
-    """Write the mean horizontal force of a trial step and its derivative by the slide.
+    """Write the mean horizontal force of a trial step and its derivative with respect to the slide.
 
     Parameters
     ----------
@@ -204,7 +204,7 @@ def write_mean_force(dq, start, contact):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def solve_step(free, beta, start, contact, goal):
-    """Solve the slide increment and mean force of a step over flanks.
+    """Solve for the slide increment and the mean force of a step along the flanks.
 
     Parameters are those of `interfaces.element_kernels.solve_step`.
 
@@ -272,7 +272,7 @@ def apply_increment(dq, start, contact, goal):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def commit_step(dq, force, start, end_velocity, contact):
-    """Update the contact after a solved step over flanks.
+    """Update the contact after a converged step along the flanks.
 
     Returns
     -------

@@ -54,7 +54,7 @@ def solve_friction(ds, flat, end, dt, contact):
     ----------
     ds : float
     flat, end : float
-        Normal force without friction [N], and slope at the end [1].
+        Normal force in the absence of friction [N], and slope at the end [1].
     dt, contact
 
     Returns
@@ -115,7 +115,7 @@ def set_normal_force(contact, normal):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_stiffness(contact):
-    """Return the derivative [N/m] of the friction force by the slide of the holder."""
+    """Return the derivative [N/m] of the friction force with respect to the slide of the holder."""
     hess = contact.hess[0]
     p = contact.workspace[WorkRow.STEP]
     total = 0.0
@@ -157,7 +157,7 @@ def find_inverse_form(hess, p, workspace):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def commit_friction(ds, along, start, end_velocity, contact):
-    """Update the points after a solved path along the flank.
+    """Update the points after a converged step along the flank.
 
     Parameters
     ----------

@@ -63,7 +63,7 @@ class GroovesModel(FlankModel):
 
     @property
     def set_valued(self) -> bool:
-        """Whether the law sticks without any stretch (rigid Coulomb friction)."""
+        """Whether the law sticks rigidly (set-valued Coulomb friction)."""
         return self.speed is None
 
     @property
@@ -71,9 +71,9 @@ class GroovesModel(FlankModel):
         """Class that integrates a motion with this contact in time."""
         return SampledRun
 
-    def build(self):
-        """Return a contact without friction, which only fills the argument of the kernels."""
-        return coulomb_model(0.0, 0.0).build()
+    def allocate_contact(self):
+        """Return a frictionless contact, which serves as a placeholder in the kernel arguments."""
+        return coulomb_model(0.0, 0.0).allocate_contact()
 
 
 def make_model(

@@ -1,4 +1,4 @@
-"""Backbone of a mode with friction: natural frequency and damping ratio over amplitude.
+"""Backbone of a mode with friction: frequency and damping ratio as functions of amplitude.
 
 A negative damping that balances friction sustains the motion.
 
@@ -55,7 +55,7 @@ class FreeBalance:
 
     - scale: scale of the frequency [rad/s]
 
-    The unknowns are the packed slides of `HarmonicBalance` over the amplitude, omega/scale and zeta. The
+    The unknowns are the packed slides of `HarmonicBalance` divided by the amplitude, omega/scale and zeta. The
     prescribed coordinate has no receptance; its two equations determine omega and zeta.
     """
 

@@ -49,7 +49,7 @@ def find_cycle_energies(periodic: SteadyMotion, modes) -> dict:
     """Return drive work, viscous loss and friction work of a steady motion per cycle [J].
 
     They follow from the harmonics by Parseval's theorem. `balance` is the imbalance of these energies
-    over the work of the drive [1]. A spring among the laws adds
+    relative to the work of the drive [1]. A spring among the laws adds
     nothing.
     """
     k = np.arange(periodic.modal.shape[0])

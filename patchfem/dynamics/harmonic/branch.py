@@ -15,10 +15,10 @@ from .point import (
     change_harmonic_count,
     differentiate_by_frequency,
     differentiate_by_level,
-    find_point,
+    find_steady_motion,
     make_balance,
     make_group,
-    make_point,
+    make_motion_from_unknowns,
 )
 from .stability import add_stability
 from .starts import find_one_harmonic_roots
@@ -26,7 +26,7 @@ from .starts import find_one_harmonic_roots
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Branch:
-    """Branch of steady motions over frequency or drive level, in order along the curve.
+    """Branch of steady motions along frequency or drive level, in order along the curve.
 
     - points: tuple of SteadyMotion
     - parameter: "frequency" [Hz] or "level" [m s-2]
@@ -111,7 +111,7 @@ class CurveNumerics(NamedTuple):
 
     - harmonics: number of harmonics, or None for as many as the tolerance needs
     - tolerance: relative error of each motion
-    - start: initial guess, see `point.find_point`
+    - start: initial guess, see `point.find_steady_motion`
     - longest: longest step of the arc length
     """
 
@@ -145,7 +145,7 @@ def _solve_points(modes, drives, group, parameter, numerics: CurveNumerics) -> B
     points = []
     last = numerics.start
     for drive in drives:
-        last = find_point(modes, drive, group, numerics.harmonics, numerics.tolerance, last)
+        last = find_steady_motion(modes, drive, group, numerics.harmonics, numerics.tolerance, last)
         points.append(last)
     return Branch(tuple(points), parameter)
 
@@ -156,7 +156,7 @@ def _trace_curve(modes, drives, group, parameter, numerics: CurveNumerics) -> Br
     The number is raised until the harmonics above it are negligible at all points.
     """
     harmonics, tolerance, start, max_step = numerics
-    first = find_point(modes, drives[0], group, harmonics, tolerance, start)
+    first = find_steady_motion(modes, drives[0], group, harmonics, tolerance, start)
     for h in [harmonics] if harmonics else [h for h in HARMONIC_COUNTS if h >= first.harmonics]:
         points, truncated, path, scale = _trace_with_harmonics(
             modes, drives, group, parameter, h, first, max_step
@@ -200,7 +200,7 @@ def _trace_with_harmonics(modes, drives, group, parameter, h, first, max_step) -
         )
         key = "omega" if is_frequency else "acceleration"
         solved_points = [
-            make_point(balance, v, replace(drives[0], **{key: float(p)}), h)
+            make_motion_from_unknowns(balance, v, replace(drives[0], **{key: float(p)}), h)
             for v, p in zip(path.x, path.p)
         ]
         amplitudes = np.max(
@@ -291,7 +291,9 @@ def find_point_between(
         raise NotConverged(
             "accuracy.method: no steady motion was found between two neighbouring points of the curve"
         )
-    return make_point(balance, corrected.x, replace(drive, omega=float(corrected.p)), h)[0]
+    return make_motion_from_unknowns(
+        balance, corrected.x, replace(drive, omega=float(corrected.p)), h
+    )[0]
 
 
 def find_branches(
@@ -321,7 +323,7 @@ def find_branches(
         *find_one_harmonic_roots(make_balance(modes, group, 512), drive.omega, drive.acceleration),
     ]:
         try:
-            motion = find_point(modes, drive, group, None, tolerance, start)
+            motion = find_steady_motion(modes, drive, group, None, tolerance, start)
         except NotConverged:
             continue
         size = max(np.abs(motion.coefficients).max(), 1e-300)
@@ -344,7 +346,7 @@ def _max_harmonic_difference(a: SteadyMotion, b: SteadyMotion) -> float:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Backbone:
-    """Backbone curve of a mode: frequency and damping ratio over amplitude.
+    """Backbone curve of a mode: frequency and damping ratio as functions of amplitude.
 
     - amplitude: (k,) amplitude of the coordinate of the mode [m]
     - frequency, damping: (k,) frequency [Hz] and damping ratio [1]
@@ -360,7 +362,7 @@ class Backbone:
 
 
 def find_backbone(modes, group, amplitudes, mode: int = 0, harmonics: int = 9) -> Backbone:
-    """Compute the backbone curve of a mode: frequency and damping ratio over amplitude.
+    """Compute the backbone curve of a mode: frequency and damping ratio as functions of amplitude.
 
     See `harmonic.backbone` for the equations.
 

@@ -53,7 +53,7 @@ class PathSettings(NamedTuple):
     - first_step, max_step: first and longest step of the arc length, in which the width of the bounds and
       the size of the motion count 1
     - max_points: largest number of points
-    - tolerance: change of the motion over its size at which Newton's method ends
+    - tolerance: change of the motion, relative to its size, at which Newton's method ends
     - size: scale of the unknowns; 0 for the larger of that at the start and half of the largest so far
     """
 

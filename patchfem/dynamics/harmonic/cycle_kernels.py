@@ -14,7 +14,7 @@ from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 
 
 class SlideValues(NamedTuple):
-    """Value, first and second derivative of a periodic slide by the angle [m]."""
+    """Value of a periodic slide and its first two derivatives with respect to the angle [m]."""
 
     value: float
     rate: float
@@ -202,7 +202,7 @@ def _write_sample(i, slide, direction, n_slipping, n_groups, groups, sums, sampl
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _slip_elements(slide, direction, n_slipping, n_groups, groups, yield_slides):
-    """Let the Jenkins elements slip that exceed their limit at a slide.
+    """Update the Jenkins elements that exceed their limit at a slide, so that they slip.
 
     Returns the number of groups of sticking elements and the number of slipping elements.
 

@@ -187,7 +187,7 @@ def find_response(tracks: list, sampled: list) -> ContactResponse:
     k = np.arange(1, h + 1)
 
     def derivative_by_omega(jacobians, change):
-        """Return the derivative of the forces by omega for changes of the harmonics."""
+        """Return the derivative of the forces with respect to omega for changes of the harmonics."""
         parts = np.concatenate([np.zeros((rows, 1)), change.real, change.imag], axis=1)
         return np.einsum("ikl,il->ik", jacobians, parts)
 

@@ -335,7 +335,7 @@ class HarmonicBalance:
         )
 
     def free_residual(self, free, c, omega: float, level: float, force) -> complex:
-        """Return the force residual of a modal coordinate without receptance, over omega^2 [m].
+        """Return the force residual of a modal coordinate without receptance, divided by omega^2 [m].
 
         Parameters
         ----------

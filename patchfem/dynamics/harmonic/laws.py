@@ -411,7 +411,7 @@ class FlowLaw(Law):
         )
 
     def _compute_tangent(self, track: SampledSlide, nodes: "FlowNodes") -> tuple:
-        """Return the derivatives of the force by the harmonics of the slide and the frequency.
+        """Return the derivatives of the force with respect to the slide harmonics and the frequency.
 
         See `SampledForce.tangent`.
 
@@ -467,7 +467,7 @@ class FlowNodes(NamedTuple):
         return np.exp(log_remainder) / cycle_loss
 
     def find_cell_factors(self) -> tuple:
-        """Return the decay factor (N,) of the stretch per cell and its derivative by the slide."""
+        """Return the decay factor (N,) of the stretch per cell, and its slide derivative."""
         decay, by_slide, _ = self.steps
         first = np.flatnonzero(self.own)
         is_reversal = ~self.own
@@ -482,7 +482,7 @@ class FlowNodes(NamedTuple):
 def _count_samples(stick_fraction: float) -> int:
     """Return the number of samples per cycle that resolves a stick phase.
 
-    stick_fraction: yield slide over amplitude. The stick phase spans the angle acos(1 - 2 stick_fraction).
+    stick_fraction: yield slide relative to the amplitude. The stick phase spans the angle acos(1 - 2 stick_fraction).
     """
     angle = np.arccos(max(1 - 2 * stick_fraction, -1.0))
     return int(min(SAMPLES_PER_STICK * 2 * np.pi / max(angle, 1e-9), 65536))

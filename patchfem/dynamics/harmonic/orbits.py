@@ -81,7 +81,7 @@ def march_to_periodic(run) -> float:
 
 
 def march_cycle(run, frames: int = 0) -> tuple:
-    """March one more cycle of a run; return its samples and snapshots of the interface.
+    """March a run over one more cycle; return its samples and snapshots of the interface.
 
     The samples are a `Mark`, whose energies are those of this cycle.
     """
@@ -140,7 +140,7 @@ def estimate_multipliers(run) -> np.ndarray:
 
 
 def _scaled_state(run) -> np.ndarray:
-    """Return the state (2 n,) [m] of a run: coordinates, and rates over the fastest rate."""
+    """Return the state (2 n,) [m] of a run: coordinates, and rates divided by the fastest rate."""
     return np.concatenate([run.state[0], run.state[1] / _fastest_rate(run)])
 
 

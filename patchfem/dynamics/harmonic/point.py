@@ -1,8 +1,8 @@
-"""Single steady motion by harmonic balance, with an estimate of its error.
+"""Steady motion at one drive by harmonic balance, with an error estimate.
 
 The balance is solved for H harmonics. Those above H follow from the harmonics of the force
 (q_k = -G_k F_k, a contraction once the inertia of k > H outweighs the stiffness of the contact),
-and their effect below H estimates the truncation error. `find_point` raises H until this error meets the
+and their effect below H estimates the truncation error. `find_steady_motion` raises H until this error meets the
 tolerance.
 """
 
@@ -137,7 +137,7 @@ def friction_force(laws: tuple, sampled: list) -> np.ndarray:
 def find_slip(track: SampledSlide, sampled: list) -> np.ndarray:
     """Return the slip (N,) [m] of an interface row from its sampled laws.
 
-    The slip is the slide minus the mean elastic stretch; it is 0 without friction.
+    The slip is the slide minus the mean elastic stretch; it is 0 if there is no friction.
 
     """
     limit = sum(law_force.limit for law_force in sampled)
@@ -184,7 +184,7 @@ def make_balance(modes, group: LawGroup, samples: int) -> HarmonicBalance:
     return HarmonicBalance(modes, sampled_group.rows, sampled_group)
 
 
-def find_point(
+def find_steady_motion(
     modes, drive, group, harmonics: int | None = None, tolerance: float = 1e-3, start=None
 ) -> SteadyMotion:
     """Find a steady motion under sinusoidal drive by harmonic balance.
@@ -284,11 +284,11 @@ def change_harmonic_count(balance, slides, unknowns, h: int, harmonics: int) -> 
     return np.concatenate([pack_harmonics(y), unknowns[y.shape[0] * (2 * h + 1) :]])
 
 
-def refine_point(motion: SteadyMotion, modes, drive) -> SteadyMotion:
-    """Recompute a steady motion with twice its harmonics and samples.
+def refine_steady_motion(motion: SteadyMotion, modes, drive) -> SteadyMotion:
+    """Recompute a steady motion with twice as many harmonics and samples.
 
-    One harmonic becomes three, because a symmetric law has no even ones. NotConverged is raised if it
-    is not found.
+    One harmonic becomes three, because a symmetric law has no even harmonics. NotConverged is raised if
+    no solution is found.
 
     Parameters
     ----------
@@ -348,7 +348,7 @@ def _solve_harmonics(
 
 
 def _solve_balance(balance, x, drive, h: int):
-    """Solve a harmonic balance from several initial guesses in turn, last from weaker drives."""
+    """Solve a harmonic balance from several initial guesses in turn, finally from weaker drives."""
     omega = drive.omega
     level = drive.acceleration
     for start in _generate_guesses(balance, x, omega, level, h):
@@ -360,7 +360,7 @@ def _solve_balance(balance, x, drive, h: int):
 
 
 def _generate_guesses(balance, x, omega, level, h: int):
-    """Yield initial guesses for Newton's method, the most promising first."""
+    """Generate initial guesses for Newton's method, the most promising first."""
     r = balance.lift.shape[1]
     if x is not None:
         free = sum(1 if k == 0 else 2 for k, *_ in balance.get_linear_part(omega, h).free)
@@ -460,8 +460,8 @@ def differentiate_by_frequency(balance, x, omega, level, h) -> tuple:
     return equations.residual, equations.jacobian, equations.by_omega
 
 
-def make_point(balance, x, drive, h: int) -> tuple:
-    """Return the steady motion of solved unknowns, and the size of the truncated harmonics.
+def make_motion_from_unknowns(balance, x, drive, h: int) -> tuple:
+    """Return the steady motion for solved unknowns, and the relative size of the truncated harmonics.
 
     Parameters
     ----------
@@ -473,7 +473,7 @@ def make_point(balance, x, drive, h: int) -> tuple:
     Returns
     -------
     tuple
-    SteadyMotion, and norm of h further harmonics over that of the motion.
+    SteadyMotion, and norm of h further harmonics relative to that of the motion.
     """
     equations = balance.evaluate(x, drive.omega, drive.acceleration, h)
     motion = _add_harmonics(balance, SweepStart(x, equations), drive, h, 1, 1.0)

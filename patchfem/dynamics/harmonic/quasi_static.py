@@ -64,7 +64,7 @@ def find_loops(laws, u: float, samples: int) -> StaticLoops:
     u : float
         Amplitude of the slide, >= 0 [m].
     samples : int
-        Samples of a cycle, for laws without a closed form.
+        Samples of a cycle, for laws that have no closed form.
 
     Returns
     -------
@@ -116,7 +116,7 @@ def find_static_motions(
     Parameters
     ----------
     modes : ModalBasis
-        Modes without the contact.
+        Modes of the structure, excluding the contact.
     group : LawGroup
         Laws on the rows.
     amplitudes : array_like
@@ -124,7 +124,7 @@ def find_static_motions(
     stuck_mode : tuple
         Frequency [rad/s] and shape (n,) of the stuck mode.
     samples : int, optional
-        Samples per cycle, for laws without a closed form.
+        Samples per cycle, for laws that have no closed form.
     row : ndarray, optional
         (n,) displacement per coordinate to which the amplitudes belong, such as that of the output;
         the component along the shape by default.
@@ -200,7 +200,7 @@ def _solve_equilibrium(
 ) -> np.ndarray:
     """Solve for the static equilibrium of a mode at an amplitude [m].
 
-    Returns z/amplitude, and the squared frequency over that of the stuck mode. mode: frequency [rad/s] and
+    Returns z/amplitude, and the squared frequency relative to that of the stuck mode. mode: frequency [rad/s] and
     shape of the stuck mode, and the row of the amplitude.
     """
     omega, shape, row = mode
@@ -236,7 +236,7 @@ def _solve_equilibrium(
 
 
 def _find_tip_slope(laws, u: float, samples: int) -> float:
-    """Return the derivative [N/m] of the tip force of friction loops by the slide amplitude."""
+    """Return the derivative [N/m] of the tip force of loops with respect to the slide amplitude."""
     step = max(RELATIVE_SLIDE_STEP * u, 1e-30)
     return (find_loops(laws, u + step, samples).tip - find_loops(laws, u, samples).tip) / step
 

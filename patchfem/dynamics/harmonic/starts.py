@@ -12,7 +12,7 @@ N_SAMPLES = 512
 def find_one_harmonic_roots(balance, omega: float, level: float, count: int = 240) -> list:
     """Find all solutions of the one-harmonic balance at a drive.
 
-    They are searched between 1e-7 and 1e4 of the linear motion without contact.
+    The search covers 1e-7 to 1e4 times the linear motion in the absence of contact.
 
     The balance is scanned over the amplitude along that linear motion; this is exact for one
     row and an initial guess for more. None is found where an undamped mode is driven at its natural

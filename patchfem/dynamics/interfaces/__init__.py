@@ -13,13 +13,13 @@ energy, slip).
 | contact | module | arrays |
 |---|---|---|
 | one law on one relative displacement; read it first | `element_kernels`, `element_solve_kernels` | `Element` |
-| points behind shear modes | `shear_kernels`, `shear_points_kernels`, `shear_solve_kernels` | `ShearedPoints` |
+| points coupled by shear modes | `shear_kernels`, `shear_points_kernels`, `shear_solve_kernels` | `ShearedPoints` |
 | points under a load that changes | `pressed_points_kernels` | `PressedPoints` |
 | one list of bonds | `list_kernels` | `BondList` |
-| lists of bonds behind shear modes | `shear_list_kernels`, `shear_lists_kernels` | `ShearedLists` |
+| bond lists coupled by shear modes | `shear_list_kernels`, `shear_lists_kernels` | `ShearedLists` |
 | nonlinear springs, as a law | `spring_kernels` | |
 
 In: numbers and memory of a law (`friction`). Out: increment and mean force of a step, and the
-updated memory. An unsolved step returns a number of iterations below 0. Cost: 20 to 100
-ns per step of one law; of m points behind r shear modes one Newton step takes m r^2/2 products.
+updated memory. A step that does not converge returns a number of iterations below 0. Cost: 20 to 100
+ns per step of one law; of m points coupled by r shear modes one Newton step takes m r^2/2 products.
 """

@@ -50,11 +50,11 @@ class SolvedStep(NamedTuple):
 
 
 class StepProblem(NamedTuple):
-    """Equation of a time step of points behind shear modes.
+    """Equation of a time step of points coupled by shear modes.
 
     It is dq = free - compliance times friction force.
 
-    - free: increment of the holder without friction [m]
+    - free: increment of the holder in the absence of friction [m]
     - compliance: compliance of the modes in the step [m/N]; if it is 0, the increment of the holder is prescribed
     - law_kind: kind of the law of the points, PLASTIC or POINTS of `shear_points_kernels`
     - relaxes: whether the pieces relax while the holder is at rest
@@ -195,7 +195,7 @@ class LoadIndex(IntEnum):
 
 
 class ShearedPoints(NamedTuple):
-    """Arrays of a contact of m points with memory behind r shear modes of the pieces.
+    """Arrays of a contact of m points with memory, coupled by r shear modes of the pieces.
 
     - weight: (m,) force per traction of the law: mu_s area/eps_0 for bonds under a load
       in Pa
@@ -361,7 +361,7 @@ class ShearedLists(
         ),
     )
 ):
-    """Arrays of a contact of m points behind shear modes, each with a list of bonds.
+    """Arrays of a contact of m points that are coupled by shear modes and each have a bond list.
 
     The functions are those of `shear_list_kernels`.
 

@@ -20,7 +20,7 @@ def solve_step(free, beta, start, contact, goal):
     Parameters
     ----------
     free, beta : float
-        Increment without friction [m], and its reduction per unit force [m/N].
+        Increment in the absence of friction [m], and its reduction per unit force [m/N].
     start : arrays.StepStart
     contact : arrays.Element
     goal : float
@@ -65,7 +65,7 @@ def apply_increment(dq, start, contact, goal):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def commit_step(dq, force, start, end_velocity, contact):
-    """Update the memory of the element after a solved step.
+    """Update the memory of the element after a converged step.
 
     Parameters
     ----------

@@ -27,7 +27,7 @@ ROUND_OFF = 4e-16  # round-off error of a sum, relative to its largest term
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_mean_and_slope(dq, contact, v0, dt):
-    """Return the path-mean force of a list of bonds over its limit, and the slope.
+    """Return the path-mean force of a bond list relative to its limit, and the slope.
 
     For a form other than FORM_MOMENTS the slope assumes that the force depends on the displacement
     alone; it may be negative.
@@ -138,10 +138,10 @@ def apply_increment(dq, start, contact, goal):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def commit_step(dq, force, start, end_velocity, contact):
-    """Update the list of bonds after a solved step.
+    """Update the list of bonds after a converged step.
 
-    The work that is not stored is dissipated where positive; the law as printed also creates
-    energy, and both are summed separately. The stretch reading creates none: what its sums gain in
+    The work that is not stored is dissipated where positive; the law with friction.reading = "report" also creates
+    energy, and both are summed separately. With friction.reading = "stretch" it creates none: what its sums gain in
     a short step beyond the work, because strips change from one integration rule to another, was
     stored before. Up to MAX_CARRIED_RATIO it is carried over and subtracted from the next dissipation.
 
@@ -164,7 +164,7 @@ def add_list_energies(work, before, limit, contact):
     """Return the dissipated energy [J] of a step, and add it to the energy sums of the list.
 
     The loss is the work of the step minus the increase of the stored energy; a negative loss is
-    added to the created energy. Gains of the stretch reading are carried over, see `commit_step`.
+    added to the created energy. Gains with friction.reading = "stretch" are carried over, see `commit_step`.
 
     Parameters
     ----------

@@ -145,7 +145,7 @@ def apply_increment(dq, start, contact, goal):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def commit_step(dq, force, start, end_velocity, contact):
-    """Update the points and relax the pieces after a solved step.
+    """Update the points and relax the pieces after a converged step.
 
     Returns
     -------
@@ -183,7 +183,7 @@ def read_state(contact, rel_disp, velocity):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def commit_points(dq, force, start, end_velocity, kind, contact):
-    """Update the memory of the points after a solved step.
+    """Update the memory of the points after a converged step.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Contact functions of bond points behind shear modes under a constant load (compiled).
+"""Contact functions of bond points coupled by shear modes under a constant load (compiled).
 
 The arrays are `arrays.ShearedPoints`.
 
@@ -53,7 +53,7 @@ def solve_full_slip_step(free, beta, contact):
     Parameters
     ----------
     free : float
-        Increment without friction [m].
+        Increment in the absence of friction [m].
     beta : float
         Compliance of the modes in the step [m/N].
     contact : arrays.ShearedPoints
@@ -106,7 +106,7 @@ def apply_increment(dq, start, contact, goal):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def commit_step(dq, force, start, end_velocity, contact):
-    """Update the points and pieces after a solved step.
+    """Update the points and pieces after a converged step.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def commit_step(dq, force, start, end_velocity, contact):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_full_slip_direction(direction, contact):
-    """Return the direction of steady full slip of all points, or 0 without full slip."""
+    """Return the direction of steady full slip of all points, or 0 if they are not in full slip."""
     points = contact.points
     length = contact.eps[0]
     for j in range(contact.weight.size):

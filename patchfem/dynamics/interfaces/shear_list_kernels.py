@@ -1,4 +1,4 @@
-"""Contact functions of lists of bonds behind shear modes (compiled).
+"""Contact functions of bond lists coupled by shear modes (compiled).
 
 The arrays are `arrays.ShearedLists`. Where the pressure of a point varies, with the load or as it
 slides over the lower piece, a bond keeps the pressure under which it formed, and a point that lifts
@@ -68,7 +68,7 @@ def apply_increment(dq, start, contact, goal):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def commit_step(dq, force, start, end_velocity, contact):
-    """Update the lists of bonds and the pieces after a solved step.
+    """Update the lists of bonds and the pieces after a converged step.
 
     The lists accumulate their dissipated and created energies.
 

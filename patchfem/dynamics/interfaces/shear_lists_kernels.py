@@ -1,6 +1,6 @@
-"""Forces of points behind shear modes, each with a list of bonds (compiled).
+"""Forces of points that are coupled by shear modes and each have a bond list (compiled).
 
-The lists have any order and reading of eq. 2.17.
+The bonds have any order p and either form of eq. 2.17 (`friction.reading`).
 
 Every point has its own path, damage and, where bonds grow, bond length, at its own
 velocity. Its weight is its friction limit [N]. The tests compare with
@@ -82,7 +82,7 @@ def find_pressure(j, contact):
 def start_step(dt, contact):
     """Start a time step: set the mean pressure under which bonds form.
 
-    dt: duration of the step [s]. A pressure fixed to the lower piece is taken half way along the slide of the step before.
+    dt: duration of the step [s]. A pressure fixed to the lower piece is taken halfway along the slide of the previous step.
     """
     contact.time[0] = dt
     for j in range(contact.points.shape[1]):

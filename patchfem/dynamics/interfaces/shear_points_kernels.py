@@ -1,7 +1,8 @@
-"""Forces and slopes of elastic-plastic or bond points behind shear modes (compiled).
+"""Forces and slopes of elastic-plastic or bond points coupled by shear modes (compiled).
 
-The bonds have the stretch reading with p = 1. A step uses the path mean of the forces under the
-load in the row LOAD; `ending` selects the forces after the slide.
+The bonds have order p = 1 and the stretch form of the law (friction.reading = "stretch"). A step
+uses the path mean of the forces under the load in the row LOAD; `ending` selects the forces after
+the slide.
 """
 
 from ...compiled.jit import njit

@@ -1,4 +1,4 @@
-"""Step solution of points behind shear modes of the pieces, by minimisation (compiled).
+"""Step solution of points coupled by shear modes of the pieces, by minimisation (compiled).
 
 The slide of point j in a step is xi_j = dq - sum_k psi_kj db_k, and the coordinates b follow kappa
 (b + db/2) = psi^T f with the path-mean forces f, so the work of the holder equals the energy of points and
@@ -226,7 +226,7 @@ def write_hessian(problem, contact, hess):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def find_largest_residual(out, scale):
-    """Return the largest residual of the step equations as a force Friction force [N].
+    """Return the largest residual of the step equations as a force [N].
 
     The residuals of the shear modes are scaled by the slide per coordinate.
     """
@@ -238,7 +238,7 @@ def find_largest_residual(out, scale):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def is_last_step(p, contact):
-    """Return whether a Newton step (1 + r,) changes all slides by less than a limit.
+    """Return whether a Newton step (1 + r,) changes every slide by less than a limit.
 
     The limit is LAST_STEP_RATIO bond lengths.
 
@@ -353,7 +353,7 @@ def minimise(problem, contact, goal):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def accept_step(contact):
-    """Update the shear modes after a solved step, and extrapolate the next initial guess."""
+    """Update the shear modes after a converged step, and extrapolate the next initial guess."""
     y = contact.y[0]
     last = contact.last
     for k in range(contact.b.size):

@@ -1,6 +1,6 @@
 """Many cases of one mode, one interface and a sine drive, integrated in vector lanes.
 
-Equation. With the angle of the drive as time, x the slide and f the friction over the mass,
+Equation. With the angle of the drive as time, x the slide and f the friction force per unit mass,
 
     x'' + D x' + W x = P sin - f(x, x', memory).
 

@@ -1,4 +1,4 @@
-"""Extrapolation of the transient: cycles up to the steady state are computed, not marched.
+"""Extrapolation of the transient up to the steady state by the linear map of a cycle.
 
 Near a periodic motion the state at the ends of the cycles follows a linear map of two dimensions. By the theorem of Cayley
 and Hamilton the changes d_k of any number from one cycle to the next then follow
@@ -109,7 +109,7 @@ def last_changes(value, place, workspace, lane):
 
 @njit(**NJIT_INLINE)
 def push_cycle_end(lane, workspace):
-    """Store the state and sums at the present end of a cycle in front of the earlier ones."""
+    """Store the state and sums at the present cycle end before those of earlier cycle ends."""
     for k in range(N_CYCLE_ENDS - 1, 0, -1):
         for n in range(CycleEnd.LAW_STATE + law.N_LAW_VARIABLES):
             older = workspace[cycle_end_element(k - 1, n, lane)]
@@ -126,7 +126,7 @@ def push_cycle_end(lane, workspace):
 
 @njit(**NJIT_INLINE)
 def has_cut_extremes(lane, workspace, lowest, highest):
-    """Return whether an extreme of the last cycle lies at its start or end, not at a reversal.
+    """Return whether an extreme of the last cycle lies at its start or end instead of at a reversal.
 
     Parameters
     ----------

@@ -2,7 +2,7 @@
 
 The equation in the angle of the drive is x'' + D x' + W x = P sin - f(z, x'), with z' = g(z, x') x'. MEMORY is the stretch
 z [m]. The functions f and g are those of the module `friction` (tanh, Bouc-Wen, LuGre, bonds), whose numbers have lengths
-in m and angles for times, so that f is a force over the mass [m].
+in m and angles for times, so that f is a force per unit mass [m].
 
 A step ends and starts anew where the slide reverses, and where the law has a kink at zero stretch. A law whose force
 changes in a thin layer of speeds (`HAS_SPEED_LAYER`) is followed through the layer in parts. A reference is the engine
@@ -20,7 +20,7 @@ from .rigid_kernels import (
     AngleStep,
     LaneState,
     StepOutcome,
-    StickReading,
+    StickFractions,
     TriedStep,
     can_extrapolate,
     cubic_peak,
@@ -86,7 +86,7 @@ AT_END = 3
 
 
 class FlowState(NamedTuple):
-    """Displacement, speed, friction over mass and stretch [m], and mean square stretch [m^2].
+    """Displacement, speed, friction per unit mass and stretch [m], and mean square stretch [m^2].
 
     The displacement is the relative displacement of the interface, and the speed its derivative
     with respect to the angle of the drive.
@@ -114,7 +114,7 @@ class LayerPlan(NamedTuple):
 
     - `flies`: whether the other forces drive the speed one way whatever the friction is; the parts
       are then equal in speed, otherwise equal in angle.
-    - `side`: sign of the acceleration without friction.
+    - `side`: sign of the acceleration in the absence of friction.
     - `n_parts`: largest number of parts.
     - `edge_speed`: speed at the edge of the layer.
     - `width`: change of the speed in a part.
@@ -130,7 +130,7 @@ class LayerPlan(NamedTuple):
 
 
 class LayerPart(NamedTuple):
-    """Part of a step: angle [rad], state at its end, and friction work over mass [m^2]."""
+    """Part of a step: angle [rad], state at its end, and friction work per unit mass [m^2]."""
 
     angle: float
     end: FlowState
@@ -159,7 +159,7 @@ def law_numbers(workspace, lane):
 def speed_layer(numbers, angle):
     """Return the edge speed of the regularisation layer, and the speed change of a part in it.
 
-    The numbers of a law with a layer begin with its limit and 1 over the speed of the layer.
+    The parameters of a law with a layer begin with its limit and the reciprocal of the layer speed.
     """
     return LAYER_EDGE_RATIO / numbers[2], max(
         LAYER_STEP_RATIO * angle, MIN_LAYER_STEP_RATIO
@@ -168,7 +168,7 @@ def speed_layer(numbers, angle):
 
 @njit(**NJIT_INLINE)
 def friction_force(state, sine, workspace, lane):
-    """Return the friction force over mass [m] from the rate equation of the law.
+    """Return the friction force per unit mass [m] from the rate equation of the law.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ def friction_force(state, sine, workspace, lane):
 
 @njit(**NJIT_INLINE)
 def friction_rate(state, acceleration, workspace, lane, when):
-    """Return the derivative of the friction over mass with respect to the drive angle.
+    """Return the derivative of the friction force per unit mass with respect to the drive angle.
 
     Parameters
     ----------
@@ -205,7 +205,7 @@ def friction_rate(state, acceleration, workspace, lane, when):
 
 @njit(**NJIT_INLINE)
 def friction_at_reversal(x, slip_sign, memory, event_memory, workspace, lane):
-    """Return the friction over mass at a reversal, from the stretch there.
+    """Return the friction force per unit mass [m] at a reversal, from the stretch at that point.
 
     Parameters
     ----------
@@ -237,9 +237,9 @@ def irreversible_slide(x, memory, workspace, lane):
 
 @njit(**NJIT_INLINE)
 def slip_increment(memory, event_memory, memory1, workspace, lane):
-    """Return the friction work of the last step over mass [m^2].
+    """Return the friction work of the last step per unit mass [m^2].
 
-    In laws of one stretch it replaces the slip path.
+    It replaces the slip path in laws with a single stretch.
 
     Parameters
     ----------
@@ -379,7 +379,7 @@ def is_sticking(v, slip_sign, memory, workspace, lane):
 
 @njit(**NJIT_INLINE)
 def try_step(workspace, lane, step, is_observed):
-    """Try a step without events: no reversal, no kink, no regularisation layer crossed.
+    """Try a step as if it contained no reversal, kink or regularisation layer.
 
     A step that is read must not contain the start or the end of a stick, nor a change of sign of the stretch.
 
@@ -442,7 +442,7 @@ def find_hermite_root(y0, y1, m0, m1):
 
 @njit(**NJIT_INLINE)
 def flow_acceleration(workspace, lane, state, sine):
-    """Return the acceleration of the relative displacement over the squared drive frequency [m].
+    """Return the acceleration of the relative displacement per squared drive frequency [m].
 
     Parameters
     ----------
@@ -519,15 +519,15 @@ def hermite_cubic(y0, y1, m0, m1, u):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def records_own_peaks():
-    """Return whether `resolve_step` adds peaks and work of a step to the readings itself."""
+    """Return whether `resolve_step` itself adds the peaks and the work of a step to the measures."""
     return friction.HAS_SPEED_LAYER
 
 
 @njit(**NJIT_INLINE)
 def slide_at_reversal(x, v, x1, v1, angle):
-    """Return the relative displacement at a reversal in a step without an event.
+    """Return the relative displacement at a reversal in a step that contains no event.
 
-    Without a reversal it is that at the end of the step.
+    If there is no reversal, it is that at the end of the step.
 
     Parameters
     ----------
@@ -615,8 +615,8 @@ def step_to_speed(workspace, lane, state, sine, cosine, end_speed):
 
 
 @njit(**NJIT_INLINE)
-def add_part_readings(workspace, lane, start, first, end, last, angle):
-    """Add peaks and loop work of a part of a step to the readings.
+def add_part_measures(workspace, lane, start, first, end, last, angle):
+    """Add the peaks and the loop work of a part of a step to the measures.
 
     Parameters
     ----------
@@ -799,7 +799,7 @@ def resolve_layer_step(workspace, lane, step):
         v1 = end.speed
         a1 = flow_acceleration(workspace, lane, end, s2)
         if workspace[StretchRowStart.IS_OBSERVED + lane] > 0.0:
-            add_part_readings(workspace, lane, state, (s, c, a), end, (s2, c2, a1), t)
+            add_part_measures(workspace, lane, state, (s, c, a), end, (s2, c2, a1), t)
         if v * v1 <= 0.0 and v != 0.0:
             place = find_hermite_root(v, v1, t * a, t * a1)
             event = (elapsed + place * t) / angle
@@ -1056,7 +1056,7 @@ def stick_fractions(start, end, workspace, lane, angle):
 
     Returns
     -------
-    StickReading
+    StickFractions
     """
     numbers = law_numbers(workspace, lane)
     x = start.state.slide
@@ -1072,10 +1072,10 @@ def stick_fractions(start, end, workspace, lane, angle):
     last_sticks = is_stuck_in_segment(start, end, numbers, angle, 1.0)
     if sticks != last_sticks:
         u = find_stick_change(start, end, numbers, angle, 0.0, 1.0)
-        return StickReading(u if sticks else 1 - u, u if sticks else 2.0, extreme_slip)
+        return StickFractions(u if sticks else 1 - u, u if sticks else 2.0, extreme_slip)
     if sticks or not is_stuck_in_segment(start, end, numbers, angle, turnover):
-        return StickReading(1.0 if sticks else 0.0, 2.0, extreme_slip)
+        return StickFractions(1.0 if sticks else 0.0, 2.0, extreme_slip)
     # The interface slips at both ends with stretches of opposite sign, so it may stick in between.
     release = find_stick_change(start, end, numbers, angle, turnover, 1.0)
     stick = find_stick_change(start, end, numbers, angle, 0.0, turnover)
-    return StickReading(release - stick, release, extreme_slip)
+    return StickFractions(release - stick, release, extreme_slip)

@@ -1,4 +1,4 @@
-"""Motion of one lane: steps with or without events, ends of cycles, and exchange of cases.
+"""Motion of one lane: steps with and without events, ends of cycles, and exchange of cases.
 
 `law` is the module of the friction law; `rigid_kernels` lists the functions that it must have. A step is tried for all
 lanes as if no event lay inside it (`try_lane_step`), which a compiler does for several lanes at once. The few lanes that
@@ -71,7 +71,7 @@ def resolve_lane_step(workspace, lane, step):
 def accept_step(workspace, lane, before, step, tried, extreme):
     """Accept a tried step of a lane and update its sums, unless it contains an event.
 
-    A lane with an event is marked.
+    A lane whose step contains an event is marked.
 
     Parameters
     ----------
@@ -111,9 +111,9 @@ def accept_step(workspace, lane, before, step, tried, extreme):
 
 @njit(**NJIT_INLINE)
 def try_lane_step(workspace, lane, step):
-    """Try a step of a lane without an event, and accept it if none occurs.
+    """Try a step of a lane as if it contained no event, and accept it if none occurs.
 
-    A lane with an event stays where it is and is marked.
+    A lane whose step contains an event is marked and does not advance.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ def try_lane_step(workspace, lane, step):
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def collect_marked_lanes(workspace, marked, n_busy):
+def collect_marked_lanes(workspace, marked, n_active):
     """Collect the indices of the lanes that are marked for an event.
 
     Parameters
@@ -140,7 +140,7 @@ def collect_marked_lanes(workspace, marked, n_busy):
         See `rows_kernels`.
     marked : (LANES + 1,) array
         Numbers of the marked lanes, which are written.
-    n_busy : int
+    n_active : int
         Number of lanes that have a case.
 
     Returns
@@ -149,7 +149,7 @@ def collect_marked_lanes(workspace, marked, n_busy):
         Number of marked lanes.
     """
     count = 0
-    for lane in range(n_busy):
+    for lane in range(n_active):
         marked[count] = lane
         count += 1 if workspace[RowStart.HAS_EVENT + lane] > 0.0 else 0
     return count

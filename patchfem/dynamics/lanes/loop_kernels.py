@@ -1,4 +1,4 @@
-"""March of many cases in lanes: all lanes take a step before the next step begins.
+"""Time integration of many cases in lanes: all lanes take a step before the next step begins.
 
 `march` takes the cases to their steady state or to a given cycle, `observe` takes them over their last cycles and reads
 these. The law is a part of the text: `run.kernels` makes an instance of it per law. A step of a case costs 2 to 5 ns on a
@@ -13,35 +13,35 @@ from . import observation_kernels as observation
 from . import rigid_kernels as law
 from .rigid_kernels import AngleStep
 from .rows_kernels import (
-    FIRST_READING,
+    FIRST_MEASURE,
     GROUP_BITS,
     LANES,
+    N_MEASURES,
     N_NUMBERS,
-    N_READINGS,
     PERIODIC_TOL,
     RowStart,
 )
 
 
 @njit(**NJIT_INLINE)
-def march_cycle(workspace, marked, table, n_busy):
-    """March the busy lanes over one cycle of the drive.
+def march_cycle(workspace, marked, table, n_active):
+    """Advance all active lanes by one drive cycle.
 
     Parameters
     ----------
     workspace, marked, table
         See `march`.
-    n_busy : int
+    n_active : int
         Number of lanes that have a case; they are the first ones.
     """
     angle = table[2, 0]
-    width = (n_busy + (1 << GROUP_BITS) - 1) >> GROUP_BITS << GROUP_BITS
+    width = (n_active + (1 << GROUP_BITS) - 1) >> GROUP_BITS << GROUP_BITS
     for k in range(table.shape[1] - 1):
         step = AngleStep(table[0, k], table[1, k], table[0, k + 1], table[1, k + 1], angle)
         law.prepare_step(workspace, step.s0, step.c0)
         for lane in range(width):
             lanes.try_lane_step(workspace, lane, step)
-        for n in range(lanes.collect_marked_lanes(workspace, marked, n_busy)):
+        for n in range(lanes.collect_marked_lanes(workspace, marked, n_active)):
             lanes.resolve_lane_step(workspace, marked[n], step)
 
 
@@ -58,7 +58,7 @@ def is_periodic(lane, workspace):
 
 @njit(cache=True, nogil=True, **NJIT_KERNEL)
 def march(cases, order, motion, table, until, history, n_cycles, workspace, marked):
-    """March cases up to a given number of cycles, or until their motion repeats.
+    """Integrate cases up to a given number of cycles, or until their motion repeats.
 
     A case is extrapolated once the map of its cycle is known (`extrapolation_kernels`). A law that asks for a proof
     marches one more cycle; if it does not end as predicted, the case goes back and is marched to the end. A lane whose
@@ -88,11 +88,11 @@ def march(cases, order, motion, table, until, history, n_cycles, workspace, mark
     proof = 1 if law.PROOF_TOL > 0.0 else 0
     for lane in range(LANES):
         lanes.load_case(order[min(lane, n_given - 1)], lane, cases, motion, workspace)
-    n_busy = n_given
-    while n_busy > 0:
-        march_cycle(workspace, marked, table, n_busy)
+    n_active = n_given
+    while n_active > 0:
+        march_cycle(workspace, marked, table, n_active)
         lane = 0
-        while lane < n_busy:
+        while lane < n_active:
             case = int(workspace[RowStart.CASE_INDEX + lane])
             k = int(workspace[RowStart.CYCLE_INDEX + lane])
             is_proof = n_cycles[case] > 0
@@ -134,8 +134,8 @@ def march(cases, order, motion, table, until, history, n_cycles, workspace, mark
                 n_given += 1
                 lane += 1
             else:
-                n_busy -= 1
-                lanes.copy_lane(lane, n_busy, workspace, cases.shape[1] - N_NUMBERS)
+                n_active -= 1
+                lanes.copy_lane(lane, n_active, workspace, cases.shape[1] - N_NUMBERS)
 
 
 @njit(cache=True, nogil=True, **NJIT_KERNEL)
@@ -147,12 +147,12 @@ def observe(
     cycles,
     history,
     first_cycle,
-    readings,
+    measures,
     acceleration,
     workspace,
     marked,
 ):
-    """March cases over their last cycles and collect their readings.
+    """Integrate cases over their last cycles and measure them.
 
     Parameters
     ----------
@@ -161,27 +161,27 @@ def observe(
     cycles : int
         Number of cycles.
     first_cycle : (n,) array
-        Number of the cycle of each case at which the reading starts.
-    readings : (n, N_READINGS) array
-        The readings, named in `rows_kernels`; it is written.
+        Number of the first measured cycle of each case.
+    measures : (n, N_MEASURES) array
+        Measures, named in `rows_kernels`; they are written.
     acceleration : (n, steps + 1) array
         Absolute acceleration of the output [m s-2] at the start and after every step; it is written, unless it has no
         columns.
     """
     n_steps = table.shape[1] - 1
     for first in range(0, len(order), LANES):
-        n_busy = min(LANES, len(order) - first)
+        n_active = min(LANES, len(order) - first)
         observation.load_observed_cases(first, cases, order, motion, workspace)
         observation.record_accelerations(workspace, acceleration, 0, table[0, 0])
         for k in range(cycles):
-            observation.observe_cycle(workspace, marked, table, n_busy, acceleration, k * n_steps)
-            for lane in range(n_busy):
+            observation.observe_cycle(workspace, marked, table, n_active, acceleration, k * n_steps)
+            for lane in range(n_active):
                 case = order[first + lane]
                 observation.finish_observed_cycle(lane, workspace, k == 0, cycles, table[2, 0])
                 lanes.finish_cycle(
                     lane, workspace, history[case, first_cycle[case] + k], 2 / n_steps
                 )
-        for lane in range(n_busy):
-            for n in range(N_READINGS):
-                readings[order[first + lane], n] = workspace[(FIRST_READING + n) * LANES + lane]
+        for lane in range(n_active):
+            for n in range(N_MEASURES):
+                measures[order[first + lane], n] = workspace[(FIRST_MEASURE + n) * LANES + lane]
             lanes.store_motion(order[first + lane], lane, workspace, motion)

@@ -22,7 +22,7 @@ from .rigid_kernels import (
     PROOF_TOL,
     AngleStep,
     StepOutcome,
-    StickReading,
+    StickFractions,
     TriedStep,
     drive_after,
     is_sticking,
@@ -102,7 +102,7 @@ SLIP_CHANGE = 3
 
 
 class BranchState(NamedTuple):
-    """Displacement, speed, friction over mass and tangent stiffness on a hysteresis branch."""
+    """Displacement, speed, friction force per unit mass and tangent stiffness on a hysteresis branch."""
 
     slide: float
     speed: float
@@ -113,7 +113,7 @@ class BranchState(NamedTuple):
 class FirstEvent(NamedTuple):
     """First event in a step of a branch: its fraction of the step and its kind.
 
-    Without an event they are 1 and NO_EVENT.
+    They are 1 and NO_EVENT if there is no event.
     """
 
     fraction: float
@@ -159,7 +159,7 @@ def restore_derived_state(workspace, lane):
 
 @njit(**NJIT_INLINE)
 def curve_abscissa(x, workspace, lane):
-    """Return the displacement since the last reversal over that at which all sliders slip.
+    """Return the displacement since the last reversal, relative to that at which all sliders slip.
 
     Parameters
     ----------
@@ -202,7 +202,7 @@ def clamped_abscissa(x, workspace, lane):
 
 @njit(**NJIT_INLINE)
 def branch_friction(x, workspace, lane, when=curve.IN_TABLE):
-    """Return friction over mass and tangent stiffness of a branch at a relative displacement.
+    """Return friction per unit mass and tangent stiffness of a branch at a relative displacement.
 
     Parameters
     ----------
@@ -238,7 +238,7 @@ def irreversible_slide(x, memory, workspace, lane, when=curve.IN_TABLE):
     Parameters
     ----------
     x, memory : float
-        Slide and friction over the mass [m].
+        Slide and friction force per unit mass [m].
     workspace, lane
         See `rigid_kernels.friction_force`.
     when : int
@@ -263,14 +263,14 @@ def irreversible_slide(x, memory, workspace, lane, when=curve.IN_TABLE):
 
 @njit(**NJIT_KERNEL)
 def slider_energy(x, memory, slip, workspace, lane):
-    """Return the elastic energy of the sliders over mass [m^2].
+    """Return the elastic energy of the sliders per unit mass [m^2].
 
     It is the energy at the last reversal and the work of the friction since then, less what slip dissipates.
 
     Parameters
     ----------
     x, memory : float
-        Slide and friction over the mass [m].
+        Slide and friction force per unit mass [m].
     slip : float
         Irreversible slide [m].
     workspace, lane
@@ -297,7 +297,7 @@ def slider_energy(x, memory, slip, workspace, lane):
 
 @njit(**NJIT_INLINE)
 def friction_force(state, sine, workspace, lane):
-    """Return the friction force over mass [m], which is the memory of the case.
+    """Return the friction force per unit mass [m], which is the memory of the case.
 
     Parameters
     ----------
@@ -313,7 +313,7 @@ def friction_force(state, sine, workspace, lane):
 
 @njit(**NJIT_INLINE)
 def friction_rate(state, acceleration, workspace, lane, when):
-    """Return the derivative of the friction over mass with respect to the drive angle.
+    """Return the derivative of the friction force per unit mass with respect to the drive angle.
 
     It follows from the tangent stiffness that the last step stored for this instant.
 
@@ -331,7 +331,7 @@ def friction_rate(state, acceleration, workspace, lane, when):
 
 @njit(**NJIT_INLINE)
 def friction_at_reversal(x, slip_sign, memory, event_memory, workspace, lane):
-    """Return the friction over mass at the last reversal [m].
+    """Return the friction force per unit mass at the last reversal [m].
 
     Parameters
     ----------
@@ -358,7 +358,7 @@ def stick_fractions(start, end, workspace, lane, angle):
 
     Returns
     -------
-    StickReading
+    StickFractions
     """
     slip = irreversible_slide(end.state.slide, end.state.memory, workspace, lane)
     # The stored fraction belongs to the first segment, so it is reset
@@ -366,8 +366,8 @@ def stick_fractions(start, end, workspace, lane, angle):
     first_fraction = workspace[SliderRowStart.STICK_FRACTION + lane]
     workspace[SliderRowStart.STICK_FRACTION + lane] = 0.0
     if start.state.slip_sign == 0.0:
-        return StickReading(1.0, 2.0, slip)
-    return StickReading(first_fraction, 1.0 if first_fraction > 0.0 else 2.0, slip)
+        return StickFractions(1.0, 2.0, slip)
+    return StickFractions(first_fraction, 1.0 if first_fraction > 0.0 else 2.0, slip)
 
 
 @njit(**NJIT_INLINE)
@@ -488,9 +488,9 @@ def hermite_step(workspace, lane, start, step, when=curve.IN_TABLE):
 
 @njit(**NJIT_INLINE)
 def next_event_slide(x, workspace, lane):
-    """Return the displacement at which a step ends at the latest.
+    """Return the largest displacement that a step may reach.
 
-    It is that of the next event, or that of the longest step.
+    It is limited by the next event and by the maximum step.
 
     Parameters
     ----------
@@ -514,7 +514,7 @@ def next_event_slide(x, workspace, lane):
 
 @njit(**NJIT_INLINE)
 def try_step(workspace, lane, step, is_observed):
-    """Try a step of a lane without events: no reversal and no closing of a loop.
+    """Try a step of a lane as if it contained no reversal and no closing of a loop.
 
     Parameters
     ----------
@@ -605,8 +605,8 @@ def find_first_event(workspace, lane, start, a0, end, a1, angle):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def stacked_slide(k, workspace, lane):
-    """Return the relative displacement of a stacked reversal [m].
+def find_stacked_reversal_slide(k, workspace, lane):
+    """Return the relative displacement [m] of a reversal on the stack.
 
     Parameters
     ----------
@@ -625,7 +625,7 @@ def stacked_slide(k, workspace, lane):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def restore_reversal(k, workspace, lane):
-    """Continue the branch from a stacked reversal and discard the later reversals.
+    """Continue the branch from a reversal on the stack, and discard the later reversals.
 
     Parameters
     ----------
@@ -644,18 +644,24 @@ def restore_reversal(k, workspace, lane):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def drop_smallest_loop(workspace, lane):
-    """Remove the loop from a full stack whose loss changes the motion least.
+    """Remove from a full stack the loop whose removal changes the motion least.
 
     It is the loop that is nearest in size to the next one.
     """
     best = 1
     smallest_gap = NO_EVENT_SLIDE
     for k in range(1, MAX_REVERSALS - 2):
-        gap = abs(stacked_slide(k + 2, workspace, lane) - stacked_slide(k, workspace, lane))
+        gap = abs(
+            find_stacked_reversal_slide(k + 2, workspace, lane)
+            - find_stacked_reversal_slide(k, workspace, lane)
+        )
         if gap < smallest_gap:
             best = k
             smallest_gap = gap
-    size = abs(stacked_slide(best, workspace, lane) - stacked_slide(best + 1, workspace, lane))
+    size = abs(
+        find_stacked_reversal_slide(best, workspace, lane)
+        - find_stacked_reversal_slide(best + 1, workspace, lane)
+    )
     workspace[SliderRowStart.MAX_DROPPED_GAP + lane] = max(
         workspace[SliderRowStart.MAX_DROPPED_GAP + lane], smallest_gap / size
     )
@@ -674,7 +680,7 @@ def start_branch(x, friction, slip, workspace, lane):
     Parameters
     ----------
     x, friction, slip : float
-        Slide, friction over the mass and irreversible slide at the new reversal [m].
+        Slide, friction force per unit mass and irreversible slide at the new reversal [m].
     workspace, lane
         See `rigid_kernels.friction_force`.
     """
@@ -703,7 +709,7 @@ def start_branch(x, friction, slip, workspace, lane):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def close_loop(x, slip, workspace, lane):
-    """Remove a loop that closes at this relative displacement from the stack.
+    """Remove from the stack a loop that closes at the given relative displacement.
 
     If the outermost loop closes and the first loading is forgotten, all sliders slip; the branch then continues from the
     reversal at which it would have had to start.
@@ -747,7 +753,7 @@ def closing_slide(workspace, lane):
             workspace[SliderRowStart.BRANCH_SCALE + lane] * workspace[RowStart.YIELD_LENGTH + lane]
         )
         return start + workspace[SliderRowStart.DIRECTION + lane] * length
-    before = stacked_slide(k - 1, workspace, lane)
+    before = find_stacked_reversal_slide(k - 1, workspace, lane)
     if k == 1 and workspace[SliderRowStart.KEEPS_FIRST_LOADING + lane] > 0.0:
         return 2 * before - start
     return before

@@ -1,4 +1,4 @@
-"""Readings of the last cycles, accumulated in the march: peaks, loop, sticks and phasors.
+"""Measures of the last cycles, accumulated during the march: peaks, loop, sticks and phasors.
 
 Between two instants that the march knows, the acceleration and the friction are cubics through their values and rates, so
 a peak between steps is found too. A step with an event is read in two segments, before and after the event.
@@ -12,7 +12,7 @@ from ...friction.flags_kernels import NJIT_INLINE
 from . import lane_kernels as lanes
 from . import rigid_kernels as law
 from .rigid_kernels import AngleStep, LaneState, cubic_peak, drive_after
-from .rows_kernels import FIRST_READING, GROUP_BITS, LANES, N_READINGS, RowStart
+from .rows_kernels import FIRST_MEASURE, GROUP_BITS, LANES, N_MEASURES, RowStart
 
 # Codes of the instants of a step at which `friction_rate` of a law can be evaluated.
 AT_START = 0
@@ -22,7 +22,7 @@ AT_END = 3
 
 
 class Instant(NamedTuple):
-    """State of a lane at an instant: drive, displacement, friction over mass and acceleration."""
+    """State of a lane at an instant: drive, displacement, friction per unit mass, acceleration."""
 
     sine: float
     cosine: float
@@ -32,7 +32,7 @@ class Instant(NamedTuple):
 
 
 class Peaks(NamedTuple):
-    """Peak absolute output acceleration [m s-2] and peak friction over mass [m] in a segment."""
+    """Peaks in a segment: absolute output acceleration [m s-2] and friction per unit mass [m]."""
 
     acceleration: float
     friction: float
@@ -95,7 +95,7 @@ def output_jerk(workspace, lane, instant, friction_rate):
         See `rigid_kernels.friction_force`.
     instant : Instant
     friction_rate : float
-        Rate of the friction over the mass [m].
+        Rate of the friction force per unit mass [m].
 
     Returns
     -------
@@ -147,7 +147,7 @@ def segment_peaks(workspace, lane, first, last, angle, when, last_when):
 
 @njit(**NJIT_INLINE)
 def instant_friction_rate(workspace, lane, instant, when):
-    """Return the derivative of the friction over mass with respect to the drive angle.
+    """Return the derivative of the friction force per unit mass with respect to the drive angle.
 
     Parameters
     ----------
@@ -167,9 +167,9 @@ def instant_friction_rate(workspace, lane, instant, when):
 
 @njit(**NJIT_INLINE)
 def observe_step(workspace, lane, step):
-    """Advance a lane over a step without an event and update its readings.
+    """Advance a lane over a step that contains no event, and update its measures.
 
-    A lane that has an event is marked and stays.
+    A lane whose step contains an event is marked and does not advance.
 
     Parameters
     ----------
@@ -241,9 +241,9 @@ def add_sample(workspace, lane, sine, cosine, slide, friction):
 
 @njit(**NJIT_INLINE)
 def observe_event_step(workspace, lane, step):
-    """Advance a lane over a step with an event and update its readings.
+    """Advance a lane over a step that contains an event, and update its measures.
 
-    The segments before and after the event are read separately.
+    The segments before and after the event are measured separately.
 
     Parameters
     ----------
@@ -305,7 +305,7 @@ def add_peaks(workspace, lane, acceleration, friction):
     acceleration : float
         Absolute acceleration of the output [m s-2].
     friction : float
-        Absolute friction over the mass [m].
+        Absolute friction force per unit mass [m].
     """
     workspace[RowStart.MAX_ACCELERATION + lane] = max(
         workspace[RowStart.MAX_ACCELERATION + lane], acceleration
@@ -336,7 +336,7 @@ def add_slip_range(workspace, lane, event, end):
 
 @njit(**NJIT_INLINE)
 def add_sticks(workspace, lane, first, second, event, angle):
-    """Add the stick and slip fractions of a step with an event to the readings.
+    """Add the stick and slip fractions of a step with an event to the measures.
 
     The start of a slip and the extremes of the slip are included.
 
@@ -387,7 +387,7 @@ def add_sticks(workspace, lane, first, second, event, angle):
 
 @njit(**NJIT_INLINE)
 def lane_friction(lane, workspace, sine):
-    """Return the friction over mass of a lane [m], given the sine of the drive angle.
+    """Return the friction force per unit mass of a lane [m], given the sine of the drive angle.
 
     Parameters
     ----------
@@ -406,7 +406,7 @@ def lane_friction(lane, workspace, sine):
 
 @njit(**NJIT_INLINE)
 def start_observed_cycle(lane, workspace):
-    """Start the readings of a lane for one cycle."""
+    """Reset the measures of a lane at the start of an observed cycle."""
     workspace[RowStart.CYCLE_START + lane] = workspace[RowStart.SLIDE + lane]
     workspace[RowStart.SLIDE_SUM + lane] = 0.0
     workspace[RowStart.FORCE_SUM + lane] = 0.5 * lane_friction(lane, workspace, 0.0)
@@ -417,7 +417,7 @@ def start_observed_cycle(lane, workspace):
 
 @njit(**NJIT_INLINE)
 def finish_observed_cycle(lane, workspace, is_first, n_cycles, angle):
-    """Add range, secant stiffness and means of a completed cycle to the readings.
+    """Add range, secant stiffness and means of a completed cycle to the measures.
 
     Parameters
     ----------
@@ -477,7 +477,7 @@ def record_accelerations(workspace, acceleration, step, sine):
 
 @njit(**NJIT_INLINE)
 def load_observed_cases(first, cases, order, motion, workspace):
-    """Load cases into the lanes and clear their readings.
+    """Load cases into the lanes and clear their measures.
 
     Parameters
     ----------
@@ -488,7 +488,7 @@ def load_observed_cases(first, cases, order, motion, workspace):
     """
     for lane in range(LANES):
         lanes.load_case(order[min(first + lane, len(order) - 1)], lane, cases, motion, workspace)
-        for n in range(FIRST_READING, FIRST_READING + N_READINGS):
+        for n in range(FIRST_MEASURE, FIRST_MEASURE + N_MEASURES):
             workspace[n * LANES + lane] = 0.0
         slip = law.irreversible_slide(
             workspace[RowStart.SLIDE + lane], workspace[RowStart.MEMORY + lane], workspace, lane
@@ -500,29 +500,29 @@ def load_observed_cases(first, cases, order, motion, workspace):
 
 
 @njit(**NJIT_INLINE)
-def observe_cycle(workspace, marked, table, n_busy, acceleration, first_step):
-    """March the first lanes over one cycle and collect its readings.
+def observe_cycle(workspace, marked, table, n_active, acceleration, first_step):
+    """Advance the active lanes by one drive cycle, and measure it.
 
-    They are the first `n_busy` lanes.
+    They are the first `n_active` lanes.
 
     Parameters
     ----------
     workspace, marked, table, acceleration : array
         See `loop_kernels.observe`.
-    n_busy : int
+    n_active : int
         Number of lanes that have a case.
     first_step : int
         Number of steps before this cycle.
     """
     angle = table[2, 0]
-    width = (n_busy + (1 << GROUP_BITS) - 1) >> GROUP_BITS << GROUP_BITS
-    for lane in range(n_busy):
+    width = (n_active + (1 << GROUP_BITS) - 1) >> GROUP_BITS << GROUP_BITS
+    for lane in range(n_active):
         start_observed_cycle(lane, workspace)
     for k in range(table.shape[1] - 1):
         step = AngleStep(table[0, k], table[1, k], table[0, k + 1], table[1, k + 1], angle)
         law.prepare_step(workspace, step.s0, step.c0)
         for lane in range(width):
             observe_step(workspace, lane, step)
-        for n in range(lanes.collect_marked_lanes(workspace, marked, n_busy)):
+        for n in range(lanes.collect_marked_lanes(workspace, marked, n_active)):
             observe_event_step(workspace, marked[n], step)
         record_accelerations(workspace, acceleration, first_step + k + 1, step.s1)

@@ -1,6 +1,7 @@
 """First-loading curve of Segalman's Iwan model, in closed form.
 
-With the force over the stiffness and YIELD_LENGTH, the slide over YIELD_LENGTH w, and the numbers chi and q of the law,
+With the force divided by the stiffness and YIELD_LENGTH, the slide w in multiples of YIELD_LENGTH, and
+the numbers chi and q of the law,
 
     g(w) = w (1 - q w^(chi + 1)/(chi + 2)) up to w = 1.
 
@@ -120,7 +121,7 @@ def force_and_slope(w, workspace, lane, when):
 def mean_slip(w, force, workspace, lane, when):
     """Return the mean slip of the sliders, weighted by friction, in scaled form.
 
-    It is the slip at w over the stiffness and YIELD_LENGTH.
+    It is the slip at w divided by the stiffness and YIELD_LENGTH.
 
     Parameters
     ----------

@@ -13,9 +13,9 @@ from . import rows_kernels as rows
 from .rows_kernels import Row
 from .run import MASING_LAWS, Cases, LaneResults, has_one_stretch, law_state
 
-# Measures of an interface in `dynamics.events`, the corresponding readings of the lanes, and their
+# Measures of an interface in `dynamics.events`, the corresponding measures of the lanes, and their
 # units; lanes use m instead of N, and drive angles instead of times.
-INTERFACE_READINGS = (
+INTERFACE_MEASURES = (
     (InterfaceMeasure.MAX_SLIP, "MAX_SLIP", "m"),
     (InterfaceMeasure.MIN_SLIP, "MIN_SLIP", "m"),
     (InterfaceMeasure.MEAN_RANGE, "MEAN_RANGE", "m"),
@@ -28,7 +28,7 @@ INTERFACE_READINGS = (
     (InterfaceMeasure.FIRST_FORCE, "FIRST_MEAN_FORCE", "N s"),
     (InterfaceMeasure.LAST_FORCE, "LAST_MEAN_FORCE", "N s"),
 )
-RUN_READINGS = (
+RUN_MEASURES = (
     (RunMeasure.MAX_ACCELERATION, "MAX_ACCELERATION"),
     (RunMeasure.N_RELEASES, "SLIP_STARTS"),
     (RunMeasure.RELEASE_COS, "START_COS"),
@@ -116,7 +116,7 @@ def _free_acceleration(law: str, cases: Cases, motion) -> np.ndarray:
 
 
 def _friction(law: str, cases: Cases, motion) -> np.ndarray:
-    """Return the friction over mass (n,) [m] where the drive passes 0."""
+    """Return the friction force per unit mass (n,) [m] where the drive passes 0."""
     x = motion[:, Row.SLIDE]
     memory = motion[:, Row.MEMORY]
     slip_sign = motion[:, Row.SLIP_SIGN]
@@ -129,7 +129,7 @@ def _friction(law: str, cases: Cases, motion) -> np.ndarray:
 
 
 def _elastic_energy(law: str, cases: Cases, motion) -> np.ndarray:
-    """Return the elastic energy (n,) of the interface over mass [m^2]."""
+    """Return the elastic energy (n,) of the interface per unit mass [m^2]."""
     if law in MASING_LAWS:
         return _slider_energy(law, cases, motion)
     if has_one_stretch(law):
@@ -140,7 +140,7 @@ def _elastic_energy(law: str, cases: Cases, motion) -> np.ndarray:
 
 
 def _slider_energy(law: str, cases: Cases, motion) -> np.ndarray:
-    """Return the elastic energy (n,) of the sliders of the Masing (Iwan) model over mass [m^2].
+    """Return the elastic energy (n,) of the sliders of the Masing (Iwan) model per unit mass [m^2].
 
     It is computed as in `masing_kernels.slider_energy`.
     """
@@ -169,9 +169,7 @@ def _slider_energy(law: str, cases: Cases, motion) -> np.ndarray:
     return law_state(law, motion, "TURN_ENERGY") + m * branch
 
 
-def reading_of_runs(
-    law: str, cases: Cases, marched: LaneResults, energy, omega, extremes
-) -> Reading:
+def measure_runs(law: str, cases: Cases, marched: LaneResults, energy, omega, extremes) -> Reading:
     """Return the measures of the observed cycles of n runs.
 
     Parameters
@@ -201,14 +199,14 @@ def reading_of_runs(
     run[:, [RunMeasure.COS_1, RunMeasure.SIN_1, RunMeasure.COS_3, RunMeasure.SIN_3]] = (
         accelerations.T / omega[:, None]
     )
-    for column, name in RUN_READINGS:
-        run[:, column] = marched.reading(name)
+    for column, name in RUN_MEASURES:
+        run[:, column] = marched.get_measure(name)
     last = marched.history[:, -extremes.shape[1] :]
     face[:, InterfaceMeasure.MIN_SLIDE] = last[..., 0].min(axis=1)
     face[:, InterfaceMeasure.MAX_SLIDE] = last[..., 1].max(axis=1)
-    for column, name, unit in INTERFACE_READINGS:
+    for column, name, unit in INTERFACE_MEASURES:
         scale = energy if "N" in unit else 1.0
-        face[:, column] = (scale / omega if "s" in unit else scale) * marched.reading(name)
+        face[:, column] = (scale / omega if "s" in unit else scale) * marched.get_measure(name)
     path = end[:, Row.SLIP_PATH] - start[:, Row.SLIP_PATH]
     if has_one_stretch(law):
         work = path
@@ -224,8 +222,8 @@ def reading_of_runs(
     )
     face[:, InterfaceMeasure.START_SLIDE] = start[:, Row.SLIDE]
     face[:, InterfaceMeasure.END_SLIDE] = end[:, Row.SLIDE]
-    n_secants = marched.reading("N_SECANTS")
-    secant = marched.reading("SECANT_SUM") / np.where(n_secants > 0, n_secants, 1.0)
+    n_secants = marched.get_measure("N_SECANTS")
+    secant = marched.get_measure("SECANT_SUM") / np.where(n_secants > 0, n_secants, 1.0)
     face[:, InterfaceMeasure.SECANT] = np.where(n_secants > 0, energy * secant, np.nan)
     return Reading(run, face[:, None], angle / omega, 2 * np.pi / omega)
 
@@ -256,10 +254,10 @@ def integrate_harmonics(law: str, cases: Cases, marched: LaneResults, angle) -> 
     second = step * step / 12
     fourth = step**4 / 720
     trapezoid = step / 2 * x + second * v
-    cosine = step * marched.reading("COS_1") + trapezoid - fourth * (j - 3 * v)
-    cosine3 = step * marched.reading("COS_3") + trapezoid - fourth * (j - 27 * v)
-    sine = step * marched.reading("SIN_1") + second * x - fourth * (3 * a - x)
-    sine3 = step * marched.reading("SIN_3") + 3 * second * x - fourth * (9 * a - 27 * x)
+    cosine = step * marched.get_measure("COS_1") + trapezoid - fourth * (j - 3 * v)
+    cosine3 = step * marched.get_measure("COS_3") + trapezoid - fourth * (j - 27 * v)
+    sine = step * marched.get_measure("SIN_1") + second * x - fourth * (3 * a - x)
+    sine3 = step * marched.get_measure("SIN_3") + 3 * second * x - fourth * (9 * a - 27 * x)
     by_cosine = -v - cosine
     by_sine = x - sine
     acceleration = Integrals(
@@ -291,7 +289,7 @@ def _end_differences(law: str, cases: Cases, start, end) -> tuple:
 
 
 def _friction_rate(law: str, cases: Cases, motion) -> np.ndarray:
-    """Return the derivative (n,) of the friction over mass with respect to the drive angle."""
+    """Return the derivative (n,) of the friction force per unit mass with respect to the drive angle."""
     if law in MASING_LAWS:
         tangent = law_state(law, motion, "TANGENT")
     else:

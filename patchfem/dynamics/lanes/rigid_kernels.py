@@ -53,7 +53,7 @@ class AngleStep(NamedTuple):
 
 
 class TriedStep(NamedTuple):
-    """State after a step tried without events, and whether an event makes it invalid."""
+    """State after a trial step that ignores events, and whether an event makes it invalid."""
 
     slide: float
     speed: float
@@ -65,7 +65,7 @@ class StepOutcome(NamedTuple):
     """State of a lane at the end of a step, and the event in the step.
 
     - `slide`, `speed`, `slip_sign`, `memory`: at the end of the step.
-    - `event`: fraction of the step before the event, 1 without an event.
+    - `event`: fraction of the step before the event, 1 if there is no event.
     - `event_slide`, `event_speed`, `event_memory`: at the event, otherwise at the end.
     - `reversal_slide`: slide where the speed changes its sign, otherwise at the end.
     - `jump`: change of the acceleration at the event.
@@ -83,8 +83,8 @@ class StepOutcome(NamedTuple):
     jump: float
 
 
-class StickReading(NamedTuple):
-    """Fractions of stick and slip in a segment of a step.
+class StickFractions(NamedTuple):
+    """Stick and slip fractions in a segment of a step.
 
     - `fraction`: fraction of the segment in which the interface sticks.
     - `slip_start`: fraction of the segment at which a slip starts inside it, 2 if none does.
@@ -190,9 +190,9 @@ def drive_after(sine, cosine, angle):
 
 @njit(**NJIT_INLINE)
 def friction_force(state, sine, workspace, lane):
-    """Return the friction force over mass [m], positive if it resists positive slip.
+    """Return the friction force per unit mass [m], positive if it resists positive slip.
 
-    Times are angles of the drive, so a force over mass is a length.
+    Times are angles of the drive, so a force per unit mass is a length.
 
     Parameters
     ----------
@@ -217,7 +217,7 @@ def friction_force(state, sine, workspace, lane):
 
 @njit(**NJIT_INLINE)
 def friction_rate(state, acceleration, workspace, lane, when):
-    """Return the derivative of the friction over mass with respect to the drive angle.
+    """Return the derivative of the friction force per unit mass with respect to the drive angle.
 
     The result is 0 for a rigid contact, whose output does not move in a stick.
 
@@ -253,13 +253,13 @@ def prepare_step(workspace, s0, c0):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def records_own_peaks():
-    """Return whether `resolve_step` adds peaks and work of a step to the readings itself."""
+    """Return whether `resolve_step` itself adds the peaks and the work of a step to the measures."""
     return False
 
 
 @njit(**NJIT_INLINE)
 def slide_at_reversal(x, v, x1, v1, angle):
-    """Return the relative displacement at a reversal in a step without an event.
+    """Return the relative displacement at a reversal in a step that contains no event.
 
     Such a step has no reversal, so the result is the slide at its end.
 
@@ -319,7 +319,7 @@ def slip_increment(memory, event_memory, memory1, workspace, lane):
 
 @njit(**NJIT_INLINE)
 def friction_at_reversal(x, slip_sign, memory, event_memory, workspace, lane):
-    """Return the friction over mass at a reversal.
+    """Return the friction force per unit mass at a reversal.
 
     It is 0, the mean of the values before and after the reversal.
 
@@ -371,11 +371,11 @@ def stick_fractions(start, end, workspace, lane, angle):
 
     Returns
     -------
-    StickReading
+    StickFractions
     """
     fraction = 1.0 if start.state.slip_sign == 0.0 else 0.0
     slip = irreversible_slide(end.state.slide, end.state.memory, workspace, lane)
-    return StickReading(fraction, 2.0, slip)
+    return StickFractions(fraction, 2.0, slip)
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
@@ -454,7 +454,7 @@ def linear_step(workspace, lane, s0, c0):
 
 @njit(**NJIT_INLINE)
 def try_step(workspace, lane, step, is_observed):
-    """Try a step without events: no stop, release or reversal.
+    """Try a step as if it contained no stop, release or reversal.
 
     Parameters
     ----------

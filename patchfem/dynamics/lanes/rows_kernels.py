@@ -4,7 +4,7 @@ The workspace is a flat array in which row r of lane i is the element r * LANES 
 distance of any two elements and takes several lanes at once. Kernels write `workspace[RowStart.SLIDE + lane]`:
 `RowStart` has the elements of lane 0 for every row of `Row`, and `StretchRowStart`, `SliderRowStart` and
 `TableRowStart` for the rows of the state of a law. Lengths are in m and times are angles of the drive [rad], so a
-force over the mass is in m and an energy over the mass in m^2.
+force per unit mass is in m and an energy per unit mass in m^2.
 """
 
 from enum import IntEnum
@@ -22,11 +22,11 @@ class Row(IntEnum):
 
     Motion: the state, then the sums of the run, then the extremes and the phasor of the cycle.
 
-    - SLIDE, SPEED: relative displacement x [m], and its derivative x' by the angle of the drive [m]
+    - SLIDE, SPEED: relative displacement x [m], and its derivative x' with respect to the angle of the drive [m]
     - SLIP_SIGN: sign of the slip, 0 while the interface sticks
     - MEMORY: state of the law [m]: slide of the unloaded spring, stretch of a bond, or friction
-      over mass (Masing)
-    - SLIP_PATH: length of the path of slip [m]; the friction work over the mass [m^2] in laws of
+      force per unit mass (Masing)
+    - SLIP_PATH: length of the path of slip [m]; the friction work per unit mass [m^2] in laws of
       one stretch
     - WORK_SUM, LOSS_SUM, POWER_SUM: sums of sin * x' (work of the drive), of x'^2 (viscous loss)
       and of |sin * x'|
@@ -41,8 +41,8 @@ class Row(IntEnum):
       linear in x and v (A), a constant force (R), and the sine (S) and the cosine (C) of the drive
     - B11 to B22, QX, QV, TX, TV, UX, UV: the same with the spring of a stick
     - DAMPING, STIFFNESS, DRIVE: of x'' + DAMPING x' + STIFFNESS x = DRIVE sin - f; DRIVE in m
-    - KINETIC, STATIC: friction over the mass in a slip, and its maximum in a stick [m]
-    - SPRING: slope of the friction over the slide in a stick, 0 for a rigid contact
+    - KINETIC, STATIC: friction force per unit mass in a slip, and its maximum in a stick [m]
+    - SPRING: slope of the friction with respect to the slide in a stick, 0 for a rigid contact
     - YIELD_LENGTH: elastic slide at which the interface slips as a whole [m]
     - OUTPUT_GAIN, BASE_GAIN: acceleration of the output per x'', and of the base per sine of the
       drive [m s-2]
@@ -50,13 +50,13 @@ class Row(IntEnum):
       angle of a step [rad], and 0.5/cos(STEP/2), by which the sine in the middle of a step follows
       from the sum of those at its ends
     - LAW_NUMBERS: first of the numbers of a law without an exact step
-    - HALF_SLIP: of Masing's rule, the slide over YIELD_LENGTH from which half of the friction slips
+    - HALF_SLIP: of Masing's rule, slide in multiples of YIELD_LENGTH from which half of the friction slips
 
-    Readings of the observed cycles.
+    Measures of the observed cycles.
 
     - MAX_ACCELERATION: largest absolute acceleration of the output [m s-2]
     - STICK_ANGLE: angle of the drive in which the interface sticks [rad]
-    - MAX_FORCE: largest friction over the mass [m]
+    - MAX_FORCE: largest friction force per unit mass [m]
     - MAX_SLIP, MIN_SLIP: largest and smallest irreversible slide [m]
     - COS_1, SIN_1, COS_3, SIN_3: sums of x times cosine and sine of the angle, and of three times
       the angle
@@ -66,7 +66,7 @@ class Row(IntEnum):
     - SLIP_STARTS, START_COS, START_SIN: number of starts of a slip, and sums of cosine and sine of
       twice their angles
     - FORCE_AT_MAX, FORCE_AT_MIN: friction at the largest and smallest slide of the cycle, nan
-      without a reversal there
+      if there is no reversal
     - MEAN_RANGE: mean over the cycles of the range of the slide [m]
     - SECANT_SUM, N_SECANTS: sum of the secant stiffnesses of the cycles that have one, and their
       number
@@ -167,8 +167,8 @@ N_STATE = int(Row.A11)
 FIRST_NUMBER = N_STATE
 N_NUMBERS = Row.MAX_ACCELERATION - Row.A11
 N_LAW_NUMBERS = 6
-FIRST_READING = int(Row.MAX_ACCELERATION)
-N_READINGS = Row.CASE_INDEX - Row.MAX_ACCELERATION
+FIRST_MEASURE = int(Row.MAX_ACCELERATION)
+N_MEASURES = Row.CASE_INDEX - Row.MAX_ACCELERATION
 
 # First row of the stored cycle ends, the latest first. A cycle end holds STATE_ROWS,
 # SUM_ROWS and the first variables of the law, from which `extrapolation_kernels`
@@ -204,7 +204,7 @@ LAW_STATE = CYCLE_ENDS + N_CYCLE_ENDS * CYCLE_END_SIZE
 class StretchRow(IntEnum):
     """Row indices of the variables of a friction law with a single stretch.
 
-    - FRICTION: friction over the mass [m]
+    - FRICTION: friction force per unit mass [m]
     - STRETCH_SQUARE: mean square of the stretches [m^2]
     - STEP_WORK: friction work of the last step [m^2]
     - IS_OBSERVED: 1 if the step is read
@@ -221,20 +221,20 @@ class SliderRow(IntEnum):
 
     - DIRECTION: sign of the speed
     - BRANCH_SCALE: m of Masing's rule
-    - TURN_SLIDE, TURN_FORCE, TURN_SLIP, TURN_ENERGY: slide, friction over the mass, irreversible
+    - TURN_SLIDE, TURN_FORCE, TURN_SLIP, TURN_ENERGY: slide, friction force per unit mass, irreversible
       slide [m] and elastic energy [m^2] at the last reversal, which are pushed onto the stack
       together
     - NEXT_EVENT: slide of the next event [m]
-    - TANGENT: present slope of the friction over the slide
+    - TANGENT: present slope of the friction with respect to the slide
     - TANGENT_START, TANGENT_BEFORE, TANGENT_AFTER, TANGENT_END: the same at the start of the step,
       before and after its event, and at its end
     - STEP_SLIP: path of slip in the step [m]
-    - REVERSAL_FORCE: friction over the mass at the last reversal that happened, also if its loop
+    - REVERSAL_FORCE: friction force per unit mass at the last reversal that happened, also if its loop
       has closed [m]
     - EVER_SLIPPED: 1 once half of the friction has slipped
     - KEEPS_FIRST_LOADING: 1 while the start of the first loading is at the bottom of the stack
     - ALL_SLIP: 1 while all sliders slip
-    - MAX_DROPPED_GAP: largest gap, over its size, of a loop that was dropped from a full stack
+    - MAX_DROPPED_GAP: largest gap, relative to its size, of a loop that was dropped from a full stack
     - N_REVERSALS: number of reversals on the stack
     - STICK_FRACTION: fraction of the segment before the event in which the interface sticks
     - INVERSE_LENGTH: DIRECTION over m YIELD_LENGTH
@@ -296,7 +296,7 @@ class TableRow(IntEnum):
 class YieldColumn(IntEnum):
     """Column indices of a yield in the table of a first-loading curve.
 
-    - YIELD: its slide over YIELD_LENGTH
+    - YIELD: its slide in multiples of YIELD_LENGTH
     - FORCE, SLOPE, MOMENT: F, S and B of `table_curve_kernels` from there on
     """
 

@@ -28,8 +28,8 @@ class Cases(NamedTuple):
     Times are angles of the drive, and x is the relative displacement [m].
 
     - `damping`, `stiffness`, `drive` (n,): D, W and P.
-    - `kinetic`, `static` (n,): friction over the mass in a slip, and its maximum in a stick [m].
-    - `spring` (n,): slope of the friction over the slide in a stick, 0 for a rigid contact.
+    - `kinetic`, `static` (n,): friction force per unit mass in a slip, and its maximum in a stick [m].
+    - `spring` (n,): slope of the friction with respect to the slide in a stick, 0 for a rigid contact.
     - `yield_length` (n,): elastic slide at which the interface slips [m].
     - `output_gain`, `base_gain` (n,) [m s-2]: acceleration of the output per x'', and of the base
       per sine.
@@ -59,7 +59,7 @@ class LaneResults(NamedTuple):
     - `start`, `observed_start`, `motion` (n, N_STATE and the state of the law): motion at the
       start, at the start of the observed cycles, and at the end.
     - `history` (n, c, 4): smallest and largest slide and phasor [m] of all cycles.
-    - `readings` (n, N_READINGS): readings of the observed cycles.
+    - `measures` (n, N_MEASURES): measured quantities of the observed cycles.
     - `n_before`, `n_observed` (n,): number of cycles before the observed ones, and of these.
     - `step`: angle of a step [rad].
     """
@@ -68,14 +68,14 @@ class LaneResults(NamedTuple):
     observed_start: np.ndarray
     motion: np.ndarray
     history: np.ndarray
-    readings: np.ndarray
+    measures: np.ndarray
     n_before: np.ndarray
     n_observed: np.ndarray
     step: float
 
-    def reading(self, name: str) -> np.ndarray:
-        """Return a reading (n,) of the observed cycles by its name in `rows_kernels`."""
-        return self.readings[:, Row[name] - rows.FIRST_READING]
+    def get_measure(self, name: str) -> np.ndarray:
+        """Return the values (n,) of a measured quantity of the observed cycles by its row name."""
+        return self.measures[:, Row[name] - rows.FIRST_MEASURE]
 
 
 def has_one_stretch(law: str) -> bool:
@@ -134,7 +134,7 @@ def make_curve_tables(groups) -> np.ndarray:
     Returns
     -------
     (n, m) array
-        Two numbers without a meaning, the fraction of the last yield slide at which half of the friction slips, and the
+        Two unused numbers, the fraction of the last yield slide at which half of the friction slips, and the
         table of `table_curve_kernels`.
     """
     heads = np.ones((len(groups), 3))
@@ -423,7 +423,7 @@ def output_accelerations(law: str, cases: Cases, motion, cycles: int, steps: int
         cycles,
         np.zeros((n, cycles, 4)),
         np.zeros(n, np.int64),
-        np.zeros((n, rows.N_READINGS)),
+        np.zeros((n, rows.N_MEASURES)),
         accelerations,
         *make_workspace(numbers, motion),
     )
@@ -465,7 +465,7 @@ def march(law: str, cases: Cases, cycles: int, window: int, steps: int) -> LaneR
     motion = start.copy()
     history = np.zeros((n, cycles, 4))
     n_before = np.zeros(n, np.int64)
-    readings = np.zeros((n, rows.N_READINGS))
+    measures = np.zeros((n, rows.N_MEASURES))
     workspace = make_workspace(numbers, motion)
     loop.march(numbers, order, motion, table, cycles - window, history, n_before, *workspace)
     observed_start = motion.copy()
@@ -479,13 +479,13 @@ def march(law: str, cases: Cases, cycles: int, window: int, steps: int) -> LaneR
             count,
             history,
             n_before,
-            readings,
+            measures,
             np.empty((n, 0)),
             *workspace,
         )
     repeat_last_cycles(history, n_before + n_observed)
     runs_away = ~(np.abs(history[:, :, :2]).max(axis=(1, 2), initial=0.0) < MAX_SLIDE)
-    for values in (observed_start, motion, history, readings):
+    for values in (observed_start, motion, history, measures):
         values[runs_away] = np.nan
     step = 2 * np.pi / steps
-    return LaneResults(start, observed_start, motion, history, readings, n_before, n_observed, step)
+    return LaneResults(start, observed_start, motion, history, measures, n_before, n_observed, step)

@@ -1,6 +1,6 @@
 """First-loading curve of parallel Jenkins elements, linear between yields.
 
-With the force over the stiffness and YIELD_LENGTH, and the slide over YIELD_LENGTH w,
+With the force divided by the stiffness and YIELD_LENGTH, and the slide w in multiples of YIELD_LENGTH,
 
     g(w) = F + S w,
 
@@ -178,7 +178,7 @@ def force_and_slope(w, workspace, lane, when):
 def mean_slip(w, force, workspace, lane, when):
     """Return the mean slip of the sliders, weighted by friction, in scaled form.
 
-    It is the slip at w over the stiffness and YIELD_LENGTH.
+    It is the slip at w divided by the stiffness and YIELD_LENGTH.
 
     Parameters
     ----------

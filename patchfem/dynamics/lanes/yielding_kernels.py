@@ -16,7 +16,7 @@ from .rigid_kernels import (
     LaneState,
     Motion,
     StepOutcome,
-    StickReading,
+    StickFractions,
     TriedStep,
     irreversible_slide,
     is_sticking,
@@ -64,7 +64,7 @@ MIN_DIVISOR = 1e-300  # smallest divisor, which prevents a division by 0
 
 
 class SpeedCurve(NamedTuple):
-    """Speed over a step without an event, v + u (m0 + u (c2 + u c3)) for 0 <= u <= 1."""
+    """Speed over a step that contains no event, v + u (m0 + u (c2 + u c3)) for 0 <= u <= 1."""
 
     x: float
     v: float
@@ -106,7 +106,7 @@ def can_extrapolate(workspace, lane):
 
 @njit(**NJIT_INLINE)
 def friction_force(state, sine, workspace, lane):
-    """Return the friction force over mass [m], positive if it resists positive slip.
+    """Return the friction force per unit mass [m], positive if it resists positive slip.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def friction_force(state, sine, workspace, lane):
 
 @njit(**NJIT_INLINE)
 def friction_rate(state, acceleration, workspace, lane, when):
-    """Return the derivative of the friction over mass with respect to the drive angle.
+    """Return the derivative of the friction force per unit mass with respect to the drive angle.
 
     The result is 0 after an event, because a stick that starts there moves with its slip.
 
@@ -143,7 +143,7 @@ def friction_rate(state, acceleration, workspace, lane, when):
 
 @njit(**NJIT_INLINE)
 def friction_at_reversal(x, slip_sign, memory, event_memory, workspace, lane):
-    """Return the friction over mass at a reversal, before which the interface may have slipped.
+    """Return the friction force per unit mass [m] at a reversal that may follow a slip.
 
     Parameters
     ----------
@@ -172,14 +172,14 @@ def stick_fractions(start, end, workspace, lane, angle):
 
     Returns
     -------
-    StickReading
+    StickFractions
     """
     if start.state.slip_sign != 0.0:
-        return StickReading(0.0, 2.0, end.state.memory)
+        return StickFractions(0.0, 2.0, end.state.memory)
     slip = abs(end.state.memory - start.state.memory)
     speed = abs(start.state.speed) * angle
     slips = min(2 * slip / speed, 1.0) if speed > 0.0 else 0.0
-    return StickReading(1.0 - slips, 0.0 if slips > 0.0 else 2.0, end.state.memory)
+    return StickFractions(1.0 - slips, 0.0 if slips > 0.0 else 2.0, end.state.memory)
 
 
 @njit(**NJIT_INLINE)
@@ -219,7 +219,7 @@ def linear_step(workspace, lane, s0, c0):
 
 @njit(**NJIT_INLINE)
 def try_step(workspace, lane, step, is_observed):
-    """Try a step without events: no stop, yield or reversal.
+    """Try a step as if it contained no stop, yield or reversal.
 
     Parameters
     ----------
@@ -467,7 +467,7 @@ def resolve_slip(workspace, lane, curve, end, is_reversed, reversal):
         See `resolve_step`.
     curve : SpeedCurve
     end : Motion
-        Motion after the step without an event.
+        Motion after the step if events are ignored.
     is_reversed : bool
     reversal : float
         Place of the reversal on the curve.

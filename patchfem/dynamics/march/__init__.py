@@ -8,9 +8,9 @@ dq of the slide. The modes then move exactly (`dynamics.propagator`), so the inc
 
     dq = free - beta F(dq),
 
-where `free` are the increments without friction and beta is the compliance of the ports in a step. The mean force times
-dq is exactly the work of the law, so the sum of all energies never grows by itself, for any step. The method is of
-second order. The table lists the module that solves the equation.
+where `free` are the increments in the absence of friction and beta is the compliance of the ports in a step. The
+mean force times dq is exactly the work of the law, so the sum of all energies never grows by itself, for any step. The
+method is of second order. The table lists the module that solves the equation.
 
 ========================================= ============================ ==============================================
 interface                                 module                       method
@@ -19,7 +19,7 @@ one contact under a constant load         `interfaces`                 Newton's 
 several elements, or elements and contact `faces_kernels`              block descent, then Newton on all forces
 set-valued Coulomb elements               `stops_kernels`              stops and releases inside the step
 a load that changes                       `pressing_kernels`           path mean of the contact, secant for the coupling
-bonds behind shear modes, many cycles     `passing_kernels`            the same, without stored samples
+coupled bond points, many cycles          `passing_kernels`            the same, sums instead of samples
 the same, many cases                      `lanes_kernels`              the same, 32 cases side by side
 ========================================= ============================ ==============================================
 
@@ -30,10 +30,10 @@ is periodic to round-off are skipped (`dynamics.periodicity`).
 
 Failures: an unknown set of stick and slip states, or a residual above 1e-11 of the friction limit, ends the run as
 not_converged with a message; a list of bonds beyond two million entries is `Missing`. Cost: 0.1 to 0.3 us per step and a
-few ns per point of a contact, so a cycle of 200 steps takes 20 to 60 us, and 150 ns per step for bonds behind shear modes.
+few ns per point of a contact, so a cycle of 200 steps takes 20 to 60 us, and 150 ns per step for coupled bond points.
 
 Modules. `march` marches a model over its cycles with a `run.Run`, which holds the state and calls the compiled loop;
-`recording` keeps its samples, and `folding` (arrays in `folded_arrays`) marches without samples. `models`, `joints` and
+`recording` keeps its samples, and `cycle_sums` (arrays in `cycle_sum_arrays`) stores sums instead. `models`, `joints` and
 `varying_load` describe contacts, elements and loads; `faces` and `element_arrays` have the arrays of the elements. `lanes`
 marches many cases, whose array rows `lane_rows` names. `instances` compiles one loop per contact, set of laws and load from
 the source of `loop_kernels`, with the flags of `parts_kernels`. Read `march` first, then `run`, then `loop_kernels`, then

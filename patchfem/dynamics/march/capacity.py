@@ -21,7 +21,7 @@ LONG_LIST_ADVICE = (
 
 
 class SavedState(NamedTuple):
-    """Copies of the arrays of a run, from which a part of the march is repeated.
+    """Copies of the arrays of a run, for repeating a part of the march.
 
     - `entries`: used entries of every list of bonds.
     - `fields`: other arrays of the contact by name.
@@ -34,9 +34,9 @@ class SavedState(NamedTuple):
 
 
 def copy_state(contact, *others) -> SavedState | None:
-    """Copy the arrays of a contact with a list of bonds, and other arrays of a run.
+    """Copy the arrays of a contact with a bond list, and other arrays of a run.
 
-    The result is None for a contact without a list.
+    The result is None if the contact has no list.
     """
     if not hasattr(contact, "bondlist"):
         return None

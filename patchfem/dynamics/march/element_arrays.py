@@ -62,7 +62,7 @@ class ContactIndex(IntEnum):
 
 
 class PortRow(IntEnum):
-    """Rows of `PortElements.port`: slide increment [m] and end speed [m/s] without forces."""
+    """Rows of `PortElements.port`: force-free slide increment [m] and end speed [m/s]."""
 
     FREE_SLIDE = 0
     FREE_SPEED = 1
@@ -109,7 +109,7 @@ class LimitRow(IntEnum):
 class FaceRow(IntEnum):
     """Rows of `SetValuedElements.field`: state of a set-valued element (a face) in a step.
 
-    - FREE_SLIDE, FREE_SPEED: increment of the slide [m] and speed at the end [m/s] without the forces of the faces
+    - FREE_SLIDE, FREE_SPEED: increment of the slide [m] and speed at the end [m/s] in the absence of face forces
     - START_SPEED: speed at the start [m/s]
     - WAS_RESTING: 1 if the face rests at the start of the step
     - HOLDING_START, HOLDING_END: force that would hold the face, at the start and at the end of the step [N]
@@ -167,7 +167,7 @@ N_LOAD_COLUMNS = len(LoadColumn)
 
 
 class SingleContact(NamedTuple):
-    """Array of a march with a single contact and no elements.
+    """Arrays of a march with a single contact and no elements.
 
     - goal: (1,) tolerance of the residual of the contact [N]
 
@@ -198,7 +198,7 @@ class SetValuedElements(NamedTuple):
 class PortElements(NamedTuple):
     """Arrays of friction elements and springs (e,) on ports (p,) of a march.
 
-    They act in addition to a contact on port 0 or in its place.
+    They supplement or replace a contact on port 0.
 
     - rows: (p, n) displacement of every port per coordinate
     - compliances: (2, p, p), see `ComplianceRow`

@@ -24,7 +24,7 @@ TINY_FORCE = 1e-300
 def make_element_arrays(model, prop, modal_system, mass: float):
     """Return the arrays of the friction elements and springs at the start of a march.
 
-    The result is a `SingleContact` for a model without elements.
+    The result is a `SingleContact` if the model has no elements.
 
     Parameters
     ----------

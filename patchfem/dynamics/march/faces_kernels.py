@@ -68,7 +68,7 @@ class NewtonSchedule(NamedTuple):
 
     - next_turn: sweep of the next Newton step
     - pause: number of sweeps between two Newton steps
-    - worst: largest force change over its tolerance before the last Newton step
+    - worst: largest force change, relative to its tolerance, before the last Newton step
     """
 
     next_turn: int
@@ -80,7 +80,7 @@ class ContactSolution(NamedTuple):
     """Solution of the contact in a sweep of the block descent.
 
     - increment: increment of the slide of the contact [m]
-    - change: force change over the tolerance, infinite if the solution fails
+    - change: force change relative to the tolerance, infinite if the solution fails
     - iterations: number of iterations
     """
 
@@ -106,7 +106,7 @@ class EventStep(NamedTuple):
 def sample_elements(modal, system, row):
     """Write the state of all elements into a sample row; return that of the first interface.
 
-    Force and slip are those of the contact, or of the first element without a contact.
+    Force and slip are those of the contact, or of the first element if there is no contact.
 
     Parameters
     ----------
@@ -291,7 +291,7 @@ def solve_element(e, sweep, elements, dt):
     Returns
     -------
     float
-        Force change over the tolerance, infinite if the solution fails.
+        Force change relative to the tolerance, infinite if the solution fails.
     int
         Number of iterations.
     """
@@ -343,7 +343,7 @@ def extrapolate_increment(e, elements):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def find_force_change(force, last_force, free_force, e, elements):
-    """Return the change of an element force in a sweep, over its tolerance.
+    """Return the change of an element force in a sweep, relative to its tolerance.
 
     Parameters
     ----------
@@ -541,7 +541,7 @@ def release_slipping(elements):
 def accelerate_sweeps(sweep, max_change, last_max_change, schedule, modal_system, elements):
     """Take a Newton step on the forces of all elements if the block descent converges slowly.
 
-    This is done only without a contact. Laws with a slope are solved to the minimum of their potential; others
+    This is done only if there is no contact. Laws with a slope are solved to the minimum of their potential; others
     take a Newton step if the sweeps converge slowly. Newton's method can cycle between two states where laws are steep. So
     the pause doubles after each Newton step that did not reduce the change of the forces, and the sweeps between
     two steps converge.
@@ -551,9 +551,9 @@ def accelerate_sweeps(sweep, max_change, last_max_change, schedule, modal_system
     sweep : int
         Number of the sweep, from 0.
     max_change : float
-        Largest change of a force in the sweep, over its tolerance.
+        Largest change of a force in the sweep, relative to its tolerance.
     last_max_change : float
-        Largest change of a force in the sweep before, over its tolerance.
+        Largest change of a force in the previous sweep, relative to its tolerance.
     schedule : NewtonSchedule
     modal_system : interfaces.arrays.ModalArrays
     elements : element_arrays.PortElements
@@ -580,7 +580,7 @@ def accelerate_sweeps(sweep, max_change, last_max_change, schedule, modal_system
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def set_free_motion(elements):
-    """Write the slides and speeds of the set-valued elements without their own forces.
+    """Write the slides and speeds that the set-valued elements would have without their own forces.
 
     The forces of the contact and of all other elements act. The result is in the field of `elements.stops`.
     """
@@ -613,7 +613,7 @@ def set_free_motion(elements):
 def copy_set_valued_forces(elements):
     """Copy the mean forces of the set-valued elements from the event solution to elements.state.
 
-    Returns the largest force change over the tolerance.
+    Returns the largest force change relative to the tolerance.
     """
     stops = elements.stops
     worst = 0.0
@@ -673,7 +673,7 @@ def rests_in_step(table_row, system):
 def solve_with_events(start, table_row, system):
     """Solve a step with stops and releases of set-valued elements inside it.
 
-    The impulses at the end of the step are determined too. The first half of the sweeps determines which elements stop
+    The impulses at the end of the step are also determined. The first half of the sweeps determines which elements stop
     and slip. The other half keeps their slides and finds the forces of the other elements.
 
     Parameters
@@ -709,7 +709,9 @@ def solve_with_events(start, table_row, system):
                     n_iterations += count
         set_free_motion(elements)
         if sweep < MAX_EVENT_SWEEPS // 2:
-            if not (rests_in_step(table_row, system) or stop_kernels.follow_step(start.dt, stops)):
+            if not (
+                rests_in_step(table_row, system) or stop_kernels.follow_step_events(start.dt, stops)
+            ):
                 break
         if not stop_kernels.match_mean_forces(stops):
             break
@@ -870,7 +872,7 @@ def apply_end_impulses(motion, mass, elements):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def commit_step(start, increment, system):
-    """Update the memory of the contact and of all elements after a solved step.
+    """Update the memory of the contact and of all elements after a converged step.
 
     Parameters
     ----------
@@ -962,7 +964,7 @@ def limit_sampled_forces(elements):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def slide_freely(mean_force, elements):
-    """Let the only set-valued element slide through a step under a prescribed mean force.
+    """Move the only set-valued element through a step under a prescribed mean force.
 
     Returns the slide of the element.
     """

@@ -143,7 +143,7 @@ def follow_path(path, dt, kind, contact, goal, energies, forces) -> int:
     contact : tuple
         Arrays of a contact.
     goal : float
-        Residual of a step over the friction limit.
+        Residual of a step relative to the friction limit.
     energies : (k, 2) array
         See `loop_kernels.follow`; output.
     forces : (k, 3) array

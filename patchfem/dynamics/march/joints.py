@@ -1,4 +1,4 @@
-"""Models of interfaces and nonlinear springs that act with a patch or in its place."""
+"""Models of interfaces and nonlinear springs that supplement or replace a patch."""
 
 from dataclasses import dataclass, replace
 
@@ -65,7 +65,7 @@ def pair_plane_joints(joints, planes) -> list:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class JointsModel:
-    """Model of friction elements and springs in addition to a patch, or in its place.
+    """Model of friction elements and springs that supplement or replace a patch.
 
     A patch with set-valued friction becomes the first of the joints, because all set-valued elements are
     solved together.
@@ -98,20 +98,20 @@ class JointsModel:
 
     @property
     def length(self) -> float:
-        """Bond length [m] of the patch, or of the first interface without a patch."""
+        """Bond length [m] of the patch or, if there is no patch, of the first interface."""
         return self.patch.length if self.patch is not None else self.joints[0].element.length
 
     @property
     def reduction(self):
         """Shear modes from which the patch was reduced (`ContactModel.reduction`).
 
-        The result is None without patch.
+        The result is None if there is no patch.
         """
         return self.patch.reduction if self.patch is not None else None
 
     @property
     def set_valued(self) -> bool:
-        """Whether the patch, or the first interface without a patch, sticks without any stretch."""
+        """Whether the patch or, if there is none, the first interface sticks rigidly (set-valued)."""
         return (
             self.patch.set_valued if self.patch is not None else not self.joints[0].element.kernels
         )
@@ -127,7 +127,7 @@ class JointsModel:
     def kind(self) -> tuple:
         """Modules of the contact of the patch and of its law (`ContactModel.kind`).
 
-        Without a patch they are those of an idle contact.
+        If there is no patch, they are those of an inactive contact.
 
         """
         return self.patch.kind if self.patch is not None else IDLE_KIND
@@ -136,6 +136,6 @@ class JointsModel:
         """Return the memory of the patch as fields for plotting."""
         return self.patch.get_plot_fields(contact) if self.patch is not None else {}
 
-    def build(self):
-        """Allocate the contact arrays of the patch, or of an idle point without a patch."""
-        return (self.patch or frictionless_model()).build()
+    def allocate_contact(self):
+        """Allocate the contact arrays of the patch or, if there is none, of an inactive point."""
+        return (self.patch or frictionless_model()).allocate_contact()

@@ -97,7 +97,7 @@ At = IntEnum("At", _stack_rows(WORKSPACE_ROWS, LANES), module=__name__)
 
 
 class RigRow(IntEnum):
-    """Rows of the propagator of a rig mode, per friction force.
+    """Rows of the propagator of a rig mode, relative to the friction force.
 
     They follow from `propagator.Propagator`, whose coefficients are per acceleration.
 

@@ -1,4 +1,4 @@
-"""March of many patches with bonds behind shear modes, side by side in lanes."""
+"""March of many patches with coupled bond points, one case per lane."""
 
 from dataclasses import replace
 from typing import NamedTuple

@@ -1,12 +1,12 @@
-"""March of patches with bonds behind shear modes, one case per lane (compiled).
+"""March of patches with coupled bond points, one case per lane (compiled).
 
 The time step is that of `passing_kernels`.
 
-The cases share the modes of their rig and the frequency of their drive, and have N_POINTS points behind N_PIECE_MODES modes
-of the pieces each. In every step all lanes take as many Newton iterations as the slowest of them needs. The workspace
-is a flat array as in `lanes.rows_kernels`, whose rows `lane_rows` names. Stretches are over the bond length
-and squares over its square, for bonds whose density is constant. A test compares a case with `march.Run`. Cost: 20 ns per
-step and case on a core with vectors of eight numbers.
+The cases share the modes of their rig and the frequency of their drive, and each have N_POINTS points coupled by
+N_PIECE_MODES modes of the pieces. In every step all lanes take as many Newton iterations as the slowest of them
+needs. The workspace is a flat array as in `lanes.rows_kernels`, whose rows `lane_rows` names. Stretches are relative
+to the bond length and squares to its square, for bonds whose density is constant. A test compares a case with
+`march.Run`. Cost: 20 ns per step and case on a core with vectors of eight numbers.
 """
 
 from math import sqrt
@@ -217,7 +217,7 @@ def take_newton_step(workspace, lane, beta, is_long):
 
 @njit(**NJIT_INLINE)
 def update_point(workspace, lane, j, is_long):
-    """Update the stretch and the square of a bond point after a solved step; return its energies.
+    """Update the stretch and the square of a bond point after a converged step; return its energies.
 
     Parameters
     ----------
@@ -256,7 +256,7 @@ def update_point(workspace, lane, j, is_long):
 
 @njit(**NJIT_INLINE)
 def commit_step(workspace, lane, beta, is_long):
-    """Update the bond points, pieces and energies of a lane after its solved step.
+    """Update the bond points, pieces and energies of a lane after its converged step.
 
     Parameters
     ----------
@@ -436,7 +436,7 @@ def add_step_sums(workspace, lane, half_mass):
 
 @njit(**NJIT_INLINE)
 def set_free_slide(workspace, lane, rig, row):
-    """Compute the slide increment of a step without friction from the motion at its start.
+    """Compute the friction-free slide increment of a step from the motion at its start.
 
     Parameters
     ----------

@@ -106,7 +106,7 @@ def march(first, steps, system, rows):
     system : element_arrays.MarchArrays
         Motion, memories and ledger are updated in place.
     rows : (steps + 1, k) array
-        Output samples. Columns: modal coordinates and rates; of the contact, or of the first element without one,
+        Output samples. Columns: modal coordinates and rates; of the contact, or of the first element if there is none,
         slide, speed, force, slip, mean force of the step that follows, energy, friction work of the step that
         follows; of every element slide, speed, force, slip and mean force of the step that follows; under a load
         that varies load, moment, energy of the preloaded contact, heave and pitch.

@@ -9,7 +9,7 @@ import numpy as np
 from ...core import ModalBasis, Outcome, Response, SineDrive
 from ...structure.drive_sizes import choose_samples_per_cycle
 from ..checkpoint import MarchSamples, open_checkpoint
-from .folding import can_fold, march_folded
+from .cycle_sums import can_sum_cycles, march_with_sums
 from .models import ContactModel, load_instances
 from .recording import Recorder, join_cycles, make_mark, read_output_extremes
 from .run import Run
@@ -145,7 +145,7 @@ def march(
     keeps_samples : bool
         Whether samples and extremes from before the last cycles are kept; always true with marks.
     keeps_extremes : bool
-        Whether extremes and phasors of all cycles are kept for bonds behind shear modes although `keeps_samples`
+        Whether extremes and phasors of all cycles are kept for bond points coupled by shear modes although `keeps_samples`
         is false, and the sample of the largest slide.
     even : bool
         The argument `needs_history` of `choose_samples_per_cycle`.
@@ -178,14 +178,14 @@ def march(
     )
     before_last = plan.n_steps - n_last * steps_per_cycle
     keeps_samples = keeps_samples or bool(mark_steps)
-    keeps_folded = keeps_extremes and can_fold(run) and not mark_steps
-    if keeps_folded:
-        if not march_folded(run, before_last, samples):
+    keeps_sums = keeps_extremes and can_sum_cycles(run) and not mark_steps
+    if keeps_sums:
+        if not march_with_sums(run, before_last, samples):
             # The march ended before its last cycles, so it is repeated
             # cycle by cycle with all samples.
             run = restart()
             samples = MarchSamples(samples.last)
-            keeps_folded = False
+            keeps_sums = False
             keeps_samples = True
     elif not keeps_samples and not samples.is_restarted:
         if not run.march_without_samples(
@@ -198,7 +198,7 @@ def march(
         samples,
         n_even,
         keeps_samples=keeps_samples,
-        keeps_extremes=keeps_samples or keeps_folded,
+        keeps_extremes=keeps_samples or keeps_sums,
     )
     snapshots = _march_recorded(run, recorder, plan, checkpoint, progress)
     run.check_steps()
@@ -222,8 +222,8 @@ class _MarchPlan(NamedTuple):
     frames: int
     mark_steps: list
 
-    def next_mark(self, n_completed: int) -> int:
-        """Return the step of the next mark after a completed step, or the last step."""
+    def next_mark_step(self, n_completed: int) -> int:
+        """Return the next step after which the state is recorded as a mark, or the last step."""
         return min((step for step in self.mark_steps if step > n_completed), default=self.n_steps)
 
 
@@ -237,7 +237,7 @@ def _march_recorded(run, recorder: Recorder, plan: _MarchPlan, checkpoint, progr
     # The march begins with the fraction of a cycle, so that the window has complete cycles.
     size = (plan.n_steps - run.done) % plan.steps_per_cycle or plan.steps_per_cycle
     while run.done < plan.n_steps and run.outcome is None:
-        next_stop = plan.next_mark(run.done)
+        next_stop = plan.next_mark_step(run.done)
         frames = plan.frames if next_stop == plan.n_steps else 0
         for cycles in run.march_cycles(size, next_stop, frames, snapshots):
             recorder.add(run, cycles)
@@ -245,7 +245,7 @@ def _march_recorded(run, recorder: Recorder, plan: _MarchPlan, checkpoint, progr
             cycles = list(samples.last)[-plan.window :]
             samples.marks.append((run.fork(run.drive), cycles, samples.extremes[-plan.window :]))
         size = plan.steps_per_cycle
-        n_left = (plan.next_mark(run.done) - run.done) // size - samples.last.maxlen
+        n_left = (plan.next_mark_step(run.done) - run.done) // size - samples.last.maxlen
         if recorder.keeps_samples and run.is_periodic(n_left):
             recorder.repeat_last(run, n_left)
         if run.done < plan.n_steps:

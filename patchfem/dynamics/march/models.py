@@ -63,7 +63,7 @@ class ContactModel:
 
     - `contact`: module of the compiled contact.
     - `limit`: friction limit [N].
-    - `fields`: initial arrays of `tuple_of`; `build` copies them.
+    - `fields`: initial arrays of `tuple_of`; `allocate_contact` copies them.
     - `length`: bond length of the criterion for sticking [m].
     - `law`: module of the compiled law, "" if the contact has a fixed law.
     - `reduction`: the JenkinsSet or ShearModes from which the arrays were made.
@@ -88,7 +88,7 @@ class ContactModel:
 
     @property
     def set_valued(self) -> bool:
-        """Whether the contact sticks without any stretch (rigid Coulomb friction)."""
+        """Whether the contact sticks rigidly (set-valued Coulomb friction)."""
         return self.law == COULOMB_LAW
 
     @property
@@ -98,7 +98,7 @@ class ContactModel:
 
     @property
     def joints(self) -> tuple:
-        """Set-valued element in place of the contact; all such elements are solved together."""
+        """Set-valued element that replaces the contact, so that all such elements are solved together."""
         return (Joint(0, self.element),) if self.set_valued else ()
 
     def get_plot_fields(self, contact) -> dict:
@@ -144,8 +144,8 @@ class ContactModel:
             "b": contact.b.copy(),
         }
 
-    def build(self):
-        """Allocate the contact with a copy of its initial arrays."""
+    def allocate_contact(self):
+        """Allocate the contact arrays as copies of the initial arrays."""
         fields = {k: np.array(v, dtype=np.float64, order="C") for k, v in self.fields.items()}
         return self.tuple_of(**fields)
 
@@ -173,7 +173,7 @@ def element_model(element: Element, reduction=None) -> ContactModel:
 
 @cache
 def frictionless_model() -> ContactModel:
-    """Return the contact model of an interface without friction."""
+    """Return the contact model of a frictionless interface."""
     return jenkins_model([0.0], [1.0])
 
 
@@ -195,7 +195,7 @@ def jenkins_model(stiffness, yield_displacement, reduction=None) -> ContactModel
 
 
 def points_model(law, area, sigma, shear=None, pattern=None) -> ContactModel:
-    """Return the contact model of bond points in the stretch reading with order 1.
+    """Return the contact model of bond points of order 1 with friction.reading = "stretch".
 
     Parameters
     ----------
@@ -248,9 +248,9 @@ def points_model(law, area, sigma, shear=None, pattern=None) -> ContactModel:
 def point_lists_model(
     law, limit, sigma, shear, reach: float, merge: float, under: dict | None = None
 ) -> ContactModel:
-    """Return the contact model of points behind shear modes, each with a list of bonds.
+    """Return the contact model of points that are coupled by shear modes and each have a bond list.
 
-    The bonds have any order and either reading.
+    The bonds have any order and either value of `friction.reading`.
 
     Parameters
     ----------
@@ -346,7 +346,7 @@ def nodal_load_fields(force, measure) -> dict:
 
 
 def point_pressures(contact) -> np.ndarray:
-    """Return the present pressures (m,) of points with bond lists, over those of their limits."""
+    """Return the present pressures (m,) of points with bond lists, relative to those of their limits."""
     if contact.pattern.size:
         x, pressure = contact.pattern
         return np.interp(
@@ -360,7 +360,7 @@ def point_pressures(contact) -> np.ndarray:
 def bond_list_model(law, limit: float, reach: float, merge: float) -> ContactModel:
     """Return the contact model of one list of bonds under a uniform slide.
 
-    The bonds have any order and either reading.
+    The bonds have any order and either value of `friction.reading`.
 
     Parameters
     ----------

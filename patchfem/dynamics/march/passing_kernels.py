@@ -1,4 +1,4 @@
-"""March of bonds behind shear modes without stored samples (compiled).
+"""March of coupled bond points that stores sums instead of samples (compiled).
 
 Extremes, phasors and energies of the cycles are accumulated in the march.
 
@@ -26,7 +26,7 @@ from ..modal_kernels import (
     write_interface_sample,
     write_modal_sample,
 )
-from .folded_arrays import N_BLOCK_ROWS, BlockRow, CycleColumn, SumIndex, TraceRow
+from .cycle_sum_arrays import N_BLOCK_ROWS, BlockRow, CycleColumn, SumIndex, TraceRow
 
 # Largest product of two successive rates, relative to the square of the largest rate, that is
 # attributed to round-off; it occurs at a stop without a reversal.
@@ -49,7 +49,7 @@ class PieceStep(NamedTuple):
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def add_step_energies(work, energy_increase, start_slide, end_slide, mean_force, folded):
+def add_step_energies(work, energy_increase, start_slide, end_slide, mean_force, record):
     """Add the friction energies of a step to the sums of the cycle.
 
     Parameters
@@ -64,11 +64,11 @@ def add_step_energies(work, energy_increase, start_slide, end_slide, mean_force,
         Slide at the end of the step [m].
     mean_force : float
         Mean of the friction forces at both ends [N].
-    folded : folded_arrays.FoldedCycles
+    record : cycle_sum_arrays.CycleSums
     """
-    sums = folded.sums
+    sums = record.sums
     dissipated = work - energy_increase
-    noise = folded.bounds.force * (1e-12 * abs(end_slide - start_slide) + 1e-15 * abs(start_slide))
+    noise = record.bounds.force * (1e-12 * abs(end_slide - start_slide) + 1e-15 * abs(start_slide))
     sums[SumIndex.WORK] += work
     sums[SumIndex.LOSS] += dissipated if dissipated > -noise else 0.0
     sums[SumIndex.CREATED] -= dissipated if dissipated < -noise else 0.0
@@ -77,17 +77,17 @@ def add_step_energies(work, energy_increase, start_slide, end_slide, mean_force,
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
-def store_largest_slide(number, folded):
+def store_largest_slide(number, record):
     """Store the present sample if its slide is the largest so far.
 
     Parameters
     ----------
     number : int
         Number of the sample.
-    folded : folded_arrays.FoldedCycles
+    record : cycle_sum_arrays.CycleSums
     """
-    row = folded.largest.row
-    stored = folded.largest.kept
+    row = record.largest.row
+    stored = record.largest.kept
     n = row.size - N_SAMPLE_COLUMNS
     if not abs(row[n]) > abs(stored[n]):
         return
@@ -95,9 +95,9 @@ def store_largest_slide(number, folded):
     for k in range(n_copied):
         stored[k] = row[k]
     for k in range(3):
-        stored[n_copied + k] = folded.totals[k] + folded.sums[k]
+        stored[n_copied + k] = record.totals[k] + record.sums[k]
     stored[n_copied + 3] = 0.0
-    folded.largest.number[0] = number
+    record.largest.number[0] = number
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
@@ -153,9 +153,9 @@ def move_mode(k, count, table_row, accel, system, workspace):
         Row of the drive table for the first step.
     accel : float
         Modal acceleration of the friction [m s-2].
-    system : folded_arrays.FoldedMarch
+    system : cycle_sum_arrays.CycleSumMarch
     workspace : (7, k) array
-        Rows of `folded_arrays.BlockRow`, to which the steps are added.
+        Rows of `cycle_sum_arrays.BlockRow`, to which the steps are added.
     """
     motion = system.motion
     modal_system = system.modal_system
@@ -239,7 +239,7 @@ def record_full_slip_steps(n_block, first_sample, slide, table_row, force, syste
         Row of the drive table for the first step.
     force : float
         Friction force [N].
-    system : folded_arrays.FoldedMarch
+    system : cycle_sum_arrays.CycleSumMarch
 
     Returns
     -------
@@ -248,11 +248,11 @@ def record_full_slip_steps(n_block, first_sample, slide, table_row, force, syste
     """
     interface = system.interface
     table = system.table
-    folded = system.folded
+    record = system.record
     direction = interface.flow[FlowIndex.FULL_SLIP_DIRECTION]
     size = 2 * system.motion.shape[1]
-    ledger = folded.ledger
-    workspace = folded.workspace
+    ledger = record.ledger
+    workspace = record.workspace
     pieces = find_piece_step(interface)
     n_steps = 0
     for s in range(n_block):
@@ -265,7 +265,7 @@ def record_full_slip_steps(n_block, first_sample, slide, table_row, force, syste
         sign = 1.0 if s % 2 == 0 else -1.0
         is_forward = 0.5 * (1.0 + sign)
         power = workspace[BlockRow.DRIVE_WORK, s] + table[table_row + s, 4 * size]
-        add_step_energies(force * increment, sign * pieces.rise, slide, end_slide, force, folded)
+        add_step_energies(force * increment, sign * pieces.rise, slide, end_slide, force, record)
         ledger[Ledger.DRIVE_WORK] += power
         ledger[Ledger.VISCOUS_LOSS] += (
             workspace[BlockRow.VISCOUS_LOSS, s] + table[table_row + s, 4 * size + 1]
@@ -277,13 +277,13 @@ def record_full_slip_steps(n_block, first_sample, slide, table_row, force, syste
             ledger[Ledger.MAX_STORED], pieces.energy + is_forward * pieces.rise + energy_of_modes
         )
         ledger[Ledger.FRICTION_WORK] += force * increment
-        folded.trace[TraceRow.OUTPUT, first_sample + n_steps] = workspace[BlockRow.OUTPUT, s]
-        folded.trace[TraceRow.RATE, first_sample + n_steps] = workspace[BlockRow.RATE, s]
+        record.trace[TraceRow.OUTPUT, first_sample + n_steps] = workspace[BlockRow.OUTPUT, s]
+        record.trace[TraceRow.RATE, first_sample + n_steps] = workspace[BlockRow.RATE, s]
         slide = end_slide
         workspace[BlockRow.SLIDE, s] = increment
         interface.flow[FlowIndex.TOTAL_SLIDE] += increment
         is_finite = np.isfinite(slide + workspace[BlockRow.SPEED, s])
-        if not (abs(workspace[BlockRow.OUTPUT, s]) <= folded.bounds.travel and is_finite):
+        if not (abs(workspace[BlockRow.OUTPUT, s]) <= record.bounds.travel and is_finite):
             break
     return n_steps
 
@@ -306,7 +306,7 @@ def march_full_slip(first, count, first_sample, slide, system):
         Number of the sample in the cycle at the start.
     slide : float
         Slide at the start of the step [m].
-    system : folded_arrays.FoldedMarch
+    system : cycle_sum_arrays.CycleSumMarch
 
     Returns
     -------
@@ -316,7 +316,7 @@ def march_full_slip(first, count, first_sample, slide, system):
     motion = system.motion
     modal_system = system.modal_system
     interface = system.interface
-    workspace = system.folded.workspace
+    workspace = system.record.workspace
     n = motion.shape[1]
     at = first % system.table.shape[0]
     force = interface.flow[FlowIndex.FULL_SLIP_DIRECTION] * interface.drag[FullSlipRow.FORCE, 0]
@@ -351,7 +351,7 @@ def march_step(table_row, start, system):
     table_row : int
         Row of the drive table for this step.
     start : interfaces.arrays.StepStart
-    system : folded_arrays.FoldedMarch
+    system : cycle_sum_arrays.CycleSumMarch
 
     Returns
     -------
@@ -359,30 +359,30 @@ def march_step(table_row, start, system):
     """
     motion = system.motion
     modal_system = system.modal_system
-    folded = system.folded
+    record = system.record
     accel = modal_system.workspace[0]
     free = free_increment(motion, modal_system, 0, system.table, table_row)
-    step = contact.solve_step(free, modal_system.beta, start, system.interface, folded.bounds.goal)
+    step = contact.solve_step(free, modal_system.beta, start, system.interface, record.bounds.goal)
     force = (free - step.increment) / modal_system.beta
     write_friction_accelerations(force, modal_system.slide, modal_system.mass, accel)
     work = force * step.increment
-    move_modes(motion, modal_system, system.table, table_row, accel, folded.ledger)
-    count_iterations(step.iterations, work, folded.ledger)
+    move_modes(motion, modal_system, system.table, table_row, accel, record.ledger)
+    count_iterations(step.iterations, work, record.ledger)
     end_velocity = project_modes(modal_system.slide, motion[1])
     loss, _ = contact.commit_step(step.increment, force, start, end_velocity, system.interface)
-    folded.ledger[Ledger.FRICTION_LOSS] += loss
+    record.ledger[Ledger.FRICTION_LOSS] += loss
     return work
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def march_folded_cycle(first, system):
-    """March one cycle without stored samples, and accumulate its energies and output.
+def march_cycle_with_sums(first, system):
+    """March one cycle and accumulate its energies and output.
 
     Parameters
     ----------
     first : int
         Row of the drive table for the first step; the rows repeat cyclically.
-    system : folded_arrays.FoldedMarch
+    system : cycle_sum_arrays.CycleSumMarch
 
     Returns
     -------
@@ -394,9 +394,9 @@ def march_folded_cycle(first, system):
     motion = system.motion
     modal_system = system.modal_system
     interface = system.interface
-    folded = system.folded
-    trace = folded.trace
-    row = folded.largest.row
+    record = system.record
+    trace = record.trace
+    row = record.largest.row
     count = trace.shape[1] - 1
     n = motion.shape[1]
     i = 0
@@ -413,17 +413,17 @@ def march_folded_cycle(first, system):
             row[: 2 * n + SampleColumn.STEP_WORK],
             reading,
             modal.output,
-            folded.bounds.travel,
+            record.bounds.travel,
             stored,
-            folded.ledger,
+            record.ledger,
         )
         if is_step_open:
             rise = reading.stored_energy - start_energy
             mean_force = 0.5 * (start_force + reading.force)
-            add_step_energies(work, rise, start_slide, modal.slide, mean_force, folded)
+            add_step_energies(work, rise, start_slide, modal.slide, mean_force, record)
         trace[TraceRow.OUTPUT, i] = modal.output
         trace[TraceRow.RATE, i] = project_modes(modal_system.output, motion[1])
-        store_largest_slide(first + i, folded)
+        store_largest_slide(first + i, record)
         if status or i == count:
             return i, status
         if interface.flow[FlowIndex.FULL_SLIP_DIRECTION] != 0.0 and modal_system.dense.size == 0:
@@ -451,7 +451,7 @@ def find_cycle_output(trace, dt, cycles):
     Parameters
     ----------
     trace : (4, s + 1) array
-        Samples of the output, and cosine and sine of the drive, see `folded_arrays.TraceRow`.
+        Samples of the output, and cosine and sine of the drive, see `cycle_sum_arrays.TraceRow`.
     dt : float
         Length of a step [s].
     cycles : (4,) array
@@ -496,8 +496,8 @@ def find_cycle_output(trace, dt, cycles):
 
 
 @njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
-def march_folded_cycles(first, cycles, system):
-    """March cycles without stored samples, and record their extremes, phasors and energies.
+def march_cycles_with_sums(first, cycles, system):
+    """March cycles and store their extremes, phasors and energy sums instead of samples.
 
     Parameters
     ----------
@@ -505,7 +505,7 @@ def march_folded_cycles(first, cycles, system):
         Row of the drive table for the first step; the rows repeat cyclically.
     cycles : (k, 4) array
         Extremes and phasors of the cycles; output.
-    system : folded_arrays.FoldedMarch
+    system : cycle_sum_arrays.CycleSumMarch
 
     Returns
     -------
@@ -514,10 +514,10 @@ def march_folded_cycles(first, cycles, system):
     int
         Status, as in `loop_kernels`.
     """
-    trace = system.folded.trace
+    trace = system.record.trace
     count = trace.shape[1] - 1
     for cycle in range(cycles.shape[0]):
-        n_steps, status = march_folded_cycle(first + cycle * count, system)
+        n_steps, status = march_cycle_with_sums(first + cycle * count, system)
         if status:
             return cycle * count + n_steps, status
         find_cycle_output(trace, system.modal_system.dt, cycles[cycle])

@@ -57,7 +57,7 @@ class PressResidual(NamedTuple):
     """Residual of the normal contact for increments of heave and pitch in a step.
 
     - increments: increments of heave and pitch
-    - residual: difference from the increments without contact forces less the compliance times the mean forces
+    - residual: difference from the increments without contact forces minus the compliance times the mean forces
     - size: size of the residual as a displacement [m]
     - round_off: round-off error of the size [m]
     - end_set: number of the contact set at the end of the step, negative if none fits
@@ -88,9 +88,9 @@ class StepData(NamedTuple):
 
     - start: slide and speed at the start, and length of the step
     - table_row: row of the drive table
-    - free: increments of heave and pitch without interface forces
+    - free: increments of heave and pitch in the absence of interface forces
     - load: normal load at the start [N]
-    - end_load: prescribed normal load at the end; without one the load at the start [N]
+    - end_load: prescribed normal load at the end, or the load at the start if none is prescribed [N]
     """
 
     start: StepStart
@@ -101,9 +101,9 @@ class StepData(NamedTuple):
 
 
 class Trial(NamedTuple):
-    """Solution of a step whose normal contact bears an assumed friction force.
+    """Solution of a step for an assumed friction force on the normal contact.
 
-    - force: mean friction force that results [N]
+    - force: resulting mean friction force [N]
     - increment: increment of the slide [m]
     - end_load: normal load at the end [N]
     - end_set: number of the contact set at the end of the step, negative if none fits
@@ -138,7 +138,7 @@ class ForceSearch(NamedTuple):
 
     - guess: last assumed friction force [N]
     - trial: solution of the step under it
-    - is_consistent: whether the force that results is the assumed one
+    - is_consistent: whether the resulting force equals the assumed force
     - iterations: number of iterations of all trials
     """
 
@@ -159,7 +159,7 @@ def start_march(press):
 def solve_press_step(press, free):
     """Solve the heave and pitch of a step by Newton's method with a line search.
 
-    The increments are those without contact forces minus beta times the mean forces. The forces have a convex
+    The increments are those in the absence of contact forces minus beta times the mean forces. The forces have a convex
     potential, so the solution is unique; within a single contact set one step finds it. The guess of the increments is
     in press.few, where increments, mean forces and their derivatives are written.
 
@@ -167,7 +167,7 @@ def solve_press_step(press, free):
     ----------
     press : interfaces.arrays.VaryingLoad
     free : contact.press_path_kernels.HolderMotion
-        Increments without contact forces.
+        Increments in the absence of contact forces.
 
     Returns
     -------
@@ -220,7 +220,7 @@ def find_press_residual(press, free, increments):
     ----------
     press : interfaces.arrays.VaryingLoad
     free : contact.press_path_kernels.HolderMotion
-        Increments without contact forces.
+        Increments in the absence of contact forces.
     increments : contact.press_path_kernels.HolderMotion
 
     Returns
@@ -481,7 +481,7 @@ def solve_press_under_friction(free, friction, press):
     Parameters
     ----------
     free : contact.press_path_kernels.HolderMotion
-        Increments without interface forces.
+        Increments in the absence of interface forces.
     friction : float
         Mean friction force [N].
     press : interfaces.arrays.VaryingLoad
@@ -518,7 +518,7 @@ def is_bracket_closed(secant):
 def take_secant_step(secant, guess, force, n_guesses):
     """Take a safeguarded secant step for the friction force.
 
-    Every eighth step is a bisection, because jumps can make the secant steps alternate.
+    Every eighth step is a bisection, because secant steps can alternate at a jump.
 
     Parameters
     ----------
@@ -598,10 +598,10 @@ def solve_trial(guess, ignores_events, data, system):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def find_consistent_force(guess, ignores_events, data, system):
-    """Find the friction force that results from a step whose normal contact bears it.
+    """Find the friction force that is consistent with the normal contact of the step.
 
-    If friction moves heave or pitch, a safeguarded secant method finds it. Otherwise every assumed force gives the same
-    result.
+    If friction moves heave or pitch, a safeguarded secant method finds it. Otherwise the result does not depend on
+    the assumed force.
 
     Parameters
     ----------
@@ -657,7 +657,7 @@ def is_between_frictions(force, data, end_load, press):
 def solve_coupled_forces(i, start, table_row, system):
     """Solve the coupled friction and normal contact over a step.
 
-    Each is solved under the mean force of the other, until the assumed friction force is the one that results. This
+    Each is solved under the mean force of the other, until the resulting friction force equals the assumed one. This
     force jumps where a stop inside the step appears or disappears with the assumed force. If no force is consistent
     then, one between kinetic and static friction means that slip begins in the step; otherwise the mean force over the
     entire step is found, which does not jump between stick and slip at one coefficient. The mean forces on heave and
@@ -713,7 +713,7 @@ def solve_coupled_forces(i, start, table_row, system):
 def read_step_data(i, start, table_row, system):
     """Return the quantities of a step that do not depend on its forces (`StepData`).
 
-    The nodal loads at the start of the step are those at the end of the last one.
+    The nodal loads at the start of the step are those at the end of the previous step.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Recording of a march: all samples of the last cycles, and selected earlier ones."""
+"""Recording of a march: all samples of the last cycles, and selected earlier samples."""
 
 from dataclasses import dataclass
 

@@ -146,7 +146,7 @@ class Run:
         self.travel = travel
         self.loops = loops
         self.prop = make_propagator(modes, drive, steps_per_cycle, getattr(model, "rows", None))
-        self.contact = model.build()
+        self.contact = model.allocate_contact()
         self.state = np.zeros((2, modes.omega.size))
         if start is not None:
             self.state[:] = start.z, start.v
@@ -194,7 +194,7 @@ class Run:
     def _carried_state(self) -> list:
         """Return the state at the end of a step as rows of comparable numbers.
 
-        The first row has the coordinates and the rates over the drive frequency, the others the
+        The first row has the coordinates and the rates divided by the drive frequency, the others the
         memories of the laws. The list is empty if the state cannot become periodic.
         """
         model = self.model
@@ -215,7 +215,7 @@ class Run:
     def is_periodic(self, n_left: int) -> bool:
         """Return whether the motion has become periodic and the remaining cycles may be skipped.
 
-        n_left: number of remaining cycles. Call this at the end of every cycle, or of those given by
+        n_left: number of remaining cycles. Call this at the end of every cycle, or at the cycles given by
         `dynamics.periodicity.cycles_to_next_check`.
         """
         n_cycles = self.done // self.prop.steps
@@ -515,7 +515,7 @@ class Run:
             return abs(float(self.modes.output @ row[: self.modes.omega.size]))
 
     def _march_steps(self, count: int, rows) -> tuple:
-        """March steps by the compiled loop into rows (count + 1, width).
+        """Integrate `count` steps with the compiled loop; store the samples in rows (count + 1, width).
 
         Returns the number of completed steps and the status.
 

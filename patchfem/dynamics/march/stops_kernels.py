@@ -9,7 +9,7 @@ carries its static friction. The limits may change linearly over the step, as un
 
 The step then needs slides and speeds at its end. Mean forces give the slides, and impulses at the end give the speeds; both
 are of second order in the step. `find_impulses` computes the work of all friction. If the friction would do work on the
-modes, the loop steps by mean forces alone. Read `follow_step` first.
+modes, the loop steps by mean forces alone. Read `follow_step_events` first.
 
 Stiff elastic-plastic faces do not replace this module, because they have one coefficient of friction: a kinetic
 coefficient below the static one cannot be given to them. With equal coefficients, on 119 random rigs, 98 % of the errors
@@ -246,7 +246,7 @@ def choose_slip_states(x, stops):
 def find_first_zero(speed, rate, half_slope):
     """Return the first zero y >= 0 of a decreasing speed that is quadratic in time.
 
-    The speed is speed + rate y + half_slope y^2; the result is infinite without a zero.
+    The speed is speed + rate y + half_slope y^2; the result is infinite if there is no zero.
 
     The speed must not be negative, and `rate` not negative where the speed is 0.
 
@@ -406,7 +406,7 @@ def advance_faces(x, distance, face, dt, stops):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def follow_events(dt, stops):
-    """Follow all faces from event to event to the end of a step; return whether it succeeds.
+    """Follow all faces from event to event to the end of a step; return whether this succeeds.
 
     The results are in stops.field.
 
@@ -545,8 +545,8 @@ def solve_holding_forces(which, stage, count, dt, stops):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def follow_step(dt, stops):
-    """Follow the stops and releases of all faces through a step; return whether it succeeds.
+def follow_step_events(dt, stops):
+    """Follow the stops and releases of all faces during a step; return whether this succeeds.
 
     The results are in stops.field.
 
@@ -660,7 +660,7 @@ def find_impulses(stops):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def find_stopping_impulses(motion, stops):
-    """Find the impulses that stop the faces without a slide after a step with mean forces."""
+    """Find the impulses that stop the faces that do not slide, after a step with mean forces."""
     f = stops.field
     count = 0
     for e in range(stops.names.size):

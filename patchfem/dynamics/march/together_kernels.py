@@ -105,7 +105,7 @@ def write_newton_equations(y, step, elements, dt, hess):
     Returns
     -------
     float
-        Largest change of a force over its tolerance.
+        Largest change of a force relative to its tolerance.
     """
     n = y.size
     worst = 0.0

@@ -101,7 +101,7 @@ def make_elastic_plastic_law(static: float, length: float) -> VaryingLoadLaw:
 
 
 def make_bonds_law(law) -> VaryingLoadLaw:
-    """Return the law of bonds in the stretch reading with order 1 at each point.
+    """Return the law of bonds of order 1 with friction.reading = "stretch" at each point.
 
     Raises PatchfemError for other bonds.
     """
@@ -124,11 +124,11 @@ def make_bonds_law(law) -> VaryingLoadLaw:
 
 
 def make_bond_lists_law(law, reach: float, merge: float) -> VaryingLoadLaw:
-    """Return the law of bonds in the printed reading, with a list of bonds at each point.
+    """Return the law of bonds with friction.reading = "report", as a bond list at each point.
 
-    Raises PatchfemError for the stretch reading.
+    Raises PatchfemError for friction.reading = "stretch".
 
-    Bonds keep the pressure under which they formed. In the stretch reading bonds are released as the load
+    Bonds keep the pressure under which they formed. With friction.reading = "stretch" bonds are released as the load
     falls.
 
     Parameters
@@ -158,7 +158,7 @@ def make_bond_lists_law(law, reach: float, merge: float) -> VaryingLoadLaw:
 
 
 def make_contact_sets(patch, spring: float = 0.0) -> ContactSets:
-    """Return the contact sets of a patch around its solved contact state.
+    """Return the contact sets of a patch near its solved contact state.
 
     `spring` is the rotational stiffness of the holder [N m/rad], 0 for a rigid one. PatchfemError for a nonlinear asperity
     layer, for strips and for a patch that carries no load.
@@ -251,12 +251,12 @@ class VaryingLoadModel:
 
     @property
     def limit(self) -> float:
-        """Force scale of the residuals [N]: static friction limit, or the load without friction."""
+        """Force scale of the residuals [N]: static friction limit, or the load if there is no friction."""
         return (self.law.static or 1.0) * max(self.preload, 1e-9)
 
     @property
     def length(self) -> float:
-        """Bond length of the law [m]; 0 without bonds."""
+        """Bond length of the law [m]; 0 if it has no bonds."""
         return self.law.length
 
     @property
@@ -266,7 +266,7 @@ class VaryingLoadModel:
 
     @property
     def set_valued(self) -> bool:
-        """Whether the law sticks without any stretch (rigid Coulomb friction)."""
+        """Whether the law sticks rigidly (set-valued Coulomb friction)."""
         return self.law.kind == LawKind.COULOMB
 
     @property
@@ -299,14 +299,14 @@ class VaryingLoadModel:
 
     @property
     def kind(self) -> tuple:
-        """Modules of contact and law without the elements, for which the loop is compiled."""
+        """Modules of contact and law, except the elements, for which the loop is compiled."""
         if self.law.kind == LawKind.LISTS:
             return SHEARED_LISTS_MODULE, ""
         if self.has_point_loads:
             return "dynamics.interfaces.pressed_points_kernels", ""
         return IDLE_KIND if self.set_valued else (IDLE_KIND[0], "friction.laws.tanh_kernels")
 
-    def build(self):
+    def allocate_contact(self):
         """Allocate the contact arrays under the preload."""
         law = self.law
         if self.has_point_loads:
@@ -317,7 +317,7 @@ class VaryingLoadModel:
             TanhLaw(
                 law.static, law.force[PressedIndex.MU_KINETIC] if law.kind == LawKind.RATE else 1.0
             ).element(self.preload)
-        ).build()
+        ).allocate_contact()
 
     def points(self, force):
         """Allocate the contact points under the nodal forces (m,) [N] of the preload."""
@@ -332,7 +332,7 @@ class VaryingLoadModel:
             self.shear,
             *law.list_options[1:],
             nodal_load_fields(force, measure),
-        ).build()
+        ).allocate_contact()
 
     def get_plot_fields(self, contact) -> dict:
         """Return an empty dict, because the run stores the memory of the interface."""
@@ -349,8 +349,8 @@ def choose_shear_modes(
 ):
     """Choose the shear modes of pieces whose contact set changes.
 
-    Modes are weighted with mu_s times the preload plus FLOOR of its mean pressure, so nodes that are open
-    at first count too; with m modes they are exact for any weights.
+    Modes are weighted with mu_s times the preload plus MIN_PRESSURE_FRACTION of its mean pressure, so nodes
+    that are open at first also count; with m modes they are exact for any weights.
 
     Parameters
     ----------
@@ -561,7 +561,7 @@ class VaryingLoadRun(Run):
 
 
 def _make_point_sets(load: float) -> SetArrays:
-    """Return the arrays of contact sets for a prescribed load on one point, which need no contact solution."""
+    """Return the arrays of contact sets for a prescribed load on one point."""
     point = np.zeros(1)
     reference = (load, 0.0, 0.0, 1.0, 1.0)
     return make_set_arrays(np.ones((1, 1)), point, point, reference, np.zeros(1, bool), n_slots=1)

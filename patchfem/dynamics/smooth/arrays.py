@@ -92,9 +92,9 @@ class Turn(IntEnum):
     """Indices of the entries of `MotionArrays.turn`, which integrator and friction law share.
 
     - DIRECTION: of the motion, 0 in stick
-    - KINK_PATH: path to the next kink of the law [m], infinite without one
+    - KINK_PATH: path to the next kink of the law [m], infinite if there is none
     - IS_ABOVE_KNEE, KNEE_VELOCITY: whether the speed is above that of a kink, and that speed [m/s],
-      0 without one
+      0 if there is none
     - FREE_ACCELERATION, INVERSE_MASS, SLIDE: for a law that holds, the acceleration [m s-2] without
       its force, the acceleration per newton [1/kg] that its force takes away, and the relative
       displacement [m]
@@ -133,7 +133,7 @@ class StepEvents(NamedTuple):
 
 
 class CallStatus(NamedTuple):
-    """Codes of the reasons for which a call of the step loop ends.
+    """Codes that state why a call of the step loop ends.
 
     - finished: the time is reached
     - travel: the output has reached its travel

@@ -141,7 +141,7 @@ def find_first_event(motion, h, travel, skip):
     event : int
         EVENT.none where no event lies in the step.
     fraction : float
-        Guess of the fraction of the step at which it occurs; 1 without an event.
+        Guess of the fraction of the step at which it occurs; 1 if there is no event.
     """
     first_event = EVENT.none
     first_fraction = 1.0
@@ -373,7 +373,7 @@ def find_cubic_dip(a, p, b, r):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def speed_round_off(motion):
-    """Return the round-off of the relative velocity [m/s], below which the interface rests."""
+    """Return the round-off error of the relative velocity [m/s]; a slower interface is at rest."""
     return 4e-16 * (
         motion.scalars[Scalar.MAX_RATE]
         + motion.scalars[Scalar.FASTEST_RATE] * motion.scalars[Scalar.MAX_COORDINATE]
@@ -520,7 +520,7 @@ def accept_step(motion, h, record):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def step_factor(error):
-    """Return the ratio of the next step to a step with known error over tolerance."""
+    """Return the ratio of the next step to the last one, from its error relative to the tolerance."""
     if error == 0:
         return MAX_STEP_FACTOR
     if not np.isfinite(error):

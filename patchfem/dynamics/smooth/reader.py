@@ -65,7 +65,7 @@ def evaluate_power_series(terms, fraction):
 def transform_parts(values, matrix) -> np.ndarray:
     """Apply a matrix (p, N_NODES) to the nodal values of k polynomials.
 
-    With so many rows a matrix product would be slower by the threads that it starts.
+    For so many rows a matrix product would be slower, because it starts threads.
     """
     return np.einsum("kj,pj->kp", values, matrix)
 
@@ -86,7 +86,7 @@ TO_GAUSS = make_interpolation_matrix(GAUSS_POINTS)
 class StepParts:
     """Last cycles of a motion as polynomial parts of steps.
 
-    response: a Response at all their places in order.
+    response: a Response at the nodes of all parts in order of time.
     """
 
     def __init__(self, response, period: float):
@@ -200,7 +200,7 @@ class StepParts:
     def drift(self) -> float | None:
         """Return the drift of the relative displacement per cycle [m].
 
-        It is None in fewer than 1.5 cycles.
+        It is None for fewer than 1.5 cycles.
 
         It is the difference of the mean relative displacements of the last and the first cycle.
         """

@@ -65,7 +65,7 @@ class SmoothResult(MarchResult):
     - integrated: measures of the last cycles, integrated over their steps
     - peak_errors: errors of peaks [unit of the measure] by measure
     - with_reversals: histories of the last cycles with samples at reversals
-    - repeat_change: change that the motion would still make, over its size, where cycles were
+    - repeat_change: remaining change of the motion, relative to its size, if cycles were
       skipped
     - tolerance: relative tolerance of its steps
     """
@@ -80,7 +80,7 @@ class SmoothResult(MarchResult):
 def start_arrays(modes: ModalBasis, drive, element, cycles: float, start=None) -> tuple:
     """Return the arrays of a motion at its initial state.
 
-    The first step is FIRST_STEP_RATIO over the fastest rate of modes and drive.
+    The first step is FIRST_STEP_RATIO divided by the fastest rate of modes and drive.
 
     Parameters
     ----------
@@ -201,7 +201,7 @@ class MotionState(NamedTuple):
 class Motion:
     """Motion in progress: its arrays, its record and what was collected from it.
 
-    repeat_change: change that it would still make, over its size, where cycles were skipped as it
+    repeat_change: remaining change, relative to its size, if cycles were skipped because it
     repeats.
     """
 
@@ -314,7 +314,7 @@ class Motion:
     def run_ahead_to(self, time: float) -> None:
         """March the motion to a time [s], skipping cycles where the motion repeats.
 
-        `periodicity` says when the motion is looked at and what it would still change by. The
+        `periodicity` determines when the motion is checked, and bounds its remaining change. The
         energies go on as in the last quarter of the cycles between two looks, so their change must
         be as small. The last cycle must equal the one before it.
         """
@@ -381,7 +381,7 @@ class Motion:
     def _has_equal_cycles(self, count: int) -> bool:
         """Return whether the last two cycles have equal extremes within the error of their steps.
 
-        They may differ by the error of their steps.
+        The error of the steps bounds the difference.
         """
         before, last = self.record.cycles[:2, count - 2 : count].T
         return np.abs(
@@ -633,7 +633,7 @@ def simulate(
         step_force=np.zeros(0),
         amplitudes=run.extremes(n_cycles),
         phasors=np.array([1, 1j]) @ run.record.cycles[2:, :n_cycles],
-        ledger=run.energy_ledger() | _work_check(with_reversals),
+        ledger=run.energy_ledger() | _compute_work_check(with_reversals),
         outcome=run.outcome,
         snapshots=snapshots,
         window_work=integrated.loops[0].work,
@@ -650,7 +650,7 @@ def simulate(
 def _run_to_window(run: Motion, window: float, n_equidistant: int) -> list:
     """March to the start of the last window; return the sample rows from before it.
 
-    They are `n_equidistant` samples of every cycle where that is not 0, and those of the last two
+    They are `n_equidistant` samples of every cycle unless that is 0, and those of the last two
     cycles before the window.
     """
     period = run.drive.period
@@ -667,8 +667,8 @@ def _run_to_window(run: Motion, window: float, n_equidistant: int) -> list:
     return rows
 
 
-def _work_check(response) -> dict:
-    """Return friction work [J] by samples and by the energy ledger, and its magnitude."""
+def _compute_work_check(response) -> dict:
+    """Return the friction work [J] from samples and from the energy ledger, and its magnitude."""
     parts = np.diff(response.extra["ledger"][0])
     return {
         "sampled": float(sampled_work(response.slide, response.force).sum()),

@@ -70,7 +70,7 @@ def write_mode_slopes(motion, i, y, out, drive, friction_accel):
     drive : float
         Drive [m s-2].
     friction_accel : float
-        Friction force over the modal mass [m s-2].
+        Friction force divided by the modal mass [m s-2].
 
     Returns
     -------
@@ -218,7 +218,7 @@ def take_step(motion, h):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def estimate_error(motion, h, tolerance):
-    """Return the estimated error of a step over the tolerance.
+    """Return the estimated error of a step, relative to the tolerance.
 
     Coordinates and rates count relative to their recent maxima, states of the law relative to their
     sizes. The size of a rate is at least the round-off that the forces leave in it during the step:

@@ -314,8 +314,8 @@ def estimate_roughness(row, force):
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def write_parts(motion, h, record):
-    """Write a step into the record, divided into parts with a smooth force.
+def write_step_parts(motion, h, record):
+    """Write a step into the record, divided into substeps in which the force is smooth.
 
     The force in each part is a polynomial to MAX_ROUGHNESS_RATIO.
 
@@ -393,4 +393,4 @@ def record_step(motion, h, record):
     write_samples(motion, h, record)
     widen_by_step(motion, h, record, 1 if motion.modes.shape[1] == 1 else 4)
     if whole:
-        write_parts(motion, h, record)
+        write_step_parts(motion, h, record)

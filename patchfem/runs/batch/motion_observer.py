@@ -206,7 +206,7 @@ class MotionObserver:
                 self.model, self.numerics, self.patch, 0, self.report
             ),
         )
-        solution = point.find_point(
+        solution = point.find_steady_motion(
             solver.modes,
             drive,
             solver.group,

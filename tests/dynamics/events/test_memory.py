@@ -9,7 +9,7 @@ from patchfem.dynamics.events import memory_kernels as kernels
 from patchfem.dynamics.events.elements import (
     element_stretches,
     make_element_table,
-    unstretched_memory,
+    make_unstretched_memory,
 )
 
 
@@ -22,7 +22,7 @@ class SlideTracker:
         self.y = np.asarray(yield_displacement, float)
         self.group = make_elements(self.k, self.y)
         self.table = make_element_table([self.group])
-        self.memory = unstretched_memory(self.table, [0.0])
+        self.memory = make_unstretched_memory(self.table, [0.0])
         self.stretch = np.zeros(self.k.size)
         self.lost = 0.0
         self.depth = 0

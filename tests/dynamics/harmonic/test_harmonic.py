@@ -25,7 +25,7 @@ from patchfem.dynamics import (
     coulomb_model,
     evaluate_series,
     find_cycle_energies,
-    find_point,
+    find_steady_motion,
     jenkins_model,
     make_balance,
     make_cycle_response,
@@ -159,14 +159,14 @@ def test_exact_limiting_cases_agree_with_linear_response(omega):
     c = np.diag(0.04 * np.arange(1, 6)) + 0.02
     for damping in (None, c):
         modes = make_five_modes(damping)
-        point = find_point(
+        point = find_steady_motion(
             modes, SineDrive(2.0, omega), Jenkins([1.0, 2.5], [1e6, 2e6]), harmonics=3
         )
         assert point.modal[1] == pytest.approx(
             solve_linear_modes(modes, omega, 2.0, 3.5), rel=1e-10
         )
         assert np.abs(point.modal[[0, 2, 3]]).max() < 1e-12
-        weak = find_point(modes, SineDrive(2.0, omega), Jenkins([1e-9], [1.0]), harmonics=3)
+        weak = find_steady_motion(modes, SineDrive(2.0, omega), Jenkins([1e-9], [1.0]), harmonics=3)
         assert weak.modal[1] == pytest.approx(solve_linear_modes(modes, omega, 2.0, 0.0), rel=1e-7)
 
 
@@ -176,12 +176,12 @@ def test_exact_rigid_and_undamped_modes_agree_with_linear_response():
     ones = np.ones(2)
     modes = make_modal_basis([0.0, 1.0], 0.0, [1.0, 0.6], ones, ones, mass=1.5)
     for omega in (0.8, 1.0):
-        point = find_point(modes, SineDrive(1.0, omega), Spring(2.0), harmonics=3)
+        point = find_steady_motion(modes, SineDrive(1.0, omega), Spring(2.0), harmonics=3)
         assert point.modal[1] == pytest.approx(
             solve_linear_modes(modes, omega, 1.0, 2.0), rel=1e-10
         )
         assert np.abs(point.modal[0]).max() < 1e-12
-    frictional = find_point(
+    frictional = find_steady_motion(
         modes, SineDrive(1.0, 1.0), [Spring(0.5), Jenkins([3.0], [0.4])], tolerance=1e-4
     )
     check_cycle(
@@ -250,7 +250,7 @@ def check_cycle(modes, drive, point, k, w, tolerance, steps=4000):
 def test_exact_five_modes_with_many_elements_agree_with_march(omega):
     """The balance of five modes with many elements agrees with a march of one cycle within 2e-4."""
     modes, (k, w), drive = make_five_modes(), make_elements(), SineDrive(1.5, omega)
-    point = find_point(modes, drive, jenkins_model(k, w), tolerance=1e-4)
+    point = find_steady_motion(modes, drive, jenkins_model(k, w), tolerance=1e-4)
     assert point.error < 1e-4 and np.ptp(evaluate_series(point.coefficients, 512)) > 4 * w.min()
     check_cycle(modes, drive, point, k, w, 2e-4)
 
@@ -263,7 +263,7 @@ def test_exact_five_modes_with_many_elements_agree_with_march(omega):
 def test_exact_peaks_at_resonance_agree_with_dop853(stiffness, tolerance, max_error):
     """Peaks at resonance agree with values by DOP853 within the tolerance, and the stated error
     covers the difference."""
-    point = find_point(
+    point = find_steady_motion(
         make_sdof(), DRIVE, Jenkins([stiffness], [0.8 / stiffness]), tolerance=tolerance
     )
     error = abs(point.amplitude([1.0]) / PEAKS[stiffness] - 1)
@@ -275,7 +275,7 @@ def test_always_work_of_drive_equals_losses(omega):
     """The work of the base per cycle equals the viscous loss plus the area of the loop, within
     2e-4, from three independent sums."""
     modes, (k, w), drive = make_five_modes(), make_elements(), SineDrive(1.5, omega)
-    point = find_point(modes, drive, Jenkins(k, w), harmonics=15)
+    point = find_steady_motion(modes, drive, Jenkins(k, w), harmonics=15)
     response = make_cycle_response(point, modes, drive, 2000)
     dt = drive.period / 2000
     base = (
@@ -304,20 +304,22 @@ def test_order_of_truncation_error():
     of the slide fall like k^-4, it falls like H^-3 or faster."""
     modes = make_sdof(0.05)
     drive = SineDrive(1.0, 0.5)
-    reference = find_point(modes, drive, Spring(0.5, 3.0), harmonics=41).amplitude([1.0])
+    reference = find_steady_motion(modes, drive, Spring(0.5, 3.0), harmonics=41).amplitude([1.0])
     errors = [
         abs(
-            find_point(modes, drive, Spring(0.5, 3.0), harmonics=h).amplitude([1.0]) / reference - 1
+            find_steady_motion(modes, drive, Spring(0.5, 3.0), harmonics=h).amplitude([1.0])
+            / reference
+            - 1
         )
         for h in (3, 9, 15)
     ]
     assert errors[0] > 1e-4 and errors[1] < 1e-2 * errors[0] and errors[2] < 1e-2 * errors[1]
     group = LawGroup(modes, Jenkins([2.0], [0.3]), 8192)
-    reference = find_point(modes, drive, group, harmonics=255)
+    reference = find_steady_motion(modes, drive, group, harmonics=255)
     y = evaluate_series(reference.coefficients[0], 1024)
     errors = []
     for h in (9, 19, 39, 79):
-        point = find_point(modes, drive, group, harmonics=h)
+        point = find_steady_motion(modes, drive, group, harmonics=h)
         errors.append(np.abs(evaluate_series(point.coefficients[0], 1024) - y).max())
     order = -np.polyfit(np.log([9, 19, 39, 79]), np.log(errors), 1)[0]
     assert 2.7 < order < 4.5
@@ -328,7 +330,7 @@ def test_exact_laws_on_two_interfaces_agree_with_linear_response():
     receptance is symmetric."""
     modes = make_five_modes()
     laws = [(0, Spring(1.5)), (modes.output, Spring(0.7))]
-    point = find_point(modes, SineDrive(1.0, 1.9), laws, harmonics=1)
+    point = find_steady_motion(modes, SineDrive(1.0, 1.9), laws, harmonics=1)
     a = np.diag(modes.omega**2) - 1.9**2 * np.eye(5) + 1.9j * modes.damping_matrix
     for row, k in ((modes.slide, 1.5), (modes.output, 0.7)):
         a = a + np.outer(row, row) * k / modes.mass
@@ -348,7 +350,9 @@ def test_exact_balance_satisfies_equation_of_motion(law):
     law, within 2e-3."""
     modes = make_sdof(0.05)
     drive = SineDrive(1.0, 1.2)
-    point = find_point(modes, drive, law, tolerance=1e-7 if isinstance(law, Interlock) else 1e-5)
+    point = find_steady_motion(
+        modes, drive, law, tolerance=1e-7 if isinstance(law, Interlock) else 1e-5
+    )
     response = make_cycle_response(point, modes, drive, 512)
     k = np.arange(point.modal.shape[0])[:, None]
     accel = evaluate_series((-((1.2 * k) ** 2) * point.modal).T, 512)
@@ -365,9 +369,11 @@ def test_refuses_laws_that_cannot_be_balanced():
     a message."""
     modes = make_sdof()
     with pytest.raises(PatchfemError, match="rigid friction"):
-        find_point(modes, DRIVE, coulomb_model(1.0, 1.0))
+        find_steady_motion(modes, DRIVE, coulomb_model(1.0, 1.0))
     with pytest.raises(PatchfemError, match="breakaway"):
-        find_point(modes, DRIVE, points_model(Bonds(0.3, 1e-6, breakaway=0.1), [1.0], [1.0]))
+        find_steady_motion(
+            modes, DRIVE, points_model(Bonds(0.3, 1e-6, breakaway=0.1), [1.0], [1.0])
+        )
     with pytest.raises(PatchfemError, match="interface 2"):
         LawGroup(modes, (2, Spring(1.0)))
     with pytest.raises(PatchfemError, match="on at least one interface"):

@@ -25,7 +25,7 @@ from patchfem.dynamics import (
     add_stability,
     evaluate_series,
     find_branches,
-    find_point,
+    find_steady_motion,
     make_cycle_response,
     trace_over_frequency,
 )
@@ -183,7 +183,7 @@ def test_exact_multipliers_of_linear_modes_agree_with_closed_form():
     """The Floquet multipliers of linear modes agree with their closed form within 1e-12."""
     modes = make_five_modes()
     multipliers = add_stability(
-        find_point(modes, SineDrive(1.0, 1.2), Spring(0.0), harmonics=1), modes
+        find_steady_motion(modes, SineDrive(1.0, 1.2), Spring(0.0), harmonics=1), modes
     ).multipliers
     power = np.exp(2 * np.pi / 1.2 * modes.omega * (-0.02 + 1j * np.sqrt(1 - 0.02**2)))
     expected = np.concatenate([power, power.conj()])
@@ -196,7 +196,7 @@ def test_exact_monodromy_agrees_with_perturbed_march(omega):
     """For five modes and 40 elements the modal part of the monodromy matrix agrees with central
     differences of a march within 0.15 %."""
     modes, (k, w), drive = make_five_modes(), make_elements(40), SineDrive(1.5, omega)
-    p = find_point(modes, drive, Jenkins(k, w), tolerance=1e-5)
+    p = find_steady_motion(modes, drive, Jenkins(k, w), tolerance=1e-5)
     response = make_cycle_response(p, modes, drive, 2000)
     stretch = jenkins_forces(np.append(np.tile(response.slide[:-1], 2), response.slide[0]), k, w)[1]
     start = np.concatenate([response.modal[0], response.modal_rate[0]])
@@ -223,7 +223,7 @@ def test_exact_monodromy_of_bonds_agrees_with_dop853():
     drive = SineDrive(1.0, 1.2)
     limit = 0.4
     length = 0.3
-    p = find_point(modes, drive, make_bond_law(limit, length), tolerance=1e-6)
+    p = find_steady_motion(modes, drive, make_bond_law(limit, length), tolerance=1e-6)
     response = make_cycle_response(p, modes, drive, 4096)
 
     def state_derivative(t, y):
@@ -387,7 +387,7 @@ def test_exact_forced_response_on_backbone_is_in_quadrature():
     free = find_backbone(modes, law, np.array([2.0]), harmonics=1)
     omega = 2 * np.pi * free.frequency[0]
     level = 2 * free.damping[0] * omega**2 * 2.0
-    forced = find_point(modes, SineDrive(level, omega), law, harmonics=1)
+    forced = find_steady_motion(modes, SineDrive(level, omega), law, harmonics=1)
     assert np.abs(forced.coefficients[0, 1]) == pytest.approx(2.0, rel=1e-6)
     assert np.angle(forced.coefficients[0, 1] / (-1j)) == pytest.approx(np.pi / 2, abs=1e-6)
 

@@ -11,8 +11,8 @@ from patchfem.core import NotConverged, SineDrive
 from patchfem.dynamics import (
     Spring,
     evaluate_series,
-    find_point,
     find_regime,
+    find_steady_motion,
     make_cycle_response,
     trace_over_frequency,
 )
@@ -43,7 +43,7 @@ def test_exact_measures_agree_with_marched_scene(law):
     modes = result.plan.model.rig.modes
     drive = result.plan.model.rig.drive.signal
     limit = 0.3 * LOAD
-    p = find_point(
+    p = find_steady_motion(
         modes,
         drive,
         Jenkins([limit / 20e-6], [20e-6])
@@ -87,7 +87,7 @@ def test_exact_thirty_interfaces_on_five_modes():
     modes = make_modal_basis(base.omega, base.zeta, faces, base.base, base.output, mass=base.mass)
     laws = [(i, Jenkins([0.1], [0.02 + 0.01 * i])) for i in range(30)]
     drive = SineDrive(1.0, 0.9)
-    p = find_point(modes, drive, laws, tolerance=1e-4)
+    p = find_steady_motion(modes, drive, laws, tolerance=1e-4)
     assert p.coefficients.shape[0] == 30 and p.error < 1e-4
     response = make_cycle_response(p, modes, drive, 1024)
     forces = make_group(modes, laws).compute_forces(p.coefficients, drive.omega, 1024)
@@ -127,7 +127,7 @@ def test_always_sweep_agrees_with_single_points():
     sweep = trace_over_frequency(modes, SineDrive(1.0, 1.0), law, values, tolerance=1e-4)
     assert sweep.ended == "listed" and sweep.values == pytest.approx(values)
     for p in sweep.points:
-        expected = find_point(modes, SineDrive(1.0, p.omega), law, tolerance=1e-4)
+        expected = find_steady_motion(modes, SineDrive(1.0, p.omega), law, tolerance=1e-4)
         assert p.amplitude([1.0]) == pytest.approx(expected.amplitude([1.0]), rel=3e-4)
 
 
@@ -142,18 +142,25 @@ def test_exact_regimes_of_slide_amplitudes():
         (0.6, ("slides", 1.0)),
     ):
         # far below resonance with a stiff spring the slide amplitude is level/stiffness
-        p = find_point(modes, SineDrive(amplitude * 1e4, 1.0), [Spring(1e4), law], harmonics=7)
+        p = find_steady_motion(
+            modes, SineDrive(amplitude * 1e4, 1.0), [Spring(1e4), law], harmonics=7
+        )
         name, fraction = find_regime(p)
         assert (name, fraction) == (expected[0], pytest.approx(expected[1]))
-    assert find_regime(find_point(modes, DRIVE, Spring(3.0), harmonics=1)) == ("no friction", 0.0)
+    assert find_regime(find_steady_motion(modes, DRIVE, Spring(3.0), harmonics=1)) == (
+        "no friction",
+        0.0,
+    )
     assert (
-        find_regime(find_point(modes, SineDrive(1e-4, 0.5), make_bond_law(1.0, 1.0), harmonics=3))[
-            0
-        ]
+        find_regime(
+            find_steady_motion(modes, SineDrive(1e-4, 0.5), make_bond_law(1.0, 1.0), harmonics=3)
+        )[0]
         == "stuck"
     )
     assert (
-        find_regime(find_point(modes, SineDrive(1.0, 0.5), make_bond_law(0.1, 0.1), harmonics=7))[0]
+        find_regime(
+            find_steady_motion(modes, SineDrive(1.0, 0.5), make_bond_law(0.1, 0.1), harmonics=7)
+        )[0]
         == "slides"
     )
 
@@ -168,9 +175,9 @@ def test_exact_undamped_resonance_is_bounded_above_friction_threshold(limit, bou
         with pytest.raises(
             NotConverged, match="undamped mode that is driven at its natural frequency"
         ):
-            find_point(modes, DRIVE, law)
+            find_steady_motion(modes, DRIVE, law)
         return
-    p = find_point(modes, DRIVE, law, tolerance=1e-4)
+    p = find_steady_motion(modes, DRIVE, law, tolerance=1e-4)
     assert np.abs(p.forces[0, 1] - 1j) < 1e-6  # friction balances the first harmonic of the drive
     response = make_cycle_response(p, modes, DRIVE, 4000)
     k = np.array([20.0])
@@ -192,7 +199,7 @@ def test_refuses_tolerance_beyond_maximum_harmonics():
     """For a nearly rigid element 255 harmonics do not reach a tolerance of 1e-12, and the message
     states the remaining error."""
     with pytest.raises(NotConverged, match="the motion still has an error"):
-        find_point(
+        find_steady_motion(
             make_sdof(0.05),
             SineDrive(1.0, 0.7),
             [Spring(0.1), Jenkins([1.0], [0.1])],

@@ -187,7 +187,7 @@ def test_exact_case_does_not_depend_on_other_lanes(law):
     order = np.random.default_rng(2).permutation(70)
     permuted = run.march(law, run.Cases(*(part[order] for part in batch)), 30, 3, 48)
     reference = run.march(law, batch, 30, 3, 48)
-    for name in ("motion", "history", "readings", "n_before"):
+    for name in ("motion", "history", "measures", "n_before"):
         np.testing.assert_array_equal(getattr(permuted, name), getattr(reference, name)[order])
 
 
@@ -241,7 +241,7 @@ def test_always_diverged_march_gives_nan_without_warnings(law):
     result = run.march(law, batch, 60, 6, 8)
     energies = reading.run_energies(law, batch, result, np.ones(60))
     angle = np.ones((60, 6, 2))
-    reading.reading_of_runs(law, batch, result, np.ones(60), np.ones(60), angle)
+    reading.measure_runs(law, batch, result, np.ones(60), np.ones(60), angle)
     assert np.isfinite(energies["work_in"][1::2]).all() and np.isnan(energies["work_in"][::2]).any()
     assert (np.isnan(energies["stored"]) == np.isnan(result.motion[:, Row.SLIDE])).all()
 

@@ -71,7 +71,7 @@ def find_ringing(law: str, cases, scales: Scales, measured, is_stuck) -> LaneRin
     if law == "rigid":  # a rigid interface holds the only mode at rest during stick
         return ringing
     may_ring = has_long_stick(cases, marched)
-    sticks_always = marched.reading("STICK_ANGLE") > 2 * np.pi * (marched.n_observed - 1e-6)
+    sticks_always = marched.get_measure("STICK_ANGLE") > 2 * np.pi * (marched.n_observed - 1e-6)
     is_unsteady = marched.n_before >= marched.history.shape[1] - measured.window
     if law == "yielding":
         _compute_spring_ringing(
@@ -92,7 +92,7 @@ def find_ringing(law: str, cases, scales: Scales, measured, is_stuck) -> LaneRin
 def has_long_stick(cases, marched) -> np.ndarray:
     """Return a mask (n,) of the cases with a stick interval long enough for a ringing fit."""
     omega = np.sqrt(np.maximum(cases.stiffness + cases.spring - cases.damping**2 / 4, 0.0))
-    return marched.reading("LONGEST_STICK") * omega >= MIN_STICK_PHASE
+    return marched.get_measure("LONGEST_STICK") * omega >= MIN_STICK_PHASE
 
 
 def may_contain_transient(cases, marched) -> np.ndarray:
@@ -106,7 +106,7 @@ def may_contain_transient(cases, marched) -> np.ndarray:
         -np.expm1(-np.pi * cases.damping), 1e-300
     )
     acceleration = np.abs(cases.output_gain) * (cases.stiffness + cases.spring) * change
-    return acceleration > MIN_SINUSOID / 3 * marched.reading("MAX_ACCELERATION")
+    return acceleration > MIN_SINUSOID / 3 * marched.get_measure("MAX_ACCELERATION")
 
 
 def _fit_ringing(
@@ -181,7 +181,7 @@ def _compute_spring_ringing(
             & (damping < MAX_DAMPING_RATIO)
             & ~is_forced
             & (squared_dynamic_stiffness > 1e-18 * stiffness**2)
-            & (amplitude > MIN_SINUSOID * marched.reading("MAX_ACCELERATION"))
+            & (amplitude > MIN_SINUSOID * marched.get_measure("MAX_ACCELERATION"))
         )
     for name, values in zip(RINGING_MEASURES, (omega * scales.omega / (2 * np.pi), damping)):
         ringing.values[name][is_ringing] = values[is_ringing]

@@ -83,7 +83,7 @@ def march_and_measure(law: str, cases, scales: Scales, cycles: int, steps: int) 
     is_reversed = scales.ratio < 0
     extremes[is_reversed] = extremes[is_reversed, :, ::-1]
     energies = reading.run_energies(law, cases, marched, scales.energy)
-    run_reading = reading.reading_of_runs(
+    run_reading = reading.measure_runs(
         law, cases, marched, scales.energy, scales.omega, extremes[:, -window:]
     )
     with np.errstate(all="ignore"):
@@ -153,7 +153,7 @@ def collect_runs(
     errors = step_errors(values, coarser)
     for name in errors.keys() & mesh_errors.keys():
         errors[name] = errors[name] + mesh_errors[name]
-    slip_ranges = marched.reading("MAX_SLIP") - marched.reading("MIN_SLIP")
+    slip_ranges = marched.get_measure("MAX_SLIP") - marched.get_measure("MIN_SLIP")
     round_off = SUM_ROUND_OFF * np.abs(marched.history[:, :, :2]).max(axis=(1, 2))
     is_stuck = slip_ranges / 2 <= np.maximum(scales.max_stick_slip, round_off)
     is_stuck &= (cases.spring > 0) | (law == "rigid")

@@ -17,8 +17,8 @@ from ....dynamics.harmonic.balance import find_cycle_energies, make_cycle_respon
 from ....dynamics.harmonic.balance import find_regime as balanced_regime
 from ....dynamics.harmonic.forces import LawGroup
 from ....dynamics.harmonic.laws import Interlock, Spring
-from ....dynamics.harmonic.point import find_point as periodic_point
-from ....dynamics.harmonic.point import refine_point
+from ....dynamics.harmonic.point import find_steady_motion as periodic_point
+from ....dynamics.harmonic.point import refine_steady_motion
 from ....dynamics.harmonic.stability import add_stability
 from ....dynamics.integrated import EngineResult
 from ....formatting import format_length
@@ -207,7 +207,7 @@ class BalanceFinder:
         """
         errors = {name: abs(v) * min(motion.error, 1.0) for name, v in values.items()}
         try:
-            finer = refine_point(motion, self.modes, drive)
+            finer = refine_steady_motion(motion, self.modes, drive)
         except NotConverged:
             return errors
         residual = max(motion.left, finer.left)

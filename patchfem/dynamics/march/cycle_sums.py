@@ -1,4 +1,4 @@
-"""Long marches of bonds behind shear modes without stored samples (`passing_kernels`)."""
+"""Long marches of coupled bond points that store sums instead of samples (`passing_kernels`)."""
 
 import numpy as np
 
@@ -7,37 +7,37 @@ from ..checkpoint import MarchSamples
 from ..interfaces.arrays import ShearedPoints
 from ..ledger import N_SAMPLE_COLUMNS
 from ..periodicity import cycles_to_next_check
-from .faces import STEP_TOL
-from .folded_arrays import (
+from .cycle_sum_arrays import (
     BLOCK,
     N_BLOCK_ROWS,
     CycleColumn,
-    FoldedCycles,
-    FoldedMarch,
+    CycleSumMarch,
+    CycleSums,
     LargestSlide,
     StepBounds,
     SumIndex,
     TraceRow,
 )
+from .faces import STEP_TOL
 from .recording import N_SUMS
 from .run import Run
 
-FOLDED_KERNELS = "dynamics.march.passing_kernels"
+CYCLE_SUM_KERNELS = "dynamics.march.passing_kernels"
 
 
-def can_fold(run: Run) -> bool:
-    """Return whether a march can record cycles without samples (`march_folded`).
+def can_sum_cycles(run: Run) -> bool:
+    """Return whether a march can store sums instead of samples (`march_with_sums`).
 
-    This requires bonds behind shear modes without other elements, under a constant load.
+    This requires bond points coupled by shear modes, no other elements, and a constant load.
 
     """
     return type(run) is Run and run.model.tuple_of is ShearedPoints and not run.model.joints
 
 
-def march_folded(run: Run, steps: int, samples: MarchSamples) -> bool:
-    """March to a step without stored samples, and record extremes and phasors of all cycles.
+def march_with_sums(run: Run, steps: int, samples: MarchSamples) -> bool:
+    """March to a step and store energy sums, extremes and phasors of all cycles instead of samples.
 
-    The sample at the largest slide is recorded too.
+    The sample at the largest slide is also stored.
 
     Parameters
     ----------
@@ -53,9 +53,9 @@ def march_folded(run: Run, steps: int, samples: MarchSamples) -> bool:
         Whether the march reached the step.
     """
     cycle_steps = run.prop.steps
-    kernel = load(FOLDED_KERNELS).march_folded_cycles
-    folded = _make_folded_cycles(run)
-    largest = folded.largest
+    kernel = load(CYCLE_SUM_KERNELS).march_cycles_with_sums
+    record = _make_cycle_sums(run)
+    largest = record.largest
     table = None
     largest_at = -1
     while run.done < steps and run.outcome is None:
@@ -66,23 +66,23 @@ def march_folded(run: Run, steps: int, samples: MarchSamples) -> bool:
             next_check = cycles_to_next_check(run.done // cycle_steps)
             count = min((steps - run.done) // size, next_check)
         rows, first_row = run.get_step_table(size * count)
-        is_new_size = folded.trace.shape[1] != size + 1
+        is_new_size = record.trace.shape[1] != size + 1
         if is_new_size:
-            folded = folded._replace(trace=_make_trace(run, size))
+            record = record._replace(trace=_make_trace(run, size))
         if is_new_size or rows is not table:
             table = rows
             bound = kernel.bind_arguments(
-                FoldedMarch(run.state, run.modal_system, rows, run.contact, folded)
+                CycleSumMarch(run.state, run.modal_system, rows, run.contact, record)
             )
-        folded.sums[:] = 0.0
+        record.sums[:] = 0.0
         largest.number[0] = -1
         cycles = np.zeros((count, len(CycleColumn)))
         n_steps, status = kernel.call_with_bound_args(bound, first_row, cycles)
         if largest.number[0] >= 0:
             largest_at = run.done + int(largest.number[0]) - first_row
         run.done += n_steps
-        run.totals += folded.sums[:N_SUMS]
-        run.second += folded.sums[N_SUMS:]
+        run.totals += record.sums[:N_SUMS]
+        run.second += record.sums[N_SUMS:]
         run.set_outcome(status)
         extremes = cycles[:, [CycleColumn.MIN_OUTPUT, CycleColumn.MAX_OUTPUT]]
         samples.extremes += [*zip(*extremes.T.tolist())]
@@ -98,8 +98,8 @@ def march_folded(run: Run, steps: int, samples: MarchSamples) -> bool:
     return run.outcome is None
 
 
-def _make_folded_cycles(run: Run) -> FoldedCycles:
-    """Return the arrays that record the cycles of a march without samples."""
+def _make_cycle_sums(run: Run) -> CycleSums:
+    """Return the arrays of the sums that are stored instead of samples."""
     largest = LargestSlide(
         row=np.zeros(2 * run.modes.omega.size + N_SAMPLE_COLUMNS),
         kept=np.zeros(run.width + N_SUMS),
@@ -110,7 +110,7 @@ def _make_folded_cycles(run: Run) -> FoldedCycles:
         force=float(run.model.limit),
         travel=float(run.travel),
     )
-    return FoldedCycles(
+    return CycleSums(
         bounds=bounds,
         largest=largest,
         ledger=run.ledger,

@@ -1,4 +1,4 @@
-"""Arrays of a march without stored samples, with names for their rows."""
+"""Arrays of a march that stores sums instead of samples, with names for their rows."""
 
 from enum import IntEnum
 from typing import NamedTuple
@@ -7,7 +7,7 @@ import numpy as np
 
 
 class SumIndex(IntEnum):
-    """Indices into `FoldedCycles.sums`: energies accumulated over the folded cycles [J].
+    """Indices into `CycleSums.sums`: energies accumulated over the cycles of a call [J].
 
     - WORK: friction work
     - LOSS, CREATED: dissipated energy, and energy created by numerical errors
@@ -23,7 +23,7 @@ class SumIndex(IntEnum):
 
 
 class TraceRow(IntEnum):
-    """Rows of `FoldedCycles.trace`: output [m], output rate [m/s], cosine and sine of the drive."""
+    """Rows of `CycleSums.trace`: output [m], output rate [m/s], cosine and sine of the drive."""
 
     OUTPUT = 0
     RATE = 1
@@ -32,7 +32,7 @@ class TraceRow(IntEnum):
 
 
 class CycleColumn(IntEnum):
-    """Columns of the results of a folded cycle: extremes and phasor of the output [m]."""
+    """Columns of the results of a cycle: extremes and phasor of the output [m]."""
 
     MIN_OUTPUT = 0
     MAX_OUTPUT = 1
@@ -41,7 +41,7 @@ class CycleColumn(IntEnum):
 
 
 class BlockRow(IntEnum):
-    """Rows of `FoldedCycles.workspace`: energies and motion in a block of steps.
+    """Rows of `CycleSums.workspace`: energies and motion in a block of steps.
 
     - DRIVE_WORK, VISCOUS_LOSS: energies of the step [J]
     - SLIDE, SPEED: slide [m] and speed [m/s] at the end of the step; SLIDE later has the increment
@@ -65,7 +65,7 @@ BLOCK = 32  # number of steps in full slip that are computed as a block, mode by
 
 
 class StepBounds(NamedTuple):
-    """Tolerance and limits of a march of folded cycles.
+    """Tolerance and limits of a march that stores sums.
 
     - goal: tolerance of the friction force of a step [N]
     - force: friction limit [N]
@@ -90,8 +90,8 @@ class LargestSlide(NamedTuple):
     number: np.ndarray
 
 
-class FoldedCycles(NamedTuple):
-    """Energy sums and output that `passing_kernels` records in place of samples.
+class CycleSums(NamedTuple):
+    """Energy sums and output that `passing_kernels` stores instead of samples.
 
     - bounds, largest: tolerance and limits, and the sample of the largest slide
     - ledger: (9,) energy sums, see `dynamics.ledger.Ledger`
@@ -110,18 +110,18 @@ class FoldedCycles(NamedTuple):
     workspace: np.ndarray
 
 
-class FoldedMarch(NamedTuple):
-    """Arguments of `passing_kernels`: modes, contact and records of folded cycles.
+class CycleSumMarch(NamedTuple):
+    """Arguments of `passing_kernels`: modes, contact and the record of sums.
 
     - motion: (2, n) coordinates and rates of the modes
     - modal_system: `interfaces.arrays.ModalArrays`
     - table: (s, k) table of `propagator.Propagator`
     - interface: `interfaces.arrays.ShearedPoints`
-    - folded: records of energy sums and output
+    - record: energy sums and output
     """
 
     motion: np.ndarray
     modal_system: tuple
     table: np.ndarray
     interface: tuple
-    folded: FoldedCycles
+    record: CycleSums
