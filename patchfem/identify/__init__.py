@@ -1,11 +1,11 @@
-"""Values and modes identified from measurements, with 95 % intervals.
+"""Identification of parameters and modes from measurements, with 95 % confidence intervals.
 
-In: a residual as a function of parameters, or records over time. Out: best values with intervals, and what
-the data do not determine; frequencies, damping ratios and shapes of modes. Read `least_squares` first for
-fits of any model, and `measured_modes` for modes.
+In: a residual as a function of parameters, or time records. Out: fitted values with intervals, and the
+parameters that the data do not determine; frequencies, damping ratios and shapes of modes. Read
+`least_squares` first for fits of any model, and `measured_modes` for modes.
 """
 
-# names that other folders use, by module
+# Names that other folders use, by module.
 PUBLIC = {
     "least_squares": (
         "Descent",
@@ -29,5 +29,5 @@ PUBLIC = {
         "make_space_filling_points",
     ),
     "two_models": ("TwoModels",),
-    "words": ("describe_fit",),
+    "fit_sentences": ("describe_fit",),
 }

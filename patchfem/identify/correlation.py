@@ -1,30 +1,30 @@
-"""Number of independent rows of a residual whose neighbouring rows are correlated."""
+"""Effective number of independent rows of a correlated residual."""
 
 import numpy as np
 
-MIN_ROWS = 20  # smallest number of rows whose correlation can be distinguished from chance
-# standard deviations 1/sqrt(rows) of the correlation of independent rows; a smaller correlation is attributed to chance
+MIN_ROWS = 20  # smallest number of rows for a significant correlation
+# Largest correlation that is attributed to chance, in standard deviations 1/sqrt(rows) of independent rows.
 CHANCE_CORRELATION_FACTOR = 2.0
-# correlation of the residuals of successive cycles, above which the cycles count as repetitions of one error
+# Smallest correlation between cycles at which they count as repetitions of the same error.
 MIN_CYCLE_CORRELATION = 0.5
 
 
 def estimate_effective_rows(residual) -> float:
-    """Estimate the number of independent residuals that are equivalent to correlated ones.
+    """Estimate the effective number of independent rows of a residual.
 
-    The number is n/tau with tau = 1 + 2 sum rho_k over the lags k before the first one without
-    correlation (Geyer, Statistical Science 7, 473, 1992). If the correlation returns at a later lag,
-    because a law has the same error in each of m cycles, these count as m/(1 + (m - 1) rho).
+    The number is n/tau, with tau = 1 + 2 sum rho_k over the lags k up to the first zero of the correlation
+    (Geyer, Statistical Science 7, 473, 1992). If m cycles have the same error, so that the correlation rho at
+    a later lag is large, they count as m/(1 + (m - 1) rho) cycles.
 
     Parameters
     ----------
     residual : (n,) array_like
-        Rows in the order in which they were measured.
+        Rows in the order of measurement.
 
     Returns
     -------
     float
-        Between 1 and n; n if there are few rows, or if neighbours are not correlated.
+        Number between 1 and n; n for few rows, or if neighbouring rows are not correlated.
     """
     r = np.asarray(residual, float)
     n = r.size
@@ -34,16 +34,16 @@ def estimate_effective_rows(residual) -> float:
     rho = _compute_autocorrelation(r)
     if rho[1] <= CHANCE_CORRELATION_FACTOR / np.sqrt(n):
         return float(n)
-    # there is such a lag, because the correlations at all lags sum to -1/2
+    # a lag without correlation exists, because the sum over all lags is -1/2
     first_lag = int(np.flatnonzero(rho[1:] <= 0)[0]) + 1
     tau = 1 + 2 * rho[1:first_lag].sum()
     return float(np.clip(n / tau / _compute_repetition_factor(rho, first_lag), 1.0, n))
 
 
 def _compute_autocorrelation(r) -> np.ndarray:
-    """Compute the autocorrelation (n,) of a residual at every lag from 0 to n - 1.
+    """Return the autocorrelation (n,) of a residual for the lags 0 to n - 1.
 
-    The residual r has the mean 0. All products are divided by n, so that the sum over the lags stays finite.
+    The residual r must have a mean of 0. All lags are divided by n (biased estimate), which limits their sum.
     """
     spectrum = np.fft.rfft(r, 2 * r.size)
     products = np.fft.irfft(spectrum * spectrum.conj())[: r.size]
@@ -51,15 +51,15 @@ def _compute_autocorrelation(r) -> np.ndarray:
 
 
 def _compute_repetition_factor(rho, first_lag: int) -> float:
-    """Return the factor by which repeated cycles carry less information than independent ones.
+    """Return the ratio of the number of cycles to the number of independent cycles.
 
-    `rho` (n,) is the autocorrelation, and `first_lag` is the first lag without correlation of neighbours.
+    `rho` (n,) is the autocorrelation, `first_lag` the first lag without correlation.
     """
     n = rho.size
     lags = np.arange(first_lag + 1, n // 2 + 1)
     if lags.size < 3:
         return 1.0
-    # at a given lag there are only n - lag products
+    # unbiased estimate: there are n - lag products at each lag
     correlation = rho[lags] / (1 - lags / n)
     best = int(np.argmax(correlation))
     if correlation[best] < MIN_CYCLE_CORRELATION:

@@ -1,8 +1,8 @@
 """Natural frequencies and damping ratios of a free decay.
 
-x = c + sum_r e^(-s_r t) (a_r cos w_r t + b_r sin w_r t). The record is not windowed, so that its damping has
-no bias. Only (w_r, s_r) are varied, because all other parameters are linear (variable projection). Sinusoids
-are added at the highest line of the spectrum of the residual, as long as each reduces it enough.
+The model is x = c + sum_r e^(-s_r t) (a_r cos w_r t + b_r sin w_r t). The record is not windowed, so that the
+damping has no bias. Only w_r and s_r are nonlinear parameters (variable projection). Sinusoids are added at the
+highest spectral line of the residual, as long as each reduces the residual enough.
 """
 
 from dataclasses import dataclass
@@ -16,13 +16,13 @@ from .variable_projection import Projection, compute_standard_errors, project_da
 
 MIN_SAMPLES = 32  # smallest number of samples of a record
 MAX_SINUSOIDS = 8  # largest number of sinusoids in one fit
-# residual with / without a further sinusoid; above this ratio the sinusoid fits noise
+# Largest ratio of the residuals with and without a further sinusoid; beyond it, the sinusoid fits noise.
 MAX_RESIDUAL_RATIO = 0.8
-MIN_MISFIT = 1e-9  # residual / record; a smaller residual is round-off
-# smallest distance of two sinusoids in spectral lines, which are 1/T apart for a record of length T
+MIN_MISFIT = 1e-9  # smallest residual above round-off, relative to the record
+# Smallest distance of two sinusoids in spectral lines (1/T for a record of length T).
 MIN_SPECTRAL_LINE_SPACING = 3
-MIN_AMPLITUDE_RATIO = 0.01  # amplitude / largest amplitude; weaker sinusoids are left out
-# decay rates, multiplied by the length of the record, from which the fit of a further sinusoid starts
+MIN_AMPLITUDE_RATIO = 0.01  # smallest amplitude of a sinusoid, relative to the largest one
+# Initial decay rates of a further sinusoid, times the record length.
 START_DECAY_RATES = (0.3, 3.0, 30.0)
 
 
@@ -33,8 +33,8 @@ class Decay:
     - frequency: undamped natural frequencies (n,) [Hz], w/(2 pi) with w^2 = w_r^2 + s_r^2.
     - damping: damping ratios (n,), s_r/w.
     - amplitude: amplitudes (n,) at the first sample.
-    - damping_error: half-widths (n,) of the 95 % intervals of the damping ratios, from the residual.
-    - misfit: root mean square of the residual over that of the record.
+    - damping_error: half-widths (n,) of the 95 % intervals of the damping ratios.
+    - misfit: root mean square of the residual relative to that of the record.
     """
 
     frequency: np.ndarray
@@ -44,14 +44,14 @@ class Decay:
     misfit: float
 
     def decrement(self) -> np.ndarray:
-        """Return the logarithmic decrements (n,) of the sinusoids, 2 pi zeta / sqrt(1 - zeta^2)."""
+        """Return the logarithmic decrements (n,), 2 pi zeta / sqrt(1 - zeta^2)."""
         return 2 * np.pi * self.damping / np.sqrt(1 - self.damping**2)
 
 
 class _RefinedPoles(NamedTuple):
-    """Fitted poles of a free decay, with the residual of the fit.
+    """Poles of a free decay, with the residual of the fit.
 
-    - poles: damped frequency [rad/s] and decay rate [1/s] of each sinusoid in turn, w_1, s_1, w_2, ... (2n,).
+    - poles: damped frequency [rad/s] and decay rate [1/s] of each sinusoid (2n,): w_1, s_1, w_2, ...
     - residual: model minus data (k,).
     """
 
@@ -70,7 +70,7 @@ def fit_decay(time, value) -> Decay:
     Parameters
     ----------
     time : (k,) ndarray
-        Times [s], from the moment on at which nothing drives the motion.
+        Times [s] after the end of the drive.
     value : (k,) ndarray
         Displacement, velocity or acceleration.
 
@@ -81,7 +81,7 @@ def fit_decay(time, value) -> Decay:
     Raises
     ------
     PatchfemError
-        If there are too few samples, or if nothing decays.
+        If there are too few samples, or no decaying oscillation.
     """
     if time.size < MIN_SAMPLES:
         raise PatchfemError(
@@ -108,12 +108,12 @@ def fit_decay(time, value) -> Decay:
 
 
 def _make_decay(time, value, poles, misfit: float) -> Decay:
-    """Convert the fitted poles of a decay to natural frequencies and damping ratios with errors."""
+    """Return natural frequencies, damping ratios and errors for the fitted poles of a decay."""
     damped_omega = poles[0::2]
     rate = poles[1::2]
     columns = _compute_columns(time, poles)
     linear = project_data(columns, value)
-    # column 0 is the constant; then every sinusoid has a cosine and a sine
+    # column 0 is the constant, followed by a cosine and a sine per sinusoid
     cos_sin_coefficients = linear.coefficients[1:].reshape(-1, 2)
     motions = columns * linear.coefficients
     energy = np.sum((motions[:, 1::2] + motions[:, 2::2]) ** 2, axis=0)
@@ -123,22 +123,22 @@ def _make_decay(time, value, poles, misfit: float) -> Decay:
             "the oscillation in the record grows instead of decaying; begin the record after the drive "
             "has ended"
         )
-    w = np.hypot(damped_omega, rate)
+    omega = np.hypot(damped_omega, rate)
     errors = compute_standard_errors(
         _compute_derivatives(time, columns, linear), misfit * np.std(value)
     )
-    order = np.flatnonzero(is_kept)[np.argsort(w[is_kept])]
+    order = np.flatnonzero(is_kept)[np.argsort(omega[is_kept])]
     return Decay(
-        frequency=(w / (2 * np.pi))[order],
-        damping=(rate / w)[order],
+        frequency=(omega / (2 * np.pi))[order],
+        damping=(rate / omega)[order],
         amplitude=np.hypot(*cos_sin_coefficients.T)[order],
-        damping_error=(1.96 * errors[1::2] / w)[order],
+        damping_error=(1.96 * errors[1::2] / omega)[order],
         misfit=float(misfit),
     )
 
 
 def _are_distinct(time, poles) -> bool:
-    """Return whether all fitted sinusoids differ in frequency and oscillate faster than they decay."""
+    """Return whether all sinusoids differ in frequency and decay slower than they oscillate."""
     damped_omega = poles[0::2]
     distances = np.diff(np.sort(damped_omega))
     are_apart = (distances >= MIN_SPECTRAL_LINE_SPACING * 2 * np.pi / time[-1]).all()
@@ -146,9 +146,9 @@ def _are_distinct(time, poles) -> bool:
 
 
 def _compute_columns(time, poles) -> np.ndarray:
-    """Compute the design matrix of a decay fit: a constant, and two sinusoids for each pole.
+    """Return the design matrix of a decay fit: a constant, and a decaying cosine and sine per pole.
 
-    The columns (k, 1 + 2n) are 1, and the decaying cosine and sine of each pole.
+    The columns are (k, 1 + 2n).
     """
     columns = [np.ones(time.size)]
     for omega, rate in poles.reshape(-1, 2):
@@ -158,7 +158,7 @@ def _compute_columns(time, poles) -> np.ndarray:
 
 
 def _compute_derivatives(time, columns, linear: Projection) -> np.ndarray:
-    """Compute the derivatives (k, 2n) of the residual of a decay fit with respect to its poles."""
+    """Return the derivatives (k, 2n) of the residual of a decay fit with respect to its poles."""
     derivatives = []
     for k in range(1, columns.shape[1], 2):
         cosine, sine = columns[:, k : k + 2].T
@@ -168,10 +168,10 @@ def _compute_derivatives(time, columns, linear: Projection) -> np.ndarray:
 
 
 def _refine_poles(time, value, poles) -> _RefinedPoles:
-    """Minimize the residual of a decay fit over its poles, from starting poles (2n,)."""
+    """Minimize the residual of a decay fit over the poles (2n,) from an initial guess."""
 
     def compute_jacobian(poles) -> np.ndarray:
-        """Compute the derivatives of the residual with respect to the poles."""
+        """Return the derivatives of the residual with respect to the poles."""
         columns = _compute_columns(time, poles)
         return _compute_derivatives(time, columns, project_data(columns, value))
 
@@ -189,10 +189,10 @@ def _refine_poles(time, value, poles) -> _RefinedPoles:
 
 
 def _find_starts(time, best_fit: _RefinedPoles) -> list:
-    """Choose starting poles of a further sinusoid at the highest spectral line of the residual.
+    """Return initial poles of a further sinusoid at the highest spectral line of the residual.
 
-    They have several decay rates. Lines near a sinusoid of the fit are left out: its residual there is no
-    further mode, but stems from a decay that is not exponential, which the misfit shows.
+    Several decay rates are tried. Lines near a fitted sinusoid are excluded, because a residual there is due
+    to a decay that is not exponential, which increases the misfit.
     """
     even_times = np.linspace(0, time[-1], time.size)
     n_padded = 4 * even_times.size

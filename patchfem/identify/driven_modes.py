@@ -1,12 +1,12 @@
-"""Modes of one response, fitted to the record itself, so no window widens a peak.
+"""Natural modes fitted to the time record of one response, without windows that widen peaks.
 
-x = sum_r A_r h_r * f + L f_-2 + U f + (free decays) + c, with h_r the impulse response of
-q'' + 2 zeta w q' + w^2 q = f, and with the residuals L and U of modes below and above the band as in
-`structure.modal_fit`. The input is taken as limited to the Nyquist frequency, so that the response follows by
-Fourier transform, which joins the end of the record to its start. Free decays of the same modes describe what
-still oscillates from before the record, and the jump at this joint. Only (w_r, zeta_r) are varied, because all
-other parameters are linear (variable projection, Golub and Pereyra 1973). A mode is added at the line where
-the residual follows the input most, as long as each reduces it enough.
+The model is x = sum_r A_r h_r * f + L f_-2 + U f + (free decays) + c, where h_r is the impulse response of
+q'' + 2 zeta w q' + w^2 q = f, and L and U are the residuals of modes below and above the band as in
+`structure.modal_fit`. The input is assumed to be band-limited, and the response is computed by Fourier
+transform, which is periodic. Free decays of the same modes represent the initial state and the jump between
+the end and the start of the record. Only w_r and zeta_r are nonlinear parameters (variable projection, Golub
+and Pereyra 1973). Modes are added at the spectral line where the residual depends most on the input, as long
+as each reduces the residual enough.
 """
 
 from dataclasses import dataclass
@@ -25,33 +25,33 @@ from .variable_projection import Projection, compute_standard_errors, project_da
 # order of the time derivative of the displacement, by the quantity of the response
 DERIVATIVE_ORDERS = {"displacement": 0, "velocity": 1, "acceleration": 2}
 MAX_MODES = 12  # largest number of modes in one fit
-# fraction of the residual sum of squares that a further mode must remove
+# Smallest relative reduction of the sum of squares by a further mode.
 MIN_RESIDUAL_DECREASE = 0.02
-# Ratio of the rms of a mode to the rms of the response; a weaker mode is not added.
+# Smallest rms of a further mode, relative to the rms of the response.
 MIN_RMS_RATIO = 3e-3
-MIN_MISFIT = 1e-8  # ratio of residual to response; a smaller residual is round-off
-MAX_START_EVALUATIONS = 12  # evaluations from each start; only the best is refined further
-# number of samples at each end that are not fitted, because the Fourier transform joins the ends by a jump
+MIN_MISFIT = 1e-8  # smallest residual above round-off, relative to the response
+MAX_START_EVALUATIONS = 12  # evaluations from each initial guess; only the best is refined further
+# Number of samples at each end that are not fitted, because of the jump of the periodic continuation.
 N_EDGE_SAMPLES = 32
-# number of samples of a record that are fitted, counted from its beginning
+# Largest number of fitted samples, from the beginning of the record.
 MAX_FITTED_SAMPLES = 2**16
 MIN_ZETA = 1e-6  # lower bound of the damping ratios in the search
 MAX_ZETA = 0.5  # upper bound of the damping ratios in the search
-# widths zeta f of the peak of a further mode from which its fit starts, in spectral lines of a segment
+# Initial peak widths zeta f of a further mode, in spectral lines of a segment.
 START_PEAK_WIDTHS = (0.1, 1.0, 5.0)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class DrivenModes:
-    """Natural modes fitted to one response and its input, in rising order of frequency.
+    """Natural modes fitted to one response and its input, in order of increasing frequency.
 
     - frequency: natural frequencies (n,) [Hz].
     - damping: damping ratios (n,).
     - residue: residues A (n,) of sum A / (w_r^2 - w^2 + 2i zeta w_r w).
-    - damping_error: half-widths (n,) of the 95 % intervals of the damping ratios, from the residual.
-    - estimate_damping: damping ratios (n,) of a fit to the windowed estimate, nan where it finds no mode.
+    - damping_error: half-widths (n,) of the 95 % intervals of the damping ratios.
+    - estimate_damping: damping ratios (n,) of a fit to the windowed H1 estimate; nan without a mode there.
     - coherence: coherence (n,) at the peaks, or None.
-    - misfit: root mean square of the residual over that of the response.
+    - misfit: root mean square of the residual relative to that of the response.
     """
 
     frequency: np.ndarray
@@ -64,7 +64,7 @@ class DrivenModes:
 
 
 class _ModeColumn(IntEnum):
-    """Columns (k, 3) of one mode in the design matrix, and their coefficients (3,).
+    """Indices of the three columns of a mode in the design matrix.
 
     - RESPONSE: response of the mode to the input; its coefficient is the residue.
     - COSINE, SINE: free decay of the mode.
@@ -78,8 +78,8 @@ class _ModeColumn(IntEnum):
 class _Columns(NamedTuple):
     """Design matrix of the linear least-squares fit for given modes, with its derivatives.
 
-    - design: columns (k, 3 + 3n). The first three do not depend on the modes: a constant, and the residuals
-      of modes below and above the band. The columns of each mode follow (`_ModeColumn`).
+    - design: design matrix (k, 3 + 3n). The first three columns are a constant, and the residuals of modes
+      below and above the band. The three columns of each mode follow (`_ModeColumn`).
     - by_frequency, by_damping: derivatives of the columns of each mode with respect to ln w_r and ln zeta_r.
     """
 
@@ -105,7 +105,7 @@ class _ModeFit(NamedTuple):
 
 
 class _ModeProblem:
-    """Least-squares problem of the modes that explain the response of a record by its input."""
+    """Separable least-squares problem for the modes of a response to a known input."""
 
     def __init__(self, step: float, force, response, derivative: int):
         self.inner = slice(N_EDGE_SAMPLES, force.size - N_EDGE_SAMPLES)
@@ -126,11 +126,11 @@ class _ModeProblem:
         ]
 
     def _inverse_transform(self, spectrum) -> np.ndarray:
-        """Transform a spectrum to the times of the fitted samples."""
+        """Return the inverse Fourier transform of a spectrum at the fitted samples."""
         return irfft(spectrum, self.samples)[self.inner]
 
     def columns(self, theta) -> _Columns:
-        """Compute the design matrix of the linear fit for given modes, with its derivatives."""
+        """Return the design matrix of the linear fit for given modes, with its derivatives."""
         columns = list(self.fixed)
         by_frequency = []
         by_damping = []
@@ -153,10 +153,10 @@ class _ModeProblem:
         return _Columns(np.stack(columns, axis=1), by_frequency, by_damping)
 
     def _differentiate_columns(self, motion: tuple, by_pole, by_omega) -> list:
-        """Compute the derivatives of the columns of a mode with respect to its parameters.
+        """Return the derivatives of the three columns of a mode with respect to one parameter.
 
-        `motion` holds its pole, decay rate, cosine and sine. `by_pole` and `by_omega` are the derivatives
-        of 1/pole and of the damped frequency.
+        `motion` contains pole, decay rate, cosine and sine of the mode. `by_pole` and `by_omega` are the
+        derivatives of 1/pole and of the damped frequency.
         """
         pole, rate, cosine, sine = motion
         return [
@@ -166,7 +166,7 @@ class _ModeProblem:
         ]
 
     def solve(self, theta) -> Projection:
-        """Fit the linear coefficients of given modes to the response."""
+        """Return the linear fit of given modes to the response."""
         return project_data(self.columns(theta).design, self.value)
 
     def mode_coefficients(self, linear: Projection) -> np.ndarray:
@@ -174,7 +174,7 @@ class _ModeProblem:
         return linear.coefficients[len(self.fixed) :].reshape(-1, len(_ModeColumn))
 
     def slopes(self, theta) -> np.ndarray:
-        """Compute the derivatives (k, 2n) of the residual with respect to the mode parameters."""
+        """Return the derivatives (k, 2n) of the residual with respect to ln w_r and ln zeta_r."""
         columns = self.columns(theta)
         linear = project_data(columns.design, self.value)
         coefficients = self.mode_coefficients(linear)
@@ -186,15 +186,15 @@ class _ModeProblem:
         return linear.jacobian(np.stack(slopes, axis=1))
 
     def refine(self, theta, max_evaluations: int = 100, tolerance: float = 1e-13) -> _ModeFit:
-        """Minimize the residual over frequencies and damping ratios, from starting modes.
+        """Minimize the residual over frequencies and damping ratios from an initial guess.
 
         Parameters
         ----------
         theta : (2n,) ndarray
-            Starting values of ln w_r of all modes, then of ln zeta_r.
+            Initial values of ln w_r of all modes, followed by ln zeta_r.
         max_evaluations : int
         tolerance : float
-            Relative change at which the iteration ends.
+            Relative change at convergence.
         """
         n = theta.size // 2
         low = np.repeat(np.log([self.omega[1] / 2, MIN_ZETA]), n)
@@ -221,7 +221,7 @@ def fit_driven_modes(
     estimate: FrequencyResponse,
     band: tuple = (0.0, np.inf),
 ) -> DrivenModes:
-    """Fit natural modes to the time histories of a response and its input.
+    """Fit natural modes to the time records of a response and its input.
 
     Parameters
     ----------
@@ -234,7 +234,7 @@ def fit_driven_modes(
     estimate : FrequencyResponse
         Frequency response of the same record, for `estimate_damping`.
     band : (float, float)
-        Band [Hz] of the modes that are returned; those outside are fitted as well.
+        Frequency band [Hz] of the returned modes; modes outside are fitted, too.
 
     Returns
     -------
@@ -254,12 +254,12 @@ def fit_driven_modes(
     w, zeta = np.exp(fit.theta).reshape(2, -1)
     residue = problem.mode_coefficients(problem.solve(fit.theta))[:, _ModeColumn.RESPONSE]
     rms = float(np.sqrt(np.mean(fit.residual**2)))
-    # the standard errors of ln zeta follow those of ln w
+    # the standard errors of ln zeta are stored after those of ln w
     zeta_error = compute_standard_errors(problem.slopes(fit.theta), rms)[n:] * zeta
     min_frequency, max_frequency = band
     min_w = 2 * np.pi * max(min_frequency, estimate.frequency[0])
     max_w = 2 * np.pi * min(max_frequency, MAX_NYQUIST_FRACTION / (2 * step))
-    # a mode whose damping ratio ends at a bound of the search fits noise or a trend, not a resonance
+    # a mode with a damping ratio at a bound represents noise or a trend, not a resonance
     is_resonance = (zeta > 2 * MIN_ZETA) & (zeta < 0.99 * MAX_ZETA)
     is_kept = (w >= min_w) & (w <= max_w) & is_resonance
     if not is_kept.any():
@@ -305,7 +305,7 @@ def _add_modes(record: _ModeProblem, estimate: FrequencyResponse) -> _ModeFit:
 
 
 def _find_starts(record: _ModeProblem, estimate: FrequencyResponse, residual) -> list:
-    """Choose starting modes (w, zeta) where the input explains most of the residual."""
+    """Return initial modes (w, zeta) at the frequency where the input explains most of the residual."""
     response = estimate_response(
         record.step,
         record.force[record.inner],
@@ -326,10 +326,10 @@ def _find_starts(record: _ModeProblem, estimate: FrequencyResponse, residual) ->
 
 
 def _fit_estimate(estimate: FrequencyResponse, w, zeta, derivative: int) -> np.ndarray:
-    """Fit modes to a windowed frequency response, starting from the modes of the record.
+    """Return the damping ratios (n,) of a fit to the windowed frequency response.
 
-    `w` (n,) are their frequencies [rad/s]. Returns the damping ratios (n,), nan for a mode whose frequency
-    changes by 10 % or more.
+    `w` (n,) are the natural frequencies [rad/s]. Returns the damping ratios (n,); nan for a mode whose
+    frequency changes by 10 % or more.
     """
     fit = ModalFit(2 * np.pi * estimate.frequency, estimate.value[:, None], np.array([derivative]))
     theta, _ = fit.refine(np.log(np.concatenate([w, zeta])))

@@ -1,9 +1,9 @@
 """Frequency response of a record by the H1 estimator, with its coherence.
 
 H1 = G_xf / G_ff, averaged over windowed segments of the record (Bendat and Piersol, Random Data, ch. 6). The
-coherence |G_xf|^2 / (G_ff G_xx) is the part of the response that depends linearly on the input. A segment of
-length T widens each peak by about 1/T, which a fit to the estimate takes for damping; `driven_modes` fits the
-record itself.
+coherence |G_xf|^2 / (G_ff G_xx) is the fraction of the response that depends linearly on the input. A segment
+of length T widens each peak by about 1/T, which increases the damping of a fit to this estimate. `driven_modes`
+therefore fits the record.
 """
 
 from dataclasses import dataclass
@@ -13,17 +13,17 @@ import numpy as np
 from ..core import PatchfemError
 from ..response.welch import CrossDensities, average_segments, transform_segments
 
-# largest error of a sample time in time steps; times in text files have only six digits
+# Largest error of a sample time in time steps; times in text files may have only six digits.
 MAX_TIME_ERROR = 1e-3
-DEFAULT_N_SEGMENTS = 8  # length of a record / length of its segments, if the user gives no length
+DEFAULT_N_SEGMENTS = 8  # default ratio of record length to segment length
 MIN_SEGMENT_SAMPLES = 64  # smallest number of samples in a segment
-# fraction of the largest response; if both ends are below it, the record is a complete transient
+# Largest response at both ends of a complete transient, relative to the largest response.
 MAX_END_FRACTION = 1e-2
-# fraction of the largest input power; spectral lines with less are not excited
+# Smallest input power of an excited spectral line, relative to the largest one.
 MIN_INPUT_POWER = 1e-6
-# fraction of the Nyquist frequency; filters and aliasing disturb higher lines
+# Highest frequency that is used, relative to the Nyquist frequency, because of filters and aliasing.
 MAX_NYQUIST_FRACTION = 0.8
-# number of spectral lines by which a Hann window widens the average of a segment
+# Half-width of the main lobe of a Hann window that disturbs the lines near 0, in spectral lines.
 WINDOW_WIDTH_LINES = 1.5
 
 
@@ -35,8 +35,8 @@ class FrequencyResponse:
     - value: response over input (q,), complex.
     - input: power spectral density (q,) of the input.
     - coherence: coherence (q,), None for a single segment.
-    - segment: samples of a segment.
-    - segments: number of segments that were averaged.
+    - segment: number of samples per segment.
+    - segments: number of averaged segments.
     - window: "hann" or "none".
     """
 
@@ -50,9 +50,9 @@ class FrequencyResponse:
 
 
 def find_time_step(time) -> float:
-    """Return the time step [s] of an evenly sampled record.
+    """Return the time step [s] of an equally sampled record.
 
-    `time` (k,) are the times of its samples. Raises PatchfemError if they are not evenly spaced.
+    `time` (k,) are the sample times [s]. Raises PatchfemError if they are not equally spaced.
     """
     step = (time[-1] - time[0]) / (time.size - 1)
     deviation = np.abs(time - time[0] - step * np.arange(time.size)).max() / step
@@ -78,10 +78,10 @@ def estimate_response(
     force, response : (k,) ndarray
         Input and response.
     segment : int, optional
-        Samples of a segment. By default it is the whole record if the response starts and ends at rest,
-        else an eighth of the record.
+        Number of samples per segment. Default: the whole record if the response starts and ends at
+        rest, else an eighth of the record.
     window : str, optional
-        ``"hann"`` or ``"none"``; by default Hann's for segments, and none for a whole record.
+        ``"hann"`` or ``"none"``. Default: ``"none"`` for a whole record, else ``"hann"``.
 
     Returns
     -------
@@ -125,7 +125,7 @@ def estimate_response(
 
 
 def _is_transient(response) -> bool:
-    """Return whether a response starts and ends at rest, so that one segment can contain it all."""
+    """Return whether a response starts and ends at rest, so that a single segment contains all of it."""
     n_end_samples = max(response.size // 50, 1)
     max_response = np.abs(response).max(initial=0.0)
     max_end_response = max(

@@ -1,8 +1,9 @@
-"""Half cycles of a measured free decay; a sine is fitted to each of them in turn.
+"""Half cycles of a measured free decay, with a sine fitted to each of them.
 
-A half cycle lies between two reversals. About its middle t_k it is a sine beside a mean m of its own. Under dry
-friction it is exactly m + S/2 sin(w (t - t_k)); in a viscous decay the sine has the factor exp(-s (t - t_k)).
-Both forms are followed through the record from its beginning, and the one with the smaller residual is taken.
+A half cycle lies between two reversals. With dry friction, it is m + S/2 sin(w (t - t_k)), with the midpoint
+t_k and a different mean m in each half cycle. With viscous damping, the sine has the factor exp(-s (t - t_k)).
+Both forms are fitted to all half cycles from the beginning of the record, and the one with the smaller
+residual is used.
 """
 
 from typing import NamedTuple
@@ -13,32 +14,32 @@ from ..core import PatchfemError
 from ..response.decay_curve import HalfCycles, smooth_slopes
 
 MIN_SAMPLES = 5  # smallest number of samples in a half cycle
-# smallest standard deviation of the middle of a half cycle / half period, and of its size / size: a sine that is fitted
-# to few samples is not more exact
+# Smallest relative standard deviation of the midpoint (relative to the half period) and the size of a half cycle,
+# because a half cycle is not exactly a sine.
 SINE_FIT_ERROR = 3e-5
-# standard deviation of the size of a half cycle by noise / size; the decay ends at a half cycle with a larger ratio
+# Largest relative standard deviation of the size of a half cycle due to noise; the decay ends where it is larger.
 MAX_NOISE_RATIO = 0.25
-# Number of fits of all half cycles; each takes half periods and rates from the fit before.
+# Number of fits of all half cycles, each with half periods and decay rates from the previous fit.
 N_PASSES = 3
-MAX_ITERATIONS = 4  # largest number of iterations that move the middle of a half cycle
-MAX_MIDDLE_SHIFT = 0.35  # largest distance of a middle from the predicted one, in half periods
-# number of half cycles on each side whose residuals give the noise of a half cycle
+MAX_ITERATIONS = 4  # largest number of iterations for the midpoint of a half cycle
+MAX_MIDDLE_SHIFT = 0.35  # largest distance of a midpoint from its prediction, in half periods
+# Number of half cycles on each side for the estimate of the noise of a half cycle.
 N_NEIGHBOURS = 8
-# frequencies that are tried for the first cycle / frequency of the highest spectral line
+# Trial frequencies of the first cycle, relative to that of the highest spectral line.
 FREQUENCY_RATIOS = np.linspace(0.75, 1.3, 56)
-MAX_STEP_RATIO = 10.0  # time step / 10 % quantile of the time steps; a larger step is a gap
-# largest difference of the second half period from the first, as a fraction of the first
+MAX_STEP_RATIO = 10.0  # smallest length of a gap, relative to the 10 % quantile of the time steps
+# Largest relative difference between the first two half periods.
 MAX_PERIOD_CHANGE = 0.3
-PADDING_FACTOR = 8  # length of the record with appended zeros / its length, for a finer spectrum
+PADDING_FACTOR = 8  # length of the zero-padded record relative to the record, for a finer spectrum
 
 
 class _HalfCycle(NamedTuple):
     """Half cycle of a free decay, with the parameters of the fitted sine.
 
-    - middle: time [s] of its middle.
-    - size: peak-to-peak motion, with the sign of the half cycle.
+    - middle: time of the midpoint [s].
+    - size: peak-to-peak value, with the sign of the half cycle.
     - length: half period [s].
-    - middle_error, size_error: standard deviations of middle and size per unit of noise.
+    - middle_error, size_error: standard deviations of midpoint and size per unit of noise.
     - sum_of_squares: sum of squares of the residual.
     - n_free: degrees of freedom of the residual.
     """
@@ -53,14 +54,14 @@ class _HalfCycle(NamedTuple):
 
 
 def find_half_cycles(time, value) -> HalfCycles:
-    """Fit a sine to each half cycle of a free decay.
+    """Return the half cycles of a free decay, from a sine fitted to each of them.
 
     Parameters
     ----------
     time : (k,) ndarray
-        Times [s], from the moment on at which nothing drives the motion.
+        Times [s] after the end of the drive.
     value : (k,) ndarray
-        Displacement, velocity or acceleration; the sizes have its unit.
+        Displacement, velocity or acceleration; the sizes have the same unit.
 
     Returns
     -------
@@ -69,14 +70,14 @@ def find_half_cycles(time, value) -> HalfCycles:
     Raises
     ------
     PatchfemError
-        If nothing oscillates, or if fewer than three half cycles have enough samples.
+        If there is no oscillation, or if fewer than three half cycles have enough samples.
     """
     if time.size < 4 * MIN_SAMPLES:
         raise PatchfemError(
             f"the free decay has {time.size} samples; at least {4 * MIN_SAMPLES} are needed"
         )
     first_half_cycle = _find_first_half_cycle(time, value)
-    half_cycles = _follow_half_cycles(time, value, *first_half_cycle)
+    half_cycles = _fit_successive_half_cycles(time, value, *first_half_cycle)
     dry = viscous = half_cycles
     if len(half_cycles) > 2:
         for _ in range(N_PASSES):
@@ -99,7 +100,7 @@ def find_half_cycles(time, value) -> HalfCycles:
 
 
 def _raise_for_short_decay(time, middle: float, length: float) -> None:
-    """Raise PatchfemError that explains why a decay has fewer than three half cycles."""
+    """Raise a PatchfemError with the reason why a decay has fewer than three half cycles."""
     reasons = [_describe_missing_samples(time, middle + k * length, length) for k in range(3)]
     reasons.append(_describe_gaps(time))
     for reason in reasons:
@@ -114,15 +115,15 @@ def _raise_for_short_decay(time, middle: float, length: float) -> None:
 
 
 def describe_missing_samples_at_end(time, half_cycles: HalfCycles) -> str:
-    """Describe the lack of samples at the end of a decay; "" if the record ends there."""
+    """Return a sentence if samples are missing after the last half cycle; "" at the end of the record."""
     length = half_cycles.middle[-1] - half_cycles.middle[-2]
     return _describe_missing_samples(time, float(half_cycles.middle[-1] + length), float(length))
 
 
 def _describe_missing_samples(time, middle: float, length: float) -> str:
-    """Describe which half cycle of a decay has too few samples; "" if none has.
+    """Return a sentence if a half cycle has too few samples, else "".
 
-    A half cycle that ends after the record has the description "" as well.
+    The result is also "" if the half cycle ends after the record.
     """
     low = middle - length / 2
     high = middle + length / 2
@@ -133,7 +134,7 @@ def _describe_missing_samples(time, middle: float, length: float) -> str:
 
 
 def _describe_gaps(time) -> str:
-    """Describe the gaps between the samples of a record; "" if it has none."""
+    """Return a sentence about gaps between the samples of a record; "" if there are none."""
     usual_step, max_step = np.quantile(np.diff(time), (0.1, 1.0))
     if max_step <= MAX_STEP_RATIO * usual_step:
         return ""
@@ -141,7 +142,7 @@ def _describe_gaps(time) -> str:
 
 
 def _find_first_half_cycle(time, value) -> tuple:
-    """Find the first half cycle of a decay: the time [s] of its middle and its half period [s]."""
+    """Return the midpoint [s] and the half period [s] of the first half cycle of a decay."""
     frequency = _find_dominant_frequency(time, value)
     best = None
     for f in frequency * FREQUENCY_RATIOS:
@@ -162,20 +163,20 @@ def _find_first_half_cycle(time, value) -> tuple:
     _, f, phase = best
     half_period = 0.5 / f
     start = phase / (2 * np.pi * f) % half_period
-    # the first half cycle lies completely in the record
+    # the first half cycle must lie completely in the record
     if start < 0.24 / f:
         start += half_period
     return time[0] + start, half_period
 
 
 def _find_dominant_frequency(time, value) -> float:
-    """Return the frequency [Hz] of the highest spectral line.
+    """Return the frequency [Hz] of the highest spectral line of a decay.
 
-    Raises PatchfemError if nothing oscillates.
+    Raises PatchfemError if there is no oscillation.
     """
     n = time.size
     even_times = np.linspace(time[0], time[-1], n)
-    # half of a Hann window gives most weight to the beginning of the decay
+    # half of a Hann window emphasizes the beginning of the decay
     weighted = np.interp(even_times, time, value - value.mean()) * np.hanning(2 * n)[n:]
     spectrum = np.abs(np.fft.rfft(weighted, PADDING_FACTOR * n))
     spectrum[:PADDING_FACTOR] = 0.0
@@ -185,8 +186,8 @@ def _find_dominant_frequency(time, value) -> float:
     return frequency
 
 
-def _follow_half_cycles(time, value, middle: float, length: float) -> list:
-    """Fit the half cycles of a decay in order, until the noise exceeds a half cycle."""
+def _fit_successive_half_cycles(time, value, middle: float, length: float) -> list:
+    """Fit the half cycles of a decay one after the other, until the noise is too large."""
     half_cycles = []
     while middle + length / 2 <= time[-1]:
         half_cycle = _fit_half_cycle(time, value, middle, length, 0.0)
@@ -232,10 +233,10 @@ def _refine_half_cycles(time, value, half_cycles: list, *, is_viscous: bool) -> 
 
 
 def _fit_half_cycle(time, value, middle: float, length: float, rate: float) -> _HalfCycle | None:
-    """Fit a sine to the samples around the predicted middle of a half cycle.
+    """Fit a sine to the samples around the predicted midpoint of a half cycle.
 
-    Returns None if it has too few samples, or if its middle is too far from the prediction.
-    `length` is its half period [s], `rate` its decay rate [1/s].
+    Returns None with too few samples, or if the midpoint is too far from its prediction. `length` is the half
+    period [s], `rate` the decay rate [1/s].
     """
     predicted = middle
     for _ in range(MAX_ITERATIONS):
@@ -274,7 +275,7 @@ def _fit_half_cycle(time, value, middle: float, length: float, rate: float) -> _
 
 
 def _compute_noise(half_cycles: list) -> np.ndarray:
-    """Estimate the standard deviation (k,) of the noise in the neighbourhood of each half cycle."""
+    """Return the standard deviation (k,) of the noise in the neighbourhood of each half cycle."""
     n = len(half_cycles)
     index = np.arange(n)
     low = np.maximum(index - N_NEIGHBOURS, 0)
@@ -285,5 +286,5 @@ def _compute_noise(half_cycles: list) -> np.ndarray:
 
 
 def _compute_mean_noise(half_cycles: list) -> float:
-    """Return the mean noise of half cycles; infinite if there are fewer than three."""
+    """Return the mean noise of half cycles; inf if there are fewer than three."""
     return _compute_noise(half_cycles).mean() if len(half_cycles) > 2 else np.inf

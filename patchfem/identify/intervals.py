@@ -1,6 +1,6 @@
-"""95 % intervals of a least-squares fit, from the Jacobian or from the profile.
+"""95 % confidence intervals of a least-squares fit, from the Jacobian or from the profile.
 
-The profile is used if the residual is not linear.
+The profile of the sum of squares is used if the residual is not linear over the interval.
 """
 
 from collections.abc import Callable
@@ -14,36 +14,36 @@ from ..core import frozen_array
 from .correlation import estimate_effective_rows
 from .space import UnitCubeResidual
 
-# fraction of the largest singular value of the scaled Jacobian; directions with smaller ones are undetermined
+# Smallest singular value of a determined direction, relative to the largest one of the scaled Jacobian.
 MIN_SINGULAR_VALUE = 1e-6
-# fraction of the largest residual; a value that changes the residual by less has no effect
+# Smallest change of the residual by a parameter with an effect, relative to the largest residual.
 MIN_RESIDUAL_EFFECT = 1e-9
-# squared component of an undetermined direction; a value with a smaller one is determined
+# Largest squared component of a determined parameter in an undetermined direction.
 MIN_DIRECTION_COMPONENT = 1e-3
-# largest relative deviation from the growth of the sum of squares that a linear residual would have at the ends of
-# an interval; above it the end is found by the profile
+# Largest relative deviation of the sum of squares from a linear model at the ends of an interval; beyond it, the
+# profile is used.
 MAX_NONLINEARITY = 0.2
-# half-width as a fraction of the range of a value; a smaller interval is round-off and treated as linear
+# Smallest half-width of an interval above round-off, relative to the range of the parameter.
 MIN_INTERVAL = 1e-9
-# distance to the bound / first step of a profile, for a value without a linear interval
+# Ratio of the distance to the bound to the first step of a profile, for a parameter without a linear interval.
 N_FIRST_STEPS = 64
-# relative error of the end of an interval, measured as the root of the growth of the sum of squares
+# Tolerance of the end of an interval, relative in the square root of the growth of the sum of squares.
 PROFILE_TOL = 1e-3
-QUICK_PROFILE_TOL = 1e-2  # the same tolerance for a residual that is expensive to evaluate
+QUICK_PROFILE_TOL = 1e-2  # the same for a residual that is expensive to evaluate
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FitIntervals:
     """95 % confidence intervals of fitted parameters, and the parameters left undetermined.
 
-    - ends: ends (n, 2) of the intervals, NaN for a value that the rows do not determine.
-    - methods: "linear", "profile" or "none" for each value.
-    - open_ends: whether each end (n, 2) is only the bound.
-    - correlation: correlation matrix (n, n), NaN for a value that the rows do not determine.
-    - sensitivity: root mean square change (n,) of the residual per range of a value.
-    - unknown: directions (d, n) of relative change, or of change over the range if a value is 0, that
-      leave the residual as it is.
-    - rows: number of independent rows, NaN without intervals.
+    - ends: ends (n, 2) of the intervals; NaN for an undetermined parameter.
+    - methods: "linear", "profile" or "none" for each parameter.
+    - open_ends: whether each end (n, 2) is the bound of the parameter.
+    - correlation: correlation matrix (n, n); NaN for an undetermined parameter.
+    - sensitivity: root mean square change (n,) of the residual per range of each parameter.
+    - unknown: undetermined directions (d, n) in parameter space, as relative changes (relative to the
+      range if a value is 0).
+    - rows: number of independent rows of the residual; NaN without intervals.
     """
 
     ends: np.ndarray
@@ -56,13 +56,13 @@ class FitIntervals:
 
 
 class _FittedPoint(NamedTuple):
-    """Result of a least-squares fit for which confidence intervals are computed.
+    """Minimum of a least-squares fit for which confidence intervals are computed.
 
-    - model: residual over the unit cube.
-    - u: point (n,) of the cube with the least squares.
-    - cost: sum of squares there.
-    - growth: relative growth of the sum of squares at the end of an interval of 95 %.
-    - descend: function that minimizes the residual over some coordinates.
+    - model: residual as a function on the unit cube.
+    - u: minimum (n,) in the unit cube.
+    - cost: sum of squares at the minimum.
+    - growth: relative growth of the sum of squares at the ends of a 95 % interval.
+    - descend: function that minimizes the residual over selected coordinates.
     """
 
     model: UnitCubeResidual
@@ -75,8 +75,8 @@ class _FittedPoint(NamedTuple):
 class _IntervalEnd(NamedTuple):
     """One end of the confidence interval of a fitted parameter.
 
-    - end: coordinate of the unit cube.
-    - is_open: whether the end is only the bound of the value.
+    - end: coordinate in the unit cube.
+    - is_open: whether the end is the bound of the parameter.
     """
 
     end: float
@@ -84,7 +84,7 @@ class _IntervalEnd(NamedTuple):
 
 
 def make_unknown_intervals(n: int) -> FitIntervals:
-    """Return intervals of NaN for a fit whose confidence intervals were not requested."""
+    """Return intervals of NaN, for a fit without confidence intervals."""
     return FitIntervals(
         ends=frozen_array(np.full((n, 2), np.nan)),
         methods=("none",) * n,
@@ -101,19 +101,19 @@ def compute_intervals(
 ) -> FitIntervals:
     """Compute the 95 % confidence intervals of the parameters of a least-squares fit.
 
-    A value on a bound is constant in the linear intervals of the others, and has a profile of its own.
+    In the linear intervals, a parameter on a bound is fixed; its own interval follows from its profile.
 
     Parameters
     ----------
     model : UnitCubeResidual
     u : (n,) ndarray
-        Least squares in the unit cube.
+        Minimum in the unit cube.
     cost : float
-        Sum of squares there.
+        Sum of squares at the minimum.
     descend : callable
-        `least_squares.descend`, for the other values of a profile.
+        Function that minimizes over the other parameters of a profile (`least_squares.descend`).
     is_series : bool
-        Whether the rows are a series in time, so that correlated ones count as fewer.
+        Whether the rows are a time series, in which correlated rows count as fewer.
 
     Returns
     -------
@@ -149,7 +149,7 @@ def compute_intervals(
             ends[i] = u[i] - half_width[i], u[i] + half_width[i]
             continue
         others = [k for k in range(n) if k != i and has_effect[k]]
-        profiles = [_follow_profile(fit, i, sign, half_width[i], others) for sign in (-1.0, 1.0)]
+        profiles = [_find_profile_end(fit, i, sign, half_width[i], others) for sign in (-1.0, 1.0)]
         open_ends[i] = [profile.is_open for profile in profiles]
         if not open_ends[i].all():
             methods[i] = "profile"
@@ -168,24 +168,24 @@ def compute_intervals(
 
 
 def _convert_ends(model: UnitCubeResidual, u, ends) -> np.ndarray:
-    """Convert the ends (n, 2) of intervals in the unit cube to parameter values.
+    """Return the ends (n, 2) of intervals in the unit cube as parameter values.
 
-    Each end is taken along its coordinate from the point u (n,).
+    The other coordinates are those of the point u (n,).
     """
     values = ends.copy()
     for i in np.flatnonzero(np.isfinite(ends[:, 0])):
         for side in (0, 1):
             point = u.copy()
             point[i] = ends[i, side]
-            values[i, side] = model.space.values(point)[i]
+            values[i, side] = model.space.to_values(point)[i]
     return values
 
 
 def _invert_normal_matrix(jacobian, column_norm) -> tuple:
-    """Invert the normal matrix J^T J in the directions that the residuals determine.
+    """Invert the normal matrix J^T J in the determined directions.
 
-    Returns the inverse (f, f), and the unit directions (d, f) that they do not determine. `column_norm` (f,)
-    are the norms of the columns of J.
+    Returns the pseudo-inverse (f, f), and the undetermined unit directions (d, f). `column_norm` (f,) are the
+    norms of the columns of J.
     """
     if not column_norm.size:
         return np.zeros((0, 0)), np.zeros((0, 0))
@@ -210,13 +210,13 @@ def _compute_correlation(covariance, unknown: set) -> np.ndarray:
 def _list_unknown_directions(
     model: UnitCubeResidual, u, free_values: list, null_vectors, column_norm
 ) -> np.ndarray:
-    """Return the directions in parameter space that the residuals do not determine.
+    """Return the directions in parameter space that the residual does not determine.
 
-    The largest change of each direction (d, n) is 1. If a value at the point u of the cube is 0, they are
-    changes over the range.
+    The directions (d, n) are relative changes with a maximum of 1. If a value at the point u is 0, they are
+    changes relative to the range.
     """
-    values = model.space.values(u)
-    slope = model.space.slope(u)
+    values = model.space.to_values(u)
+    slope = model.space.derivatives(u)
     scale = values if (values[free_values] != 0).all() else model.space.high - model.space.low
     directions = np.zeros((len(null_vectors), u.size))
     for row, direction in zip(directions, null_vectors):
@@ -230,7 +230,7 @@ def _list_unknown_directions(
 def _is_linear(fit: _FittedPoint, i: int, half_width: float, covariance, free_values: list) -> bool:
     """Return whether the sum of squares at both ends of an interval agrees with a linear model.
 
-    The interval is that of value i. The other values follow their covariance (n, n) with value i.
+    The interval is that of parameter i; the other parameters change according to the covariance (n, n).
     """
     if half_width < MIN_INTERVAL:
         return True
@@ -248,21 +248,21 @@ def _is_linear(fit: _FittedPoint, i: int, half_width: float, covariance, free_va
     return True
 
 
-def _follow_profile(
+def _find_profile_end(
     fit: _FittedPoint, i: int, sign: float, half_width: float, others: list
 ) -> _IntervalEnd:
-    """Find one end of a confidence interval by profiling the sum of squares.
+    """Find one end of a confidence interval from the profile of the sum of squares.
 
-    At this end of the interval of value i, on the side `sign`, the sum of squares, minimized over the other
-    values, has grown by `fit.growth`. The root of the growth is nearly linear, so that a secant step inside a
-    bracket finds it.
+    At the end of the interval of parameter i on the side `sign`, the sum of squares, minimized over the other
+    parameters, has grown by `fit.growth`. The square root of the growth is nearly linear, so that a bracketed
+    secant method is used.
     """
     max_step = fit.u[i] if sign < 0 else 1 - fit.u[i]
     if max_step <= 0:
         return _IntervalEnd(fit.u[i], True)
 
     def evaluate(step: float, nearby_point) -> tuple:
-        """Return the root of growth over limit, minus 1, at a step of value i, and the constrained minimum."""
+        """Return the root of the relative growth minus 1 at a step of parameter i, and the minimum there."""
         point = nearby_point.copy()
         point[i] = fit.u[i] + sign * step
         descent = fit.descend(fit.model, point, others)
@@ -273,28 +273,28 @@ def _follow_profile(
     if np.isfinite(half_width) and half_width > MIN_INTERVAL:
         step = min(half_width, max_step)
     low = 0.0
-    f_low = -1.0
+    excess_low = -1.0
     high = None
     nearby_point = fit.u
-    tolerance = QUICK_PROFILE_TOL if fit.model.is_quick else PROFILE_TOL
-    # the step doubles until the end is bracketed; bracketing and the secant method need fewer than 40 evaluations
+    tolerance = QUICK_PROFILE_TOL if fit.model.is_expensive else PROFILE_TOL
+    # the step is doubled until the end is bracketed; 40 evaluations are more than sufficient
     for _ in range(40):
-        f, point = evaluate(step, nearby_point)
-        if abs(f) < tolerance:
+        excess, point = evaluate(step, nearby_point)
+        if abs(excess) < tolerance:
             break
-        if f < 0:
+        if excess < 0:
             low = step
-            f_low = f
+            excess_low = excess
             nearby_point = point
             if step >= max_step:
                 return _IntervalEnd(float(fit.u[i] + sign * max_step), True)
         else:
             high = step
-            f_high = f
+            excess_high = excess
         if high is None:
             step = min(2 * step, max_step)
             continue
-        fraction = -f_low / (f_high - f_low) if np.isfinite(f_high) else 0.5
+        fraction = -excess_low / (excess_high - excess_low) if np.isfinite(excess_high) else 0.5
         step = low + (high - low) * min(max(fraction, 0.1), 0.9)
         if high - low < 1e-6 * max(high, 1e-12):
             break

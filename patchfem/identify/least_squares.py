@@ -1,10 +1,10 @@
-"""Least squares within bounds: values, 95 % intervals, and undetermined directions.
+"""Least squares with bounds: fitted parameters, 95 % intervals, and undetermined directions.
 
-The search runs in the unit cube of the bounds, in logarithms where they are positive and wide, from several
-starts that are the same in every call. The intervals are those of the linearised problem, with Student's t of
-rows - values degrees of freedom; of a series in time only the independent rows count (`correlation`). If the
-residual is not linear over an interval, and at a bound, the interval follows from the profile of the sum of
-squares.
+The parameters are mapped to the unit cube, on a logarithmic scale if the bounds are positive and wide. Local
+searches (descents) start from several points, the same in every call. The confidence intervals are those of
+the linearized problem, with Student's t distribution for (rows - parameters) degrees of freedom. In a time
+series, only the independent rows count (`correlation`). If the residual is not linear over an interval, or
+the parameter lies on a bound, the interval follows from the profile of the sum of squares.
 """
 
 from collections.abc import Callable, Sequence
@@ -17,19 +17,19 @@ from scipy.optimize import least_squares
 
 from ..core import NotConverged, Outcome, frozen_array
 from .intervals import FitIntervals, compute_intervals, make_unknown_intervals
-from .space import SearchSpace, UnitCubeResidual, make_space, make_space_filling_points
+from .space import SearchSpace, UnitCubeResidual, make_search_space, make_space_filling_points
 
-COST_TOL = 1e-10  # relative change of the sum of squares in a step at which a descent ends
-QUICK_COST_TOL = 1e-4  # COST_TOL of a residual that is expensive to evaluate
-MAX_EVALUATIONS = 100  # largest number of evaluations in one descent, without those for Jacobians
-# root mean square of the residual / largest residual of the search; below it a fit is exact and the search ends
+COST_TOL = 1e-10  # relative change of the sum of squares per step at convergence
+QUICK_COST_TOL = 1e-4  # the same for a residual that is expensive to evaluate
+MAX_EVALUATIONS = 100  # largest number of evaluations in one descent, without Jacobians
+# Largest root mean square residual of an exact fit, relative to the largest residual of the search.
 EXACT_FIT_RATIO = 1e-9
-# sum of squares / the smallest one; descents that end below it found the same minimum
+# Largest sum of squares of descents to the same minimum, relative to the smallest one.
 SAME_MINIMUM_RATIO = 1.02
-SAME_RESULT_TOL = 1e-6  # relative difference of the sums of squares of descents that agree
-# fraction of the range; a value closer to a bound is tried on the bound as well
+SAME_RESULT_TOL = 1e-6  # relative difference between the sums of squares of equal results
+# Largest distance from a bound at which a parameter is tried on the bound, relative to its range.
 NEAR_BOUND_FRACTION = 1e-3
-# number of points per value at which the residual is evaluated to choose the starting points
+# Number of trial points per parameter for the choice of the starting points.
 N_TRIALS_PER_VALUE = 8
 
 
@@ -37,9 +37,9 @@ class IntervalKind(StrEnum):
     """Assumption on the errors of the data from which confidence intervals are computed.
 
     - ROWS: the rows are independent.
-    - SERIES: the rows are a series in time, in which correlated neighbours count as fewer rows.
-    - BOUNDS: no intervals are computed (NaN); values near a bound are still tried on it.
-    - NONE: no intervals are computed, and no value is tried on a bound.
+    - SERIES: the rows are a time series, in which correlated neighbours count as fewer rows.
+    - BOUNDS: no intervals are computed (NaN), but parameters near a bound are tried on it.
+    - NONE: no intervals are computed, and no parameter is tried on a bound.
     """
 
     ROWS = "rows"
@@ -49,21 +49,21 @@ class IntervalKind(StrEnum):
 
 
 class DescentStorage:
-    """Storage for finished local searches, from which a search continues; this one is empty."""
+    """Storage of finished descents, with which an interrupted search continues; this one stores nothing."""
 
     def load(self, start: int) -> "Descent | None":
-        """Return the stored local search that began at a starting point, or None."""
+        """Return the stored descent from a starting point, or None."""
         return None
 
     def save(self, start: int, descent: "Descent") -> None:
-        """Store the local search that began at a starting point."""
+        """Store the descent from a starting point."""
 
 
 class SearchCounts(NamedTuple):
-    """Numbers of residual evaluations of a search, and of failed evaluations.
+    """Number of residual evaluations of a search, and of failures.
 
     - evaluations: number of evaluations.
-    - failures: number of those that failed.
+    - failures: number of failed evaluations.
     - reason: reason of the first failure; "" if none failed.
     """
 
@@ -76,14 +76,14 @@ class SearchCounts(NamedTuple):
 class Fit:
     """Result of a least-squares fit of n parameters.
 
-    - values: best values (n,).
-    - at_bound: "low", "high" or "" for each value.
-    - intervals: 95 % intervals, and what the rows do not determine.
+    - values: fitted parameters (n,).
+    - at_bound: "low", "high" or "" for each parameter.
+    - intervals: 95 % intervals, and undetermined directions.
     - rms: root mean square of the residual.
-    - agreed: number of descents that ended at the same sum of squares.
-    - counts: evaluations of the residual.
-    - outcome: done if the best descent converged, or if another one ended in the same valley; a
-      residual with noise in its last digits never lets a descent converge.
+    - agreed: number of descents with the same final sum of squares.
+    - counts: number of evaluations of the residual.
+    - outcome: DONE if the best descent converged, or if another one reached the same minimum. With
+      round-off noise in the residual, a descent may not converge formally.
     """
 
     values: np.ndarray
@@ -96,10 +96,10 @@ class Fit:
 
 
 class Descent(NamedTuple):
-    """Result of one local least-squares search (descent).
+    """Result of a local least-squares search (descent).
 
-    - u: point (n,) of the unit cube.
-    - cost: sum of squares, infinite if the start failed.
+    - u: final point (n,) in the unit cube.
+    - cost: final sum of squares; infinite if the evaluation at the start failed.
     - is_converged: whether the descent converged.
     - rows: number of rows of the residual.
     """
@@ -111,7 +111,7 @@ class Descent(NamedTuple):
 
     @property
     def rms(self) -> float:
-        """Root mean square of the residual, NaN if the start failed."""
+        """Root mean square of the residual; NaN if the evaluation at the start failed."""
         return float(np.sqrt(self.cost / self.rows)) if np.isfinite(self.cost) else np.nan
 
 
@@ -119,10 +119,10 @@ class Descent(NamedTuple):
 class Problem:
     """Least-squares problem whose residual is a function of n bounded parameters.
 
-    - residual: function of values (n,) that returns the residual (r,), each row divided by its weight. If it
-      raises a PatchfemError or is not finite, the evaluation is counted as failed.
+    - residual: function of the parameters (n,) that returns the residual (r,), each row divided by its
+      standard deviation. An evaluation fails if it raises a PatchfemError or is not finite.
     - low, high: bounds (n,).
-    - start: values (n,) from which the first descent starts, or None.
+    - start: parameters (n,) from which the first descent starts, or None.
     """
 
     residual: Callable
@@ -131,9 +131,9 @@ class Problem:
     start: Sequence | None = None
 
     @property
-    def space(self) -> SearchSpace:
+    def search_space(self) -> SearchSpace:
         """Mapping of the bounded parameters to the unit cube."""
-        return make_space(self.low, self.high)
+        return make_search_space(self.low, self.high)
 
     def solve(self, max_descents: int = 3, interval_kind: str = IntervalKind.ROWS) -> Fit:
         """Minimize the sum of squares of the residual within the bounds.
@@ -141,12 +141,9 @@ class Problem:
         Parameters
         ----------
         max_descents : int
-            Largest number of descents; with 1 only that from `start`, if it works.
+            Largest number of descents; if 1, only that from `start`, unless the evaluation there fails.
         interval_kind : str
-            ``"rows"``: the rows are independent.
-            ``"series"``: the rows are a series in time, in which correlated neighbours count as fewer rows.
-            ``"bounds"``: the intervals are NaN; values near a bound are still tried on it.
-            ``""``: the intervals are NaN, and no value is tried on a bound.
+            Value of `IntervalKind`.
 
         Returns
         -------
@@ -155,14 +152,14 @@ class Problem:
         Raises
         ------
         ValueError
-            If the bounds are wrong, or if there are fewer rows than values.
+            If the bounds are invalid, or if there are fewer rows than parameters.
         NotConverged
-            If all starts fail.
+            If the evaluations at all starting points fail.
         """
-        space = self.space
+        space = self.search_space
         model = UnitCubeResidual(self.residual, space)
         n = space.low.size
-        start = None if self.start is None else space.unit(self.start)
+        start = None if self.start is None else space.to_unit_cube(self.start)
         starting_points = choose_starting_points(model, start, max_descents)
         if model.rows < n:
             raise ValueError(f"{model.rows} rows of data cannot determine {n} values")
@@ -187,13 +184,13 @@ def run_descents(
     starting_points : sequence of (n,) ndarray
         Points from which the descents start.
     stops_when_exact : bool
-        Whether a result to round-off ends the search.
+        Whether the search ends after a fit that is exact to round-off.
     storage : DescentStorage, optional
-        Descents of an earlier search that are not repeated; new ones are added. By default nothing is stored.
+        Stored descents, which are not repeated; new descents are added. Default: no storage.
     before_descent : callable, optional
-        Is called before each descent.
+        Called before each descent.
     report : callable, optional
-        Is called with 1 after each descent.
+        Called with 1 after each descent.
 
     Returns
     -------
@@ -219,16 +216,17 @@ def run_descents(
 def assemble_fit(
     model: UnitCubeResidual, ends: list, interval_kind: str = IntervalKind.ROWS, first_descents=None
 ) -> Fit:
-    """Assemble the result of a least-squares fit from the best of its descents.
+    """Return the result of a least-squares fit from its descents.
 
     Parameters
     ----------
     model : UnitCubeResidual
     ends : list of Descent
     interval_kind : str
-        As in `Problem.solve`.
+        Value of `IntervalKind`.
     first_descents : list of Descent, optional
-        Descents that show whether several found the same valley, if `ends` continues the best of them.
+        Descents from all starting points, if `ends` continues the best of them; they show whether several
+        reached the same minimum.
 
     Returns
     -------
@@ -245,11 +243,11 @@ def assemble_fit(
     if interval_kind in (IntervalKind.ROWS, IntervalKind.SERIES):
         is_series = interval_kind == IntervalKind.SERIES
         intervals = compute_intervals(model, u, cost, descend, is_series=is_series)
-    n_same_valley = sum(end.cost <= SAME_MINIMUM_RATIO * cost for end in first_descents or ends)
-    is_converged = best.is_converged or n_same_valley > 1
+    n_same_minimum = sum(end.cost <= SAME_MINIMUM_RATIO * cost for end in first_descents or ends)
+    is_converged = best.is_converged or n_same_minimum > 1
     at_bound = np.where(u <= 0, "low", np.where(u >= 1, "high", ""))
     return Fit(
-        values=frozen_array(model.space.values(u)),
+        values=frozen_array(model.space.to_values(u)),
         at_bound=tuple(at_bound.tolist()),
         intervals=intervals,
         rms=float(np.sqrt(cost / model.rows)),
@@ -262,17 +260,18 @@ def assemble_fit(
 def choose_starting_points(
     model: UnitCubeResidual, given_start, max_points: int, n_trials: int = 0
 ) -> list:
-    """Choose points of the unit cube from which local searches start.
+    """Return the points of the unit cube from which the descents start.
 
     Parameters
     ----------
     model : UnitCubeResidual
     given_start : (n,) ndarray or None
-        Point that comes first, if it works.
+        First starting point, unless the evaluation there fails.
     max_points : int
         Largest number of points.
     n_trials : int
-        Number of points that fill the cube, of which the best are chosen; by default 8 n.
+        Number of space-filling trial points, of which the best are chosen; 0 for the default of
+        N_TRIALS_PER_VALUE per parameter.
 
     Returns
     -------
@@ -281,7 +280,7 @@ def choose_starting_points(
     Raises
     ------
     NotConverged
-        If the residual fails at all points.
+        If the evaluations at all trial points fail.
     """
     n = model.space.low.size
     if max_points == 1 and given_start is not None and model(given_start) is not None:
@@ -293,47 +292,47 @@ def choose_starting_points(
         if residual is not None:
             costs.append(float(residual @ residual))
             points.append(u)
-    best = [points[k] for k in np.argsort(costs, kind="stable")]
+    starting_points = [points[k] for k in np.argsort(costs, kind="stable")]
     if given_start is not None and model(given_start) is not None:
-        best = [given_start, *best]
-    if not best:
+        starting_points = [given_start, *starting_points]
+    if not starting_points:
         raise NotConverged(
             f"the model failed at all {model.evaluations} starting points of the search: {model.reason}"
         )
-    return best[: max(1, max_points)]
+    return starting_points[: max(1, max_points)]
 
 
 class _CubeSlice(NamedTuple):
-    """Residual as a function of some coordinates of the unit cube, with the others fixed.
+    """Residual as a function of the free coordinates of the unit cube, with the others fixed.
 
-    - model: residual over the whole cube.
-    - u: point (n,) of the cube.
-    - free: indices of the coordinates (f,) that may change.
+    - model: residual on the whole unit cube.
+    - u: point (n,) with the fixed coordinates.
+    - free: indices of the free coordinates (f,).
     """
 
     model: UnitCubeResidual
     u: np.ndarray
     free: list
 
-    def point(self, free_coordinates) -> np.ndarray:
+    def full_point(self, free_coordinates) -> np.ndarray:
         """Return the point (n,) of the unit cube with given free coordinates (f,)."""
-        full_point = self.u.copy()
-        full_point[self.free] = free_coordinates
-        return full_point
+        point = self.u.copy()
+        point[self.free] = free_coordinates
+        return point
 
     def residual(self, free_coordinates) -> np.ndarray:
-        """Return the residual (r,), or a large penalty where it cannot be evaluated."""
-        return self.model.with_penalty(self.point(free_coordinates))
+        """Return the residual (r,), or a penalty if the evaluation fails."""
+        return self.model.with_penalty(self.full_point(free_coordinates))
 
     def jacobian(self, free_coordinates) -> np.ndarray:
         """Return the derivatives (r, f) of the residual with respect to the free coordinates."""
-        return self.model.jacobian(self.point(free_coordinates), self.free)
+        return self.model.jacobian(self.full_point(free_coordinates), self.free)
 
 
 def descend(model: UnitCubeResidual, u, free) -> Descent:
     """Minimize a residual locally from a point of the unit cube (trust-region reflective method).
 
-    The end is never worse than the start.
+    The final sum of squares is never larger than that at the start.
 
     Parameters
     ----------
@@ -341,7 +340,7 @@ def descend(model: UnitCubeResidual, u, free) -> Descent:
     u : (n,) array_like
         Starting point.
     free : sequence of int
-        Indices of the coordinates that may change.
+        Indices of the free coordinates.
 
     Returns
     -------
@@ -357,15 +356,15 @@ def descend(model: UnitCubeResidual, u, free) -> Descent:
         return start
 
     slice_of_cube = _CubeSlice(model, u, free)
-    # the trust region starts inside the bounds
+    # the trust-region method needs a start inside the bounds
     for margin in (1e-3, 1e-9):
         inner_start = np.clip(u[free], margin, 1 - margin)
-        if model(slice_of_cube.point(inner_start)) is not None:
+        if model(slice_of_cube.full_point(inner_start)) is not None:
             break
     else:
         return start._replace(is_converged=False)
     residual_scale = max(float(np.abs(slice_of_cube.residual(inner_start)).max()), 1e-300)
-    ftol = QUICK_COST_TOL if model.is_quick else COST_TOL
+    ftol = QUICK_COST_TOL if model.is_expensive else COST_TOL
     result = least_squares(
         lambda part: slice_of_cube.residual(part) / residual_scale,
         inner_start,
@@ -377,7 +376,7 @@ def descend(model: UnitCubeResidual, u, free) -> Descent:
         gtol=1e-15,
         max_nfev=MAX_EVALUATIONS,
     )
-    end = slice_of_cube.point(result.x)
+    end = slice_of_cube.full_point(result.x)
     residual = model(end)
     is_converged = result.status > 0
     if residual is None or residual @ residual > start.cost:
@@ -386,9 +385,9 @@ def descend(model: UnitCubeResidual, u, free) -> Descent:
 
 
 def _move_onto_bounds(model: UnitCubeResidual, u, cost: float) -> tuple:
-    """Move parameters that are close to a bound onto it, unless the sum of squares rises.
+    """Move parameters near a bound onto it, unless the sum of squares increases.
 
-    Only values are set that would decrease the sum of squares beyond the bound. The other values are
+    A parameter is moved only if the sum of squares decreases towards the bound. The other parameters are
     fitted again. Returns the point u (n,) and the sum of squares.
     """
     gradient = model.jacobian(u, range(u.size)).T @ model(u)

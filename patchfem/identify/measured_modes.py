@@ -1,4 +1,4 @@
-"""Modes of a rig from a driven record, a free decay or measured shapes, for a scene."""
+"""Modes of a scene from a driven record, a free decay or measured mode shapes."""
 
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -14,16 +14,16 @@ from .driven_modes import DERIVATIVE_ORDERS, MAX_FITTED_SAMPLES, DrivenModes, fi
 from .frequency_response import FrequencyResponse, estimate_response, find_time_step
 from .half_cycles import describe_missing_samples_at_end, find_half_cycles
 
-INPUT_QUANTITIES = ("force", "base_acceleration")  # quantities of a record that can be its input
-# motions of a mode whose node and direction in a file of mode shapes a user can name (--map)
+INPUT_QUANTITIES = ("force", "base_acceleration")  # possible inputs of a record
+# Components of a mode whose node and direction in a file of mode shapes a user can give (--map).
 SHAPE_QUANTITIES = ("slide", "output", "base", "normal", "pitch")
-# fraction by which the damping ratio of the windowed estimate may be larger without a note
+# Largest relative excess of the damping ratio of the windowed estimate without a note.
 MAX_DAMPING_EXCESS = 0.05
-# Half-width of the interval / damping ratio; an amplitude with a wider interval is left out.
+# Largest half-width of the interval of a damping ratio, relative to the damping ratio.
 MAX_ERROR_RATIO = 2.0
-# fraction of a driven response that the modes may leave unexplained without a note
+# Largest misfit of a driven response without a note.
 MAX_MISFIT = 0.1
-# fraction of a free decay that the sinusoids may leave unexplained without a note
+# Largest misfit of a free decay without a note.
 MAX_DECAY_MISFIT = 0.05
 
 
@@ -33,9 +33,9 @@ class ListedModes:
 
     - frequency: natural frequencies (n,) [Hz].
     - damping: damping ratios (n,).
-    - rows: motions (n,) by the key of the table.
-    - mass: modal mass [kg], None if the record does not determine it.
-    - descriptions: a description of each mode.
+    - rows: mode-shape components (n,) by key of the table.
+    - mass: modal mass [kg]; None if the record does not determine it.
+    - descriptions: description of each mode.
     - notes: sentences for the user.
     - estimate: frequency response of the record, or None.
     """
@@ -50,11 +50,11 @@ class ListedModes:
 
 
 class RecordEstimate(NamedTuple):
-    """Frequency response estimated from a record, with the quantities used for it.
+    """Frequency response estimated from a record, with the names of input and response.
 
     - estimate: frequency response.
     - step: time step [s].
-    - input, response: names of the quantities.
+    - input, response: names of the two quantities.
     """
 
     estimate: FrequencyResponse
@@ -64,9 +64,9 @@ class RecordEstimate(NamedTuple):
 
 
 class _ModeRows(NamedTuple):
-    """Mode-shape components and modal mass that follow from residues.
+    """Mode-shape components and modal mass, from residues.
 
-    - rows: components (n,) by the key of the table of a mode.
+    - rows: components (n,) by key of the table of a mode.
     - mass: modal mass [kg], or None.
     - notes: sentences for the user.
     """
@@ -77,7 +77,7 @@ class _ModeRows(NamedTuple):
 
 
 def find_response_name(values: dict) -> str:
-    """Return the name of the response of a record.
+    """Return the name of the response in a record.
 
     Raises PatchfemError unless the record has exactly one.
     """
@@ -100,9 +100,9 @@ def estimate_record(
     values : dict
         Time, one input and one response by name.
     segment : float, optional
-        Length [s] of a segment.
+        Length of a segment [s].
     window : str, optional
-        Window of a segment (`frequency_response.estimate_response`).
+        Window of the segments (`frequency_response.estimate_response`).
 
     Returns
     -------
@@ -131,17 +131,17 @@ def estimate_record(
 def identify_driven_modes(
     values: dict, segment: float | None, window: str | None, band: tuple
 ) -> ListedModes:
-    """Identify modes from the response to a force at the same point or to base acceleration.
+    """Identify modes from the response to a force at the same point or to a base acceleration.
 
-    An acceleration is absolute; a displacement or a velocity is relative to the base. The slide of the
-    contact is taken to be the motion at this place.
+    An acceleration must be absolute, a displacement or a velocity relative to the base. The slide of the
+    contact is assumed to be the motion at the measured point.
 
     Parameters
     ----------
     values, segment, window
         As in `estimate_record`.
     band : (float, float)
-        Band [Hz] of the modes.
+        Frequency band [Hz] of the modes.
 
     Returns
     -------
@@ -176,9 +176,9 @@ def identify_driven_modes(
 
 
 def _convert_force_residues(modes: DrivenModes) -> _ModeRows:
-    """Derive mode-shape components at the drive point, and the modal mass, from the residues.
+    """Return mode-shape components at the drive point and the modal mass, from residues.
 
-    The components are relative to that of the first mode, whose residue is the reciprocal of the mass.
+    The components are relative to that of the first mode, whose residue is the reciprocal of the modal mass.
     """
     first = modes.residue[0]
     if first <= 0:
@@ -197,13 +197,14 @@ def _convert_force_residues(modes: DrivenModes) -> _ModeRows:
 
 
 def _convert_base_residues(modes: DrivenModes) -> _ModeRows:
-    """Split residues of a base excitation into participation and mode-shape component.
+    """Split the residues of a base excitation into participation and mode-shape component.
 
-    The residue is minus their product; both factors get the same magnitude before they are scaled.
+    The residue is the negative product of both factors, which are assumed to have the same magnitude before
+    they are scaled.
     """
     product = -modes.residue
     magnitude = np.sqrt(np.abs(product))
-    # the squared participations sum to at most 1
+    # the sum of the squared participations must not exceed 1
     scale = max(1.0, float(np.sqrt(np.sum(magnitude**2))))
     motion = np.sign(product) * magnitude * scale
     rows = {"slide": motion, "output": motion, "base": magnitude / scale}
@@ -211,7 +212,7 @@ def _convert_base_residues(modes: DrivenModes) -> _ModeRows:
 
 
 def _describe_modes(modes: DrivenModes) -> list:
-    """Describe the damping ratio of each mode and the record that gives it."""
+    """Return a sentence about the damping ratio of each mode."""
     descriptions = []
     for k, (zeta, error) in enumerate(zip(modes.damping, modes.damping_error)):
         text = f"damping {zeta:.4g} +- {error:.1g} from the whole record"
@@ -224,10 +225,10 @@ def _describe_modes(modes: DrivenModes) -> list:
 
 
 def _write_fit_notes(modes: DrivenModes, estimate: FrequencyResponse, step: float) -> list:
-    """Write notes on peaks that the window broadens, and on a large misfit of the modes."""
+    """Return notes on peaks that are widened by the window, and on a large misfit."""
     notes = []
     is_widened = modes.estimate_damping > (1 + MAX_DAMPING_EXCESS) * modes.damping
-    # a single segment has no window, so that a larger damping comes from noise
+    # a single segment has no window, so that a larger damping is due to noise
     if is_widened.any() and estimate.segments > 1:
         ratio = np.where(is_widened, modes.estimate_damping / modes.damping, 0)
         k = int(np.argmax(ratio))
@@ -246,9 +247,9 @@ def _write_fit_notes(modes: DrivenModes, estimate: FrequencyResponse, step: floa
 
 
 def _select_decay(values: dict, begin: float | None) -> tuple:
-    """Select the times [s] and samples of a response from the start of its decay.
+    """Return the times [s] and samples of a response from the start of its decay.
 
-    The decay starts at the time `begin` [s], by default at the largest deviation from the final value.
+    The decay starts at the time `begin` [s]. Default: the largest deviation from the final value.
     """
     value = values[find_response_name(values)]
     if "time" not in values:
@@ -265,26 +266,26 @@ def _select_decay(values: dict, begin: float | None) -> tuple:
 def compute_decay_curve(values: dict, begin: float | None = None) -> tuple:
     """Compute frequency and damping ratio against amplitude from a measured free decay.
 
-    A velocity is divided by the undamped circular frequency of its point, an acceleration by its square.
-    Amplitudes whose damping ratio is too uncertain are left out with a note.
+    A velocity or an acceleration is converted to a displacement by the undamped angular frequency at each
+    amplitude. Amplitudes with a too uncertain damping ratio are omitted with a note.
 
     Parameters
     ----------
     values : dict
-        Time and one displacement, velocity or acceleration by name.
+        Time and one displacement, velocity or acceleration, by name.
     begin : float, optional
-        Time [s] at which the decay begins; by default that of the largest value.
+        Start of the decay [s]. Default: the largest deviation from the final value.
 
     Returns
     -------
     curve : DecayCurve
-        Over the amplitude [m].
+        Curve against the amplitude [m].
     notes : list of str
 
     Raises
     ------
     PatchfemError
-        If no decay rises above the noise.
+        If there is no decay above the noise.
     """
     time, value = _select_decay(values, begin)
     half_cycles = find_half_cycles(time, value)
@@ -313,7 +314,7 @@ def compute_decay_curve(values: dict, begin: float | None = None) -> tuple:
 def identify_decay_modes(values: dict, begin: float | None = None) -> ListedModes:
     """Identify natural modes from a measured free decay.
 
-    The decay starts at the time `begin` [s], by default at the largest deviation from the final value.
+    The decay starts at the time `begin` [s]. Default: the largest deviation from the final value.
     """
     decay = fit_decay(*_select_decay(values, begin))
     descriptions = []
@@ -338,15 +339,15 @@ def identify_decay_modes(values: dict, begin: float | None = None) -> ListedMode
 def list_shape_modes(shapes: MeasuredModes, places: dict) -> ListedModes:
     """Convert measured mode shapes to the modes of a scene and their modal mass.
 
-    The mass is 1 / sum phi^2 at the place that slides, or at `base`: the part of the mass that the modes
-    contain there. With a larger mass, part of it would belong to no mode.
+    The modal mass is 1 / sum phi^2 at the sliding point, or at the point `base`. A larger mass would exceed
+    the mass that the modes represent there.
 
     Parameters
     ----------
     shapes : MeasuredModes
     places : dict
-        Text of a place such as ``"12:+x"`` for some of `SHAPE_QUANTITIES`; `slide` is needed unless there is only
-        one place.
+        Node and direction such as ``"12:+x"`` for some of `SHAPE_QUANTITIES`; `slide` is required unless
+        the file has only one node and direction.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Mapping of the bounds of a search to a unit cube, and the residual as a function on this cube."""
+"""Mapping of bounded parameters to the unit cube, and the residual as a function on this cube."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -7,60 +7,58 @@ import numpy as np
 
 from ..core import Missing, PatchfemError
 
-DIFFERENCE_STEP = 1e-5  # fraction of the range of a value; step of difference quotients
-# Ratio of upper to lower bound above which a parameter is searched on a log scale.
+DIFFERENCE_STEP = 1e-5  # step of finite differences, relative to the range of a parameter
+# Largest ratio of upper to lower bound for a linear scale.
 MIN_BOUND_RATIO_FOR_LOG = 10
-PENALTY_FACTOR = 1e3  # residual that stands for a failed evaluation / largest residual so far
+PENALTY_FACTOR = 1e3  # residual of a failed evaluation, relative to the largest residual
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SearchSpace:
-    """Mapping of n bounded parameters to the unit cube u in [0, 1]^n.
+    """Mapping of n bounded parameters to the unit cube, u in [0, 1]^n.
 
     - low, high: bounds (n,), low < high.
-    - log: whether each value is searched in logarithms (n,).
+    - is_log: whether each parameter has a logarithmic scale (n,).
     """
 
     low: np.ndarray
     high: np.ndarray
-    log: np.ndarray
+    is_log: np.ndarray
 
-    def values(self, u) -> np.ndarray:
-        """Map a point u of the unit cube to parameter values (n,), exactly at the bounds."""
+    def to_values(self, u) -> np.ndarray:
+        """Return the parameters (n,) of a point u of the unit cube, exactly at the bounds."""
         u = np.asarray(u, float)
         inside = np.empty(u.size)
-        for i, coordinate in enumerate(u):
+        for i, x in enumerate(u):
             low = self.low[i]
             high = self.high[i]
-            inside[i] = (
-                low * (high / low) ** coordinate if self.log[i] else low + (high - low) * coordinate
-            )
+            inside[i] = low * (high / low) ** x if self.is_log[i] else low + (high - low) * x
         return np.where(u <= 0, self.low, np.where(u >= 1, self.high, inside))
 
-    def unit(self, values) -> np.ndarray:
-        """Map parameter values (n,) to the nearest point of the unit cube."""
+    def to_unit_cube(self, values) -> np.ndarray:
+        """Return the point of the unit cube nearest to given parameters (n,)."""
         u = np.empty(len(values))
         for i, value in enumerate(values):
             low = self.low[i]
             high = self.high[i]
-            if self.log[i]:
+            if self.is_log[i]:
                 u[i] = np.log(max(value, low) / low) / np.log(high / low)
             else:
                 u[i] = (value - low) / (high - low)
         return np.clip(u, 0.0, 1.0)
 
-    def slope(self, u) -> np.ndarray:
-        """Return the derivatives (n,) of the parameters with respect to unit-cube coordinates u."""
+    def derivatives(self, u) -> np.ndarray:
+        """Return the derivatives (n,) of the parameters with respect to the coordinates u."""
         slope = self.high - self.low
-        ratio = self.high[self.log] / self.low[self.log]
-        slope[self.log] = self.values(u)[self.log] * np.log(ratio)
+        ratio = self.high[self.is_log] / self.low[self.is_log]
+        slope[self.is_log] = self.to_values(u)[self.is_log] * np.log(ratio)
         return slope
 
 
-def make_space(low, high) -> SearchSpace:
+def make_search_space(low, high) -> SearchSpace:
     """Return the mapping of bounded parameters to the unit cube.
 
-    A positive value with a wide range is searched in logarithms.
+    Positive parameters with a wide range have a logarithmic scale.
 
     Parameters
     ----------
@@ -73,7 +71,7 @@ def make_space(low, high) -> SearchSpace:
     Raises
     ------
     ValueError
-        If bounds are not finite and in order.
+        If the bounds are not finite, or not low < high.
     """
     low = np.array(low, float)
     high = np.array(high, float)
@@ -88,25 +86,25 @@ def make_space(low, high) -> SearchSpace:
 
 
 class UnitCubeResidual:
-    """Residual as a function of a point of the unit cube, which counts its evaluations.
+    """Residual as a function of a point u of the unit cube, with a count of evaluations.
 
-    A failure is a PatchfemError, an arithmetic error, or a residual that is not finite; `reason` is the
-    first one. An error of type Missing is passed on.
+    An evaluation fails if it raises a PatchfemError or an arithmetic error, or if the residual is not finite.
+    `reason` describes the first failure. An error of type Missing is not caught.
 
     Parameters
     ----------
     residual : callable
-        Function of values (n,) that returns a residual (r,).
+        Function of the parameters (n,) that returns the residual (r,).
     space : SearchSpace
-    is_quick : bool
-        Whether evaluations are expensive, so that derivatives are one-sided and of first order, and ends
-        of profiles are accurate to 1 %.
+    is_expensive : bool
+        Whether evaluations are expensive. Derivatives are then one-sided differences of first order, and
+        profile intervals are accurate to 1 %.
     """
 
-    def __init__(self, residual: Callable, space: SearchSpace, *, is_quick: bool = False):
+    def __init__(self, residual: Callable, space: SearchSpace, *, is_expensive: bool = False):
         self.residual = residual
         self.space = space
-        self.is_quick = is_quick
+        self.is_expensive = is_expensive
         self.evaluations = 0
         self.failures = 0
         self.reason = ""
@@ -116,7 +114,7 @@ class UnitCubeResidual:
         self._last_residual = None
 
     def __call__(self, u) -> np.ndarray | None:
-        """Evaluate the residual (r,) at u (n,); return None if it fails."""
+        """Return the residual (r,) at u (n,), or None if the evaluation fails."""
         if self._last_point is None or not np.array_equal(self._last_point, u):
             self._cache_residual(u, self._evaluate(u))
         return self._last_residual
@@ -127,11 +125,11 @@ class UnitCubeResidual:
         self._last_residual = residual
 
     def _evaluate(self, u) -> np.ndarray | None:
-        """Evaluate the residual at u (n,), and count the evaluation and its failure."""
+        """Evaluate the residual at u (n,), and count evaluations and failures."""
         self.evaluations += 1
         reason = ""
         try:
-            residual = np.asarray(self.residual(self.space.values(u)), float)
+            residual = np.asarray(self.residual(self.space.to_values(u)), float)
             if not np.isfinite(residual).all():
                 reason = "the residual is not finite"
         except Missing:
@@ -147,9 +145,9 @@ class UnitCubeResidual:
         return residual
 
     def with_penalty(self, u) -> np.ndarray:
-        """Evaluate the residual (r,) at u (n,); if this fails, return a penalty.
+        """Return the residual (r,) at u (n,), or a penalty if the evaluation fails.
 
-        The penalty is larger than all residuals so far.
+        The penalty is larger than all previous residuals.
         """
         residual = self(u)
         if residual is None:
@@ -157,16 +155,16 @@ class UnitCubeResidual:
         return residual
 
     def jacobian(self, u, free) -> np.ndarray:
-        """Compute the derivatives (r, f) of the residual along some coordinates by differences.
+        """Compute the derivatives (r, f) of the residual along selected coordinates by finite differences.
 
-        The differences are central, but one-sided at a bound, next to a failed evaluation, and for an
+        The differences are central. They are one-sided at a bound, next to a failed evaluation, and for an
         expensive residual.
 
         Parameters
         ----------
         u : (n,) array_like
         free : sequence of int
-            Indices of the f coordinates.
+            Indices of the f coordinates that vary.
         """
         residual_at_u = self(u)
         columns = []
@@ -176,13 +174,13 @@ class UnitCubeResidual:
         return np.column_stack(columns) if columns else np.zeros((self.rows, 0))
 
     def _evaluate_neighbours(self, u, i: int) -> dict:
-        """Evaluate the residual at points that differ from u along coordinate i.
+        """Evaluate the residual at neighbouring points of u along coordinate i.
 
-        Returns residuals (r,) by the number of difference steps from u.
+        Returns a dict of residuals (r,) by the number of difference steps.
         """
         neighbours = {}
         for n_steps in (1, -1, 2, -2):
-            if self.is_quick and neighbours:
+            if self.is_expensive and neighbours:
                 break
             point = np.array(u, float)
             point[i] += n_steps * DIFFERENCE_STEP
@@ -195,9 +193,9 @@ class UnitCubeResidual:
 
 
 def _difference_quotient(residual_at_u, neighbours: dict) -> np.ndarray:
-    """Compute a derivative (r,) by finite differences from the residuals at neighbouring points.
+    """Return the derivative (r,) of the residual by finite differences.
 
-    `neighbours` holds these residuals by the number of steps. Without any the derivative is 0.
+    `neighbours` contains these residuals by the number of steps; if it is empty, the derivative is 0.
     """
     if 1 in neighbours and -1 in neighbours:
         return (neighbours[1] - neighbours[-1]) / (2 * DIFFERENCE_STEP)
@@ -214,9 +212,9 @@ def _difference_quotient(residual_at_u, neighbours: dict) -> np.ndarray:
 
 
 def make_space_filling_points(count: int, n: int) -> np.ndarray:
-    """Return points (count, n) that fill the unit cube evenly, the same points in every call.
+    """Return points (count, n) of the unit cube with low discrepancy, the same in every call.
 
-    They are an additive recurrence with the root of x^(n + 1) = x + 1 (Roberts 2018).
+    The points are an additive recurrence with the root of x^(n + 1) = x + 1 (Roberts 2018).
     """
     root = 2.0
     for _ in range(60):

@@ -1,10 +1,9 @@
-"""Least squares of an expensive model with a cheap model that is corrected to agree with it.
+"""Least squares of an expensive model with a corrected cheap model (manifold mapping).
 
-A cheap model that is multiplied so that it has the value of the expensive one at a point still has other
-slopes. A search with it ends where the residual is orthogonal to the wrong slopes, which is not the least
-squares of the expensive model unless the residual is zero. With the difference of the slopes added, the cheap
-model has both, and a point where its search does not move any more is the least squares of the expensive model
-(manifold mapping: Echeverria and Hemker 2005).
+A cheap model that is scaled to the value of the expensive model at a point still has other derivatives there.
+Its minimum differs from that of the expensive model unless the residual is zero. If the difference of the
+derivatives is added to the cheap model, a fixed point of the search is a minimum of the expensive model
+(Echeverria and Hemker 2005).
 """
 
 from collections.abc import Callable
@@ -18,27 +17,29 @@ from .least_squares import choose_starting_points, descend, run_descents
 from .space import SearchSpace, UnitCubeResidual
 
 MAX_CORRECTIONS = 4  # largest number of corrections of the cheap model in one search
-MAX_RESIDUAL_CHANGE = 1e-3  # largest difference of the residuals of two models that agree
-# number of points per value at which the cheap model is computed to choose the starting points
+MAX_RESIDUAL_CHANGE = 1e-3  # largest difference of the residuals of two models that agree [1]
+# Number of trial points per parameter, at which the cheap model is evaluated to choose the starting points.
 N_TRIALS_PER_VALUE = 24
-MAX_MINIMA = 3  # largest number of minima of the cheap model from which the search continues
-# smallest distance in the unit cube between two minima from which the search continues
+MAX_MINIMA = 3  # largest number of minima of the cheap model that are refined
+# Smallest distance in the unit cube between two different minima.
 MIN_MINIMUM_DISTANCE = 0.03
-# sum of squares / the smallest one; a minimum with a larger ratio is left out
+# Largest sum of squares of a minimum that is refined, relative to the smallest one.
 MAX_COST_RATIO = 10.0
-# sum of squares / the smallest one; minima below it are refined with derivatives of the expensive model
+# Largest sum of squares of a minimum that is refined with derivatives, relative to the smallest one.
 MAX_LOCAL_MINIMUM_RATIO = 1.5
-# fraction of the edge of the unit cube; step of difference quotients of the expensive model
+# Step of the finite differences of the expensive model in the unit cube.
 DIFFERENCE_STEP = 1e-4
-MIN_IMPROVEMENT = 1e-4  # relative decrease of the sum of squares below which the search ends
+MIN_IMPROVEMENT = (
+    1e-4  # smallest relative decrease of the sum of squares for which the search continues
+)
 
 
 class _SearchPoint(NamedTuple):
-    """Point that a search with a cheap and an expensive model has reached.
+    """Result of a search with a cheap and an expensive model.
 
     - sum_of_squares: sum of squares of the residual of the expensive model.
-    - u: point (n,) of the unit cube.
-    - model: corrected cheap model with the value and the slopes of the expensive one there, or None.
+    - u: point (n,) in the unit cube.
+    - model: cheap model with the value and the derivatives of the expensive one at u, or None.
     """
 
     sum_of_squares: float
@@ -50,9 +51,10 @@ class _SearchPoint(NamedTuple):
 class TwoModels:
     """Cheap and expensive models of the same data, and the residual to minimize.
 
-    - cheap, expensive: functions of values (n,) that return an array; a PatchfemError is a failure.
+    - cheap, expensive: functions of the parameters (n,) that return an array, or raise a PatchfemError
+      on failure.
     - residual: function of such an array that returns the residual (r,).
-    - space: bounds of the values.
+    - space: bounds of the parameters.
     """
 
     cheap: Callable
@@ -61,33 +63,34 @@ class TwoModels:
     space: SearchSpace
 
     def search(self, given_values, n_starts: int) -> tuple:
-        """Minimize the sum of squares of the expensive model, guided by the cheap one.
+        """Minimize the sum of squares of the expensive model with the help of the cheap one.
 
         Parameters
         ----------
         given_values : (n,) array_like
-            Values at one of the starting points.
+            Parameters (n,) of one starting point.
         n_starts : int
             Number of starting points of the search with the cheap model.
 
         Returns
         -------
         model : callable or None
-            Cheap model with the value and the slopes of the expensive one at the result, None if the
-            search did not converge.
+            Cheap model with the value and the derivatives of the expensive one at the result; None if
+            the search did not converge.
         values : (n,) ndarray
+            Parameters of the best point.
 
         Raises
         ------
         PatchfemError
-            If the expensive model fails at all ends of the search with the cheap one.
+            If the expensive model fails at all minima of the cheap one.
         NotConverged
-            If the cheap model fails at all starts.
+            If the cheap model fails at all starting points.
         """
         cheap = UnitCubeResidual(lambda values: self.residual(self.cheap(values)), self.space)
         n_trials = N_TRIALS_PER_VALUE * len(given_values)
         starting_points = choose_starting_points(
-            cheap, self.space.unit(given_values), n_starts, n_trials
+            cheap, self.space.to_unit_cube(given_values), n_starts, n_trials
         )
         points = []
         errors = []
@@ -102,10 +105,10 @@ class TwoModels:
         best_points = [point for point in points if point.sum_of_squares <= limit]
         refined = list(map(self._minimize_with_slope_correction, best_points))
         best = min(refined, key=lambda point: point.sum_of_squares)
-        return best.model, self.space.values(best.u)
+        return best.model, self.space.to_values(best.u)
 
     def correct_cheap_model(self, u, expensive_value, slopes=None) -> Callable:
-        """Correct the cheap model so that it agrees with the expensive one at a point.
+        """Return the cheap model, corrected to agree with the expensive one at a point.
 
         Parameters
         ----------
@@ -113,36 +116,37 @@ class TwoModels:
         expensive_value : ndarray
             Value of the expensive model at u.
         slopes : (..., n) ndarray, optional
-            Derivatives with respect to u of the expensive model minus those of the corrected cheap model.
+            Difference of the derivatives with respect to u, expensive model minus corrected cheap model.
 
         Returns
         -------
         callable
-            Function of values (n,).
+            Function of the parameters (n,).
         """
-        cheap_value = self.cheap(self.space.values(u))
+        cheap_value = self.cheap(self.space.to_values(u))
         ratio = np.divide(
             expensive_value, cheap_value, out=np.ones_like(expensive_value), where=cheap_value != 0
         )
 
-        def model(values) -> np.ndarray:
-            """Return the cheap values, corrected to agree with the expensive ones at u."""
+        def corrected_model(values) -> np.ndarray:
+            """Return the corrected cheap model at given parameters."""
             out = expensive_value + ratio * (self.cheap(values) - cheap_value)
-            return out if slopes is None else out + slopes @ (self.space.unit(values) - u)
+            return out if slopes is None else out + slopes @ (self.space.to_unit_cube(values) - u)
 
-        return model
+        return corrected_model
 
     def _minimize_with_value_correction(self, u) -> _SearchPoint:
-        """Minimize the cheap model, corrected to the value of the expensive one at each minimum.
+        """Minimize the cheap model, corrected by the value of the expensive one at each minimum.
 
-        Minimization and correction are repeated from u (n,) until the models agree. Returns the best point.
+        Starting from u (n,), minimization and correction are repeated until the models agree. Returns the
+        best point.
         """
-        expensive_value = self.expensive(self.space.values(u))
+        expensive_value = self.expensive(self.space.to_values(u))
         best = _SearchPoint(self._sum_of_squares(expensive_value), u)
         for _ in range(MAX_CORRECTIONS):
             model = self.correct_cheap_model(u, expensive_value)
             u = self._descend(model, u)
-            values = self.space.values(u)
+            values = self.space.to_values(u)
             try:
                 expensive_value = self.expensive(values)
             except PatchfemError:
@@ -156,7 +160,7 @@ class TwoModels:
         return best
 
     def _minimize_with_slope_correction(self, point: _SearchPoint) -> _SearchPoint:
-        """Minimize the cheap model, corrected to value and gradient of the expensive one.
+        """Minimize the cheap model, corrected by value and derivatives of the expensive one.
 
         Returns the best point, without a model if the sum of squares does not converge.
         """
@@ -166,7 +170,7 @@ class TwoModels:
             try:
                 model = self._make_tangent_model(u)
                 new_u = self._descend(model, u)
-                new_sum = self._sum_of_squares(self.expensive(self.space.values(new_u)))
+                new_sum = self._sum_of_squares(self.expensive(self.space.to_values(new_u)))
             except PatchfemError:
                 break
             if new_sum > sum_of_squares * (1 - MIN_IMPROVEMENT):
@@ -177,36 +181,36 @@ class TwoModels:
         return _SearchPoint(sum_of_squares, u)
 
     def _make_tangent_model(self, u) -> Callable:
-        """Correct the cheap model to the value and gradient of the expensive one at u (n,).
+        """Return the cheap model with the value and the derivatives of the expensive one at u (n,).
 
-        The derivatives are one-sided difference quotients.
+        The derivatives are approximated by one-sided differences.
         """
-        expensive_value = self.expensive(self.space.values(u))
+        expensive_value = self.expensive(self.space.to_values(u))
         value_corrected_model = self.correct_cheap_model(u, expensive_value)
         slopes = []
         for i in range(u.size):
             neighbour = u.copy()
             neighbour[i] += -DIFFERENCE_STEP if u[i] > 0.5 else DIFFERENCE_STEP
-            values = self.space.values(neighbour)
+            values = self.space.to_values(neighbour)
             slopes.append(
                 (self.expensive(values) - value_corrected_model(values)) / (neighbour[i] - u[i])
             )
         return self.correct_cheap_model(u, expensive_value, np.stack(slopes, axis=-1))
 
     def _descend(self, model: Callable, u) -> np.ndarray:
-        """Return the point (n,) at which a local search with a model from u (n,) ends."""
+        """Return the minimum (n,) of a local search with a model from u (n,)."""
         cube_residual = UnitCubeResidual(lambda values: self.residual(model(values)), self.space)
         return descend(cube_residual, u, range(u.size)).u
 
     def _sum_of_squares(self, data) -> float:
-        """Return the sum of squares of the residual between data and a model."""
+        """Return the sum of squares of the residual for the output of a model."""
         return float(np.square(self.residual(data)).sum())
 
 
 def _choose_minima(ends: list) -> list:
-    """Select the end points (n,) of the best local searches that are not close to each other.
+    """Return the minima (n,) of the best local searches that are not close to each other.
 
-    The best comes first.
+    The points are sorted by their sum of squares.
     """
     ends = sorted((end for end in ends if np.isfinite(end.cost)), key=lambda end: end.cost)
     minima = []

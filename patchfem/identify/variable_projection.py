@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-# largest condition number of the design matrix; in directions of smaller singular values the coefficients are 0
+# Largest condition number of the design matrix; smaller singular values are ignored.
 MAX_CONDITION = 1e12
 
 
@@ -12,7 +12,7 @@ class Projection(NamedTuple):
     """Solution of the linear part of a separable least-squares problem.
 
     - residual: model minus data (k,).
-    - coefficients: coefficients (n,) of the columns.
+    - coefficients: coefficients (n,) of the columns of the design matrix.
     - basis: orthonormal basis (k, n) of the columns.
     """
 
@@ -23,16 +23,16 @@ class Projection(NamedTuple):
     def jacobian(self, derivatives) -> np.ndarray:
         """Return the Jacobian (k, p) of the residual with respect to the nonlinear parameters.
 
-        It is the part of `derivatives` that is orthogonal to the columns. `derivatives` (k, p) are those of
-        the model with respect to the nonlinear parameters, with constant coefficients.
+        The Jacobian is the part of `derivatives` orthogonal to the columns, where `derivatives` (k, p) are the
+        derivatives of the model at constant coefficients.
         """
         return derivatives - self.basis @ (self.basis.T @ derivatives)
 
 
 def project_data(design, value) -> Projection:
-    """Fit data by a linear combination of the columns of a design matrix, by least squares.
+    """Solve a linear least-squares problem for given columns of a design matrix.
 
-    `design` (k, n) is the matrix, and `value` (k,) are the data.
+    `design` (k, n) is the design matrix, `value` (k,) are the data.
     """
     norms = np.maximum(np.linalg.norm(design, axis=0), 1e-300)
     basis, triangular = np.linalg.qr(design / norms)
@@ -43,9 +43,9 @@ def project_data(design, value) -> Projection:
 
 
 def compute_standard_errors(jacobian, rms: float) -> np.ndarray:
-    """Estimate the standard deviations of fitted parameters from the residual of the fit.
+    """Return the standard errors of fitted parameters from the residual of the fit.
 
-    `jacobian` (k, p) holds the derivatives of the residual, whose root mean square is `rms`.
+    `jacobian` (k, p) is that of the residual, `rms` the root mean square of the residual.
     """
     variances = np.diag(np.linalg.pinv(jacobian.T @ jacobian))
     return rms * np.sqrt(np.maximum(variances, 0))

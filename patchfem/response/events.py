@@ -89,9 +89,7 @@ def detect_events(
     borders : sequence of float
         Times of the borders between segments of the drive [s].
     """
-    rows = [
-        (border, 0, SEGMENT_BORDER, np.nan) for border in borders if time[0] < border < time[-1]
-    ]
+    rows = [(t, 0, SEGMENT_BORDER, np.nan) for t in borders if time[0] < t < time[-1]]
     for number in range(slips.shape[1]):
         rows += _detect_interface_events(
             time, slips[:, number], slides[:, number], period, max_stick_slip, number + 1

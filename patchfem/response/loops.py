@@ -43,15 +43,13 @@ def cycle_spans(time, period: float) -> list:
 def reversal_force_rule(model) -> str:
     """Return the name of the rule for the friction force at a reversal."""
     law = model.friction.law
-    partial = model.partial_slip or (
+    soft = model.partial_slip or (
         model.rig is not None and model.rig.friction.interfaces[0].partial_slip
     )
-    if law_has_trait(law, "memoryless") and not partial:
+    if law_has_trait(law, "memoryless") and not soft:
         return "jumps"
     return (
-        "slide"
-        if partial or law_has_trait(law, "timeless") or law_has_trait(law, "bonds")
-        else "rate"
+        "slide" if soft or law_has_trait(law, "timeless") or law_has_trait(law, "bonds") else "rate"
     )
 
 

@@ -35,15 +35,11 @@ def harmonic_weights(time, omega: float) -> list:
         Weights (k - 1,) [s] and phase factors exp(-i omega t) (k - 1,) for each of the four Gauss points.
     """
     step = np.diff(time)
-    phase_factors = np.exp(-1j * omega * time[:-1])
+    phases = np.exp(-1j * omega * time[:-1])
     # for equal steps, the phase factors of the Gauss points differ by constant factors
-    is_uniform = step.size and np.ptp(step) <= 1e-15 * abs(time[-1])
-    factors = [
-        np.exp(-1j * omega * s * (step.mean() if is_uniform else step)) for s in GAUSS_POINTS
-    ]
-    return [
-        (weight * step, phase_factors * factor) for factor, weight in zip(factors, GAUSS_WEIGHTS)
-    ]
+    uniform = step.size and np.ptp(step) <= 1e-15 * abs(time[-1])
+    factors = [np.exp(-1j * omega * s * (step.mean() if uniform else step)) for s in GAUSS_POINTS]
+    return [(weight * step, phases * factor) for factor, weight in zip(factors, GAUSS_WEIGHTS)]
 
 
 def motion_harmonic(time, value, rate, omega: float, weights: list | None = None) -> complex:

@@ -191,20 +191,15 @@ def transform_record(record: Record) -> Segments:
 
 def compute_spectra(window, drive) -> Spectra:
     """Compute the spectra of a window, up to twice the highest frequency of the drive."""
-    frequency, (drive_transforms, displacement_transforms, acceleration_transforms) = (
-        transform_record(make_record(window, drive))
+    frequency, (inputs, outputs, acceleration_transforms) = transform_record(
+        make_record(window, drive)
     )
     low, high = drive.band
     in_range = (frequency > 0) & (frequency <= 2 * high)
     densities = CrossDensities(
-        *(
-            density[in_range]
-            for density in average_segments(drive_transforms, displacement_transforms)
-        )
+        *(density[in_range] for density in average_segments(inputs, outputs))
     )
-    acceleration_density = average_segments(drive_transforms, acceleration_transforms).output[
-        in_range
-    ]
+    acceleration_density = average_segments(inputs, acceleration_transforms).output[in_range]
     frequency = frequency[in_range]
     in_band = (frequency >= low) & (frequency <= high)
     gain = np.where(in_band, densities.cross / np.where(in_band, densities.input, np.inf), np.nan)

@@ -30,7 +30,7 @@ from patchfem.campaigns.rows.search import make_residual
 from patchfem.core import G_N
 from patchfem.identify import UnitCubeResidual, run_descents
 from patchfem.identify.least_squares import NEAR_BOUND_FRACTION
-from patchfem.identify.space import make_space
+from patchfem.identify.space import make_search_space
 
 MIL = 25.4e-6
 SCORES = FOLDER / "scores.json"
@@ -204,12 +204,12 @@ def search_starts(cells, computed, seen, starts: int, most: int, begins=()) -> t
     """
     wanted = computed.models.ranges
     residual = make_residual(cells, computed, seen, "bound")
-    box = make_space([one.low for one in wanted], [one.high for one in wanted])
-    quick = UnitCubeResidual(residual, box, is_quick=True)
+    box = make_search_space([one.low for one in wanted], [one.high for one in wanted])
+    quick = UnitCubeResidual(residual, box, is_expensive=True)
     rng = np.random.default_rng(SEED)
     random = 0
     ends = run_descents(
-        quick, [box.unit(one) for one in begins], before_descent=computed.reset_motions
+        quick, [box.to_unit_cube(one) for one in begins], before_descent=computed.reset_motions
     )
     while True:
         points = rng.random((starts - random, SCREEN, len(wanted)))
@@ -231,12 +231,12 @@ def search_starts(cells, computed, seen, starts: int, most: int, begins=()) -> t
             before_descent=computed.reset_motions,
         )[0]
         best, others = group_valleys(
-            cells, computed, seen, last, [(box.values(one.u), one.rms) for one in ends]
+            cells, computed, seen, last, [(box.to_values(one.u), one.rms) for one in ends]
         )
         random = starts
         if best > 1 or 2 * starts > most:
             valleys = {"starts": len(ends), "best": best, "tied": others}
-            return box.values(last.u), [one.rms for one in ends], valleys
+            return box.to_values(last.u), [one.rms for one in ends], valleys
         starts *= 2
 
 
@@ -265,13 +265,13 @@ def group_valleys(cells, computed, seen, last, ends) -> tuple:
     """
     wanted = computed.models.ranges
     residual = make_residual(cells, computed, seen, "bound")
-    box = make_space([one.low for one in wanted], [one.high for one in wanted])
+    box = make_search_space([one.low for one in wanted], [one.high for one in wanted])
 
     def at(values) -> np.ndarray:
         computed.reset_motions()
         return residual(values)
 
-    least = at(box.values(last.u))
+    least = at(box.to_values(last.u))
     count = 0
     valleys = []
     for values, score in sorted(ends, key=lambda one: (not one[1] < np.inf, one[1])):
@@ -296,7 +296,7 @@ def rms(values) -> float:
 
 def bounds(wanted, values) -> list:
     """Return "low", "high" or "" for every value: whether it lies within a thousandth of its range from an end."""
-    u = make_space([one.low for one in wanted], [one.high for one in wanted]).unit(
+    u = make_search_space([one.low for one in wanted], [one.high for one in wanted]).unit(
         np.asarray(values)
     )
     return [

@@ -8,7 +8,7 @@ from scipy.stats import t as student
 
 from patchfem.core import Missing, NotConverged, Outcome, PatchfemError
 from patchfem.identify import Problem, describe_fit
-from patchfem.identify.space import make_space
+from patchfem.identify.space import make_search_space
 
 RNG = np.random.default_rng(7)
 DESIGN = RNG.normal(size=(30, 3))
@@ -176,7 +176,11 @@ def test_exact_wide_positive_range_uses_logarithm():
     assert np.log(fit.intervals.ends[0]) == pytest.approx(
         [spread.mean() - half, spread.mean() + half], abs=1e-6
     )
-    assert make_space([1.0, 1.0, -1.0], [10.0, 11.0, 1e3]).log.tolist() == [False, True, False]
+    assert make_search_space([1.0, 1.0, -1.0], [10.0, 11.0, 1e3]).is_log.tolist() == [
+        False,
+        True,
+        False,
+    ]
 
 
 def test_always_failed_evaluations_are_counted():

@@ -5,12 +5,12 @@ import pytest
 
 from patchfem.core import PatchfemError
 from patchfem.identify import Problem, TwoModels
-from patchfem.identify.space import make_space
+from patchfem.identify.space import make_search_space
 
 X = np.linspace(0.1, 3.0, 30)
 # no values of the models fit the data exactly
 DATA = np.array([np.exp(-X) + 0.3 * np.sin(3 * X), 0.5 * X])
-BOX = make_space([0.1, 0.1], [5.0, 5.0])
+BOX = make_search_space([0.1, 0.1], [5.0, 5.0])
 
 
 def expensive_model(values) -> np.ndarray:
@@ -44,11 +44,11 @@ def test_exact_two_models_reach_expensive_minimum():
         best_fit.rms**2 * DATA.size, rel=2e-4
     )
     np.testing.assert_allclose(model(values), expensive_model(values), rtol=1e-12)
-    u = BOX.unit(best_fit.values)
+    u = BOX.to_unit_cube(best_fit.values)
     for _ in range(8):
-        u = models._descend(models.correct_cheap_model(u, expensive_model(BOX.values(u))), u)
+        u = models._descend(models.correct_cheap_model(u, expensive_model(BOX.to_values(u))), u)
     assert (
-        np.square(residuals(expensive_model(BOX.values(u)))).sum()
+        np.square(residuals(expensive_model(BOX.to_values(u)))).sum()
         > 1.01 * best_fit.rms**2 * DATA.size
     )
 

@@ -29,7 +29,7 @@ from patchfem.core import PatchfemError
 from patchfem.export.lab import imported
 from patchfem.identify import UnitCubeResidual
 from patchfem.identify.least_squares import descend
-from patchfem.identify.space import make_space
+from patchfem.identify.space import make_search_space
 from patchfem.model import build
 from patchfem.scene import BaseScene, read_ranges
 
@@ -171,10 +171,10 @@ def minimize_from_truth(case: DecayCase, path: Path, keys: list) -> float:
         ).curves["balance"]
         return ((np.array([curve.frequency, curve.damping]) - measured) / error).ravel()
 
-    box = make_space([key.low for key in keys], [key.high for key in keys])
+    box = make_search_space([key.low for key in keys], [key.high for key in keys])
     return descend(
-        UnitCubeResidual(residual, box, is_quick=True),
-        box.unit(list(case.truth.values())),
+        UnitCubeResidual(residual, box, is_expensive=True),
+        box.to_unit_cube(list(case.truth.values())),
         range(len(keys)),
     ).cost
 

@@ -311,8 +311,8 @@ def fit_curve(
     problem = keys.make_problem(
         lambda values: measured.normalized_residual(curves.compute_quick(values))
     )
-    space = problem.space
-    other_trials = map(space.values, make_space_filling_points(MAX_TRIALS, len(ranges)))
+    space = problem.search_space
+    other_trials = map(space.to_values, make_space_filling_points(MAX_TRIALS, len(ranges)))
     curves.choose_methods([problem.start, *other_trials])
     if say:
         say(f"{n_amplitudes} amplitudes computed by {' and '.join(curves.methods)}")
@@ -432,7 +432,7 @@ def _widen_by_missing_modes(
         start=fit.values,
     )
     parameter_shifts = np.abs(shifted.solve(1, "").values - fit.values)
-    space = problem.space
+    space = problem.search_space
     ends = fit.intervals.ends + parameter_shifts[:, None] * [-1, 1]
     ends = frozen_array(np.clip(ends, space.low[:, None], space.high[:, None]))
     fractions = map(_format_relative_shift, parameter_shifts, fit.values)

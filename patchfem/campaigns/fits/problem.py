@@ -11,8 +11,8 @@ from time import perf_counter
 import numpy as np
 
 from ...core import Outcome, PatchfemError
+from ...identify.fit_sentences import describe_fit
 from ...identify.least_squares import Fit, Problem
-from ...identify.words import describe_fit
 from ...model.model import Model, build
 from ...runs import joint
 from ...runs.patch import mesh_levels

@@ -166,9 +166,9 @@ def search_random_starts(
     NotConverged
         If all descents fail.
     """
-    space = problem.space
+    space = problem.search_space
     n = space.low.size
-    quick_residual = UnitCubeResidual(problem.residual, space, is_quick=True)
+    quick_residual = UnitCubeResidual(problem.residual, space, is_expensive=True)
     starts = np.random.default_rng(settings.seed).random((settings.starts, n))
     ends = run_descents(
         quick_residual,
@@ -189,10 +189,10 @@ def search_random_starts(
     )
     end_values = []
     for end in ends:
-        end_values.append(space.values(end.u) if np.isfinite(end.cost) else np.full(n, np.nan))
+        end_values.append(space.to_values(end.u) if np.isfinite(end.cost) else np.full(n, np.nan))
     return BestFit(
         fit=assemble_fit(quick_residual, best, interval_kind, ends),
-        starts=np.array([space.values(u) for u in starts]),
+        starts=np.array([space.to_values(u) for u in starts]),
         ends=np.array(end_values),
         rms=rms,
     )

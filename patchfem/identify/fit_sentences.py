@@ -1,25 +1,25 @@
-"""Sentences on the fitted values that the data do not determine."""
+"""Sentences about parameters that a fit does not determine, and about failures of its search."""
 
 import numpy as np
 
 from ..core import Outcome
 from .least_squares import MAX_EVALUATIONS, Fit
 
-# fraction of the largest sensitivity; a fitted value with a smaller one has no effect on the residual
+# Smallest sensitivity of a parameter with an effect on the residual, relative to the largest sensitivity.
 MIN_SENSITIVITY = 1e-9
 
 
 def describe_fit(fit: Fit, names) -> list:
-    """Describe the parameters that a fit does not determine, and failures of its search.
+    """Return sentences about parameters that a fit does not determine, and failures of its search.
 
-    The sentences name values that are at a bound, without effect, determined only in a combination, or whose
-    interval reaches a bound; failed evaluations; and a search that did not converge.
+    The sentences report parameters that are at a bound, without effect, determined only in combination with
+    others, or whose interval reaches a bound. They also report failed evaluations and a lack of convergence.
 
     Parameters
     ----------
     fit : Fit
     names : sequence of str
-        Names (n,) of the values.
+        Names (n,) of the parameters.
 
     Returns
     -------
@@ -62,9 +62,9 @@ def describe_fit(fit: Fit, names) -> list:
 
 
 def _describe_direction(row, names) -> str:
-    """Describe a direction in parameter space along which the residual stays unchanged.
+    """Return a sentence about a direction in parameter space in which the residual is constant.
 
-    `row` (n,) is the relative change of each value [%].
+    `row` (n,) is the relative change of each parameter [%].
     """
     involved = np.flatnonzero(row)
     changes = ", ".join(f"{names[i]} by {row[i]:+.3g} %" for i in involved)
