@@ -499,8 +499,8 @@ class Motion:
         end, window : float
             [s].
         shots : sequence of float, optional
-            Times [s] of snapshots of the interface, which are appended to `seen`.
-        seen : list, optional
+            Times [s] of snapshots of the interface, which are appended to `snapshots`.
+        snapshots : list, optional
 
         Returns
         -------
