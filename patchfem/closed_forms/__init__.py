@@ -4,7 +4,7 @@ In: sizes in SI units, shapes as each docstring of `contact` says. Out: closed f
 round-off. Nothing here uses the rest of the package, so tests may trust it.
 """
 
-# names that other folders use, by module
+# Names that other folders use, by module
 PUBLIC = {
     "contact": (
         "rounded_corner_contact",

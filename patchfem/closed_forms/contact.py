@@ -253,7 +253,7 @@ def punch_pressure(x, line_load, half, offset=0.0):
     with np.errstate(divide="ignore", invalid="ignore"):
         if abs(offset) <= half / 2:
             p = line_load / np.pi * (1 + 2 * offset * x / half**2) / np.sqrt(half**2 - x**2)
-            if abs(offset) == half / 2:  # 0/0 at the corner that begins to lift off
+            if abs(offset) == half / 2:  # the pressure is 0/0 at the corner that begins to lift off
                 p = np.where(x == -2 * offset, 0.0, p)
         else:
             near = right - x if offset > 0 else x - left
@@ -799,7 +799,7 @@ def wedge_on_asperities(rotation, length, decay) -> tuple:
     require_positive(length=length, decay=decay)
     b = np.abs(np.asarray(rotation, float)) * length / decay
     ratio = np.where(b > 0, -np.expm1(-b) / np.where(b > 0, b, 1), 1.0)
-    large = np.maximum(b, 0.05)  # the closed form cancels below this value
+    large = np.maximum(b, 0.05)  # the closed form suffers from cancellation below this value
     closed_form = 1 / 2 - 1 / large - np.exp(-large) / np.expm1(-large)
     series = b / 12 * (1 - b**2 / 60 * (1 - b**2 / 42))
     centre = np.where(b > 0.05, closed_form, series)
@@ -860,7 +860,7 @@ def wedge_loop_area(amplitude, friction, tangential_stiffness, area, min_pressur
     return 4 * tangential_stiffness * area * fraction * integral
 
 
-def kern_contact_fraction(offset, length):
+def core_contact_fraction(offset, length):
     """Return the contact fraction of a pad that can rotate under a load beside its middle.
 
     The foundation is linear. The fraction is 1 up to |e| = L/6 (the kern), then 3 (1/2 - |e|/L).

@@ -14,7 +14,7 @@ set. Read `gaps`, `unilateral` and `active_set` first.
 `press_path_kernels`), `batch` solves many cases at once, and `half_space` serves rows of thousands of points.
 """
 
-# names that other folders use, by module
+# Names that other folders use, by module
 PUBLIC = {
     "active_set": ("patch_problem",),
     "asperity_laws": (
@@ -59,7 +59,7 @@ PUBLIC = {
         "REFERENCE_STIFFNESS",
         "SetArrays",
         "make_set_arrays",
-        "name_set",
+        "hash_set",
     ),
     "stiffness": (
         "coupled_stiffness",

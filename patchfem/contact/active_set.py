@@ -20,9 +20,9 @@ import numpy as np
 
 from ..core import NotConverged
 
-# Rounding error of an opening relative to the sum of the magnitudes of its terms.
+# Rounding error of an opening, relative to the sum of the magnitudes of its terms
 OPENING_NOISE = 1e-14
-N_REFINEMENTS = 2  # steps of iterative refinement; a third one changes nothing
+N_REFINEMENTS = 2  # number of steps of iterative refinement; a third step changes nothing
 
 
 class ContactProblem(NamedTuple):
@@ -104,10 +104,12 @@ class _SetEquations:
         n_nodes = self.index.size
         n_motions = problem.target.size
         gap = problem.gap[self.index]
-        # the smallest gap is subtracted first, because the approach may be far smaller than the gaps
+        # The smallest gap is subtracted first, because the approach may be far smaller than the
+        # gaps.
         self.offset = gap.min() if n_motions else 0.0
-        # right-hand sides: a row for the gap and one for each motion. The first columns are the gap or closing of
-        # the nodes; the last columns of the motions begin as the identity and become T, transposed
+        # There is one right-hand side for the gap and one for each motion. The first columns are
+        # the gap or the displacement of the nodes; the last columns of the motions begin as the
+        # identity and become T, transposed.
         right_sides = np.zeros((1 + n_motions, n_nodes + n_motions))
         right_sides[0, :n_nodes] = gap - self.offset
         rows = right_sides[1:]
@@ -117,7 +119,7 @@ class _SetEquations:
         for k in range(1, n_motions):
             rows[k] -= (rows[k, 0] + rows[k, n_nodes - 1]) / 2 * rows[0]
         self.solve_block = compliance.solver(active)
-        # the forces that these motions cause in the nodes, then in the springs
+        # The solution holds the forces that these motions cause in the nodes, then in the springs.
         solution = right_sides.copy()
         solution[:, :n_nodes] = self.solve_block(right_sides[:, :n_nodes].T).T
         solution[:, n_nodes:] *= problem.springs
@@ -179,7 +181,7 @@ class _SetEquations:
 def solve_on_set(
     compliance, problem: ContactProblem, active: np.ndarray, n_refinements: int = 0
 ) -> SetSolution:
-    """Solve for forces and holder motion with given nodes in contact, whatever the signs.
+    """Solve for forces and holder motion with given nodes in contact; forces may have either sign.
 
     Parameters
     ----------
@@ -213,7 +215,8 @@ def refine_solution(compliance, problem, solution: SetSolution, active) -> SetSo
         Solution on the set `active`; it is returned unless its openings show rounding errors.
     active : (n,) bool ndarray
     """
-    # the solution is refined only if openings exceed a tenth of the overlap at which a node enters the set
+    # The solution is refined only if an opening exceeds a tenth of the overlap at which a node
+    # enters the set.
     error = np.abs(solution.opening[active])
     if not (error > OPENING_NOISE / 10 * solution.scale[active]).any():
         return solution
@@ -403,7 +406,7 @@ def find_rest_motion(problem: ContactProblem) -> np.ndarray:
     for k in range(1, motion.size):
         position = problem.motions[:, k]
         lowest = gap
-        # several strips have nodes at the same position
+        # Several strips have nodes at the same position.
         if (position[1:] <= position[:-1]).any():
             position, group = np.unique(position, return_inverse=True)
             lowest = np.full(position.size, np.inf)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-# nodes of the trapezoidal rule, whose error is below 1e-15 because the integrand is even and analytic
+# Nodes of the trapezoidal rule; its error is below 1e-15 because the integrand is even and analytic
 TRAPEZOID_NODES = 0.1 * np.arange(1, 70)
 
 
@@ -142,7 +142,7 @@ def peak_integral(h: np.ndarray) -> tuple:
 
 
 def _moment(n: float, a: np.ndarray) -> np.ndarray:
-    """Return the expectation of (1 + z/a)^n for a unit normal z and large a.
+    """Return the expectation of (1 + z/a)^n for a standard normal variable z and large a.
 
     It is the sum of binom(n, 2k) (2k - 1)!! a^-2k.
     """

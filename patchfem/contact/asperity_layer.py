@@ -21,17 +21,19 @@ from .asperity_laws import SmoothAsperities
 from .strip_compliance import StripCompliance
 from .unilateral import solve
 
-MAX_NEWTON_STEPS = 60  # more steps do not converge either; the descent of the dual function follows
-# largest number of descent steps, and of trials along each direction of descent
+# Largest number of Newton steps; if they do not suffice, the dual function is minimized
+MAX_NEWTON_STEPS = 60
+# Largest number of descent steps, and of trial points along each direction of descent
 MAX_DUAL_STEPS = 60
-# log of the pressure [Pa] below which the asperity layer counts as untouched
+# Largest logarithm of a pressure [Pa] at which the asperity layer counts as untouched
 MIN_LOG_PRESSURE = -300.0
-# log of a force [N] above which the exponential function overflows in products
+# Largest logarithm of a force [N] for which products with the exponential function do not overflow
 MAX_LOG_FORCE = 600.0
-# ratio of a slope to the largest slope below which a Newton step leaves the force unchanged
+# Smallest slope, relative to the largest slope, for which a Newton step changes the force
 MIN_RELATIVE_SLOPE = 1e-18
-NEWTON_TOL = 1e-12  # relative imbalance and relative change of pressure of a solution
-# ratio to the mean pressure up to which the pressure of an unloaded node may rise in one step
+# Relative imbalance and relative change of pressure at which Newton's method has converged
+NEWTON_TOL = 1e-12
+# Largest pressure that an unloaded node may reach in one step, relative to the mean pressure
 MAX_PRESSURE_RISE = 0.01
 
 
@@ -169,12 +171,13 @@ def _solve_newton(problem: AsperityProblem, separation, motion) -> AsperitySolut
         fraction = np.exp(np.minimum(0.0, new_log_force - log_force.max()))
         depth = np.ptp(contact.gap) + np.abs(problem.compliance.product(force)).max()
         depth += 2 * np.abs(motion[1:]).sum()
-        # the last digit of a separation changes the pressure of the loaded nodes by this fraction
+        # Round-off of a separation changes the pressure of the loaded nodes by this fraction.
         noise = NEWTON_TOL + 1e-15 * depth * decay[force > 1e-6 * force.max()].max()
         missing = np.abs(imbalance).max() / contact.target[0] if imbalance.size else 0.0
         if max(missing, np.max(fraction * np.abs(log_change))) <= noise:
-            # a nearly unloaded node takes its force from the pressure law of the asperity layer, because
-            # the Newton step gives that force only to rounding errors of the largest force
+            # The force of a nearly unloaded node is computed from the pressure law of the asperity
+            # layer, because the Newton step gives that force only to rounding errors of the largest
+            # force.
             law_force = np.exp(np.minimum(log_force + log_change, MAX_LOG_FORCE))
             new_force = np.maximum(force + force_change, 0.0)
             new_force = np.where(fraction < 1e-15, law_force, new_force)
@@ -346,14 +349,14 @@ def _linearised_start(problem: AsperityProblem) -> tuple:
     mean_pressure = problem.mean_pressure
     mean_separation = problem.asperities.separation(np.array([mean_pressure]))
     stiffness = mean_pressure * problem.asperities.log_pressure(mean_separation)[1][0]
-    # separation at which the tangent becomes zero
+    # The tangent of the pressure law is zero at this separation.
     first_touch = mean_separation[0] + mean_pressure / stiffness
     n_nodes = len(problem.compliance.common)
     compliance = problem.compliance.add_to_diagonal(1 / (stiffness * problem.area[:n_nodes]))
     try:
         linear = solve(compliance, contact._replace(gap=contact.gap - first_touch))
     except (np.linalg.LinAlgError, NotConverged):
-        # uniform separations serve as the start where the linear problem has no solution
+        # The start has uniform separations where the linear problem has no solution.
         approach = contact.gap.mean() - mean_separation[0]
         uniform = np.full(contact.gap.size, mean_separation[0])
         return uniform, approach * np.eye(1, contact.target.size)[0]

@@ -12,9 +12,9 @@ import numpy as np
 
 from .active_set import OPENING_NOISE, ContactProblem
 
-# Rounding error of the energy relative to the sum of the magnitudes of its terms.
+# Rounding error of the energy, relative to the sum of the magnitudes of its terms
 ENERGY_NOISE = 1e-13
-# ratio of the error of a resultant to the load, above which the forces are projected once more
+# Largest error of a resultant, relative to the load, for which the forces are not projected again
 RESULTANT_TOL = 1e-12
 
 
@@ -84,7 +84,8 @@ def project_forces(
     """
     if not target.size:
         return np.maximum(force, 0.0)
-    # keeps the Newton matrix regular where the nodes in contact do not determine all motions
+    # This term keeps the Newton matrix regular where the nodes in contact do not determine all
+    # motions.
     regularisation = rigid.T @ rigid
     regularisation += 1e-3 * np.trace(regularisation) * np.eye(target.size)
     shifted = force
@@ -165,7 +166,7 @@ def solve_by_gradients(
         energy = force @ (gap + displacement / 2)
         noise = ENERGY_NOISE * (np.abs(force * gap).sum() + force @ displacement)
         if energy > min_energy + noise:
-            # a projected gradient step of this length always lowers the energy
+            # A projected gradient step of this length always lowers the energy.
             downhill = best_force - safe_step * (gap + product(best_force))
             force = project_forces(downhill, rigid, target)
             is_conjugate = 0.0
@@ -185,7 +186,7 @@ def solve_by_gradients(
         curvature = direction @ product(direction)
         step = (slope @ direction) / curvature if curvature > 0 else safe_step
         moved = np.maximum(force - step * direction, 0.0)
-        # open nodes that overlap enter the contact with a gradient step
+        # Open nodes that overlap enter the contact with a gradient step.
         is_entering = (moved == 0) & (slope < 0)
         is_conjugate = 0.0 if is_entering.any() else 1.0
         last_square = max(square, 1e-300)

@@ -17,9 +17,9 @@ from scipy.linalg import cho_factor, cho_solve
 from ..core import PatchfemError, frozen_array
 from .set_arrays import SetArrays, make_set_arrays
 
-# bytes of the stored contact sets; when they are full, the oldest set is replaced
+# Largest memory [bytes] of the stored contact sets; when it is full, the oldest set is replaced
 MAX_STORED_BYTES = 64e6
-MAX_SLOTS = 100_000  # largest number of stored contact sets; more are not needed
+MAX_SLOTS = 100_000  # largest number of stored contact sets; no problem needs more
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -122,7 +122,7 @@ class ContactSets:
 
         max_bytes: size of the contact sets that can be stored [bytes].
         """
-        # 25 m + 400 bytes: unknowns, nodes, polygon and names of one set
+        # One set takes 25 m + 400 bytes: unknowns, nodes, polygon and names.
         n_slots = int(max(16, min(max_bytes / (25 * self.x.size + 400), MAX_SLOTS)))
         stiffness = self.reference.energy[3]
         return make_set_arrays(

@@ -12,9 +12,10 @@ import numpy as np
 
 from ..elasticity.lapack import cho_factor, cho_solve
 
-# ratio of nodal to largest pressure, above which a node with a smooth asperity law counts as in contact
+# Smallest pressure, relative to the largest, at which a node with a smooth asperity law counts as
+# in contact
 MIN_RELATIVE_PRESSURE = 1e-13
-# largest ratio of first-row height to cell length for which `edge_offset_fraction` was measured
+# Largest ratio of first-row height to cell length for which `edge_offset_fraction` was measured
 MAX_ASPECT = 4.0
 
 
@@ -51,7 +52,7 @@ def edge_offset_fraction(aspect):
 
 
 def edge_offset(inner, outer, fraction, row_height: float | None = None):
-    """Return how far [m] an edge lies inside the position that its cell fraction gives.
+    """Return the inward offset [m] of an edge from the position that its cell fraction gives.
 
     The cell length is interpolated between both cells by the fraction, so an edge does not jump where cells of two
     lengths meet.
@@ -78,7 +79,7 @@ def _find_ends(active: np.ndarray) -> list:
 
 
 def compute_edge_fraction(force: float, force_rate: float, gap: float, gap_rate: float) -> float:
-    """Return the fraction of a cell that an edge has passed; 1/2 if it is not determined.
+    """Return the fraction of a cell that an edge has passed; 1/2 if it is undetermined.
 
     Parameters
     ----------
@@ -138,7 +139,7 @@ def find_edges(normal, x, force, gap, softness=None, row_height: float | None = 
 
 
 def snap_to_steps(edges: list, x, gap, jumps) -> list:
-    """Move contact edges within a cell of an opening step of the gap onto this step.
+    """Snap contact edges to a step at which the gap opens if they lie less than one cell away from it.
 
     Parameters
     ----------
@@ -196,7 +197,7 @@ def find_pressure_edges(x, pressure, fraction: float, largest: float | None = No
 
 
 def contact_intervals(x, force, edges: list) -> np.ndarray:
-    """Return the intervals in contact (k, 2) [m] by increasing x.
+    """Return the intervals in contact (k, 2) [m] in ascending order of x.
 
     An interval of a node or two may be shorter than the offsets of its edges; its length is 0 then.
 

@@ -1,4 +1,4 @@
-"""Compiled polygons of the rigid displacements (d, t) at which a contact set holds.
+"""Compiled polygons of the rigid displacements (d, t) for which a contact set is valid.
 
 Each node of a set limits these motions to one side of a line. The lines enclose a convex polygon, of
 which only a few are sides, so comparing a motion with the sides is faster than checking all nodes.
@@ -14,8 +14,8 @@ from ..compiled.jit import njit
 from .set_arrays import MAX_POLYGON_SIDES, REFERENCE_OPENING
 
 NJIT_NO_REFCOUNT = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
-ROUND_OFF = 1e-13  # rounding error of a force or gap relative to the largest of its terms
-# half width of the box in which polygons are computed, in the units of `polygon_units`
+ROUND_OFF = 1e-13  # rounding error of a force or gap, relative to the largest of its terms
+# Half width of the box in which polygons are computed, in the units of `polygon_units`
 BOX_HALF_WIDTH = 100.0
 
 
@@ -186,7 +186,7 @@ def is_in_box(sets, d, t):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def side_margin(sets, slot, side, d, t):
-    """Return by how much the force [N] or gap [m] of a polygon side exceeds its limit.
+    """Return the margin by which the force [N] or gap [m] of a polygon side exceeds its limit.
 
     Parameters
     ----------

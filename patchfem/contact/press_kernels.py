@@ -29,14 +29,16 @@ from .set_arrays import (
 )
 
 FASTMATH_FLAGS = {"reassoc", "contract", "arcp"}
-# the compiler vectorises loops that search for a minimum only with these flags
+# Fast-math flags with which the compiler vectorizes loops that search for a minimum
 FASTMATH_MINIMUM = FASTMATH_FLAGS | {"nnan", "nsz"}
-# number of sets that are tried with all violating nodes exchanged at once; more may cycle
+# Largest number of sets for which all violating nodes are exchanged at once; beyond it the
+# exchanges may cycle
 N_BLOCK_EXCHANGES = 12
-# relative residual above which the tableau is computed anew; below it one refinement reaches
-# rounding errors
+# Largest relative residual for which the tableau is not recomputed; one refinement then reduces it
+# to rounding errors
 MAX_TABLEAU_RESIDUAL = 1e-8
-MIN_TABLEAU_RESIDUAL = 1e-15  # relative residual at round-off, which cannot be refined
+# Smallest relative residual for which the tableau is refined; smaller ones are round-off
+MIN_TABLEAU_RESIDUAL = 1e-15
 
 
 class ContactBounds(NamedTuple):
@@ -67,7 +69,7 @@ class PressedState(NamedTuple):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def pivot(sets, k):
-    """Exchange force and gap of node k in the tableau; return False on a bad pivot.
+    """Exchange force and gap of node k in the tableau; return False if the pivot is not positive.
 
     Cost: m^2 multiplications.
     """
@@ -177,7 +179,7 @@ def refine_rows(sets):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def take_slot(sets):
-    """Return a free slot for a contact set, if needed that of the oldest one."""
+    """Return a free slot for a contact set; if none is free, return that of the oldest set."""
     stored = sets.stored
     slot = sets.counters[NEXT_SLOT]
     sets.counters[NEXT_SLOT] = (slot + 1) % stored.names.size
@@ -233,7 +235,7 @@ def store_set(sets, name):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def pivot_to_target(sets):
-    """Pivot the tableau to its target contact set; return False on a bad pivot."""
+    """Pivot the tableau to its target contact set; return False if a pivot is not positive."""
     tableau = sets.tableau
     for i in range(sets.x.size):
         if tableau.in_contact[i] != tableau.target[i] and not pivot(sets, i):
@@ -279,7 +281,7 @@ def find_stored(sets, name):
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_MINIMUM, **NJIT_NO_REFCOUNT)
-def check_set(sets, slot, d, t):
+def check_contact_conditions(sets, slot, d, t):
     """Check whether a set meets the contact conditions at a rigid displacement (d, t).
 
     Parameters
@@ -315,8 +317,8 @@ def check_set(sets, slot, d, t):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def exchange_failing(sets, slot, d, t, bounds, is_single):
-    """Make the target set from the current one by exchanging the violating nodes.
+def exchange_violating_nodes(sets, slot, d, t, bounds, is_single):
+    """Set the target contact set to the current one with the violating nodes exchanged.
 
     Parameters
     ----------
@@ -370,11 +372,11 @@ def find_set(sets, slot, d, t):
     for count in range(N_BLOCK_EXCHANGES + 10 * sets.x.size):
         if is_inside(sets, slot, d, t):
             return slot
-        holds, bounds = check_set(sets, slot, d, t)
+        holds, bounds = check_contact_conditions(sets, slot, d, t)
         if holds:
             return slot
         is_single = count >= N_BLOCK_EXCHANGES
-        name = exchange_failing(sets, slot, d, t, bounds, is_single)
+        name = exchange_violating_nodes(sets, slot, d, t, bounds, is_single)
         slot = find_stored(sets, name)
         if slot < 0:
             slot = build_set(sets, name)

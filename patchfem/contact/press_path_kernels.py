@@ -9,10 +9,16 @@ import numpy as np
 
 from ..compiled.jit import njit
 from .polygon_kernels import NJIT_NO_REFCOUNT, find_exit, is_inside
-from .press_kernels import FASTMATH_MINIMUM, ContactBounds, check_set, compute_energy, find_set
+from .press_kernels import (
+    FASTMATH_MINIMUM,
+    ContactBounds,
+    check_contact_conditions,
+    compute_energy,
+    find_set,
+)
 
-# fraction of the increment beyond a border at which the next set is determined; it is larger than
-# rounding errors
+# Distance beyond a border at which the next set is determined, as a fraction of the increment; it
+# is larger than rounding errors
 BORDER_STEP = 1e-10
 
 
@@ -24,7 +30,7 @@ class HolderMotion(NamedTuple):
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_MINIMUM, **NJIT_NO_REFCOUNT)
-def find_first_failure(sets, slot, motion, change, bounds):
+def find_first_violation(sets, slot, motion, change, bounds):
     """Return the fraction of an increment after which a node first violates its condition.
 
     Parameters
@@ -123,15 +129,15 @@ def find_border(sets, slot, start, motion, change):
     )
     if side >= 0:
         return min(start + max(fraction, 0.0) * remainder, 1.0), side
-    holds, end_bounds = check_set(sets, slot, end_d, end_t)
+    holds, end_bounds = check_contact_conditions(sets, slot, end_d, end_t)
     if holds:
         return 1.0, -1
-    _, start_bounds = check_set(sets, slot, d, t)
+    _, start_bounds = check_contact_conditions(sets, slot, d, t)
     bounds = ContactBounds(
         min(end_bounds.min_force, start_bounds.min_force),
         min(end_bounds.min_gap, start_bounds.min_gap),
     )
-    fraction = find_first_failure(sets, slot, start_motion, change, bounds)
+    fraction = find_first_violation(sets, slot, start_motion, change, bounds)
     return min(start + max(fraction, 0.0), 1.0), -1
 
 
@@ -163,7 +169,8 @@ def path_mean(sets, slot, heave, rotation, heave_change, rotation_change, out):
     out[:] = 0.0
     start = 0.0
     border_step = BORDER_STEP
-    # the number of sets is limited, because rounding errors may make a path return to the same sets
+    # The number of sets is limited, because rounding errors may make a path return to the same
+    # sets.
     for _ in range(20 * sets.x.size + 100):
         end, side = find_border(sets, slot, start, motion, change)
         at_start = compute_energy(
@@ -192,7 +199,7 @@ def path_mean(sets, slot, heave, rotation, heave_change, rotation_change, out):
         following = cross_side(sets, slot, side, d, rotation + beyond * rotation_change)
         if following < 0:
             return following
-        # if the search beyond the border returns the same set, it is repeated farther beyond it
+        # If the search beyond the border returns the same set, it is repeated farther beyond it.
         if following == slot:
             border_step *= 10
             start = beyond

@@ -7,19 +7,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-MAX_POLYGON_SIDES = 16  # largest number of sides; sets with more are checked node by node
-# indices into `SetArrays.reference`
-REFERENCE_LOAD = 0  # index of the load of the reference state [N]
-REFERENCE_MOMENT = 1  # index of the moment of the reference state about x = 0 [N m]
-REFERENCE_ENERGY = 2  # index of the elastic energy of the reference state [J]
-REFERENCE_OPENING = 3  # index of the largest magnitude of its openings [m]
-REFERENCE_STIFFNESS = 4  # index of dN/d(approach) of the reference state [N/m]
-# indices into `SetArrays.counters`
-N_STORED = 0  # index of the number of stored sets
-NEXT_SLOT = 1  # index of the slot of the next set
-N_BUILT = 2  # index of the number of sets computed so far
-N_PIVOTS = 3  # index of the number of pivots so far
-N_RESETS = 4  # index of the number of times that the tableau was computed anew
+# Largest number of sides of a stored polygon; sets with more sides are checked node by node
+MAX_POLYGON_SIDES = 16
+REFERENCE_LOAD = 0  # index into `SetArrays.reference` of the load of the reference state [N]
+# Index into `SetArrays.reference` of the moment of the reference state about x = 0 [N m]
+REFERENCE_MOMENT = 1
+# Index into `SetArrays.reference` of the elastic energy of the reference state [J]
+REFERENCE_ENERGY = 2
+# Index into `SetArrays.reference` of the largest magnitude of the openings [m]
+REFERENCE_OPENING = 3
+# Index into `SetArrays.reference` of the stiffness dN/d(approach) of the reference state [N/m]
+REFERENCE_STIFFNESS = 4
+N_STORED = 0  # index into `SetArrays.counters` of the number of stored sets
+NEXT_SLOT = 1  # index into `SetArrays.counters` of the slot of the next set
+N_BUILT = 2  # index into `SetArrays.counters` of the number of sets computed so far
+N_PIVOTS = 3  # index into `SetArrays.counters` of the number of pivots so far
+# Index into `SetArrays.counters` of the number of times that the tableau was recomputed
+N_RESETS = 4
 
 
 class Tableau(NamedTuple):
@@ -146,6 +150,6 @@ def make_set_arrays(compliance, x, opening, reference, in_contact, n_slots: int)
     )
 
 
-def name_set(sets: SetArrays, in_contact) -> int:
+def hash_set(sets: SetArrays, in_contact) -> int:
     """Return the 64-bit hash of the contact set with given nodes (m,)."""
     return int(np.bitwise_xor.reduce(sets.stored.node_names[in_contact], initial=0))

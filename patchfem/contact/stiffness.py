@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..core import Compliance
-from ..elasticity.lapack import one_thread
+from ..elasticity.lapack import use_one_blas_thread
 
 
 def tangential_stiffness(tangential: np.ndarray, active: np.ndarray) -> float:
@@ -41,7 +41,7 @@ def coupled_stiffness(pieces: Compliance, coupling: np.ndarray, active: np.ndarr
         [[pieces.normal[here], coupling[here]], [coupling[here].T, pieces.tangential[here]]]
     )
     slide = np.repeat([0.0, 1.0], len(system) // 2)
-    with one_thread():
+    with use_one_blas_thread():
         return float(slide @ np.linalg.solve(system, slide))
 
 

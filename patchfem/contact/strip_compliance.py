@@ -11,7 +11,8 @@ import numpy as np
 
 from ..elasticity.lapack import dpotrf, dpotrs
 
-# bytes of cached Cholesky factors; 16 strips that are pressed repeatedly need fewer
+# Largest memory [bytes] of the cached Cholesky factors; 16 strips that are pressed repeatedly need
+# less
 MAX_CACHE_BYTES = 1e8
 
 
@@ -42,7 +43,7 @@ class WarmStart:
         lower_factor = self.factors.pop(key, None)
         if lower_factor is None:
             lower_factor = factorise(make_matrix())
-        # a factor in use moves to the end, so that the oldest one is dropped first
+        # A factor in use moves to the end, so that the oldest one is dropped first.
         self.factors[key] = lower_factor
         while len(self.factors) > max(1, MAX_CACHE_BYTES // lower_factor.nbytes):
             del self.factors[next(iter(self.factors))]

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import Compliance, NotConverged, Outcome, PatchfemError, frozen_array
-from ..elasticity.lapack import one_thread
+from ..elasticity.lapack import use_one_blas_thread
 from .active_set import ContactProblem
 from .asperity_laws import ExponentialAsperities, LinearAsperities, SmoothAsperities
 from .asperity_layer import (
@@ -37,11 +37,12 @@ from .unilateral import (
     solve,
 )
 
-# relative residual of solved strips; rounding errors of steep asperity laws stay below it
+# Largest relative residual of a solved contact of strips; rounding errors of steep asperity laws
+# stay below it
 STRIP_RESIDUAL_TOL = 1e-9
-# the smallest force [N] that counts, so that quotients of an unloaded interface stay finite
+# Smallest total force [N] in a divisor; it keeps quotients of an unloaded interface finite
 MIN_TOTAL_FORCE = 1e-150
-# ratio of the force of a loaded node to the largest force; smaller ones are rounding errors
+# Smallest force of a loaded node relative to the largest force; smaller forces are rounding errors
 MIN_RELATIVE_FORCE = 1e-12
 NEGLECTED_SHEAR_NOTE = (
     "the shear between neighbouring strips is neglected; fields and pictures show the mean over the strips, "
@@ -328,7 +329,7 @@ def press_strips(
         mean_pressure = loads.load / (strips.layout.weight.sum() * offsets.size)
         strips = strips._replace(asperities=replace(asperities, reference=mean_pressure))
     problem = _holder_problem(strips.layout, gap, loads)
-    with one_thread():
+    with use_one_blas_thread():
         if isinstance(asperities, SmoothAsperities):
             solution = _press_with_asperities(strips, problem, approach)
         else:
@@ -337,7 +338,7 @@ def press_strips(
     change = _holder_position(solution.motion, loads)
     gap = gap + change.roll * offsets[:, None]
     residuals = compute_strip_residuals(strips, gap, force, change, loads)
-    # one node of a single strip may carry the load; `unilateral.solve` then chooses the rotation
+    # A single strip may be in contact at one node; `unilateral.solve` then chooses the rotation.
     if not isinstance(asperities, SmoothAsperities) and offsets.size > 1:
         _refuse_loose_holder(force, loads)
     _refuse_strip_residuals(asperities, residuals)
@@ -347,7 +348,7 @@ def press_strips(
 
 
 def _strip_opening(strips: StripModel, gap, solution, position: HolderPosition) -> np.ndarray:
-    """Return the gap (s, m) [m] under load, with asperities that between the mean planes.
+    """Return the gap (s, m) [m] under load; with asperities, the gap between the mean planes.
 
     gap: (s, m) [m] before loading, with the rotation about x; position: that beyond the gap.
     """
@@ -407,7 +408,8 @@ def _press_bare(strips: StripModel, problem: ContactProblem, approach) -> Contac
         solution = solve(compliance, problem._replace(gap=problem.gap - touch), start)
     except np.linalg.LinAlgError:
         message = explain_singular_set(compliance.common, problem)
-        # the column of the roll is the last one, and it alone is constant along a strip
+        # The column of the roll is the last one, and it is the only one that is constant along a
+        # strip.
         rolls = np.ptp(problem.motions[: layout.x.size, -1]) == 0 and problem.target.size > 1
         if rolls and message != INDEFINITE_MESSAGE:
             message = LOOSE_ROLL_MESSAGE
@@ -564,7 +566,7 @@ def strips_stiffness(
     if not state.load:
         return 0.0
     compliance = StripCompliance(c)
-    with one_thread():
+    with use_one_blas_thread():
         if state.stiffness is None or np.isinf(ratio):
             active = (state.force > 0).ravel()
             uniform = np.ones((np.count_nonzero(active), 1))

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import Compliance, ContactState, NotConverged, Outcome, PatchfemError, frozen_array
-from ..elasticity.lapack import one_thread
+from ..elasticity.lapack import use_one_blas_thread
 from ..formatting import format_length
 from . import conjugate_gradients
 from .active_set import (
@@ -31,13 +31,16 @@ from .active_set import (
 )
 from .strip_compliance import StripCompliance, factorise
 
-RESIDUAL_TOL = 1e-12  # relative residual of a solved contact; a wrong set is off by 1e-9 or more
+# Largest relative residual of a solved contact; that of a wrong set is 1e-9 or more
+RESIDUAL_TOL = 1e-12
 INDEFINITE_MESSAGE = (
     "contact: the compliance of the pieces is not positive definite to working precision; raise "
     "contact.element_size, bring the stiffnesses of coating and substrate closer together, or check the "
     "cells of contact.mesh"
 )
-MIN_LOAD = 1e-200  # load [N] or overlap [m] below which the products of the check underflow
+# Smallest load [N] or overlap [m] for which the products in the check of the solution do not
+# underflow
+MIN_LOAD = 1e-200
 
 
 class ContactSolution(NamedTuple):
@@ -84,7 +87,7 @@ def _solve_by_fallbacks(compliance, problem: ContactProblem, max_iterations: int
     if solution is not None and relative_violation(solution) <= RESIDUAL_TOL:
         return solution, n_first
     force, n_second = conjugate_gradients.solve_by_gradients(compliance, problem)
-    # smaller forces are remainders that the gradient steps have not yet removed
+    # Smaller forces are remainders that the gradient steps have not yet removed.
     is_loaded = force > 1e-9 * force.max()
     solution, n_third = solve_primal_dual(compliance, problem, is_loaded, max_iterations)
     n_iterations = n_first + n_second + n_third
@@ -394,7 +397,7 @@ def press_to_approach(
 
 
 def _open_interface(gap: np.ndarray, approach: float, rotation: float) -> ContactState:
-    """Return the ContactState of pieces that do not press each other."""
+    """Return the ContactState of pieces that do not touch."""
     return ContactState(
         frozen_array(np.zeros(gap.size)),
         frozen_array(gap - approach),
@@ -417,7 +420,7 @@ def _solve_and_check(
     """
     x = pieces.interface.x
     weight = pieces.interface.weight
-    with one_thread():
+    with use_one_blas_thread():
         try:
             solution = solve(StripCompliance(pieces.normal), problem, start)
         except np.linalg.LinAlgError:

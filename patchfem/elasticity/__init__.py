@@ -21,7 +21,7 @@ complement S = K_ss - K_si K_ii^-1 K_is.
 - `cache` stores compliances on disk; `lapack` loads BLAS and LAPACK quickly.
 """
 
-# names that other folders use, by module
+# Names that other folders use, by module
 PUBLIC = {
     "cache": (
         "grid_key",
@@ -58,7 +58,7 @@ PUBLIC = {
         "dpotrs",
         "dtrsm",
         "dtrtri",
-        "one_thread",
+        "use_one_blas_thread",
     ),
     "mortar": (
         "PieceInterface",

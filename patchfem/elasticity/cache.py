@@ -16,12 +16,16 @@ import numpy as np
 from ..core import frozen_array
 from ..disk import user_cache
 
-# size of all files above which the least recently used files are deleted
+# Total size [bytes] of the cache above which the least recently used files are deleted
 MAX_FOLDER_BYTES = 512 * 2**20
-# Source files from which a result is computed; their text is hashed into its key.
+# Source files that determine the matrices of the reference cells; their text is hashed into the
+# cache key
 REFERENCE_SOURCE_FILES = ("plane_form.py",)
+# Source files that determine the compliance of every piece
 COMMON_SOURCE_FILES = ("elasticity.py", "plane_form.py", "lapack.py")
+# Source files that determine the compliance of a piece on a tensor grid
 GRID_SOURCE_FILES = (*COMMON_SOURCE_FILES, "tensor_stiffness.py", "condense.py", "grid_fronts.py")
+# Source files that determine the compliance of a piece on an unstructured mesh
 MESH_SOURCE_FILES = (*COMMON_SOURCE_FILES, "dissect.py", "fronts.py", "substructure.py")
 
 
@@ -140,4 +144,4 @@ def _delete_oldest_files() -> None:
             total -= path.stat().st_size
             path.unlink(missing_ok=True)
     except OSError:
-        return  # another process has deleted a file at the same time
+        return  # another process may have deleted a file in the meantime

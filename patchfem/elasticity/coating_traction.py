@@ -51,7 +51,7 @@ def compute_coating_traction(cells: Cells, u) -> CoatingTraction | None:
     position = np.empty(len(cells.points), np.int64)
     position[nodes] = np.arange(nodes.size)
     along_x, inward = (cells.points[edges[:, 1]] - cells.points[edges[:, 0]]).T
-    # each normal points into the substrate and has the length of its edge
+    # Each normal points into the substrate and has the length of its edge.
     edge_normals = np.stack([inward, -along_x], axis=1)
     edge_lengths = np.hypot(*edge_normals.T)
     across = np.zeros((nodes.size, 2))
@@ -113,7 +113,7 @@ def _nodal_forces(coating: Cells, gauss_points: list, u) -> np.ndarray:
         is_coating = np.ones(points.weight.shape[1], bool)
         xx, yy, _, xy = np.moveaxis(hooke(points.strain(u), is_coating, coating.layers), -1, 0)
         tensor = np.array([[xx, xy], [xy, yy]]) * points.weight
-        # stress tensor with its second axis along the local coordinates
+        # The second axis of the stress tensor is along the local coordinates.
         local = np.einsum("ijgc,jkgc->gkic", tensor, points.inverse_jacobian)
         force = np.tensordot(points.element.gradient, local, axes=([0, 1], [0, 1]))
         np.add.at(out, points.corners, force.swapaxes(1, 2))

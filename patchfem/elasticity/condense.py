@@ -17,20 +17,22 @@ import numpy as np
 
 from ..core import NotConverged
 from .grid_fronts import GridFactor, eliminate_inner_nodes
-from .lapack import cho_inverse, dpotrf, dtrsm, one_thread
+from .lapack import cho_inverse, dpotrf, dtrsm, use_one_blas_thread
 from .tensor_stiffness import apply_stencil
 
-# Ratio of the residual to the largest load above which a solution is refined once.
+# Largest residual of a solution, relative to the largest load, that is not refined
 RESIDUAL_TOL = 1e-8
-# Relative change of the displacements by one step of refinement above which factors are refused.
+# Largest relative change of the displacements by one step of refinement; factors with a larger
+# change are rejected
 MAX_REFINEMENT_CHANGE = 1e-2
-# In even motion the displacement along x changes sign at the mirror plane, the inward one does not.
+# Signs of the two displacement components at mirrored nodes in even motion: that along x is
+# reversed, the inward one is not
 MIRROR_SIGNS = np.array([-1.0, 1.0])
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class KeptNodeFactor:
-    """Cholesky factor of the stiffness of the kept nodes, for even or for odd motion if the grid is mirrored.
+    """Cholesky factor of the stiffness of the retained nodes; of a mirrored grid, for symmetric or antisymmetric motion.
 
     - ``unknowns``: (k,) kept unknowns that can move, those of the interface last
     - ``lower_factor``: (k, k) lower Cholesky factor
@@ -46,7 +48,7 @@ class KeptNodeFactor:
         return cho_inverse(self.lower_factor[-self.n_interface :, -self.n_interface :])
 
     def solve(self, load) -> np.ndarray:
-        """Return the displacements (n, 2, r) of the kept nodes under loads of the same shape."""
+        """Return the displacements (n, 2, r) of the retained nodes under loads of the same shape."""
         out = np.zeros_like(load).reshape(-1, load.shape[-1])
         half_solved = dtrsm(1.0, self.lower_factor, load.reshape(out.shape)[self.unknowns], lower=1)
         out[self.unknowns] = dtrsm(1.0, self.lower_factor, half_solved, lower=1, trans_a=1)
@@ -79,12 +81,12 @@ class CondensedGrid:
         (2 nx, 2 nx) ndarray [m2/N]
             Symmetric; node by node along x and inward.
         """
-        with one_thread():
+        with use_one_blas_thread():
             parts = [factor.compliance() for factor in self.kept_factors]
         return self._join_halves(*parts) if self.is_mirrored else parts[0]
 
     def _join_halves(self, even, odd) -> np.ndarray:
-        """Combine the compliances of even and odd motion to that of the full interface.
+        """Combine the compliances of symmetric and antisymmetric motion to that of the full interface.
 
         A force on the right half is the sum of an even and an odd pair of forces, each of half its
         size. The displacements on the left are the mirror images of those on the right, with the
@@ -94,8 +96,8 @@ class CondensedGrid:
         right = np.arange(2 * (columns // 2), 2 * columns)
         halves = np.zeros((2, right.size, right.size))
         for half, factor, compliance in zip(halves, self.kept_factors, (even, odd)):
-            # the first interface node and the other ones are numbered before and after the kept
-            # column, whose unknowns are skipped to number the interface alone
+            # The first interface node is numbered before the kept column and the other ones after
+            # it. The unknowns of the column are skipped to number the interface alone.
             unknowns = factor.unknowns[-factor.n_interface :]
             position = np.where(unknowns < 2, unknowns, unknowns - 2 * (rows - 1))
             half[np.ix_(position, position)] = compliance / 2
@@ -135,7 +137,7 @@ class CondensedGrid:
 
         has_inner_loads: whether forces act below the interface.
         """
-        with one_thread():
+        with use_one_blas_thread():
             if not self.is_mirrored:
                 return self._solve_part(load, has_inner_loads)
             columns = load.shape[0]
@@ -154,7 +156,7 @@ class CondensedGrid:
             return np.concatenate([left[: columns - half], even + odd])
 
     def _solve_part(self, load, has_inner_loads: bool) -> np.ndarray:
-        """Solve one part of a grid; the loads of even motion precede those of odd motion."""
+        """Solve one part of a grid; the loads of symmetric motion precede those of antisymmetric motion."""
         nodes = load.reshape(-1, *load.shape[2:])
         nodes = self.inner_factor.forward(nodes) if has_inner_loads else nodes.copy()
         ring = self.inner_factor.ring
@@ -188,7 +190,7 @@ def condense(stencil, is_mirrored: bool) -> CondensedGrid:
     """
     columns = stencil.shape[0]
     is_mirrored = is_mirrored and columns > 3
-    with one_thread():
+    with use_one_blas_thread():
         if is_mirrored:
             half = stencil[columns // 2 :]
             if columns % 2:
@@ -210,7 +212,7 @@ def condense(stencil, is_mirrored: bool) -> CondensedGrid:
 
 
 def _factorise_motion(stencil, inside: GridFactor, *, is_odd: bool) -> KeptNodeFactor:
-    """Factorise the stiffness of the kept nodes of the right half in even or in odd motion.
+    """Factorise the stiffness of the retained nodes of the right half for symmetric or antisymmetric motion.
 
     If a column of nodes lies in the middle, it does not move along x in even motion, nor inward in
     odd motion. Otherwise the middle runs through a column of cells, and the left neighbour of each
@@ -218,7 +220,7 @@ def _factorise_motion(stencil, inside: GridFactor, *, is_odd: bool) -> KeptNodeF
     """
     columns, rows = stencil.shape[:2]
     n_kept = inside.schur.shape[0]
-    # the kept nodes are numbered down the first column, whose first node is on the interface
+    # The kept nodes are numbered down the first column, whose first node is on the interface.
     column = np.arange(2, 2 * rows)
     interface = np.concatenate([[0, 1], np.arange(2 * rows, n_kept)])
     unknowns = np.concatenate([column, interface])
@@ -246,7 +248,7 @@ def _factorise(matrix, unknowns, n_interface: int) -> KeptNodeFactor:
 
 
 def irregular_load(size: int) -> np.ndarray:
-    """Return a quasi-random load (size,) with which the factors are checked.
+    """Return a quasi-random load (size,) for the check of the factors.
 
     The fractional parts of k^2 (sqrt(5) - 1)/2 are equidistributed (Weyl, Math. Ann. 77, 1916,
     313). Importing numpy.random would take 20 ms.

@@ -10,8 +10,10 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components, dijkstra, maximum_bipartite_matching
 
-MAX_LEAF_NODES = 48  # parts of more nodes are cut again
-N_LANDMARKS = 4  # nodes whose distances serve as coordinates; four separate a graph well
+MAX_LEAF_NODES = 48  # largest number of nodes in a part that is not divided further
+# Number of nodes whose graph distances serve as coordinates; four separate the nodes of a graph
+# well
+N_LANDMARKS = 4
 
 
 def graph_coordinates(graph) -> np.ndarray:
@@ -67,7 +69,7 @@ def dissect_nodes(points, pairs) -> tuple[np.ndarray, np.ndarray]:
     n_nodes = len(points)
     if not n_nodes:
         return np.empty(0, np.int64), np.zeros(1, np.int64)
-    # each level adds a digit of base 3: 0 and 1 for the halves, 2 for the cut
+    # Each level adds a digit of base 3: 0 and 1 for the halves, 2 for the cut.
     key = np.zeros(n_nodes, np.int64)
     nodes = np.arange(n_nodes)
     sorted_nodes = np.argsort(points, axis=0, kind="stable").T.copy()
@@ -101,7 +103,7 @@ def _split_parts(sorted_nodes, pairs, part_of_node) -> np.ndarray:
     sizes = np.bincount(part_of_node[part_of_node >= 0])
     sides = np.zeros((len(sorted_nodes), part_of_node.size), np.int64)
     n_severed = np.empty((len(sorted_nodes), sizes.size), np.int64)
-    # NumPy sorts 16-bit integers by radix sort, which is faster than its sort of longer integers
+    # NumPy sorts 16-bit integers by radix sort, which is faster than its sort of longer integers.
     short_int = np.uint16 if sizes.size < 2**16 else np.int64
     for side, severed, nodes in zip(sides, n_severed, sorted_nodes):
         nodes = nodes[part_of_node[nodes] >= 0]
@@ -139,7 +141,7 @@ def minimum_vertex_cover(pairs, side) -> np.ndarray:
     right, right_end = np.unique(pairs[:, 1], return_inverse=True)
     ones = np.ones(left_end.size, np.int8)
     graph = csr_matrix((ones, (left_end, right_end)), shape=(left.size, right.size))
-    mate = maximum_bipartite_matching(graph, perm_type="column")  # -1 for an unmatched node
+    mate = maximum_bipartite_matching(graph, perm_type="column")  # an unmatched node has -1
     is_matched = mate >= 0
     mate_of_right = np.full(right.size, -1)
     mate_of_right[mate[is_matched]] = np.flatnonzero(is_matched)

@@ -13,7 +13,7 @@ import numpy as np
 from ..core import NotConverged, frozen_array
 from ..formatting import format_length
 from .condense import CondensedGrid, condense
-from .lapack import one_thread
+from .lapack import use_one_blas_thread
 from .tensor_stiffness import tensor_stencil
 
 
@@ -129,7 +129,7 @@ class Piece:
 
 
 def describe_remedy(layers: Layers, min_length: float, size, *, has_coating: bool) -> str:
-    """Return a sentence on what to change if the stiffness of a piece is singular.
+    """Return a sentence that says what to change if the stiffness of a piece is singular.
 
     Parameters
     ----------
@@ -289,7 +289,7 @@ def interface_compliance(piece) -> InterfaceCompliance:
     NotConverged
         If the stiffness of the piece cannot be factorised.
     """
-    with one_thread():
+    with use_one_blas_thread():
         both = piece.factor.compliance()
     along = slice(0, None, 2)
     inward = slice(1, None, 2)

@@ -20,9 +20,12 @@ from ..core import NotConverged
 from .dissect import dissect_nodes, graph_coordinates
 from .lapack import cho_inverse
 
-UNKNOWNS_PER_NODE = 2  # unknowns of a node, which follow one another
-MIN_SLICED_NODES = 40  # updates of fewer nodes are added by one indexed assignment
-# mean length [nodes] of runs of consecutive node numbers, below which an update is added column by column
+UNKNOWNS_PER_NODE = 2  # number of unknowns of a node, which are consecutive
+# Smallest number of nodes of an update that is added by runs of consecutive nodes; a smaller update
+# is added by one indexed assignment
+MIN_SLICED_NODES = 40
+# Mean length [nodes] of runs of consecutive node numbers from which an update is added run by run;
+# with shorter runs it is added column by column
 MIN_MEAN_RUN_LENGTH = 24
 
 
@@ -82,7 +85,7 @@ class SparseFactor:
 
     def __init__(self, matrix, min_pivot: float = 0.0):
         pattern = csr_matrix(matrix != 0)
-        # rows with the same pattern have the same sum of random numbers
+        # Rows with the same pattern have the same sum of random numbers.
         numbers = np.random.default_rng(0).integers(2**62, size=matrix.shape[0])
         row_hash = pattern.astype(np.int64) @ numbers
         _, first, node = np.unique(row_hash, return_index=True, return_inverse=True)
@@ -107,7 +110,7 @@ class SparseFactor:
 def factorise(
     matrix: csc_matrix, firsts, per_node: int = UNKNOWNS_PER_NODE, min_pivot: float = 0.0
 ) -> Fronts:
-    """Factorise a symmetric positive definite matrix without reordering its unknowns.
+    """Factorise a symmetric positive definite matrix in the given order of its unknowns.
 
     Parameters
     ----------
@@ -135,7 +138,7 @@ def factorise(
     later_nodes = _find_later_nodes(lower, firsts, per_node)
     n_fronts = len(later_nodes)
     front_of_node = np.repeat(np.arange(n_fronts), np.diff(firsts))
-    position = np.empty(firsts[-1], np.int64)  # of a node within the present front
+    position = np.empty(firsts[-1], np.int64)  # position of a node within the present front
     updates = [[] for _ in range(n_fronts)]
     triangles = []
     lower_blocks = []
@@ -147,7 +150,7 @@ def factorise(
         front = _make_front(lower, start, stop, per_node * nodes.size, position, per_node)
         for rows, update in updates[number]:
             _add_update(front, update, position[rows], per_node)
-        updates[number] = None  # frees the memory
+        updates[number] = None  # the update is no longer needed and its memory is freed
         triangle, fault = dpotrf(front[:own, :own], lower=1)
         size = diagonal[per_node * start : per_node * stop]
         if fault or (np.diag(triangle) ** 2 <= min_pivot * size).any():
@@ -184,7 +187,8 @@ def _add_update(front, update, nodes, per_node: int) -> None:
     """
     unknowns = _list_unknowns(nodes, per_node)
     if nodes.size < MIN_SLICED_NODES:
-        front.T[unknowns[:, None], unknowns] += update.T  # transposed: both are stored by rows
+        # Both are stored by rows, so their transposes are added.
+        front.T[unknowns[:, None], unknowns] += update.T
         return
     cuts = np.flatnonzero(np.diff(nodes) > 1) + 1
     if (cuts.size + 1) * MIN_MEAN_RUN_LENGTH > nodes.size:
@@ -222,7 +226,7 @@ def _find_later_nodes(lower: csc_matrix, firsts, per_node: int) -> list:
         coupled = [rows[pointer[start] : pointer[stop]], *from_updates[number]]
         nodes = np.unique(np.concatenate(coupled))
         later = nodes[np.searchsorted(nodes, stop) :]
-        from_updates[number] = None  # frees the memory
+        from_updates[number] = None  # the update is no longer needed and its memory is freed
         if later.size:
             from_updates[front_of_node[later[0]]].append(later)
         later_nodes.append(later)

@@ -23,10 +23,13 @@ from .. import cost_model
 from ..core import NotConverged
 from .lapack import dgemm, dpotrf, dtrsm
 
-MAX_LEAF_CELLS = 24  # parts of more cells are halved
-LEAVES_PER_CHUNK = 256  # the index arrays of this number of leaves fit into the cache of a core
-ENTRIES_PER_NODE = 36  # numbers in the stencil of one node: 3 x 3 neighbours, 2 x 2 directions
-BYTES_PER_NUMBER = 8
+MAX_LEAF_CELLS = 24  # largest number of cells in a part that is not halved further
+# Number of leaves that are assembled together; their index arrays fit into the cache of a processor
+# core
+LEAVES_PER_CHUNK = 256
+# Number of entries in the stencil of one node: 3 x 3 neighbours, 2 x 2 directions
+ENTRIES_PER_NODE = 36
+BYTES_PER_NUMBER = 8  # size [bytes] of a double-precision number
 
 
 class RegionHalf(NamedTuple):
@@ -141,7 +144,7 @@ class StiffnessBlocks(NamedTuple):
     ring_ring: np.ndarray
 
 
-# The kinds (is_own_row, is_own_column) of the stored blocks, in their order.
+# Kinds (is_own_row, is_own_column) of the stored blocks, in the order of storage
 BLOCK_KINDS = ((True, True), (True, False), (False, False))
 
 
@@ -313,10 +316,8 @@ def _add_updates(shape: RegionShape, updates) -> StiffnessBlocks:
             for row, column in product(row_runs, column_runs):
                 rectangle = update[:, row.source, column.source]
                 if half is halves[0]:
-                    block[:, row.target, column.target] = (
-                        # copying the first contribution to a zero block is faster than adding it
-                        rectangle
-                    )
+                    # Copying the first contribution to a zero block is faster than adding it.
+                    block[:, row.target, column.target] = rectangle
                 else:
                     block[:, row.target, column.target] += rectangle
     return blocks
@@ -335,7 +336,8 @@ def _eliminate_inner_unknowns(blocks: StiffnessBlocks) -> None:
             raise NotConverged("the stiffness of the piece is not positive definite")
         side = own_ring.T
         dtrsm(1.0, own_own.T, side, side=1, lower=1, trans_a=1, overwrite_b=1)
-        # the product is subtracted in place: a temporary array would cost as much as the product
+        # The product is subtracted in place, because a temporary array would cost as much as the
+        # product.
         dgemm(-1.0, side, side, beta=1.0, c=ring_ring.T, trans_b=1, overwrite_c=1)
 
 
@@ -356,7 +358,7 @@ class FactorStack:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class GridFactor:
-    """Factors of the eliminated nodes of a grid, and the stiffness of the kept ones.
+    """Factors of the eliminated nodes of a grid, and the stiffness of the retained ones.
 
     - ``stacks``: in the order of elimination
     - ``ring``: (b,) numbers column * rows + row of the kept nodes
@@ -397,7 +399,7 @@ class GridFactor:
         return out
 
     def backward(self, values, *, has_inner_loads: bool) -> np.ndarray:
-        """Compute the displacements of all nodes from those of the kept ones (back substitution).
+        """Compute the displacements of all nodes from those of the retained ones (back substitution).
 
         Parameters
         ----------
@@ -459,7 +461,7 @@ def _dissect_levels(root: RegionShape) -> list[dict[RegionShape, LevelParts]]:
 
 
 def eliminate_inner_nodes(stencil, *, keep_left: bool = False) -> GridFactor:
-    """Eliminate all nodes of a grid but its first row and, on request, its first column.
+    """Eliminate all nodes of a grid except its first row and, on request, its first column.
 
     Parameters
     ----------
@@ -598,7 +600,8 @@ def predict_work(nx: int, ny: int, is_mirrored: bool) -> WorkEstimate:
                 below[half.shape] += parts
         max_updates = max(max_updates, updates)
         level = below
-    # a mirrored piece has two kinds of motion, whose kept stiffness is factorised and inverted
+    # A mirror-symmetric piece moves symmetrically or antisymmetrically; the condensed stiffness of
+    # each motion is factorised and inverted.
     kinds = 2 if is_halved else 1
     kept = 2 * (columns + (ny - 2 if is_halved else 0))
     operations += kinds * (kept**3 / 3 + 2 * (2 * columns) ** 3 / 3)

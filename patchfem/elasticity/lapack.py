@@ -1,4 +1,4 @@
-"""Functions of BLAS and LAPACK from SciPy without the import of scipy.linalg.
+"""Functions of BLAS and LAPACK from SciPy, loaded without the import of scipy.linalg.
 
 Importing scipy.linalg loads much of NumPy and SciPy that no run needs and takes 0.15 to 0.2 s, 15
 times as long as its two compiled modules. These need NumPy alone, so they are loaded from their
@@ -22,7 +22,7 @@ __all__ = [
     "dpotrs",
     "dtrsm",
     "dtrtri",
-    "one_thread",
+    "use_one_blas_thread",
 ]
 
 
@@ -34,7 +34,7 @@ def _load_compiled(name: str):
         module = module_from_spec(spec)
         spec.loader.exec_module(module)
         return module
-    # the file does not exist, or the package has to find its shared libraries first
+    # The file may be missing, or the package may have to find its shared libraries first.
     except (ImportError, AttributeError, OSError):
         return import_module(f"scipy.linalg.{name}")
 
@@ -81,6 +81,6 @@ def _thread_pools():
     return ThreadpoolController()
 
 
-def one_thread():
+def use_one_blas_thread():
     """Return a context in which BLAS uses a single thread."""
     return _thread_pools().limit(limits=1, user_api="blas")

@@ -32,13 +32,16 @@ from ..formatting import format_length
 from ..mesh.grading import LENGTH_TOL, tributary_lengths
 from .elasticity import InterfaceCompliance
 
-# Ratio of compliances above which the pressure is defined on the nodes of the softer piece, even if
-# these are finer.
+# Largest ratio of compliances for which the pressure is defined on the nodes of the stiffer piece;
+# beyond it, the nodes of the softer piece are used even if they are finer
 MAX_SOFTNESS_RATIO = 20.0
-# Half width of the contact to which `estimate_ripples` refers, in cells of the coarser piece.
+# Half width of the contact for which `estimate_ripples` holds, in cells of the coarser piece
 N_REFERENCE_CELLS = 16
-MAX_RIPPLE = 1e-2  # ratio of expected ripple to peak pressure above which other grids are tried
-MIN_REFUSED_RIPPLE = 0.1  # expected ripple of the best grid above which the pair is refused
+# Largest ratio of the expected ripple to the peak pressure for which no other grids are tried
+MAX_RIPPLE = 1e-2
+# Smallest expected ripple of the best grid, relative to the peak pressure, for which the pair is
+# rejected
+MIN_REFUSED_RIPPLE = 0.1
 
 
 class PieceInterface(NamedTuple):
@@ -60,7 +63,7 @@ class Grids(NamedTuple):
     both: np.ndarray
 
     def name_common_grid(self) -> str:
-        """Return "lower" or "upper" if the common grid has just the nodes of that piece, else "both"."""
+        """Return "lower" or "upper" if the common grid consists of the nodes of that piece, else "both"."""
         for side in ("lower", "upper"):
             x = getattr(self, side)
             if x.size == self.both.size and np.abs(x - self.both).max() <= LENGTH_TOL * np.ptp(x):
@@ -123,8 +126,8 @@ def join_pieces(lower: PieceInterface, upper: PieceInterface) -> Mortar:
     if best.ripple > MAX_RIPPLE:
         others = [side for side in ("lower", "upper") if side != best.side]
         candidates = [best, *(join_on_grid(grids, side, lower, upper) for side in others)]
-        # pressure ripples are compared to three digits, because round-off must not decide: the same
-        # grid has to follow if lower and upper piece are exchanged
+        # Ripples are compared to three digits, so that round-off does not change the choice of the
+        # grid when the pieces are exchanged.
         best = min(candidates, key=lambda joined: (float(f"{joined.ripple:.2e}"), tuple(joined.x)))
     if best.ripple > MIN_REFUSED_RIPPLE:
         raise PatchfemError(
@@ -191,7 +194,8 @@ def transfer_matrix(x, piece_x) -> csr_array:
     columns = []
     integrals = []
     for i, j in np.ndindex(2, 2):
-        # integral of the product of two linear functions, from their values at both ends
+        # This is the integral of the product of two linear functions, from their values at both
+        # ends.
         by_left = dual_left[i] * (2 * piece_left[j] + piece_right[j])
         by_right = dual_right[i] * (piece_left[j] + 2 * piece_right[j])
         rows.append(cell + i)

@@ -13,10 +13,11 @@ import numpy as np
 from ..core import frozen_array
 from ..mesh.nodal_averages import Patches, collect_patches
 from .elasticity import Layers, Piece, hooke
-from .lapack import one_thread
+from .lapack import use_one_blas_thread
 from .reference_cells import ElementValues, element_values
 
-# A patch whose correlations of (1, x, y) have a smaller determinant takes in the cells around it.
+# Smallest determinant of the correlations of (1, x, y) for which a patch determines a plane; a
+# patch with a smaller one is extended by the neighbouring cells
 MIN_PLANE_DETERMINANT = 0.1
 
 
@@ -97,8 +98,8 @@ def _local_slopes(element: ElementValues, corners, values) -> np.ndarray:
 
 def _combine_corners(factors, values) -> np.ndarray:
     """Return the products (..., c) of factors (..., n) with values (n, ..., c) at the corners."""
-    # several BLAS threads only wait for each other in products with so few rows
-    with one_thread():
+    # Several BLAS threads only wait for each other in products with so few rows.
+    with use_one_blas_thread():
         return np.tensordot(factors, values, axes=1)
 
 
@@ -197,9 +198,8 @@ def fit_recovery(cells: Cells) -> Recovery:
     if is_thin.any():
         thin = np.flatnonzero(is_thin)
         own = near.select(thin)
-        touched = collect_patches(near.cells, near.point_of_entry).select(
-            own.cells
-        )  # points near these cells
+        # These are the points whose patches contain the cells of the thin patches.
+        touched = collect_patches(near.cells, near.point_of_entry).select(own.cells)
         beyond = near.select(touched.cells)
         widened = collect_patches(
             own.point_of_entry[touched.point_of_entry][beyond.point_of_entry], beyond.cells
@@ -236,7 +236,7 @@ def _fit_planes(near: Patches, points, centres) -> tuple[Patches, np.ndarray]:
     mean = gram[:, 0, 1:] / counts[:, None]
     deviation = offset - mean[row]
     spread = np.add.reduceat(deviation[:, :, None] * deviation[:, None], starts)
-    # cells in one line determine no slope across it, which the pseudo-inverse sets to zero
+    # Cells in one line determine no slope across it; the pseudo-inverse sets this slope to zero.
     inverse = np.linalg.pinv(spread, rcond=1e-8, hermitian=True)
     slope = np.einsum("sij,sj->si", inverse, -mean)
     weights = 1 / counts[row] + np.einsum("ni,ni->n", deviation, slope[row])

@@ -54,7 +54,7 @@ def element_values(n_corners: int, kind: str) -> ElementValues:
 @cache
 def _load_arrays() -> dict[str, np.ndarray]:
     """Return the shape functions on the reference cells, from the disk cache if possible."""
-    # Lame constant, term A, B or C, two corners, two directions
+    # The axes are the Lame constant, the term A, B or C, two corners and two directions.
     shapes = {"rectangle_terms": (2, 3, 4, 4, 2, 2)}
     for n_corners, name in CELL_NAMES.items():
         for kind, n_points in (("gauss", n_corners), ("centre", 1)):

@@ -18,7 +18,7 @@ from .condense import estimate_round_off, irregular_load
 from .dissect import dissect_nodes
 from .elasticity import Layers, describe_remedy
 from .fronts import Fronts, factorise
-from .lapack import one_thread
+from .lapack import use_one_blas_thread
 from .plane_form import plane_elasticity
 
 
@@ -59,7 +59,7 @@ class Substructure:
         n_interface, _, frames = load.shape
         whole = np.zeros((self.order.size, 2, frames))
         whole[-n_interface:] = load
-        with one_thread():
+        with use_one_blas_thread():
             u = self.factor.solve(whole.reshape(-1, frames)).reshape(whole.shape)
         out = np.zeros((frames, len(self.mesh.points), 2))
         out[:, self.order] = np.moveaxis(u, 2, 0)
@@ -71,7 +71,7 @@ class Substructure:
             order, firsts = elimination_order(self.mesh)
             stiffness = assemble_stiffness(self.mesh, self.layers, order)
             try:
-                with one_thread():
+                with use_one_blas_thread():
                     factor = factorise(stiffness, firsts)
                     load = irregular_load(stiffness.shape[0])[:, None]
                     u = factor.solve(load)

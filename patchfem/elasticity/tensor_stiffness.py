@@ -12,10 +12,10 @@ not exist. rows: the free ones; the last row of nodes is fixed.
 
 import numpy as np
 
-from .lapack import one_thread
+from .lapack import use_one_blas_thread
 from .reference_cells import rectangle_terms
 
-# Corners (column, row) of a cell, in the order of scikit-fem.
+# Corners (column, row) of a cell, in the order of scikit-fem
 CORNER_POSITIONS = ((0, 0), (1, 0), (1, 1), (0, 1))
 
 
@@ -35,7 +35,8 @@ def tensor_stencil(x, depth, lam, mu) -> np.ndarray:
     """
     widths = np.diff(x)
     heights = np.diff(depth)
-    # the terms r A, B and C / r of a cell are products of a factor of its column and one of its row
+    # The terms r A, B and C / r of a cell are products of a factor of its column and a factor of
+    # its row.
     column_factors = np.stack([1 / widths, np.ones_like(widths), widths], axis=1)
     materials = np.array([lam, mu], float)
     row_terms = np.einsum("lr,ltabij->trabij", materials, rectangle_terms())
@@ -44,8 +45,9 @@ def tensor_stencil(x, depth, lam, mu) -> np.ndarray:
     n_columns = widths.size
     n_rows = heights.size
     stencil = np.zeros((n_columns + 1, n_rows, 9, 4))
-    # these products of matrices with three columns are so small that several BLAS threads only wait for each other
-    with one_thread():
+    # These products of matrices with three columns are so small that several BLAS threads only wait
+    # for each other.
+    with use_one_blas_thread():
         for a, b in np.ndindex(4, 4):
             column, row = CORNER_POSITIONS[a]
             other_column, other_row = CORNER_POSITIONS[b]
@@ -55,9 +57,8 @@ def tensor_stencil(x, depth, lam, mu) -> np.ndarray:
             couplings = (column_factors @ terms).reshape(n_columns, n_free, 4)
             stencil[column : column + n_columns, row:, neighbour] += couplings
     stencil = stencil.reshape(n_columns + 1, n_rows, 3, 3, 2, 2)
-    stencil[:, -1, :, 2] = (
-        0.0  # nodes of the fixed row do not move, so that their couplings are dropped
-    )
+    # Nodes of the fixed row do not move, so their couplings are dropped.
+    stencil[:, -1, :, 2] = 0.0
     return stencil
 
 

@@ -12,7 +12,7 @@ In: sizes and layers, or a file with tagged cells and edges. Out: a `TensorGrid`
 - `nodal_averages` adds up values over the cells around a node.
 """
 
-# names that other folders use, by module
+# Names that other folders use, by module
 PUBLIC = {
     "anymesh": (
         "PieceMesh",
@@ -40,7 +40,7 @@ PUBLIC = {
     ),
     "recognise": (
         "find_holes",
-        "measure_fixed_length",
+        "measure_clamped_length",
     ),
     "shaped": ("shaped_grid",),
     "tensor": (

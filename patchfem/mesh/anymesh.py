@@ -14,15 +14,18 @@ from scipy.spatial import cKDTree
 from ..core import PatchfemError, frozen_array
 from .grading import LENGTH_TOL, tributary_lengths
 
-# Slope of a rounded edge at which the normal and the vertical gap differ by half a percent.
+# Largest slope of a rounded edge within the interface; the normal and the vertical gap then differ
+# by half a percent
 MAX_SLOPE = 0.1
+# Tags of the cells of a pair
 CELL_TAGS = ("upper_substrate", "upper_coating", "lower_substrate", "lower_coating")
+# Tags of the edges of a pair
 EDGE_TAGS = ("upper_interface", "lower_interface", "upper_far", "lower_far")
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class TaggedMesh:
-    """Mesh with named groups of cells and edges, as its file contains it.
+    """Mesh with named groups of cells and edges, as read from a file.
 
     - ``points``: (N, 2) or (N, 3) [m]
     - ``triangles``: (t, 3), ``quads``: (q, 4) node numbers
@@ -95,7 +98,7 @@ class PieceMesh:
 
     @property
     def coating_thickness(self) -> float:
-        """Mean thickness of the coating [m], area over extent along x; 0 without a coating."""
+        """Mean thickness of the coating [m], area over extent along x; 0 if there is no coating."""
         if not self.is_coating.any():
             return 0.0
         n_triangles = len(self.triangles)
@@ -143,7 +146,7 @@ class PieceMesh:
         interface[::2] = self.interface
         interface_pairs = np.stack([self.interface[:-1], self.interface[1:]], axis=1)
         interface_pairs.sort(axis=1)
-        key = pairs[:, 0] * n_points + pairs[:, 1]  # ascending, because the pairs are sorted
+        key = pairs[:, 0] * n_points + pairs[:, 1]  # the keys ascend, because the pairs are sorted
         wanted = interface_pairs[:, 0] * n_points + interface_pairs[:, 1]
         interface[1::2] = np.searchsorted(key, wanted) + n_points
         is_fixed = np.isin(pairs, self.far).all(axis=1) & (n_cells == 1)
@@ -337,8 +340,8 @@ def _build_piece(mesh: TaggedMesh, side: str, is_cell, used, source) -> PieceMes
 
 
 def _signed_areas(corners) -> np.ndarray:
-    """Return the areas (c,) of cells by their corners (c, n, 2), > 0 if counterclockwise."""
-    # coordinates relative to a corner of the cell lose no digits if the origin is far away
+    """Return the areas (c,) of cells with corners (c, n, 2), > 0 if counterclockwise."""
+    # Coordinates relative to a corner of the cell lose no digits if the origin is far away.
     own = corners[:, :1]
     a = corners - own
     b = np.roll(corners, -1, axis=1) - own

@@ -20,8 +20,8 @@ PLANE_ELEMENT = re.compile(
 )
 LINE_ELEMENT = re.compile(r"(?:T2D2|T3D2|B21|B31|R2D2|RAX2|SAX1)H?$")
 UNSUPPORTED_KEYWORDS = ("INCLUDE", "SYSTEM", "NGEN", "NFILL", "ELGEN", "NCOPY", "ELCOPY")
-# Largest ratio of the members of a set to the number of nodes and elements. A set may repeat the
-# members of other sets, so a short deck could otherwise name any number of members.
+# Largest ratio of the members of a set to the number of nodes and elements; since a set may repeat
+# members of other sets, a short deck could otherwise name any number of members
 MAX_SET_SIZE_RATIO = 4
 
 
@@ -169,7 +169,7 @@ def read_deck(text: str) -> TaggedMesh:
 
 
 def _split_blocks(text: str):
-    """Yield the keyword blocks of a deck, without comments and empty lines."""
+    """Yield the keyword blocks of a deck; comments and empty lines are skipped."""
     block = DeckBlock("", {}, [])
     for line in text.splitlines():
         if not line.strip() or line.startswith("**"):

@@ -5,9 +5,10 @@ from math import hypot, sqrt
 
 import numpy as np
 
-# Slope up to which the face of a rounded end belongs to the interface, as on pieces of a mesh file.
+# Largest slope at which the face of a rounded end belongs to the interface, as on pieces of a mesh
+# file
 MAX_INTERFACE_SLOPE = 0.097
-# At this slope (60 degrees) a rounded end leaves the circle and continues along its tangent.
+# Slope (60 degrees) at which a rounded end leaves the circle and continues along its tangent
 MAX_CIRCLE_SLOPE = sqrt(3)
 
 
@@ -36,7 +37,7 @@ class End:
         return half_flat_length + self.size * MAX_INTERFACE_SLOPE / hypot(1, MAX_INTERFACE_SLOPE)
 
     def face_depth(self, x, length: float) -> np.ndarray:
-        """Return how far [m] the end face lies below the flat face.
+        """Return the depth [m] of the end face below the flat face.
 
         At the distance s beyond the flat part the circle lies R - sqrt(R^2 - s^2) deep. It is
         followed to 60 degrees, then its tangent: the cells below a vertical face would have an

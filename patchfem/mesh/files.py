@@ -20,10 +20,13 @@ from .decks import read_deck
 from .pairs import join_meshes
 from .recognise import recognise_grids
 
+# Tag numbers of the cells of a pair
 CELL_TAGS = {"upper_substrate": 1, "upper_coating": 2, "lower_substrate": 3, "lower_coating": 4}
+# Tag numbers of the edges of a pair
 EDGE_TAGS = {"upper_interface": 11, "lower_interface": 12, "upper_far": 13, "lower_far": 14}
-MAX_FILE_BYTES = 256 * 2**20  # meshes of two plane pieces are smaller
-# Minimum number of bytes that an entry takes in these sections of a .msh file.
+# Largest size of a mesh file [bytes]; meshes of two plane pieces are smaller
+MAX_FILE_BYTES = 256 * 2**20
+# Smallest size [bytes] of an entry in these sections of a .msh file
 MIN_ENTRY_BYTES = {b"$Nodes": 6, b"$Elements": 4}
 
 
@@ -252,7 +255,7 @@ def _check_node_numbers(path: Path, content: bytes) -> None:
         return
     elements = content.partition(b"$Elements")[2].partition(b"$EndElements")[0]
     for line in elements.splitlines()[2:]:
-        words = line.split()  # number, kind, number of tags, the tags, the nodes
+        words = line.split()  # the fields are number, kind, number of tags, the tags, the nodes
         if len(words) < 4 or not words[2].isdigit():
             continue
         for node in words[3 + int(words[2]) :]:

@@ -7,7 +7,8 @@ import numpy as np
 
 from ..core import frozen_array
 
-LENGTH_TOL = 1e-9  # lengths are equal if they differ by less than this fraction of the interface
+# Largest difference of lengths that count as equal, as a fraction of the interface length
+LENGTH_TOL = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +33,7 @@ class Layout:
         """Return the target cell lengths (k,) [m] at positions (k,) [m]."""
         x = np.asarray(x, float)
         out = np.full(x.shape, self.max_length)
-        # the lengths are computed in place, because there are many bands
+        # The lengths are computed in place, because there may be many bands.
         for low, high, length in self.bands:
             lengths = _distance_from_interval(x, low, high)
             lengths *= self.slope
@@ -80,7 +81,8 @@ def graded_levels(layout: Layout, *, is_even: bool = False, min_cells: int = 1) 
         Both ends included.
     """
     length = layout.stop - layout.start
-    # 1/length changes fast near the bands, so the samples there have geometrically spaced distances
+    # The target length changes fast near the bands, so the samples there have geometrically
+    # increasing distances.
     samples = [np.linspace(layout.start, layout.stop, 2001)]
     for low, high, band_length in layout.bands:
         distances = np.append(0.0, np.geomspace(band_length / 16, max(length, band_length), 400))

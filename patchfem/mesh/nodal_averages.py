@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-# NumPy sums at most this number of terms in their given order; `GroupedPatches` uses the same order.
+# Largest number of terms that NumPy sums in their given order; `GroupedPatches` uses the same order
 MAX_ORDERED_CELLS = 8
 
 

@@ -1,4 +1,4 @@
-"""Two pieces as one list of points and tagged cells, as a mesh file contains them."""
+"""Two pieces as one list of points and tagged cells, as stored in a mesh file."""
 
 from typing import NamedTuple
 
@@ -16,8 +16,8 @@ class CellBlock(NamedTuple):
     names: np.ndarray
 
 
-def as_piece(body) -> PieceMesh:
-    """Return a body as a PieceMesh; the cells of a TensorGrid become quads.
+def convert_to_piece_mesh(body) -> PieceMesh:
+    """Convert a body to a PieceMesh; the cells of a TensorGrid become quads.
 
     The node in a column and a row has the number column * ny + row.
     """
@@ -51,10 +51,13 @@ def join_meshes(lower, upper) -> tuple[np.ndarray, list[CellBlock]]:
     points = []
     pieces = {"triangle": [], "quad": [], "line": []}
     n_points = 0
-    for side, sign, body in (("lower", -1.0, as_piece(lower)), ("upper", 1.0, as_piece(upper))):
+    for side, sign, body in (
+        ("lower", -1.0, convert_to_piece_mesh(lower)),
+        ("upper", 1.0, convert_to_piece_mesh(upper)),
+    ):
         names = np.where(body.is_coating, f"{side}_coating", f"{side}_substrate")
         n_triangles = len(body.triangles)
-        # mirroring at y = 0 makes a cell clockwise, so the order of its corners is reversed
+        # Mirroring at y = 0 makes a cell clockwise, so the order of its corners is reversed.
         corner_order = slice(None, None, -1) if sign < 0 else slice(None)
         pieces["triangle"].append((body.triangles[:, corner_order] + n_points, names[:n_triangles]))
         pieces["quad"].append((body.quads[:, corner_order] + n_points, names[n_triangles:]))

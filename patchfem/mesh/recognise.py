@@ -1,4 +1,4 @@
-"""Shape of an unstructured piece: tensor grid or not, fixed length and holes."""
+"""Shape of an unstructured piece: tensor grid or not, clamped length and holes."""
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -9,9 +9,9 @@ from .anymesh import PairMesh, PieceMesh, cell_edges
 from .grading import LENGTH_TOL
 from .tensor import TensorGrid
 
-# Fraction of the size of the piece; coordinates that differ by less lie on the same grid line.
+# Largest difference of coordinates on the same grid line, as a fraction of the size of the piece
 GRID_LINE_TOL = 1e-7
-# Successive boundary edges that turn by more than 30 degrees belong to different faces.
+# Smallest cosine of the angle (30 degrees) between successive boundary edges of the same face
 MIN_FACE_COSINE = np.cos(np.radians(30.0))
 
 
@@ -79,8 +79,8 @@ def _grid_lines(values, span: float) -> np.ndarray:
     return values[np.append(True, np.diff(values) > GRID_LINE_TOL * span)]
 
 
-def measure_fixed_length(mesh: PieceMesh) -> tuple[float, float]:
-    """Measure the fixed length and the whole length of the far face.
+def measure_clamped_length(mesh: PieceMesh) -> tuple[float, float]:
+    """Measure the clamped length and the whole length of the far face.
 
     The whole face consists of every face of the border, from corner to corner, on which an edge is
     fixed, and of the deepest face. An edge is fixed if both of its ends are.
@@ -139,7 +139,7 @@ def _number_faces(mesh: PieceMesh, border, directions) -> np.ndarray:
 
     A face ends at corners and at the ends of the interface. directions: (b, 2) unit vectors.
     """
-    # the boundary is counterclockwise, so every edge ends where another one begins
+    # The boundary is counterclockwise, so every edge ends where another one begins.
     by_begin = np.argsort(border[:, 0], kind="stable")
     position = np.searchsorted(border[by_begin, 0], border[:, 1])
     following = by_begin[np.minimum(position, len(border) - 1)]

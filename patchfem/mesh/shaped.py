@@ -13,7 +13,7 @@ import numpy as np
 from ..core import frozen_array
 from .anymesh import PieceMesh
 from .ends import End
-from .pairs import as_piece
+from .pairs import convert_to_piece_mesh
 from .tensor import ROW_GROWTH, TensorGrid, graded_rows, merge_levels, split_levels
 
 
@@ -32,7 +32,7 @@ class ShapedGrid(PieceMesh):
 
     @property
     def coating_thickness(self) -> float:
-        """Thickness of the coating [m]; 0 without a coating."""
+        """Thickness of the coating [m]; 0 if there is no coating."""
         return self.inner.coating_thickness
 
     @property
@@ -103,7 +103,7 @@ def _move_columns(inner: TensorGrid, outer, length: float, end: End) -> ShapedGr
     if beyond.size:
         beyond[-1] = length / 2
     x = np.concatenate([-beyond[::-1], inner.x, beyond])
-    grid = as_piece(TensorGrid(x, inner.depth, inner.coating_rows))
+    grid = convert_to_piece_mesh(TensorGrid(x, inner.depth, inner.coating_rows))
     substrate_height = inner.height - inner.coating_thickness
     fraction = np.minimum(1.0, (inner.height - inner.depth) / substrate_height)
     points = grid.points.copy()

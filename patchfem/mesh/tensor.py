@@ -12,11 +12,11 @@ import numpy as np
 from ..core import PatchfemError, frozen_array
 from .grading import tributary_lengths
 
-# Ratio of the heights of successive rows. The relative error of the compliance is 1e-3, and 2e-3 if
-# the ratio is 1.15.
+# Ratio of the heights of successive rows; the relative error of the compliance is 1e-3 (2e-3 for a
+# ratio of 1.15)
 ROW_GROWTH = 1.1
-MIN_COATING_ROWS = 4  # minimum number of rows through a coating
-MIN_SUBSTRATE_ROWS = 3  # minimum number of rows below the coating
+MIN_COATING_ROWS = 4  # smallest number of rows through a coating
+MIN_SUBSTRATE_ROWS = 3  # smallest number of rows below the coating
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -49,7 +49,7 @@ class TensorGrid:
 
     @property
     def coating_thickness(self) -> float:
-        """Thickness of the coating [m]; 0 without a coating."""
+        """Thickness of the coating [m]; 0 if there is no coating."""
         return float(self.depth[self.coating_rows])
 
     @property
@@ -123,7 +123,7 @@ def graded_rows(
     n_rows = max(min_rows, ceil(log(1 + total * (growth - 1) / start) / log(growth) - 1e-9))
     if n_rows * start >= total * (1 - 1e-12):
         return np.full(n_rows, total / n_rows)
-    # the sum is convex in the ratio, so Newton steps from above decrease until round-off
+    # The sum is convex in the ratio, so Newton steps from above decrease until round-off.
     powers = np.arange(n_rows)
     next_ratio = growth * (1 + 1e-6) + 1e-6
     ratio = np.inf
@@ -224,7 +224,7 @@ def graded_grid(
 
 
 def merge_levels(levels) -> np.ndarray:
-    """Return every second grid line, always with the first and the last."""
+    """Return every second grid line, including the first and the last."""
     if levels.size % 2:
         return levels[::2]
     position = np.linspace(0, levels.size - 1, levels.size // 2 + 1)
@@ -243,7 +243,7 @@ def split_levels(levels) -> np.ndarray:
         ratio[-1] = cells[-1] / cells[-2]
     out = np.empty(2 * levels.size - 1)
     out[::2] = levels
-    # a ratio beyond four is a jump of the cell size where two gradings meet; the limit keeps the halves of a cell beside
-    # the jump within a factor of two of each other
+    # A ratio above four is a jump of the cell size where two gradings meet; the limit keeps the
+    # halves of a cell beside the jump within a factor of two of each other.
     out[1::2] = levels[:-1] + cells / (1 + np.sqrt(np.clip(ratio, 0.25, 4.0)))
     return out

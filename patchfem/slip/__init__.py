@@ -9,7 +9,7 @@ the states of both. `mesh_correction` estimates the error of elements that yield
 `shear_modes` first.
 """
 
-# names that other folders use, by module
+# Names that other folders use, by module
 PUBLIC = {
     "fields": (
         "bond_shear_modes",
@@ -25,10 +25,10 @@ PUBLIC = {
         "N_REFERENCE_MODES",
         "N_SHEAR_MODES",
         "comparison_mode_count",
-        "enough_modes",
-        "fewest_gauss_points",
+        "find_sufficient_modes",
+        "find_fewest_gauss_points",
         "jenkins_set",
-        "modes_on_gauss",
+        "modes_at_gauss_points",
         "scale_limits",
     ),
 }

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..friction.bonds.parameters import Bonds
-from .shear_modes import N_SHEAR_MODES, enough_modes, fewest_modes, shear_modes
+from .shear_modes import N_SHEAR_MODES, find_fewest_modes, find_sufficient_modes, shear_modes
 
 
 class ShearFields(NamedTuple):
@@ -102,7 +102,7 @@ def bond_shear_modes(
     if count is not None:
         return shear_modes(patch.slip_compliance, limit, law.length, count, weakening)
     if fewest:
-        return fewest_modes(patch.slip_compliance, limit, law.length, tolerance, weakening)
-    return enough_modes(
+        return find_fewest_modes(patch.slip_compliance, limit, law.length, tolerance, weakening)
+    return find_sufficient_modes(
         patch.slip_compliance, limit, law.length, N_SHEAR_MODES, tolerance, weakening
     )

@@ -11,14 +11,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-# factor from the change of a measure, when each element is spread over a range of yield displacements, to the error
-# of the measure (tests/README.md)
+# Ratio of the error of a measure to its change when each element is spread over a range of yield
+# displacements (measured in tests/README.md)
 SPREAD_FACTOR = 1.5
 N_ELEMENT_PARTS = 4  # number of parts into which each element but the first is divided
-# number of times that the range of the first element is halved, with N_ELEMENT_PARTS parts per halving; displacements
-# down to 1/256 of this range then cause slip
+# Number of times that the range of the first element is halved, with N_ELEMENT_PARTS parts per
+# halving; displacements down to 1/256 of this range then cause slip
 N_HALVINGS = 8
-# relative difference of yield displacements below which nodes at both ends of a contact count as one
+# Largest relative difference of yield displacements for which nodes at both ends of a contact count
+# as one
 EQUAL_YIELD_TOL = 1e-6
 
 
@@ -55,10 +56,11 @@ def spread_elements(stiffness, yield_displacement) -> SpreadElements:
     width = np.empty(y.size)
     width[1:-1] = np.maximum(distance[1:], distance[:-1])
     width[-1] = distance[-1]
-    # the second element may be at the other end of the contact
+    # The second element may be at the other end of the contact.
     width[0] = 2 * min(y[0], y[min(2, y.size - 1)] - y[0])
     width = np.minimum(width, 2 * y)
-    # the parts of the first element become narrower by a constant ratio towards zero displacement
+    # The widths of the parts of the first element decrease by a constant ratio towards zero
+    # displacement.
     number = np.arange(N_ELEMENT_PARTS * N_HALVINGS + 1)
     borders = np.append(2.0 ** (-number / N_ELEMENT_PARTS), 0.0)
     first_fraction = -np.diff(borders)

@@ -22,39 +22,47 @@ import numpy as np
 
 from ..contact.unilateral import INDEFINITE_MESSAGE
 from ..core import PatchfemError, frozen_array
-from ..elasticity.lapack import dpotrf, dpotrs, dtrsm, dtrtri, one_thread
+from ..elasticity.lapack import dpotrf, dpotrs, dtrsm, dtrtri, use_one_blas_thread
 
-# relative difference of yield displacements below which nodes yield together, as mirrored nodes do; the rounding
-# errors of a patch with 801 nodes are 7e-13
+# Largest relative difference of yield displacements of nodes that yield together, such as mirrored
+# nodes; the rounding errors of a patch with 801 nodes are 7e-13
 EQUAL_YIELD_TOL = 1e-11
-# Number of sorts of the nodes before neighbours are exchanged; sorting corrects large errors only.
+# Largest number of sorts of the nodes before neighbours are exchanged; sorting only corrects large
+# errors
 MAX_SORTING_PASSES = 2
-# exchanges of neighbours per node, after which nodes are eliminated one by one; patches need at most 1
+# Largest number of exchanges of neighbours per node before nodes are eliminated one by one; patches
+# need at most 1
 MAX_EXCHANGES = 20
-# number of modes with which a reduction starts; without a layer of asperities its error is 1e-6 of the friction limit
+# Number of modes with which a reduction starts; without an asperity layer its error is 1e-6 of the
+# friction limit
 N_SHEAR_MODES = 4
 N_REFERENCE_MODES = 16  # smallest number of modes of the reference for an error
-# error of a reduction / tolerance at which it is accepted; the modes beyond the reference cause the rest of the error
+# Largest error of an accepted reduction relative to the tolerance; modes beyond the reference cause
+# the rest of the error
 MODE_ERROR_FRACTION = 0.8
-# Number of nodes from which it is faster to compute the most compliant modes alone.
+# Smallest number of nodes for which it is faster to compute only the most compliant modes
 MIN_LANCZOS_POINTS = 128
-# matrix products of Lanczos' method, with two vectors each; it fails to converge only for a soft layer of asperities
+# Largest number of matrix products of the Lanczos method, with two vectors each; only soft asperity
+# layers need more
 MAX_LANCZOS_PRODUCTS = 24
-# residual of a mode / largest eigenvalue; the relative error of an eigenvalue is the square of this ratio
+# Largest residual of a mode relative to the largest eigenvalue; the relative error of an eigenvalue
+# is the square of this ratio
 MODE_TOL = 1e-6
 GAUSS_POINT_COUNTS = (16, 32, 64)  # numbers of Gauss points that may represent the nodes of a patch
-# bond lengths by which a Newton step may move a node back; the law there is exp(2) times as steep as at rest
+# Largest backward motion of a node in a Newton step, in bond lengths; the law there is exp(2) times
+# as steep as at rest
 MAX_BACKWARD_LENGTHS = 2.0
 N_BACKBONE_DISPLACEMENTS = 24  # number of relative displacements at which backbones are compared
-# largest relative displacement of a compared backbone [bond lengths], to which twice the displacement of the pieces is
-# added; the force there is within exp(-6) of its limit
+# Largest relative displacement of a compared backbone in bond lengths, in addition to twice the
+# displacement of the pieces; the force there is within exp(-6) of its limit
 MAX_BACKBONE_LENGTHS = 6
-# Smallest number of modes with which the backbone error of a reduction is computed.
+# Smallest number of modes for which the backbone error of a reduction is computed
 N_ERROR_MODES = 64
-MAX_ITERATIONS = 400  # iterations of Newton's method for a backbone
-# Relative step of Newton's method; it converges quadratically, so the next step is round-off.
+MAX_ITERATIONS = 400  # largest number of Newton iterations for a backbone
+# Relative step at which Newton's method has converged; because of its quadratic convergence, the
+# next step is round-off
 NEWTON_TOL = 1e-11
-MAX_DECAY_EXPONENT = 700.0  # exponent that keeps the exponential of the law finite
+MAX_DECAY_EXPONENT = 700.0  # largest exponent in the law, which keeps the exponential finite
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +137,7 @@ class Spectrum:
 
     @cached_property
     def complete(self) -> "Spectrum":
-        """Spectrum with all modes."""
+        """Spectrum that contains all modes."""
         if self.tangential is None:
             return self
         return _all_modes(self.tangential, self.points, self.limit, self.length)
@@ -189,7 +197,7 @@ class Spectrum:
         if is_own:
             shape = self.shape[:, :count]
             limit = self.limit
-        with one_thread(), np.errstate(over="ignore", invalid="ignore"):
+        with use_one_blas_thread(), np.errstate(over="ignore", invalid="ignore"):
             backbone = _solve_backbone(
                 limit, shape, self.compliance[:count], self.length, self.displacements, start
             )
@@ -260,7 +268,7 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
     points = np.flatnonzero(limit > 0)
     force = limit[points]
     none = np.zeros(0, np.int64)
-    # rigid pieces in series with one spring slip at all nodes together
+    # Rigid pieces in series with one spring slip at all nodes together.
     if local_length == 0 and np.ptp(tangential) == 0:
         stiffness = 1 / tangential[0, 0]
         return JenkinsSet(
@@ -273,8 +281,9 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
             none,
             0,
         )
-    # one thread: under load from other processes, waiting for a second one turns 5 ms into 270 ms
-    with one_thread():
+    # One thread is used because, on a loaded machine, waiting for a second one turns 5 ms into 270
+    # ms.
+    with use_one_blas_thread():
         c = _submatrix(tangential, points)
         if local_length:
             c = c + np.diag(local_length / force)
@@ -295,7 +304,7 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
 
 
 class _YieldSequence(NamedTuple):
-    """Yield displacements of n nodes if they yield in a given order.
+    """Yield displacements of n nodes that yield in a given order.
 
     - order (n,): indices of the nodes in reverse order of yielding
     - cholesky_factor (n, n): lower Cholesky factor L of the compliance in that order
@@ -410,7 +419,7 @@ def _exchange_neighbours(sequence: _YieldSequence) -> _YieldSequence | None:
         size = np.hypot(factor[k, k], factor[k, k + 1])
         c = float(factor[k, k] / size)
         s = float(factor[k, k + 1] / size)
-        # this sign keeps the diagonal positive
+        # This sign keeps the diagonal positive.
         rotation = np.array([[c, s], [s, -c]])
         factor[k:, both] = factor[k:, both] @ rotation
         factor[k, k + 1] = 0.0
@@ -520,10 +529,10 @@ def _all_modes(tangential, index, limit, length: float) -> Spectrum:
     """Return the Spectrum with all modes of the nodes `index` (a,) with friction limits (a,) [N]."""
     points = frozen_array(index, np.int64)
     if np.ptp(tangential) == 0:
-        # rigid pieces in series with one spring have only one mode
+        # Rigid pieces in series with one spring have only one mode.
         return Spectrum(points, limit, np.ones((index.size, 1)), tangential[:1, 0], length)
     root = np.sqrt(limit)
-    with one_thread():
+    with use_one_blas_thread():
         values, vectors = np.linalg.eigh(root[:, None] * tangential[np.ix_(index, index)] * root)
     return Spectrum(points, limit, vectors[:, ::-1] / root[:, None], values[::-1], length)
 
@@ -541,7 +550,7 @@ def _first_modes(tangential, index, limit, length: float) -> Spectrum | None:
         """Multiply by D^1/2 C D^1/2."""
         return root * (c @ (root * vectors))
 
-    with one_thread():
+    with use_one_blas_thread():
         values, vectors, residual = largest_eigenpairs(
             product, root[:, 0], N_REFERENCE_MODES, MAX_LANCZOS_PRODUCTS
         )
@@ -590,7 +599,7 @@ def largest_eigenpairs(
     basis, images = np.empty((2, len(start), 2 * n_products))
     new = np.stack([start, start * np.linspace(-1, 1, len(start))], axis=1)
     for k in range(0, 2 * n_products, 2):
-        # the orthogonalisation is repeated because rounding errors of the first pass remain
+        # The orthogonalization is repeated because rounding errors of the first pass remain.
         for _ in range(2):
             new = new - basis[:, :k] @ (basis[:, :k].T @ new)
             first = new[:, 0] / np.sqrt(new[:, 0] @ new[:, 0])
@@ -608,7 +617,7 @@ def largest_eigenpairs(
     return EigenPairs(values, vectors, float(np.sqrt(residuals.max())))
 
 
-def enough_modes(
+def find_sufficient_modes(
     tangential: np.ndarray,
     limit: np.ndarray,
     bond_length: float,
@@ -617,9 +626,9 @@ def enough_modes(
     weakening: float = 1.0,
     max_modes: int = 64,
 ) -> ShearModes:
-    """Return modes whose backbone error meets a tolerance.
+    """Return the most compliant modes, in a number for which the backbone error meets a tolerance.
 
-    The number of modes is doubled until it does. The pieces alone need four modes, a soft layer of asperities many.
+    The number of modes is doubled until it suffices. The pieces alone need four modes, a soft layer of asperities many.
 
     Parameters
     ----------
@@ -642,7 +651,7 @@ def enough_modes(
     return modes
 
 
-def fewest_modes(
+def find_fewest_modes(
     tangential: np.ndarray,
     limit: np.ndarray,
     bond_length: float,
@@ -670,7 +679,7 @@ def fewest_modes(
     """
     spectrum = _make_spectrum(tangential, limit, bond_length, weakening, first_modes_only=True)
     for count in range(2, max_modes):
-        # the backbone of a few modes is the initial guess for that of the reference
+        # The backbone of a few modes is the initial guess for that of the reference.
         backbone = spectrum.backbone(count)
         reference = spectrum.backbone(max(N_REFERENCE_MODES, 4 * count))
         error = spectrum.relative_difference(reference, backbone)
@@ -688,7 +697,7 @@ def comparison_mode_count(count: int) -> int:
 
 
 class GaussModes(NamedTuple):
-    """Modes on Gauss points that represent the nodes.
+    """Modes at Gauss points that represent the nodes.
 
     - modes: shear modes, whose `points` are the indices 0 to k - 1 of the Gauss points
     - limit (k,): friction limits [N] of the Gauss points
@@ -700,8 +709,8 @@ class GaussModes(NamedTuple):
     error: float
 
 
-def fewest_gauss_points(modes: ShearModes, x: np.ndarray, tolerance: float) -> GaussModes:
-    """Return the modes at the fewest Gauss points that meet a tolerance.
+def find_fewest_gauss_points(modes: ShearModes, x: np.ndarray, tolerance: float) -> GaussModes:
+    """Return the modes at the smallest number of Gauss points that meets a tolerance.
 
     All nodes are kept if the rule would need more than half as many points. Traction and slip of the nodes cannot be
     recovered from Gauss points.
@@ -721,14 +730,14 @@ def fewest_gauss_points(modes: ShearModes, x: np.ndarray, tolerance: float) -> G
     for count in GAUSS_POINT_COUNTS:
         if 2 * count > x.size:
             break
-        on_gauss = modes_on_gauss(modes, x, count)
+        on_gauss = modes_at_gauss_points(modes, x, count)
         if on_gauss.error <= tolerance:
             return on_gauss
     every_point = frozen_array(np.arange(x.size), np.int64)
     return GaussModes(replace(modes, points=every_point), modes.spectrum.limit, 0.0)
 
 
-def modes_on_gauss(modes: ShearModes, x: np.ndarray, count: int) -> GaussModes:
+def modes_at_gauss_points(modes: ShearModes, x: np.ndarray, count: int) -> GaussModes:
     """Return the modes at `count` Gauss points of the rule weighted by the friction limit.
 
     Parameters
@@ -779,7 +788,7 @@ def gauss_rule(x: np.ndarray, weight: np.ndarray, count: int) -> tuple:
     for _ in range(count):
         new = scaled * basis[-1]
         diagonal.append(new @ basis[-1])
-        # the orthogonalisation is repeated because rounding errors of the first pass remain
+        # The orthogonalization is repeated because rounding errors of the first pass remain.
         for _ in range(2):
             new = new - np.array(basis).T @ (np.array(basis) @ new)
         off_diagonal.append(np.linalg.norm(new))
@@ -820,7 +829,7 @@ def _solve_backbone(limit, shape, compliance, length, displacements, start) -> _
         except np.linalg.LinAlgError:
             return _Backbone(np.full(displacements.size, np.nan), coordinates)
         change = step @ shape.T
-        # fraction of the step that moves no node back by more than the limit
+        # This is the largest fraction of the step that moves no node back by more than the limit.
         backward = np.where(change < 0, -change, 1.0)
         fraction = (xi + MAX_BACKWARD_LENGTHS * length) / backward
         fraction = np.where(change < 0, fraction, 1.0).min(axis=1)

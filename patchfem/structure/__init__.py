@@ -6,7 +6,7 @@ z_i'' + 2 zeta_i w_i z_i' + w_i^2 z_i = G_i + g_i (3.4). Read `matrices` first f
 signals.
 """
 
-# names that other folders use, by module
+# Names that other folders use, by module
 PUBLIC = {
     "arrays": ("read_arrays",),
     "drive_sizes": (

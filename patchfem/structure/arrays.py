@@ -22,7 +22,7 @@ from ..inputs.matlab import read_variables
 from . import masses, matrices
 from .modes import PATCH_MOTIONS
 
-ARRAY_NAMES = (  # arrays that are read from a file
+ARRAY_NAMES = (  # names of the arrays that are read from a file
     "M",
     "K",
     "C",
@@ -37,14 +37,18 @@ ARRAY_NAMES = (  # arrays that are read from a file
     *PATCH_MOTIONS,
     "names",
 )
-MAX_NAME_BYTES = 1024  # bytes of a name; a longer one is not a name
-MAX_NUMBER_BYTES = 16  # bytes of a number, which is at most complex of double precision
-MAX_DIRECTORY_BYTES = 2**20  # bytes of the list of members of a zip file; a longer one is damaged
+MAX_NAME_BYTES = 1024  # largest length of a name [bytes]; longer data are not a name
+# Largest size of a number [bytes], that of a complex number of double precision
+MAX_NUMBER_BYTES = 16
+# Largest size of the list of members of a zip file [bytes]; a file with a longer list is damaged
+MAX_DIRECTORY_BYTES = 2**20
 ZIP_END_SIGNATURE = b"PK\x05\x06"  # signature of the end of the list of members of a zip file
-MAX_ZIP_END_BYTES = 2**16 + 22  # bytes after the list of members: a record and a comment
-# fraction of the largest entry; a more negative eigenvalue is not round-off of a singular D
+# Largest number of bytes after the list of members: a record and a comment
+MAX_ZIP_END_BYTES = 2**16 + 22
+# Most negative eigenvalue of a damping matrix that is accepted as round-off of a singular matrix,
+# relative to the largest entry
 MIN_DAMPING_EIGENVALUE = -1e-9
-MAX_MASS_FRACTION = 1 + 1e-9  # sum of base^2: at most 1, plus round-off of the shapes
+MAX_MASS_FRACTION = 1 + 1e-9  # largest sum of base^2: 1, plus round-off of the shapes
 
 
 def read_arrays(path: Path) -> dict:
@@ -71,7 +75,7 @@ def read_arrays(path: Path) -> dict:
         reason = str(error).removeprefix(f"{path}: ")
         raise PatchfemError(f"structure.file: {path} cannot be read ({reason})") from None
     except Exception as error:
-        # NumPy and zipfile raise errors of many types for a damaged file
+        # NumPy and zipfile raise errors of many types for a damaged file.
         raise PatchfemError(
             f"structure.file: {path} cannot be read ({error}); plain arrays are needed, not objects"
         ) from None
@@ -343,7 +347,7 @@ def _read_names(data: dict, n: int) -> tuple | None:
     """Read the names of n coordinates; None if the file has none."""
     if "names" not in data:
         return None
-    # a cell of a .mat file is an array with one string
+    # A cell of a .mat file is an array with one string.
     texts = [name if isinstance(name, str) else np.ravel(name)[0] for name in data["names"]]
     names = tuple(str(text).strip() for text in texts)
     if len(names) != n or len(set(names)) != n:

@@ -7,7 +7,8 @@ import numpy as np
 from ..core import ModalBasis, PatchfemError, frozen_array
 from .matrices import decouple_modes, split_damping, trim_round_off
 
-# fraction of the largest omega^2; a mode with a smaller omega^2 is rigid
+# Smallest squared frequency of an elastic mode relative to the largest one; a mode with a smaller
+# one is rigid
 MIN_ELASTIC_FRACTION = 1e-12
 PARTICIPATION_FIELDS = (
     "slide",
@@ -18,7 +19,7 @@ PARTICIPATION_FIELDS = (
     "pitch",
     "lateral",
     "yaw",
-)  # fields of a basis that are rows over its coordinates
+)  # fields of a basis whose rows run over its coordinates
 
 
 def add_spring(basis: ModalBasis, stiffness: float, damping: float = 0.0) -> ModalBasis:
@@ -90,7 +91,7 @@ def remove_springs(basis: ModalBasis, stiffness, damping: float = 0.0) -> ModalB
                 "part; lower structure.bonded.damping"
             )
     free = _change_coordinates(basis, np.sqrt(squares), shapes, damper)
-    # a single mode keeps its coordinate, so no shapes are needed
+    # A single mode keeps its coordinate, so no shapes are needed.
     return replace(free, shapes=None) if squares.size == 1 and basis.shapes is None else free
 
 

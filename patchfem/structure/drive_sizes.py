@@ -7,10 +7,14 @@ import numpy as np
 
 from ..core import InitialState, ModalBasis, SineDrive
 
-SAMPLES_PER_CYCLE = 200  # equally spaced samples of a whole release; they resolve 100 harmonics
-MIN_SAMPLES_PER_CYCLE = 20  # with fewer samples only the reversals are stored
-MAX_STORED_SAMPLES = 20_000  # samples of a whole run; more make results files large
-TIME_TOL = 1e-6  # fraction of a period; round-off of times after many cycles
+# Number of equally spaced samples per cycle of a fully recorded release; they resolve 100 harmonics
+SAMPLES_PER_CYCLE = 200
+# Smallest number of samples per cycle; if fewer fit, only the reversals are stored
+MIN_SAMPLES_PER_CYCLE = 20
+# Largest number of samples of a whole run; more samples make results files large
+MAX_STORED_SAMPLES = 20_000
+# Tolerance on times as a fraction of a period; it exceeds the round-off after many cycles
+TIME_TOL = 1e-6
 
 
 class DriveKeys(NamedTuple):
@@ -29,12 +33,12 @@ class DriveKeys(NamedTuple):
 
     @property
     def moving(self) -> bool:
-        """Whether the base accelerates; otherwise a force acts."""
+        """Whether the base accelerates; if not, a force acts."""
         return self.keys.kind == "base"
 
     @property
     def levels(self) -> tuple:
-        """Acceleration, or force per modal mass, of each drive level [m s-2]; () without levels."""
+        """Acceleration, or force per modal mass, of each drive level [m s-2]; () if there are no levels."""
         mass = 1.0 if self.moving else self.mass
         return tuple(level / mass for level in self.keys.levels or ())
 
@@ -52,7 +56,7 @@ class DriveKeys(NamedTuple):
 
 
 def count_cycles_per_level(keys) -> float:
-    """Return the drive cycles per level, an integer, so each level begins at a cycle start."""
+    """Return the number of drive cycles per level, an integer, so that each level begins at a cycle start."""
     cycles = keys.cycles if keys.cycles is not None else keys.duration * keys.frequency
     return float(max(1, round(cycles)))
 
@@ -98,7 +102,7 @@ def find_drive_omega(drive) -> float:
 
 
 def estimate_peak_speed(drive, start: InitialState | None = None) -> float:
-    """Estimate the largest speed [m/s] of a motion from its drive and its start.
+    """Estimate the largest speed [m/s] of a motion from its drive and its initial conditions.
 
     It is the largest of the acceleration over omega, the initial velocities, and the initial
     displacements times omega.
@@ -146,7 +150,7 @@ def has_full_cycle(span: float, drive) -> bool:
 
 
 def is_release(drive) -> bool:
-    """Return whether the motion is a release without any drive."""
+    """Return whether the motion is a release in the absence of a drive."""
     return len(drive.segments) == 1 and find_max_acceleration(drive) == 0
 
 
@@ -176,5 +180,5 @@ def _build_sine(drive: DriveKeys) -> SineDrive:
     return SineDrive(float(drive.acceleration(omega)), float(omega), drive.moving)
 
 
-# only the sine is built here, so a run with a sine does not import the other drives
+# The sine is the only drive of this module, so that a run with a sine does not import the others.
 DRIVE_BUILDERS = {"sine": _build_sine}

@@ -1,4 +1,4 @@
-"""Drives other than the plain sine: steps, levels, releases, sweeps and recorded signals.
+"""Drives except the plain sine: steps, levels, releases, sweeps and recorded signals.
 
 Every drive has these attributes:
 
@@ -28,7 +28,8 @@ import numpy as np
 from ..core import DriveSegment, PatchfemError
 from .drive_sizes import DriveKeys, count_cycles_per_level
 
-# smallest product of the rate and the duration of a sweep, so that a Taylor series covers at most 1/20 of it
+# Smallest product of rate and duration of a sweep; with it, a Taylor series covers at most 1/20 of
+# the sweep
 MIN_TAYLOR_RATE = 40
 
 
@@ -136,7 +137,7 @@ class SweepDrive:
 
     @property
     def segments(self) -> tuple:
-        """Empty, because the response to a sweep has no elementary form."""
+        """Empty, because the response to a sweep has no closed form."""
         return ()
 
     @property
@@ -221,7 +222,7 @@ class RecordedDrive:
 
     @property
     def segments(self) -> tuple:
-        """Empty, because a recorded signal is no sequence of constants and sines."""
+        """Empty, because a recorded signal does not consist of constants and sines."""
         return ()
 
     @property
@@ -245,7 +246,7 @@ class RecordedDrive:
 
     @property
     def max_frequency_ratio(self) -> float:
-        """Ratio 1, because the cycle of a recorded drive is that of the rig."""
+        """Ratio 1, because a recorded drive has the same cycle as the rig."""
         return 1.0
 
     @property
@@ -267,7 +268,7 @@ def _build_levels(drive: DriveKeys) -> PiecewiseDrive:
 def _build_step(drive: DriveKeys) -> PiecewiseDrive:
     """Build the drive with waveform "step"."""
     if drive.moving and drive.keys.acceleration is None:
-        # the jump of the base displacement is included in the initial state
+        # The jump of the base displacement is included in the initial state.
         return make_release(drive.period)
     return make_step(float(drive.acceleration(0.0)), drive.period, moving=drive.moving)
 

@@ -13,16 +13,21 @@ from scipy.linalg import LinAlgError, cholesky, eigh, solve_triangular, svd
 
 from ..core import ModalBasis, PatchfemError, frozen_array
 
-# relative; round-off of an eigenvalue of an n x n matrix is about n times this fraction of the largest eigenvalue
+# Round-off of an eigenvalue of an n x n matrix, divided by n and relative to the largest eigenvalue
 EIGENVALUE_TOL = 16 * np.finfo(float).eps
-ENTRY_TOL = 1e-12  # relative; smaller entries of a projected damping matrix are round-off
-# fraction of the largest entry by which a matrix may differ from its transpose
+# Largest entry of a projected damping matrix that is set to zero as round-off, relative to its
+# scale
+ENTRY_TOL = 1e-12
+# Largest difference of a matrix and its transpose, relative to the largest entry
 MAX_ASYMMETRY = 1e-8
-# fraction of the largest eigenvalue; a more negative one is not round-off of a singular C
+# Most negative eigenvalue of a damping matrix that is accepted as round-off of a singular matrix,
+# relative to the largest eigenvalue
 MIN_DAMPING_EIGENVALUE = -1e-9
-# relative; closer modes count as modes of equal frequency, whose shapes may be rotated
+# Largest relative difference of natural frequencies that count as equal; the shapes of such modes
+# may be rotated
 EQUAL_FREQUENCY_TOL = 1e-11
-# relative motion of the output in a mode; a smaller one is round-off, because the output lies at a node of the mode
+# Smallest relative motion of the output in a mode; a smaller one is round-off, because the output
+# lies at a node of the mode
 MIN_OUTPUT_MOTION = 1e-9
 
 
@@ -198,7 +203,7 @@ def _compute_modes(root, K) -> tuple:
 
 
 def _require_finite(per_mass) -> np.ndarray:
-    """Raise PatchfemError if the stiffness over the mass has overflowed."""
+    """Raise PatchfemError if the stiffness divided by the mass has overflowed."""
     if not np.isfinite(per_mass).all():
         raise PatchfemError(
             "structure: K/M is too large to compute; check that K and M are in SI units"
@@ -235,7 +240,7 @@ def _divide_by_root(root, right, *, transpose: bool = False) -> np.ndarray:
         return solve_triangular(
             root, right, lower=True, trans="T" if transpose else "N", check_finite=False
         )
-    with np.errstate(over="ignore"):  # `_require_finite` raises an error
+    with np.errstate(over="ignore"):  # `_require_finite` raises an error instead
         return right / root[:, None]
 
 

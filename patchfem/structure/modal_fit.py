@@ -19,22 +19,27 @@ from scipy.signal import find_peaks
 from ..core import NotConverged, PatchfemError
 from .places import DIRECTION_NAMES, MeasuredModes
 
-MAX_MODES = 30  # maximum number of modes of one fit
-N_PEAKS_PER_SPECTRUM = 2  # largest peaks of each residual spectrum at which a further mode is tried
-# mean cosine of neighbouring residuals at a peak: 1 for a mode, 0 for noise
+MAX_MODES = 30  # largest number of modes of one fit
+# Number of largest peaks of each residual spectrum at which a further mode is tried
+N_PEAKS_PER_SPECTRUM = 2
+# Smallest mean cosine of neighbouring residuals at a peak of a mode; it is 1 for a mode and 0 for
+# noise
 MIN_RESIDUAL_CORRELATION = 0.5
-N_NEIGHBOURS = 8  # frequencies on each side of a peak or mode over which means are taken
-# ratio of the decrease of the sum of squares by a further mode to that expected in white noise
+N_NEIGHBOURS = 8  # number of frequencies on each side of a peak or mode over which means are taken
+# Smallest decrease of the sum of squares by a further mode, relative to the decrease expected in
+# white noise
 MIN_NOISE_RATIO = 15.0
-# fraction of the residual sum of squares that a further mode must explain
+# Smallest decrease of the residual sum of squares by a further mode, relative to that sum
 MIN_RESIDUAL_DECREASE = 0.02
-MIN_CONTRIBUTION = 1e-3  # fraction of the responses near its frequency that a mode must contribute
-# minimum ratio of the contribution of a mode near its frequency to the residual there
+# Smallest contribution of a mode near its frequency, relative to the responses there
+MIN_CONTRIBUTION = 1e-3
+# Smallest contribution of a mode near its frequency, relative to the residual there
 MIN_RESIDUAL_RATIO = 5.0
-MIN_MISFIT = 1e-9  # relative residual; a smaller one is round-off
-# fraction of the largest residue; a mode with less does not move the driven point
+MIN_MISFIT = 1e-9  # smallest relative residual that is not round-off
+# Smallest residue of a mode at the driven point, relative to its largest residue, for which the
+# mode is kept
 MIN_DRIVEN_RESIDUE = 1e-6
-MAX_MISFIT = 0.5  # relative residual; with more, the fit is refused
+MAX_MISFIT = 0.5  # largest relative residual; a fit with a larger one is rejected
 
 
 class Columns(NamedTuple):
@@ -130,7 +135,7 @@ class ModalFit:
         self.derivative = (1j * omega) ** power[0]
         self.data = data / self.size
         self.level = np.sqrt(np.mean(np.abs(self.data) ** 2, axis=1))
-        # the first guess of the noise is proportional to the response, and never 0
+        # The first guess of the noise is proportional to the response, and never 0.
         self.set_noise(self.level + 1e-3 * self.level.max())
 
     def set_noise(self, noise):
@@ -311,7 +316,7 @@ def add_mode(theta, w: float, zeta: float) -> np.ndarray:
 
 
 def _refine_with_noise(fit: ModalFit, theta, cost):
-    """Refine the parameters to the last digits, with weights from the noise of the responses.
+    """Refine the parameters to round-off, with weights from the noise of the responses.
 
     The variance a^2 + b^2 level^2 of the noise is fitted to the residual.
     """
@@ -321,7 +326,8 @@ def _refine_with_noise(fit: ModalFit, theta, cost):
         square = np.mean(np.abs(fit.complex_residual(theta)) ** 2, axis=1)
         columns = np.stack([np.ones_like(fit.level), fit.level**2], axis=1)
         variance = np.full(square.size, square.mean())
-        # the uncertainty of a squared residual is proportional to the variance that is estimated
+        # The uncertainty of a squared residual is proportional to the variance that is estimated,
+        # so the weights are iterated.
         for _ in range(4):
             parts = nnls(columns / variance[:, None], square / variance)[0]
             variance = np.maximum(columns @ parts, 1e-6 * square.mean())
@@ -441,7 +447,7 @@ def identify_modes(frequency, measured: dict, notes: list) -> MeasuredModes:
     zeta = poles.zeta[is_inside]
     residues = residues[is_inside]
     own = residues[:, driven]
-    # the shape is the residue over the root of the residue at the driven point
+    # The shape is the residue divided by the square root of the residue at the driven point.
     is_scaled = own > MIN_DRIVEN_RESIDUE * np.abs(residues).max(axis=1)
     notes += [
         f"the mode at {w_r / (2 * np.pi):.5g} Hz does not move the driven point "

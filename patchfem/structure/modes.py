@@ -8,7 +8,7 @@ import numpy as np
 
 from ..core import ModalBasis, frozen_array
 
-# motions of the patch in addition to its slide
+# Motions of the patch in addition to its slide
 PATCH_MOTIONS = ("normal", "pitch", "lateral", "yaw")
 
 

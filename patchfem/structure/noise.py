@@ -15,9 +15,10 @@ from ..core import PatchfemError
 from .drive_sizes import DriveKeys
 from .drives import RecordedDrive
 
-ROWS_PER_PERIOD = 8  # rows of the record per period of the highest frequency
-MIN_SPECTRAL_LINES = 8  # spectral lines of a record; fewer do not make its values Gaussian
-# line spacings; tolerance on the number of the spectral line at each end of the band
+ROWS_PER_PERIOD = 8  # number of rows of the record per period of the highest frequency
+# Smallest number of spectral lines of a record; the values of a record with fewer are not Gaussian
+MIN_SPECTRAL_LINES = 8
+# Tolerance on the number of the spectral line at each end of the band, in line spacings
 SPECTRAL_LINE_TOL = 1e-9
 
 

@@ -1,4 +1,4 @@
-"""Measured modes at nodes of a rig, with directions such as "12:+x", or "12:+x, 13:-x"."""
+"""Measured modes at nodes of a rig, with directions such as "12:+x" or "12:+x, 13:-x"."""
 
 import re
 from dataclasses import dataclass, field
@@ -7,12 +7,17 @@ import numpy as np
 
 from ..core import ModalBasis, PatchfemError, frozen_array
 
+# Names of the directions of a node: three displacements and three rotations
 DIRECTION_NAMES = ("x", "y", "z", "rx", "ry", "rz")
-DIRECTION_PATTERN = re.compile(r"(\d+):([+-]?)(r?[xyz])")  # "12:+x"
-MAX_LISTED_NODES = 12  # nodes with directions that an error message lists
-# fraction of the moving mass; with more, the mass or the node of the base motion is wrong
+# Pattern of a node with a direction, such as "12:+x"
+DIRECTION_PATTERN = re.compile(r"(\d+):([+-]?)(r?[xyz])")
+MAX_LISTED_NODES = 12  # largest number of nodes with directions that an error message lists
+# Largest mass that the modes represent, as a fraction of the moving mass; a larger one shows that
+# the mass or the node of the base motion is wrong
 MAX_MASS_FRACTION = 1.05
-MIN_MASS_FRACTION = 0.8  # fraction of the moving mass; with less, a note says how much is missing
+# Smallest mass that the modes represent, as a fraction of the moving mass, for which no note on
+# missing mass is given
+MIN_MASS_FRACTION = 0.8
 
 
 @dataclass(frozen=True, eq=False, slots=True)

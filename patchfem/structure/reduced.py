@@ -21,24 +21,29 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 from ..core import ModalBasis, NotConverged, PatchfemError, frozen_array
 from ..effects import MAX_COORDINATES
 from ..elasticity.fronts import SparseFactor, ZeroEnergyMotion
-from ..elasticity.lapack import one_thread
+from ..elasticity.lapack import use_one_blas_thread
 from . import masses, matrices
 
-# coordinates; the modes of a larger structure come from Lanczos iteration
+# Largest number of coordinates for a dense eigensolution; larger structures use Lanczos iteration
 MAX_DENSE_COORDINATES = 600
-# modes computed beyond twice the retained number, because the run for the error estimate retains more
+# Number of computed modes beyond twice the retained number, because the run for the error estimate
+# retains more modes
 N_EXTRA_MODES = 4
-# relative; round-off of a projected matrix entry, compared with the sum of its absolute terms
+# Round-off of an entry of a projected matrix, relative to the sum of the magnitudes of its terms
 PROJECTION_TOL = 64 * np.finfo(float).eps
-# fraction of the largest stiffness over mass, by which the stiffness of an unconstrained structure is shifted,
-# because K alone has no inverse
+# Shift of the stiffness of an unconstrained structure, relative to the largest ratio of stiffness
+# to mass; without it K is singular
 SHIFT_FRACTION = 1e-9
-MIN_PIVOT = 1e-12  # fraction of a diagonal stiffness; a smaller pivot belongs to a rigid motion
-# fraction of the largest mass over stiffness; a motion with a smaller ratio is massless
+# Smallest pivot of a stiffness matrix relative to its diagonal entry; a smaller one belongs to a
+# rigid motion
+MIN_PIVOT = 1e-12
+# Smallest ratio of mass to stiffness of a motion that has mass, relative to the largest ratio
 MIN_INERTIA = 1e-14
-# fraction of the largest squared frequency, per coordinate; a smaller one belongs to a rigid motion
+# Smallest squared frequency of an elastic mode, relative to the largest one and per coordinate; a
+# smaller one belongs to a rigid motion
 MIN_STRAIN = 1e-12
-# minimum reciprocal condition number of the residual flexibility at the boundary; a smaller one is round-off
+# Smallest reciprocal condition number of the residual flexibility at the boundary that is not
+# round-off
 MIN_RESIDUAL_FLEXIBILITY = 1e-8
 CRAIG_BAMPTON = "craig-bampton"
 
@@ -146,12 +151,12 @@ def reduce_matrices(K, M, C, boundary, modes: int, method: str, moved=None) -> R
         _compute_craig_bampton_shapes if method == CRAIG_BAMPTON else _compute_free_interface_shapes
     )
     count = 2 * modes + N_EXTRA_MODES
-    with one_thread():
+    with use_one_blas_thread():
         shapes, computed = compute_shapes(K.tocsc(), M.tocsc(), np.asarray(boundary), count, load)
         stiffness = _project(K, shapes, PROJECTION_TOL)
         mass = _project(M, shapes, PROJECTION_TOL)
         damping = None if C is None else _project(C, shapes, matrices.ENTRY_TOL)
-        # static shapes are orthogonal to the modes with respect to K
+        # The static shapes are orthogonal to the modes with respect to K.
         n_modes = computed.omega.size
         stiffness[:n_modes] = 0.0
         stiffness[:, :n_modes] = 0.0
@@ -234,7 +239,8 @@ def _compute_lowest_modes(K, M, count: int, factor: SparseFactor, shift: float =
             "structure.reduced.modes",
         )
     shifted = (K + shift * M).toarray()
-    # eigh requires a positive definite second matrix; M may be singular, so M v = mu K v is solved
+    # The second matrix of eigh must be positive definite; M may be singular, so M v = mu K v is
+    # solved.
     inverse_squares, shapes = eigh(M.toarray(), (shifted + shifted.T) / 2)
     has_mass = inverse_squares > MIN_INERTIA * inverse_squares.max(initial=0.0)
     lowest = np.flatnonzero(has_mass)[::-1][:count]
@@ -317,13 +323,13 @@ def _subtract_modes(static, modes, M) -> tuple:
     static = static / np.sqrt(np.maximum(modal_mass, 1e-300))
     participation = modes.T @ (M @ static)
     residual = static - modes @ participation
-    # the second Gram-Schmidt step removes the round-off of the first
+    # The second Gram-Schmidt step removes the round-off of the first.
     correction = modes.T @ (M @ residual)
     return residual - modes @ correction, participation + correction
 
 
 def _expand_rows(shapes, rows, n: int) -> np.ndarray:
-    """Expand shapes to n coordinates, with zeros in the added rows."""
+    """Expand shapes to n coordinates, with zeros in the other rows."""
     expanded = np.zeros((n, shapes.shape[1]))
     expanded[rows] = shapes
     return expanded

@@ -54,7 +54,7 @@ def _convert_to_coordinates(basis: ModalBasis, values) -> np.ndarray:
 
 
 def start_from_output_displacement(basis: ModalBasis, displacement: float) -> InitialState:
-    """Start at rest from a displacement [m] of the output, deflected by a static force there.
+    """Return the initial state at rest with a displacement [m] of the output, deflected by a static force there.
 
     The coordinates are proportional to output_i / omega_i^2. If rigid modes move the output, a force
     moves only these, in proportion to output_i.
@@ -83,7 +83,7 @@ def start_from_output_displacement(basis: ModalBasis, displacement: float) -> In
 
 
 def start_from_base_step(basis: ModalBasis, displacement: float) -> InitialState:
-    """Start right after the base has jumped by a displacement X [m]: z = -X base.
+    """Return the initial state right after the base has jumped by a displacement X [m]: z = -X base.
 
     The masses have not moved yet, and displacements are relative to the base.
     """

@@ -1,4 +1,4 @@
-"""Drive of several sines, such as two tones or a modulated one, as a linear interpolation.
+"""Drive of several sines, such as two tones or a modulated tone, interpolated linearly.
 
 a(t) = sum_k a_k sin(2 pi f_k t + phi_k). Linear interpolation between rows h apart multiplies a tone by
 sinc^2(f h), which is compensated. It adds images at n/h +- f of the relative size (f h)^2; a mode of a
@@ -14,8 +14,9 @@ import numpy as np
 from .drive_sizes import DriveKeys
 from .drives import RecordedDrive
 
-ROWS_PER_PERIOD = 64  # rows of the record per period of the highest tone
-MAX_DENOMINATOR = 10**6  # largest denominator of a frequency [Hz]; finer differences do not matter
+ROWS_PER_PERIOD = 64  # number of rows of the record per period of the highest tone
+# Largest denominator of a frequency [Hz]; finer differences of frequencies do not matter
+MAX_DENOMINATOR = 10**6
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -31,7 +32,7 @@ class TonesRecord(RecordedDrive):
 
     @property
     def max_frequency_ratio(self) -> float:
-        """Highest frequency over that of the cycle."""
+        """Ratio of the highest frequency to the frequency of the drive cycle."""
         return self.max_frequency * self.period
 
 
@@ -66,7 +67,7 @@ def make_tones(frequencies, accelerations, phases, duration: float) -> TonesReco
 
 
 def count_beat_cycles(frequencies) -> float:
-    """Return the cycles of the first tone after which all repeat: f_1 / greatest common divisor."""
+    """Return the number of cycles of the first tone after which all tones repeat: f_1 / greatest common divisor."""
     fractions = [Fraction(f).limit_denominator(MAX_DENOMINATOR) or Fraction(f) for f in frequencies]
     denominator = lcm(*(fraction.denominator for fraction in fractions))
     numerators = [int(fraction * denominator) for fraction in fractions]

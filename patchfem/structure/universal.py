@@ -12,15 +12,20 @@ from .places import DIRECTION_NAMES, MeasuredModes
 
 NORMAL_MODE_TYPE = 2  # analysis type of a real mode in dataset 55
 COMPLEX_MODE_TYPES = (3, 7)  # analysis types of a complex mode in dataset 55
-DERIVATIVE_ORDERS = {  # time derivative of the displacement for each ordinate type of dataset 58
+# Order of the time derivative of the displacement, by ordinate type of dataset 58
+DERIVATIVE_ORDERS = {
     OrdinateType.DISPLACEMENT: 0,
     OrdinateType.VELOCITY: 1,
     OrdinateType.ACCELERATION: 2,
 }
-FORCE_TYPES = (OrdinateType.EXCITATION_FORCE, OrdinateType.FORCE)
-UNIT_FACTORS = {"g": 9.80665, "lbf": 4.4482216152605}  # SI units per unit of an axis label
+FORCE_TYPES = (OrdinateType.EXCITATION_FORCE, OrdinateType.FORCE)  # ordinate types of a force
+# Conversion factors to SI units, by axis label
+UNIT_FACTORS = {"g": 9.80665, "lbf": 4.4482216152605}
+# Axis labels of SI units
 SI_LABELS = {"", "none", "n", "m", "m/s", "m/s^2", "m/s2", "m/s**2", "mps2"}
-MAX_FREQUENCY_CHANGE = 1e-6  # relative; the frequencies of all responses agree to single precision
+# Largest relative difference between the frequencies of two responses; it allows for single
+# precision
+MAX_FREQUENCY_CHANGE = 1e-6
 
 
 class _UnitFactors(NamedTuple):

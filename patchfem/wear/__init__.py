@@ -6,14 +6,14 @@ together. `depth` solves one jump over many cycles together with the contact; `j
 Read `depth` first.
 """
 
-# names that other folders use, by module
+# Names that other folders use, by module
 PUBLIC = {
     "depth": ("wear_rates",),
     "jumps": (
         "WearProblem",
         "WearState",
         "replay_jumps",
-        "start_wear",
+        "make_initial_wear_state",
         "take_jump",
     ),
 }

@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-# coefficient of the L-stable method of two stages; both of its weights are positive
+# Coefficient of the L-stable method of two stages; both of its weights are positive
 STAGE_COEFFICIENT = 1 - np.sqrt(0.5)
 
 

@@ -1,4 +1,4 @@
-"""Jumps over many cycles of wear, as long as the tolerance allows or of equal length."""
+"""Jumps over many cycles of wear, of equal length or as long as the tolerance allows."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -7,18 +7,21 @@ import numpy as np
 
 from .depth import solve_jump, wear_rates
 
-MAX_JUMP_GROWTH = 4.0  # largest ratio of a jump to the jump before it
-MIN_RETRY_RATIO = 0.2  # smallest ratio of a repeated jump to the rejected jump
-SAFETY_FACTOR = 0.9  # factor on the length that would just meet the tolerance
+MAX_JUMP_GROWTH = 4.0  # largest ratio of the length of a jump to that of the previous jump
+# Smallest ratio of the length of a repeated jump to that of the rejected jump
+MIN_RETRY_RATIO = 0.2
+SAFETY_FACTOR = 0.9  # safety factor on the length of a jump that would just meet the tolerance
 FIRST_JUMP_FRACTION = 1e-3  # length of the first automatic jump as a fraction of all cycles
 MIN_JUMP_FRACTION = 1e-9  # smallest length of a jump as a fraction of all cycles
-METHOD_ORDER = 2  # order of `depth.solve_jump`
-# divisor of the difference between a jump and its two halves, which gives the error of the halves
+METHOD_ORDER = 2  # order of the method of `depth.solve_jump`
+# Ratio of the difference between a jump and its two halves to the error of the halves
 RICHARDSON_DIVISOR = 2**METHOD_ORDER - 1
-MIN_ERROR_RATIO = 1e-9  # smallest error / tolerance from which the next jump is computed
-MIN_DEPTH = 1e-300  # depth [m] that keeps quotients finite before anything is worn
-# wear of a jump / worn depth; a jump that wears less than this fraction hardly changes the depth, and the error of its
-# slip path is then compared with this fraction of the depth
+# Smallest ratio of error to tolerance from which the length of the next jump is computed
+MIN_ERROR_RATIO = 1e-9
+# Smallest depth [m] in a divisor; it keeps quotients finite before anything is worn
+MIN_DEPTH = 1e-300
+# Smallest wear of a jump, relative to the worn depth, with which the error of its slip path is
+# compared; a jump with less wear hardly changes the depth
 SHAKEDOWN_WEAR_RATIO = 1e-3
 
 
@@ -75,8 +78,8 @@ class WearState:
         return float(np.abs(self.depth - self.coarse_depth).max()) + self.path_error
 
 
-def start_wear(problem: WearProblem, depth=None) -> WearState:
-    """Return the state at the start.
+def make_initial_wear_state(problem: WearProblem, depth=None) -> WearState:
+    """Return the wear state before the first jump.
 
     Parameters
     ----------

@@ -453,10 +453,10 @@ def test_exact_kern_fraction_equals_wedge_fraction():
     """The contact fraction from the load line equals that of the tilted pad."""
     for tilt in (1e-5, 1e-4, 1e-3):
         fraction, centre, *_ = exact.wedge_on_linear_foundation(tilt, **PAD_PARAMETERS)
-        assert exact.kern_contact_fraction(centre, PAD_PARAMETERS["length"]) == pytest.approx(
+        assert exact.core_contact_fraction(centre, PAD_PARAMETERS["length"]) == pytest.approx(
             fraction, rel=1e-12
         )
-    assert exact.kern_contact_fraction(
+    assert exact.core_contact_fraction(
         PAD_PARAMETERS["length"] / 6, PAD_PARAMETERS["length"]
     ) == pytest.approx(1.0, rel=1e-12)
 
@@ -539,7 +539,7 @@ def test_exact_level_pad_loop_area_equals_single_strip():
         lambda: exact.wedge_on_asperities(1.0, 1.0, 0.0),
         lambda: exact.wedge_loop_area(1.0, 1.0, 1.0, 1.0, 2.0, 1.0),
         lambda: exact.wedge_loop_area(1.0, 1.0, 1.0, 1.0, 0.0, 0.0),
-        lambda: exact.kern_contact_fraction(0.5, 1.0),
+        lambda: exact.core_contact_fraction(0.5, 1.0),
     ],
 )
 def test_refuses_invalid_contact_arguments(call):

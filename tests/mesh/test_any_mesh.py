@@ -23,7 +23,7 @@ from hypothesis import strategies as st
 from patchfem.core import PatchfemError
 from patchfem.mesh import graded_grid, read_pieces, write_mesh
 from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS
-from patchfem.mesh.pairs import as_piece
+from patchfem.mesh.pairs import convert_to_piece_mesh
 
 ELEMENT_KINDS = ("quads", "triangles", "mixed")
 
@@ -94,7 +94,7 @@ def test_exact_different_grids_round_trip(tmp_path):
         assert piece.coating_thickness == pytest.approx(grid.coating_thickness, rel=1e-12)
         assert np.array_equal(
             np.sort(piece.quads, axis=1)[np.argsort(piece.is_coating, kind="stable")],
-            np.sort(as_piece(grid).quads, axis=1)[
+            np.sort(convert_to_piece_mesh(grid).quads, axis=1)[
                 np.argsort(grid.is_coating_cell().ravel(), kind="stable")
             ],
         )

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from any_mesh_cases import FORMATS, GRID, make_pair, mesh_of_grid
 
-from patchfem.mesh import PieceMesh, find_holes, measure_fixed_length, read_bodies
+from patchfem.mesh import PieceMesh, find_holes, measure_clamped_length, read_bodies
 from patchfem.mesh.files import EDGE_TAGS
 from patchfem.mesh.recognise import recognise_grid
 
@@ -50,29 +50,29 @@ def test_exact_partly_fixed_far_face_is_read_as_mesh(form, tmp_path):
     mesh = make_pair("quads")
     low, high = write_and_read(remove_edges(mesh, far_edges(mesh)[2:]), tmp_path, form)
     assert isinstance(low, PieceMesh) and isinstance(high, PieceMesh)
-    assert measure_fixed_length(low) == pytest.approx(
+    assert measure_clamped_length(low) == pytest.approx(
         (5e-4, 2e-3), rel=1e-12
     )  # 2 edges of 0.25 mm on 2 mm
-    assert measure_fixed_length(high) == pytest.approx((2e-3, 2e-3), rel=1e-12)
+    assert measure_clamped_length(high) == pytest.approx((2e-3, 2e-3), rel=1e-12)
 
 
 def test_exact_fixed_length_of_bottom_side_and_inclined_face():
     """The fixed length of a bottom, a side and an inclined far face agrees with the closed form."""
     piece = mesh_of_grid(GRID, 0.5, 3)
-    assert measure_fixed_length(piece) == pytest.approx((2e-3, 2e-3), rel=1e-12)
+    assert measure_clamped_length(piece) == pytest.approx((2e-3, 2e-3), rel=1e-12)
     bottom = piece.points[:, 1] == 1e-3
     left = piece.points[:, 0] == -1e-3
     sides = replace(piece, far=np.flatnonzero(left & (piece.points[:, 1] > 0)))
     first = piece.points[left, 1]
     first = np.sort(first)[1]  # the edge at the interface has only one fixed node
-    assert measure_fixed_length(sides) == pytest.approx((1e-3 - first, 1e-3 + 2e-3), rel=1e-12)
+    assert measure_clamped_length(sides) == pytest.approx((1e-3 - first, 1e-3 + 2e-3), rel=1e-12)
     points = piece.points.copy()
     points[:, 1] *= (
         1 + 40 * np.abs(points[:, 0]) / 2
     )  # two slopes of 0.02 without a corner between them
     slanted = replace(piece, points=points, far=np.flatnonzero(bottom & (points[:, 0] <= 0)))
     side = np.hypot(1e-3, 2e-5)
-    assert measure_fixed_length(slanted) == pytest.approx((side, 2 * side), rel=1e-12)
+    assert measure_clamped_length(slanted) == pytest.approx((side, 2 * side), rel=1e-12)
 
 
 def test_always_grid_is_recognised_for_any_numbering():
@@ -124,6 +124,6 @@ def test_exact_far_face_ends_at_corner_of_thirty_degrees(angle, free_length):
     points[:, 1] *= 1 + slope * np.maximum(-points[:, 0], 0) / 1e-3
     inclined = replace(piece, points=points, far=np.flatnonzero(is_fixed))
     fixed_length = 1e-3 * np.hypot(1, slope)
-    assert measure_fixed_length(inclined) == pytest.approx(
+    assert measure_clamped_length(inclined) == pytest.approx(
         (fixed_length, fixed_length + free_length), rel=1e-12
     )

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from patchfem.mesh import SHARP_END, End, graded_grid, shaped_grid
 from patchfem.mesh.ends import MAX_INTERFACE_SLOPE
-from patchfem.mesh.pairs import as_piece
+from patchfem.mesh.pairs import convert_to_piece_mesh
 
 LENGTH, HEIGHT, COATING = 10e-3, 4e-3, 0.2e-3
 ENDS = {"sharp": SHARP_END, "chamfer": End("chamfer", 0.7e-3), "radius": End("radius", 1.1e-3)}
@@ -81,7 +81,7 @@ def test_exact_sharp_piece_without_overhang_equals_grid():
     """A sharp piece without overhang equals the mesh of its tensor grid."""
     grid = graded_grid(LENGTH, HEIGHT, 0.31e-3, COATING)
     body = shaped_grid(grid, LENGTH, SHARP_END)
-    expected = as_piece(grid)
+    expected = convert_to_piece_mesh(grid)
     for name in ("points", "quads", "is_coating", "interface", "far"):
         assert np.array_equal(getattr(body, name), getattr(expected, name)), name
     assert body.base_grid is grid and expected.base_grid is None

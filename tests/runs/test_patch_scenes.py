@@ -15,7 +15,7 @@ from patchfem.closed_forms import contact as exact
 from patchfem.core import PatchfemError, frozen_array
 from patchfem.formatting import format_length
 from patchfem.mesh import graded_grid, write_mesh
-from patchfem.mesh.pairs import as_piece
+from patchfem.mesh.pairs import convert_to_piece_mesh
 from patchfem.model import make_piece_meshes
 from patchfem.runs import estimate_static_measures, solve_with_coarser
 from patchfem.runs.patch.measures import note_on_plane_state
@@ -326,7 +326,7 @@ def test_refuses_mesh_with_other_dimensions_than_scene(tmp_path):
 def test_exact_rounded_mesh_agrees_with_crown(tmp_path):
     """Both faces of a mesh are rounded by x^2/(4 R); together they agree with a crown of radius R."""
     grid = graded_grid(LENGTH, HEIGHT, 0.127e-3)
-    flat = as_piece(grid)
+    flat = convert_to_piece_mesh(grid)
     depth = flat.points[:, 1]
     points = flat.points.copy()
     points[:, 1] = depth + points[:, 0] ** 2 / (4 * 5.0) * (1 - depth / HEIGHT)

@@ -34,7 +34,7 @@ from patchfem.runs.patch.result import solve_with_coarser
 from patchfem.runs.wear import evolve
 from patchfem.scene import loads
 from patchfem.slip import jenkins_set
-from patchfem.wear import WearProblem, start_wear, take_jump
+from patchfem.wear import WearProblem, make_initial_wear_state, take_jump
 
 TILTED = COATED + '[contact.tilt]\nangle = "0.1 mrad"\n'
 SINE = '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "143 Hz"\ncycles = 2\n'
@@ -258,7 +258,7 @@ def test_exact_wear_shakedown_of_crown_agrees_with_closed_form():
         return np.where(slips, 4 * np.abs(slide - pair.tangential @ shear), 0.0)
 
     problem = WearProblem(press, path, area, 1e-13, 1e9)
-    state = start_wear(problem)
+    state = make_initial_wear_state(problem)
     count = 0
     initial_work = state.path @ state.force
     while state.cycle < problem.cycles:

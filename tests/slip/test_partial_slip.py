@@ -13,8 +13,8 @@ from slip_paths import draw_paths, jenkins_forces
 from patchfem.contact import press, tangential_stiffness
 from patchfem.contact.gaps import crown, tilt
 from patchfem.core import PatchfemError
-from patchfem.slip import enough_modes, fewest_gauss_points, jenkins_set, scale_limits
-from patchfem.slip.shear_modes import fewest_modes, shear_modes
+from patchfem.slip import find_fewest_gauss_points, find_sufficient_modes, jenkins_set, scale_limits
+from patchfem.slip.shear_modes import find_fewest_modes, shear_modes
 
 MU = 0.3
 
@@ -333,7 +333,7 @@ def test_always_short_bonds_use_enough_modes(angle):
             for n in (4, 8, 16, 32)
         ]
         assert np.all(np.diff(errors) <= 1e-12) and errors[1] < max_error and errors[0] < 0.05
-    assert enough_modes(
+    assert find_sufficient_modes(
         pair.tangential, limit, 1e-9 * gross_slip_slide, 8, 1e-4
     ).stiffness.size == min(64, np.sum(limit > 0))
 
@@ -345,7 +345,7 @@ def test_always_number_of_modes_is_minimal(angle, tolerance):
     of 1.3)."""
     pair = make_coated_pair(100)
     limit = friction_limit(100, angle)
-    modes = fewest_modes(pair.tangential, limit, 1e-6, tolerance)
+    modes = find_fewest_modes(pair.tangential, limit, 1e-6, tolerance)
     count = modes.stiffness.size
     fewer = shear_modes(pair.tangential, limit, 1e-6, count - 1)
     assert modes.backbone_error <= tolerance and (
@@ -383,7 +383,9 @@ def test_always_reduced_points_preserve_backbone(angle):
     pair = make_coated_pair(200)
     limit = friction_limit(200, angle)
     modes = shear_modes(pair.tangential, limit, 1e-6, 4)
-    reduced, reduced_limit, _ = fewest_gauss_points(modes, pair.interface.x[modes.points], 1e-5)
+    reduced, reduced_limit, _ = find_fewest_gauss_points(
+        modes, pair.interface.x[modes.points], 1e-5
+    )
     assert reduced.points.size in (16, 32) and reduced_limit.sum() == pytest.approx(
         limit.sum(), rel=1e-12
     )
@@ -393,7 +395,7 @@ def test_always_reduced_points_preserve_backbone(angle):
             abs(solve_with_modes(reduced, reduced_limit, 1e-6, slide) - reference)
             <= 2e-5 * limit.sum()
         )
-    unreduced, unreduced_limit, _ = fewest_gauss_points(
+    unreduced, unreduced_limit, _ = find_fewest_gauss_points(
         modes, pair.interface.x[modes.points], 1e-16
     )
     assert unreduced.shape is modes.shape and (unreduced_limit == limit[modes.points]).all()

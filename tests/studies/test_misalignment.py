@@ -114,7 +114,7 @@ def test_always_free_piece_loses_contact_inside_the_kern(tilted, fixtures):
     assert (
         solve_coarse(tilted, fixtures.free(0.16))["contact_fraction"]
         < 1
-        == exact.kern_contact_fraction(0.16, 1.0)
+        == exact.core_contact_fraction(0.16, 1.0)
     )
 
 

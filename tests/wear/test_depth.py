@@ -12,7 +12,7 @@ from wear_forms import uniform_wear_pressure, worn_crown_half_width, worn_pad_fr
 from patchfem.closed_forms.contact import hertz_half_width
 from patchfem.contact.unilateral import solve_forces
 from patchfem.elasticity import interface_compliance, make_piece
-from patchfem.wear import WearProblem, start_wear, take_jump, wear_rates
+from patchfem.wear import WearProblem, make_initial_wear_state, take_jump, wear_rates
 from patchfem.wear.depth import solve_jump
 
 LOAD, KAPPA, PATH = 116.0, 1e-14, 40e-6
@@ -70,7 +70,7 @@ def flat_contact():
 
 def run_wear(problem, tolerance=1e-3, count=None):
     """Return the last state and the number of steps of a complete wear run."""
-    state = start_wear(problem)
+    state = make_initial_wear_state(problem)
     jumps = 0
     while state.cycle < problem.cycles:
         state = take_jump(problem, state, tolerance, count)
@@ -132,7 +132,7 @@ def test_order_step_size_follows_true_error():
     tolerance = 1e-7
     path = np.full(area.size, PATH)
     problem = WearProblem(press, lambda worn: path, area, KAPPA, 100 * critical)
-    previous = take_jump(problem, start_wear(problem), tolerance)
+    previous = take_jump(problem, make_initial_wear_state(problem), tolerance)
     for _ in range(5):
         state = take_jump(problem, previous, tolerance)
         length = state.cycle - previous.cycle

@@ -1,4 +1,4 @@
-"""Many contacts of one pair of pieces at once, for sweeps over loads, tilts and crowns.
+"""Simultaneous solution of many contacts of one pair of pieces, for sweeps over loads, tilts and crowns.
 
 In: one compliance, and gaps, loads and moments of q cases. Out: forces, motions, edges and stiffnesses, the
 same that `unilateral` and `edges` give case by case.

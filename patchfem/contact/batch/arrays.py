@@ -6,7 +6,7 @@ import numpy as np
 
 
 class NestedStretches(NamedTuple):
-    """Arrays with which contacts on runs of consecutive nodes are solved.
+    """Arrays for the solution of contacts on runs of consecutive nodes.
 
     A stretch begins at a left end, from which on the Cholesky factor is kept.
 
@@ -63,7 +63,7 @@ class Cases(NamedTuple):
 
 
 def make_cases(first_try, end_limit, gap, loads) -> Cases:
-    """Return q contact problems with solutions that are still zero.
+    """Return q contact problems whose solutions are initialized with zeros.
 
     Parameters
     ----------

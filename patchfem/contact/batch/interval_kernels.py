@@ -1,4 +1,4 @@
-"""Compiled solution of contacts that consist of a single stretch of nodes.
+"""Compiled solution of contacts on a single run of consecutive nodes.
 
 The kernels update the factors of nested stretches and find the right ends of the contacts. With C = U^T U on the nodes
 from a on, the leading blocks of U are the factors of all stretches that begin at a. One forward substitution of the gap
@@ -23,7 +23,7 @@ FASTMATH_FLAGS = {"reassoc", "contract", "arcp"}
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def drop_first_node(upper, a, row):
-    """Update in place a Cholesky factor after its first node is removed.
+    """Update a Cholesky factor in place after its first node is removed.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def write_sums(stretches, a):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def solve_motion(load, moment, spring, is_free, sums, stop):
-    """Return closing [m] and rotation [rad] of the holder for one run of nodes in contact.
+    """Return the approach [m] and rotation [rad] of the holder for one contiguous set of nodes in contact.
 
     With the sums a, b and c of the stretch, the equations are closing a - theta b = load and
     closing b - theta (c + spring) = moment; theta is 0 unless it is free.
@@ -120,7 +120,7 @@ def solve_motion(load, moment, spring, is_free, sums, stop):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_end(stretches, a, y, limit, loads, is_free):
-    """Find the end of the longest run from a node that meets the contact conditions there.
+    """Find the end of the longest run of nodes that begins at a given node and ends at a contact edge.
 
     The last node of the stretch is pressed, and the next node is open.
 
@@ -155,7 +155,8 @@ def find_end(stretches, a, y, limit, loads, is_free):
         closing, theta = solve_motion(load, moment, loads[2], is_free, stretches.sums[a], i + 1)
         is_pressed = closing * unit_closing[i] - theta * unit_arm[i] - y[i - a] > 0
         is_open = i + 1 == n_nodes
-        # the free rotation of a few nodes is a rounding error, which may look like a contact
+        # With few nodes in contact, a free rotation is a rounding error, which may look like a
+        # contact.
         if i + 1 < limit:
             n = i + 1
             is_open = closing * unit_closing[n] - theta * unit_arm[n] - y[n - a] <= 0

@@ -1,4 +1,4 @@
-"""Contacts of a single stretch of nodes: many cases on one compliance in one pass.
+"""Contacts on a single run of consecutive nodes: simultaneous solution of many cases with one compliance.
 
 Flat, tilted and crowned pieces touch on a single stretch under any load, wherever the load line is. The pass goes over
 the left ends of the stretches. Cases that begin at the same node share its Cholesky factor (`interval_kernels`) and are
@@ -18,12 +18,15 @@ from ..unilateral import RESIDUAL_TOL
 from .arrays import Cases, NestedStretches, make_cases
 
 kernels = compiled.load("contact.batch.interval_kernels")
-# Left ends that are tried if the stretch is known; beyond them all others are tried.
+# Largest number of left ends that are tried from a known bracket before all others are tried
 MAX_LEFT_ENDS = 12
-MIN_COARSE_NODES = 40  # nodes above which the contacts are first located on a coarser interface
-COARSENING_FACTOR = 4  # the coarse interface has every fourth node
-BATCH_SIZE = 256  # cases that are solved together, so that their forces stay in the cache
-MIN_PARABOLA_NODES = 3  # nodes in contact from which a stiffness is interpolated between sets
+# Smallest number of nodes for which the contacts are first located on a coarser interface
+MIN_COARSE_NODES = 40
+COARSENING_FACTOR = 4  # ratio of the numbers of nodes of the original and the coarser interface
+# Number of cases that are solved together; their forces fit into the processor cache
+BATCH_SIZE = 256
+# Smallest number of nodes in contact for which a stiffness is interpolated between contact sets
+MIN_PARABOLA_NODES = 3
 
 
 class ContactBatch(NamedTuple):
@@ -79,7 +82,8 @@ class Intervals:
     def __init__(self, c: np.ndarray, x: np.ndarray):
         self.c = np.ascontiguousarray(c)
         self.x = np.ascontiguousarray(x)
-        # the sums of `arrays.NestedStretches`, filled for the left ends that were visited
+        # These are the sums of `arrays.NestedStretches`; they are filled for the left ends that
+        # were visited.
         self.sums = np.zeros((x.size + 1, 3, x.size + 1))
 
     def press(self, gap, load, moment=None, spring=0.0, brackets=None) -> ContactBatch:
@@ -167,7 +171,7 @@ class Intervals:
         self._solve_all(cases, int(first.min()) - 1, int(first.max()) + 1, 1, is_free=False)
 
     def _solve_all(self, cases: Cases, low: int, high: int, n_tries: int, *, is_free: bool) -> None:
-        """Solve all cases, and compute the sums that later calls need.
+        """Solve all cases and precompute the sums that later calls reuse.
 
         These are the left ends from `low` to `high` and those beside every stretch.
 
@@ -181,7 +185,7 @@ class Intervals:
             self.c, self.x, upper, np.zeros((2, m)), self.sums, workspace=np.zeros(m)
         )
         kernels.move_left_end(stretches, a, a, 1)
-        # for each case the left end to try next, or m once the case is solved
+        # For each case this is the left end to try next, or m once the case is solved.
         next_try = np.minimum(cases.first_try, m)
         while (left_end := int(next_try.min(initial=m))) < m:
             if left_end > a:
@@ -216,7 +220,8 @@ class Intervals:
         )
         force = _substitute(lower, y, is_backward=True)
         is_solved = (stop > 0) & (force[:, 0] > 0)
-        # a case without a contact end before its limit is solved again with the limit at the last node
+        # A case without a contact end before its limit is solved again with the limit at the last
+        # node.
         is_cut = (stop == 0) & (limits < m)
         cases.end_limit[indices[is_cut]] = m
         if is_solved.any():

@@ -15,20 +15,20 @@ import numpy as np
 
 from ...elasticity.elasticity import Layers, Piece, lame
 
-# wave number times thickness above which a wave does not reach the other side of a
-# layer: its relative amplitude exp(-40) there is below round-off
+# Largest product of wavenumber and thickness for which a wave reaches the other side of a layer;
+# its relative amplitude exp(-40) there is below round-off
 MAX_WAVE_DEPTH = 40.0
 
 
 class WaveCompliance(NamedTuple):
-    """Displacement of the face per traction [m/Pa]: inward per pressure, and along x per shear."""
+    """Displacement of the face per traction [m/Pa]: inwards under a pressure, along x under a shear traction."""
 
     normal: np.ndarray
     shear: np.ndarray
 
 
 def layer_compliance(k, height: float, thickness: float, layers: Layers) -> WaveCompliance:
-    """Return the compliance of a coated layer on a rigid base over wavenumber.
+    """Return the compliance of a coated layer on a rigid base as a function of wavenumber.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def _solve_waves(k, depths: list, moduli: list) -> WaveCompliance:
     scale = moduli[0][1]
     matrix = np.zeros((k.size, n_unknowns, n_unknowns))
     face = _layer_states(k, 0.0, depths[0], moduli[0], scale)
-    # the tractions of the face are prescribed
+    # The tractions on the face are prescribed.
     matrix[:, 0:2, :4] = face[:, 2:4]
     for n, (depth, layer_moduli) in enumerate(zip(depths, moduli)):
         first_row = 2 + 4 * n
@@ -70,16 +70,17 @@ def _solve_waves(k, depths: list, moduli: list) -> WaveCompliance:
         columns = slice(first_column, first_column + 4)
         foot = _layer_states(k, depth, depth, layer_moduli, scale)
         if n == len(depths) - 1:
-            # the foot of the last layer does not move
+            # The base of the last layer does not move.
             matrix[:, first_row : first_row + 2, columns] = foot[:, :2]
             break
-        # displacements and tractions are continuous across the interface of two layers
+        # Displacements and tractions are continuous across the interface of two layers.
         rows = slice(first_row, first_row + 4)
         matrix[:, rows, columns] = foot
         below = _layer_states(k, 0.0, depths[n + 1], moduli[n + 1], scale)
         matrix[:, rows, first_column + 4 : first_column + 8] = -below
     right_sides = np.zeros((k.size, n_unknowns, 2))
-    # loads on the face: normal stress -1 for a unit pressure, and shear stress -1 for a unit shear traction
+    # The loads on the face are a normal stress of -1 for a unit pressure and a shear stress of -1
+    # for a unit shear traction.
     right_sides[:, 0, 0] = -1.0
     right_sides[:, 1, 1] = -1.0
     coefficients = np.linalg.solve(matrix, right_sides)[:, :4]
@@ -96,7 +97,7 @@ def _layer_states(k, z: float, depth: float, moduli: tuple, scale: float) -> np.
     nu = lam / (2 * (lam + mu))
     softness = scale / (2 * mu)
     states = np.empty((k.size, 4, 4))
-    # the first two solutions decay downwards, the others upwards
+    # The first two solutions decay downwards, the others upwards.
     for first, sign, distance in ((0, 1.0, z), (2, -1.0, depth - z)):
         kz = k * distance
         one = np.ones(k.size)

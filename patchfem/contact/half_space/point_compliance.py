@@ -14,13 +14,16 @@ from scipy.fft import dct, idct
 from ...core import NotConverged
 from ..edges import ContactEdge, compute_edge_fraction, parabola_change
 
-# ratio of a compliance of the free ends to the largest one below which its function is left out
+# Smallest magnitude of a compliance of the free ends, relative to the largest, whose eigenfunction
+# is kept
 MIN_RELATIVE_COMPLIANCE = 1e-9
-EQUATION_TOL = 1e-10  # relative residual of the equations on the active points
-# offset of an edge over the length of a cell (see `edges.edge_offset`), measured to 0.001 for Hertz contact
-# on 24 rows of points
+# Relative residual of the equations on the active points at which their solution has converged
+EQUATION_TOL = 1e-10
+# Offset of a contact edge (see `edges.edge_offset`) relative to the cell length, measured to 0.001
+# for Hertz contact on 24 rows of points
 EDGE_OFFSET_FRACTION = 0.189
-# maximum number of points that are counted to find the longest contact; longer contacts count as equal
+# Largest number of points that are counted to find the longest contact; longer contacts count as
+# equal
 MAX_REFERENCE_POINTS = 64
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from ...contact.stiffness import tangential_stiffness
 from ...core import Outcome, PatchfemError, Response
 from ...friction.grooves import Grooves
-from ...slip.shear_modes import N_SHEAR_MODES, enough_modes, shear_modes
+from ...slip.shear_modes import N_SHEAR_MODES, find_sufficient_modes, shear_modes
 from ..integrated import find_accelerations
 from ..interfaces.arrays import ClimbingPoints
 from ..ledger import Ledger
@@ -129,7 +129,7 @@ def with_shear_modes(
     found = (
         shear_modes(patch.slip_compliance, limit, length, count, weakening)
         if count is not None
-        else enough_modes(
+        else find_sufficient_modes(
             patch.slip_compliance, limit, length, N_SHEAR_MODES, 0.1 * tolerance, weakening
         )
     )

@@ -13,14 +13,14 @@ import numpy as np
 
 from ...compiled import load as compiled
 from ...contact.contact_sets import ContactSets
-from ...contact.set_arrays import N_BUILT, SetArrays, make_set_arrays, name_set
+from ...contact.set_arrays import N_BUILT, SetArrays, hash_set, make_set_arrays
 from ...core import ModalBasis, PatchfemError, Response
 from ...effects import describe_unsupported
 from ...friction.bonds.list_rows_kernels import STATUS
 from ...friction.laws.coulomb import Coulomb
 from ...friction.laws.stretch import growth_numbers
 from ...friction.laws.tanh import TanhLaw
-from ...slip.shear_modes import N_SHEAR_MODES, enough_modes, shear_modes
+from ...slip.shear_modes import N_SHEAR_MODES, find_sufficient_modes, shear_modes
 from ..interfaces import arrays
 from ..interfaces.arrays import LoadIndex, PointRow, PressedIndex
 from ..interfaces.dispatch import COULOMB_LAW
@@ -382,7 +382,7 @@ def choose_shear_modes(
         )
     if count is not None:
         return shear_modes(compliance, limit, law.length, count)
-    return enough_modes(compliance, limit, law.length, N_SHEAR_MODES, 0.1 * tolerance)
+    return find_sufficient_modes(compliance, limit, law.length, N_SHEAR_MODES, 0.1 * tolerance)
 
 
 def make_model(
@@ -448,7 +448,7 @@ class VaryingLoadRun(Run):
         nodal_forces = np.full(x.size, model.preload)
         if model.load is None:
             heave, pitch = model.rows[1:] @ self.state[0]
-            name = name_set(self.sets, model.sets.reference.in_contact)
+            name = hash_set(self.sets, model.sets.reference.in_contact)
             slot = press.find_set(self.sets, press.build_first_set(self.sets, name), -heave, pitch)
             press.press_state(self.sets, slot, -heave, pitch, nodal_forces)
         if model.has_point_loads:

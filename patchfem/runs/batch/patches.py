@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import Outcome, compute_allowed_error
-from ...elasticity.lapack import one_thread
+from ...elasticity.lapack import use_one_blas_thread
 from ...model.model import Model
 from ...model.similar_models import SimilarModels, select_models
 from ..accuracy_warnings import AccuracyContext, tolerance_warnings
@@ -101,7 +101,7 @@ def solve_patches_then_motions(
     results = CaseResults.blank(len(models))
     for first in range(0, len(models), cases_per_call):
         # for such small systems, the synchronization of BLAS threads takes longer than the solution
-        with one_thread():
+        with use_one_blas_thread():
             part = attach_solved_patches(models[first : first + cases_per_call])
             results.insert(range(first, first + len(part)), solve(part))
     return results

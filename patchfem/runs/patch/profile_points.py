@@ -23,7 +23,7 @@ from ...contact.half_space.point_compliance import (
 )
 from ...core import NotConverged
 from ...elasticity.elasticity import make_piece
-from ...elasticity.lapack import one_thread
+from ...elasticity.lapack import use_one_blas_thread
 from ...mesh.grading import Layout, divide_into_columns, divide_into_rows
 from ...model import profile
 from ...model.pieces import make_elastic_layers
@@ -153,7 +153,7 @@ def solve_on_points(patch_model, meets_tolerance) -> PointSolution | None:
     """
     count = _count_first_level_points(patch_model)
     solution = None
-    with one_thread():
+    with use_one_blas_thread():
         try:
             ends = [_compute_free_end_compliance(patch_model, level) for level in range(MIN_LEVELS)]
             end_levels = [_solve_level(patch_model, free_ends, count) for free_ends in ends]

@@ -389,7 +389,7 @@ def notes_on_mesh_file(pair) -> list:
                 f"contact.mesh: the {side} piece has {count} hole{'s' * (count > 1)} inside, {area:.3g} m2 in "
                 "all; if a hole is not intended, close it in the mesh"
             )
-        fixed_length, face_length = recognise.measure_fixed_length(body)
+        fixed_length, face_length = recognise.measure_clamped_length(body)
         if fixed_length < MIN_COMPLETE_FRACTION * face_length:
             out.append(
                 f"contact.mesh: the held nodes `{side}_far` cover {fixed_length:.6g} m of a face of {face_length:.6g} m, "

@@ -16,7 +16,7 @@ import numpy as np
 from ...contact.batch.intervals import ContactBatch, Intervals
 from ...contact.unilateral import RESIDUAL_TOL
 from ...core import ContactState, Outcome, frozen_array
-from ...elasticity.lapack import one_thread
+from ...elasticity.lapack import use_one_blas_thread
 from ...mesh.tensor import TensorGrid
 from .condensed import CondensedPair, condense_on_shared_level, condense_on_shared_meshes
 from .edge_values import EdgeValues
@@ -239,7 +239,7 @@ def solve_patches_on_pair(patch_models, pair: CondensedPair) -> list:
         return out
     for cases in _group_batches(patch_models):
         batch = [patch_models[case] for case in cases]
-        with one_thread():
+        with use_one_blas_thread():
             level = solve_batch_on_pair(collect_patch_loads(batch), pair)
         for row, case in enumerate(cases):
             if level.is_solved[row] and level.contacts.n_nodes[row] > MAX_UNRESOLVED_NODES:
@@ -336,7 +336,7 @@ def solve_patch_batch(
     pairs = pairs or condense_on_shared_meshes(first)
     levels = []
     other_level = None
-    with one_thread():
+    with use_one_blas_thread():
         for pair in reversed(pairs):
             levels.insert(0, solve_batch_on_pair(loads, pair, levels[0] if levels else None))
         if other_model is not None:

@@ -9,7 +9,7 @@ import numpy as np
 from ...closed_forms import contact
 from ...contact import edges, stiffness
 from ...core import Outcome
-from ...elasticity.lapack import one_thread
+from ...elasticity.lapack import use_one_blas_thread
 from . import strips
 from .edge_values import EdgeValues
 from .press import Patch
@@ -162,7 +162,7 @@ def compute_static_values(patch: Patch) -> dict:
     sigma = patch.pressure.sigma_n[None] if state is None else state.pressure
     edge_values = EdgeValues(0.0, 0.0, 0.0, 0.0, 0.0)
     if state is None and patch.pressure.outcome is not Outcome.NO_CONTACT:
-        with one_thread():
+        with use_one_blas_thread():
             edge_values = _compute_edge_values(patch)
     elif state is not None and state.load > 0:
         edge_values = strips.compute_strip_edge_values(patch)

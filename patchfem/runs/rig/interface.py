@@ -225,7 +225,7 @@ def _compute_shear_modes(patch, law, n_modes: int | None, model) -> tuple:
         )
         force = None
         if has_few_points:
-            reduced, force, _ = shear_modes.fewest_gauss_points(
+            reduced, force, _ = shear_modes.find_fewest_gauss_points(
                 reduced, patch.x[reduced.points], REDUCTION_TOL_FRACTION * tolerance
             )
             force = force / law.static
@@ -260,7 +260,7 @@ def reduce_to_few_points(
         all_modes = fields.bond_shear_modes(patch, law, None, tolerance, fewest=True)
         cache[key] = None
         if all_modes.stiffness.size <= max_modes:
-            reduced, limit, error = shear_modes.modes_on_gauss(
+            reduced, limit, error = shear_modes.modes_at_gauss_points(
                 all_modes, patch.x[all_modes.points], n_points
             )
             whole = all_modes.spectrum.backbone(max(shear_modes.N_REFERENCE_MODES, 4 * max_modes))

@@ -21,7 +21,7 @@ from ...core import PatchfemError, frozen_array
 from ...disk.atomic_write import write_atomically
 from ...effects import describe_unsupported
 from ...wear.depth import wear_rates
-from ...wear.jumps import WearProblem, WearState, replay_jumps, start_wear, take_jump
+from ...wear.jumps import WearProblem, WearState, make_initial_wear_state, replay_jumps, take_jump
 from ..patch.measures import with_other_strip_count
 from ..patch.press import make_contact_force_function, nodal_areas, solve_patch_contact
 from ..patch.values import compute_static_values
@@ -418,7 +418,9 @@ def _make_initial_state(model, patch, problem: WearProblem, motion: _SlipPathFun
 
     They contain the wear of an earlier run only.
     """
-    state = start_wear(problem, model.wear.compute_earlier_depth(patch.x, problem.area))
+    state = make_initial_wear_state(
+        problem, model.wear.compute_earlier_depth(patch.x, problem.area)
+    )
     return state, (_record_moment(patch, state, motion),)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...core import PatchfemError
 from ...structure.drive_sizes import find_drive_omega, find_max_acceleration
-from ...wear.jumps import WearProblem, start_wear, take_jump
+from ...wear.jumps import WearProblem, make_initial_wear_state, take_jump
 from ..cost import Cost
 from .evolve import find_cycle_of_next_table_row
 
@@ -69,7 +69,7 @@ def estimate_jump_count(model) -> int:
         return path * (wear.friction.compute_worn_law(law, mean).static / law.static)
 
     row = WearProblem(springs.press, slip_path, area, wear.coefficient, wear.cycles)
-    state = start_wear(row, wear.compute_earlier_depth(x, area))
+    state = make_initial_wear_state(row, wear.compute_earlier_depth(x, area))
     jumps = 0
     while state.cycle < wear.cycles and jumps < MAX_COUNTED_JUMPS:
         state = take_jump(
