@@ -139,18 +139,6 @@ def test_exact_backbone_of_cubic_spring_agrees_with_duffing():
     assert backbone.curves["balance"].damping == pytest.approx(0.002 * OMEGA / omega, rel=1e-5)
 
 
-def test_flutter_amplitude_agrees_with_that_of_a_run():
-    """The amplitude at which the damping falls through 0 agrees with the flutter amplitude within 1 %."""
-    rig = pf.build(make_shaken_block(PLASTIC), **{"structure.mode.axial.damping": -0.01})
-    backbone = compute_backbone(rig, "", np.geomspace(2e-3, 2e-2, 25), ("balance",))
-    free = make_shaken_block(PLASTIC).replace(
-        'kind = "base"\nfrequency = "100 Hz"\nacceleration = "1 g"',
-        'kind = "free"\ndisplacement = "1 mm"',
-    )
-    measure = pf.run(free, **{"structure.mode.axial.damping": -0.01}).measures["flutter_amplitude"]
-    assert backbone.flutter == pytest.approx(measure.value, rel=0.01)
-
-
 def test_modes_are_selected_by_name_and_matched_by_shape():
     """The stuck mode with the largest part of a named mode is selected, whatever its order in frequency."""
     scene = make_shaken_block('law = "elastic-plastic"\nbond_length = "1 um"').replace(

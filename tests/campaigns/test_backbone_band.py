@@ -241,7 +241,7 @@ def test_new_joint_scene_has_a_backbone(tmp_path, monkeypatch, capsys):
                     "--json",
                     "--no-page",
                     "--amplitudes",
-                    "9 um..1 mm:9",
+                    "9 um..1 mm:5",
                     *options,
                 ]
             )

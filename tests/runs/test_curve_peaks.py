@@ -151,7 +151,7 @@ def error_ratios(seed: int) -> list:
     return ratios
 
 
-@pytest.mark.share(1, 5)
+@pytest.mark.share(5)
 @pytest.mark.parametrize("seed", range(FIRST_SEED, FIRST_SEED + SEED_COUNT))
 def test_always_peak_of_random_rig_is_within_errors(seed):
     """The peak of the curve agrees with sine runs within its errors. The largest ratio of true to

@@ -316,7 +316,7 @@ def test_always_unbounded_motion_has_no_wear():
         assert any("nothing was worn" in line for line in result.warnings)
 
 
-@pytest.mark.share(0, 1, 4)
+@pytest.mark.share(1, 4)
 @pytest.mark.parametrize(
     "text",
     [

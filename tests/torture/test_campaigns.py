@@ -16,7 +16,7 @@ ALWAYS = {
     "grammar": 0.0005,
     "bytes": 0.001,
     "words": 0.003,
-    "energy": 0.003,
+    "energy": 0.002,
     "profiles": 0.002,
     "signals": 0.002,
     "paths": 0.003,
