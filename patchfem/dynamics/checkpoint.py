@@ -57,7 +57,7 @@ class CheckpointFiles:
 
 @contextmanager
 def store_checkpoints(files: CheckpointFiles | None) -> Iterator[None]:
-    """Set the checkpoint files of all marches in this context; None disables checkpoints."""
+    """Set the checkpoint files of the marches in this context; None disables checkpoints."""
     token = _FILES.set(files)
     try:
         yield
@@ -87,7 +87,7 @@ class MarchSamples:
     - extremes: smallest and largest output [m] of every cycle
     - phasors: phasor [m] of every cycle
     - is_restarted: whether the march was started a second time, cycle by cycle
-    - marks: for each mark that was passed, the march at that time, the cycles before it and their
+    - marks: for each mark already reached, the march at that time, the cycles before it and their
       extremes
     """
 

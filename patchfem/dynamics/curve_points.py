@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 # Smallest reference value of relative errors, relative to the largest value of the curve; it is
-# needed where a curve starts from 0.
+# needed if a curve starts from 0.
 MIN_VALUE_RATIO = 1e-3
 # Smallest interval that is halved, relative to its abscissa; it ends the refinement at a jump.
 MIN_INTERVAL_RATIO = 1e-6

@@ -29,8 +29,8 @@ def mean_slip_phase(count, cosine, sine):
     -------
     array_like
     """
-    told = (count > 0) & (np.hypot(cosine, sine) >= MIN_ALIGNMENT * count)
-    return np.where(told, np.arctan2(sine, cosine) / 2 % np.pi, np.nan)[()]
+    have_common_phase = (count > 0) & (np.hypot(cosine, sine) >= MIN_ALIGNMENT * count)
+    return np.where(have_common_phase, np.arctan2(sine, cosine) / 2 % np.pi, np.nan)[()]
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -171,10 +171,10 @@ def trace_relay_backbone(modes: ModalBasis, row, forces: tuple, amplitudes, mode
     Returns
     -------
     list
-        (LimitCycle, damping ratio) at each amplitude, or None where the interface would stick.
+        (LimitCycle, damping ratio) at each amplitude, or None if the interface would stick.
     """
 
-    def cycle(log_rate: float):
+    def solve_cycle(log_rate: float):
         undamped_modes = replace(
             modes,
             damping=modes.damping_matrix
@@ -197,19 +197,19 @@ def trace_relay_backbone(modes: ModalBasis, row, forces: tuple, amplitudes, mode
     max_rate = 2 * MAX_FIRST_RATIO * modes.omega[mode]
     dampings = [None] * len(rates)
     for k in np.flatnonzero((rates > 0) & (rates <= max_rate)):
-        dampings[k] = _solve_damping(cycle, float(amplitudes[k]), modal_rate, float(rates[k]))
+        dampings[k] = _solve_damping(solve_cycle, float(amplitudes[k]), modal_rate, float(rates[k]))
     return dampings
 
 
 def _solve_damping(
-    cycle, amplitude: float, modal_rate: float, friction_rate: float
+    solve_cycle, amplitude: float, modal_rate: float, friction_rate: float
 ) -> tuple | None:
     """Return the limit cycle and damping ratio of an amplitude [m] by the secant method.
 
     modal_rate: damping rate of the mode [1/s]; friction_rate: guess of the damping rate of friction [1/s].
     """
     log_rates = np.log([friction_rate, 1.01 * friction_rate])
-    cycles = [cycle(limit_cycle) for limit_cycle in log_rates]
+    cycles = [solve_cycle(log_rate) for log_rate in log_rates]
     for _ in range(MAX_SECANT_STEPS):
         if None in cycles:
             return None
@@ -223,7 +223,7 @@ def _solve_damping(
                 - log_errors[1] * (log_rates[1] - log_rates[0]) / (log_errors[1] - log_errors[0]),
             ]
         )
-        cycles = [cycles[1], cycle(log_rates[1])]
+        cycles = [cycles[1], solve_cycle(log_rates[1])]
     return None
 
 

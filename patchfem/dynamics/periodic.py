@@ -81,7 +81,7 @@ class MappedPoint:
     def newton_step(self) -> np.ndarray:
         """Return the Newton step (m,) towards the fixed point of the map.
 
-        It is a least-squares step where the rest position of an interface is not unique.
+        It is a least-squares step if the rest position of an interface is not unique.
 
         """
         scale = self.scale
@@ -236,7 +236,7 @@ class Shooting:
 def solve_linear(matrix):
     """Return a function that solves a linear system with a matrix (n, n) for right sides b.
 
-    The solution is that of least squares if the matrix is singular, as where nothing determines a mean
+    The least-squares solution is returned if the matrix is singular, for example if nothing determines a mean
     displacement or a rest position.
     """
     factors, pivots, _ = dgetrf(matrix)

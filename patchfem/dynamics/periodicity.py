@@ -1,4 +1,4 @@
-"""Schedule and error bound for the check whether a marched motion has become periodic.
+"""Schedule and error bound of the check whether a motion has become periodic.
 
 The remaining cycles of a periodic motion equal the last one and need not be computed.
 

@@ -35,7 +35,7 @@ class Propagator:
 
     free (4, n): z and z' at the end per z and z' at the start (zz, zv, vz, vv); push (2, n): both
     per modal acceleration, constant over the step; dense (2 n, 3 n): the same for (z, z',
-    acceleration) where damping couples the coordinates, else (0, 0). reach (p, 2 n): displacement
+    acceleration) if damping couples the coordinates, else (0, 0). reach (p, 2 n): displacement
     of every port in a free motion; beta (p, p) [m/N]: displacement of the ports against unit port
     forces; rows (p, n): the ports. loss (6, n) or dense_loss (3 n, 3 n): viscous loss of a step as
     a quadratic form of (z, z', acceleration). drive: see `tables`; steps: number per period.
@@ -103,7 +103,7 @@ class Propagator:
 def make_propagator(modes: ModalBasis, drive, steps_per_cycle: int, rows=None) -> Propagator:
     """Return the propagator of the modes for equal steps of a drive period.
 
-    Steps of large omega dt use up to MAX_GAUSS_POINTS Gauss points; where these do not suffice, a
+    Steps of large omega dt use up to MAX_GAUSS_POINTS Gauss points; if these do not suffice, a
     short step is doubled. The last few propagators are cached, because the runs that estimate
     errors use the same ones again.
 
@@ -283,7 +283,7 @@ def _integrate_by_doubling(modes: ModalBasis, dt: float, fastest: float, slowest
 def free_motion(modes: ModalBasis, times) -> tuple:
     """Return the blocks zz, zv, vz, vv of the modal transition matrix after given times (k,).
 
-    Each has the shape (k, n), or (k, n, n) where damping couples the coordinates.
+    Each has the shape (k, n), or (k, n, n) if damping couples the coordinates.
     """
     times = np.asarray(times, float)
     if modes.damping is None:
@@ -349,7 +349,7 @@ def matrix_exponentials(a) -> np.ndarray:
 def _motion_per_acceleration(modes: ModalBasis, dt: float, nodes, weight) -> tuple:
     """Return the modal coordinate and rate after dt [s] per constant modal acceleration.
 
-    Each has the shape (n,), or (n, n) where damping couples the coordinates. The first one is the
+    Each has the shape (n,), or (n, n) if damping couples the coordinates. The first one is the
     integral of zv, which avoids cancellation in a short step.
     """
     return np.tensordot(weight, free_motion(modes, nodes)[1], 1), free_motion(

@@ -1,4 +1,4 @@
-"""Estimates of the CPU time of the event engine as interpreted Python.
+"""Estimates of the CPU time of the event engine in interpreted Python.
 
 The engine decides by it whether to compile its loop.
 

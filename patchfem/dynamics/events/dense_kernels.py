@@ -22,7 +22,7 @@ from .stick_kernels import constrain_slides
 def expand_row(row, h, run):
     """Expand the motion of a recorded time interval as power series into the workspace.
 
-    The constraint is built again where other interfaces stick than in the row before;
+    The constraint is built again if other interfaces stick than in the row before;
     constraint.status[ConstraintStatus.N_STICKING] < 0 requests it.
 
     Parameters
@@ -148,7 +148,7 @@ def find_peaks(rows, base_moves, run, reactions):
     ----------
     rows
     base_moves : float
-        1 where the acceleration of the base counts, else 0.
+        1 if the acceleration of the base counts, else 0.
     run : RunArrays
     reactions : ndarray
         (i,) becomes the largest reaction [N] of every interface while its rigid element sticks.

@@ -1,4 +1,4 @@
-"""Parallel friction elements of interfaces, rigid and elastic-plastic, and their memory.
+"""Parallel rigid and elastic-plastic friction elements of interfaces, and their memory.
 
 All elements share the relative displacement of their interface. The elastic-plastic ones are
 sorted by yield slide, the stretch at which they slip.
@@ -176,7 +176,7 @@ class ElementTable(NamedTuple):
     - yield_slide: (i, t + 1) [m], infinite after the last element
     - stiffness_sum, limit_sum, energy_sum: (i, t + 1) sums of k [N/m], k y [N] and k y^2 [J] over
       the first j elements
-    - static_limit, kinetic_limit: (i,) limits of the rigid elements [N], 0 where there is none
+    - static_limit, kinetic_limit: (i,) limits of the rigid elements [N], 0 if there is none
     """
 
     n_elements: np.ndarray

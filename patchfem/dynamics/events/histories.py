@@ -81,7 +81,7 @@ class EventRunResult:
     - phasors: (c,) output at the frequency of the drive in the last cycle of every window [m], 0 in
       the other cycles
     - ledger: energies [J] by name
-    - outcome: None where the run reached its end
+    - outcome: None if the run reached its end
     - reading: measures of the window
     - events: number of pieces
     - cycles_done: cycles that were computed
@@ -258,7 +258,7 @@ def simulate(
     Returns
     -------
     EventRunResult
-        Its outcome is set only where the output passed the travel.
+        Its outcome is set only if the output passed the travel.
 
     Raises
     ------
@@ -550,10 +550,10 @@ class _EventRun:
         """Compute one cycle of a repeating motion and let it stand for the following cycles.
 
         The last cycle is number `end`, or the one before the next segment of the drive. The
-        cycles are computed one by one where that cycle needs more than `rows`.
+        cycles are computed one by one if that cycle needs more than `rows`.
 
         The border is the cycle number `end`, or the next segment of the drive. The cycles are
-        computed one by one where that cycle needs more than `rows`.
+        computed one by one if that cycle needs more than `rows`.
         """
         run_sums = self.run_sums
         begin = int(self.time_state.now[Time.CYCLE])
@@ -593,7 +593,7 @@ class _EventRun:
     def _repeat_rows(
         self, rows, n_cycles: int, first_event: int, n_earlier_events: int, gains
     ) -> None:
-        """Append shifted copies of the rows (k, w) and events of a cycle for `n_cycles` more cycles.
+        """Append shifted copies of the rows (k, w) and events of a cycle for `n_cycles` further cycles.
 
         first_event: index of its first event array; n_earlier_events: events before it; gains: work and loss (i,) [J]
         of the elements in a cycle. Rows are kept for at most MAX_REPEATED_CYCLES cycles.
@@ -671,7 +671,7 @@ class _EventRun:
     def run(self, frames: int, progress, *, even: bool = False) -> EventRunResult | None:
         """March the run to its end and return the result with histories.
 
-        Returns None where the output passed the travel. The parameters are those of `simulate`.
+        Returns None if the output passed the travel. The parameters are those of `simulate`.
         """
         end = self.cycles
         early_rows = []
@@ -877,7 +877,7 @@ class _EventRun:
     def sample_rows(self, rows, grid) -> Response:
         """Return histories on a time grid (k,) [s] and at reversals, stops and releases.
 
-        The force of rigid elements jumps, so there are samples on both sides of their events.
+        The force of rigid elements jumps at their events, so there are samples on both sides.
         """
         slipping = rows[:, self._column_index(0, Column.SLIPPING) :: N_COLUMNS] >= SLIP_FRACTION
         is_jump = (rows[:, Row.BEGIN] > ROW_BEGIN.reversal) & self.has_rigid

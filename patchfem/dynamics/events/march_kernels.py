@@ -368,7 +368,7 @@ def choose_current_sticks(run):
 def choose_initial_sticks(run):
     """Choose which interfaces stick at the start of a run.
 
-    The guess is that a rigid element sticks where its interface is at rest.
+    The guess is that a rigid element sticks if its interface is at rest.
 
     Parameters
     ----------

@@ -53,7 +53,7 @@ def next_yield_slide(interface, direction, table, memory):
     Returns
     -------
     float
-        +-NO_YIELD where all elements slip.
+        +-NO_YIELD if all elements slip.
     """
     first = memory.n_slipping[interface]
     if first >= table.n_elements[interface]:
@@ -128,7 +128,7 @@ def is_sticking(interface, table, memory):
 def rigid_friction_force(interface, table, memory):
     """Return the friction force of the rigid element of an interface [N].
 
-    It is the kinetic limit in slip, and the static limit where other elements hold the relative
+    It is the kinetic limit in slip, and the static limit if other elements hold the relative
     displacement. It is 0 in stick, where the constraint determines the reaction, and without a
     rigid element.
 

@@ -97,7 +97,7 @@ class TimeState(NamedTuple):
     - now: (6,) time and what the march notes of it, see `Time`
     - segments: (p, 12) segments of the drive, see `Segment`
     - period: (1,) duration of a cycle [s]
-    - is_at_reversal: (i + 1,) 1 where an interface, or last the output, is at rest at a reversal
+    - is_at_reversal: (i + 1,) 1 if an interface, or last the output, is at rest at a reversal
     """
 
     now: np.ndarray
@@ -302,13 +302,13 @@ class Constraint(NamedTuple):
 
     It is built by `stick_kernels.constrain_slides`.
 
-    - is_sticking: (i,) 1 where the rigid element of an interface sticks
+    - is_sticking: (i,) 1 if the rigid element of an interface sticks
     - status: (2,) see `ConstraintStatus`
     - basis: (i, n) orthogonal rows that span those of the sticking interfaces, 0 in the dependent
       ones
     - inverse: (i, n) transposed pseudo-inverse of the rows of the sticking interfaces, 0 in the
       others
-    - is_tied: (i,) 1 where the sticking interfaces hold this one too
+    - is_tied: (i,) 1 if the sticking interfaces also prevent motion at this one
     - reactions: (i, terms) series of the reactions [N] over a piece
     - matrix: (i, i) the transformation to `basis`, or a matrix to solve with
     - scratch: (2, i)
@@ -325,11 +325,11 @@ class Constraint(NamedTuple):
 
 
 class Choice(NamedTuple):
-    """State of the search for the interfaces that stick after an event.
+    """Workspace of the search for the interfaces that stick after an event.
 
     The search is `stick_kernels.choose_sticks`.
 
-    - is_resting: (i,) 1 where an interface with a rigid element has no velocity
+    - is_resting: (i,) 1 if an interface with a rigid element has no velocity
     - slip_signs, guess: (i,) directions of slip, 0 in stick, at first and as they are tried
     - orders: (i, 2) orders of the terms that vanish where the next piece begins, -1 before the
       first choice

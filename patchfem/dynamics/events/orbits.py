@@ -65,7 +65,7 @@ class PeriodicMotionFinder:
     def replace_system(self, modes: ModalBasis, groups) -> bool:
         """Replace the modes and the friction elements, keeping the workspace.
 
-        Returns False where they do not fit.
+        Returns False if they do not fit.
         """
         fits = self.period_map.replace_system(modes, groups)
         if fits:
@@ -114,7 +114,7 @@ class PeriodicMotionFinder:
     def _march_half_period(self, drive, point: PoincarePoint, modal_system) -> tuple:
         """March half a period; return the number of time intervals and the peak output [m].
 
-        The pieces are left in `rows`; the other half of the period changes sign.
+        The time intervals are stored in `rows`; the other half of the period changes sign.
         """
         period_map = self.period_map
         run_sums = self.run_sums

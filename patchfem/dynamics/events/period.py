@@ -37,7 +37,7 @@ class PoincarePoint(NamedTuple):
 
     - motion: (2 n,) modal coordinates [m] and rates [m/s]
     - memory: of the elements
-    - known: reversals, None where they are not computed yet
+    - known: reversals, None if they are not computed yet
     """
 
     motion: np.ndarray

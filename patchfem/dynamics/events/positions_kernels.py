@@ -19,7 +19,7 @@ class Segment(IntEnum):
     - OMEGA, PHASE: angular frequency [rad/s] and phase [rad], both at the start of the first cycle
       of a sine, or at the start of a sweep
     - SLOPE: of the line [m s-3], of omega [rad/s2], or of the logarithm of omega [1/s]
-    - IS_DISPLACEMENT: 1 where the amplitude is a displacement
+    - IS_DISPLACEMENT: 1 if the amplitude is a displacement
     - RATE: largest rate [1/s]
     - TURNS, TURNS_REMAINDER: what the revolutions per cycle exceed a whole number by, in two parts;
       the first has 24 bits, so its product with a number of cycles is exact and the phase keeps its
@@ -149,7 +149,7 @@ class Time(IntEnum):
     - CYCLE, OFFSET: number of the cycle, and time since it began [s]
     - SEGMENT: number of the segment of the drive
     - BEGIN: what begins the next row, a number of `RowBegins`
-    - IS_PAUSED: 1 where the march stopped because no row was free
+    - IS_PAUSED: 1 if the march stopped because no row was free
     """
 
     CYCLE = 0
@@ -167,7 +167,7 @@ class Ledger(IntEnum):
     - FRICTION_WORK, FRICTION_LOSS: work done on the interfaces, and energy dissipated there
     - MAX_STORED: largest energy of modes and elements
     - N_PIECES: number of pieces
-    - HAS_SLIPPED: 1 where half or more of an interface has slipped
+    - HAS_SLIPPED: 1 if half or more of an interface has slipped
     """
 
     DRIVE_WORK = 0
@@ -194,9 +194,9 @@ class Limit(IntEnum):
 class ConstraintStatus(IntEnum):
     """Indices of the entries of `Constraint.status`.
 
-    - N_STICKING: number of interfaces whose rigid elements stick; below 0 where the constraint is
+    - N_STICKING: number of interfaces whose rigid elements stick; below 0 if the constraint is
       to be built again
-    - IS_IMMOBILE: 1 where they leave no motion of the modes
+    - IS_IMMOBILE: 1 if they leave no motion of the modes
     """
 
     N_STICKING = 0
@@ -208,7 +208,7 @@ class PreviousStatus(IntEnum):
 
     - SEGMENT: of the drive then, -1 before there is a state
     - LAST_DISTANT: last cycle at whose end the state was far from that of the cycle before
-    - REPEATS: 1 where the motion repeats to the last bit
+    - REPEATS: 1 if the motion repeats to the last bit
     """
 
     SEGMENT = 0

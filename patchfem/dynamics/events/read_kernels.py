@@ -1,4 +1,4 @@
-"""Measures of the last cycles of a run, from its recorded time intervals (compiled).
+"""Measures of the last cycles of a run from its recorded time intervals (compiled).
 
 Every measure is an integral or an extremum of the series of the pieces; nothing is sampled.
 """
@@ -124,7 +124,7 @@ def find_peak_acceleration(top, h, base_moves, largest, run):
     h : float
         Duration of the piece [s].
     base_moves : float
-        1 where the base moves, else 0.
+        1 if the base moves, else 0.
     largest : float
         A lower bound of the result [m s-2].
     run : RunArrays
@@ -316,7 +316,7 @@ def find_reversal_force(rows, j, interface, modal_system, min_motion):
     Returns
     -------
     float
-        NaN where the force jumps and one of both is unknown.
+        NaN if the force jumps and one of both is unknown.
     """
     n_rows = rows.shape[0] - 1
     row_before = j - 1
@@ -591,7 +591,7 @@ def read_rows(rows, cycles, base_moves, run, run_values, interface_values):
     cycles : int
         Whole cycles among them; each ends with a piece.
     base_moves : float
-        1 where the acceleration of the base counts, else 0.
+        1 if the acceleration of the base counts, else 0.
     run : RunArrays
     run_values : ndarray
         (13,) see `RunMeasure`.

@@ -56,7 +56,7 @@ class Reading:
         )
 
     @property
-    def start(self):
+    def slip_start_phase(self):
         """Mean phase [rad] modulo pi at which the first interface starts to slip.
 
         See `mean_slip_phase`.
@@ -94,7 +94,7 @@ class Reading:
         )[()]
 
     @property
-    def rise(self):
+    def force_increase(self):
         """Increase of the mean friction force magnitude of the first interface [N].
 
         It is that of the last cycle minus that of the first.
@@ -147,7 +147,7 @@ def find_stick_vibration(modal_system, table, reading: Reading) -> tuple | None:
     -------
     tuple or None
         Amplitude [m s-2], frequency [rad/s] and damping ratio. They have a closed form for a
-        single element; the amplitude is 0 where nothing vibrates, or where the sticks of many
+        single element; the amplitude is 0 if nothing vibrates, or if the sticks of many
         elements are too short. None where samples must tell.
     """
     if table.n_elements[0] > 1:

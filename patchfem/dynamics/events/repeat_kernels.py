@@ -1,8 +1,8 @@
-"""Detection of a motion that repeats bit by bit, which ends the transient (compiled).
+"""Detection of a bitwise repeating motion, which ends the transient (compiled).
 
-A steady motion would continue to differ from cycle to cycle by round-off alone. Where the state at
-the end of a cycle equals that of the cycle before within REPEAT_TOL, it takes the digits of that
-state. From there on every cycle is the same bit by bit, so a caller may count cycles instead of
+A steady motion would continue to differ from cycle to cycle by round-off alone. If the state at
+the end of a cycle equals that of the previous cycle within REPEAT_TOL, it is replaced by that
+state. All later cycles are then bitwise equal, so a caller may count cycles instead of
 computing them. The rate of approach bounds the remaining change: states that
 came from APPROACH_TOL to REPEAT_TOL of each other in n cycles change by at most REPEAT_TOL
 n/ln(APPROACH_TOL/REPEAT_TOL) more.
@@ -35,7 +35,7 @@ def measure_cycle_change(run):
     Returns
     -------
     change : float
-        [m]; 1e300 where other elements slip, or where the drive is no sine.
+        [m]; 1e300 if other elements slip, or if the drive is no sine.
     size : float
         [m].
     """
@@ -94,10 +94,10 @@ def clear_previous_cycle(previous):
 def detect_repeat(run):
     """Return whether the motion begins to repeat at the present cycle end.
 
-    It does where the state equals that of the previous cycle to round-off for the first time.
+    It does if the state equals that of the previous cycle to round-off for the first time.
 
-    There and at all later ends of cycles the state takes the digits of the previous one; elsewhere
-    the state is stored.
+    At this and all later cycle ends the state is replaced by the previous one; otherwise the state
+    is stored.
 
     Parameters
     ----------

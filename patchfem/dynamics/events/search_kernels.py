@@ -23,7 +23,7 @@ ACCELERATION_TOL = 1e-14
 class NextEvent(NamedTuple):
     """First event in a time interval.
 
-    - u: fraction of the piece; 1 where no event ends the piece, 0 where the elements change before
+    - u: fraction of the piece; 1 if no event ends the piece, 0 if the elements change before
       anything moves
     - kind: a number of `EventKinds`
     - interface: its number
@@ -55,7 +55,7 @@ def find_initial_direction(poly, top, is_at_rest):
     -------
     order : int
     sign : float
-        0 where all terms are round-off.
+        0 if all terms are round-off.
     """
     if not is_at_rest and poly[0] != 0.0:
         return 0, 1.0 if poly[0] > 0 else -1.0
@@ -119,7 +119,7 @@ def integrate_speed(poly, top, u):
 def find_crossing(poly, top, distance, limit, scratch):
     """Return the fraction of a time interval at which a given displacement is reached.
 
-    It is NO_ROOT where it is not reached up to `limit`.
+    It is NO_ROOT if it is not reached up to `limit`.
 
     Parameters
     ----------
@@ -168,7 +168,7 @@ def find_release(interface, top, limit, workspace):
     Returns
     -------
     u : float
-        NO_ROOT where it does not.
+        NO_ROOT if it does not.
     sign : float
         Sign of the slip that follows.
     """
@@ -207,7 +207,7 @@ def find_release(interface, top, limit, workspace):
 def find_speed_root(order, direction, poly, top, workspace):
     """Return the fraction of a time interval at which a velocity first changes its sign.
 
-    It is NO_ROOT where the velocity keeps its sign.
+    It is NO_ROOT if the velocity keeps its sign.
 
     Parameters
     ----------
@@ -237,7 +237,7 @@ def find_speed_root(order, direction, poly, top, workspace):
 def find_stop(interface, direction, poly, top, workspace):
     """Return the fraction of a time interval at which a rigid slipping element stops.
 
-    It is NO_ROOT where the element does not stop.
+    It is NO_ROOT if the element does not stop.
 
     Parameters
     ----------

@@ -147,7 +147,7 @@ def bound_fastest_rate(modal_system, springs):
 def bound_modal_rate(modal_system, workspace):
     """Return an upper bound [1/s] of the present modal rates.
 
-    It is that of `bound_fastest_rate` for workspace.stiffness, and 0 where the sticking
+    It is that of `bound_fastest_rate` for workspace.stiffness, and 0 if the sticking
     interfaces leave no motion.
     """
     if workspace.constraint.status[ConstraintStatus.IS_IMMOBILE] == 1.0:
@@ -254,7 +254,7 @@ def expand_two_modes(start, series, h, top, modal_system, spring):
 
 @njit(**NJIT_KERNEL)
 def expand_immobile(start, series, top, modal_system, workspace):
-    """Expand reactions as power series where the sticking interfaces prevent all motion.
+    """Expand reactions as power series if the sticking interfaces prevent all motion.
 
     Only the reactions depend on time.
 
@@ -710,7 +710,7 @@ def _halve_interval(hull, half, degree, first):
 def _take_right_half(hulls, depth, width, degree):
     """Return depth and width of the next right half of the search for a root.
 
-    The depth is 0 where no half remains.
+    The depth is 0 if no half remains.
     """
     while depth > 0 and hulls[depth, N_HULL_COLUMNS - 1] == 1.0:
         depth -= 1

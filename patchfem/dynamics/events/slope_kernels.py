@@ -1,8 +1,8 @@
 """March from event to event with the derivative of the motion (compiled).
 
-An interface remembers where its relative displacement turned. The force is continuous in those
-places, so nothing jumps at a yield or a reversal, and the derivative over a run is the
-product of the linear flows of its pieces. A reversal may shift in time, but the interface is
+The memory of an interface consists of its reversal displacements. The force is a continuous
+function of them, so nothing jumps at a yield or a reversal, and the derivative over a run is the
+product of the linear flows of its time intervals. A reversal may shift in time, but the interface is
 at rest there, so the derivative of the new reversal displacement is that of the relative displacement.
 """
 
@@ -132,7 +132,7 @@ def march_with_slopes(stop, run, slopes, reversal_slopes, scratch, counts):
     Returns
     -------
     int
-        Number of pieces, -1 where events follow each other without progress.
+        Number of pieces, -1 if events follow each other without progress.
     """
     memory = run.memory
     time_state = run.time_state

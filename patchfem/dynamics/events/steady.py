@@ -31,7 +31,7 @@ class SteadyState:
     - point, start, memory: state at phase 0 of the drive
     - residual: |state after a period - start| relative to the size of the motion
     - multipliers: (m,) complex Floquet multipliers of motion and reversal displacements, the largest first;
-      the motion is stable where all magnitudes are below 1
+      the motion is stable if all magnitudes are below 1
     - amplitude: half the range of the output [m]
     - slipping: fraction of the friction limit of all interfaces that slips within a cycle
     - symmetric: whether it changes sign after half a period
@@ -58,7 +58,7 @@ class SteadyState:
 
     @property
     def regime(self) -> str:
-        """State of the interfaces: "stuck", "partial slip", or "slides" where all of them slip."""
+        """State of the interfaces: "stuck", "partial slip", or "slides" if all of them slip."""
         if self.slipping == 0:
             return "stuck"
         return "slides" if self.slipping > 1 - FULL_SLIP_TOL else "partial slip"
@@ -99,7 +99,7 @@ def continue_to_steady_state(
 ) -> SteadyState:
     """Find the periodic motion that a run from a given state approaches.
 
-    It is that motion if the elements have slipped for the last time.
+    The result is valid if the groups of elements no longer change on the way to that motion.
 
     Parameters
     ----------
@@ -201,7 +201,7 @@ class YieldShooting(Shooting):
         return mapped_point.image.end.with_unknowns(mapped_point.point.unknowns + step)
 
     def march_periods(self, mapped_point: MappedPoint, n_periods: int) -> PoincarePoint:
-        """Return the state after some periods that start at the end of a map."""
+        """Return the state after some periods that follow a mapped period."""
         return self.run(self._make_next_start(mapped_point.image), n_periods)
 
     def run(self, point: PoincarePoint, n_periods: int) -> PoincarePoint:
@@ -211,10 +211,10 @@ class YieldShooting(Shooting):
         return point
 
     def _make_next_start(self, mapping: PeriodMapping) -> PoincarePoint:
-        """Return the end state of a map as the start of the next map.
+        """Return the end state of a mapped period as the start of the next one.
 
-        For a motion that changes sign, the reversal displacements that no slip has passed are left out, as
-        if their elements had never slipped.
+        For a motion that changes sign, reversal displacements that no slip has passed are removed, as if
+        their elements had never slipped.
         """
         if not self.half or not mapping.min_groups.any():
             return mapping.end

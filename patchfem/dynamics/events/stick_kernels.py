@@ -306,9 +306,9 @@ def find_leading_slip_term(interface, sign, noise, modal_system, workspace):
     Returns
     -------
     order : float
-        MAX_DECIDING_ORDER where there is none.
+        MAX_DECIDING_ORDER if there is none.
     sign : float
-        0 where there is none.
+        0 if there is none.
     """
     for k in range(1, MAX_DECIDING_ORDER):
         rate = 0.0
@@ -343,9 +343,9 @@ def find_leading_margin_term(interface, side, noise, limit, workspace):
     Returns
     -------
     order : float
-        MAX_DECIDING_ORDER where there is none.
+        MAX_DECIDING_ORDER if there is none.
     sign : float
-        0 where there is none.
+        0 if there is none.
     """
     for k in range(MAX_DECIDING_ORDER):
         gap = -side * workspace.constraint.reactions[interface, k]
@@ -368,7 +368,7 @@ def find_violation(noise, h, run):
     Returns
     -------
     interface : int
-        -1 where all interfaces obey.
+        -1 if all interfaces obey.
     side : int
         1 or -1: overloaded in this direction; 0: it does not move in the direction of its slip.
     """

@@ -142,7 +142,7 @@ class SampledRun(GroovesRun):
         size_floors[n : 2 * n] = (
             REST_RATIO / g.wave_number * self.smooth_motion.arrays.scalars[Scalar.FASTEST_RATE]
         )
-        self.booked = self._read_sums()
+        self.counted_sums = self._read_sums()
 
     def _read_sums(self) -> np.ndarray:
         """Return the energy sums and the step counter of the smooth motion, (6,).
@@ -213,11 +213,11 @@ class SampledRun(GroovesRun):
         filled_rows[:-1, 2 * n + 7] = work - np.diff(samples[:, 2 * n + 5])
         self.state[:] = motion.arrays.state[: 2 * n].reshape(2, n)
         sums = self._read_sums()
-        self.ledger[LEDGER_SUMS] += sums - self.booked
+        self.ledger[LEDGER_SUMS] += sums - self.counted_sums
         self.ledger[Ledger.MAX_STORED] = max(
             self.ledger[Ledger.MAX_STORED], motion.record.counters[Counter.MAX_STORED]
         )
-        self.booked = sums
+        self.counted_sums = sums
         return last, status
 
     def _sampled_works(self, rows) -> np.ndarray:

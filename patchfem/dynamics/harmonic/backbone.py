@@ -190,7 +190,7 @@ class FreeBalance:
 def _invert_matrices(matrices) -> np.ndarray:
     """Return the inverses of matrices (k, n, n), or pseudoinverses if one is singular.
 
-    A matrix is singular where nothing determines the mean of a coordinate.
+    A matrix is singular if nothing determines the mean of a coordinate.
 
     """
     try:

@@ -16,7 +16,7 @@ def find_regime(periodic: SteadyMotion) -> tuple:
 
     The regimes are "stuck", "partial slip", "slides" and "no friction". The fraction is that of the
     friction limits of all laws. An elastic-plastic element
-    slips where the range of its slide exceeds twice its yield slide, bonds where their slip
+    slips if the range of its slide exceeds twice its yield slide, bonds if their slip
     exceeds STUCK_SLIDE_RATIO bond lengths; a velocity-dependent law always slides.
     """
     slipping_limit = 0.0
@@ -93,7 +93,7 @@ def make_cycle_response(periodic: SteadyMotion, modes, drive, samples: int = 100
     n_samples = samples * max(1, -(-2 * periodic.samples // samples))
     stride = n_samples // samples
 
-    def cycle(values):
+    def sample_cycle(values):
         """Return the samples of one cycle, whose last sample repeats the first one."""
         selected = values[..., ::stride]
         return np.concatenate([selected, selected[..., :1]], axis=-1).T
@@ -108,14 +108,14 @@ def make_cycle_response(periodic: SteadyMotion, modes, drive, samples: int = 100
     floor = base if drive.moving else 0 * base
     return Response(
         np.arange(samples + 1) * (2 * np.pi / omega / samples),
-        cycle(z),
-        cycle(rate),
-        cycle(track.q),
-        cycle(omega * track.rate),
-        cycle(modes.output @ z),
-        cycle(modes.output @ rate),
-        cycle(modes.output @ accel + floor),
-        cycle(floor),
-        cycle(friction_force(group.laws[0], sampled)),
-        cycle(find_slip(track, sampled)),
+        sample_cycle(z),
+        sample_cycle(rate),
+        sample_cycle(track.q),
+        sample_cycle(omega * track.rate),
+        sample_cycle(modes.output @ z),
+        sample_cycle(modes.output @ rate),
+        sample_cycle(modes.output @ accel + floor),
+        sample_cycle(floor),
+        sample_cycle(friction_force(group.laws[0], sampled)),
+        sample_cycle(find_slip(track, sampled)),
     )

@@ -80,7 +80,7 @@ class CorrectedPoint(NamedTuple):
 
 
 class _PathPoint(NamedTuple):
-    """Point of a solution curve with its unit tangent (N + 1,) and arc length.
+    """Point of a solution curve with unit tangent (N + 1,) and arc length.
 
     sign: sign of the determinant of the bordered Jacobian, which changes at a bifurcation.
 
@@ -243,7 +243,7 @@ def correct_point(
     Returns
     -------
     CorrectedPoint or None
-        None where the method does not converge.
+        None if the method does not converge.
     """
     x, p = guess
     last_length = np.inf

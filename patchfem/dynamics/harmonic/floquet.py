@@ -23,7 +23,7 @@ from ..propagator import matrix_exponentials
 
 @dataclass(frozen=True, eq=False, slots=True)
 class TurningPoint:
-    """Perturbed slide at a reversal, which the sticking elements remember.
+    """Perturbed slide at a reversal, on which the force of the sticking elements depends.
 
     - row, cell, share: interface row, cell of the cycle, and position [0, 1] in this cell
     - hold: (N,) force in each cell per perturbation of the slide at the reversal [N/m]

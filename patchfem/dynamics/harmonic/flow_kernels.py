@@ -53,12 +53,12 @@ def solve_cycle(num, q, speed, dt, z, steps, force, slopes):
             )
             kept *= steps[0, i]
             largest = max(largest, abs(now))
-        miss = abs(now - start)
+        mismatch = abs(now - start)
         # The iteration ends when the periodicity error has reached
         # round-off or no longer decreases.
-        if miss <= 1e-14 * largest * min(1 - kept, 1.0) or (turn > 2 and miss > 0.5 * last):
+        if mismatch <= 1e-14 * largest * min(1 - kept, 1.0) or (turn > 2 and mismatch > 0.5 * last):
             break
-        last = miss
+        last = mismatch
         start += (now - start) / (1 - kept) if turn and kept < 1 - 1e-9 else now - start
     for i in range(n):
         direction = 1.0 if speed[i] > 0 else -1.0

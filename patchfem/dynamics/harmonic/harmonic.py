@@ -167,7 +167,7 @@ class HarmonicBalance:
 
     If the rows are linearly dependent, the unknowns are `rank` combinations
     y of the slides, q = lift y. The unknowns are the packed harmonics of y, then the coordinates without
-    receptance. PatchfemError is raised where no mode moves the rows.
+    receptance. PatchfemError is raised if no mode moves the rows.
     """
 
     def __init__(self, modes: ModalBasis, rows, contact):

@@ -1,7 +1,7 @@
 """Periodic motions by time marching with extrapolation, and their Floquet multipliers.
 
 A motion is marched, and every few cycles the limit of its states is extrapolated from their
-differences: reduced rank extrapolation, which is exact where a perturbation decays linearly
+differences: reduced rank extrapolation, which is exact if a perturbation decays linearly
 (Sidi, J. Comput. Appl. Math. 36, 305, 1991). The memory of the contact adapts in the cycles
 between. Elements that slip a little further in every cycle come to rest by themselves; after an
 extrapolation that did not reduce the change per cycle, the next one is postponed.
@@ -39,7 +39,7 @@ MIN_PERTURBATION_RATIO = 1e-5
 
 
 def march_to_periodic(run) -> float:
-    """March a run to its periodic motion; return the relative change in the last cycle.
+    """Integrate a run until its motion is periodic; return the relative change in the last cycle.
 
     The change exceeds PERIODIC_TOL if no periodic motion is reached within MAX_CYCLES; `run.outcome` is set
     if the march ended early.
@@ -96,8 +96,8 @@ def estimate_multipliers(run) -> np.ndarray:
     """Estimate the Floquet multipliers (2 n,) of a periodic march by perturbed marches.
 
     They are in decreasing magnitude. Each march perturbs one number of the present state. In the first
-    N_SETTLING_CYCLES the memory of the contact adapts; the map of a cycle is fitted to the cycles that
-    follow in least squares. Memories that fade slowly bias the fit: no multiplier counts as larger
+    N_SETTLING_CYCLES the memory of the contact adapts; the map of a cycle is a least-squares
+    fit to the following cycles. Memories that fade slowly bias the fit: no multiplier counts as larger
     than 1 unless the perturbation grew as much.
     """
     state = _scaled_state(run)

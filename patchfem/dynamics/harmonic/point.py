@@ -53,12 +53,12 @@ class SteadyMotion:
       `group`
     - modal: (K + 1, n) modal harmonics [m]
     - harmonics, samples: H that were solved for (K >= H), and samples per cycle
-    - residual: rms of the unbalanced force in time, on twice the samples, over the rms
-      of the force
+    - residual: rms of the unbalanced force at twice the samples, relative to the rms of the
+      force
     - error: relative error of the motion
     - iterations: number of Newton steps
     - unknowns: (N,) unknowns of the balance, the initial guess for a neighbouring motion
-    - left: relative change that further sweeps of the higher harmonics would make
+    - remaining_change: relative change that further sweeps of the higher harmonics would make
     - stable, multipliers: None until they are computed
     """
 
@@ -74,7 +74,7 @@ class SteadyMotion:
     iterations: int
     unknowns: np.ndarray
     group: LawGroup
-    left: float = 0.0
+    remaining_change: float = 0.0
     stable: bool | None = None
     multipliers: np.ndarray | None = None
 
@@ -596,20 +596,20 @@ def _make_steady_motion(
     q = q[:, : n_harmonics + 1]
     sampled_forces = group.compute_forces(q, omega, 2 * samples)
     force_harmonics = group.compute_force_harmonics(q, omega, n_harmonics, samples)
-    left = sampled_forces - evaluate_series(force_harmonics, 2 * samples)
+    imbalance = sampled_forces - evaluate_series(force_harmonics, 2 * samples)
     scale = float(np.sqrt(np.mean(sampled_forces**2)))
-    residual = float(np.sqrt(np.mean(left**2))) / scale if scale > 0 else 0.0
+    residual = float(np.sqrt(np.mean(imbalance**2))) / scale if scale > 0 else 0.0
     z = balance.compute_modal_motion(x, omega, level, h, force_harmonics)
     error = max(changes)
-    left = 0.0
+    remaining_change = 0.0
     if n_harmonics > h:
         # The error of the unfinished sweeps is that of a geometric series. The harmonics above
         # n_harmonics decrease like k^-5/2.
         ratio = 0.9
         if len(changes) > 3:
             ratio = min((changes[-2] / changes[1]) ** (1 / (len(changes) - 3)), ratio)
-        left = changes[-2] * ratio / (1 - ratio)
-        error = 2 * (changes[-1] + left + max(changes) * (h / n_harmonics) ** 2.5)
+        remaining_change = changes[-2] * ratio / (1 - ratio)
+        error = 2 * (changes[-1] + remaining_change + max(changes) * (h / n_harmonics) ** 2.5)
     size = max(size, 1e-300)
     return SteadyMotion(
         omega,
@@ -624,5 +624,5 @@ def _make_steady_motion(
         count,
         x,
         group,
-        left / size,
+        remaining_change / size,
     )

@@ -7,7 +7,7 @@ amplitudes, and that of the mode without the contact at large ones. The damping 
 of 2 pi m omega^2 z z. Where a law follows Masing's rule the loop is its curve of first loading, twice
 as large: one static curve gives both (Festjens, Chevallier and Dion 2013, with the distribution of the
 force updated by the deflection; Lacayo and Allen 2019). A force with the fixed shape of the stuck mode
-would not tend to the free mode where several modes move the contact.
+would not tend to the free mode if several modes move the contact.
 """
 
 from itertools import chain
@@ -132,7 +132,7 @@ def find_static_motions(
     Returns
     -------
     list of StaticMotion
-        One motion per amplitude, with NaN where no equilibrium is found.
+        One motion per amplitude, with NaN if no equilibrium is found.
 
     Raises
     ------

@@ -78,7 +78,7 @@ def _weigh_samples(track, sampled):
     """Return the weights (N,) of the later sample in the mean stiffness of each cell.
 
     The mean is the secant of the force over the cell, or follows the position of a reversal in
-    it; the weight is 0.5 where the force does not depend on the slide alone.
+    it; the weight is 0.5 if the force does not depend on the slide alone.
     """
     if sampled.slope is None:
         return 0.5
@@ -118,7 +118,7 @@ def _find_cell_positions(track) -> np.ndarray:
 
 
 def _make_turning_points(row: int, track, hold, weights, slope) -> list:
-    """Return the reversals of a slide that the sticking elements remember.
+    """Return the reversals of a slide on which the sticking elements depend.
 
     The list has no reversal whose elements never slip. In the cell of a reversal its stiffness does not act yet:
     the slide has not left it by more than the

@@ -14,8 +14,8 @@ def find_one_harmonic_roots(balance, omega: float, level: float, count: int = 24
 
     The search covers 1e-7 to 1e4 times the linear motion in the absence of contact.
 
-    The balance is scanned over the amplitude along that linear motion; this is exact for one
-    row and an initial guess for more. None is found where an undamped mode is driven at its natural
+    The balance is sampled at amplitudes of that linear motion. The result is exact for one row and an
+    initial guess for several. None is found if an undamped mode is driven at its natural
     frequency.
 
     Parameters
@@ -41,21 +41,21 @@ def find_one_harmonic_roots(balance, omega: float, level: float, count: int = 24
     direction = linear / size
     receptance = force_to_slide @ balance.rows.T / balance.modes.mass
 
-    def left(log):
+    def find_linear_motion(log):
         q = np.zeros((balance.lift.shape[0], 2), complex)
         q[:, 1] = balance.lift @ direction * np.exp(log)
         force = balance.contact.compute_force_harmonics(q, omega, 1, N_SAMPLES)[:, 1]
         return np.exp(log) + direction.conj() @ (receptance @ force)
 
-    def miss(log):
-        return abs(left(log)) - size
+    def find_mismatch(log):
+        return abs(find_linear_motion(log)) - size
 
     grid = np.log(size) + np.linspace(np.log(1e-7), np.log(1e4), count)
-    values = [miss(g) for g in grid]
+    values = [find_mismatch(g) for g in grid]
     roots = []
-    for a, b in _bracket_roots(miss, grid, values):
-        log = brentq(miss, a, b, xtol=1e-10)
-        residual = left(log)
+    for a, b in _bracket_roots(find_mismatch, grid, values):
+        log = brentq(find_mismatch, a, b, xtol=1e-10)
+        residual = find_linear_motion(log)
         y = direction * np.exp(log) * (residual.conjugate() / abs(residual))
         roots.append(
             np.concatenate([*([0.0, v.real, v.imag] for v in y), np.zeros(len(linear_part.free))])

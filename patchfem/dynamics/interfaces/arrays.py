@@ -370,8 +370,8 @@ class ShearedLists(
     - law, table: see `BondList`
     - time: (1,) duration of the step [s]
     - pressed: (2, m) nodal forces at both ends of the step [N], relative to the row LOAD of points; (2,
-      0) where they are constant
-    - pattern: (2, k) positions [m] and relative pressures of the lower piece, (2, 0) where the
+      0) if they are constant
+    - pattern: (2, k) positions [m] and relative pressures of the lower piece, (2, 0) if the
       pressure moves with the upper one
     - places: (m,) initial positions of the points [m]
 
@@ -390,7 +390,7 @@ class VaryingLoad(NamedTuple):
       per constant force
     - arm: (1,) half-length of the patch [m]
     - force: (2,) mu_s, mu_k of a law under the resultant load
-    - now: (m,) nodal forces [N]; loads: (steps + 1,) prescribed load [N], empty where the contact
+    - now: (m,) nodal forces [N]; loads: (steps + 1,) prescribed load [N], empty if the contact
       determines it
     - slot: (1,) number of the contact set, below 0 where none fits
     - mean, goal: (1,) friction force of the step before, and tolerance of the residuals [N]

@@ -1,4 +1,4 @@
-"""Contact functions of points under a normal load that varies in time (compiled).
+"""Contact functions of points under a time-varying normal load (compiled).
 
 The arrays are `arrays.PressedPoints`; the points are elastic-plastic or bonds.
 
@@ -46,7 +46,7 @@ def gather_loaded_points(part, contact):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def press_points(kind, contact):
-    """Change the load of the points to that at mid-step, and write their memory under it."""
+    """Set the load of the points to that at mid-step, and update their memory for it."""
     gather_loaded_points(0.5, contact)
     memory = contact.memory
     points = contact.points

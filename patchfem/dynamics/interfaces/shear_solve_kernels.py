@@ -8,7 +8,7 @@ changes a smooth motion to second order. With `ending` the pieces relax while th
 is at rest: kappa (b + db) = psi^T f with the forces after the slide, which dissipates energy as long
 as the force increases with the slide.
 
-Both are minima of convex functions where no slope of a point is below 0; Newton's method with a
+Both are minima of convex functions if no slope of a point is below 0; Newton's method with a
 line search finds them. The forces of some laws may decrease as their points slide, and then several
 minima exist: the descent from the extrapolated last steps selects the one to which massless pieces
 would jump. `contact` is an `arrays.ShearedPoints`, or a tuple with its fields from `weight` on. `law`

@@ -187,20 +187,22 @@ def fit_cycle_map(lane, workspace, history, size):
     else:
         a = (x.last * x.second + v.last * v.second) / square
         b = 0.0
-    miss = max(abs(x.last - a * x.second - b * x.third), abs(v.last - a * v.second - b * v.third))
-    miss = max(miss, abs(p.last - a * p.second - b * p.third))
+    deviation = max(
+        abs(x.last - a * x.second - b * x.third), abs(v.last - a * v.second - b * v.third)
+    )
+    deviation = max(deviation, abs(p.last - a * p.second - b * p.third))
     for n in range(N_HISTORY):
         last = history[n_done - 1, n]
         second = history[n_done - 2, n]
         third = history[n_done - 3, n]
         older = third - history[n_done - 4, n]
-        miss = max(miss, abs(last - second - a * (second - third) - b * older))
+        deviation = max(deviation, abs(last - second - a * (second - third) - b * older))
     # The larger magnitude of the eigenvalues determines how the error of one cycle
     # accumulates over all later cycles.
     discriminant = a * a + 4 * b
     slow = 0.5 * (abs(a) + sqrt(discriminant)) if discriminant > 0.0 else sqrt(-b)
     fraction = (1 - slow) * (1 - slow * slow)
-    is_sure = slow < 1.0 and miss < STATE_TOL * size * fraction
+    is_sure = slow < 1.0 and deviation < STATE_TOL * size * fraction
     for n in range(len(SUM_ROWS)):
         value = workspace[SUM_ROWS[n] * LANES + lane]
         change = last_changes(value, CycleEnd.SLIP_PATH + n, workspace, lane)
@@ -209,8 +211,8 @@ def fit_cycle_map(lane, workspace, history, size):
             - workspace[cycle_end_element(3, CycleEnd.SLIP_PATH + n, lane)]
         )
         second = change.second - change.third
-        miss = abs(change.last - change.second - a * second - b * (change.third - fourth))
-        is_sure = is_sure and miss <= SUM_TOL * abs(value) * fraction * (1 - slow)
+        deviation = abs(change.last - change.second - a * second - b * (change.third - fourth))
+        is_sure = is_sure and deviation <= SUM_TOL * abs(value) * fraction * (1 - slow)
     return CycleMap(a, b, is_sure)
 
 
@@ -324,6 +326,6 @@ def confirms_extrapolation(lane, workspace):
     confirms = True
     for m in range(len(STATE_ROWS) - 1):
         predicted = workspace[cycle_end_element(0, m, lane)]
-        miss = abs(workspace[STATE_ROWS[m] * LANES + lane] - predicted)
-        confirms = confirms and miss <= law.PROOF_TOL * size
+        deviation = abs(workspace[STATE_ROWS[m] * LANES + lane] - predicted)
+        confirms = confirms and deviation <= law.PROOF_TOL * size
     return confirms

@@ -102,7 +102,7 @@ class FlowState(NamedTuple):
 class FirstEvent(NamedTuple):
     """First event in a part of a step: its fraction of the part, and whether it is a reversal.
 
-    The fraction is 1 where there is no event.
+    The fraction is 1 if there is no event.
     """
 
     fraction: float

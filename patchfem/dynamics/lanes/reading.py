@@ -1,4 +1,4 @@
-"""Energies and measures of a march in lanes, in the form of those of `dynamics.events`.
+"""Energies and measures of cases in lanes, in the format of `dynamics.events`.
 
 Sums of a march are those of the trapezoidal rule; the formula of Euler and Maclaurin corrects them at their ends.
 """
@@ -56,7 +56,7 @@ class Harmonics(NamedTuple):
 
 
 def run_energies(law: str, cases: Cases, marched: LaneResults, energy) -> dict:
-    """Return the energies (n,) [J] of complete runs by name.
+    """Return the energies (n,) [J] of complete runs as a dictionary.
 
     Parameters
     ----------

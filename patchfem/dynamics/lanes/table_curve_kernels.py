@@ -8,7 +8,7 @@ where F = sum k y over the elements that have yielded and S = sum k over the oth
 slide y of an element. A case has a table after its numbers (`run.make_curve_tables`): of each yield its place, F, S and
 B = sum k y^2. In a step the table is walked through once, from where the last step ended. After an event the walk starts
 at an equal part of the range of the yields, of which the table has the first yield. What is found is written into rows of
-the workspace, because a compiler takes several lanes at once only where it knows the distance of any two numbers. A
+the workspace, because a compiler takes several lanes at once only if it knows the distance of any two numbers. A
 reference is the engine `dynamics.events` with the elements themselves.
 """
 

@@ -408,9 +408,9 @@ def find_yield(curve, memory, side, length, top, highest):
         bow = curve.angle * max(bend, MIN_DIVISOR)
         u = max(top - sqrt(2 * (highest - length) / bow), 0.0)
     for _ in range(N_NEWTON):
-        miss = side * (slide_on_curve(curve, u) - memory) - length
+        residual = side * (slide_on_curve(curve, u) - memory) - length
         speed = side * speed_on_curve(curve, u)
-        u = min(max(u - miss / (curve.angle * speed), 0.0), top) if speed > 0.0 else u
+        u = min(max(u - residual / (curve.angle * speed), 0.0), top) if speed > 0.0 else u
     return u
 
 

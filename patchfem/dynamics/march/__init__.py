@@ -37,5 +37,5 @@ Modules. `march` marches a model over its cycles with a `run.Run`, which holds t
 `varying_load` describe contacts, elements and loads; `faces` and `element_arrays` have the arrays of the elements. `lanes`
 marches many cases, whose array rows `lane_rows` names. `instances` compiles one loop per contact, set of laws and load from
 the source of `loop_kernels`, with the flags of `parts_kernels`. Read `march` first, then `run`, then `loop_kernels`, then
-`faces_kernels` or `pressing_kernels` where a rig needs them.
+`faces_kernels` or `pressing_kernels` if a rig needs them.
 """

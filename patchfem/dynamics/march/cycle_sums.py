@@ -82,7 +82,7 @@ def march_with_sums(run: Run, steps: int, samples: MarchSamples) -> bool:
             largest_at = run.done + int(largest.number[0]) - first_row
         run.done += n_steps
         run.totals += record.sums[:N_SUMS]
-        run.second += record.sums[N_SUMS:]
+        run.work_sums += record.sums[N_SUMS:]
         run.set_outcome(status)
         extremes = cycles[:, [CycleColumn.MIN_OUTPUT, CycleColumn.MAX_OUTPUT]]
         samples.extremes += [*zip(*extremes.T.tolist())]

@@ -542,7 +542,7 @@ def accelerate_sweeps(sweep, max_change, last_max_change, schedule, modal_system
     """Take a Newton step on the forces of all elements if the block descent converges slowly.
 
     This is done only if there is no contact. Laws with a slope are solved to the minimum of their potential; others
-    take a Newton step if the sweeps converge slowly. Newton's method can cycle between two states where laws are steep. So
+    take a Newton step if the sweeps converge slowly. Newton's method can cycle between two states if laws are steep. So
     the pause doubles after each Newton step that did not reduce the change of the forces, and the sweeps between
     two steps converge.
 

@@ -1,4 +1,4 @@
-"""Compiled loops of the march: one instance of the source per contact, set of laws and load.
+"""Compiled loops of the march: one instance per contact, set of laws and type of load.
 
 `loop_kernels` runs with any contact, `interfaces.element_kernels` and its solver with any law. A law passed to a compiled
 function as an argument cannot be cached on disk, so `compiled.instantiate` writes the loop once per law instead.

@@ -61,23 +61,23 @@ class MarchedCases(NamedTuple):
     """Results of n marched cases: cycle extremes, energies and samples.
 
     - `extremes` (n, c, 2), `phasors` (n, c): of the output in each cycle [m].
-    - `book`: energy sums of the run by name, (n,) [J].
+    - `energies`: energy sums of the run by name, (n,) [J].
     - `z`, `rate` (s, modes, n), `force` (s, n), `slip` (s, n): samples of the last cycles.
-    - `worked` (n,): friction work of the last cycles [J].
+    - `friction_work` (n,): friction work of the last cycles [J].
     - `reach` (n,): largest slide [m].
-    - `bad` (n,): number of steps without a solution.
+    - `n_unsolved` (n,): number of steps that did not converge.
     """
 
     extremes: np.ndarray
     phasors: np.ndarray
-    book: dict
+    energies: dict
     z: np.ndarray
     rate: np.ndarray
     force: np.ndarray
     slip: np.ndarray
-    worked: np.ndarray
+    friction_work: np.ndarray
     reach: np.ndarray
-    bad: np.ndarray
+    n_unsolved: np.ndarray
 
 
 def can_march(modes: ModalBasis) -> bool:
@@ -193,20 +193,20 @@ def march(
         blocks.append([array[..., : len(block_cases)] for array in arrays])
     workspace, history, samples, work = (np.concatenate(part, axis=-1) for part in zip(*blocks))
     n = modes.omega.size
-    book = {name: get_rows(workspace, at)[0] for name, at in LEDGER_POSITIONS.items()}
+    energies = {name: get_rows(workspace, at)[0] for name, at in LEDGER_POSITIONS.items()}
     rates = get_rows(workspace, At.RIG_RATE)[:n]
     places = get_rows(workspace, At.RIG_POSITION)[:n]
     squares = (rates**2 + (modes.omega[:, None] * places) ** 2).sum(axis=0)
-    book["stored"] = 0.5 * modes.mass * squares + get_rows(workspace, At.INTERFACE_ENERGY)[0]
+    energies["stored"] = 0.5 * modes.mass * squares + get_rows(workspace, At.INTERFACE_ENERGY)[0]
     return MarchedCases(
         extremes=history[:, :2].transpose(2, 0, 1),
         phasors=(history[:, 2] + 1j * history[:, 3]).T,
-        book=book,
+        energies=energies,
         z=samples[:, :n],
         rate=samples[:, N_RIG_MODES : N_RIG_MODES + n],
         force=samples[:, 2 * N_RIG_MODES],
         slip=samples[:, 2 * N_RIG_MODES + 1],
-        worked=book["booked"] - work,
+        friction_work=energies["booked"] - work,
         reach=get_rows(workspace, At.MAX_SLIDE)[0],
-        bad=get_rows(workspace, At.N_UNSOLVED)[0],
+        n_unsolved=get_rows(workspace, At.N_UNSOLVED)[0],
     )

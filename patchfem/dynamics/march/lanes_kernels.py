@@ -419,8 +419,10 @@ def add_step_sums(workspace, lane, half_mass):
     workspace[At.WORK_IN + lane] += work
     workspace[At.DRIVE_WORK_SIZE + lane] += abs(work)
     workspace[At.VISCOUS_SUM + lane] += workspace[At.VISCOUS_LOSS + lane]
-    held = workspace[At.INTERFACE_ENERGY + lane] + half_mass * workspace[At.RATE_SQUARES + lane]
-    workspace[At.MAX_STORED + lane] = max(workspace[At.MAX_STORED + lane], held)
+    stored_energy = (
+        workspace[At.INTERFACE_ENERGY + lane] + half_mass * workspace[At.RATE_SQUARES + lane]
+    )
+    workspace[At.MAX_STORED + lane] = max(workspace[At.MAX_STORED + lane], stored_energy)
     workspace[At.MAX_SLIDE + lane] = max(workspace[At.MAX_SLIDE + lane], abs(place))
     workspace[At.MIN_OUTPUT + lane] = min(workspace[At.MIN_OUTPUT + lane], out)
     workspace[At.MAX_OUTPUT + lane] = max(workspace[At.MAX_OUTPUT + lane], out)

@@ -212,7 +212,7 @@ class _MarchPlan(NamedTuple):
     - steps_per_cycle: number of steps of a cycle
     - window: number of last cycles with all samples
     - frames: number of snapshots in the last cycle
-    - mark_steps: steps after which a `Mark` is kept
+    - mark_steps: steps after which the state is recorded as a `Mark`
 
     """
 

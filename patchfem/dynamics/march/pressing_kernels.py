@@ -1,4 +1,4 @@
-"""Varying load in a march: unilateral contact under heave and pitch, or a prescribed load.
+"""Varying load in a march: unilateral contact with heave and pitch, or a prescribed load.
 
 Heave h (positive away) and pitch t (positive if it opens +x) move the upper holder, so the approach d = -h closes it. Over
 a step the modes move exactly under constant forces. Those of the normal contact are the path mean of its forces along the

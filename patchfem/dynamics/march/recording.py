@@ -17,7 +17,7 @@ N_SUMS = 3
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Mark:
-    """State of a march at a requested number of cycles, with samples of the cycles before it.
+    """Recorded state of a march at a requested number of cycles, with the last samples before it.
 
     - `window`, `step_force`, `work`, `amplitudes`, `ledger`: as in `march.MarchResult`.
     - `after`: the `Run` from which to continue.

@@ -134,7 +134,7 @@ class Run:
     - `contact`, `faces`, `load`: arrays of the contact, the elements and the load, in `interfaces.arrays`.
     - `ledger` (9,): energy balance of `loop_kernels.march`.
     - `totals` (3,): friction work, dissipated and created energy since the start [J].
-    - `second` (2,): friction work from the samples, and sum of the absolute friction works of the steps [J].
+    - `work_sums` (2,): friction work from the samples, and sum of the absolute friction works of the steps [J].
     - `done`: number of completed steps.
     - `outcome`, `message`: how the march ended; None and "" while it continues.
     """
@@ -157,7 +157,7 @@ class Run:
         self.totals = np.zeros(N_SUMS)
         # These are the friction work from the samples, and the sum of the absolute
         # friction works of the steps [J].
-        self.second = np.zeros(2)
+        self.work_sums = np.zeros(2)
         # The energy stored at the start counts as work input.
         self.ledger[Ledger.DRIVE_WORK] = self.find_modal_energy()
         self.modal_system = make_modal_arrays(modes, self.prop)
@@ -173,9 +173,9 @@ class Run:
             self.prop.tables(drive, 0, steps_per_cycle) if isinstance(drive, SineDrive) else None
         )
         # `is_periodic` compares the state with those at the last check and one cycle ago. The third
-        # row holds their sizes, and `books` holds the energy sums one cycle ago.
-        self.looks = np.zeros((3, sum(map(len, self._carried_state()))))
-        self.books = np.zeros(14)
+        # row holds their sizes, and `last_sums` holds the energy sums one cycle ago.
+        self.checked_states = np.zeros((3, sum(map(len, self._carried_state()))))
+        self.last_sums = np.zeros(14)
         self.change = np.inf
 
     def fork(self, drive):
@@ -209,8 +209,8 @@ class Run:
         return rows
 
     def _collect_sums(self) -> np.ndarray:
-        """Return all energy sums of the march, (14,): ledger, totals and `second`."""
-        return np.concatenate([self.ledger, self.totals, self.second])
+        """Return all energy sums of the march, (14,): ledger, totals and `work_sums`."""
+        return np.concatenate([self.ledger, self.totals, self.work_sums])
 
     def is_periodic(self, n_left: int) -> bool:
         """Return whether the motion has become periodic and the remaining cycles may be skipped.
@@ -219,7 +219,7 @@ class Run:
         `dynamics.periodicity.cycles_to_next_check`.
         """
         n_cycles = self.done // self.prop.steps
-        size = self.looks.shape[1]
+        size = self.checked_states.shape[1]
         if (
             not size
             or self.periodic is None
@@ -229,17 +229,17 @@ class Run:
         rows = self._carried_state()
         state = np.concatenate(rows)
         if not is_check_cycle(n_cycles):
-            self.looks[1] = state
-            self.books = self._collect_sums()
+            self.checked_states[1] = state
+            self.last_sums = self._collect_sums()
             return False
         sizes = np.repeat([np.abs(row).max(initial=0.0) for row in rows], [*map(len, rows)])
-        self.looks[2] = np.maximum(self.looks[2], sizes)
-        scale = np.where(self.looks[2] > 0, self.looks[2], 1.0)
-        change = float(np.max(np.abs(state - self.looks[0]) / scale))
-        last_change = float(np.max(np.abs(state - self.looks[1]) / scale))
+        self.checked_states[2] = np.maximum(self.checked_states[2], sizes)
+        scale = np.where(self.checked_states[2] > 0, self.checked_states[2], 1.0)
+        change = float(np.max(np.abs(state - self.checked_states[0]) / scale))
+        last_change = float(np.max(np.abs(state - self.checked_states[1]) / scale))
         previous_change = self.change
         self.change = change
-        self.looks[0] = state
+        self.checked_states[0] = state
         # The changes over two intervals between checks must be known.
         has_two_intervals = n_left > 0 and n_cycles >= 4 * FIRST_CHECK
         return (
@@ -250,10 +250,10 @@ class Run:
 
     def skip_cycles(self, count: int) -> None:
         """Skip cycles that are equal to the last one, directly after `is_periodic`."""
-        increase = count * (self._collect_sums() - self.books)
+        increase = count * (self._collect_sums() - self.last_sums)
         self.ledger[SUM_POSITIONS] += increase[SUM_POSITIONS]
         self.totals += increase[9:12]
-        self.second += increase[12:]
+        self.work_sums += increase[12:]
         self.done += count * self.prop.steps
 
     def move_to(self, place, rate) -> None:
@@ -283,7 +283,7 @@ class Run:
         """Restart the energy balance with the present energies at the start of a cycle."""
         self.ledger[:] = 0.0
         self.totals[:] = 0.0
-        self.second[:] = 0.0
+        self.work_sums[:] = 0.0
         self.done = 0
         self.ledger[Ledger.DRIVE_WORK] = self.find_modal_energy() + self.find_interface_energy()
 
@@ -493,7 +493,7 @@ class Run:
         rows = parts[0]
         if len(parts) > 1:
             rows = np.concatenate([part[:-1] for part in parts[:-1]] + parts[-1:])
-        self.second += self._sampled_works(rows).sum(), np.abs(self._step_works(rows)).sum()
+        self.work_sums += self._sampled_works(rows).sum(), np.abs(self._step_works(rows)).sum()
         return rows
 
     def _copy_for_softening_springs(self) -> tuple:
@@ -704,8 +704,8 @@ class Run:
         }
         balance |= {
             "booked": float(self.ledger[Ledger.FRICTION_WORK]),
-            "sampled": float(self.second[0]),
-            "passed": float(self.second[1]),
+            "sampled": float(self.work_sums[0]),
+            "passed": float(self.work_sums[1]),
         }
         if hasattr(self.contact, "status"):
             status = getattr(self.contact, "statuses", self.contact.status[None])

@@ -15,7 +15,7 @@ Stiff elastic-plastic faces do not replace this module, because they have one co
 coefficient below the static one cannot be given to them. With equal coefficients, on 119 random rigs, 98 % of the errors
 hold with set-valued faces; with elastic-plastic ones 50 %, 74 % and 81 % hold for bond lengths of 0.1, 0.01 and 0.001 of
 the tolerance times the friction force over the stiffness of the mode, and 72 %, 88 % and 91 % of the values are within the
-tolerance, where all set-valued ones are.
+tolerance, if all set-valued ones are.
 """
 
 from typing import NamedTuple

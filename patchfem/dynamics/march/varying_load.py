@@ -1,4 +1,4 @@
-"""March of modes under the normal force, moment and friction of a contact with varying load.
+"""Time integration of modes under the force, moment and friction of a varying contact load.
 
 The upper holder moves from its solved preload by the heave h = normal . z and the pitch th = pitch . z. The nodal forces are
 those of the unilateral contact at approach delta0 - h and rotation theta0 + th (`contact.contact_sets`). The modes are

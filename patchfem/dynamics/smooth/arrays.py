@@ -1,4 +1,4 @@
-"""Arrays of the compiled steps of the smooth engine, and named indices of them."""
+"""Arrays of the compiled steps of the smooth engine, with names for their indices."""
 
 from enum import IntEnum
 from typing import NamedTuple
@@ -38,12 +38,12 @@ class Scalar(IntEnum):
       in this direction
     - MAX_COORDINATE, MAX_RATE: recent maximum of coordinates [m] and rates [m/s]
     - FASTEST_RATE: rate of the fastest mode or of the drive [1/s]
-    - STAGE: 0 before the start, 1 after it, 2 where the motion was left at a reversal
+    - STAGE: 0 before the start, 1 after it, 2 if the motion was left at a reversal
     - SLOPE_SEGMENT: segment of the drive to which the first slopes belong
     - MASS, STIFFNESS: modal mass [kg], and stiffness of the law [N/m]
     - PERIOD: of the drive [s]
     - SEGMENT: of the drive
-    - BASE_MOVES: 1 where the drive moves the base
+    - BASE_MOVES: 1 if the drive moves the base
     """
 
     TIME = 0
@@ -99,7 +99,7 @@ class Turn(IntEnum):
       its force, the acceleration per newton [1/kg] that its force takes away, and the relative
       displacement [m]
     - FORCE, NORMAL_FORCE, RELEASE_DIRECTION: results of a law that holds, [N], [N], and the
-      direction in which it lets go, 0 where it holds
+      direction of its release, 0 while it sticks
     """
 
     DIRECTION = 0
@@ -120,7 +120,7 @@ class StepEvents(NamedTuple):
     - stop: the velocity vanishes
     - kink, knee: the law has a kink along its path, or at a speed
     - travel: the output reaches its travel
-    - release, lift: a law that holds lets go, or loses its normal force
+    - release, lift: release of a sticking law, or loss of its normal force
     """
 
     none: int = 0
@@ -167,7 +167,7 @@ class MotionArrays(NamedTuple):
     The state has N = 2 n + l + 3 entries for n modes and l states of the law.
 
     - modes: (5, n) see `Mode`
-    - damping: (n, n) damping matrix where it couples the modes, else (0, 0)
+    - damping: (n, n) damping matrix if it couples the modes, else (0, 0)
     - segments: (p, 12) segments of the drive, see `events.positions_kernels.Segment`
     - numbers, memory: numbers of the law (1, k), its memory and a copy to work with (2, m)
     - turn: (10,) see `Turn`
@@ -195,7 +195,7 @@ class MotionRecord(NamedTuple):
     slip, energy in the interface and friction work [J].
 
     - cycles: (4, c) smallest and largest output of every cycle, and real and imaginary part of the
-      output at the frequency of the cycle [m], NaN where it is not wanted
+      output at the frequency of the cycle [m], NaN if it is not wanted
     - samples: (s, 2 n + 7) at the times in their first column
     - turns: (r, 2 n + 7) at reversals
     - parts: (k, N_NODES, 2 n + 7) at NODE_FRACTIONS of the parts of steps

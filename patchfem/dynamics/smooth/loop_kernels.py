@@ -139,7 +139,7 @@ def find_first_event(motion, h, travel, skip):
     Returns
     -------
     event : int
-        EVENT.none where no event lies in the step.
+        EVENT.none if no event lies in the step.
     fraction : float
         Guess of the fraction of the step at which it occurs; 1 if there is no event.
     """
@@ -196,7 +196,7 @@ def find_cubic_return(p, b, r):
     Returns
     -------
     float
-        0 where the cubic is nowhere positive.
+        0 if the cubic is nowhere positive.
     """
     c2 = 3 * b - 2 * p - r
     c3 = p + r - 2 * b
@@ -261,7 +261,7 @@ def locate_event(motion, h, event, fraction, travel):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def locate_release(motion, h, event, travel):
-    """Return the length of the step that ends just after a set-valued law releases.
+    """Return the length of the step that ends just after the release of a set-valued law.
 
     Method: regula falsi with halved ends (Illinois), then bisection.
 
@@ -325,7 +325,7 @@ def locate_release(motion, h, event, travel):
 def find_speed_dip(motion, h):
     """Return the fraction of a step at which the relative speed may fall below zero.
 
-    It is 0 where it does not.
+    It is 0 if it does not.
 
     The speed is positive at both ends.
     """
@@ -354,7 +354,7 @@ def find_cubic_dip(a, p, b, r):
     Returns
     -------
     float
-        0 where it does not.
+        0 if it does not.
     """
     if p >= 0 or r <= 0 or a <= 0 or b <= 0:
         return 0.0
@@ -544,7 +544,7 @@ def try_step(motion, h, tolerance, record):
     Returns
     -------
     h : float
-        Length of the step [s]; 0 where no step meets the tolerance.
+        Length of the step [s]; 0 if no step meets the tolerance.
     next_step : float
         Length of the next step [s].
     """
@@ -575,7 +575,7 @@ def record_reversal(motion, record):
 
 @njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def pass_event(motion, record, event):
-    """Continue after an event: in the other direction, or on the next branch of the law.
+    """Continue after an event, in the other direction or on the next branch of the law.
 
     Parameters
     ----------
@@ -632,7 +632,7 @@ def take_samples(motion, record):
 def find_stop_state(motion):
     """Return whether the motion was interrupted at a reversal.
 
-    It is AT_STOP where no row was free then, else NOT_AT_STOP.
+    It is AT_STOP if no row was free then, else NOT_AT_STOP.
     """
     stop_state = AT_STOP if motion.scalars[Scalar.STAGE] == AT_REVERSAL else NOT_AT_STOP
     motion.scalars[Scalar.STAGE] = 1.0

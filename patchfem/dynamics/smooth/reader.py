@@ -200,9 +200,8 @@ class StepParts:
     def drift(self) -> float | None:
         """Return the drift of the relative displacement per cycle [m].
 
-        It is None for fewer than 1.5 cycles.
-
-        It is the difference of the mean relative displacements of the last and the first cycle.
+        It is the difference of the mean relative displacements of the last and the first cycle, divided
+        by the cycles between them; None for fewer than 1.5 cycles.
         """
         begin = self.time[0, 0]
         end = self.time[-1, -1]
@@ -217,9 +216,8 @@ class StepParts:
         """Return the time in stick [s] and the times [s] at which slip begins.
 
         The interface sticks where less than SLIP_FRACTION of its velocity is irreversible. At a
-        turning point both velocities vanish and what is computed of them is round-off; there the
-        place beside it in the part decides. A part that lies in such a place as a whole shows
-        nothing.
+        reversal both velocities vanish and their computed values are round-off, so the nearest
+        moving position in the part decides. A part that is entirely at rest is ignored.
         """
         slip = transform_parts(self.values("slip"), TO_SLOPES)
         slide = transform_parts(self.values("slide"), TO_SLOPES)
@@ -320,7 +318,7 @@ def _acceleration_harmonics(parts: StepParts, drive, ends) -> tuple | None:
     """Return the first and third harmonic [m s-2] of the output acceleration.
 
     That of the output relative to the base is that of the displacement, integrated by parts. None
-    where the drive is no sine.
+    if the drive is no sine.
     """
     if not is_sinusoidal(drive):
         return None

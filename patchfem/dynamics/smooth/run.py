@@ -199,7 +199,7 @@ class MotionState(NamedTuple):
 
 
 class Motion:
-    """Motion in progress: its arrays, its record and what was collected from it.
+    """Motion in progress: its arrays, its record and the collected results.
 
     repeat_change: remaining change, relative to its size, if cycles were skipped because it
     repeats.
@@ -284,7 +284,7 @@ class Motion:
         Returns
         -------
         ndarray
-            (s, 2 n + 7) samples; fewer where the run ends before.
+            (s, 2 n + 7) samples; fewer if the run ends before.
         """
         times = np.asarray(times, float)
         width = self.record.turns.shape[1]
@@ -312,11 +312,11 @@ class Motion:
         return self.record.samples[: int(self.record.counters[Counter.NEXT_SAMPLE])]
 
     def run_ahead_to(self, time: float) -> None:
-        """March the motion to a time [s], skipping cycles where the motion repeats.
+        """March the motion to a time [s], skipping cycles if the motion repeats.
 
         `periodicity` determines when the motion is checked, and bounds its remaining change. The
-        energies go on as in the last quarter of the cycles between two looks, so their change must
-        be as small. The last cycle must equal the one before it.
+        energies are continued as in the last quarter of the cycles between two checks, so their
+        change must be as small. The last cycle must equal the previous one.
         """
         period = self.drive.period
         n_cycles = 2 * FIRST_CHECK
@@ -589,7 +589,7 @@ def simulate(
     Returns
     -------
     SmoothResult
-        Its outcome is set where the output passed the travel, and where no step meets the
+        Its outcome is set if the output passed the travel, and if no step meets the
         tolerance.
     """
     run = Motion(modes, drive, element, cycles, tolerance, travel, start)

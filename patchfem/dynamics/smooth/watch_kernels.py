@@ -1,4 +1,4 @@
-"""Record of a step: samples, extremes, phasors and the step itself (compiled).
+"""Recording of a step: samples, extremes, phasors and polynomial parts (compiled).
 
 The dense output takes three more slopes, so only a step inside which something is read has one.
 """
@@ -103,11 +103,11 @@ def find_output(motion, y):
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def can_output_turn(motion):
+def can_output_reverse(motion):
     """Return whether the output may have an extremum inside the step.
 
-    With several modes it may. With one mode it turns where the interface does, which ends a step,
-    and else by round-off.
+    With several modes it may. With one mode it reverses only together with the interface, which
+    ends a step, or by round-off.
     """
     return (
         motion.modes.shape[1] > 1
@@ -274,7 +274,7 @@ def add_step_to_phasors(motion, h, record):
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
 def write_samples(motion, h, record):
-    """Write the due samples inside a step, its end included, into the record.
+    """Write the samples that are due inside a step or at its end into the record.
 
     Parameters
     ----------
@@ -386,7 +386,7 @@ def record_step(motion, h, record):
         at < record.samples.shape[0] and record.samples[at, 0] <= motion.scalars[Scalar.TIME] + h
     )
     whole = record.parts.shape[0] > 0
-    if not (whole or sampled or can_output_turn(motion)):
+    if not (whole or sampled or can_output_reverse(motion)):
         widen_by_step(motion, h, record, 1)
         return
     steps.extend_step(motion, h)

@@ -343,8 +343,8 @@ def _evaluate_march(
     drive = rig.drive.signal
     amplitudes = np.array([model.rig.drive.signal.acceleration for model in models])
     samples = Samples(marched, modes, drive.omega, amplitudes, steps, cases[0].numerics.window)
-    energies = {"friction": marched.book["lost"], "peak_stored": marched.book["peak"]}
-    energies |= marched.book
+    energies = {"friction": marched.energies["lost"], "peak_stored": marched.energies["peak"]}
+    energies |= marched.energies
     load = np.array([case.patch.pressure.load for case in cases])
     points = [case.fine.case for case in cases]
     with np.errstate(all="ignore"):
@@ -373,7 +373,7 @@ def _evaluate_march(
         for name, value in rings.items():
             values[name][case] = value
         error_estimates[case] |= errors
-    needs_single_run = (marched.bad > 0) | ~np.isfinite(marched.book["work_in"])
+    needs_single_run = (marched.n_unsolved > 0) | ~np.isfinite(marched.energies["work_in"])
     return _EvaluatedMarch(values, energies, marched, error_estimates, needs_single_run)
 
 

@@ -200,7 +200,7 @@ class Samples:
             half_ranges,
             modes.slide @ fundamental,
             friction_fundamental,
-            self.motion.worked * self.period / self.span,
+            self.motion.friction_work * self.period / self.span,
             stiffness,
         ) | {"secant_stiffness": secant}
 

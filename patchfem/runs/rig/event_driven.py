@@ -546,7 +546,7 @@ def compute_event_measures(
         "absolute_acceleration_fundamental": first if valid else nan,
         "acceleration_distortion": distortion_ratio(first, third, acceleration) if valid else nan,
         "drift_per_cycle": reading.drift,
-        "slip_start_phase": reading.start if is_sine else nan,
+        "slip_start_phase": reading.slip_start_phase if is_sine else nan,
         "work_check": _compute_work_check(reading, energies),
         "slip_amplitude": loop.slip_range / 2,
         "friction_force_peak": loop.max_force,

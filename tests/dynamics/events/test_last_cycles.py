@@ -154,7 +154,7 @@ def test_exact_release_phase_agrees_with_event_log():
     in_window = (result.log.time > rows[0, 0]) & (np.abs(result.log.kind) == 1)
     assert in_window.sum() == result.reading.run[RunMeasure.N_RELEASES] > 4
     expected = np.angle(np.mean(np.exp(2j * result.log.phase[in_window]))) / 2 % np.pi
-    assert result.reading.start == pytest.approx(expected, abs=1e-12)
+    assert result.reading.slip_start_phase == pytest.approx(expected, abs=1e-12)
 
 
 def test_exact_batch_measures_agree_with_single_run():
@@ -174,7 +174,7 @@ def test_exact_batch_measures_agree_with_single_run():
             np.testing.assert_array_equal(second.amplitudes, expected.amplitudes)
             np.testing.assert_array_equal(second.reading.faces, first.reading.faces)
             ratio = first.reading.span / expected.reading.span
-            for name in ("output_amplitude", "acceleration", "start"):
+            for name in ("output_amplitude", "acceleration", "slip_start_phase"):
                 assert getattr(first.reading, name) == pytest.approx(
                     getattr(expected.reading, name), rel=tolerance
                 )

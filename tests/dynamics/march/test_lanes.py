@@ -80,23 +80,25 @@ def test_exact_lanes_agree_with_single_marches(basis):
     """Cases that stick, slip partially and slip fully in lanes agree with single marches within
     1e-7, the slip within 1e-6; the difference is the remaining residual of Newton's method."""
     batch, marches = march_both_ways(basis)
-    assert not batch.bad.any()
+    assert not batch.n_unsolved.any()
     for k, single in enumerate(marches):
         assert_close(batch.extremes[k], single.amplitudes, 1e-7)
         assert_close(batch.phasors[k], single.phasors, 1e-7)
         assert_close(batch.force[:, k], single.window.force, 1e-7)
         assert_close(batch.slip[:, k], single.window.slip, 1e-6)
         assert_close(batch.z[:, :, k], single.window.modal, 1e-7)
-        assert_close(batch.worked[k], single.window_work, 1e-7)
+        assert_close(batch.friction_work[k], single.window_work, 1e-7)
         ledger = single.response.extra["ledger"][:, -1]
-        assert_close(batch.book["gone"][k], ledger[2], 1e-7)
-        assert batch.book["created"][k] <= 1e-9 * ledger[2] >= ledger[3]
+        assert_close(batch.energies["gone"][k], ledger[2], 1e-7)
+        assert batch.energies["created"][k] <= 1e-9 * ledger[2] >= ledger[3]
         for lane_name, name in LEDGER_NAMES.items():
-            assert batch.book[lane_name][k] == pytest.approx(single.ledger[name], rel=1e-7), name
-        imbalance = batch.book["work_in"][k] - sum(
-            batch.book[name][k] for name in ("stored", "lost", "viscous")
+            assert batch.energies[lane_name][k] == pytest.approx(single.ledger[name], rel=1e-7), (
+                name
+            )
+        imbalance = batch.energies["work_in"][k] - sum(
+            batch.energies[name][k] for name in ("stored", "lost", "viscous")
         )
-        assert abs(imbalance) < 1e-9 * batch.book["power"][k]
+        assert abs(imbalance) < 1e-9 * batch.energies["power"][k]
 
 
 def test_exact_case_does_not_depend_on_other_lanes():
@@ -118,7 +120,7 @@ def test_exact_batch_measures_agree_with_single_measures(two_mode_marches):
     same samples."""
     batch, marches = two_mode_marches
     samples = Samples(batch, TWO, OMEGA, np.array(ACCELERATIONS), STEPS, WINDOW)
-    energies = {"peak_stored": batch.book["peak"]} | batch.book
+    energies = {"peak_stored": batch.energies["peak"]} | batch.energies
     values = samples.values(energies, np.full(4, 1e5), np.full(4, 60.0))
     for k, single in enumerate(marches):
         window = single.window
@@ -144,7 +146,7 @@ def test_exact_batch_measures_agree_with_single_measures(two_mode_marches):
             loops.mean_half_range(reversals),
             spectrum.motion_harmonic(window.time, response.slide, response.slide_rate, OMEGA),
             spectrum.friction_harmonic(response, TWO, drive),
-            batch.worked[k] / WINDOW,
+            batch.friction_work[k] / WINDOW,
             1e5,
         )
         expected = (

@@ -195,7 +195,7 @@ def test_always_only_decaying_motion_counts_as_periodic(motion, periodic, monkey
     monkeypatch.setattr(
         run, "_carried_state", lambda: [np.array([1.0 + motion(run.done // STEPS), 1.0])]
     )
-    run.looks = np.zeros((3, 2))
+    run.checked_states = np.zeros((3, 2))
     is_found = False
     for number in range(1, 1025):
         run.done = number * STEPS

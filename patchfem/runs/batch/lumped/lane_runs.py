@@ -103,7 +103,7 @@ def march_and_measure(law: str, cases, scales: Scales, cycles: int, steps: int) 
         "energy_balance": energy_balance(energies),
     }
     return MeasuredMarch(
-        steps, cycles, window, values, energies, marched, extremes, run_reading.rise
+        steps, cycles, window, values, energies, marched, extremes, run_reading.force_increase
     )
 
 

@@ -244,7 +244,7 @@ def _evaluate_runs(cases: list, finished: list, cycles: int, window: int, steady
         errors,
         PIECES.min_relative_error,
         PIECES.max_balance_error,
-        is_stuck & (reading.rise > max_rise),
+        is_stuck & (reading.force_increase > max_rise),
         tuple(steady_motions),
     )
 
