@@ -108,7 +108,7 @@ def compare(
         raise UsageError(
             f"compare --datum {datum}: give --datum straight, or leave it out if the datum may be bent"
         )
-    how = {
+    settings = {
         "units": parse_units(units),
         "shift": parse_quantity(shift, "length", "compare --shift"),
         "keep_spikes": keep_spikes,
@@ -124,7 +124,7 @@ def compare(
                 f"compare --pairs {pairs}: give the table alone, without "
                 f"{'other files' if files else other_option}"
             )
-        _compare_table(pairs, direction, how, choose_folder(out, pairs.stem), json_, quiet)
+        _compare_table(pairs, direction, settings, choose_folder(out, pairs.stem), json_, quiet)
         return
     if len(files) < 2:
         raise UsageError(
@@ -150,7 +150,7 @@ def compare(
         return _compare_runs(before, after, out, json_)
     request = _RunRequest(scene, set_, predicted, piece)
     target = choose_folder(out, f"{before.stem}-{after.stem}")
-    judgement = verdict.judge_files(tuple(files), direction, **how)
+    judgement = verdict.judge_files(tuple(files), direction, **settings)
     data = _write_comparison(judgement, request, target, json_=json_, quiet=quiet)
     for text in data["notes"]:
         note(text)
@@ -159,7 +159,7 @@ def compare(
 
 
 class _RunRequest(NamedTuple):
-    """What to compute besides the comparison: a scene to press, and a run with wear to lay over it."""
+    """Additional requests of a comparison: a scene to solve, and a run whose wear is overlaid."""
 
     scene: Path | None
     sets: tuple
@@ -207,7 +207,7 @@ def _write_comparison(
 
 
 def _compare_table(
-    path: Path, direction: str, how: dict, target: Path, json_: bool, quiet: bool
+    path: Path, direction: str, settings: dict, target: Path, json_: bool, quiet: bool
 ) -> None:
     """Compare all pairs of a table; exit code 3 if some fail, 2 if all of them do.
 
@@ -217,7 +217,7 @@ def _compare_table(
         The table.
     direction : str
         Axis of the traces whose line in the table states none.
-    how : dict
+    settings : dict
         Settings of `verdict.judge_files`.
     target : Path
         Folder of the results.
@@ -226,7 +226,7 @@ def _compare_table(
     requests = tables.read_pairs(path)
     with results.Folder(target) as folder:
         with progress_bar(quiet) as report_progress:
-            rows = pairs_paper.compare_pairs(requests, direction, report_progress, **how)
+            rows = pairs_paper.compare_pairs(requests, direction, report_progress, **settings)
         data = pairs_paper.pairs_data(rows)
         summary.write_json(data, folder.path / "pairs.json")
         pairs_paper.write_csv(rows, folder.path / "pairs.csv")

@@ -1,4 +1,4 @@
-"""Check of an installation: what it has and lacks, with the command that adds it."""
+"""Check of an installation: available and missing parts, with the command that adds each."""
 
 import os
 import re

@@ -127,23 +127,25 @@ def _print_split(
     """Print the tables that divide a trace between the mesh of a scene and a layer; write the new scene."""
     target = scene_path if out is None else out
     refuse_existing(out)
-    place = Path(os.path.relpath(trace, target.parent)).as_posix()
+    relative_path = Path(os.path.relpath(trace, target.parent)).as_posix()
     text = toml_text.read_text(scene_path)
     if scene.loads(text, target).contact is None:
         raise UsageError(
             f"profile --split: {scene_path} has no [contact], so no patch has this trace"
         )
-    given = require_files(scene.loads(text, target, [f"contact.profile.file={place}"]))
-    with locate_errors(given):
-        divided = trace_split.split_trace(model.build(given).patch, cutoff)
+    scene_with_trace = require_files(
+        scene.loads(text, target, [f"contact.profile.file={relative_path}"])
+    )
+    with locate_errors(scene_with_trace):
+        divided = trace_split.split_trace(model.build(scene_with_trace).patch, cutoff)
     if out is not None:
-        kept = SPLIT_TABLES.sub("", text).rstrip()
-        if {"profile", "asperities"} & tomllib.loads(kept)["contact"].keys():
+        remaining_text = SPLIT_TABLES.sub("", text).rstrip()
+        if {"profile", "asperities"} & tomllib.loads(remaining_text)["contact"].keys():
             raise UsageError(
                 f"profile --split: {scene_path} has profile or asperities inside [contact]; write them as tables "
                 "[contact.profile] and [contact.asperities], or paste the tables that are printed without -o"
             )
-        text = f"{kept}\n\n{divided.tables}"
+        text = f"{remaining_text}\n\n{divided.tables}"
         scene.loads(text, out)
         write_text(out, text)
     if json_:

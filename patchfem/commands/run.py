@@ -150,10 +150,10 @@ def _print_answer(stored_run, target: Path, verbose: bool, page: str) -> None:
         )
     print(f"results: {target}{page}")
     if (target / "fields.vtkhdf").is_file():
-        place = shlex.quote(str(target))
+        quoted_folder = shlex.quote(str(target))
         print(
             f"fields: {target / 'fields.vtkhdf'} for ParaView 5.13 or newer; for older versions run `patchfem export "
-            f"{place} -o {shlex.quote(str(target / 'fields.pvd'))}`"
+            f"{quoted_folder} -o {shlex.quote(str(target / 'fields.pvd'))}`"
         )
     if inside := sorted(target.glob("interfaces/*")):
         print(

@@ -7,7 +7,7 @@ import warnings
 
 # Word of more than 400 characters, longer than any readable path; a key or a value
 # can be megabytes long.
-LONG = re.compile(r"\S{401,}")
+LONG_WORD = re.compile(r"\S{401,}")
 
 
 def prepare_streams() -> None:
@@ -39,12 +39,11 @@ def prepare_streams() -> None:
 
 
 def make_printable(text: str) -> str:
-    """Return a text as one line in which no character moves the cursor.
+    """Return a text as one line, with a question mark for each character that cannot be printed.
 
-    Characters that cannot be printed become question marks; of a word with more than 400 characters
-    only the first and last ones are shown.
+    A word of more than 400 characters is shortened to its beginning and its end.
     """
-    shortened = LONG.sub(
+    shortened = LONG_WORD.sub(
         lambda match: f"{match[0][:60]}...{match[0][-20:]} ({len(match[0])} letters)", text
     )
     return "".join(character if character.isprintable() else "?" for character in shortened)

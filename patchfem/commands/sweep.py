@@ -33,8 +33,8 @@ from .shared import (
     text_option,
 )
 
-FIRST = 5  # largest number of messages of failed cases that are printed
-TABLE = 1000  # size of a lumped case in sweep.csv and sweep.nc [bytes]
+MAX_PRINTED_MESSAGES = 5  # largest number of messages of failed cases that are printed
+BYTES_PER_CASE = 1000  # size of a lumped case in sweep.csv and sweep.nc [bytes]
 
 
 @Parameter(name="*")
@@ -261,7 +261,7 @@ class Progress:
         self.begin = perf_counter()
         self.text = ""
         self.over = Event()
-        self.said = self.begin
+        self.shown_at = self.begin
         self.open = sys.stderr.isatty()
 
     def __call__(self, done: int, total: int, seconds_left: float | None) -> None:
@@ -269,7 +269,7 @@ class Progress:
             Thread(target=self._show_waiting_time, daemon=True).start()
         self.text = f"{done}/{total} cases"
         self.done = done
-        if not self.silent and perf_counter() - self.said >= (0.2 if self.open else self.WAIT):
+        if not self.silent and perf_counter() - self.shown_at >= (0.2 if self.open else self.WAIT):
             self._show(
                 f"{self.text}, {sweeping.format_duration(seconds_left)} left"
                 if seconds_left is not None
@@ -280,7 +280,7 @@ class Progress:
         """Show the elapsed time while no case is complete."""
         wait = self.WAIT
         while not self.over.wait(wait):
-            if perf_counter() - self.said >= wait:
+            if perf_counter() - self.shown_at >= wait:
                 self._show(
                     f"{self.text}, {sweeping.format_duration(perf_counter() - self.begin)} so far"
                 )
@@ -288,7 +288,7 @@ class Progress:
 
     def _show(self, text: str) -> None:
         """Show a line."""
-        self.said = perf_counter()
+        self.shown_at = perf_counter()
         print(
             f"\r\x1b[K{text}" if self.open else text,
             end="" if self.open else "\n",
@@ -297,7 +297,7 @@ class Progress:
         )
 
     def end(self) -> None:
-        """Clear the line and show nothing more."""
+        """Clear the line and stop the display."""
         self.over.set()
         if self.open and not self.silent:
             print("\r\x1b[K", end="", file=sys.stderr, flush=True)
@@ -358,17 +358,17 @@ def _print_results(number: int, messages: dict, answer: dict, output: OutputOpti
         else:
             print(
                 f"results: {target / 'sweep.json'}; sweep.csv and sweep.nc are not written, because they would take "
-                f"about {1e-6 * TABLE * number:.0f} MB; to write them, run the same command with --collect"
+                f"about {1e-6 * BYTES_PER_CASE * number:.0f} MB; to write them, run the same command with --collect"
             )
     sys.stdout.flush()
     cases_by_message = {}
     for case in failed:
         cases_by_message.setdefault(messages[case], []).append(case + 1)
-    for text, numbers in list(cases_by_message.items())[:FIRST]:
+    for text, numbers in list(cases_by_message.items())[:MAX_PRINTED_MESSAGES]:
         print_message(
             f"case {numbers[0]}{f' and {len(numbers) - 1} more' * (len(numbers) > 1)}: {text}"
         )
-    if len(cases_by_message) > FIRST:
+    if len(cases_by_message) > MAX_PRINTED_MESSAGES:
         print_message("the messages of all failed cases are in sweep.csv")
     if len(failed) == number:
         raise UsageError("sweep: no case could be run")

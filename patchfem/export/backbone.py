@@ -87,7 +87,7 @@ def backbone_data(backbone: Backbone) -> dict:
 
 
 def _band_data(backbone: Backbone) -> dict | None:
-    """Return the band of a backbone as lists in SI units; None without a band."""
+    """Return the band of a backbone as lists in SI units; None if it has no band."""
     band = backbone.answer.band
     if band is None:
         return None
@@ -229,7 +229,7 @@ def _band_mark(band: Band, scale: float, name: str, floor: float = -np.inf) -> d
 
 
 class CurveStyle(NamedTuple):
-    """Colour, legend and line width of a curve; None: the usual width, with points and error bars."""
+    """Colour, legend and line width of a curve; a width of None adds points and error bars."""
 
     method: str
     legend: str

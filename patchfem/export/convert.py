@@ -122,10 +122,10 @@ def _create_parent_folder(out: Path | None) -> Iterator[None]:
                 folder.rmdir()
 
 
-def _make_folder(place: Path, out: Path) -> None:
+def _make_folder(folder: Path, out: Path) -> None:
     """Create a folder, or raise Missing."""
     try:
-        place.mkdir(parents=True)
+        folder.mkdir(parents=True)
     except OSError as error:
         raise Missing(
             f"{out}: the folder of this file cannot be made ({explain_mkdir_error(error)})"

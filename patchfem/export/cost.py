@@ -42,8 +42,8 @@ MAIN_MEASURES = (
 )
 ROUND_OFF = 1e-12  # relative error below which a result counts as exact
 LABEL_HEIGHT = 0.06  # smallest distance of two labels, relative to the height of the axes
-HEIGHT = 210.0  # height of the axes [points]
-TALL = 4.2  # height of the picture [inch]
+AXES_HEIGHT = 210.0  # height of the axes [points]
+HEIGHT = 4.2  # height of the picture [inch]
 # Position along the axis, relative to its width, beyond which a label
 # stands to the left of its point.
 LABEL_LEFT_FRACTION = 0.6
@@ -74,7 +74,7 @@ def format_cost(knob: str, runs: list, tolerance: float) -> list[str]:
         rows = [(run, worst_error(run, names, tolerance), "") for run in runs]
         last = [describe_fastest_setting(runs, tolerance)]
     else:
-        groups = _by_tolerance(runs)
+        groups = _group_by_tolerance(runs)
         rows = [(group[0], worst_run_error(group[0]), _format_outcome(group)) for group in groups]
         missed = [group[-1] for group in groups if not group[-1].meets_tolerance()][-1:]
         last = [
@@ -91,7 +91,7 @@ def format_cost(knob: str, runs: list, tolerance: float) -> list[str]:
     return [*out, *last]
 
 
-def _by_tolerance(runs: list) -> list[list]:
+def _group_by_tolerance(runs: list) -> list[list]:
     """Group the runs of a cost curve by tolerance, each with the settings tried for it."""
     out: list[list] = []
     for run in runs:
@@ -159,13 +159,13 @@ def format_details(knob: str, runs: list, tolerance: float) -> list[str]:
         ]
         out.append(
             "  ".join(
-                cells + [_format_shares(run, name).rjust(max(17, len(name))) for name in names]
+                cells + [_format_errors(run, name).rjust(max(17, len(name))) for name in names]
             )
         )
     return [*out, describe_fastest_setting(runs, tolerance)]
 
 
-def _format_shares(run: Cost, name: str) -> str:
+def _format_errors(run: Cost, name: str) -> str:
     """Format the error of a measure and its distance to the most accurate run.
 
     Both are relative to the value.
@@ -187,7 +187,7 @@ def _format_relative(difference: float | None, size: float) -> str:
 def detailed_measures(runs: list, tolerance: float) -> list:
     """Return the measures that the detailed cost table shows.
 
-    They are those of MAIN that the setting changes, and the worst measure of each run; if there are
+    They are those of MAIN_MEASURES that the setting changes, and the worst measure of each run; if there are
     none of these, all measures that it changes.
     """
     changed = find_affected_measures(runs) or find_measures_with_error(runs)
@@ -264,7 +264,7 @@ def write_picture(folder: Path, knob: str, runs: list, tolerance: float) -> Path
         That of the scene.
     """
     picture = Path(folder) / ("cost.svg" if knob == TOLERANCE else f"cost_{knob}.svg")
-    write_text(picture, pictures.draw_charts([cost_chart(knob, runs, tolerance)], height=TALL))
+    write_text(picture, pictures.draw_charts([cost_chart(knob, runs, tolerance)], height=HEIGHT))
     return picture
 
 
@@ -348,18 +348,18 @@ def cost_chart(knob: str, runs: list, tolerance: float) -> dict:
     if knob == TOLERANCE and scene_points:
         first = scene_points[0]
         ring = charts.make_dots(
-            [first.run.seconds], [first.share], "warm", "the scene as it is", size=13, hollow=True
+            [first.run.seconds], [first.error], "warm", "the scene as it is", size=13, hollow=True
         )
         marks.append(ring)
     for text, is_met in (("meets its tolerance", True), ("misses its tolerance", False)):
         same_points = [
             point
             for point in points
-            if (point.share <= (point.run.tolerance or tolerance)) == is_met
+            if (point.error <= (point.run.tolerance or tolerance)) == is_met
         ]
         if same_points:
             x = [one.run.seconds for one in same_points]
-            y = [one.share for one in same_points]
+            y = [one.error for one in same_points]
             marks.append(charts.make_dots(x, y, "accent", text, size=6, hollow=not is_met))
     ends = _axis_range([run.seconds for run in runs], MIN_SECONDS_RATIO)
     limit = f"tolerance of the scene, {tolerance:g}"
@@ -368,7 +368,7 @@ def cost_chart(knob: str, runs: list, tolerance: float) -> dict:
     )
     x_axis = charts.make_axis("CPU seconds of a run", "", True) | {"range": ends}
     y_axis = charts.make_axis("error of the worst measure", "", True)
-    y_axis["range"] = _axis_range([tolerance, *(point.share for point in points)], MIN_ERROR_RATIO)
+    y_axis["range"] = _axis_range([tolerance, *(point.error for point in points)], MIN_ERROR_RATIO)
     title = f"What accuracy costs, by {AXES[knob]}"
     labels = _place_labels(points, x_axis["range"], y_axis["range"])
     return charts.make_chart(title, x_axis, y_axis, marks) | {"labels": labels}
@@ -378,7 +378,7 @@ class Point(NamedTuple):
     """Run of a cost curve, with the relative error of its worst measure."""
 
     run: Cost
-    share: float
+    error: float
 
 
 def _axis_range(values: list, min_ratio: float) -> list:
@@ -407,7 +407,7 @@ def _place_labels(points: list, x_range: list, y_range: list) -> list:
                 "text": "; ".join(texts),
                 "x": seconds,
                 "y": error,
-                "raised": (height - position) * HEIGHT,
+                "raised": (height - position) * AXES_HEIGHT,
                 "side": "left" if is_right else "right",
             }
         )

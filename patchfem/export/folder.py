@@ -25,13 +25,13 @@ class WrittenRun(NamedTuple):
     """Finished run whose results are on disk.
 
     summary: content of summary.json; result: the run; bodies: the pressed pieces for a picture, or
-    {}; place: device and inode of the folder, which identify it after it has been renamed.
+    {}; folder_id: device and inode of the folder, which identify it after it has been renamed.
     """
 
     summary: dict
     result: Result
     bodies: dict
-    place: tuple
+    folder_id: tuple
 
 
 def run_into(
@@ -162,7 +162,7 @@ def write_run_page(stored_run: WrittenRun, folder: Path) -> Path:
     """
     text = report.run_page(stored_run.result, stored_run.bodies, player.player_data(folder))
     path = Path(folder) / PAGE
-    if not path.parent.is_dir() or _folder_identity(path.parent) != stored_run.place:
+    if not path.parent.is_dir() or _folder_identity(path.parent) != stored_run.folder_id:
         raise Missing(f"{folder}: replaced by another run while the page was drawn")
     write_text(path, text)
     return path

@@ -67,12 +67,12 @@ class Verdict:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class PressedPatch:
-    """Solved patch that a page shows, or none.
+    """Solved patch that a page shows; empty if there is none.
 
     Attributes
     ----------
     x : (m,) ndarray or None
-        Positions along the interface [m]; None without a patch.
+        Positions along the interface [m]; None if there is no patch.
     width : float or None
         [m].
     fields : dict
@@ -161,13 +161,13 @@ class Measured:
     rows : list
         Rows of the table.
     gains : tuple
-        Reading factors of the accelerometer and of the displacement gauge.
+        Indicated per true amplitude, of the accelerometer and of the displacement gauge.
     frequency, input : float or None
         Of the drive [Hz], [m s-2].
     reading : str
-        How the accelerometer reads a motion.
-    share : float
-        What it reads, as a fraction of the peak.
+        Amplitude measure that the accelerometer indicates, such as "peak".
+    reading_factor : float
+        Indicated amplitude relative to the peak.
     """
 
     rows: list
@@ -175,16 +175,16 @@ class Measured:
     frequency: float | None = None
     input: float | None = None
     reading: str = "peak"
-    share: float = 1.0
+    reading_factor: float = 1.0
 
     def is_comparable(self) -> bool:
         """Return whether the drive has a frequency, so that measured rows can be compared."""
         return self.input is not None and self.frequency is not None
 
     def factors(self) -> tuple:
-        """Return the readings of the instruments per unit of peak acceleration and displacement."""
+        """Return the indicated amplitudes per unit of peak acceleration and displacement."""
         acceleration, displacement = self.gains
-        return acceleration * self.share, displacement
+        return acceleration * self.reading_factor, displacement
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -218,16 +218,16 @@ def collect_run_data(result: Result) -> RunData:
             describe_drive(tables),
             run_command(source.path, source.sets),
         ),
-        verdict=_verdict(result),
+        verdict=_collect_verdict(result),
         versions=package_versions(),
-        patch=_patch(result),
+        patch=_collect_patch(result),
         motion=motion,
-        evaluations=_evaluations(result),
+        evaluations=_collect_evaluations(result),
         measured=_measured_responses(result),
     )
 
 
-def _verdict(result: Result) -> Verdict:
+def _collect_verdict(result: Result) -> Verdict:
     """Return the summary and the outcome of a run."""
     summary = summarise_run(result)
     steady = None
@@ -244,7 +244,7 @@ def _verdict(result: Result) -> Verdict:
     )
 
 
-def _patch(result: Result) -> PressedPatch:
+def _collect_patch(result: Result) -> PressedPatch:
     """Return the solved patch of a run with its fields."""
     faces = [
         (face.surface.x, face.fields, f"interface {face.name}")
@@ -266,7 +266,7 @@ def _patch(result: Result) -> PressedPatch:
     )
 
 
-def _evaluations(result: Result) -> Evaluations:
+def _collect_evaluations(result: Result) -> Evaluations:
     """Return the curves, levels, spectra and decay of a run."""
     extra = result.extra
     levels = None
@@ -306,7 +306,7 @@ def _bench_motion(result: Result, tables: dict) -> Motion:
 
 
 def _read_recorded_loop(folder: Path, slide: dict, response) -> tuple | None:
-    """Read times [s], slides [m] and forces [N] from the file of a slide; None without forces."""
+    """Read times [s], slides [m] and forces [N] from the file of a slide; None if it has no forces."""
     if slide["kind"] != "file":
         return None
     try:
@@ -378,5 +378,6 @@ def _measured_responses(result: Result) -> Measured | None:
     return replace(
         responses,
         reading=kind,
-        share=spectrum.read_instrument(result.window, rig.drive.signal, peak, kind, cutoff) / peak,
+        reading_factor=spectrum.read_instrument(result.window, rig.drive.signal, peak, kind, cutoff)
+        / peak,
     )

@@ -1,4 +1,4 @@
-"""Results that are read again: every file is checked when it is opened.
+"""Reader of results files, which checks every file when it is opened.
 
 A damaged file gives one error, which says what is wrong.
 """

@@ -481,7 +481,7 @@ def _measured_picture(data: RunData) -> Picture | None:
         if gain != 1
     )
     if responses.reading != "peak":
-        factor += f" (readings are taken as {responses.reading}, which is {responses.share:.4g} of the peak)"
+        factor += f" (readings are taken as {responses.reading}, which is {responses.reading_factor:.4g} of the peak)"
     return Picture(
         charts.measured_charts,
         (responses.rows, responses.frequency, responses.input, *points),

@@ -1,4 +1,4 @@
-"""One page over finished runs, or over finished sweeps, from their folders."""
+"""Page that compares finished runs, or finished sweeps, from their folders."""
 
 from pathlib import Path
 

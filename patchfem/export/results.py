@@ -167,16 +167,16 @@ class Folder:
 
 
 def is_state(name: str) -> bool:
-    """Return whether a file name is that of the state of an interrupted run."""
+    """Return whether a file name denotes the saved state of an interrupted run."""
     return STATES.fullmatch(name) is not None
 
 
-def refuse_others(place: Path, user_path, allowed, kind: str, dots: bool = False) -> None:
+def refuse_others(folder: Path, user_path, allowed, kind: str, dots: bool = False) -> None:
     """Raise PatchfemError for a path that is no folder or contains foreign files.
 
     Parameters
     ----------
-    place : Path
+    folder : Path
     user_path : Path
         The path as the user named it.
     allowed : container of str
@@ -186,21 +186,21 @@ def refuse_others(place: Path, user_path, allowed, kind: str, dots: bool = False
     dots : bool
         Whether names that start with a dot are allowed.
     """
-    if not place.exists():
+    if not folder.exists():
         return
-    if not place.is_dir():
+    if not folder.is_dir():
         raise PatchfemError(
-            f"{user_path}: {place.name} is a file, but a folder is needed; choose another -o"
+            f"{user_path}: {folder.name} is a file, but a folder is needed; choose another -o"
         )
     others = sorted(
         path.name
-        for path in place.iterdir()
+        for path in folder.iterdir()
         if path.name.removesuffix(".partial") not in allowed
         and not (is_partial_name(path.name) or is_state(path.name))
         and not (dots and path.name.startswith("."))
     )
     if others:
         raise PatchfemError(
-            f"{user_path}: {place.name} contains files that are not {kind} "
+            f"{user_path}: {folder.name} contains files that are not {kind} "
             f"({', '.join(others[:3])}{', ...' if len(others) > 3 else ''}); choose another -o"
         )

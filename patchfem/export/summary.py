@@ -199,8 +199,8 @@ def loop_entry(result: Result) -> dict:
     ):
         return {}
     amplitude = result.plan.model.slide.amplitude
-    open_ = stiffness.error or stiffness.floor
-    if stiffness.value <= MIN_STIFFNESS_ERRORS * open_ or work.value < 0:
+    stiffness_error = stiffness.error or stiffness.floor
+    if stiffness.value <= MIN_STIFFNESS_ERRORS * stiffness_error or work.value < 0:
         return {}
     factor = work.value / (math.pi * stiffness.value * amplitude**2)
     error = (

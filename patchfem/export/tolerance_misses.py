@@ -64,7 +64,7 @@ def format_floor(measure: dict, cases: np.ndarray) -> str:
 
 
 def count_over_tolerance(measures: dict, tolerance) -> dict:
-    """Count the cases over the tolerance by measure, for measures with any.
+    """Count the cases that exceed the tolerance, for each measure that has any.
 
     measures: {name: as for `is_over_tolerance`}.
 
@@ -88,7 +88,7 @@ def count_over_tolerance(measures: dict, tolerance) -> dict:
 
 
 def tolerance_sentence(measures: dict, tolerance, format_case, first: str = "") -> str:
-    """State how many cases miss the tolerance in the worst main measure.
+    """State how many cases miss the tolerance for the worst main measure.
 
     It also states the worst case, and how many other measures miss the tolerance.
 
@@ -185,7 +185,7 @@ def _others_sentence(count: int) -> str:
 
 
 def _error_ratio(measure: dict, tolerance) -> np.ndarray:
-    """Return the error over the allowed error (n,)."""
+    """Return the ratio (n,) of the error to the allowed error."""
     floors = np.nan_to_num(np.asarray(measure.get("floors", 0.0), float))
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(measure["errors"], float) / compute_allowed_error(
@@ -194,7 +194,7 @@ def _error_ratio(measure: dict, tolerance) -> np.ndarray:
 
 
 def _relative_error(measure: dict) -> np.ndarray:
-    """Return error over |value| (n,); inf if the value is 0."""
+    """Return the ratio (n,) of the error to |value|; inf if the value is 0."""
     values, errors = (np.asarray(measure[name], float) for name in ("values", "errors"))
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(errors > 0, errors / np.abs(values), 0.0)

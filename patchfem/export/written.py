@@ -1,4 +1,4 @@
-"""Values of swept keys as text, without digits that only a computer would write."""
+"""Values of swept keys as text, with no more digits than a reader needs."""
 
 import re
 
@@ -25,7 +25,7 @@ def shorten_number(text: str) -> str:
 
 
 def shorten_to_spacing(text: str, value: float, spacing: float) -> str:
-    """Return a value as written, with as few digits as distinguish it from its neighbours.
+    """Return a value as written, shortened to the digits that distinguish it from its neighbours.
 
     For example, 3.16227766016838 urad between 1 urad and 10 urad becomes 3.2 urad.
 
@@ -51,7 +51,7 @@ def shorten_to_spacing(text: str, value: float, spacing: float) -> str:
 
 
 def drop_repeated_unit(text: str, next_text: str) -> str:
-    """Return a value without its unit if the next value has the same: 0.1 before 0.2 mrad."""
+    """Remove the unit of a value if the next value has the same unit: 0.1 before 0.2 mrad."""
     number, _, unit = text.partition(" ")
     return number if unit and unit == next_text.partition(" ")[2] else text
 

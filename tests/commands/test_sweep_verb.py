@@ -364,7 +364,7 @@ def test_always_two_shards_can_set_tables_aside_at_once(tmp_path, monkeypatch):
 
     with Folder(tmp_path, (), True) as folder, monkeypatch.context() as twice:
         twice.setattr(os, "replace", rename_twice)
-        folder.unfinish()
+        folder.mark_tables_outdated()
     assert (tmp_path / "sweep.csv.partial").read_text() == "older" and not (
         tmp_path / "sweep.csv"
     ).exists()

@@ -45,8 +45,8 @@ def test_exact_rms_reading_of_sine(tmp_path):
         == peak_run.measures["absolute_acceleration_peak"].value
     )
     data = collect_run_data(rms_run).measured
-    assert data.share == pytest.approx(np.sqrt(0.5), rel=1e-5)
-    assert collect_run_data(peak_run).measured.share == 1
+    assert data.reading_factor == pytest.approx(np.sqrt(0.5), rel=1e-5)
+    assert collect_run_data(peak_run).measured.reading_factor == 1
     peak = peak_run.measures["absolute_acceleration_peak"].value / 9.80665
     assert f"{1.5 * np.sqrt(0.5) * peak:.3g} g" in run_page(rms_run, {})
     assert f"{1.5 * peak:.3g} g" in run_page(peak_run, {})

@@ -84,7 +84,11 @@ def test_exact_frames_share_scale_and_window(small_folder):
     ):
         positions = []
         for panel, frame in zip(panels, frames):
-            assert (panel.window, panel.top, panel.aside) == (window, top, settings.aside)
+            assert (panel.window, panel.top, panel.slide_factor) == (
+                window,
+                top,
+                settings.slide_factor,
+            )
             assert panel.factor == panels[0].factor
             cells = np.repeat(panel.cells, np.diff(frame.offsets))
             positions.append(panel.places[np.unique(frame.connectivity[cells])])

@@ -93,10 +93,10 @@ def test_exact_panels_share_stress_scale(bench_folder):
     mises = frame.cell_data["von_mises"]
     assert overview.cells.sum() == (frame.cell_data["part"] < 2).sum()
     assert detail.cells.sum() < overview.cells.sum()
-    assert detail.top == overview.top >= mises[detail.cells].max() and not detail.over
+    assert detail.top == overview.top >= mises[detail.cells].max() and not detail.is_cut
     areas = cell_areas(frame)
     assert areas.sum() == pytest.approx(2 * 12.7e-3 * 6.35e-3, rel=1e-9)
-    assert overview.top == np.nanmax(mises) and not overview.over
+    assert overview.top == np.nanmax(mises) and not overview.is_cut
     singular = mises.copy()
     singular[np.argmax(np.nan_to_num(mises))] *= (
         30  # a single small cell must not darken all others
@@ -109,7 +109,7 @@ def test_exact_panels_share_stress_scale(bench_folder):
     assert singular_detail.top == singular_overview.top
     area_above = areas[overview.cells & (singular > singular_overview.top)].sum()
     assert (
-        singular_overview.over
+        singular_overview.is_cut
         and singular_overview.top <= np.nanmax(mises)
         and "or more" in singular_overview.title()
     )

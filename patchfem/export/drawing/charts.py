@@ -19,7 +19,7 @@ MAX_LINE_POINTS = 6000  # largest number of points of a drawn line; longer lines
 MIN_LINE_POINTS = 200  # smallest number of points that thinning leaves of a line
 MAX_FRAMES = 24  # largest number of frames whose shear stress is drawn in the background
 FAINT_FRAME_POINTS = 400  # largest number of points of such a background line
-GRID = 6000  # approximate number of cells per piece in a picture; finer grids are averaged
+MAX_PICTURE_CELLS = 6000  # approximate number of cells per piece in a picture
 CHARACTERS_PER_NUMBER = 13  # estimated number of characters per number in a page
 REGIMES = {"stable": "solid", "stuck": "solid", "unstable": "dashed", "unbounded": "dotted"}
 COLOURS = ("accent", "warm", "#2f9e63", "#8e5fc2", "#b08a12", "#c14a86")
@@ -34,7 +34,7 @@ WEAR_LABELS = {
     "loop_area": "loop area",
     "relative_displacement_amplitude": "amplitude",
 }
-PROFILES = 6  # largest number of wear cycles whose pressure and depth profiles are drawn
+MAX_WEAR_PROFILES = 6  # largest number of wear cycles whose pressure and depth profiles are drawn
 MIN_COHERENCE = 0.5  # smallest coherence at which H1 is drawn as reliable
 # Height and largest width [px] of a frame with equal scales on both axes.
 FRAME_HEIGHT = 270
@@ -48,7 +48,7 @@ def make_axis(label: str, unit: str = "", log: bool = False) -> dict:
     ----------
     label : str
     unit : str
-        Unit of the values; "" without one.
+        Unit of the values; "" if they have none.
     log : bool
         Whether the axis is logarithmic.
     """
@@ -323,7 +323,7 @@ def stress_charts(x, depths, mises, sigma) -> list:
         )
         marks = []
         for side, row, part in zip((-1, 1), rows, cells):
-            x_lines, depth_lines, means = reduce_grid(x[i], row, part, GRID)
+            x_lines, depth_lines, means = reduce_grid(x[i], row, part, MAX_PICTURE_CELLS)
             # Four digits suffice for values that are shown as colours.
             values = np.array([float(f"{v:.4g}") for v in means.ravel().tolist()]).reshape(
                 means.shape
@@ -366,7 +366,7 @@ def worn_map_chart(x, width: float, depth) -> list:
         choose_axis_unit(np.concatenate([x, edges]), "m"),
     )
     x_lines, across_lines, means = reduce_grid(
-        x, edges, (depth[:, 1:] + depth[:, :-1]).T / 2 * scale, GRID
+        x, edges, (depth[:, 1:] + depth[:, :-1]).T / 2 * scale, MAX_PICTURE_CELLS
     )
     values = np.array([float(f"{v:.4g}") for v in means.ravel().tolist()]).reshape(means.shape)
     marks = [
@@ -468,7 +468,7 @@ def loop_charts(loops: list) -> list:
 
 
 def cycle_envelope(time, value, period: float) -> tuple:
-    """Return middle, minimum and maximum of the samples of each cycle; NaN without samples.
+    """Return middle, minimum and maximum of the samples of each cycle; NaN if it has none.
 
     Cycles are merged if there are more than a picture can show.
 
@@ -611,7 +611,7 @@ def history_charts(
 
 
 def measured_charts(rows: list, frequency: float, level: float, acceleration, displacement) -> list:
-    """Return charts of measured readings against the input, and of the computed point.
+    """Return charts of the measured responses against the input, and of the computed response.
 
     Parameters
     ----------
@@ -963,7 +963,7 @@ def wear_charts(x, cycles, pressure, depth, history: dict) -> list:
         Name -> (j,), with `cycle`; measures are divided by their first value.
     """
     (length_unit, size), drawn_charts = choose_axis_unit(x, "m"), []
-    pick = np.unique(np.linspace(0, len(cycles) - 1, PROFILES).round().astype(int))
+    indices = np.unique(np.linspace(0, len(cycles) - 1, MAX_WEAR_PROFILES).round().astype(int))
     for values, unit, title in ((pressure, "Pa", "Pressure"), (depth, "m", "Worn depth")):
         name, scale = choose_axis_unit(values, unit)
         lines = [
@@ -973,7 +973,7 @@ def wear_charts(x, cycles, pressure, depth, history: dict) -> list:
                 colour,
                 "new" if cycles[k] == 0 else f"{format_number(cycles[k], 4)} cycles",
             )
-            for k, colour in zip(pick, ("soft", *COLOURS))
+            for k, colour in zip(indices, ("soft", *COLOURS))
         ]
         drawn_charts.append(
             make_chart(title, make_axis("x", length_unit), make_axis(title.lower(), name), lines)

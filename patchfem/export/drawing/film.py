@@ -25,7 +25,7 @@ FILM_EXTENSIONS = (".gif", ".mp4")
 FRAME_SIZE = (12.0, 6.8)  # width and height of a frame [inch]
 DPI = 100  # resolution [pixels per inch]; video formats require an even number of pixels per side
 BIT_RATE = 4000  # bit rate of a video [kbit/s]
-SLIDE_LABEL = 0.03  # largest slide as drawn, relative to the length of the pieces
+DRAWN_SLIDE = 0.03  # largest slide as drawn, relative to the length of the pieces
 # Duration of a cycle [s], subject to the limits on the duration of a frame.
 CYCLE_SECONDS = 2.4
 MIN_FRAME_SECONDS = 0.04  # shortest duration of a frame [s]
@@ -44,14 +44,14 @@ class Film:
         Factor of the motion in each panel.
     close : tuple
         Window [mm] of the second panel.
-    aside : float
+    slide_factor : float
         Factor of the slide.
     windows : tuple
         (left, right, bottom, top) [mm] of each panel.
     tops : tuple of float
         Stress at the upper end of the colours of each panel [Pa].
-    over : tuple of bool
-        Whether some cell exceeds this stress.
+    is_cut : tuple of bool
+        Whether the stress of some cell exceeds this value.
     reach : tuple
         Minimum and maximum stress on the interface [Pa].
     pressure : float
@@ -61,10 +61,10 @@ class Film:
     numbers: tuple
     factors: tuple
     close: tuple
-    aside: float
+    slide_factor: float
     windows: tuple
     tops: tuple
-    over: tuple
+    is_cut: tuple
     reach: tuple
     pressure: float
 
@@ -78,18 +78,18 @@ class Film:
     def panels(self, frame: Frame) -> tuple:
         """Return the panels of one frame of the film."""
         return tuple(
-            replace(panel, window=window, top=top, over=over)
-            for panel, window, top, over in zip(
-                make_panels(frame, self.factors, self.close, self.aside),
+            replace(panel, window=window, top=top, is_cut=is_cut)
+            for panel, window, top, is_cut in zip(
+                make_panels(frame, self.factors, self.close, self.slide_factor),
                 self.windows,
                 self.tops,
-                self.over,
+                self.is_cut,
             )
         )
 
 
 def make_film(series: Series, magnify: float | None = None) -> Film:
-    """Return what the frames of an animation have in common, such as windows and colours.
+    """Return the settings that all frames of an animation share, such as windows and colours.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ def make_film(series: Series, magnify: float | None = None) -> Film:
     close = (*_enclosing_window(windows)[:2], *windows[0][2:])
     left, right = np.array([pair[0].window for pair in first_panels])[:, :2].T
     length = float((right - left).max())
-    slide_factor = round_down_factor(SLIDE_LABEL * length / max(slides)) if max(slides) > 0 else 1.0
+    slide_factor = round_down_factor(DRAWN_SLIDE * length / max(slides)) if max(slides) > 0 else 1.0
     values_or_factors = [value for values in stress_ranges.values() for value in values]
     film = Film(
         numbers,
@@ -151,7 +151,7 @@ def make_film(series: Series, magnify: float | None = None) -> Film:
         film,
         windows=tuple(_enclosing_window([pair[k].window for pair in final_panels]) for k in (0, 1)),
         tops=tuple(max(pair[k].top for pair in final_panels) for k in (0, 1)),
-        over=tuple(any(pair[k].over for pair in final_panels) for k in (0, 1)),
+        is_cut=tuple(any(pair[k].is_cut for pair in final_panels) for k in (0, 1)),
     )
 
 

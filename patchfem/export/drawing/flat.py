@@ -25,7 +25,7 @@ def draw_frame(frame: Frame, head: str, magnify: float | None, path: Path) -> No
     head : str
         First line of the title.
     magnify : float or None
-        Factor of the motion; None for one that makes it visible.
+        Magnification of the motion; None selects one that makes it visible.
     path : Path
         File whose suffix chooses the format.
     """

@@ -35,9 +35,9 @@ class Panel:
         (left, right, bottom, top) [mm].
     top : float
         Stress at the upper end of the colours [Pa].
-    over : bool
-        Whether some cell exceeds this stress.
-    aside : float
+    is_cut : bool
+        Whether the stress of some cell exceeds this value.
+    slide_factor : float
         Factor of the slide.
     """
 
@@ -47,8 +47,8 @@ class Panel:
     slide: float
     window: tuple
     top: float
-    over: bool
-    aside: float = 1.0
+    is_cut: bool
+    slide_factor: float = 1.0
 
     def title(self, scaled: bool = True) -> str:
         """Return the title of the panel, with the factors of motion and slide.
@@ -62,10 +62,13 @@ class Panel:
         )
         unit, scale = choose_axis_unit([self.top], "Pa")
         text += (
-            f", top colour: {self.top * scale:.3g} {unit} or more" if self.over and scaled else ""
+            f", top colour: {self.top * scale:.3g} {unit} or more" if self.is_cut and scaled else ""
         )
-        if self.aside != 1:
-            return text + f"\nthe slide of {self.slide * 1e3:.3g} um magnified {self.aside:g} times"
+        if self.slide_factor != 1:
+            return (
+                text
+                + f"\nthe slide of {self.slide * 1e3:.3g} um magnified {self.slide_factor:g} times"
+            )
         return text + (
             f"\nthe slide of {self.slide * 1e3:.3g} um, drawn to scale"
             if self.slide and self.factor > 1
@@ -200,7 +203,7 @@ def _make_panel(
 
 
 def _weighted_quantile(values, weight, fraction: float) -> float:
-    """Return the value below which the fraction `fraction` of the weight lies."""
+    """Return the weighted quantile of values at a fraction of the total weight."""
     if not values.size:
         return 0.0
     order = np.argsort(values)
@@ -228,23 +231,23 @@ def upper_piece_slide(frame: Frame) -> float:
     )
 
 
-def upper_piece_slides(points, moves) -> np.ndarray:
+def upper_piece_slides(points, displacements) -> np.ndarray:
     """Return the slides (f,) [m] of the upper piece in f frames.
 
     Parameters
     ----------
     points : (n, 2) array
         [m]
-    moves : (f, n, 2) array
+    displacements : (f, n, 2) array
         Displacements [m].
     """
     height = points[:, 1].max()
     is_far_face = points[:, 1] >= height * (1 - 1e-9)
     x_from_centre = points[is_far_face, 0] - points[is_far_face, 0].mean()
     # The far face is rigid, so that its slope is the rotation of the piece.
-    rotation = moves[:, is_far_face, 1] @ x_from_centre / (x_from_centre @ x_from_centre)
-    slide = moves[:, is_far_face, 0].mean(axis=1) + rotation * height
-    return np.where(np.abs(slide) > ROUND_OFF * np.abs(moves).max(axis=(1, 2)), slide, 0.0)
+    rotation = displacements[:, is_far_face, 1] @ x_from_centre / (x_from_centre @ x_from_centre)
+    slide = displacements[:, is_far_face, 0].mean(axis=1) + rotation * height
+    return np.where(np.abs(slide) > ROUND_OFF * np.abs(displacements).max(axis=(1, 2)), slide, 0.0)
 
 
 def drawn_displacement(frame: Frame) -> np.ndarray:
@@ -381,20 +384,20 @@ def outer_edges(frame: Frame, cells) -> tuple:
     material = frame.cell_data["material"]
     for part in (0, 1):
         ends = []
-        coat = []
+        edge_material = []
         is_drawn = []
         for count in (3, 4):
             is_selected = (frame.cell_data["part"] == part) & (size == count)
             block = frame.connectivity[frame.offsets[:-1][is_selected][:, None] + np.arange(count)]
             ends.append(np.stack([block, np.roll(block, -1, axis=1)], axis=2).reshape(-1, 2))
-            coat.append(np.repeat(material[is_selected], count))
+            edge_material.append(np.repeat(material[is_selected], count))
             is_drawn.append(np.repeat(cells[is_selected], count))
         ends = np.sort(np.concatenate(ends), axis=1)
-        coat = np.concatenate(coat)
+        edge_material = np.concatenate(edge_material)
         pairs, number = np.unique(ends, axis=0, return_inverse=True)
-        times = np.bincount(number.ravel())
-        coats = np.bincount(number.ravel(), coat > 0)
+        n_cells = np.bincount(number.ravel())
+        n_coated_cells = np.bincount(number.ravel(), edge_material > 0)
         is_visible = np.bincount(number.ravel(), np.concatenate(is_drawn)) > 0
-        outer.append(pairs[(times == 1) & is_visible])
-        inner.append(pairs[(times == 2) & (coats == 1) & is_visible])
+        outer.append(pairs[(n_cells == 1) & is_visible])
+        inner.append(pairs[(n_cells == 2) & (n_coated_cells == 1) & is_visible])
     return np.concatenate(outer), np.concatenate(inner)

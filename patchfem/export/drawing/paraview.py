@@ -20,7 +20,7 @@ from .panels import drawn_displacement, upper_piece_slide, upper_points
 
 MPA = 1e-6
 # Fraction of the stress values that the colour scale covers; the larger ones are peaks in corners.
-MAX_SHARPNESS = 0.998
+MAX_QUANTILE = 0.998
 # Title of each component, and its index in the stored stress (xx, yy, zz, xy, yz, xz), or None if
 # it is stored as a separate array.
 STRESSES = {
@@ -189,7 +189,7 @@ def _colour_range(series: Series, film: Film, component: str) -> tuple:
         values = get_stress(series.frame(number).cell_data, component)
         top = max(
             top,
-            float(np.quantile(np.abs(values[np.isfinite(values)]), MAX_SHARPNESS, method="higher")),
+            float(np.quantile(np.abs(values[np.isfinite(values)]), MAX_QUANTILE, method="higher")),
         )
     return -top, top
 
@@ -218,8 +218,8 @@ def script_text(out: Path, film: Film, component: str, ends: tuple, status: bool
     return SCRIPT.format(
         fields=fields.name,
         motion=film.factors[0],
-        slide=film.aside,
-        stress=tuple(MPA * one for one in ends),
+        slide=film.slide_factor,
+        stress=tuple(MPA * end for end in ends),
         pressure=(0.0, MPA * film.pressure),
         status=status,
         pace=max(1, round(1 / film.seconds)),

@@ -126,21 +126,23 @@ def draw_charts(chart_list: list, axes_to_use=None, height: float = HEIGHT):
         for mark in chart["marks"]:
             MARKS[mark["kind"]](axis, mark)
         for name in ("x", "y"):
-            how = chart[name]
+            settings = chart[name]
             axis.set(
                 **{
-                    f"{name}label": f"{how['label']} [{how['unit']}]"
-                    if how["unit"]
-                    else how["label"]
+                    f"{name}label": f"{settings['label']} [{settings['unit']}]"
+                    if settings["unit"]
+                    else settings["label"]
                 }
             )
-            if how.get("log"):
+            if settings.get("log"):
                 axis.set(**{f"{name}scale": "log"})
-            if "ticks" in how:
-                axis.set(**dict(zip((f"{name}ticks", f"{name}ticklabels"), zip(*how["ticks"]))))
-            if "range" in how:
-                axis.set(**{f"{name}lim": how["range"]})
-            if how.get("log"):
+            if "ticks" in settings:
+                axis.set(
+                    **dict(zip((f"{name}ticks", f"{name}ticklabels"), zip(*settings["ticks"])))
+                )
+            if "range" in settings:
+                axis.set(**{f"{name}lim": settings["range"]})
+            if settings.get("log"):
                 _write_plain_numbers(getattr(axis, f"{name}axis"))
         for label in chart.get("labels", ()):
             _write_label(axis, label)

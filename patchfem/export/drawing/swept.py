@@ -1,4 +1,4 @@
-"""Chart of a measure of a sweep against a key, a line per combination of the other keys."""
+"""Chart of a measure of a sweep against a key, one line for each combination of other keys."""
 
 import numpy as np
 

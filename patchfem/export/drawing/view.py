@@ -30,7 +30,7 @@ assert plotter.screenshot(None, return_img=True).std() > 0, "the picture is empt
 """
 WINDOW_SIZE = (1800, 1000)
 COLOURS = "viridis"
-FONT = 20
+FONT_SIZE = 20
 
 
 def view(
@@ -95,7 +95,7 @@ def _write_film(folder: Path, out: Path, frame: int | None, magnify: float | Non
 
 
 def _open_window(frame: Frame, head: str, magnify) -> None:
-    """Open a window with the fields; raise Missing without a screen or OpenGL."""
+    """Open a window with the fields; raise Missing if there is no screen or no OpenGL."""
     if sys.platform.startswith("linux") and not (
         os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     ):
@@ -145,7 +145,7 @@ def make_plotter(frame: Frame, head: str, magnify: float | None, off_screen: boo
     head : str
         First line of the title.
     magnify : float or None
-        Factor of the motion; None for one that makes it visible.
+        Magnification of the motion; None selects one that makes it visible.
     off_screen : bool
     """
     import pyvista as pv
@@ -195,8 +195,8 @@ def _draw_pieces(plotter, frame: Frame, panel: Panel, text: str, has_colour_bar:
             mapper=plotter.mapper,
             vertical=True,
             color="black",
-            title_font_size=FONT,
-            label_font_size=FONT,
+            title_font_size=FONT_SIZE,
+            label_font_size=FONT_SIZE,
             fmt="%.3g",
             n_labels=5,
             width=0.045,
@@ -210,7 +210,7 @@ def _draw_pieces(plotter, frame: Frame, panel: Panel, text: str, has_colour_bar:
             lines = pv.PolyData(places, lines=np.insert(edges, 0, 2, axis=1).ravel())
             plotter.add_mesh(lines, color=colour, line_width=2, lighting=False)
     title_actor = plotter.add_text(
-        text, font_size=FONT * 0.6, color="black", position=(0.03, 0.98), viewport=True
+        text, font_size=FONT_SIZE * 0.6, color="black", position=(0.03, 0.98), viewport=True
     )
     title_actor.GetTextProperty().SetVerticalJustificationToTop()
     plotter.view_xy()
@@ -219,7 +219,7 @@ def _draw_pieces(plotter, frame: Frame, panel: Panel, text: str, has_colour_bar:
         bounds=(*panel.window, 0, 0),
         xtitle="x [mm]",
         ytitle="y [mm]",
-        font_size=FONT - 6,
+        font_size=FONT_SIZE - 6,
         bold=False,
         location="outer",
         show_zaxis=False,
@@ -238,9 +238,9 @@ def _draw_stresses(plotter, frame: Frame) -> None:
     for (label, values), colour in zip(curves, ("#1f5f99", "#c8551b")):
         chart.line(x, values, color=colour, width=3, label=label)
     for axis in (chart.x_axis, chart.y_axis):
-        axis.label_size = FONT
-        axis.tick_label_size = FONT - 3
-        axis.label_font_size = FONT
+        axis.label_size = FONT_SIZE
+        axis.tick_label_size = FONT_SIZE - 3
+        axis.label_font_size = FONT_SIZE
     chart.legend_visible = True
     chart.background_color = "white"
     plotter.add_chart(chart)

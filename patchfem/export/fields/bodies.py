@@ -64,16 +64,16 @@ def write_fields(result, path: Path) -> dict:
     interface = {k: v for k, v in fields.items() if k != "time" and not k.startswith("holder_")}
     loads = [_nodal_loads(patch, fields, side) for side in ("lower", "upper")]
     motions = _piece_displacements(patch, loads)
-    insides = [_mesh_and_stress(patch.pair.piece, patch.pair.grid)]
-    insides += (
-        insides
+    meshes = [_mesh_and_stress(patch.pair.piece, patch.pair.grid)]
+    meshes += (
+        meshes
         if patch.pair.upper is patch.pair.piece
         else [_mesh_and_stress(patch.pair.upper, patch.pair.upper_grid)]
     )
     x = patch_surface(patch, fields).x
     low, high = (
         _collect_piece_fields(patch, fields, x, *piece_data)
-        for piece_data in zip(("lower", "upper"), insides, motions)
+        for piece_data in zip(("lower", "upper"), meshes, motions)
     )
     for one, other_body in ((low, high), (high, low)):
         one["stress_error"] = one["error"].relative_error(other_body["error"])[0]
@@ -160,8 +160,8 @@ class _PieceFields:
         Node numbers.
     stress : callable
         Displacements -> stresses of cells.
-    cells, rules, found
-        Cells, Gauss points and recovery for the error of the stress.
+    cells, rules, recovery
+        Cells, Gauss points and stress recovery, for the error estimate of the stress.
     """
 
     points: np.ndarray
@@ -170,7 +170,7 @@ class _PieceFields:
     stress: Callable
     cells: Cells
     rules: list
-    found: Recovery
+    recovery: Recovery
 
 
 def _mesh_and_stress(piece, grid) -> _PieceFields:
@@ -229,7 +229,7 @@ def _collect_piece_fields(patch, fields: dict, x, side: str, piece_fields: _Piec
         frame_slice = slice(first, first + FRAMES_PER_PASS)
         motion = u[:1] + u[1:][frame_slice]
         stress = piece_fields.stress(motion)
-        errors.append(estimate_error(piece_fields.found, motion, stress, piece_fields.rules))
+        errors.append(estimate_error(piece_fields.recovery, motion, stress, piece_fields.rules))
         out["mises"][frame_slice] = von_mises(stress)
         out["stress"][frame_slice] = stress * [1.0, 1.0, 1.0, sign]
         largest = max(largest, float(np.abs(motion).max()))
@@ -253,7 +253,7 @@ def _collect_piece_fields(patch, fields: dict, x, side: str, piece_fields: _Piec
         bond["shear_bond"] *= -sign
     blocks = [block if not lower else block[:, ::-1] for block in piece_fields.blocks]
     finest = min(
-        choose_rounding_step(piece_fields.found, error, piece_fields.rules, ROUNDING_FRACTION),
+        choose_rounding_step(piece_fields.recovery, error, piece_fields.rules, ROUNDING_FRACTION),
         MIN_STEP_FRACTION * float(out["mises"].max(initial=0.0)),
     )
     return out | {

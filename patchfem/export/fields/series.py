@@ -12,7 +12,7 @@ from .blocks import NAMES, PARTS, Block, merge_blocks
 from .vtkhdf import NAME
 
 # Trailing dimensions of arrays with several values per point.
-TAILS = {"displacement": (3,), "stress": (6,)}
+VALUE_SHAPES = {"displacement": (3,), "stress": (6,)}
 BODY = {"PointData": ("displacement",), "CellData": ("material", "stress", "von_mises")}
 LINE = {"PointData": ("displacement", "gap", "normal_stress"), "CellData": ()}
 # Names of the arrays that a reader requires, by part and kind.
@@ -175,7 +175,7 @@ class Series:
             for one, rows in group[kind].items():
                 first = group[f"Steps/{kind}Offsets/{one}"][:]
                 require_valid(
-                    rows.dtype.kind in "iuf" and rows.shape[1:] == TAILS.get(one, ()),
+                    rows.dtype.kind in "iuf" and rows.shape[1:] == VALUE_SHAPES.get(one, ()),
                     f"{name}/{kind}/{one} contains {rows.ndim}-dimensional {rows.dtype}",
                 )
                 require_valid(

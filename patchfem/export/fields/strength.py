@@ -42,27 +42,27 @@ def find_yielding(patch_model, bodies: dict, min_peak: float = 0.0) -> dict:
     places_by_strength = {}
     for side, body in bodies.items():
         piece = getattr(patch_model.pieces, side)
-        middle = np.concatenate([body["points"][block].mean(axis=1) for block in body["blocks"]])
-        free = (
-            np.abs(middle[:, 1]) < (1 - FIXED_REGION_FRACTION) * np.abs(body["points"][:, 1]).max()
+        centres = np.concatenate([body["points"][block].mean(axis=1) for block in body["blocks"]])
+        is_free = (
+            np.abs(centres[:, 1]) < (1 - FIXED_REGION_FRACTION) * np.abs(body["points"][:, 1]).max()
         )
-        for coated, kind in (
+        for coated, material in (
             (False, piece.substrate),
             (True, piece.coating.material if piece.coating else None),
         ):
-            mine = np.flatnonzero((np.asarray(body["material"]) == coated) & free)
-            strength = yield_strength(kind)
-            if strength is None or not mine.size:
+            cells = np.flatnonzero((np.asarray(body["material"]) == coated) & is_free)
+            strength = yield_strength(material)
+            if strength is None or not cells.size:
                 continue
-            highest = body["mises"][:, mine].max(axis=0)
-            cell = int(mine[np.argmax(highest)])
+            highest = body["mises"][:, cells].max(axis=0)
+            cell = int(cells[np.argmax(highest)])
             stress_at_face = 0.0
             if min_peak and (coated or piece.coating is None):
                 plane = patch_model.pieces.plane
-                stress_at_face = min_von_mises_ratio(kind.poisson, plane) * min_peak
+                stress_at_face = min_von_mises_ratio(material.poisson, plane) * min_peak
             if highest.max() > max(strength.pressure, stress_at_face):
                 places_by_strength.setdefault(strength, []).append(
-                    (float(highest.max()), side, middle[cell])
+                    (float(highest.max()), side, centres[cell])
                 )
     return {
         strength: _yielding_note(

@@ -39,7 +39,7 @@ MIN_FRAMEWISE_BYTES = 1 << 28
 BITS = {"stress_error": 5}
 # Number of mantissa bits that are kept of other arrays that have no rounding step: a relative
 # error of 3e-5, far below the discretization error.
-MOST_BITS = 14
+OTHER_BITS = 14
 EMPTY = Block(
     np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros(1, np.int64), np.zeros(0, np.uint8), {}, {}
 )
@@ -273,8 +273,8 @@ def _write_block(group, block: Block, times, settings: tuple) -> None:
     """Write a mesh block with its arrays.
 
     settings: units by name; the field arrays of text; the list for arrays that are written frame after
-    frame, None if all are written at once; and the steps of rounding by name, None without
-    compression.
+    frame, None if all are written at once; and the rounding steps by name, None if the
+    arrays are not compressed.
     """
     units, text, large_arrays, rounding = settings
     _write_mesh(group, block)
@@ -313,7 +313,7 @@ def _write_arrays(group, steps, kind: str, data: dict, settings: tuple) -> None:
                 compression_opts=1,
             )
             nearest = _rounding_function(
-                dataset, rounding.get(name, 0.0), BITS.get(name, MOST_BITS)
+                dataset, rounding.get(name, 0.0), BITS.get(name, OTHER_BITS)
             )
             if large_arrays is None:
                 for number in range(count):

@@ -25,7 +25,7 @@ from ...disk.atomic_write import explain_write_error, is_partial_name, write_ato
 from .blocks import CODES, PARTS, Block
 from .series import Frame, Series
 
-BLOCK = 1 << 20  # size of a block before compression [bytes]
+BLOCK_BYTES = 1 << 20  # size of a block before compression [bytes]
 # LZMA filter settings for values of four bytes.
 PACKING = {
     "id": lzma.FILTER_LZMA2,
@@ -43,7 +43,7 @@ TYPES = {
     "u1": "UInt8",
 }
 # File names of the frames of a .pvd file.
-FRAME = re.compile(rf"frame_\d+(\.vtm|(_({'|'.join(PARTS)}))?\.vtu)")
+FRAME_FILE = re.compile(rf"frame_\d+(\.vtm|(_({'|'.join(PARTS)}))?\.vtu)")
 ENDINGS = (".pvd", ".vtu", ".csv", ".vtkhdf")
 
 
@@ -134,7 +134,7 @@ def write_pvd(path: Path, series: Series, numbers=None, change=None) -> int:
     other_files = sorted(
         item.name
         for item in old_files
-        if not FRAME.fullmatch(item.name) and not is_partial_name(item.name)
+        if not FRAME_FILE.fullmatch(item.name) and not is_partial_name(item.name)
     )
     if other_files:
         raise PatchfemError(
@@ -250,7 +250,7 @@ def write_vtu(path: Path, frame: Block | Frame, time: float, units: dict) -> Non
 
 
 def _field_meanings(names: tuple, units: dict) -> list:
-    """Return field arrays (name, value, None) that state the unit and the codes of every array."""
+    """Return metadata arrays (name, value, None) with unit and codes of every field array."""
     return [(f"unit of {name}: {units.get(name, '1')}", 1.0, None) for name in names] + [
         (f"code of {name}: {meaning}", code, None)
         for name in names
@@ -279,10 +279,10 @@ def _compress_array(values) -> str:
     width = values.dtype.itemsize * (values.shape[1] if values.ndim > 1 else 1)
     filters = [{"id": lzma.FILTER_DELTA, "dist": min(width, 256)}, PACKING]
     blocks = [
-        lzma.compress(raw[at : at + BLOCK], lzma.FORMAT_XZ, lzma.CHECK_CRC32, filters=filters)
-        for at in range(0, len(raw), BLOCK)
+        lzma.compress(raw[at : at + BLOCK_BYTES], lzma.FORMAT_XZ, lzma.CHECK_CRC32, filters=filters)
+        for at in range(0, len(raw), BLOCK_BYTES)
     ]
-    sizes = np.array([len(blocks), BLOCK, len(raw) % BLOCK, *map(len, blocks)], "<u8")
+    sizes = np.array([len(blocks), BLOCK_BYTES, len(raw) % BLOCK_BYTES, *map(len, blocks)], "<u8")
     return (base64.b64encode(sizes.tobytes()) + base64.b64encode(b"".join(blocks))).decode()
 
 

@@ -101,14 +101,16 @@ def _draw_charts(curve_fit: FittedCurve) -> list:
     """Chart measured and fitted frequency and damping ratio against amplitude."""
     measured = curve_fit.measured
     unit, scale = choose_axis_unit(measured.amplitude, "m")
-    along = charts.make_axis("amplitude", unit, True)
+    x_axis = charts.make_axis("amplitude", unit, True)
     x = measured.amplitude * scale
-    out = []
-    for k, (title, name, of) in enumerate(
+    drawn_charts = []
+    for k, (title, name, value_unit) in enumerate(
         (("Frequency", "frequency", "Hz"), ("Damping ratio", "damping ratio", ""))
     ):
         errors = 2 * measured.error[k]
         dots = charts.make_dots(x, measured.value[k], "soft", "measured", errors=errors)
         fit = charts.make_line(x, curve_fit.model[k], "accent", "fitted")
-        out.append(charts.make_chart(title, along, charts.make_axis(name, of), [dots, fit]))
-    return out
+        drawn_charts.append(
+            charts.make_chart(title, x_axis, charts.make_axis(name, value_unit), [dots, fit])
+        )
+    return drawn_charts

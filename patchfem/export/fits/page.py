@@ -41,7 +41,7 @@ def page_html(
     summary : sequence of str
         Lines of text at the top of the page.
     picture : str
-        SVG text of fit.svg; "" without one.
+        SVG text of fit.svg; "" if there is none.
     caption : str
         Caption of the picture.
     scene_text : str

@@ -229,7 +229,7 @@ def _format_stiffness(fit_data: dict) -> str:
 
 
 def _best_law_sentence(fit_data: dict) -> str:
-    """Name the law that fits a patch best, with its largest errors."""
+    """State the law that fits a patch best, with its largest errors."""
     stiffness, loss = (fit_data["laws"][fit_data["law"]][part] for part in COMPARED_QUANTITIES)
     return (
         f"Law '{fit_data['law']}' fits best; its largest errors over this range are "

@@ -41,7 +41,7 @@ def format_line(name: str, entry: dict) -> str:
     value, unit, ends = format_fitted(entry)
     interval = "not determined"
     if ends:
-        by = "profile" if entry["method"] == "profile" else "linearised problem"
-        interval = f"95 % in [{', '.join(ends)}] by the {by}"
+        method = "profile" if entry["method"] == "profile" else "linearised problem"
+        interval = f"95 % in [{', '.join(ends)}] by the {method}"
     bound = f", at its {entry['at_bound']} bound" if entry["at_bound"] else ""
     return f"  {name} {f'{value} {unit}'.strip()}   {interval}{bound}"

@@ -33,7 +33,7 @@ def describe_wear_fit(fit: FittedCoefficient, scene: Scene) -> FitFiles:
     }
     source = "" if measured.source == "--to" else f" of {Path(measured.source).name}"
     numbers = (fit.value, fit.low, fit.high)
-    number, low, high = (format_number(one, 4) for one in numbers)
+    number, low, high = (format_number(entry, 4) for entry in numbers)
     line = f"{COEFFICIENT_KEY} {number} {value['unit']}, {low} to {high} from the interval of {measured.name}"
     return FitFiles(
         answer=fit_data,

@@ -17,7 +17,7 @@ from . import modes as mode_lines
 from . import write
 
 # Columns of an exported file that can be its displacement, in order of preference.
-OUTPUT = {"displacement": ("output_displacement", "relative_displacement", "slide")}
+COLUMNS = {"displacement": ("output_displacement", "relative_displacement", "slide")}
 
 
 class EstimateOptions(NamedTuple):
@@ -218,7 +218,7 @@ def _write_response(file: Path, out: Path, requests, settings: EstimateOptions) 
 
 def _read_records(file: Path, requests) -> tuple:
     """Read measured records, and check that one of them is a response."""
-    laboratory_records = laboratory.read_records(file, records.parse_requests(requests), OUTPUT)
+    laboratory_records = laboratory.read_records(file, records.parse_requests(requests), COLUMNS)
     if (
         laboratory_records.channel_list
         and not laboratory_records.values.keys() & measured.DERIVATIVE_ORDERS.keys()

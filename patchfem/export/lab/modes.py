@@ -12,7 +12,7 @@ ACCELERATION = 12
 FORCE = 13
 FREQUENCY = 18
 RESPONSE_TYPES = {"displacement": (8, "m"), "velocity": (11, "m/s"), "acceleration": (12, "m/s^2")}
-OVER = {"force": (FORCE, "N"), "base_acceleration": (ACCELERATION, "m/s^2")}
+INPUT_TYPES = {"force": (FORCE, "N"), "base_acceleration": (ACCELERATION, "m/s^2")}
 # Codes of the function types of universal dataset 58.
 RESPONSE_FUNCTION = 4
 COHERENCE_FUNCTION = 6
@@ -66,9 +66,9 @@ def write_response(path: Path, estimate, drive: str, response: str) -> None:
     estimate : object
         With frequency (k,) [Hz], complex value (k,) and coherence (k,) or None.
     drive, response : str
-        Kinds of input and output, keys of OVER and KINDS.
+        Kinds of input and output, keys of INPUT_TYPES and KINDS.
     """
-    (kind, unit), (drive_type, drive_unit) = RESPONSE_TYPES[response], OVER[drive]
+    (kind, unit), (drive_type, drive_unit) = RESPONSE_TYPES[response], INPUT_TYPES[drive]
     common = {
         "type": 58,
         "binary": 1,

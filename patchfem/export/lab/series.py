@@ -37,7 +37,7 @@ class Column(NamedTuple):
 
     @property
     def label(self) -> str:
-        """Name with the number at its end."""
+        """Name of the column, followed by its number."""
         return f"{self.name}_{self.number}" if self.number else self.name
 
 

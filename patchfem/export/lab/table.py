@@ -1,4 +1,4 @@
-"""Columns as CSV with units in the header and all digits, so that the same bits are read."""
+"""Columns as CSV with units in the header and as many digits as reproduce the same numbers."""
 
 from pathlib import Path
 

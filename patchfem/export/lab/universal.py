@@ -123,7 +123,7 @@ def _write_byte_count(path: Path, start: int, size: int) -> None:
 
 
 def _function_dataset(name: str, abscissa: Column, ordinate: Column, kind: int, title: str) -> dict:
-    """Return a universal dataset 58 of one column over another."""
+    """Return a universal dataset 58 of one column as a function of another."""
     line = "".join(letter if " " <= letter <= "~" else "?" for letter in title)[:80].strip()
     return {
         "type": 58,

@@ -22,11 +22,11 @@ ERROR_DIGITS = 3
 class PlottedCases(NamedTuple):
     """Cases of a sweep that are plotted on its page.
 
-    cases: their numbers; said: a sentence that says which they are, "" for all.
+    cases: their numbers; note: a sentence that describes the selection, "" if all are plotted.
     """
 
     cases: np.ndarray
-    said: str = ""
+    note: str = ""
 
 
 def select_cases(table: dict, data) -> PlottedCases:

@@ -1,4 +1,4 @@
-"""Description of what drives a run, and the command that repeats the run."""
+"""Description of the drive of a run, and the command that repeats the run."""
 
 import shlex
 from pathlib import Path
@@ -29,7 +29,7 @@ def format_resolved(text) -> str:
 
 
 def describe_drive(resolved: dict) -> str:
-    """Describe the drive of a run in a phrase; "" without a drive.
+    """Describe the drive of a run in a phrase; "" if it has no drive.
 
     resolved: the scene with all defaults, as nested tables.
     """

@@ -52,8 +52,8 @@ class Sentences(NamedTuple):
         Range of the main measure.
     misses : str
         Number of cases that miss the tolerance.
-    left : str
-        Number of cases without a result, and whether none has settled.
+    qualification : str
+        Number of cases that have no result, and whether none has settled.
     ends : str
         Number of curves over frequency that are largest at an end.
     unsettled : str
@@ -66,7 +66,7 @@ class Sentences(NamedTuple):
     scatter: str = ""
     span: str = ""
     misses: str = ""
-    left: str = ""
+    qualification: str = ""
     ends: str = ""
     unsettled: str = ""
 
@@ -76,7 +76,7 @@ class SweepHeadline(NamedTuple):
 
     Attributes
     ----------
-    said : Sentences
+    texts : Sentences
     missed : dict
         Cases over the tolerance, from `tolerance_misses.count_over_tolerance`.
     limits : limits.Limits
@@ -85,30 +85,30 @@ class SweepHeadline(NamedTuple):
         From `ranked.sobol_indices` and `ranked.measure_quantiles`.
     peaks : Sequence
         From `peaks.find_peaks`.
-    asked : str
-        Measure of `--of`.
+    requested_measure : str
+        Measure that `--of` requests; "" if none is requested.
     """
 
-    said: Sentences
+    texts: Sentences
     missed: dict
     limits: Limits
     ranks: dict
     spread: dict
     peaks: Sequence
-    asked: str
+    requested_measure: str
 
     def sentences(self) -> list:
         """Return the sentences for the reader.
 
         They are the answer, whether all cases meet the tolerance, and all others.
         """
-        sentences = self.said
+        sentences = self.texts
         # The limits of a grid are more informative than the ranking.
         rank = (
             sentences.rank if sentences.scatter or not (sentences.limit or sentences.peak) else ""
         )
         other_sentences = [sentences.limit, sentences.peak, rank, sentences.scatter, sentences.span]
-        if self.asked:
+        if self.requested_measure:
             other_sentences = [
                 sentences.rank,
                 sentences.scatter,
@@ -136,21 +136,23 @@ class SweepHeadline(NamedTuple):
         without a result, unsettled or over the tolerance.
         """
         text = join_sentences(self._answer_parts())
-        misses = self.said.misses if self.missed else ""
-        notes = join_sentences([note for note in (self.said.left, misses, self.said.ends) if note])
+        misses = self.texts.misses if self.missed else ""
+        notes = join_sentences(
+            [note for note in (self.texts.qualification, misses, self.texts.ends) if note]
+        )
         if not text or not notes:
-            return text or notes or self.said.misses
+            return text or notes or self.texts.misses
         first = notes[0].lower() if notes[1].islower() else notes[0]
         return f"{text.rstrip('.')} ({first}{notes[1:].rstrip('.')})."
 
     def _answer_parts(self) -> list:
         """Return the sentences of which the main result consists."""
-        sentences = self.said
+        sentences = self.texts
         of_random_cases = [sentence for sentence in (sentences.rank, sentences.scatter) if sentence]
         over_key = sentences.limit or sentences.peak
-        if self.asked == "peak_frequency" and sentences.peak and not of_random_cases:
+        if self.requested_measure == "peak_frequency" and sentences.peak and not of_random_cases:
             parts = [sentences.peak]
-        elif self.asked and (of_random_cases or sentences.span):
+        elif self.requested_measure and (of_random_cases or sentences.span):
             parts = of_random_cases or [sentences.span]
         elif over_key:
             parts = [over_key]
@@ -194,7 +196,7 @@ def summarise_sweep(table: dict) -> SweepHeadline:
         values,
         trusted,
         settled,
-        ranked.asked_first(MAIN_MEASURES, table),
+        ranked.put_requested_first(MAIN_MEASURES, table),
         _cases_within_floor(measures, tolerance),
         where=None if table.get("drawn") else where,
     )
@@ -207,8 +209,8 @@ def summarise_sweep(table: dict) -> SweepHeadline:
         scatter=keys_ranked.scatter,
         span=span_of_measure,
         misses=tolerance_misses.tolerance_sentence(measures, tolerance, where, first_measure),
-        left=_qualification_sentence(
-            table, outcome, keys_ranked.rank == ranked.too_few(table, settled)
+        qualification=_qualification_sentence(
+            table, outcome, keys_ranked.rank == ranked.too_few_settled_sentence(table, settled)
         ),
         ends=_end_peaks_sentence(table),
         unsettled=unsettled,
@@ -243,7 +245,7 @@ def _trusted_cases(name: str, measure: dict, tolerance, settled: np.ndarray) -> 
 
 
 def _cases_within_floor(measures: dict, tolerance) -> dict:
-    """Return for each measure the cases whose error is only below the error floor.
+    """Return for each measure the cases that meet the tolerance only by the error floor.
 
     The floor is given as text.
     """

@@ -1,4 +1,4 @@
-"""Limits of a swept key, up to which measures of the motion and of the patch stay the same.
+"""Limits of a swept key: largest values at which measures of motion and patch stay nearly the same.
 
 The first case is the reference. A measure reaches its limit if it differs from this case by 5 %;
 the peak pressure, if it has doubled. The limit lies between the last case that is surely within it
@@ -96,10 +96,10 @@ class Limits(NamedTuple):
     key : dict or None
         The key, with the strings of its values in `unit`; None if no numerical key varies along lines
         of cases.
-    found : sequence of KeyLimit
+    entries : sequence of KeyLimit
         One for each measure of CHANGE_AT_LIMIT that the cases have.
-    lost : sequence of str
-        Measures of the motion without a limit, because their first case did not settle or misses
+    measures_without_limit : sequence of str
+        Measures of the motion that have no limit, because their first case did not settle or misses
         its tolerance.
     unit : str
         Unit in which values of the key are shown.
@@ -110,8 +110,8 @@ class Limits(NamedTuple):
     """
 
     key: dict | None = None
-    found: Sequence = ()
-    lost: Sequence = ()
+    entries: Sequence = ()
+    measures_without_limit: Sequence = ()
     unit: str = ""
     scale: float = 1.0
     patch: dict | None = None
@@ -273,7 +273,7 @@ def limits_json(limits: Limits) -> list:
             "low": float(limits.sizes()[limit.inside]),
             "high": float(limits.sizes()[limit.beyond]),
         }
-        for limit in limits.found
+        for limit in limits.entries
         if limit.beyond is not None
     ]
 
@@ -284,7 +284,7 @@ def limits_sentence(limits: Limits) -> str:
         return ""
     motion = _motion_sentence(limits)
     reached = [
-        limit for limit in limits.found if limit.beyond is not None and limits.is_resolved(limit)
+        limit for limit in limits.entries if limit.beyond is not None and limits.is_resolved(limit)
     ]
     parts = [motion] if motion else []
     parts += [
@@ -311,7 +311,7 @@ def _motion_sentence(limits: Limits) -> str:
 
     It is "" if the cases do not show it.
     """
-    moving = [limit for limit in limits.found if limit.name in MOTION_MEASURES]
+    moving = [limit for limit in limits.entries if limit.name in MOTION_MEASURES]
     if not moving or not all(limits.is_resolved(limit) for limit in moving):
         return ""
     key_name = GAP_OF_ANGLE.get(limits.key["name"], (limits.key["name"],))[0]
@@ -322,7 +322,7 @@ def _motion_sentence(limits: Limits) -> str:
         key=_sort_key,
     )
     if not ends:
-        if limits.lost:
+        if limits.measures_without_limit:
             return ""
         largest_value = moving[0]._replace(value=float(limits.sizes().max()))
         names = (
@@ -441,7 +441,7 @@ def _choose_unit(limits: Limits) -> tuple:
     is above MIN_NUMBER.
     """
     key = limits.key
-    resolved = [limit for limit in limits.found if limits.is_resolved(limit)]
+    resolved = [limit for limit in limits.entries if limits.is_resolved(limit)]
     first = min(
         [limit for limit in resolved if limit.name in MOTION_MEASURES] or resolved,
         key=_sort_key,
@@ -487,12 +487,12 @@ def limits_table(limits: Limits, measures: dict) -> str:
     measures : dict
         {name: (values, errors, SI unit)}.
     """
-    if not limits.found:
+    if not limits.entries:
         return ""
     format_case = key_formatter(limits.key)
     sizes = limits.sizes()
     rows = []
-    for limit in limits.found:
+    for limit in limits.entries:
         if limit.beyond is not None:
             where = f"about {_format_limit(limits, limit)} (between the cases at {_format_cases(limits, limit)})"
         elif limit.covers_line:

@@ -1,4 +1,4 @@
-"""Peaks over a swept frequency: frequency, height and half-power width.
+"""Peaks of the response as a function of a swept frequency: frequency, height and half-power width.
 
 There is one peak for each combination of the values of the other keys.
 """
@@ -71,13 +71,13 @@ class Peak(NamedTuple):
     """Peak of a response curve with its measure, its unit and the values of the other keys."""
 
     name: str
-    held: str
+    fixed_values: str
     unit: str
     swept: SweptPeak
 
 
 def find_peaks(keys: list, measures: dict, trusted: dict, grid: bool) -> list:
-    """Find the peak of each response curve over a swept frequency.
+    """Find the peak of each response curve as a function of a swept frequency.
 
     Parameters
     ----------
@@ -217,7 +217,7 @@ def _find_swept_peak(
 def _find_minimum(
     square: np.ndarray, g: np.ndarray, peak_index: int, low: int, high: int
 ) -> tuple | None:
-    """Find the minimum of the polynomial of 1/y^2 over f^2 through some cases.
+    """Find the minimum of the polynomial that interpolates 1/y^2 against f^2 in some cases.
 
     Parameters
     ----------
@@ -335,7 +335,7 @@ def _unknown_peaks(peaks: list, some_are_known: bool) -> str:
     number_of_others = (
         f" and {len(peaks) - 1} other{'s' * (len(peaks) > 2)}" if len(peaks) > 1 else ""
     )
-    line_text = f" with {peaks[0].held}{number_of_others}" if peaks[0].held else ""
+    line_text = f" with {peaks[0].fixed_values}{number_of_others}" if peaks[0].fixed_values else ""
     where = "where it" if some_are_known else f"Where {measure_label(peaks[0].name)}"
     return (
         f"{where} peaks{line_text} is not known: cases next to the largest value have not settled or miss the "
@@ -353,8 +353,8 @@ def _known_peaks_sentence(peaks: list) -> str:
     if len(peaks) == 1:
         return f"{head}, {_format_height(first)}{_format_width(first)}."
     return (
-        f"{head} with {first.held} ({_format_height(first)}{_format_width(first)}) "
-        f"and at {_format_frequency(last)} with {last.held} "
+        f"{head} with {first.fixed_values} ({_format_height(first)}{_format_width(first)}) "
+        f"and at {_format_frequency(last)} with {last.fixed_values} "
         f"({_format_height(last)}{_format_width(last)})."
     )
 
@@ -381,7 +381,7 @@ def peaks_table(peaks: list) -> str:
     """Return the peaks of a sweep as an HTML table, or ""."""
     if not peaks:
         return ""
-    rows = [[escape(peak.held), *_peak_cells(peak)] for peak in peaks]
+    rows = [[escape(peak.fixed_values), *_peak_cells(peak)] for peak in peaks]
     return (
         f"<p class=soft>The largest {measure_link(measure_label(peaks[0].name), peaks[0].name)} of each curve is found "
         "from a "

@@ -68,7 +68,7 @@ def pack_array(values) -> dict:
 
 
 def player_data(folder: Path) -> dict | None:
-    """Return the data of the animation player for a results folder; None without fields.
+    """Return the data of the animation player for a results folder; None if it has no fields.
 
     Returns
     -------

@@ -97,21 +97,24 @@ def rank_keys(table: dict, trusted: dict, settled: np.ndarray) -> RankedKeys:
     rank = join_sentences(
         [sentence for sentence in (rank, describe_trend(table, shares, settled)) if sentence]
     )
-    too_few_text = "" if rank else too_few(table, settled)
+    too_few_text = "" if rank else too_few_settled_sentence(table, settled)
     spread_text = ""
     if not too_few_text:
         spread_text = describe_scatter(
-            quantiles, count, settled.any() and ends_unsettled, asked_first(SCATTER_MEASURES, table)
+            quantiles,
+            count,
+            settled.any() and ends_unsettled,
+            put_requested_first(SCATTER_MEASURES, table),
         )
     return RankedKeys(shares, rank or too_few_text, quantiles, spread_text)
 
 
-def too_few(table: dict, settled: np.ndarray) -> str:
+def too_few_settled_sentence(table: dict, settled: np.ndarray) -> str:
     """State that too few random cases have settled, and what to do; "" if enough have.
 
     The consequence is that no ranking is possible, or that the scatter is not known.
     """
-    outcome = [str(one) for one in table["outcome"]]
+    outcome = [str(text) for text in table["outcome"]]
     count = int(settled.sum())
     if (
         not table.get("drawn")
@@ -262,7 +265,7 @@ def _trend_sentence(
     return f"{measure_text} {'grows with' if increase > 0 else 'falls with growing'} {key['name']}."
 
 
-def asked_first(names: tuple, table: dict) -> tuple:
+def put_requested_first(names: tuple, table: dict) -> tuple:
     """Return names of measures, with the one that the user asked for first."""
     first = table.get("first", "")
     return (first, *(name for name in names if name != first)) if first else names
@@ -279,7 +282,7 @@ def sobol_indices(table: dict) -> dict:
         fits = table.get("drawn") or (table["grid"] and np.prod(shape) == len(table["outcome"]))
         measures = {
             name: (table["measures"][name]["values"], table["measures"][name]["errors"])
-            for name in asked_first(RANKED_MEASURES, table)
+            for name in put_requested_first(RANKED_MEASURES, table)
             if name in table["measures"]
         }
         table["ranks"] = compute_sobol_indices(keys, measures, shape) if fits else {}
@@ -324,14 +327,14 @@ def ranking_sentence(
         )
     else:
         clauses[0] += (
-            f"{' about equally' * _all_overlap(first)} ({_format_shares(first)} of the variance; their intervals overlap)"
+            f"{' about equally' * _all_overlap(first)} ({_format_indices(first)} of the variance; their intervals overlap)"
         )
     clauses += [
-        f"then on {_list_keys(group)} ({_format_shares(group)})"
+        f"then on {_list_keys(group)} ({_format_indices(group)})"
         for group in others[: MAX_NAMED_KEYS - 1]
     ]
     if len(others) >= MAX_NAMED_KEYS:
-        clauses.append(f"least on {_list_keys(others[-1])} ({_format_shares(others[-1])})")
+        clauses.append(f"least on {_list_keys(others[-1])} ({_format_indices(others[-1])})")
     if sum(round(100 * index.total) for index in ranks[name]) > 100:
         clauses.append(
             "where each share includes interactions between keys, so that the shares can sum to more than "
@@ -353,18 +356,18 @@ def ranking_sentence(
     return f"{measure_text.capitalize()} {clauses}{included_clause}{f' with {its} {last}' if n_unsettled and moves else ''}."
 
 
-def _group_overlapping(shares: list) -> list:
+def _group_overlapping(indices: list) -> list:
     """Group keys whose Sobol indices overlap within their intervals, largest first.
 
     The interval of each index overlaps that of the first index of its group.
     """
-    out = []
-    for share in shares:
-        if out and share.high > out[-1][0].low and share.low != share.high:
-            out[-1].append(share)
+    groups = []
+    for index in indices:
+        if groups and index.high > groups[-1][0].low and index.low != index.high:
+            groups[-1].append(index)
         else:
-            out.append([share])
-    return out
+            groups.append([index])
+    return groups
 
 
 def _all_overlap(group: list) -> bool:
@@ -380,7 +383,7 @@ def _list_keys(group: list) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
-def _format_shares(group: list) -> str:
+def _format_indices(group: list) -> str:
     """Format the Sobol indices of a group of keys."""
     if len(group) == 1:
         return format_percent(group[0])
@@ -445,7 +448,7 @@ def measure_quantiles(table: dict, trusted: dict) -> dict:
     quantiles = {}
     settled = np.isin(np.asarray(table["outcome"], str), FINAL_OUTCOMES)
     for name in (
-        asked_first(RANKED_MEASURES, table)
+        put_requested_first(RANKED_MEASURES, table)
         if table.get("drawn") and len(table["outcome"]) >= MIN_RANDOM_CASES
         else ()
     ):
@@ -519,21 +522,21 @@ def describe_scatter(
     return f"90 % of the {cases_text} have {', '.join(clauses)}." if clauses else ""
 
 
-def share_bars(ranks: dict) -> str:
+def sobol_bars(ranks: dict) -> str:
     """Return bars of the Sobol indices of all keys and measures as HTML, or ""."""
     if not ranks:
         return ""
     parts = []
-    for name, shares in ranks.items():
+    for name, indices in ranks.items():
         rows = [
             [
-                escape(share.key),
-                f"{100 * share.first:.0f} %",
-                f"{100 * share.total:.0f} %",
-                _format_range(share),
-                f"<td class=bars>{_bar_svg(share)}</td>",
+                escape(index.key),
+                f"{100 * index.first:.0f} %",
+                f"{100 * index.total:.0f} %",
+                _format_range(index),
+                f"<td class=bars>{_bar_svg(index)}</td>",
             ]
-            for share in shares
+            for index in indices
         ]
         parts.append(
             f"<h3>{measure_link(measure_label(name), name)}</h3>"

@@ -1,4 +1,4 @@
-"""Motion of an output after a release: its first swing, and the time until it is at rest."""
+"""Motion of an output after a release: its first swing and the time until it comes to rest."""
 
 import numpy as np
 

@@ -40,7 +40,7 @@ GROUPS = ("motion", "friction", "energy", "patch", "wear")
 # Largest relative difference of two values of the contact fraction that are treated as equal.
 EQUAL_FRACTION_TOL = 2e-3
 MAX_LISTED = 3  # largest number of interfaces or contact regions that are listed one by one
-NO_SLIP = 1e-15  # largest slide that is attributed to round-off [m]
+SLIP_ROUND_OFF = 1e-15  # largest slide that is attributed to round-off [m]
 WHOLE_RUN = "over the whole run"
 LOOPS = "over the two stored cycles of the steady motion"
 PERIOD_BY_ENGINE = {"harmonic": LOOPS}  # period to which energies refer, by method
@@ -356,7 +356,7 @@ def _bench_slip_sentence(slip: dict | None, first_sentence: str, patch: bool) ->
     """
     if slip is None or slip["value"] is None:
         return first_sentence
-    if slip["value"] <= max(_error_or_floor(slip), NO_SLIP):
+    if slip["value"] <= max(_error_or_floor(slip), SLIP_ROUND_OFF):
         return f"{first_sentence} {_no_slip_sentence(patch, 'cycle')}"
     return (
         f"{first_sentence} Slip amplitude (half the peak-to-peak slip, averaged over the interface): "
@@ -373,10 +373,10 @@ def _bench_loop_sentence(loop: dict, stiffness: dict) -> str:
         """Format the loss factor with its error."""
         if error is not None and factor <= error:
             return f"at most {formatting.format_number((factor + error) * scale, 2)}"
-        value, off = formatting.round_to_error(
+        value, rounded_error = formatting.round_to_error(
             factor * scale, None if error is None else error * scale, 1e-9, is_ratio=True
         )
-        return formatting.format_with_error(value, off, "")
+        return formatting.format_with_error(value, rounded_error, "")
 
     return (
         f"At a slide amplitude of {formatting.format_quantity(loop['slide_amplitude'], 'm', 4)} the "
@@ -499,14 +499,14 @@ def _energy_statements(summary: dict) -> list:
         text = "friction work of the last cycle {}"
     elif summary["outcome"] in CHANGING_OUTCOMES and summary["kind"] in ("rig", "linear"):
         text += " (mean of the last cycles)"
-    return _at_each_interface(summary, "loop_area", text)
+    return _interface_statements(summary, "loop_area", text)
 
 
 def _patch_statements(summary: dict) -> list:
     """Return the statements of a headline on the solved patch."""
     fraction = summary["measures"].get("contact_fraction", {}).get("value")
     where = describe_contact(summary.get("contact"), fraction)
-    statements = _at_each_interface(
+    statements = _interface_statements(
         summary, "contact_fraction", "{} of the length in contact" + where
     )
     if summary["kind"] == "patch":
@@ -514,7 +514,7 @@ def _patch_statements(summary: dict) -> list:
     return statements
 
 
-def _at_each_interface(summary: dict, name: str, text: str) -> list:
+def _interface_statements(summary: dict, name: str, text: str) -> list:
     """Return the statement of each interface, or only of the first if there are more than MAX_LISTED.
 
     Strips do not count as interfaces.
@@ -722,11 +722,11 @@ def order_measures(measures: dict) -> dict:
     Under a random drive those that a record determines come first; their scatter is shown with them
     and is left out.
     """
-    shaken = [name for name in measures if f"{name}{SCATTER}" in measures]
+    random_measures = [name for name in measures if f"{name}{SCATTER}" in measures]
     return {
         name: measures[name]
-        for name in dict.fromkeys((*shaken, *measures))
-        if name.removesuffix(SCATTER) not in shaken or name in shaken
+        for name in dict.fromkeys((*random_measures, *measures))
+        if name.removesuffix(SCATTER) not in random_measures or name in random_measures
     }
 
 
@@ -786,7 +786,7 @@ def format_measures(measures: dict, engine: str = "") -> list[str]:
 
 
 def notebook_html(summary: dict, sentence: str, cycles: float | None, released: str = "") -> str:
-    """Return the results as HTML without styles, for a notebook.
+    """Return the results as unstyled HTML, for a notebook.
 
     Parameters
     ----------
@@ -824,14 +824,14 @@ def _format_record_interval(name: str, measures: dict) -> str:
     return f" ({numerics}{text} for other records)" if text else ""
 
 
-def _format_measure_line(name: str, measure: dict, range_text: str, shaken: bool) -> str:
+def _format_measure_line(name: str, measure: dict, range_text: str, is_random: bool) -> str:
     """Format a measure with its error, or the reason why it has no value."""
     if measure.get("reason"):
         return f"- ({measure['reason']})"
     qualifier = QUALIFIERS.get(re.sub(r"_\d+$", "", name))
     qualifier = range_text if qualifier == WHOLE_RUN else qualifier
     qualifier = (
-        f"{qualifier} of the first mode" if shaken and qualifier == "per cycle" else qualifier
+        f"{qualifier} of the first mode" if is_random and qualifier == "per cycle" else qualifier
     )
     unknown = UNKNOWN if measure["error"] is None and measure["value"] is not None else ""
     return f"{format_with_error(name, measure)}{unknown}{f', {qualifier}' if qualifier else ''}"

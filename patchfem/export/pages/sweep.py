@@ -1,4 +1,4 @@
-"""Page of a sweep: its results over the swept keys, explored in the browser, and its cases."""
+"""Page of a sweep: an interactive plot of the results against the swept keys, and the cases."""
 
 from collections import Counter
 from html import escape
@@ -30,7 +30,7 @@ MAX_COLUMNS = 8  # largest number of keys and measures together
 PAGE = "report.html"
 SUMMARY = "summary.json"
 MAX_LISTED_CASES = 400  # largest number of cases in the table; sweep.csv contains all cases
-MIN_SCROLLED_ROWS = 24  # largest number of rows of a table that does not scroll
+MAX_UNSCROLLED_ROWS = 24  # largest number of rows of a table that does not scroll
 
 
 def page_html(table: dict, summary: SweepHeadline | None = None) -> str:
@@ -57,19 +57,19 @@ def page_html(table: dict, summary: SweepHeadline | None = None) -> str:
     first = next(
         (
             name
-            for name in ranked.asked_first(MAIN_MEASURES, table)
+            for name in ranked.put_requested_first(MAIN_MEASURES, table)
             if name in table["measures"] and np.isfinite(table["measures"][name]["values"]).any()
         ),
         None,
     )
     summary = summary or summarise_sweep(table)
     drawn_cases = select_cases(table, lambda cases, whole: _script_data(table, first, cases, whole))
-    data = _script_data(table, first, drawn_cases.cases, not drawn_cases.said)
+    data = _script_data(table, first, drawn_cases.cases, not drawn_cases.note)
     sections = [
         Section(
             "answers",
             "Results",
-            _explorer_html(drawn_cases.said, table["folders"])
+            _explorer_html(drawn_cases.note, table["folders"])
             if data["measures"]
             else "<p>No case has a value to draw.</p>",
         ),
@@ -78,7 +78,7 @@ def page_html(table: dict, summary: SweepHeadline | None = None) -> str:
             Section(*section)
             for section in (
                 ("peaks", "Peaks", peaks.peaks_table(summary.peaks)),
-                ("ranking", "Keys that matter most", ranked.share_bars(summary.ranks)),
+                ("ranking", "Keys that matter most", ranked.sobol_bars(summary.ranks)),
                 (
                     "scatter",
                     "Scatter of the answers",
@@ -278,17 +278,17 @@ def _cases_table(table: dict) -> str:
     """Return the first cases of a sweep as an HTML table."""
     shown_measures = [
         name
-        for name in ranked.asked_first(
+        for name in ranked.put_requested_first(
             (MAIN_MEASURES[0], "peak_frequency", *MAIN_MEASURES[1:]), table
         )
         if name in table["measures"]
     ]
     shown_measures += [
         name
-        for name, one in table["measures"].items()
+        for name, column_data in table["measures"].items()
         if name not in shown_measures
-        and _is_varied(one["values"])
-        and np.nanmax(np.abs(one["values"])) > format_zero(name)
+        and _is_varied(column_data["values"])
+        and np.nanmax(np.abs(column_data["values"])) > format_zero(name)
     ]
     shown_measures = shown_measures[: min(MAX_MEASURES, max(2, MAX_COLUMNS - len(table["keys"])))]
     listed_cases = slice(MAX_LISTED_CASES)
@@ -297,7 +297,7 @@ def _cases_table(table: dict) -> str:
         for name in shown_measures
     ]
     heads = [
-        *(with_line_breaks(one["name"]) for one in table["keys"]),
+        *(with_line_breaks(column_data["name"]) for column_data in table["keys"]),
         "outcome",
         *(
             f">{measure_link(column['label'], column['name'])}{escape(column['unit'] and ' [' + column['unit'] + ']')}"
@@ -319,8 +319,8 @@ def _cases_table(table: dict) -> str:
                 "" if outcome in SETTLED_OUTCOMES else " class=bad",
                 [
                     *(
-                        _keep_unit_together(shorten_number(str(one["texts"][i])))
-                        for one in table["keys"]
+                        _keep_unit_together(shorten_number(str(column_data["texts"][i])))
+                        for column_data in table["keys"]
                     ),
                     outcome_cell,
                     *numbers,
@@ -343,7 +343,7 @@ def _cases_table(table: dict) -> str:
         if table.get("own", True)
         else ""
     )
-    frame = "wide long" if len(rows) > MIN_SCROLLED_ROWS else "wide"
+    frame = "wide long" if len(rows) > MAX_UNSCROLLED_ROWS else "wide"
     return f"{files_note}{document.table_html(heads, rows, frame)}{more_note}"
 
 

@@ -1,4 +1,4 @@
-"""Coarser meshes for a page, with means over the cells that a coarse cell covers."""
+"""Coarser meshes for a page, whose values are averages over the original cells."""
 
 from dataclasses import dataclass
 
@@ -78,19 +78,24 @@ def reduce_mesh(
     # grid, it is the corner itself.
     by_key = np.lexsort((corner_distance, key))
     _, first, number = np.unique(key[by_key], return_index=True, return_inverse=True)
-    stand_in = np.empty(len(points), int)
-    stand_in[by_key] = number
-    reduced_cells = stand_in[cells]
+    new_number = np.empty(len(points), int)
+    new_number[by_key] = number
+    reduced_cells = new_number[cells]
     ranked = np.sort(reduced_cells, axis=1)
     kept_cells = np.flatnonzero((np.diff(ranked, axis=1) > 0).sum(axis=1) >= 2)
     kept_cells = kept_cells[np.unique(ranked[kept_cells], axis=0, return_index=True)[1]]
     box = (bins[0][cells].min(axis=1) * heights + bins[1][cells].min(axis=1)) * 2 + (material > 0)
     order = np.argsort(box, kind="stable")
     _, starts, group = np.unique(box[order], return_index=True, return_inverse=True)
-    of_cell = np.empty(count, int)
-    of_cell[order] = group
+    group_of_cell = np.empty(count, int)
+    group_of_cell[order] = group
     return ReducedMesh(
-        by_key[first], reduced_cells[kept_cells], order, starts, of_cell[kept_cells], size[order]
+        by_key[first],
+        reduced_cells[kept_cells],
+        order,
+        starts,
+        group_of_cell[kept_cells],
+        size[order],
     )
 
 
@@ -109,12 +114,13 @@ def _line_bins(points, cells, material, max_cells: int, fine_range: tuple | None
         rows.size - 1,
         max(int((max_cells / COLUMNS_PER_ROW) ** 0.5), max_cells // (columns.size - 1)),
     )
-    coat = np.zeros((2, len(points)), bool)
-    for kind in (0, 1):
-        coat[kind][cells[(material > 0) == kind]] = True
-    border = np.unique(depth[coat.all(axis=0)])
+    touches_material = np.zeros((2, len(points)), bool)
+    for is_coating in (0, 1):
+        touches_material[is_coating][cells[(material > 0) == is_coating]] = True
+    boundary_depths = np.unique(depth[touches_material.all(axis=0)])
     kept_rows = np.union1d(
-        rows[select_lines(rows, n_rows)], border if border.size < n_rows / 2 else []
+        rows[select_lines(rows, n_rows)],
+        boundary_depths if boundary_depths.size < n_rows / 2 else [],
     )
     kept_columns = columns[
         select_lines(

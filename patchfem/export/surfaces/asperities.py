@@ -98,7 +98,7 @@ def format_asperities(moments: TraceMoments | None, cutoff: float | None) -> lis
 
 
 def _describe_split(cutoff: float | None) -> str:
-    """Describe which waves of a trace its table of asperities contains."""
+    """Describe which waves of a trace are represented by its table of asperities."""
     if cutoff is None:
         return (
             "This table describes all waves of the trace. If [contact.profile] takes the same "

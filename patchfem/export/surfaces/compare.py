@@ -135,7 +135,7 @@ NOTHING_COMPUTED = ComputedParts()
 
 
 def add_predicted_sentence(verdict: tuple, predicted: PredictedWear | None) -> tuple:
-    """Return headline and sentences with that on the computed wear as the last one."""
+    """Return headline and sentences, with a sentence on the computed wear at the end."""
     if predicted is None:
         return verdict
     headline, sentences = verdict
@@ -473,7 +473,7 @@ def page_html(
 
 
 def _predicted_section(predicted: PredictedWear) -> Section:
-    """Return the section of a page with the computed wear over the measured one."""
+    """Return the page section that compares the computed with the measured wear."""
     body = [figure_html("w", *predicted_picture(predicted)), predicted_table(predicted).html()]
     return Section("predicted", "Computed wear over the measured wear", "\n".join(body))
 
@@ -641,7 +641,7 @@ def _pressed_html(surface_runs: SurfaceRuns) -> str:
 
 
 def _format_ratio(first, second) -> str:
-    """Format the ratio of two measures, second over first; "" if it is unknown."""
+    """Format the ratio of the second to the first measure; "" if it is unknown."""
     values = [None if measure is None else measure.value for measure in (first, second)]
     if None in values or values[0] == 0:
         return ""

@@ -179,7 +179,7 @@ def _direction_text(row: dict) -> str:
 
 
 def _main_texts(row: dict) -> list:
-    """Return the main quantities of a pair that have an interval as strings."""
+    """Return the main quantities of a pair that have an interval, as strings."""
     if row["outcome"] == "failed":
         return []
     out = []

@@ -218,17 +218,22 @@ def _wavelength_unit(spectrum: Spectrum) -> tuple:
 def _density_marks(
     spectrum: Spectrum, scale: float, colour: str, name: str = "", band: str = ""
 ) -> list:
-    """Return the chart marks of a spectrum over wavelength, and of its 95 % band."""
+    """Return the chart marks of a spectrum as a function of wavelength, and of its 95 % band."""
     low, high = spectrum.band()
-    pick = np.geomspace(1, spectrum.frequency.size, MAX_SPECTRUM_POINTS)
-    pick = np.unique(np.round(pick).astype(int)) - 1
-    pick = pick[spectrum.density[pick] > 0]
-    waves = scale / spectrum.frequency[pick]
+    shown = np.geomspace(1, spectrum.frequency.size, MAX_SPECTRUM_POINTS)
+    shown = np.unique(np.round(shown).astype(int)) - 1
+    shown = shown[spectrum.density[shown] > 0]
+    waves = scale / spectrum.frequency[shown]
     return [
         make_mark(
-            "band", colour, band, x=waves, low=low[pick] * UM3_PER_M3, high=high[pick] * UM3_PER_M3
+            "band",
+            colour,
+            band,
+            x=waves,
+            low=low[shown] * UM3_PER_M3,
+            high=high[shown] * UM3_PER_M3,
         ),
-        make_line(waves, spectrum.density[pick] * UM3_PER_M3, colour, name, width=1.0),
+        make_line(waves, spectrum.density[shown] * UM3_PER_M3, colour, name, width=1.0),
     ]
 
 
@@ -383,7 +388,7 @@ def draw_mean_section(track, start: float, end: float) -> str:
 
 
 def draw_aligned(x, first, second, worn_depth) -> str:
-    """Draw two aligned traces, and enlarged the part around the largest wear.
+    """Draw two aligned traces, and an enlarged view of the largest wear.
 
     Parameters
     ----------
@@ -529,7 +534,7 @@ def draw_both_statistics(heights: tuple, spectra: tuple, band: tuple) -> str:
 
 
 def draw_directions(parts: list, directions: list) -> str:
-    """Draw the spectra along x and y, and the ratios x over y with their intervals.
+    """Draw the spectra along x and y, and the ratios of x to y with their intervals.
 
     directions: (when, amplitude ratio, slope ratio) each.
     """

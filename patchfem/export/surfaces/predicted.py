@@ -1,4 +1,4 @@
-"""Computed wear over the measured one: reading of the run, table, CSV and picture."""
+"""Computed wear beside the measured one: results of the run, table, CSV and picture."""
 
 from pathlib import Path
 
@@ -28,7 +28,7 @@ COLUMNS = "x_patch [um],measured [um],computed [um],difference [um],noise [um]"
 
 
 def predict_wear(parts: list, folder: Path, piece: str = "") -> PredictedWear:
-    """Fit the wear of a run to the wear that traces along x show.
+    """Fit the computed wear of a run to the wear measured by traces along x.
 
     Parameters
     ----------
@@ -78,8 +78,8 @@ def read_history(folder: Path, piece: str = "") -> WearHistory:
             f"compare --predicted {folder}: with wear.upper_share = {upper_share:g} the pieces wear differently; say "
             "with --piece upper or --piece lower of which piece the traces are"
         )
-    share = 1 - upper_share if piece == "lower" else upper_share
-    if not share > 0:
+    piece_fraction = 1 - upper_share if piece == "lower" else upper_share
+    if not piece_fraction > 0:
         raise PatchfemError(
             f"compare --piece {piece}: with wear.upper_share = {upper_share:g} this piece does not wear"
         )
@@ -97,7 +97,7 @@ def read_history(folder: Path, piece: str = "") -> WearHistory:
     return WearHistory(
         x=run.surface.x,
         work=work,
-        depth=share * fields["worn_depth"][first],
+        depth=piece_fraction * fields["worn_depth"][first],
         coefficient=parse_quantity(wear["coefficient"], "wear coefficient"),
         error=_relative_error(run),
         source=str(folder),
@@ -106,7 +106,7 @@ def read_history(folder: Path, piece: str = "") -> WearHistory:
 
 
 def _require_wear(run: PatchRun, folder: Path) -> None:
-    """Refuse a run whose worn depth is not that of one trace since the unworn state."""
+    """Raise PatchfemError unless the worn depth is that of one trace since the unworn state."""
     name = f"compare --predicted {folder}"
     if not run.has_wear:
         raise PatchfemError(
@@ -134,9 +134,9 @@ def _relative_error(run: PatchRun) -> float:
 
 
 def predicted_table(predicted: PredictedWear) -> QuantityTable:
-    """Return the table of coefficient and place."""
+    """Return the table of the fitted wear coefficient and position."""
     rows = []
-    for name, quantity in _quantities(predicted).items():
+    for name, quantity in _fit_values(predicted).items():
         unit = ("m^2/N", 1.0) if name == "coefficient" else None
         rows.append(Row(LABELS[name], quantity, unit, meaning=quantity.text))
     name = f"computed wear of {predicted.history.source}"
@@ -145,13 +145,14 @@ def predicted_table(predicted: PredictedWear) -> QuantityTable:
     return QuantityTable((name, *HEADS), rows)
 
 
-def _quantities(predicted: PredictedWear) -> dict:
+def _fit_values(predicted: PredictedWear) -> dict:
+    """Return the fitted wear coefficient and the position of the patch centre."""
     return {"coefficient": predicted.coefficient, "patch_centre": predicted.centre}
 
 
 def predicted_data(predicted: PredictedWear) -> dict:
     """Return the fitted wear as a dict in SI units."""
-    out = {name: quantity_data(quantity) for name, quantity in _quantities(predicted).items()}
+    out = {name: quantity_data(quantity) for name, quantity in _fit_values(predicted).items()}
     difference = predicted.difference
     out |= {
         "difference_rms": predicted.difference_rms,
@@ -184,7 +185,7 @@ def write_csv(path: Path, predicted: PredictedWear) -> None:
 
 
 def predicted_picture(predicted: PredictedWear) -> Picture:
-    """Draw the computed depth over the measured one, and their difference beside it."""
+    """Draw the computed and the measured depth in one chart, and their difference in another."""
     place, measured, computed, noise = predicted.depths
     along, mm = choose_axis_unit(place, "m")
     up, um = choose_axis_unit(measured, "m")

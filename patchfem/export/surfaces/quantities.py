@@ -69,14 +69,14 @@ def choose_common_unit(quantities: list) -> tuple:
 
 
 def _format_below_million(value: float, digits: int) -> str:
-    """Write a number with `digits` digits, without a power of ten below a million."""
+    """Write a number with `digits` digits; numbers below a million have no power of ten."""
     if value == 0 or not 1 <= abs(value) < MAX_PLAIN_NUMBER:
         return format_number(value, digits)
     return f"{value:.{max(digits - 1 - int(np.floor(np.log10(abs(value)))), 0)}f}"
 
 
 def _count_digits(low: float, high: float) -> int:
-    """Return the number of digits that show two digits of the width of an interval."""
+    """Return the number of digits that resolves two digits of the width of an interval."""
     width = high - low
     size = max(abs(low), abs(high))
     if not width > 0 or not size > 0:

@@ -267,7 +267,7 @@ def write_surfaces(folder: Path, reports: list) -> None:
 
 
 def _names_by_reason(report: RoughnessReport) -> dict:
-    """Group the roughness parameters without an interval by the reason."""
+    """Group the roughness parameters that have no interval by the reason."""
     out: dict = {}
     for value in report.values:
         if value.value is not None and value.low is None and value.reason:

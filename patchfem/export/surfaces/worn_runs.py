@@ -65,7 +65,7 @@ class PatchSurface(NamedTuple):
     x : (m,) array
         [m]
     y : (s,) array or None
-        Middles of the strips [m]; None without strips.
+        Centres of the strips [m]; None if there are no strips.
     area : array
         Areas of the nodes [m2].
     gap : array
@@ -93,7 +93,7 @@ class PatchRun(NamedTuple):
     pressure : (m,) array
         Normal stress [Pa]; the mean over strips.
     loop : tuple or None
-        Displacement [m] and friction force [N] (k,) of the last cycle; None without a drive.
+        Displacement [m] and friction force [N] (k,) of the last cycle; None if there is no drive.
     cycles : float
         Cycles of wear.
     """
@@ -107,7 +107,7 @@ class PatchRun(NamedTuple):
 
     @property
     def has_wear(self) -> bool:
-        """Whether the run has [wear]."""
+        """Whether the scene of the run has a table [wear]."""
         return "wear" in self.run.resolved
 
     def measure(self, name: str) -> dict | None:
@@ -373,7 +373,7 @@ def hidden_depths(surface: PatchSurface, depth) -> tuple:
 
 
 def hidden_line(x, depth) -> tuple:
-    """Find the straight line of the highest mean below depths (m,) [m] at x (m,) [m].
+    """Find the straight line with the largest mean below depths (m,) [m] at x (m,) [m].
 
     Returns its depths [m] at both ends, none below zero. An unworn stretch leaves none: from there
     a trace shows all wear.
@@ -382,7 +382,7 @@ def hidden_line(x, depth) -> tuple:
 
 
 def find_plane_below(x, y, depth) -> tuple:
-    """Find the plane of the highest mean below depths (s, m) [m] by linear programming.
+    """Find the plane with the largest mean below depths (s, m) [m] by linear programming.
 
     Parameters
     ----------
@@ -416,7 +416,7 @@ def find_plane_below(x, y, depth) -> tuple:
 
 
 def _wave_ratios(x, gaps: tuple) -> dict:
-    """Compute the ratios of amplitude and slope of the surfaces, after over before."""
+    """Compute the ratios of amplitude and slope of the surface after wear to those before."""
     texts = {"amplitude": AMPLITUDE, "slope": SLOPE}
     reason = ""
     if gaps[0].ndim == 2:

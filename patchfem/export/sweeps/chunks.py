@@ -172,7 +172,7 @@ def _read_column(dataset, kind, count: int | None = None, rows: int | None = Non
 
 @dataclass(eq=False, slots=True)
 class Chunks:
-    """Files of a folder and the cases that they contain.
+    """Files of a results folder, and the requested cases that they contain.
 
     Attributes
     ----------
@@ -180,20 +180,20 @@ class Chunks:
     names : (n,) array of uint64
         Names of the requested cases, in their order.
     files : list of Path
-    held : (n,) array
-        Index in `files` of the file of a case; -1 if no file contains it.
-    others : int
-        Number of cases in the files that are not requested.
+    file_index : (n,) array
+        Index in `files` of the file that contains each case; -1 if there is none.
+    n_other_cases : int
+        Number of cases in the files that were not requested.
     """
 
     folder: Path
     names: np.ndarray
     files: list = field(default_factory=list)
-    held: np.ndarray = None
-    others: int = 0
+    file_index: np.ndarray = None
+    n_other_cases: int = 0
 
-    def look(self) -> None:
-        """Find the files that the folder contains now."""
+    def find_files(self) -> None:
+        """List the files in the folder, and locate the requested cases in them."""
         # The cases of a sweep are not always distinct.
         distinct_names, position_of_name = np.unique(self.names, return_inverse=True)
         file_of_name = np.full(distinct_names.size, -1, np.int32)
@@ -215,23 +215,23 @@ class Chunks:
             )
             file_of_name[position[is_requested]] = file_number
             others.append(names[~is_requested])
-        self.held = file_of_name[position_of_name]
-        self.others = np.unique(np.concatenate(others)).size
+        self.file_index = file_of_name[position_of_name]
+        self.n_other_cases = np.unique(np.concatenate(others)).size
 
-    def parts(self, numbers: np.ndarray) -> Iterator[tuple[np.ndarray, CaseResults]]:
-        """Yield (numbers, CaseResults) of the requested cases that exist, file by file.
+    def iterate_results(self, numbers: np.ndarray) -> Iterator[tuple[np.ndarray, CaseResults]]:
+        """Yield (numbers, CaseResults) of the requested cases that have a result, file by file.
 
         A damaged file contains no cases.
         """
         numbers = np.asarray(numbers, int)
-        for file_number in np.unique(self.held[numbers]).tolist():
-            numbers_in_file = numbers[self.held[numbers] == file_number]
+        for file_number in np.unique(self.file_index[numbers]).tolist():
+            numbers_in_file = numbers[self.file_index[numbers] == file_number]
             try:
                 names, results = (
                     read_chunk(self.files[file_number]) if file_number >= 0 else (None, None)
                 )
             except (OSError, KeyError, ValueError, TypeError, IndexError, AttributeError):
-                self.held[self.held == file_number] = -1
+                self.file_index[self.file_index == file_number] = -1
                 continue
             if file_number >= 0:
                 order = np.argsort(names)
@@ -242,20 +242,20 @@ class Chunks:
                     ),
                 )
 
-    def pack(self, others: bool) -> None:
+    def merge_small_files(self, removes_others: bool) -> None:
         """Merge files if most of them contain few cases.
 
-        others: whether to remove files of other sweeps as well.
+        removes_others: whether to remove files of other sweeps as well.
         """
-        numbers_with_result = np.flatnonzero(self.held >= 0)
-        used = set(np.unique(self.held[numbers_with_result]).tolist())
+        numbers_with_result = np.flatnonzero(self.file_index >= 0)
+        used = set(np.unique(self.file_index[numbers_with_result]).tolist())
         old_files = [self.files[file_number] for file_number in sorted(used)]
         if len(old_files) > 2 * -(-numbers_with_result.size // MAX_CASES_PER_FILE):
             new_files = set()
             for first in range(0, numbers_with_result.size, MAX_CASES_PER_FILE):
                 numbers = numbers_with_result[first : first + MAX_CASES_PER_FILE]
                 results = CaseResults.blank(numbers.size)
-                for part_numbers, part in self.parts(numbers):
+                for part_numbers, part in self.iterate_results(numbers):
                     results.insert(np.searchsorted(numbers, part_numbers), part)
                 new_files.add(
                     write_chunk(self.folder, numbers.tolist(), self.names[numbers], results)
@@ -266,11 +266,13 @@ class Chunks:
         removed_files += [
             path for file_number, path in enumerate(self.files) if file_number not in used
         ]
-        sorted_names = np.sort(self.names) if removed_files and not others else self.names[:0]
+        sorted_names = (
+            np.sort(self.names) if removed_files and not removes_others else self.names[:0]
+        )
         for path in removed_files:
             names = read_names(path)
             if (
-                others
+                removes_others
                 or (
                     sorted_names[
                         np.searchsorted(sorted_names, names).clip(max=sorted_names.size - 1)

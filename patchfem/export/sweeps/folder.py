@@ -180,16 +180,16 @@ class Writer:
         except (OSError, WriteError) as error:
             raise self._fault(error) from None
 
-    def _put(self, place: Path, text: str) -> None:
+    def _put(self, case_folder: Path, text: str) -> None:
         """Write summary.json of a case into its folder, which replaces an older one."""
-        draft = place.with_name(f".{place.name}.{os.getpid()}")
+        draft = case_folder.with_name(f".{case_folder.name}.{os.getpid()}")
         try:
             draft.mkdir(parents=True, exist_ok=True)
             write_in_partial_folder(draft / SUMMARY, text)
             try:
-                os.rename(draft, place)
+                os.rename(draft, case_folder)
             except OSError:  # the folder exists already
-                replace_folder(draft, place)
+                replace_folder(draft, case_folder)
         except (OSError, WriteError) as error:
             shutil.rmtree(draft, ignore_errors=True)
             raise self._fault(error) from None
@@ -247,7 +247,7 @@ class Folder:
                     self._remove_empty()
                 raise
         write_bytes(self.target / CHUNKS / self.token, b"")
-        self.chunks.look()
+        self.chunks.find_files()
         self._adopt()
         return self
 
@@ -258,7 +258,7 @@ class Folder:
         folder_names = {summary.name for summary in os.scandir(self.target / CASES)}
         numbers = []
         summaries = []
-        for number in np.flatnonzero(self.chunks.held < 0).tolist():
+        for number in np.flatnonzero(self.chunks.file_index < 0).tolist():
             if (key := case_folder_name(self.chunks.names[number])) in folder_names:
                 with suppress(OSError, ValueError):
                     summaries.append(read_summary(self.target / CASES / key / SUMMARY))
@@ -280,7 +280,7 @@ class Folder:
                 self.chunks.folder, numbers[part], self.chunks.names[numbers[part]], results
             )
         if numbers:
-            self.chunks.look()
+            self.chunks.find_files()
 
     def __exit__(self, fault, *_) -> None:
         (self.target / CHUNKS / self.token).unlink(missing_ok=True)
@@ -291,26 +291,26 @@ class Folder:
 
     def _remove_empty(self) -> None:
         """Remove the folders of the sweep that are empty."""
-        for place in (self.target / CASES, self.target / CHUNKS, self.target):
+        for folder in (self.target / CASES, self.target / CHUNKS, self.target):
             # Folders with older files or with results of this sweep are kept.
             with suppress(OSError):
-                place.rmdir()
+                folder.rmdir()
 
     def is_complete(self) -> bool:
         """Return whether the folder contains the tables of a complete sweep."""
         return read_answer(self.target / "sweep.json").get("cases", {}).get("unfinished") == 0
 
-    def refuse_another(self, of: dict) -> None:
-        """Raise PatchfemError if the tables in the folder are of another scene or of other keys.
+    def refuse_other_sweep(self, identity: dict) -> None:
+        """Raise PatchfemError if the tables in the folder belong to another scene or to other keys.
 
-        A resumed sweep would replace them. of: from `run.sweep_identity`.
+        A resumed sweep would replace them. identity: from `run.sweep_identity`.
         """
-        stored_identity = read_answer(self.target / "sweep.json").get("of", of)
-        if stored_identity == of:
+        stored_identity = read_answer(self.target / "sweep.json").get("of", identity)
+        if stored_identity == identity:
             return
         keys = [
-            identity.get("keys", []) if isinstance(identity, dict) else []
-            for identity in (stored_identity, of)
+            entry.get("keys", []) if isinstance(entry, dict) else []
+            for entry in (stored_identity, identity)
         ]
         difference = (
             "other keys" + f" ({', '.join(map(str, keys[0]))})" * bool(keys[0])
@@ -325,12 +325,12 @@ class Folder:
     def find_complete_cases(self, numbers: np.ndarray, keep: str = "none") -> np.ndarray:
         """Return the numbers of the cases that have a result and the files that `keep` requires."""
         numbers = np.asarray(numbers, int)
-        numbers = numbers[self.chunks.held[numbers] >= 0]
+        numbers = numbers[self.chunks.file_index[numbers] >= 0]
         if keep == "none":
             return numbers
         failed = set()
         if keep != "summaries":
-            for at, part in self.chunks.parts(numbers):
+            for at, part in self.chunks.iterate_results(numbers):
                 failed.update(at[list(part.messages)].tolist() if part.messages else ())
         return np.array(
             [
@@ -360,37 +360,37 @@ class Folder:
             and all(os.path.isfile(os.path.join(case_folder, name)) for name in required_files)
         )
 
-    def answers(self, total: CaseResults) -> CaseResults:
-        """Fill in the results of all cases that have any, and return `total`."""
-        self.chunks.look()
-        for at, part in self.chunks.parts(np.arange(len(total))):
+    def fill_results(self, total: CaseResults) -> CaseResults:
+        """Insert all stored results into `total`, and return it."""
+        self.chunks.find_files()
+        for at, part in self.chunks.iterate_results(np.arange(len(total))):
             part.reasons.clear()  # the reasons appear in no table
             total.insert(at, part)
         return total
 
-    def keys(self) -> list[str]:
-        """Return the names of the folders of the cases in cases/; [] if there are none."""
+    def case_folder_names(self) -> list[str]:
+        """Return the folder names of the cases in cases/; [] if no case has a folder."""
         return (
             list(map(case_folder_name, self.chunks.names)) if (self.target / CASES).is_dir() else []
         )
 
-    def unfinish(self) -> None:
-        """Rename the tables of an older sweep while cases are computed, because they do not match."""
+    def mark_tables_outdated(self) -> None:
+        """Rename the tables of an older sweep, which are outdated once cases are computed."""
         for name in TABLES:
             with suppress(FileNotFoundError):  # there is no table, or another shard has renamed it
                 os.replace(self.target / name, self.target / f"{name}.partial")
 
-    def tidy(self, others: bool, keep: str = "") -> None:
+    def remove_incomplete_files(self, removes_others: bool, keep: str = "") -> None:
         """Remove files of tables and cases that were never complete.
 
         Parameters
         ----------
-        others : bool
+        removes_others : bool
             Whether to remove files of other sweeps as well.
         keep : str
             The folders of cases are removed if it is "none".
         """
-        self.chunks.pack(others)
+        self.chunks.merge_small_files(removes_others)
         for entry in os.scandir(self.target / CHUNKS):
             if entry.name.startswith(".") and entry.name != self.token and not self.shared:
                 Path(entry.path).unlink(missing_ok=True)
@@ -402,7 +402,7 @@ class Folder:
                 if (
                     entry.name.startswith(".")
                     or entry.name.endswith(".partial")
-                    or (others and entry.name not in folder_names)
+                    or (removes_others and entry.name not in folder_names)
                 ):
                     if entry.is_dir(follow_symlinks=False):
                         shutil.rmtree(entry.path, ignore_errors=True)
@@ -410,9 +410,9 @@ class Folder:
                         Path(entry.path).unlink(missing_ok=True)
             with suppress(OSError):  # the folder may still contain cases
                 (self.target / CASES).rmdir()
-        self.finish()
+        self.remove_outdated_tables()
 
-    def finish(self) -> None:
-        """Remove the tables of an older sweep, which those of this sweep have replaced."""
+    def remove_outdated_tables(self) -> None:
+        """Remove the tables of an older sweep, which the new tables replace."""
         for name in TABLES:
             (self.target / f"{name}.partial").unlink(missing_ok=True)

@@ -21,7 +21,7 @@ TABLES = "sweep.csv", "sweep.nc", "sweep.json", "report.html"
 
 
 def hash_request(path: Path, words: Sequence[str], cases: Path | None = None) -> str:
-    """Return a hash of all that a sweep depends on; "" if it cannot be computed.
+    """Return a hash of all data on which a sweep depends; "" if it cannot be computed.
 
     It covers the scene, the words of the command, the table of cases, the files that these name,
     and this program.

@@ -49,7 +49,7 @@ def write_page(table: dict, lead: SweepHeadline, folder: Path) -> None:
 def sweep_table(
     sweep_scene: SweepScene, cases: Cases, results: CaseResults, keys: list, folder: Path
 ) -> dict:
-    """Return the table for `pages.sweep.page_html` from the results of the cases.
+    """Return the table for `pages.sweep.page_html`, from the results of the cases.
 
     Parameters
     ----------
@@ -99,18 +99,18 @@ def sweep_table(
 def key_columns(cases: Cases) -> list:
     """Return the swept keys, each with its values in SI and as written in every case."""
     all_cases = np.arange(len(cases))
-    places = [all_cases] * len(cases.axes)
+    indices = [all_cases] * len(cases.axes)
     if not cases.is_table:
-        places = np.unravel_index(all_cases, cases.shape)
+        indices = np.unravel_index(all_cases, cases.shape)
     return [
         {
             "name": axis.key,
             "unit": axis.unit or "1",
-            "texts": axis.texts if cases.is_table else [axis.texts[k] for k in place],
-            "values": axis_numbers(axis.values)[place],
+            "texts": axis.texts if cases.is_table else [axis.texts[k] for k in index],
+            "values": axis_numbers(axis.values)[index],
             "log": suits_log_axis(axis.values),
         }
-        for axis, place in zip(cases.axes, places)
+        for axis, index in zip(cases.axes, indices)
     ]
 
 
@@ -133,12 +133,15 @@ def _shared_facts(facts: dict, columns: list) -> dict:
     }
 
 
-def page_titles(columns: list, of: str) -> dict:
+def page_titles(columns: list, scene_title: str) -> dict:
     """Return the title of the page, made of the swept keys, and the title of the scene.
 
     The title of the scene refers to the values before the keys were changed.
     """
-    return {"title": f"Sweep of {' × '.join(column['name'] for column in columns)}", "of": of}
+    return {
+        "title": f"Sweep of {' × '.join(column['name'] for column in columns)}",
+        "of": scene_title,
+    }
 
 
 def case_link(folder: Path, key: str) -> str:
@@ -150,7 +153,7 @@ def axis_numbers(values) -> np.ndarray:
     """Return values along an axis: numbers unchanged, words numbered in order of occurrence."""
     if isinstance(values, array) or all(isinstance(value, int | float) for value in values):
         return np.asarray(values, float)
-    order = {word: place for place, word in enumerate(dict.fromkeys(values))}
+    order = {word: number for number, word in enumerate(dict.fromkeys(values))}
     return np.array([order[value] for value in values], float)
 
 

@@ -1,4 +1,4 @@
-"""A sweep into its folder: existing results are used, others computed, tables written."""
+"""Computation of a sweep into its folder, which reuses existing results and writes the tables."""
 
 from __future__ import annotations
 
@@ -92,9 +92,9 @@ def sweep_into(
     keep = place.kept_files(len(cases))
     with Folder(place.target, cases.compute_hashes(sweep_scene), is_shard) as folder:
         if place.resume:
-            folder.refuse_another(sweep_identity(sweep_scene, cases))
-            if folder.chunks.others and folder.is_complete() and say is not None:
-                say(_left_out(folder.chunks.others))
+            folder.refuse_other_sweep(sweep_identity(sweep_scene, cases))
+            if folder.chunks.n_other_cases and folder.is_complete() and say is not None:
+                say(_omitted_values_note(folder.chunks.n_other_cases))
         requested = _shard_cases(len(cases), place.shard)
         complete = folder.find_complete_cases(requested, keep)
         if not (place.resume or is_shard):
@@ -106,7 +106,7 @@ def sweep_into(
             complete = complete[:0]
         remaining = np.setdiff1d(requested, complete)
         if remaining.size:
-            folder.unfinish()
+            folder.mark_tables_outdated()
         if report_progress is not None:
             report_progress(complete.size, requested.size, None)
         total = CaseResults.blank(len(cases), folder.target)
@@ -127,12 +127,12 @@ def sweep_into(
             if not is_shard:
                 with suppress(PatchfemError):
                     _write_partial_tables(
-                        sweep_scene, cases, folder, folder.answers(total), place.page
+                        sweep_scene, cases, folder, folder.fill_results(total), place.page
                     )
             raise
         if is_shard:
             return total
-        folder.answers(total)
+        folder.fill_results(total)
         for numbers, fault in dead_cases:
             total.insert(numbers, fault)
         sign = hash_tables(sweep_scene, cases, folder, place.page)
@@ -140,17 +140,17 @@ def sweep_into(
             write_tables(
                 sweep_scene, cases, total, folder, place.page, sign="" if dead_cases else sign
             )
-        folder.tidy(not place.resume, keep)
+        folder.remove_incomplete_files(not place.resume, keep)
     return total
 
 
 def sweep_identity(sweep_scene: SweepScene, cases: Cases) -> dict:
-    """Return scene (as a hash) and keys of a sweep, by which `--resume` recognises it."""
+    """Return the scene hash and the keys of a sweep, by which `--resume` identifies it."""
     return {"scene": sweep_scene.hash_common_data(), "keys": [axis.key for axis in cases.axes]}
 
 
-def _left_out(count: int) -> str:
-    """Return a note that a resumed sweep has fewer values than the folder has results."""
+def _omitted_values_note(count: int) -> str:
+    """Return a note that the folder has results for more values than the resumed sweep."""
     is_single = count == 1
     verb = "is" if is_single else "are"
     these = "this case" if is_single else "these cases"
@@ -167,13 +167,13 @@ def _write_partial_tables(
     """Write the tables of an interrupted sweep, if it has any results."""
     if any(results.outcome):
         write_tables(sweep_scene, cases, results, folder, page)
-        folder.finish()
+        folder.remove_outdated_tables()
 
 
 class Jobs(NamedTuple):
     """Cases of a sweep, their folder, and what is stored for each case."""
 
-    asked: SweepScene
+    sweep_scene: SweepScene
     cases: Cases
     folder: Folder
     keep: str
@@ -186,7 +186,7 @@ def _compute_cases(
     say: Callable | None,
     report_progress: Callable | None,
 ) -> list:
-    """Compute cases into the folder, and return (numbers, CaseResults) of those that died.
+    """Compute cases into the folder; return (numbers, CaseResults) of those that crashed.
 
     These are not written, so that a resumed sweep tries them again.
 
@@ -212,7 +212,7 @@ def _compute_cases(
         else None
     )
     work = Work(
-        jobs.asked,
+        jobs.sweep_scene,
         jobs.cases,
         None if keep == "none" else SummaryWriter(jobs.cases),
         results_writer,
@@ -279,7 +279,7 @@ def collect_shards(
         If cases have no result yet.
     """
     with Folder(target, cases.compute_hashes(sweep_scene)) as folder:
-        results = folder.answers(CaseResults.blank(len(cases), folder.target))
+        results = folder.fill_results(CaseResults.blank(len(cases), folder.target))
         missing = int(np.sum(results.outcome == ""))
         if missing:
             raise Missing(
@@ -287,12 +287,12 @@ def collect_shards(
                 "continue with --resume"
             )
         write_tables(sweep_scene, cases, results, folder, page, True)
-        folder.tidy(False)
+        folder.remove_incomplete_files(False)
     return results
 
 
 def hash_tables(sweep_scene: SweepScene, cases: Cases, folder: Folder, page: bool) -> str:
-    """Return a hash of all that the tables of a complete sweep depend on.
+    """Return a hash of all data on which the tables of a complete sweep depend.
 
     If sweep.json contains this hash, the tables exist.
 
@@ -310,13 +310,13 @@ def hash_tables(sweep_scene: SweepScene, cases: Cases, folder: Folder, page: boo
         [(axis.key, *_axis_content(axis)) for axis in cases.axes],
         sweep_command(sweep_scene, cases),
         page,
-        [case_link(folder.target, key) for key in folder.keys()],
+        [case_link(folder.target, key) for key in folder.case_folder_names()],
     ]
     return sha256(json.dumps(content).encode() + folder.chunks.names.tobytes()).hexdigest()
 
 
 def _axis_content(axis: Axis) -> tuple:
-    """Return what the tables contain of an axis: its strings, or a hash of its numbers."""
+    """Return the table contents that depend on an axis: its strings, or a hash of its numbers."""
     texts = axis.texts
     return (
         (texts.unit, sha256(texts.numbers).hexdigest())
@@ -361,7 +361,7 @@ def write_tables(
     sign : str
         From `hash_tables` if every case has a result that is stored; else "".
     """
-    keys = folder.keys()
+    keys = folder.case_folder_names()
     has_tables = at_any_size or len(cases) <= MAX_CASES_WITH_TABLES
     table = sweep_table(sweep_scene, cases, results, keys, folder.target) | {"tabled": has_tables}
     lead = summarise_sweep(table)

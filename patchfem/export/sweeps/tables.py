@@ -272,7 +272,7 @@ def _key_attributes(axis) -> dict:
 
 
 def cf_unit(unit: str) -> str:
-    """Return a unit of a scene as results write it: "m/s^2" becomes "m s-2"."""
+    """Convert a unit of a scene to the notation of result files: "m/s^2" becomes "m s-2"."""
     above, *below = unit.split("/")
     parts = [factor.replace("^", "") for factor in above.split() if factor != "1" or not below]
     for factor in " ".join(below).replace("(", "").replace(")", "").split():

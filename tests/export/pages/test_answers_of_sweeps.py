@@ -154,7 +154,7 @@ def test_always_random_cases_are_ranked_with_scatter(random_sweep):
     assert "Scatter of the answers" in page
     assert "<svg viewBox" in page
     # `patchfem report` makes this text from the files
-    sentences = summarise_sweep(read_table(out)).said
+    sentences = summarise_sweep(read_table(out)).texts
     head, count, *_ = answer.out.splitlines()
     assert head == f"{sentences.rank.rstrip('.')}; {sentences.scatter}" == summary["answer"]
     assert count == "64 cases: 64 steady"
@@ -196,10 +196,10 @@ def test_always_answer_states_that_no_case_is_steady(random_sweep):
     assert summary.sentences()[0] == summary.answer() and summary.answer().endswith(
         f" (1 of {count} cases has no result yet and is left out; n{warning})."
     )
-    assert "settled" not in summary.said.scatter and not any(
+    assert "settled" not in summary.texts.scatter and not any(
         warning in sentence for sentence in summary.sentences()[1:]
     )
-    assert summarise_sweep(table | {"outcome": ["failed"] * count}).said.left == ""
+    assert summarise_sweep(table | {"outcome": ["failed"] * count}).texts.qualification == ""
 
 
 @pytest.mark.parametrize(
@@ -315,11 +315,11 @@ def test_exact_too_few_steady_cases_give_no_ranking():
         "Only 1 of 64 cases settled (32 failed, 31 transient), so no ranking is possible; raise drive.cycles so that "
         "the transient cases settle and correct what the messages of the failed cases name."
     )
-    assert summary.said.span.startswith(
+    assert summary.texts.span.startswith(
         "31 of 64 cases did not settle; their relative displacement amplitude at the end"
     )
-    assert "; relative displacement amplitude of the only settled case is " in summary.said.span
-    assert "throughout" not in summary.said.span and summary.said.span in summary.sentences()
+    assert "; relative displacement amplitude of the only settled case is " in summary.texts.span
+    assert "throughout" not in summary.texts.span and summary.texts.span in summary.sentences()
     table = table | {"outcome": ["failed"] * 32 + ["transient"] * 32}
     assert (
         summarise_sweep(table)
@@ -434,7 +434,7 @@ def test_exact_scatter_is_unknown_with_many_transient_cases():
     assert "curve" not in text
     assert (
         "34 of 100 cases did not settle; their relative displacement amplitude at the end of"
-        in summarise_sweep(table).said.span
+        in summarise_sweep(table).texts.span
     )
 
 

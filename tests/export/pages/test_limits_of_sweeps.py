@@ -39,7 +39,7 @@ def tilt_limits(measures: dict, errors=0.0, tilt=TILT, factors=False, trusted=No
 
 def loop_area_limit(values, errors=0.0, **more):
     """Return the limit of the tilt for the loop area."""
-    (limit,) = tilt_limits({"loop_area": values}, errors, **more).found
+    (limit,) = tilt_limits({"loop_area": values}, errors, **more).entries
     return limit
 
 
@@ -80,11 +80,11 @@ def test_exact_limit_of_logarithmic_key():
         3,
         -0.05,
     )
-    (peak,) = tilt_limits({"pressure_peak": (tilt / 1e-3) ** 0.5}, tilt=tilt, factors=True).found
+    (peak,) = tilt_limits({"pressure_peak": (tilt / 1e-3) ** 0.5}, tilt=tilt, factors=True).entries
     assert peak.value == pytest.approx(4e-6) and peak.change == 1
     assert (
         tilt_limits({"pressure_peak": (tilt / 1e-3) ** -0.5}, tilt=tilt, factors=True)
-        .found[0]
+        .entries[0]
         .beyond
         is None
     )
@@ -161,7 +161,7 @@ def test_exact_limit_within_first_step_has_no_sentence():
     assert sentence == "" and [limit[name] for name in ("low", "high")] == pytest.approx(
         [5e-5, 1e-4]
     )
-    assert tilt_limits({"loop_area": [0, 1, 2, 3, 4]}).found == []
+    assert tilt_limits({"loop_area": [0, 1, 2, 3, 4]}).entries == []
 
 
 def test_exact_drive_keys_have_no_limit():
@@ -246,7 +246,7 @@ def test_exact_limit_is_smallest_over_lines():
     keys = [make_key(tilt), make_sweep_key("normal.load", slope, "N")]
     values = 1 + slope * (tilt - 0.05)
     trusted = {"loop_area": np.ones(10, bool)}
-    (limit,) = find_limits(keys, {"loop_area": (values, 0 * values)}, trusted).found
+    (limit,) = find_limits(keys, {"loop_area": (values, 0 * values)}, trusted).entries
     assert limit.value == pytest.approx(0.15e-3)
     assert find_limits(keys, {"loop_area": (values, 0 * values)}, trusted, grid=False).key is None
 
@@ -364,7 +364,7 @@ def test_always_limit_lies_between_named_cases(curve, error, tilt):
     """The limit of curves with a kink, with and without an inflection lies between the two cases that are named."""
     (limit_found,) = tilt_limits(
         {"loop_area": 1 - curve(tilt)}, error, tilt=tilt, factors=tilt[0] > 0
-    ).found
+    ).entries
     reference = 1 - curve(tilt[0])
     limit = brentq(lambda t: 1 - (1 - curve(t)) / reference - 0.05, 0, 3, xtol=1e-9)
     assert tilt[limit_found.inside] <= limit + 1e-6 and (

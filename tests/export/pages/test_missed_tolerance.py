@@ -155,7 +155,7 @@ def test_exact_sentence_states_floor_if_decisive():
     keys = [make_sweep_key("slide.amplitude", [1e-7, 1e-6], "m", ["0.1 um", "1 um"], log=True)]
     table = make_sweep_table(keys, {"loop_area": loop | {"means": ""}}, outcome=["done"] * 2)
     table["tolerance"] = 1e-3
-    assert summarise_sweep(table).said.span == (
+    assert summarise_sweep(table).texts.span == (
         "Loop area ranges from 0.16 nJ (slide.amplitude 0.1 um) to 1 mJ (slide.amplitude 1 um), with errors of at most "
         "0.01 % or 0.1 nJ, the floor of this measure."
     )

@@ -89,10 +89,10 @@ def test_exact_cases_are_read_by_name(tmp_path):
     chunks.write_chunk(tmp_path, range(6), names[:6], first)
     chunks.write_chunk(tmp_path, range(6, 11), names[[5, 7, 8, 9, 10]], second)
     stored = Chunks(tmp_path, names[[9, 2, 0, 9, 5, 6]])
-    stored.look()
-    assert (stored.held >= 0).tolist() == [True] * 5 + [False]
+    stored.find_files()
+    assert (stored.file_index >= 0).tolist() == [True] * 5 + [False]
     total = CaseResults.blank(6)
-    for indices, part in stored.parts(np.arange(6)):
+    for indices, part in stored.iterate_results(np.arange(6)):
         total.insert(indices, part)
     expected = [second.values["loop_area"][k] for k in (3, 0)]
     np.testing.assert_array_equal(
@@ -125,15 +125,15 @@ def test_exact_small_files_are_merged(tmp_path):
         )
     other_file = chunks.write_chunk(tmp_path, [0], np.array([3], np.uint64), random_results(1, 3))
     stored = Chunks(tmp_path, names)
-    stored.look()
-    stored.pack(False)
+    stored.find_files()
+    stored.merge_small_files(False)
     # the file of another sweep stays, because that sweep may be continued
     assert len(list(tmp_path.iterdir())) == 2 and (tmp_path / other_file).exists()
-    stored.look()
-    ((indices, part),) = stored.parts(np.arange(300))
+    stored.find_files()
+    ((indices, part),) = stored.iterate_results(np.arange(300))
     assert indices.tolist() == list(range(300))
     assert_results_equal(part, results)
-    stored.pack(True)
+    stored.merge_small_files(True)
     assert not (tmp_path / other_file).exists()
 
 
