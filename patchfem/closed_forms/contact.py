@@ -799,8 +799,8 @@ def wedge_on_asperities(rotation, length, decay) -> tuple:
     require_positive(length=length, decay=decay)
     b = np.abs(np.asarray(rotation, float)) * length / decay
     ratio = np.where(b > 0, -np.expm1(-b) / np.where(b > 0, b, 1), 1.0)
-    large = np.maximum(b, 0.05)  # the closed form suffers from cancellation below this value
-    closed_form = 1 / 2 - 1 / large - np.exp(-large) / np.expm1(-large)
+    clipped_b = np.maximum(b, 0.05)  # the closed form suffers from cancellation below this value
+    closed_form = 1 / 2 - 1 / clipped_b - np.exp(-clipped_b) / np.expm1(-clipped_b)
     series = b / 12 * (1 - b**2 / 60 * (1 - b**2 / 42))
     centre = np.where(b > 0.05, closed_form, series)
     return ratio[()], (-np.sign(rotation) * length * centre)[()]

@@ -246,8 +246,11 @@ def complete_set(problem: ContactProblem, active: np.ndarray) -> np.ndarray:
     for k in problem.free_rotations:
         position = problem.motions[:, k]
         load_line = problem.target[k] / problem.target[0]
-        reached = position[active]
-        if reached.size > 1 and reached.min() <= load_line <= reached.max():
+        active_positions = position[active]
+        if (
+            active_positions.size > 1
+            and active_positions.min() <= load_line <= active_positions.max()
+        ):
             continue
         active = active.copy()
         for is_side in (position <= load_line, position > load_line):

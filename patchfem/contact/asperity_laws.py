@@ -94,24 +94,24 @@ class HertzAsperities(SmoothAsperities):
 
         The decay rate is -d(log P)/ds.
         """
-        log, fall = peak_integral(np.asarray(s, float) / self.deviation)
-        return self._log_pressure_factor + log, fall / self.deviation
+        log, decay_rate = peak_integral(np.asarray(s, float) / self.deviation)
+        return self._log_pressure_factor + log, decay_rate / self.deviation
 
     def separation(self, pressure: np.ndarray) -> np.ndarray:
         """Separation s [m] that carries `pressure` [Pa] > 0.
 
         Newton's method on the concave log P; it starts from the steep side, so it is monotone.
         """
-        wanted = np.log(np.asarray(pressure, float)) - self._log_pressure_factor
+        log_target = np.log(np.asarray(pressure, float)) - self._log_pressure_factor
         h = np.where(
-            wanted < 0,
-            np.sqrt(np.maximum(0.0, -2 * wanted)),
-            -np.exp(np.clip(wanted, 0, 400) / 1.5),
+            log_target < 0,
+            np.sqrt(np.maximum(0.0, -2 * log_target)),
+            -np.exp(np.clip(log_target, 0, 400) / 1.5),
         )
         for _ in range(80):
-            log, fall = peak_integral(h)
-            h = h + (log - wanted) / fall
-            if np.all(np.abs(log - wanted) <= 1e-14 * (1 + np.abs(wanted))):
+            log, decay_rate = peak_integral(h)
+            h = h + (log - log_target) / decay_rate
+            if np.all(np.abs(log - log_target) <= 1e-14 * (1 + np.abs(log_target))):
                 break
         return h * self.deviation
 
@@ -124,20 +124,20 @@ def peak_integral(h: np.ndarray) -> tuple:
     short of it by exp(-32). Error of log F 2e-14 + 1e-16 h^2, of the decay rate 3e-13.
     """
     h = np.asarray(h, float)
-    flat = np.maximum(h, -8.0).reshape(-1, 1)
-    scale = 1 + np.maximum(flat, 0.0)
+    clipped_height = np.maximum(h, -8.0).reshape(-1, 1)
+    scale = 1 + np.maximum(clipped_height, 0.0)
     square = TRAPEZOID_NODES**2 / scale
-    weight = np.exp(-flat * square - square**2 / 2) * square
+    weight = np.exp(-clipped_height * square - square**2 / 2) * square
     low = weight.sum(axis=1)
     high = (weight * square).sum(axis=1)
-    log = -(flat[:, 0] ** 2) / 2 + np.log(0.2 * high / np.sqrt(2 * np.pi * scale[:, 0]))
+    log = -(clipped_height[:, 0] ** 2) / 2 + np.log(0.2 * high / np.sqrt(2 * np.pi * scale[:, 0]))
     log = log.reshape(h.shape)
-    fall = (1.5 * low / high).reshape(h.shape)
+    decay_rate = (1.5 * low / high).reshape(h.shape)
     depth = np.where(h < -8, -h, 8.0)
-    three = _moment(1.5, depth)
-    one = _moment(0.5, depth)
-    return np.where(h < -8, 1.5 * np.log(depth) + np.log(three), log), np.where(
-        h < -8, 1.5 * one / three / depth, fall
+    moment_3_2 = _moment(1.5, depth)
+    moment_1_2 = _moment(0.5, depth)
+    return np.where(h < -8, 1.5 * np.log(depth) + np.log(moment_3_2), log), np.where(
+        h < -8, 1.5 * moment_1_2 / moment_3_2 / depth, decay_rate
     )
 
 

@@ -173,8 +173,8 @@ def _solve_newton(problem: AsperityProblem, separation, motion) -> AsperitySolut
         depth += 2 * np.abs(motion[1:]).sum()
         # Round-off of a separation changes the pressure of the loaded nodes by this fraction.
         noise = NEWTON_TOL + 1e-15 * depth * decay[force > 1e-6 * force.max()].max()
-        missing = np.abs(imbalance).max() / contact.target[0] if imbalance.size else 0.0
-        if max(missing, np.max(fraction * np.abs(log_change))) <= noise:
+        relative_imbalance = np.abs(imbalance).max() / contact.target[0] if imbalance.size else 0.0
+        if max(relative_imbalance, np.max(fraction * np.abs(log_change))) <= noise:
             # The force of a nearly unloaded node is computed from the pressure law of the asperity
             # layer, because the Newton step gives that force only to rounding errors of the largest
             # force.
@@ -183,10 +183,10 @@ def _solve_newton(problem: AsperityProblem, separation, motion) -> AsperitySolut
             new_force = np.where(fraction < 1e-15, law_force, new_force)
             return AsperitySolution(new_force, separation + change, motion, iteration)
         along_log = -np.log1p(np.maximum(log_change, 0.0)) / decay
-        careful = np.where(log_change > 0, along_log, change)
+        limited_change = np.where(log_change > 0, along_log, change)
         load = contact.target[0] if imbalance.size else force.sum()
         risen = asperities.separation(np.array(MAX_PRESSURE_RISE * load / problem.area.sum()))
-        separation = separation + np.maximum(change, np.minimum(careful, risen - separation))
+        separation = separation + np.maximum(change, np.minimum(limited_change, risen - separation))
     return None
 
 
@@ -256,8 +256,10 @@ def solve_at_motion(problem: AsperityProblem, motion: np.ndarray) -> AsperitySol
     for strip, strip_gap in enumerate(gap.reshape(-1, n_nodes)):
         block = StripCompliance(problem.compliance.block(strip, every_node))
         prescribed = ContactProblem(strip_gap, np.zeros((n_nodes, 0)), np.zeros(0), np.zeros(0))
-        alone = AsperityProblem(problem.asperities, block, problem.area[:n_nodes], prescribed)
-        solutions.append(_solve_strip(alone))
+        strip_problem = AsperityProblem(
+            problem.asperities, block, problem.area[:n_nodes], prescribed
+        )
+        solutions.append(_solve_strip(strip_problem))
     return AsperitySolution(
         np.concatenate([solution.force for solution in solutions]),
         np.concatenate([solution.separation for solution in solutions]),

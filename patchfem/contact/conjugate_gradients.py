@@ -46,10 +46,10 @@ def _quadratic_program(compliance, problem: ContactProblem) -> _QuadraticProgram
         half_length[k] = np.ptp(rigid[:, k]) / 2
         rigid[:, k] = (rigid[:, k] - middle) / half_length[k]
         target[k] = (target[k] - target[0] * middle) / half_length[k]
-    sprung = np.flatnonzero(problem.springs)
-    if not sprung.size:
+    spring_indices = np.flatnonzero(problem.springs)
+    if not spring_indices.size:
         return _QuadraticProgram(compliance.product, problem.gap, rigid, target)
-    k = sprung[0]
+    k = spring_indices[0]
     node_compliance = compliance.node_compliance
     arms = np.zeros((2, target.size))
     arms[:, k] = np.sqrt(problem.springs[k] * node_compliance) / half_length[k]
@@ -90,18 +90,20 @@ def project_forces(
     regularisation += 1e-3 * np.trace(regularisation) * np.eye(target.size)
     shifted = force
     for _ in range(max_iterations):
-        positive = np.maximum(shifted, 0.0)
-        missing = target - rigid.T @ positive
-        if np.abs(missing).max() <= 1e-14 * target[0]:
+        projected_force = np.maximum(shifted, 0.0)
+        resultant_error = target - rigid.T @ projected_force
+        if np.abs(resultant_error).max() <= 1e-14 * target[0]:
             break
-        in_contact = rigid[positive > 0]
-        direction = np.linalg.solve(in_contact.T @ in_contact + 1e-10 * regularisation, missing)
+        in_contact = rigid[projected_force > 0]
+        direction = np.linalg.solve(
+            in_contact.T @ in_contact + 1e-10 * regularisation, resultant_error
+        )
         change = rigid @ direction
         shifted = shifted + _line_search(shifted, change, target @ direction) * change
     return np.maximum(shifted, 0.0)
 
 
-def _line_search(start: np.ndarray, change: np.ndarray, wanted: float) -> float:
+def _line_search(start: np.ndarray, change: np.ndarray, target_value: float) -> float:
     """Find the step t > 0 at which change . max(0, start + t change) has a given value.
 
     The left-hand side is piecewise linear in t.
@@ -117,9 +119,9 @@ def _line_search(start: np.ndarray, change: np.ndarray, wanted: float) -> float:
     first_slope = change[is_positive] @ change[is_positive]
     value = np.cumsum(np.append(first_value, sign * start[crossing] * change[crossing]))
     slope = np.cumsum(np.append(first_slope, sign * change[crossing] ** 2))
-    reached = np.flatnonzero(value[:-1] + t * slope[:-1] >= wanted)
-    piece = reached[0] if reached.size else -1
-    return (wanted - value[piece]) / slope[piece] if slope[piece] > 0 else 0.0
+    crossing_pieces = np.flatnonzero(value[:-1] + t * slope[:-1] >= target_value)
+    piece = crossing_pieces[0] if crossing_pieces.size else -1
+    return (target_value - value[piece]) / slope[piece] if slope[piece] > 0 else 0.0
 
 
 def solve_by_gradients(
@@ -153,7 +155,7 @@ def solve_by_gradients(
     product, gap, rigid, target = program
     n_nodes = problem.gap.size
     eigenvalue_bound = compliance.eigenvalue_bound
-    safe_step = 1 / max(eigenvalue_bound, compliance.node_compliance)
+    descent_step = 1 / max(eigenvalue_bound, compliance.node_compliance)
     guess = _guess_forces(program, start, n_nodes, eigenvalue_bound)
     force = project_forces(guess, rigid, target)
     direction = np.zeros(gap.size)
@@ -167,8 +169,8 @@ def solve_by_gradients(
         noise = ENERGY_NOISE * (np.abs(force * gap).sum() + force @ displacement)
         if energy > min_energy + noise:
             # A projected gradient step of this length always lowers the energy.
-            downhill = best_force - safe_step * (gap + product(best_force))
-            force = project_forces(downhill, rigid, target)
+            gradient_force = best_force - descent_step * (gap + product(best_force))
+            force = project_forces(gradient_force, rigid, target)
             is_conjugate = 0.0
             min_energy = np.inf
             continue
@@ -184,14 +186,14 @@ def solve_by_gradients(
         previous = is_conjugate * square / last_square * direction
         direction = np.where(in_contact, slope + previous, 0.0)
         curvature = direction @ product(direction)
-        step = (slope @ direction) / curvature if curvature > 0 else safe_step
-        moved = np.maximum(force - step * direction, 0.0)
+        step = (slope @ direction) / curvature if curvature > 0 else descent_step
+        new_force = np.maximum(force - step * direction, 0.0)
         # Open nodes that overlap enter the contact with a gradient step.
-        is_entering = (moved == 0) & (slope < 0)
+        is_entering = (new_force == 0) & (slope < 0)
         is_conjugate = 0.0 if is_entering.any() else 1.0
         last_square = max(square, 1e-300)
-        moved[is_entering] -= step * slope[is_entering]
-        force = _restore_resultants(moved, rigid, target)
+        new_force[is_entering] -= step * slope[is_entering]
+        force = _restore_resultants(new_force, rigid, target)
     return force[:n_nodes], max_iterations
 
 

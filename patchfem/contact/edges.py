@@ -90,10 +90,10 @@ def compute_edge_fraction(force: float, force_rate: float, gap: float, gap_rate:
     """
     if not (force_rate > 0 and gap_rate > 0):
         return 0.5
-    since_entry = force / force_rate
-    until_next = gap / gap_rate
-    total = since_entry + until_next
-    return float(since_entry / total) if total > 0 else 0.5
+    approach_since_entry = force / force_rate
+    approach_to_next = gap / gap_rate
+    total = approach_since_entry + approach_to_next
+    return float(approach_since_entry / total) if total > 0 else 0.5
 
 
 def find_edges(normal, x, force, gap, softness=None, row_height: float | None = None) -> list:
@@ -190,9 +190,9 @@ def find_pressure_edges(x, pressure, fraction: float, largest: float | None = No
         height = np.log(np.maximum(pressure, 1e-300 * largest)) - np.log(threshold)
     edges = []
     for node, side in _find_ends(pressure > threshold):
-        passed = height[node] / (height[node] - height[node + side])
-        position = x[node] + passed * (x[node + side] - x[node])
-        edges.append(ContactEdge(node, side, float(passed), float(position)))
+        cell_fraction = height[node] / (height[node] - height[node + side])
+        position = x[node] + cell_fraction * (x[node + side] - x[node])
+        edges.append(ContactEdge(node, side, float(cell_fraction), float(position)))
     return edges
 
 

@@ -146,10 +146,10 @@ def write_polygon(sets, slot):
         half_plane = HalfPlane(
             unknowns[0, i] - limit, unknowns[1, i] * unit_d, unknowns[2, i] * unit_t
         )
-        smallest = np.inf
+        min_value = np.inf
         for k in range(n_corners):
-            smallest = min(smallest, half_plane_value(half_plane, old[0, k], old[1, k]))
-        if smallest >= 0:
+            min_value = min(min_value, half_plane_value(half_plane, old[0, k], old[1, k]))
+        if min_value >= 0:
             continue
         n_corners = clip_polygon(old, new, n_corners, half_plane, i)
         if n_corners <= 0:

@@ -187,10 +187,10 @@ def take_slot(sets):
     if sets.counters[N_STORED] < stored.names.size:
         sets.counters[N_STORED] += 1
         return slot
-    chain = stored.names[slot] & (stored.heads.size - 1)
-    k = stored.heads[chain]
+    bucket = stored.names[slot] & (stored.heads.size - 1)
+    k = stored.heads[bucket]
     if k == slot:
-        stored.heads[chain] = stored.links[slot]
+        stored.heads[bucket] = stored.links[slot]
         return slot
     while stored.links[k] != slot:
         k = stored.links[k]
@@ -226,9 +226,9 @@ def store_set(sets, name):
             energy[4] += 0.5 * (by_t - by_d * sets.x[i])
             energy[5] -= by_t * sets.x[i]
     stored.names[slot] = name
-    chain = name & (stored.heads.size - 1)
-    stored.links[slot] = stored.heads[chain]
-    stored.heads[chain] = slot
+    bucket = name & (stored.heads.size - 1)
+    stored.links[slot] = stored.heads[bucket]
+    stored.heads[bucket] = slot
     write_polygon(sets, slot)
     return slot
 
@@ -342,11 +342,11 @@ def exchange_violating_nodes(sets, slot, d, t, bounds, is_single):
         in_contact = stored.in_contact[slot, i]
         value = stored.unknowns[slot, 0, i] + stored.unknowns[slot, 1, i] * d
         value += stored.unknowns[slot, 2, i] * t
-        fails = is_searching and value < (bounds.min_force if in_contact else bounds.min_gap)
-        if fails:
+        is_violated = is_searching and value < (bounds.min_force if in_contact else bounds.min_gap)
+        if is_violated:
             name ^= stored.node_names[i]
             is_searching = not is_single
-        sets.tableau.target[i] = in_contact != fails
+        sets.tableau.target[i] = in_contact != is_violated
     return name
 
 

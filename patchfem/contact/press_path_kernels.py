@@ -85,14 +85,14 @@ def cross_side(sets, slot, side, d, t):
         return find_set(sets, slot, d, t)
     stored = sets.stored
     polygons = sets.polygons
-    following = polygons.neighbours[slot, side]
+    next_slot = polygons.neighbours[slot, side]
     name = stored.names[slot] ^ stored.node_names[polygons.nodes[slot, side]]
-    if following >= 0 and stored.names[following] == name and is_inside(sets, following, d, t):
-        return following
-    following = find_set(sets, slot, d, t)
-    if following >= 0 and stored.names[following] == name and following != slot:
-        polygons.neighbours[slot, side] = following
-    return following
+    if next_slot >= 0 and stored.names[next_slot] == name and is_inside(sets, next_slot, d, t):
+        return next_slot
+    next_slot = find_set(sets, slot, d, t)
+    if next_slot >= 0 and stored.names[next_slot] == name and next_slot != slot:
+        polygons.neighbours[slot, side] = next_slot
+    return next_slot
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -196,14 +196,14 @@ def path_mean(sets, slot, heave, rotation, heave_change, rotation_change, out):
             return slot
         beyond = min(start + border_step, 1.0)
         d = -(heave + beyond * heave_change)
-        following = cross_side(sets, slot, side, d, rotation + beyond * rotation_change)
-        if following < 0:
-            return following
+        next_slot = cross_side(sets, slot, side, d, rotation + beyond * rotation_change)
+        if next_slot < 0:
+            return next_slot
         # If the search beyond the border returns the same set, it is repeated farther beyond it.
-        if following == slot:
+        if next_slot == slot:
             border_step *= 10
             start = beyond
         else:
             border_step = BORDER_STEP
-        slot = following
+        slot = next_slot
     return -1

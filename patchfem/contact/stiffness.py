@@ -36,9 +36,12 @@ def coupled_stiffness(pieces: Compliance, coupling: np.ndarray, active: np.ndarr
     active : (m,) bool ndarray
         Contact set; the stiffness of an empty one is 0.
     """
-    here = np.ix_(*2 * (np.flatnonzero(active),))
+    active_block = np.ix_(*2 * (np.flatnonzero(active),))
     system = np.block(
-        [[pieces.normal[here], coupling[here]], [coupling[here].T, pieces.tangential[here]]]
+        [
+            [pieces.normal[active_block], coupling[active_block]],
+            [coupling[active_block].T, pieces.tangential[active_block]],
+        ]
     )
     slide = np.repeat([0.0, 1.0], len(system) // 2)
     with use_one_blas_thread():

@@ -66,23 +66,23 @@ class StripCompliance:
     @property
     def node_compliance(self) -> float:
         """Mean displacement of a node per force on it [m/N]."""
-        added = 0.0 if self.added is None else self.added.mean()
-        return float(self.common.diagonal().mean() + added)
+        mean_added = 0.0 if self.added is None else self.added.mean()
+        return float(self.common.diagonal().mean() + mean_added)
 
     @property
     def eigenvalue_bound(self) -> float:
         """Upper bound of the largest eigenvalue [m/N]."""
-        added = 0.0 if self.added is None else self.added.max()
-        return float(np.abs(self.common).sum(axis=1).max() + added)
+        max_added = 0.0 if self.added is None else self.added.max()
+        return float(np.abs(self.common).sum(axis=1).max() + max_added)
 
     def product(self, force: np.ndarray) -> np.ndarray:
         """Return the displacements C f (n,) [m] under forces f (n,) [N]."""
         strips = force.reshape(-1, len(self.common))
         is_loaded = strips.any(axis=0) if len(strips) > 1 else force
-        loaded = is_loaded.nonzero()[0]
-        if not loaded.size:
+        loaded_nodes = is_loaded.nonzero()[0]
+        if not loaded_nodes.size:
             return np.zeros(force.size)
-        span = slice(loaded[0], loaded[-1] + 1)
+        span = slice(loaded_nodes[0], loaded_nodes[-1] + 1)
         displacement = strips[:, span] @ self.common[span]
         if self.added is not None:
             displacement += self.added * strips

@@ -271,11 +271,11 @@ def compute_strip_residuals(
         residuals["force_balance"] = abs(force.sum() - load) / load
     if loads.moment is not None:
         spring_moment = loads.spring * theta
-        missing = abs((force @ x).sum() - loads.moment - spring_moment)
-        residuals["moment_balance"] = missing / (load * np.ptp(x) + abs(spring_moment))
+        moment_error = abs((force @ x).sum() - loads.moment - spring_moment)
+        residuals["moment_balance"] = moment_error / (load * np.ptp(x) + abs(spring_moment))
     if loads.roll_moment is not None:
-        missing = abs(force.sum(axis=1) @ offsets - loads.roll_moment)
-        residuals["roll_balance"] = missing / (load * np.ptp(offsets))
+        moment_error = abs(force.sum(axis=1) @ offsets - loads.roll_moment)
+        residuals["roll_balance"] = moment_error / (load * np.ptp(offsets))
     return MappingProxyType({key: float(value) for key, value in residuals.items()})
 
 
@@ -400,12 +400,12 @@ def _press_bare(strips: StripModel, problem: ContactProblem, approach) -> Contac
         else:
             solution = ContactSolution(np.zeros(gap.size), np.zeros(0), 0.0, 0)
         return solution._replace(motion=np.array([approach]))
-    touch = problem.gap.min()
+    touch_approach = problem.gap.min()
     start = None
     if warm_start is not None and warm_start.contact_set is not None:
         start = np.asarray(warm_start.contact_set).ravel()
     try:
-        solution = solve(compliance, problem._replace(gap=problem.gap - touch), start)
+        solution = solve(compliance, problem._replace(gap=problem.gap - touch_approach), start)
     except np.linalg.LinAlgError:
         message = explain_singular_set(compliance.common, problem)
         # The column of the roll is the last one, and it is the only one that is constant along a
@@ -416,7 +416,7 @@ def _press_bare(strips: StripModel, problem: ContactProblem, approach) -> Contac
         raise NotConverged(message) from None
     if warm_start is not None:
         warm_start.contact_set = solution.force > 0
-    solution.motion[0] += touch
+    solution.motion[0] += touch_approach
     return solution
 
 
@@ -437,8 +437,10 @@ def _press_with_asperities(strips: StripModel, problem: ContactProblem, approach
     if approach is None:
         solution = solve_asperity_layer(AsperityProblem(asperities, compliance, area, scaled))
         return solution._replace(motion=solution.motion * scale)
-    moved = scaled._replace(gap=problem.gap - approach)
-    solution = solve_at_motion(AsperityProblem(asperities, compliance, area, moved), np.zeros(0))
+    moved_problem = scaled._replace(gap=problem.gap - approach)
+    solution = solve_at_motion(
+        AsperityProblem(asperities, compliance, area, moved_problem), np.zeros(0)
+    )
     return solution._replace(motion=np.array([approach]))
 
 

@@ -162,15 +162,16 @@ def solve(
     LinAlgError
         If the compliance is not positive definite.
     """
-    rest = find_rest_motion(problem)
+    rest_motion = find_rest_motion(problem)
     problem = problem._replace(
-        gap=problem.gap - problem.motions @ rest, target=problem.target - problem.springs * rest
+        gap=problem.gap - problem.motions @ rest_motion,
+        target=problem.target - problem.springs * rest_motion,
     )
     solution = None
     n_iterations = 0
     is_patch = problem.gap.size == len(compliance.common)
     if is_patch and problem.min_nodes == 2:
-        solution = _solve_on_one_node(compliance, problem, rest[1])
+        solution = _solve_on_one_node(compliance, problem, rest_motion[1])
     if solution is None:
         if start is None or np.count_nonzero(start) < problem.min_nodes:
             start = guess_contact_set(compliance, problem)
@@ -178,7 +179,9 @@ def solve(
         if solution is None or not relative_violation(solution) <= RESIDUAL_TOL:
             solution, n_more = _solve_by_fallbacks(compliance, problem, max_iterations)
             n_iterations += n_more
-    return ContactSolution(solution.force, solution.motion + rest, solution.stiffness, n_iterations)
+    return ContactSolution(
+        solution.force, solution.motion + rest_motion, solution.stiffness, n_iterations
+    )
 
 
 def solve_forces(c, x, gap, target, start=None, spring: float = 0.0) -> PlainSolution:
@@ -201,10 +204,10 @@ def solve_forces(c, x, gap, target, start=None, spring: float = 0.0) -> PlainSol
     -------
     PlainSolution
     """
-    touch = gap.min() if target.size else 0.0
-    problem = patch_problem(x, gap - touch, *map(float, target), spring=spring)
+    touch_approach = gap.min() if target.size else 0.0
+    problem = patch_problem(x, gap - touch_approach, *map(float, target), spring=spring)
     solution = solve(StripCompliance(c), problem, start)
-    solution.motion[:1] += touch
+    solution.motion[:1] += touch_approach
     return PlainSolution(solution.force, solution.motion, solution.n_iterations)
 
 
@@ -234,8 +237,8 @@ def compute_residuals(c, x, problem: ContactProblem, solution: ContactSolution) 
     theta = solution.theta
     load = float(problem.target[0]) if problem.target.size else float(force.sum())
     opening = gap + theta * x - delta + c @ force
-    loaded = np.flatnonzero(force)
-    span = slice(loaded[0], loaded[-1] + 1)
+    loaded_nodes = np.flatnonzero(force)
+    span = slice(loaded_nodes[0], loaded_nodes[-1] + 1)
     scale = np.abs(gap) + np.abs(theta * x) + abs(delta) + np.abs(c[:, span]) @ np.abs(force[span])
     relative_opening = opening / np.where(scale > 0, scale, 1.0)
     residuals = {
@@ -343,12 +346,12 @@ def press(
         If a residual exceeds 1e-12.
     """
     refuse_unsolvable(pieces.interface.x, gap, load, moment, spring)
-    touch = float(gap.min())
+    touch_approach = float(gap.min())
     if load == 0:
-        return _open_interface(gap, touch, rotation)
+        return _open_interface(gap, touch_approach, rotation)
     moment = None if moment is None else float(moment)
-    problem = patch_problem(pieces.interface.x, gap - touch, float(load), moment, spring)
-    return _solve_and_check(pieces, problem, start, touch, rotation)
+    problem = patch_problem(pieces.interface.x, gap - touch_approach, float(load), moment, spring)
+    return _solve_and_check(pieces, problem, start, touch_approach, rotation)
 
 
 def press_to_approach(
@@ -506,7 +509,7 @@ def refuse_residuals(residuals, tolerance: float, place: str = "contact", remedy
     """
     if all(value <= tolerance for value in residuals.values()):
         return
-    worst = max(residuals, key=lambda name: (np.isnan(residuals[name]), residuals[name]))
+    largest_name = max(residuals, key=lambda name: (np.isnan(residuals[name]), residuals[name]))
     raise NotConverged(
-        f"{place}: the residual {worst} = {residuals[worst]:.2e} exceeds {tolerance:.0e}{remedy}"
+        f"{place}: the residual {largest_name} = {residuals[largest_name]:.2e} exceeds {tolerance:.0e}{remedy}"
     )

@@ -83,9 +83,9 @@ def _hash_piece(arrays, words: tuple, layers, source: tuple) -> str:
 
 
 def _hash_source(digest, source: tuple) -> str:
-    here = Path(__file__).parent
+    source_folder = Path(__file__).parent
     for name in source:
-        digest.update((here / name).read_bytes())
+        digest.update((source_folder / name).read_bytes())
     return digest.hexdigest()[:32]
 
 

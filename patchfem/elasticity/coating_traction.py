@@ -138,8 +138,8 @@ def interpolate_coating_traction(cells: Cells, traction: CoatingTraction | None,
     if traction is None:
         return {}
     line_x = cells.points[traction.node, 0]
-    close = LENGTH_TOL * np.ptp(line_x)
-    is_outside = (x < line_x[0] - close) | (x > line_x[-1] + close)
+    tolerance = LENGTH_TOL * np.ptp(line_x)
+    is_outside = (x < line_x[0] - tolerance) | (x > line_x[-1] + tolerance)
     out = {}
     for name, values in (("normal_bond", traction.normal), ("shear_bond", traction.shear)):
         rows = np.stack([np.interp(x, line_x, row) for row in values])

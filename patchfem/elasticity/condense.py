@@ -125,11 +125,11 @@ class CondensedGrid:
         -------
         (nx, rows, 2, r) ndarray [m]
         """
-        whole = np.zeros((*self.stencil.shape[:2], *load.shape[1:]))
-        whole[:, 0] = load
-        u = self.solve(whole, has_inner_loads=False)
+        full_load = np.zeros((*self.stencil.shape[:2], *load.shape[1:]))
+        full_load[:, 0] = load
+        u = self.solve(full_load, has_inner_loads=False)
         if self.round_off_error:
-            u += self.solve(whole - apply_stencil(self.stencil, u))
+            u += self.solve(full_load - apply_stencil(self.stencil, u))
         return u
 
     def solve(self, load, *, has_inner_loads: bool = True) -> np.ndarray:
@@ -197,11 +197,13 @@ def condense(stencil, is_mirrored: bool) -> CondensedGrid:
                 half = half.copy()
                 half[0, :, 1] /= 2  # the middle column belongs to both halves
             inside = eliminate_inner_nodes(half, keep_left=True)
-            kept = tuple(_factorise_motion(stencil, inside, is_odd=odd) for odd in (False, True))
+            kept_factors = tuple(
+                _factorise_motion(stencil, inside, is_odd=odd) for odd in (False, True)
+            )
         else:
             inside = eliminate_inner_nodes(stencil)
-            kept = (_factorise(inside.schur, np.arange(2 * columns), 2 * columns),)
-    condensed = CondensedGrid(stencil, inside, kept, is_mirrored)
+            kept_factors = (_factorise(inside.schur, np.arange(2 * columns), 2 * columns),)
+    condensed = CondensedGrid(stencil, inside, kept_factors, is_mirrored)
     load = irregular_load(2 * columns).reshape(columns, 2, 1)
     u = condensed.displacement(load)
     residual = -apply_stencil(stencil, u)
@@ -240,8 +242,8 @@ def _factorise_motion(stencil, inside: GridFactor, *, is_odd: bool) -> KeptNodeF
 
 
 def _factorise(matrix, unknowns, n_interface: int) -> KeptNodeFactor:
-    kept = np.asfortranarray(matrix[np.ix_(unknowns, unknowns)])
-    low, fault = dpotrf(kept, lower=1, clean=1, overwrite_a=1)
+    kept_matrix = np.asfortranarray(matrix[np.ix_(unknowns, unknowns)])
+    low, fault = dpotrf(kept_matrix, lower=1, clean=1, overwrite_a=1)
     if fault:
         raise NotConverged("the stiffness of the piece is not positive definite")
     return KeptNodeFactor(unknowns, low, n_interface)

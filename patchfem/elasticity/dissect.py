@@ -135,8 +135,8 @@ def minimum_vertex_cover(pairs, side) -> np.ndarray:
     """
     if not len(pairs):
         return np.empty(0, np.int64)
-    swapped = side[pairs[:, :1]] == 1
-    pairs = np.where(swapped, pairs[:, ::-1], pairs)
+    is_swapped = side[pairs[:, :1]] == 1
+    pairs = np.where(is_swapped, pairs[:, ::-1], pairs)
     left, left_end = np.unique(pairs[:, 0], return_inverse=True)
     right, right_end = np.unique(pairs[:, 1], return_inverse=True)
     ones = np.ones(left_end.size, np.int8)

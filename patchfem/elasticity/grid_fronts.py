@@ -487,7 +487,9 @@ def eliminate_inner_nodes(stencil, *, keep_left: bool = False) -> GridFactor:
         updates = {}
         for shape, (corners, halves) in level.items():
             if halves:
-                blocks = _add_updates(shape, [updates_below[half][where] for half, where in halves])
+                blocks = _add_updates(
+                    shape, [updates_below[half][half_indices] for half, half_indices in halves]
+                )
             else:
                 blocks = _assemble_leaves(stencil, shape, corners)
             numbering = number_nodes(shape)
@@ -603,9 +605,9 @@ def predict_work(nx: int, ny: int, is_mirrored: bool) -> WorkEstimate:
     # A mirror-symmetric piece moves symmetrically or antisymmetrically; the condensed stiffness of
     # each motion is factorised and inverted.
     kinds = 2 if is_halved else 1
-    kept = 2 * (columns + (ny - 2 if is_halved else 0))
-    operations += kinds * (kept**3 / 3 + 2 * (2 * columns) ** 3 / 3)
-    factor_entries += kinds * kept**2
+    n_kept = 2 * (columns + (ny - 2 if is_halved else 0))
+    operations += kinds * (n_kept**3 / 3 + 2 * (2 * columns) ** 3 / 3)
+    factor_entries += kinds * n_kept**2
     stencil_entries = kinds * ENTRIES_PER_NODE * nx * (ny - 1)
     compliance_entries = 5 * (2 * nx) ** 2
     other_entries = 2 * max_updates + stencil_entries + compliance_entries

@@ -94,9 +94,9 @@ class Mortar:
     ripple: float
     reason: str
 
-    def distribute_forces(self, nodal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def distribute_forces(self, forces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Convert forces (..., m) at `x` into forces on the nodes of the lower and the upper piece."""
-        return nodal @ self.to_lower, nodal @ self.to_upper
+        return forces @ self.to_lower, forces @ self.to_upper
 
 
 def join_pieces(lower: PieceInterface, upper: PieceInterface) -> Mortar:
@@ -247,9 +247,9 @@ def clip_nodes(x, begin: float, end: float) -> np.ndarray:
     -------
     (k,) ndarray [m]
     """
-    close = LENGTH_TOL * (end - begin)
-    cuts_left = abs(x[0] - begin) > close
-    cuts_right = abs(x[-1] - end) > close
+    tolerance = LENGTH_TOL * (end - begin)
+    cuts_left = abs(x[0] - begin) > tolerance
+    cuts_right = abs(x[-1] - end) > tolerance
     if not (cuts_left or cuts_right):
         return x
     cell = np.minimum(np.diff(x, prepend=-np.inf), np.diff(x, append=np.inf))
@@ -279,11 +279,11 @@ def common_grid(x_lower, x_upper, softness_lower, softness_upper) -> np.ndarray:
     """
     node = x_lower[0]
     end = x_lower[-1]
-    close = LENGTH_TOL * (end - node)
+    tolerance = LENGTH_TOL * (end - node)
     grid = [node]
-    while node < end - close:
+    while node < end - tolerance:
         next_lower, next_upper = (
-            x[min(int(np.searchsorted(x, node + close, "right")), x.size - 1)]
+            x[min(int(np.searchsorted(x, node + tolerance, "right")), x.size - 1)]
             for x in (x_lower, x_upper)
         )
         ratio = np.interp(node, x_upper, softness_upper) / np.interp(node, x_lower, softness_lower)
@@ -417,8 +417,8 @@ def join_on_grid(grids: Grids, side: str, lower: PieceInterface, upper: PieceInt
     nn = (nn + nn.T) / 2
     tt = (tt + tt.T) / 2
     ripples = estimate_ripples(x, nn, ((lower, to_lower), (upper, to_upper)))
-    worst = int(np.argmax(ripples))
-    ripple = float(ripples[worst])
+    largest_index = int(np.argmax(ripples))
+    ripple = float(ripples[largest_index])
     for matrix in (to_lower, to_upper):
         matrix.data.setflags(write=False)
     nodes = "nodes of both pieces alternately"
@@ -427,7 +427,7 @@ def join_on_grid(grids: Grids, side: str, lower: PieceInterface, upper: PieceInt
     reason = (
         f"with the pressure defined on {nodes} ({x.size} points; the lower interface has "
         f"{grids.lower.size}, the upper interface {grids.upper.size}), pressure ripples of "
-        f"{100 * ripple:.2g} % are expected near x = {format_length(float(x[1 + worst]), 3)}"
+        f"{100 * ripple:.2g} % are expected near x = {format_length(float(x[1 + largest_index]), 3)}"
     )
     return Mortar(
         side,

@@ -192,39 +192,44 @@ def fit_recovery(cells: Cells) -> Recovery:
         2 * cells.corners() + cells.is_coating[cell_of_corner], return_inverse=True
     )
     node = key // 2
-    near = collect_patches(recovery_point, cell_of_corner)
+    patches = collect_patches(recovery_point, cell_of_corner)
     centres = cells.centres()
-    fit, is_thin = _fit_planes(near, cells.points[node], centres)
+    fit, is_thin = _fit_planes(patches, cells.points[node], centres)
     if is_thin.any():
-        thin = np.flatnonzero(is_thin)
-        own = near.select(thin)
+        thin_points = np.flatnonzero(is_thin)
+        thin_patches = patches.select(thin_points)
         # These are the points whose patches contain the cells of the thin patches.
-        touched = collect_patches(near.cells, near.point_of_entry).select(own.cells)
-        beyond = near.select(touched.cells)
-        widened = collect_patches(
-            own.point_of_entry[touched.point_of_entry][beyond.point_of_entry], beyond.cells
+        neighbour_points = collect_patches(patches.cells, patches.point_of_entry).select(
+            thin_patches.cells
         )
-        more, _ = _fit_planes(widened, cells.points[node[thin]], centres)
+        neighbour_patches = patches.select(neighbour_points.cells)
+        wide_patches = collect_patches(
+            thin_patches.point_of_entry[neighbour_points.point_of_entry][
+                neighbour_patches.point_of_entry
+            ],
+            neighbour_patches.cells,
+        )
+        wide_fit, _ = _fit_planes(wide_patches, cells.points[node[thin_points]], centres)
         is_kept = ~is_thin[fit.point_of_entry]
         fit = collect_patches(
-            np.concatenate([fit.point_of_entry[is_kept], thin[more.point_of_entry]]),
-            np.concatenate([fit.cells[is_kept], more.cells]),
-            np.concatenate([fit.weights[is_kept], more.weights]),
+            np.concatenate([fit.point_of_entry[is_kept], thin_points[wide_fit.point_of_entry]]),
+            np.concatenate([fit.cells[is_kept], wide_fit.cells]),
+            np.concatenate([fit.weights[is_kept], wide_fit.weights]),
         )
     return Recovery(cells, node, key % 2 == 1, recovery_point, fit)
 
 
-def _fit_planes(near: Patches, points, centres) -> tuple[Patches, np.ndarray]:
+def _fit_planes(patches: Patches, points, centres) -> tuple[Patches, np.ndarray]:
     """Fit a plane to the values at the cell centres around each node by least squares.
 
     Returns the weights of the cells of each patch, and whether it is too thin for a plane.
 
     points: (s, 2) [m] at which the planes are evaluated.
     """
-    starts = near.starts[:-1]
-    counts = np.diff(near.starts)
-    row = near.point_of_entry
-    offset = centres[near.cells] - points[row]
+    starts = patches.starts[:-1]
+    counts = np.diff(patches.starts)
+    row = patches.point_of_entry
+    offset = centres[patches.cells] - points[row]
     size = np.maximum.reduceat(np.abs(offset), starts)
     offset /= np.where(size > 0, size, 1.0)[row]
     terms = np.column_stack([np.ones(row.size), offset])
@@ -240,7 +245,7 @@ def _fit_planes(near: Patches, points, centres) -> tuple[Patches, np.ndarray]:
     inverse = np.linalg.pinv(spread, rcond=1e-8, hermitian=True)
     slope = np.einsum("sij,sj->si", inverse, -mean)
     weights = 1 / counts[row] + np.einsum("ni,ni->n", deviation, slope[row])
-    return Patches(near.starts, near.cells, weights), is_thin
+    return Patches(patches.starts, patches.cells, weights), is_thin
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -317,12 +322,12 @@ def estimate_error(recovery: Recovery, u, stress, gauss_points: list) -> StressE
             at_corners = np.stack([recovered.take(node, axis=1) for node in nodes])
             at_points = points.interpolate(at_corners)
             exx, eyy, exy = points.strain(motion)
-            computed = (
+            components = (
                 bulk[cells] * (exx + eyy),
                 shear[cells] * (exx - eyy),
                 shear[cells] * (2 * exy),
             )
-            for k, component in enumerate(computed):
+            for k, component in enumerate(components):
                 energy[frame] += (points.weight * component**2).sum()
                 difference = at_points[:, k] - component
                 error[frame, cells] += np.einsum("gc,gc->c", points.weight, difference**2)

@@ -62,9 +62,9 @@ def _load_arrays() -> dict[str, np.ndarray]:
             shapes[f"{name}_{kind}_gradient"] = (n_points, 2, n_corners)
             shapes[f"{name}_{kind}_weight"] = (n_points,)
     key = disk_cache.reference_cell_key()
-    stored = disk_cache.load_arrays(key, shapes)
-    if stored is not None:
-        return stored
+    stored_arrays = disk_cache.load_arrays(key, shapes)
+    if stored_arrays is not None:
+        return stored_arrays
     from .plane_form import evaluate_reference_cells
 
     arrays = evaluate_reference_cells()

@@ -57,10 +57,10 @@ class Substructure:
     def solve(self, load) -> np.ndarray:
         """Return displacements (frames, N, 2) [m] under interface loads (m, 2, frames) [N/m]."""
         n_interface, _, frames = load.shape
-        whole = np.zeros((self.order.size, 2, frames))
-        whole[-n_interface:] = load
+        full_load = np.zeros((self.order.size, 2, frames))
+        full_load[-n_interface:] = load
         with use_one_blas_thread():
-            u = self.factor.solve(whole.reshape(-1, frames)).reshape(whole.shape)
+            u = self.factor.solve(full_load.reshape(-1, frames)).reshape(full_load.shape)
         out = np.zeros((frames, len(self.mesh.points), 2))
         out[:, self.order] = np.moveaxis(u, 2, 0)
         return out

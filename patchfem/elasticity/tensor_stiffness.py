@@ -68,7 +68,13 @@ def apply_stencil(stencil, u) -> np.ndarray:
     forces = np.zeros_like(u)
     for dc in (-1, 0, 1):
         for dr in (-1, 0, 1):
-            here = slice(max(0, -dc), columns - max(0, dc)), slice(max(0, -dr), rows - max(0, dr))
-            there = slice(max(0, dc), columns + min(0, dc)), slice(max(0, dr), rows + min(0, dr))
-            forces[here] += stencil[here][:, :, 1 + dc, 1 + dr] @ u[there]
+            node_slices = (
+                slice(max(0, -dc), columns - max(0, dc)),
+                slice(max(0, -dr), rows - max(0, dr)),
+            )
+            neighbour_slices = (
+                slice(max(0, dc), columns + min(0, dc)),
+                slice(max(0, dr), rows + min(0, dr)),
+            )
+            forces[node_slices] += stencil[node_slices][:, :, 1 + dc, 1 + dr] @ u[neighbour_slices]
     return forces

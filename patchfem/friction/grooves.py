@@ -163,8 +163,8 @@ class Grooves:
 
     def _integrate_loss(self, start, end, signed_friction):
         """Integrate the friction loss mu (1 + t^2)/(1 - mu t) over angles in closed form."""
-        moves = signed_friction != 0
-        mu = np.where(moves, signed_friction, 1.0)
+        has_friction = signed_friction != 0
+        mu = np.where(has_friction, signed_friction, 1.0)
         b = signed_friction * self.max_slope
         root = np.sqrt(1 - b * b)
         angle = end - start
@@ -178,7 +178,7 @@ class Grooves:
         total = (
             -self.max_slope * sine_integral / mu - angle / mu**2 + (1 + 1 / mu**2) * 2 / root * arc
         )
-        return np.where(moves, mu * total, 0.0)
+        return np.where(has_friction, mu * total, 0.0)
 
     def min_mass_ratio(self, friction: float) -> float:
         """Return the minimum of t (t - mu)/(1 + mu t) over the slopes t of the flanks.

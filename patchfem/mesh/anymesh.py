@@ -147,8 +147,8 @@ class PieceMesh:
         interface_pairs = np.stack([self.interface[:-1], self.interface[1:]], axis=1)
         interface_pairs.sort(axis=1)
         key = pairs[:, 0] * n_points + pairs[:, 1]  # the keys ascend, because the pairs are sorted
-        wanted = interface_pairs[:, 0] * n_points + interface_pairs[:, 1]
-        interface[1::2] = np.searchsorted(key, wanted) + n_points
+        interface_keys = interface_pairs[:, 0] * n_points + interface_pairs[:, 1]
+        interface[1::2] = np.searchsorted(key, interface_keys) + n_points
         is_fixed = np.isin(pairs, self.far).all(axis=1) & (n_cells == 1)
         return freeze_piece(
             PieceMesh(
@@ -267,9 +267,9 @@ def _check_tags(mesh: TaggedMesh, source) -> None:
         )
     unknown = names - set(CELL_TAGS)
     if unknown:
-        shown = ", ".join(sorted(name or "no tag" for name in unknown)[:4])
+        tag_list = ", ".join(sorted(name or "no tag" for name in unknown)[:4])
         raise PatchfemError(
-            f"{source}: some cells have an unknown tag ({shown}); possible tags are {', '.join(CELL_TAGS)}"
+            f"{source}: some cells have an unknown tag ({tag_list}); possible tags are {', '.join(CELL_TAGS)}"
         )
 
 
@@ -278,20 +278,22 @@ def _check_numbers(mesh: TaggedMesh, source) -> None:
     n_points = len(mesh.points)
     for group in (mesh.triangles, mesh.quads, *(mesh.nodes[edge] for edge in EDGE_TAGS)):
         if group.size and (group.min() < 0 or group.max() >= n_points):
-            wrong = group.min() if group.min() < 0 else group.max()
+            wrong_node = group.min() if group.min() < 0 else group.max()
             raise PatchfemError(
-                f"{source}: a cell names node {int(wrong)}, but the file has {n_points} nodes"
+                f"{source}: a cell names node {int(wrong_node)}, but the file has {n_points} nodes"
             )
     if not np.isfinite(mesh.points).all():
         raise PatchfemError(f"{source}: a node has a coordinate that is not finite")
-    used = mesh.points[np.unique(np.concatenate([mesh.triangles.ravel(), mesh.quads.ravel()]))]
-    span = np.ptp(used, axis=0)
+    used_points = mesh.points[
+        np.unique(np.concatenate([mesh.triangles.ravel(), mesh.quads.ravel()]))
+    ]
+    span = np.ptp(used_points, axis=0)
     if span.size > 2 and span[2] > LENGTH_TOL * span[:2].max():
         raise PatchfemError(
             f"{source}: the mesh is not plane: its z values span {span[2]:.6g} m; draw the mesh in x "
             "and y"
         )
-    if not np.abs(used[:, :2]).max() < 1e150:  # squares of larger numbers overflow
+    if not np.abs(used_points[:, :2]).max() < 1e150:  # squares of larger numbers overflow
         raise PatchfemError(f"{source}: a node lies beyond 1e150 m")
 
 
@@ -342,9 +344,9 @@ def _build_piece(mesh: TaggedMesh, side: str, is_cell, used, source) -> PieceMes
 def _signed_areas(corners) -> np.ndarray:
     """Return the areas (c,) of cells with corners (c, n, 2), > 0 if counterclockwise."""
     # Coordinates relative to a corner of the cell lose no digits if the origin is far away.
-    own = corners[:, :1]
-    a = corners - own
-    b = np.roll(corners, -1, axis=1) - own
+    first_corner = corners[:, :1]
+    a = corners - first_corner
+    b = np.roll(corners, -1, axis=1) - first_corner
     return (a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]).sum(axis=1) / 2
 
 
@@ -378,15 +380,17 @@ def _check_interface(points, nodes, side: str, source) -> None:
         )
     x, y = points[nodes].T
     cells = np.diff(x)
-    close = LENGTH_TOL * np.ptp(x)
+    tolerance = LENGTH_TOL * np.ptp(x)
     shortest = int(np.argmin(cells))
-    if cells[shortest] <= close and np.ptp(x) > 0:
+    if cells[shortest] <= tolerance and np.ptp(x) > 0:
         raise PatchfemError(
             f"{source}: {name} has two nodes at x = {x[shortest]:.6g} m; merge these nodes"
         )
-    is_flat = np.abs(y) <= close
+    is_flat = np.abs(y) <= tolerance
     slope = np.diff(y) / np.maximum(cells, 1e-300)
-    is_concave = np.append(False, np.diff(slope) < -1e-6 - 4 * close / max(cells.min(), close))
+    is_concave = np.append(
+        False, np.diff(slope) < -1e-6 - 4 * tolerance / max(cells.min(), tolerance)
+    )
     is_wrong = (np.abs(slope) > MAX_SLOPE) | is_concave
     if not is_flat.any() and not is_wrong.any():
         raise PatchfemError(
@@ -400,7 +404,7 @@ def _check_interface(points, nodes, side: str, source) -> None:
             f"{MAX_SLOPE:g}): the node at x = {x[node]:.6g} m lies {abs(y[node]):.6g} m away "
             "from this line; give the shape of a surface by [contact.crown] or [contact.tilt]"
         )
-    if points[:, 1].min() < -close:
+    if points[:, 1].min() < -tolerance:
         raise PatchfemError(
             f"{source}: the {side} piece reaches {-points[:, 1].min():.6g} m across y = 0; the lower "
             "piece must lie at y <= 0, and the upper piece at y >= 0"
@@ -413,11 +417,11 @@ def _check_connections(mesh: PieceMesh, side: str, source) -> None:
     The interface and the far face must lie on the border of the piece.
     """
     n_points = len(mesh.points)
-    near = cKDTree(mesh.points).query_pairs(LENGTH_TOL * mesh.length, output_type="ndarray")
-    if len(near):
-        x, y = mesh.points[near[0, 0]]
+    close_pairs = cKDTree(mesh.points).query_pairs(LENGTH_TOL * mesh.length, output_type="ndarray")
+    if len(close_pairs):
+        x, y = mesh.points[close_pairs[0, 0]]
         raise PatchfemError(
-            f"{source}: {len(near)} pairs of nodes of the {side} piece coincide, the first at x = "
+            f"{source}: {len(close_pairs)} pairs of nodes of the {side} piece coincide, the first at x = "
             f"{x:.6g} m, {y:.6g} m from the interface; merge these nodes"
         )
     edges, owner = cell_edges(mesh)
@@ -462,11 +466,13 @@ def _check_hanging_nodes(mesh: PieceMesh, border, side: str, source) -> None:
     along = mesh.points[border[:, 1]] - begin
     length = np.hypot(*along.T)
     tree = cKDTree(mesh.points[nodes])
-    near = tree.query_ball_point(begin + along / 2, length / 2 * (1 - 1e-6))
-    edge = np.repeat(np.arange(len(border)), [len(found) for found in near])
+    nearby_nodes = tree.query_ball_point(begin + along / 2, length / 2 * (1 - 1e-6))
+    edge = np.repeat(np.arange(len(border)), [len(found) for found in nearby_nodes])
     if edge.size == 0:
         return
-    point = mesh.points[nodes[np.concatenate([found for found in near if found]).astype(int)]]
+    point = mesh.points[
+        nodes[np.concatenate([found for found in nearby_nodes if found]).astype(int)]
+    ]
     offset = point - begin[edge]
     area = along[edge, 0] * offset[:, 1] - along[edge, 1] * offset[:, 0]
     distance = np.abs(area) / length[edge]

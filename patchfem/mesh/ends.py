@@ -54,16 +54,16 @@ class End:
         -------
         (k,) ndarray [m]
         """
-        beyond = np.maximum(np.abs(np.asarray(x, float)) - (length / 2 - self.size), 0.0)
+        end_distance = np.maximum(np.abs(np.asarray(x, float)) - (length / 2 - self.size), 0.0)
         if self.kind == "chamfer":
-            return beyond
+            return end_distance
         if self.kind == "sharp":
-            return np.zeros(beyond.shape)
+            return np.zeros(end_distance.shape)
         circle_end = self.size * MAX_CIRCLE_SLOPE / hypot(1, MAX_CIRCLE_SLOPE)
-        on_circle = np.minimum(beyond, circle_end)
+        on_circle = np.minimum(end_distance, circle_end)
         cosine_part = np.sqrt(np.maximum(self.size**2 - on_circle**2, 0.0))
         circle = on_circle**2 / (self.size + cosine_part)
-        return circle + MAX_CIRCLE_SLOPE * np.maximum(beyond - circle_end, 0.0)
+        return circle + MAX_CIRCLE_SLOPE * np.maximum(end_distance - circle_end, 0.0)
 
 
 SHARP_END = End()

@@ -188,14 +188,14 @@ def _convert_mesh(path: Path, mesh) -> TaggedMesh:
         dimension = 1 if block.type == "line" else 2
         codes = np.zeros(len(block.data), int) if codes is None else np.ravel(codes)
         for code in np.unique(codes).tolist():
-            chosen = block.data[codes == code]
+            tagged_cells = block.data[codes == code]
             name = tags.names.get((dimension, int(code)), f"tag {int(code)}" if code else "")
             if block.type == "line":
-                known = nodes.get(name, np.empty(0, np.int64))
-                nodes[name] = np.append(known, np.ravel(chosen))
+                known_nodes = nodes.get(name, np.empty(0, np.int64))
+                nodes[name] = np.append(known_nodes, np.ravel(tagged_cells))
             else:
-                cells[block.type].append(chosen)
-                labels[block.type].append(np.full(len(chosen), name))
+                cells[block.type].append(tagged_cells)
+                labels[block.type].append(np.full(len(tagged_cells), name))
     return TaggedMesh(
         np.asarray(mesh.points, float),
         np.concatenate(cells["triangle"]).astype(np.int64),
@@ -238,10 +238,10 @@ def _check_counts(path: Path) -> None:
         if start < 0 or len(lines) < 2:
             continue
         numbers = [int(word) for word in lines[1].split() if word.isdigit()]
-        announced = max(numbers[:4], default=0)
-        if announced * min_bytes > len(content):
+        declared_count = max(numbers[:4], default=0)
+        if declared_count * min_bytes > len(content):
             raise PatchfemError(
-                f"{path}: {section.decode()[1:]} announces {announced} entries, more than a "
+                f"{path}: {section.decode()[1:]} announces {declared_count} entries, more than a "
                 f"file of {len(content)} bytes can hold"
             )
 

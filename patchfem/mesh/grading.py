@@ -149,8 +149,12 @@ def divide_into_rows(layout: Layout, coating_thickness: float) -> tuple[np.ndarr
         From the interface to the far face.
     coating_rows : int
     """
-    under = graded_levels(replace(layout, start=layout.start + coating_thickness), min_cells=3)
+    substrate_levels = graded_levels(
+        replace(layout, start=layout.start + coating_thickness), min_cells=3
+    )
     if coating_thickness <= 0:
-        return frozen_array(under), 0
-    coated = graded_levels(replace(layout, stop=layout.start + coating_thickness), min_cells=2)[:-1]
-    return frozen_array(np.concatenate([coated, under])), coated.size
+        return frozen_array(substrate_levels), 0
+    coating_levels = graded_levels(
+        replace(layout, stop=layout.start + coating_thickness), min_cells=2
+    )[:-1]
+    return frozen_array(np.concatenate([coating_levels, substrate_levels])), coating_levels.size

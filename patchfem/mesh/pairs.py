@@ -78,5 +78,5 @@ def _far_edges(body: PieceMesh) -> np.ndarray:
     """Return the edges between nodes of the far face; an isolated node is joined to itself."""
     edges = np.unique(np.sort(cell_edges(body)[0], axis=1), axis=0)
     edges = edges[np.isin(edges, body.far).all(axis=1)]
-    single = np.setdiff1d(body.far, edges)
-    return np.concatenate([edges, np.stack([single, single], axis=1)])
+    isolated_nodes = np.setdiff1d(body.far, edges)
+    return np.concatenate([edges, np.stack([isolated_nodes, isolated_nodes], axis=1)])

@@ -53,19 +53,19 @@ def recognise_grid(mesh: PieceMesh) -> TensorGrid | None:
     has_sizes = len(mesh.quads) == columns * rows and len(mesh.points) == x.size * depth.size
     if len(mesh.triangles) or not has_sizes or mesh.interface_depths.any():
         return None
-    close = LENGTH_TOL * span
+    tolerance = LENGTH_TOL * span
     corners = mesh.points[mesh.quads]
     low = corners.min(axis=1)
     high = corners.max(axis=1)
-    column = np.minimum(np.searchsorted(x, low[:, 0] - close), columns - 1)
-    row = np.minimum(np.searchsorted(depth, low[:, 1] - close), rows - 1)
+    column = np.minimum(np.searchsorted(x, low[:, 0] - tolerance), columns - 1)
+    row = np.minimum(np.searchsorted(depth, low[:, 1] - tolerance), rows - 1)
     low_lines = np.stack([x[column], depth[row]], axis=1)
     high_lines = np.stack([x[column + 1], depth[row + 1]], axis=1)
     deviation = max(np.abs(low - low_lines).max(), np.abs(high - high_lines).max())
-    if deviation > close or np.unique(column * rows + row).size < column.size:
+    if deviation > tolerance or np.unique(column * rows + row).size < column.size:
         return None
     coating_rows = int(row[mesh.is_coating].max(initial=-1)) + 1
-    last_row = np.flatnonzero(mesh.points[:, 1] > depth[-1] - close)
+    last_row = np.flatnonzero(mesh.points[:, 1] > depth[-1] - tolerance)
     if not np.array_equal(mesh.is_coating, row < coating_rows):
         return None
     if not np.array_equal(np.unique(mesh.far), last_row):

@@ -90,9 +90,9 @@ def shaped_grid(
     stops = {length / 2 - end.size, length / 2}
     outer = [np.zeros(1)]
     for stop in sorted(stop for stop in stops if stop > half_interface * (1 + 1e-12)):
-        reached = outer[-1][-1]
-        columns = graded_rows(cell, stop - (half_interface + reached), growth)
-        outer.append(reached + np.cumsum(columns))
+        outer_length = outer[-1][-1]
+        columns = graded_rows(cell, stop - (half_interface + outer_length), growth)
+        outer.append(outer_length + np.cumsum(columns))
         cell = columns[-1] * growth
     return _move_columns(inner, np.concatenate(outer), length, end)
 

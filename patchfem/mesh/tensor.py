@@ -86,10 +86,10 @@ class TensorGrid:
 
     def _with_rows(self, x, change) -> "TensorGrid":
         """Return the grid with given columns, and rows changed by a function for each layer."""
-        coated = change(self.depth[: self.coating_rows + 1])
-        under = change(self.depth[self.coating_rows :])
-        depth = np.concatenate([coated, under[1:]])
-        return TensorGrid(frozen_array(x), frozen_array(depth), coated.size - 1)
+        coating_depth = change(self.depth[: self.coating_rows + 1])
+        substrate_depth = change(self.depth[self.coating_rows :])
+        depth = np.concatenate([coating_depth, substrate_depth[1:]])
+        return TensorGrid(frozen_array(x), frozen_array(depth), coating_depth.size - 1)
 
 
 def graded_rows(
@@ -177,8 +177,8 @@ def graded_depth(
     if coating > 0:
         rows = graded_rows(min(first, coating / min_rows), coating, growth, min_rows)
         first = rows[-1] * growth
-    under = graded_rows(first, height - coating, growth, MIN_SUBSTRATE_ROWS)
-    depth = np.concatenate([[0.0], np.cumsum(rows), coating + np.cumsum(under)])
+    substrate_rows = graded_rows(first, height - coating, growth, MIN_SUBSTRATE_ROWS)
+    depth = np.concatenate([[0.0], np.cumsum(rows), coating + np.cumsum(substrate_rows)])
     if coating > 0:
         depth[rows.size] = coating
     depth[-1] = height

@@ -267,7 +267,7 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
         raise PatchfemError("contact.shear: the friction limit is 0 at every point of the contact")
     points = np.flatnonzero(limit > 0)
     force = limit[points]
-    none = np.zeros(0, np.int64)
+    no_nodes = np.zeros(0, np.int64)
     # Rigid pieces in series with one spring slip at all nodes together.
     if local_length == 0 and np.ptp(tangential) == 0:
         stiffness = 1 / tangential[0, 0]
@@ -276,9 +276,9 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
             frozen_array([force.sum() / stiffness]),
             frozen_array(points, np.int64),
             frozen_array(force),
-            none,
+            no_nodes,
             np.zeros((0, 0)),
-            none,
+            no_nodes,
             0,
         )
     # One thread is used because, on a loaded machine, waiting for a second one turns 5 ms into 270
@@ -430,8 +430,8 @@ def _exchange_neighbours(sequence: _YieldSequence) -> _YieldSequence | None:
             is_positive = inverse_ones[i] > 0
             displacements[i] = factored_force[i] / inverse_ones[i] if is_positive else np.inf
         pending += [k + 1, k - 1]
-    lists = (order, factor, inverse_ones, factored_force, displacements)
-    return _YieldSequence(*map(np.array, lists))
+    arrays = (order, factor, inverse_ones, factored_force, displacements)
+    return _YieldSequence(*map(np.array, arrays))
 
 
 def _factorise(c: np.ndarray) -> np.ndarray:
@@ -452,11 +452,11 @@ def _eliminate_points(c: np.ndarray, force: np.ndarray) -> np.ndarray:
     yielded = []
     rate = inverse.sum(axis=0)
     for _ in range(force.size):
-        wait = _divide_or_inf(remaining, rate)
-        wait[yielded] = np.inf
-        point = int(wait.argmin())
+        change_to_yield = _divide_or_inf(remaining, rate)
+        change_to_yield[yielded] = np.inf
+        point = int(change_to_yield.argmin())
         yielded.append(point)
-        remaining -= rate * max(wait[point], 0.0)
+        remaining -= rate * max(change_to_yield[point], 0.0)
         column = inverse[point].copy()
         pivot = inverse[point, point]
         rate = rate - column / pivot * rate[point]

@@ -102,9 +102,9 @@ def _refuse_long_directory(path: Path) -> None:
     with open(path, "rb") as file:
         size = file.seek(0, 2)
         file.seek(max(0, size - MAX_ZIP_END_BYTES))
-        tail = file.read()
-    end = tail.rfind(ZIP_END_SIGNATURE)
-    size = int.from_bytes(tail[end + 12 : end + 16], "little") if end >= 0 else 0
+        last_bytes = file.read()
+    end = last_bytes.rfind(ZIP_END_SIGNATURE)
+    size = int.from_bytes(last_bytes[end + 12 : end + 16], "little") if end >= 0 else 0
     if size > MAX_DIRECTORY_BYTES:
         raise PatchfemError(
             f"the list of members takes {size} bytes; {MAX_DIRECTORY_BYTES} is the limit"
@@ -192,8 +192,8 @@ def _build_basis_from_matrices(
             "contains `slide`, but [[structure.interface]] also defines where sliding "
             "occurs: keep only one of these two descriptions"
         )
-    named = [coordinate for pair in pairs for coordinate in pair] + [driven_mass or 0]
-    missing = [coordinate for coordinate in named if coordinate > n]
+    coordinates = [coordinate for pair in pairs for coordinate in pair] + [driven_mass or 0]
+    missing = [coordinate for coordinate in coordinates if coordinate > n]
     if missing:
         raise PatchfemError(f"there is no coordinate {missing[0]}: M has {n}, numbered from 1")
     faces = masses.make_slide_rows(pairs, n) if pairs else data.get("slide")
@@ -250,8 +250,8 @@ def _build_basis_from_modes(
     else:
         _refuse_missing(data, "M and K, or omega [rad/s] or frequency [Hz] of modes")
     n = omega.size
-    required = ("damping", "slide") if is_forced else ("damping", "slide", "base")
-    for name in required:
+    required_names = ("damping", "slide") if is_forced else ("damping", "slide", "base")
+    for name in required_names:
         if name not in data:
             _refuse_missing(data, f"{name} of the modes")
     if mass is None and "moving_mass" in data:

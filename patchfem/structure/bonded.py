@@ -74,8 +74,8 @@ def remove_springs(basis: ModalBasis, stiffness, damping: float = 0.0) -> ModalB
     squares, shapes = np.linalg.eigh(np.diag(basis.omega**2) - joint)
     min_square = MIN_ELASTIC_FRACTION * float(np.max(basis.omega**2 + np.diag(joint), initial=0.0))
     if squares[0] < -min_square:
-        measured = float(shapes[:, 0] ** 2 @ basis.omega**2)
-        ratio = 1 - squares[0] / measured if measured else np.inf
+        measured_square = float(shapes[:, 0] ** 2 @ basis.omega**2)
+        ratio = 1 - squares[0] / measured_square if measured_square else np.inf
         raise PatchfemError(
             f"the stiffness of the joint is {100 * ratio:.4g} % of "
             "the stiffness of the mode that the joint stiffens most, so without the joint this mode "

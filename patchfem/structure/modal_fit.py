@@ -343,12 +343,12 @@ def _remove_weak_modes(fit: ModalFit, theta):
         contribution = np.sqrt(np.mean(np.abs(fit.contributions(theta)) ** 2, axis=2))
         strength = np.zeros(w.size)
         for r, index in enumerate(np.searchsorted(fit.omega, w)):
-            near = slice(max(0, index - N_NEIGHBOURS), index + N_NEIGHBOURS)
-            needed = MIN_CONTRIBUTION * fit.level[near].max(initial=1e-300)
-            if residual[near].size:
-                noise = np.sqrt(np.mean(residual[near] ** 2))
-                needed = max(needed, MIN_RESIDUAL_RATIO * noise)
-            strength[r] = contribution[near, r].max(initial=0.0) / needed
+            neighbours = slice(max(0, index - N_NEIGHBOURS), index + N_NEIGHBOURS)
+            min_contribution = MIN_CONTRIBUTION * fit.level[neighbours].max(initial=1e-300)
+            if residual[neighbours].size:
+                noise = np.sqrt(np.mean(residual[neighbours] ** 2))
+                min_contribution = max(min_contribution, MIN_RESIDUAL_RATIO * noise)
+            strength[r] = contribution[neighbours, r].max(initial=0.0) / min_contribution
         if strength.min() >= 1:
             return theta
         is_kept = np.arange(w.size) != strength.argmin()
@@ -366,7 +366,7 @@ def _find_starts(fit: ModalFit, theta):
     size = np.maximum(np.sqrt(np.sum(np.abs(residual) ** 2, axis=1)), 1e-300)
     products = np.real(np.sum(residual[:-1] * residual[1:].conj(), axis=1))
     correlation = products / (size[:-1] * size[1:])
-    tried = set()
+    tried_peaks = set()
     for spectrum in ((size / fit.weight) ** 2, size**2):
         peaks = find_peaks(np.concatenate([[0], spectrum, [0]]))[0] - 1
         modal_peaks = [
@@ -376,10 +376,10 @@ def _find_starts(fit: ModalFit, theta):
             > MIN_RESIDUAL_CORRELATION
         ]
         for k in sorted(modal_peaks, key=lambda k: -spectrum[k])[:N_PEAKS_PER_SPECTRUM]:
-            if k not in tried:
+            if k not in tried_peaks:
                 width = _find_half_power_width(fit.omega, spectrum, k)
                 yield fit.omega[k], np.clip(width / (2 * fit.omega[k]), 1e-5, 0.3)
-            tried.add(k)
+            tried_peaks.add(k)
 
 
 def _find_half_power_width(omega, spectrum, peak: int) -> float:
@@ -446,9 +446,9 @@ def identify_modes(frequency, measured: dict, notes: list) -> MeasuredModes:
     w = poles.w[is_inside]
     zeta = poles.zeta[is_inside]
     residues = residues[is_inside]
-    own = residues[:, driven]
+    driven_residues = residues[:, driven]
     # The shape is the residue divided by the square root of the residue at the driven point.
-    is_scaled = own > MIN_DRIVEN_RESIDUE * np.abs(residues).max(axis=1)
+    is_scaled = driven_residues > MIN_DRIVEN_RESIDUE * np.abs(residues).max(axis=1)
     notes += [
         f"the mode at {w_r / (2 * np.pi):.5g} Hz does not move the driven point "
         f"{_format_direction(reference)} and is left out"
@@ -461,7 +461,7 @@ def identify_modes(frequency, measured: dict, notes: list) -> MeasuredModes:
         )
     notes += _note_modes_below(poles, data[0, is_moving])
     notes += _check_misfit(poles, int(is_scaled.sum()))
-    shapes = residues[is_scaled] / np.sqrt(own[is_scaled])[:, None]
+    shapes = residues[is_scaled] / np.sqrt(driven_residues[is_scaled])[:, None]
     motion = {direction: shapes[:, k] for k, direction in enumerate(places)}
     return MeasuredModes(w[is_scaled] / (2 * np.pi), zeta[is_scaled], motion, notes)
 

@@ -115,8 +115,10 @@ def _cut_spectrum(frequency, density, low: float | None, high: float | None) -> 
             "drive.from" if low < frequency[0] else "drive.to",
         )
     inner = frequency[(frequency > low) & (frequency < high)]
-    kept = np.array([low, *inner, high])
-    return kept, np.exp(np.interp(np.log(kept), np.log(frequency), np.log(density)))
+    cut_frequency = np.array([low, *inner, high])
+    return cut_frequency, np.exp(
+        np.interp(np.log(cut_frequency), np.log(frequency), np.log(density))
+    )
 
 
 DRIVE_BUILDERS = {"random": _build_random}

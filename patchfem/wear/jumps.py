@@ -169,15 +169,15 @@ def _correct_path(
     path = problem.path(after.depth)
     if path is state.path:
         return after, error
-    again, error = _take_halves(problem, state, (state.path + path) / 2, length, tolerance)
+    repeated, error = _take_halves(problem, state, (state.path + path) / 2, length, tolerance)
     # Let h be the length of this jump, k that of the previous jump, and f the path as a function of the cycles. The
     # truncation error of the mean of both ends is h^3/12 f'', and that of the trend is -(h/6 + k/4) h^2 f''. So the
     # error of the mean is 1/(3 + 3 k/h) of the difference of both, which is at most a third.
-    path_error = float(np.abs(again.depth - after.depth).max()) / 3
-    worn = float((again.depth - state.depth).max())
-    scale = max(worn, SHAKEDOWN_WEAR_RATIO * float(again.depth.max()))
+    path_error = float(np.abs(repeated.depth - after.depth).max()) / 3
+    worn = float((repeated.depth - state.depth).max())
+    scale = max(worn, SHAKEDOWN_WEAR_RATIO * float(repeated.depth.max()))
     corrected = replace(
-        again,
+        repeated,
         path=path,
         trend=(path - state.path) / length,
         path_error=state.path_error + path_error,

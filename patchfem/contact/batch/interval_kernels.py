@@ -43,10 +43,10 @@ def drop_first_node(upper, a, row):
         sine = row[j] / size
         upper[j, j] = size
         for i in range(j + 1, n_nodes):
-            above = upper[j, i]
-            below = row[i]
-            upper[j, i] = cosine * above + sine * below
-            row[i] = cosine * below - sine * above
+            old_entry = upper[j, i]
+            row_entry = row[i]
+            upper[j, i] = cosine * old_entry + sine * row_entry
+            row[i] = cosine * row_entry - sine * old_entry
 
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)

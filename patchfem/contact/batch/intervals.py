@@ -115,9 +115,9 @@ class Intervals:
     def _press(self, gap, loads: np.ndarray, brackets, *, is_free: bool) -> ContactBatch:
         n_cases, m = gap.shape
         gap = np.ascontiguousarray(gap)
-        everywhere = ((0,), (m,))
+        all_nodes = ((0,), (m,))
         if brackets is None:
-            brackets = everywhere
+            brackets = all_nodes
             if m > MIN_COARSE_NODES:
                 brackets = self._bracket_on_coarse_grid(gap, loads, is_free=is_free)
         first, stop = np.clip(brackets, [[0], [1]], [[m - 1], [m]])
@@ -143,11 +143,13 @@ class Intervals:
             fractions=self._edge_fractions(cases, opening),
             residual=np.where(cases.solutions.stop > 0, residual, np.inf),
         )
-        missed = np.flatnonzero(~(contacts.residual <= RESIDUAL_TOL))
-        if is_known and missed.size:
-            again = self._press(gap[missed], loads[missed], everywhere, is_free=is_free)
-            for values, new_values in zip(contacts, again):
-                values[missed] = new_values
+        failed_cases = np.flatnonzero(~(contacts.residual <= RESIDUAL_TOL))
+        if is_known and failed_cases.size:
+            new_contacts = self._press(
+                gap[failed_cases], loads[failed_cases], all_nodes, is_free=is_free
+            )
+            for values, new_values in zip(contacts, new_contacts):
+                values[failed_cases] = new_values
         return contacts
 
     def _bracket_on_coarse_grid(self, gap, loads, *, is_free: bool) -> tuple:
@@ -166,8 +168,8 @@ class Intervals:
 
     def fill_sums(self, first: np.ndarray) -> None:
         """Compute the sums of the runs of nodes that begin at or next to given nodes (q,)."""
-        none = np.zeros(0, int)
-        cases = make_cases(none, none, np.zeros((0, self.x.size)), np.zeros((0, 3)))
+        no_nodes = np.zeros(0, int)
+        cases = make_cases(no_nodes, no_nodes, np.zeros((0, self.x.size)), np.zeros((0, 3)))
         self._solve_all(cases, int(first.min()) - 1, int(first.max()) + 1, 1, is_free=False)
 
     def _solve_all(self, cases: Cases, low: int, high: int, n_tries: int, *, is_free: bool) -> None:
@@ -191,14 +193,14 @@ class Intervals:
             if left_end > a:
                 kernels.move_left_end(stretches, a, left_end, 0)
             a = left_end
-            here = np.flatnonzero(next_try == a)
-            here = here[np.argsort(cases.end_limit[here], kind="stable")]
-            for start in range(0, here.size, BATCH_SIZE):
-                indices = here[start : start + BATCH_SIZE]
+            case_indices = np.flatnonzero(next_try == a)
+            case_indices = case_indices[np.argsort(cases.end_limit[case_indices], kind="stable")]
+            for start in range(0, case_indices.size, BATCH_SIZE):
+                indices = case_indices[start : start + BATCH_SIZE]
                 next_try[indices] = self._try_left_end(
                     stretches, cases, indices, a, is_free=is_free
                 )
-            if (cases.solutions.stop[here] > 0).any():
+            if (cases.solutions.stop[case_indices] > 0).any():
                 high = max(high, a + 1)
             next_try[next_try >= cases.first_try + n_tries] = m
         if min(high, m - 1) > a:
@@ -261,9 +263,9 @@ class Intervals:
         cases.solutions.leaving[indices[inside], 1] = last_force * pivots[end - 1] / unit[end - 1]
         cases.solutions.gap_rate[indices[inside], 1] = pivots[end] * unit[end]
         if a > 0:
-            increase = _substitute(group.lower, in_contact * unit[nodes], is_backward=True)
-            cases.solutions.leaving[indices, 0] = force[:, 0] / increase[:, 0]
-            cases.solutions.gap_rate[indices, 0] = 1 - increase @ self.c[nodes, a - 1]
+            force_rate = _substitute(group.lower, in_contact * unit[nodes], is_backward=True)
+            cases.solutions.leaving[indices, 0] = force[:, 0] / force_rate[:, 0]
+            cases.solutions.gap_rate[indices, 0] = 1 - force_rate @ self.c[nodes, a - 1]
 
     def edge_positions(self, contacts: ContactBatch, softness, row_height: float) -> np.ndarray:
         """Return the positions (2, q) [m] of both contact edges, between the nodes.
@@ -291,8 +293,8 @@ class Intervals:
             offset = elastic_fraction[node] * edge_offset(
                 inner_cell, outer_cell, fraction, row_height
             )
-            between = x[node] + fraction * (x[outer] - x[node]) - side * offset
-            positions.append(np.where(is_border, x[node], between))
+            inner_position = x[node] + fraction * (x[outer] - x[node]) - side * offset
+            positions.append(np.where(is_border, x[node], inner_position))
         return np.clip(positions, x[0], x[-1])
 
     def stiffness(self, contacts: ContactBatch, *, is_rotation: bool = False) -> np.ndarray:

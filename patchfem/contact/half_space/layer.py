@@ -76,8 +76,8 @@ def _solve_waves(k, depths: list, moduli: list) -> WaveCompliance:
         # Displacements and tractions are continuous across the interface of two layers.
         rows = slice(first_row, first_row + 4)
         matrix[:, rows, columns] = foot
-        below = _layer_states(k, 0.0, depths[n + 1], moduli[n + 1], scale)
-        matrix[:, rows, first_column + 4 : first_column + 8] = -below
+        lower_states = _layer_states(k, 0.0, depths[n + 1], moduli[n + 1], scale)
+        matrix[:, rows, first_column + 4 : first_column + 8] = -lower_states
     right_sides = np.zeros((k.size, n_unknowns, 2))
     # The loads on the face are a normal stress of -1 for a unit pressure and a shear stress of -1
     # for a unit shear traction.
@@ -100,11 +100,11 @@ def _layer_states(k, z: float, depth: float, moduli: tuple, scale: float) -> np.
     # The first two solutions decay downwards, the others upwards.
     for first, sign, distance in ((0, 1.0, z), (2, -1.0, depth - z)):
         kz = k * distance
-        one = np.ones(k.size)
-        along = np.stack([one, kz - 2 * (1 - nu)]) * softness
-        inward = np.stack([one, kz + 1 - 2 * nu]) * softness * sign
-        tension = -np.stack([one, kz])
-        shear = np.stack([-one, 1 - kz]) * sign
+        ones = np.ones(k.size)
+        along = np.stack([ones, kz - 2 * (1 - nu)]) * softness
+        inward = np.stack([ones, kz + 1 - 2 * nu]) * softness * sign
+        tension = -np.stack([ones, kz])
+        shear = np.stack([-ones, 1 - kz]) * sign
         decayed = np.stack([along, inward, tension, shear]) * np.exp(-kz)
         states[:, :, first : first + 2] = decayed.transpose(2, 0, 1)
     return states

@@ -130,9 +130,9 @@ def smooth_modes(positions, change, x) -> SmoothModes:
     cells = np.diff(positions)
     weight = np.sqrt((np.append(cells, 0.0) + np.append(0.0, cells)) / 2)
     compliances, vectors = np.linalg.eigh(weight[:, None] * change * weight)
-    kept = np.abs(compliances) > MIN_RELATIVE_COMPLIANCE * np.abs(compliances).max(initial=0.0)
+    is_kept = np.abs(compliances) > MIN_RELATIVE_COMPLIANCE * np.abs(compliances).max(initial=0.0)
     return SmoothModes(
-        CubicSpline(positions, vectors[:, kept] / weight[:, None])(x), compliances[kept]
+        CubicSpline(positions, vectors[:, is_kept] / weight[:, None])(x), compliances[is_kept]
     )
 
 
@@ -189,11 +189,11 @@ def set_stiffness(compliance: PointCompliance, active, motion, edges: list) -> f
     if not edges or active.sum() < 3:
         return stiffness
     mismatch = motion - compliance.product(force)
-    longest = max(edges, key=lambda edge: _contact_length(active, edge))
+    longest_edge = max(edges, key=lambda edge: _contact_length(active, edge))
     indices = np.arange(motion.size)
-    outside = longest.node + longest.side
-    inner = compliance.solve_forces(active, (indices == longest.node).astype(float))
-    inner_stiffness = inner[longest.node]
+    outside = longest_edge.node + longest_edge.side
+    inner = compliance.solve_forces(active, (indices == longest_edge.node).astype(float))
+    inner_stiffness = inner[longest_edge.node]
     column = compliance.product((indices == outside).astype(float))
     outer_compliance = column[outside] - float(compliance.solve_forces(active, column) @ column)
     for edge in edges:

@@ -157,17 +157,17 @@ def choose_engine(
     if width is None:
         width = min(MAX_MERGE_WIDTH, sqrt(0.09 * tolerance / _merge_error_factor(law)))
     choices = {
-        name: _estimate(law, name, tail * drops, width * merges, stroke, steps)
-        for name, (drops, merges) in LIST_SETTINGS.items()
+        name: _estimate(law, name, tail * drops_strips, width * merges_strips, stroke, steps)
+        for name, (drops_strips, merges_strips) in LIST_SETTINGS.items()
     }
     if engine != "auto":
         return choices[engine]
     if merge is not None:
         return choices["merged" if merge > 0 else "truncated"]
-    accurate = [
+    accurate_choices = [
         choice for choice in choices.values() if choice.tail > 0 and choice.error <= 0.1 * tolerance
     ]
-    return min(accurate or [choices["truncated"]], key=lambda choice: choice.seconds)
+    return min(accurate_choices or [choices["truncated"]], key=lambda choice: choice.seconds)
 
 
 def _merge_error_factor(law: Bonds) -> float:

@@ -175,8 +175,8 @@ def _count_strips(path, eps, growth, law):
     count = max(1.0, path / (MAX_STRIP_LENGTH * eps))
     if law[LAW.form] == FORM_REPORT_GROWING:
         limit = (path / law[LAW.length]) ** (1 + min(law[LAW.order], 0.0))
-        needed = (limit / NEW_BOND_TOL) ** 0.25
-        count = max(count, min(growth / MAX_STRIP_GROWTH, MAX_GROWTH_STRIPS, needed))
+        min_count = (limit / NEW_BOND_TOL) ** 0.25
+        count = max(count, min(growth / MAX_STRIP_GROWTH, MAX_GROWTH_STRIPS, min_count))
     count = np.ceil(count)
     age_measure = path / eps if law[LAW.form] < FORM_REPORT else path
     return StripCount(count, min(count, 1 + np.ceil(count * (law[LAW.cutoff] / age_measure))))
@@ -217,10 +217,10 @@ def sum_list(increment, bond_list, v0, dt):
     """
     after = _advance_path_state(increment, bond_list.now, bond_list.growth, v0, v0, dt)
     initial = sum_initial(after.displacement, after.path, after.damage, bond_list.law)
-    formed = _sum_strips(increment, bond_list, v0, dt)
+    formed_sum = _sum_strips(increment, bond_list, v0, dt)
     pressure = bond_list.status[STATUS.initial_pressure]
     return BondSum(
-        pressure * initial.force + formed.force, pressure * initial.energy + formed.energy
+        pressure * initial.force + formed_sum.force, pressure * initial.energy + formed_sum.energy
     )
 
 
@@ -260,13 +260,15 @@ def _sum_strips(increment, bond_list, v0, dt):
         force += factor * total.force
         energy += factor * total.energy
     path = abs(increment)
-    formed = 0.0
+    new_bond_force = 0.0
     if path > 0:
         if form == FORM_REPORT_GROWING:
-            formed = _formed_growing_force(path, path_state, after, law)
+            new_bond_force = _formed_growing_force(path, path_state, after, law)
         else:
-            formed = formed_force(path, after.middle_length if form <= FORM_POWER else eps0, law)
-    return BondSum(force + np.copysign(status[STATUS.pressure] * formed, increment), energy)
+            new_bond_force = formed_force(
+                path, after.middle_length if form <= FORM_POWER else eps0, law
+            )
+    return BondSum(force + np.copysign(status[STATUS.pressure] * new_bond_force, increment), energy)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -304,9 +306,12 @@ def list_energy(increment, bond_list, v0, dt):
     """
     law = bond_list.law
     eps = _advance_path_state(increment, bond_list.now, bond_list.growth, v0, v0, dt).middle_length
-    formed = eps * eps / law[LAW.length] * bond_gammainc(law[LAW.order] + 1, abs(increment) / eps)
+    new_bond_energy = (
+        eps * eps / law[LAW.length] * bond_gammainc(law[LAW.order] + 1, abs(increment) / eps)
+    )
     return (
-        bond_list.status[STATUS.pressure] * formed + sum_list(increment, bond_list, v0, dt).energy
+        bond_list.status[STATUS.pressure] * new_bond_energy
+        + sum_list(increment, bond_list, v0, dt).energy
     )
 
 
@@ -403,8 +408,8 @@ def _needs_energy_balance(increment, bond_list):
     end = start + increment
     crosses_zero = min(start, end) <= 0.0 <= max(start, end)
     has_jump = law[LAW.initial] > 0 and law[LAW.order] < 1
-    smallest = MIN_ENERGY_STEP if law[LAW.half_width] == 0 else MIN_ENERGY_STEP_SPREAD
-    is_large = abs(increment) / path_state[PATH.length] > smallest
+    min_step = MIN_ENERGY_STEP if law[LAW.half_width] == 0 else MIN_ENERGY_STEP_SPREAD
+    is_large = abs(increment) / path_state[PATH.length] > min_step
     return is_large or (crosses_zero and has_jump)
 
 
@@ -412,13 +417,13 @@ def _needs_energy_balance(increment, bond_list):
 def _mean_from_energy(is_short, increment, bond_list, v0, dt):
     """Return the path-mean force of a bond list from its energy balance."""
     last = list_energy(increment, bond_list, v0, dt)
-    gain = last - bond_list.status[STATUS.energy]
+    energy_gain = last - bond_list.status[STATUS.energy]
     eps = _advance_path_state(increment, bond_list.now, bond_list.growth, v0, v0, dt).middle_length
     if is_short:
         stored = _average_by_simpson(True, last, increment, bond_list, v0, dt)
     else:
         stored = _average_by_gauss(True, increment, bond_list, v0, dt)
-    return (stored * abs(increment) / eps + gain) / increment
+    return (stored * abs(increment) / eps + energy_gain) / increment
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -513,7 +518,7 @@ def list_slope(increment, bond_list, v0, dt):
 def list_step(increment, bond_list, v0, v1, dt):
     """Advance a list of bond strips by an increment: append new strips and drop the oldest.
 
-    The strips are merged now and then.
+    The strips are merged from time to time.
 
     Force and energy after the step are written into the status.
 
@@ -618,19 +623,19 @@ def _append_strip(formation, bond_list):
         if end + pieces.kept > capacity:
             return False
     for piece in range(int(pieces.kept) - 1, -1, -1):
-        near = piece / count
-        far = (piece + 1) / count
-        bonds[STRIP.start, end] = after.displacement - far * increment
-        bonds[STRIP.end, end] = after.displacement - near * increment
+        end_fraction = piece / count
+        start_fraction = (piece + 1) / count
+        bonds[STRIP.start, end] = after.displacement - start_fraction * increment
+        bonds[STRIP.end, end] = after.displacement - end_fraction * increment
         bonds[STRIP.covered, end] = path / count
-        bonds[STRIP.path, end] = after.path - near * path
+        bonds[STRIP.path, end] = after.path - end_fraction * path
         bonds[STRIP.age_measure, end] = bonds[STRIP.path, end]
         bonds[STRIP.age_width, end] = bonds[STRIP.covered, end]
         bonds[STRIP.weight, end] = pressure * bonds[STRIP.covered, end]
         if form == FORM_MOMENTS:
             _write_moments(formation, bonds, end)
         elif form == FORM_POWER:
-            _write_powers(near, count, formation, law[LAW.order], bonds, end)
+            _write_powers(end_fraction, count, formation, law[LAW.order], bonds, end)
         elif form == FORM_REPORT:
             bonds[REPORT_ROW.pressure, end] = pressure
         else:
@@ -664,14 +669,14 @@ def _extend_last_strip(formation, bonds, status):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _write_powers(near, count, formation, p, bonds, k):
+def _write_powers(end_fraction, count, formation, p, bonds, k):
     """Write the damage and the scaled weights of a strip in the form FORM_POWER.
 
-    near: fraction of the increment at which the strip ends.
+    end_fraction: fraction of the increment at which the strip ends.
     """
     increment, before, after, pressure, reference = formation
     damage = after.damage - before.damage
-    age_measure = after.damage - near * damage
+    age_measure = after.damage - end_fraction * damage
     width = damage / count
     weight = pressure * (abs(increment) / count * after.middle_length ** (-p))
     bonds[STRIP.age_measure, k] = age_measure

@@ -166,13 +166,13 @@ def _is_uniformly_weighted(bonds, i, k, path_state, law):
     depends_on_path = form == FORM_REPORT or (form == FORM_REPORT_GROWING and p < 1)
     if not depends_on_path or p == 0.0:
         return True
-    near = (path_state[PATH.path] - bonds[STRIP.path, k]) / law[LAW.length]
-    joint = (bonds[STRIP.covered, i] + bonds[STRIP.covered, k]) / law[LAW.length]
-    far = near + joint
+    path_to_end = (path_state[PATH.path] - bonds[STRIP.path, k]) / law[LAW.length]
+    joint_path = (bonds[STRIP.covered, i] + bonds[STRIP.covered, k]) / law[LAW.length]
+    path_to_start = path_to_end + joint_path
     part = law[LAW.inverse_gamma] * (
-        fast_exp((p + 1) * fast_log(far)) - fast_exp((p + 1) * fast_log(near))
+        fast_exp((p + 1) * fast_log(path_to_start)) - fast_exp((p + 1) * fast_log(path_to_end))
     )
-    return abs(p) * part * joint <= law[LAW.merge_width] * law[LAW.merge_width] * far
+    return abs(p) * part * joint_path <= law[LAW.merge_width] * law[LAW.merge_width] * path_to_start
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -185,8 +185,8 @@ def _have_similar_density(bonds, i, k, width, eps0):
     """
     left = bonds[STRIP.weight, i] * bonds[STRIP.covered, k]
     right = bonds[STRIP.weight, k] * bonds[STRIP.covered, i]
-    joint = bonds[STRIP.covered, i] + bonds[STRIP.covered, k]
-    return abs(left - right) * joint * eps0 <= width * width * (left + right)
+    joint_path = bonds[STRIP.covered, i] + bonds[STRIP.covered, k]
+    return abs(left - right) * joint_path * eps0 <= width * width * (left + right)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -217,11 +217,11 @@ def _have_same_range(bonds, i, k, path_state, law, status):
     width = max(high_i, high_k) - min(low_i, low_k)
     if mismatch <= MAX_RANGE_MISMATCH * width:
         return True
-    joint = bonds[STRIP.covered, i] + bonds[STRIP.covered, k]
+    joint_path = bonds[STRIP.covered, i] + bonds[STRIP.covered, k]
     merge_width = law[LAW.merge_width]
     age = (path_state[PATH.path] - bonds[STRIP.path, k]) / law[LAW.length]
     cubic = merge_width * merge_width * merge_width * law[LAW.length] * exp(min(age, MAX_AGE))
-    if joint * mismatch <= cubic * width:
+    if joint_path * mismatch <= cubic * width:
         status[STATUS.n_unlike] += 1
         return True
     return False
@@ -235,10 +235,12 @@ def _join_moments(bonds, i, k):
     total = weight_i + weight_k
     if total > 0:
         gap = bonds[MOMENT.centre, k] - bonds[MOMENT.centre, i]
-        within = (
+        variance_within = (
             weight_i * bonds[MOMENT.variance, i] + weight_k * bonds[MOMENT.variance, k]
         ) / total
-        bonds[MOMENT.variance, i] = within + weight_i * weight_k * gap * gap / (total * total)
+        bonds[MOMENT.variance, i] = variance_within + weight_i * weight_k * gap * gap / (
+            total * total
+        )
         bonds[MOMENT.centre, i] += weight_k / total * gap
     bonds[MOMENT.weight, i] = total
     _extend_strip(bonds, i, k)

@@ -74,7 +74,7 @@ def sum_moments(displacement, scale, bonds, strips):
     Parameters
     ----------
     displacement : float
-        Relative displacement [m] now.
+        Present relative displacement [m].
     scale : float
         exp(reference - damage), which undoes the scale of the weights.
     bonds : (N_ROWS, capacity) array
@@ -160,13 +160,15 @@ def _integrate_power_strip(displacement, bonds, k, p, nodes, is_force):
     slope = bonds[STRIP.age_width, k] / step
     low = min(start, end)
     high = max(start, end)
-    below = _integrate_jacobi(displacement - low, -slope, nodes, p)
-    below -= _integrate_jacobi(displacement - high, -slope, nodes, p)
-    above = _integrate_jacobi(high - displacement, slope, nodes, p)
-    above -= _integrate_jacobi(low - displacement, slope, nodes, p)
+    integral_below = _integrate_jacobi(displacement - low, -slope, nodes, p)
+    integral_below -= _integrate_jacobi(displacement - high, -slope, nodes, p)
+    integral_above = _integrate_jacobi(high - displacement, slope, nodes, p)
+    integral_above -= _integrate_jacobi(low - displacement, slope, nodes, p)
     density = 2 * bonds[POWER_ROW.weight_1, k] / abs(step)
     density *= exp(slope * (displacement - end + GAUSS_POINT_1 * step))
-    return density * (below - above if is_force else below + above)
+    return density * (
+        integral_below - integral_above if is_force else integral_below + integral_above
+    )
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -176,7 +178,7 @@ def average_spread(displacement, low, high, p):
     Parameters
     ----------
     displacement, low, high : float
-        Relative displacement now, ends of the range [m], low < high.
+        Present relative displacement and ends of the range [m], low < high.
     p : float
         Exponent.
 
@@ -212,7 +214,7 @@ def sum_linear_density(displacement, start, end, weights, p):
     Parameters
     ----------
     displacement, start, end : float
-        Relative displacement now, ends of the strip [m].
+        Present relative displacement and ends of the strip [m].
     weights : (float, float)
         Weights at both Gauss points.
     p : float
@@ -247,7 +249,7 @@ def sum_powers(displacement, damage, bonds, strips, law):
     Parameters
     ----------
     displacement, damage : float
-        Relative displacement [m] and damage [1] now.
+        Present relative displacement [m] and damage [1].
     bonds, strips : array, Range
         Array of strips, and those that are summed.
     law : (24,) array
@@ -316,13 +318,13 @@ def _sum_report_closed(displacement, path, bonds, strips, law):
         end = bonds[STRIP.end, k]
         step = end - bonds[STRIP.start, k]
         direction = np.copysign(1.0, step)
-        near = path - bonds[STRIP.age_measure, k]
-        turn = min(max(direction * (end - displacement), 0.0), abs(step))
+        path_to_end = path - bonds[STRIP.age_measure, k]
+        zero_position = min(max(direction * (end - displacement), 0.0), abs(step))
         # The path in bond lengths since bonds formed is x at the end of the strip, y at u = 0 and z
         # at the start.
-        x = near / eps0
-        y = (near + turn) / eps0
-        z = (near + abs(step)) / eps0
+        x = path_to_end / eps0
+        y = (path_to_end + zero_position) / eps0
+        z = (path_to_end + abs(step)) / eps0
         exp_x = fast_exp(-x)
         exp_y = fast_exp(-y)
         exp_z = fast_exp(-z)
@@ -335,7 +337,7 @@ def _sum_report_closed(displacement, path, bonds, strips, law):
         density_y = exp_y * y * (phi_0 + y * (phi_1 + y * phi_2))
         density_z = exp_z * z * (phi_0 + z * (phi_1 + z * phi_2))
         lever = (p + 1) * signed + 2 * density_y - density_x - density_z
-        offset = direction * (displacement - end - direction * near)
+        offset = direction * (displacement - end - direction * path_to_end)
         force += pressure * (direction * signed)
         energy += pressure * (offset * signed + eps0 * lever)
     return BondSum(force, energy)
@@ -360,10 +362,10 @@ def _sum_report_table(displacement, path, bonds, strips, law, table):
         end = bonds[STRIP.end, k]
         step = end - bonds[STRIP.start, k]
         direction = np.copysign(1.0, step)
-        near = path - bonds[STRIP.age_measure, k]
-        turn = min(max(direction * (end - displacement), 0.0), abs(step))
-        x = near / eps0
-        z = (near + abs(step)) / eps0
+        path_to_end = path - bonds[STRIP.age_measure, k]
+        zero_position = min(max(direction * (end - displacement), 0.0), abs(step))
+        x = path_to_end / eps0
+        z = (path_to_end + abs(step)) / eps0
         if last < 0:
             last = interpolate_gammainc(p, x, table, inverse_gamma)
             last_lever = _integrate_lever(p, x, last, inverse_gamma)
@@ -371,16 +373,16 @@ def _sum_report_table(displacement, path, bonds, strips, law, table):
         lever_x = last_lever
         last = interpolate_gammainc(p, z, table, inverse_gamma)
         last_lever = _integrate_lever(p, z, last, inverse_gamma)
-        p_y = p_x if turn == 0 else last
-        lever_y = lever_x if turn == 0 else last_lever
-        if 0 < turn < abs(step):
-            y = (near + turn) / eps0
+        p_y = p_x if zero_position == 0 else last
+        lever_y = lever_x if zero_position == 0 else last_lever
+        if 0 < zero_position < abs(step):
+            y = (path_to_end + zero_position) / eps0
             p_y = interpolate_gammainc(p, y, table, inverse_gamma)
             lever_y = _integrate_lever(p, y, p_y, inverse_gamma)
         signed = last - 2 * p_y + p_x
         lever = last_lever - 2 * lever_y + lever_x
         pressure = bonds[REPORT_ROW.pressure, k]
-        offset = direction * (displacement - end - direction * near)
+        offset = direction * (displacement - end - direction * path_to_end)
         force += pressure * (direction * signed)
         energy += pressure * (offset * signed + eps0 * lever)
     return BondSum(force, energy)
@@ -395,7 +397,7 @@ def sum_report(displacement, path, bonds, strips, law, table):
     Parameters
     ----------
     displacement, path : float
-        Relative displacement and path [m] now.
+        Present relative displacement and path [m].
     bonds, strips : array, Range
         Array of strips, and those that are summed.
     law : (24,) array
@@ -418,15 +420,15 @@ def sum_report(displacement, path, bonds, strips, law, table):
     force = total.force
     energy = total.energy
     for k in range(strips.head, strips.first):
-        near = path - bonds[STRIP.age_measure, k]
+        path_to_end = path - bonds[STRIP.age_measure, k]
         average = average_spread(displacement, bonds[STRIP.start, k], bonds[STRIP.end, k], 0.0)
         older = interpolate_gammainc(
-            p, (near + bonds[STRIP.age_width, k]) / eps0, table, inverse_gamma
+            p, (path_to_end + bonds[STRIP.age_width, k]) / eps0, table, inverse_gamma
         )
-        younger = interpolate_gammainc(p, near / eps0, table, inverse_gamma)
-        carried = bonds[REPORT_ROW.pressure, k] * (older - younger)
-        force += average.force * carried
-        energy += average.energy * carried
+        younger = interpolate_gammainc(p, path_to_end / eps0, table, inverse_gamma)
+        full_force = bonds[REPORT_ROW.pressure, k] * (older - younger)
+        force += average.force * full_force
+        energy += average.energy * full_force
     return BondSum(force, energy)
 
 
@@ -444,13 +446,13 @@ def _integrate_lever(p, x, gamma_p, inverse_gamma):
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def _gauss_path_ratios(path, mature, bonds, k):
     """Return the path / bond length R/eps of growing bonds at both Gauss points of a strip."""
-    near = path - bonds[STRIP.age_measure, k]
+    path_to_end = path - bonds[STRIP.age_measure, k]
     width = bonds[STRIP.age_width, k]
     min_length = MIN_LENGTH_RATIO * mature.length
     length_1 = max(mature.length - mature.scale * bonds[GROWING_ROW.length_1, k], min_length)
     length_2 = max(mature.length - mature.scale * bonds[GROWING_ROW.length_2, k], min_length)
-    path_1 = max(near + GAUSS_POINT_1 * width, MIN_PATH)
-    path_2 = max(near + GAUSS_POINT_2 * width, MIN_PATH)
+    path_1 = max(path_to_end + GAUSS_POINT_1 * width, MIN_PATH)
+    path_2 = max(path_to_end + GAUSS_POINT_2 * width, MIN_PATH)
     return path_1 / length_1, path_2 / length_2
 
 
@@ -525,19 +527,19 @@ def _integrate_growing_strip(displacement, path, mature, bonds, k, p):
     end = bonds[STRIP.end, k]
     width = bonds[STRIP.age_width, k]
     step = end - start
-    near = max(path - bonds[STRIP.age_measure, k], 0.0)
+    path_to_end = max(path - bonds[STRIP.age_measure, k], 0.0)
     force = 0.0
     energy = 0.0
-    turn = min(max((end - displacement) / step, 0.0), 1.0)
+    zero_position = min(max((end - displacement) / step, 0.0), 1.0)
     is_steep = False
     if _is_steep(p):
         last = _bond_length(0.0, mature, bonds, k)
         first = _bond_length(1.0, mature, bonds, k)
         grew_at_rest = last > MIN_GROWING_RATIO * first
-        is_steep = grew_at_rest and near * first < 0.5 * (near + width) * last
+        is_steep = grew_at_rest and path_to_end * first < 0.5 * (path_to_end + width) * last
     for side in range(2):
-        low = 0.0 if side == 0 else turn
-        high = turn if side == 0 else 1.0
+        low = 0.0 if side == 0 else zero_position
+        high = zero_position if side == 0 else 1.0
         if high <= low:
             continue
         for point in range(2):
@@ -545,16 +547,18 @@ def _integrate_growing_strip(displacement, path, mature, bonds, k, p):
             fraction = low + gauss * (high - low)
             weight = 0.5 * (high - low) * width
             if is_steep:
-                power_low = (near + low * width) ** (p + 1)
-                power_high = (near + high * width) ** (p + 1)
+                power_low = (path_to_end + low * width) ** (p + 1)
+                power_high = (path_to_end + high * width) ** (p + 1)
                 position = (power_low + gauss * (power_high - power_low)) ** (1 / (p + 1))
-                fraction = (position - near) / width
+                fraction = (position - path_to_end) / width
                 weight = 0.5 * (power_high - power_low) / (p + 1) * position ** (-p)
-            x = max(near + fraction * width, MIN_PATH) / _bond_length(fraction, mature, bonds, k)
-            carried = weight * fast_exp(p * fast_log(x) - x)
+            x = max(path_to_end + fraction * width, MIN_PATH) / _bond_length(
+                fraction, mature, bonds, k
+            )
+            point_force = weight * fast_exp(p * fast_log(x) - x)
             u = displacement - end + fraction * step
-            force += np.copysign(carried, u)
-            energy += carried * abs(u)
+            force += np.copysign(point_force, u)
+            energy += point_force * abs(u)
     density = bonds[STRIP.weight, k] / width
     return BondSum(density * force, density * energy)
 
@@ -568,8 +572,8 @@ def _spread_growing_strip(displacement, path, mature, bonds, k, p):
     # At a position outside the strip all bonds pull in one direction, so their sum there is the
     # force that they can carry.
     beyond = high + bonds[STRIP.age_width, k]
-    carried = _sum_gauss_growing(beyond, path, mature, bonds, StripRange(k, k, k + 1), p).force
-    return BondSum(average.force * carried, average.energy * carried)
+    full_force = _sum_gauss_growing(beyond, path, mature, bonds, StripRange(k, k, k + 1), p).force
+    return BondSum(average.force * full_force, average.energy * full_force)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -579,7 +583,7 @@ def sum_growing(displacement, path, mature, bonds, strips, law):
     Parameters
     ----------
     displacement, path : float
-        Relative displacement and path [m] now.
+        Present relative displacement and path [m].
     mature : MatureBonds
         Length of mature bonds, and factor that undoes the scale of the starting lengths.
     bonds, strips : array, Range
@@ -600,15 +604,15 @@ def sum_growing(displacement, path, mature, bonds, strips, law):
     for k in range(strips.first, strips.end):
         from_start = displacement - bonds[STRIP.start, k]
         from_end = displacement - bonds[STRIP.end, k]
-        near = path - bonds[STRIP.age_measure, k]
+        path_to_end = path - bonds[STRIP.age_measure, k]
         width = bonds[STRIP.age_width, k]
-        is_young = _is_steep(p) and near <= 3 * width
+        is_young = _is_steep(p) and path_to_end <= 3 * width
         if from_start * from_end >= 0 and not is_young:
             continue
         strip = StripRange(k, k, k + 1)
         gauss = _sum_gauss_growing(displacement, path, mature, bonds, strip, p)
-        is_narrow = width <= merge_width * fast_exp(near / (3 * mature.length))
-        if not is_young and is_narrow and near > mature.length:
+        is_narrow = width <= merge_width * fast_exp(path_to_end / (3 * mature.length))
+        if not is_young and is_narrow and path_to_end > mature.length:
             exact = _spread_growing_strip(displacement, path, mature, bonds, k, p)
         else:
             exact = _integrate_growing_strip(displacement, path, mature, bonds, k, p)
@@ -616,11 +620,11 @@ def sum_growing(displacement, path, mature, bonds, strips, law):
         energy += exact.energy - gauss.energy
     for k in range(strips.head, strips.first):
         x_1, x_2 = _gauss_path_ratios(path, mature, bonds, k)
-        carried = fast_exp(p * fast_log(x_1) - x_1) + fast_exp(p * fast_log(x_2) - x_2)
-        carried *= 0.5 * bonds[STRIP.weight, k]
+        full_force = fast_exp(p * fast_log(x_1) - x_1) + fast_exp(p * fast_log(x_2) - x_2)
+        full_force *= 0.5 * bonds[STRIP.weight, k]
         average = average_spread(displacement, bonds[STRIP.start, k], bonds[STRIP.end, k], 0.0)
-        force += average.force * carried
-        energy += average.energy * carried
+        force += average.force * full_force
+        energy += average.energy * full_force
     return BondSum(force, energy)
 
 
@@ -634,7 +638,7 @@ def sum_initial(displacement, path, damage, law):
     Parameters
     ----------
     displacement, path, damage : float
-        Relative displacement [m], path [m] and damage [1] now.
+        Present relative displacement [m], path [m] and damage [1].
     law : (24,) array
         Numbers of `LAW`.
 
@@ -695,15 +699,17 @@ def average_initial(increment, displacement, path, law):
     direction = np.copysign(1.0, increment)
     # These are the lengths of the increment before it enters and before it leaves the range of the
     # bonds.
-    enter = min(max(-direction * displacement - half_width, 0.0), size)
-    leave = min(max(-direction * displacement + half_width, 0.0), size)
+    path_to_entry = min(max(-direction * displacement - half_width, 0.0), size)
+    path_to_exit = min(max(-direction * displacement + half_width, 0.0), size)
     p_start = bond_gammainc(p, path / eps0)
-    p_enter = bond_gammainc(p, (path + enter) / eps0)
-    p_leave = bond_gammainc(p, (path + leave) / eps0)
-    total = bond_gammainc(p, (path + size) / eps0) - p_leave - (p_enter - p_start)
-    if leave > enter:
-        middle = 0.5 * (direction * displacement + enter + (direction * displacement + leave))
-        total += (p_leave - p_enter) * middle / half_width
+    p_entry = bond_gammainc(p, (path + path_to_entry) / eps0)
+    p_exit = bond_gammainc(p, (path + path_to_exit) / eps0)
+    total = bond_gammainc(p, (path + size) / eps0) - p_exit - (p_entry - p_start)
+    if path_to_exit > path_to_entry:
+        middle = 0.5 * (
+            direction * displacement + path_to_entry + (direction * displacement + path_to_exit)
+        )
+        total += (p_exit - p_entry) * middle / half_width
     return direction * law[LAW.initial] * total * eps0 / size
 
 

@@ -118,11 +118,11 @@ def split_elastic(law: Bonds, play, increment, eps) -> ElasticSplit:
     return ElasticSplit(elastic, increment - elastic, after)
 
 
-def _integrate_slowness(speed: float, floor: float) -> float:
-    """Return the integral of 1/max(|v|, floor) over v from 0 to the speed."""
-    if abs(speed) < floor:
-        return speed / floor
-    return np.sign(speed) * (1 + log(abs(speed) / floor))
+def _integrate_slowness(speed: float, min_speed: float) -> float:
+    """Return the integral of 1/max(|v|, min_speed) over v from 0 to the speed."""
+    if abs(speed) < min_speed:
+        return speed / min_speed
+    return np.sign(speed) * (1 + log(abs(speed) / min_speed))
 
 
 def growth_exponents(law: Bonds, v0: float, v1: float, increment: float, dt: float) -> tuple:
@@ -141,14 +141,14 @@ def growth_exponents(law: Bonds, v0: float, v1: float, increment: float, dt: flo
     healing, weakening : float
         Exponents of eq. 2.10.
     """
-    floor = law.rest_speed
-    if max(abs(v0), abs(v1)) < floor:
-        healing = law.rest_growth * dt / floor
+    min_speed = law.rest_speed
+    if max(abs(v0), abs(v1)) < min_speed:
+        healing = law.rest_growth * dt / min_speed
     elif abs(v1 - v0) > SAME_SPEED_TOL * (abs(v0) + abs(v1)):
-        slowness = _integrate_slowness(v1, floor) - _integrate_slowness(v0, floor)
+        slowness = _integrate_slowness(v1, min_speed) - _integrate_slowness(v0, min_speed)
         healing = law.rest_growth * dt * slowness / (v1 - v0)
     else:
-        healing = law.rest_growth * dt / max(abs(v0 + v1) / 2, floor)
+        healing = law.rest_growth * dt / max(abs(v0 + v1) / 2, min_speed)
     weakening = abs(increment) / law.slip_growth
     return np.minimum(healing, MAX_EXPONENT), np.minimum(weakening, MAX_EXPONENT)
 

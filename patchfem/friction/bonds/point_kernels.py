@@ -138,9 +138,11 @@ def _mean_stretch(m, z, increment, sigma, eps, shapes):
     f1, f2 = shapes
     direction = 1.0 if increment > 0 else -1.0
     x = abs(increment) / eps
-    missing = sigma - m
-    mean = z * f1 + direction * eps * x * (sigma * f2 - missing * (f1 - f2))
-    slope = direction * z * (f2 - f1) / eps + sigma * (f1 - f2) - missing * (f2 - x * (f1 - f2))
+    density_deficit = sigma - m
+    mean = z * f1 + direction * eps * x * (sigma * f2 - density_deficit * (f1 - f2))
+    slope = (
+        direction * z * (f2 - f1) / eps + sigma * (f1 - f2) - density_deficit * (f2 - x * (f1 - f2))
+    )
     return mean, slope
 
 
@@ -191,13 +193,13 @@ def _step_bonds(bonds, increment, sigma, eps, shapes, powers):
     direction = 1.0 if increment > 0 else -1.0
     x = path / eps
     zeroth = x * f1
-    missing = sigma - m
+    density_deficit = sigma - m
     square = eps * eps
     stretched = s2 + 2 * direction * z * path + m * path * path
     damage = s2 * zeroth + 2 * direction * z * eps * first
     return BondStep(
-        sigma - missing * decay,
-        z * decay + direction * eps * (sigma * zeroth - missing * x * decay),
+        sigma - density_deficit * decay,
+        z * decay + direction * eps * (sigma * zeroth - density_deficit * x * decay),
         decay * stretched + sigma * square * second,
         damage + m * square * second + sigma * square * second_integral,
     )
@@ -331,10 +333,10 @@ def bond_end_stretch(m, z, increment, sigma, eps):
     direction = 1.0 if increment > 0 else -1.0
     x = abs(increment) / eps
     shapes = shape_functions(x)
-    missing = sigma - m
-    fresh = direction * eps * (sigma * x * shapes.f1 - missing * x * shapes.decay)
+    density_deficit = sigma - m
+    fresh = direction * eps * (sigma * x * shapes.f1 - density_deficit * x * shapes.decay)
     end = z * shapes.decay + fresh
-    return end, sigma - missing * shapes.decay - direction * end / eps
+    return end, sigma - density_deficit * shapes.decay - direction * end / eps
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -358,8 +360,8 @@ def press_point(bonds, s0, s1, initial, length):
     if s1 >= s0:
         return m + initial * (s1 - s0), z, s2
     remaining = m * s1 / s0
-    needed = z * z / s2 if s2 > 0 else 0.0
-    factor = remaining / needed if needed > remaining else 1.0
+    min_density = z * z / s2 if s2 > 0 else 0.0
+    factor = remaining / min_density if min_density > remaining else 1.0
     bound = length * s1
     if factor * abs(z) > bound:
         factor = bound / abs(z)

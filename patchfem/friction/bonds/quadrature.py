@@ -146,22 +146,24 @@ class Quadrature:
         dq = np.atleast_1d(np.asarray(dq, float))
         after = self.advance(state, dq, s0, s1, dt)
         stored = self.stored_energy(state)
-        gain = self.stored_energy(after) - stored
+        energy_gain = self.stored_energy(after) - stored
         if not dq.any():
-            return Step(self.traction(after), -gain, after)
+            return Step(self.traction(after), -energy_gain, after)
         if self._has_moments:
             mean = self._mean_from_moments(state, dq, (s0 + s1) / 2, dt)
         elif self.law.reading == "report":
             mean = self._integrate_step(state, dq, s0, s1, dt).mean
         else:
-            gain_before_loss = gain
+            gain_before_loss = energy_gain
             if not (s1 > 0).all():
                 # Bonds that are lost at the end of the step still act during the step.
-                positive = np.maximum(s1, np.finfo(float).tiny)
-                before_loss = self.advance(state, dq, s0, positive, dt, forming=(s0 + s1) / 2)
+                positive_pressure = np.maximum(s1, np.finfo(float).tiny)
+                before_loss = self.advance(
+                    state, dq, s0, positive_pressure, dt, forming=(s0 + s1) / 2
+                )
                 gain_before_loss = self.stored_energy(before_loss) - stored
             mean = self._mean_from_energy(state, gain_before_loss, dq, s0, s1, dt)
-        return Step(_drop_single_axis(mean), dq @ mean - gain, after)
+        return Step(_drop_single_axis(mean), dq @ mean - energy_gain, after)
 
     def _mean_from_moments(self, state: Strips, dq, sigma, dt: float) -> np.ndarray:
         """Return the mean traction (d, m) [Pa] by the closed form of `recursion`."""
@@ -171,11 +173,11 @@ class Quadrature:
         mean = move_bonds(self.law, bonds, increment, sigma, middle).mean
         return self.law.static / self.law.length * np.reshape(mean, (len(dq), -1))
 
-    def _mean_from_energy(self, state: Strips, gain, dq, s0, s1, dt: float) -> np.ndarray:
+    def _mean_from_energy(self, state: Strips, energy_gain, dq, s0, s1, dt: float) -> np.ndarray:
         """Return the mean traction (d, m) [Pa] of an increment from its energy balance."""
         mean, dissipated = self._integrate_step(state, dq, s0, s1, dt)
         path, direction = length_and_direction(dq)
-        along = (dissipated + gain) / path
+        along = (dissipated + energy_gain) / path
         if len(dq) == 1:
             return direction[:, None] * along
         return mean + direction[:, None] * (along - direction @ mean)
@@ -203,7 +205,7 @@ class Quadrature:
                 (low + high + (high - low) * points) / 2, (high - low) / 2 * weights
             ):
                 fraction = elastic + (1 - elastic) * point / damage
-                here = self.advance(
+                point_state = self.advance(
                     state,
                     fraction * dq,
                     s0,
@@ -211,7 +213,7 @@ class Quadrature:
                     fraction * dt,
                     forming=(s0 + s1) / 2,
                 )
-                sums = self.law.static * self._sums(here)
+                sums = self.law.static * self._sums(point_state)
                 mean = mean + weight / damage * sums[:-1]
                 dissipated = dissipated + weight * sums[-1]
         return _StepIntegrals(mean, dissipated)
@@ -237,10 +239,12 @@ class Quadrature:
         after = replace(state, first_active=first_active)
         if self.law.reading == "stretch":
             release = self._release_by_moments if self._has_moments else self._release_last_formed
-            kept, formed = release(after, s0, s1)
+            kept_fraction, formed_pressure = release(after, s0, s1)
             now = state.now
             cohort = Strip(now, np.zeros_like(now.displacement), 0.0, now.mature_length, 0.0, 0.0)
-            pressure = np.vstack([state.pressure * kept, np.where(s1 > 0, formed, 0.0)])
+            pressure = np.vstack(
+                [state.pressure * kept_fraction, np.where(s1 > 0, formed_pressure, 0.0)]
+            )
             after = replace(after, strips=state.strips.append(cohort), pressure=pressure)
         return Step(
             self.traction(after), self.stored_energy(state) - self.stored_energy(after), after
@@ -254,8 +258,8 @@ class Quadrature:
         before = self._moments(state)
         m, _, s2 = before
         density, _, s2_after = press_bonds(self.law, before, s0, s1)
-        kept = np.divide(s2_after, s2, out=np.ones_like(s2), where=s2 > 0)
-        return _Release(kept, density - kept * m)
+        kept_fraction = np.divide(s2_after, s2, out=np.ones_like(s2), where=s2 > 0)
+        return _Release(kept_fraction, density - kept_fraction * m)
 
     def _release_last_formed(self, state: Strips, s0, s1) -> _Release:
         """Return the change of the bonds at rest; where the pressure falls, the last-formed bonds are lost first.
@@ -269,13 +273,19 @@ class Quadrature:
         excess = np.where(is_falling & (s0 > 0), total * lost_fraction, 0.0)
         younger = np.cumsum(density[::-1], axis=0)[::-1] - density
         released = np.clip(excess - younger, 0.0, density)
-        kept = 1 - np.divide(released, density, out=np.zeros_like(density), where=density > 0)
-        carried = np.abs(self.weights(state)[:, 0] @ (_active_pressure(state) * kept))
-        is_over_limit = is_falling & (carried > s1)
-        factor = np.where(is_over_limit, s1 / np.where(carried > 0, carried, 1.0), 1.0)
-        re_formed = (1 - factor) * (density * kept).sum(axis=0)
+        kept_fraction = 1 - np.divide(
+            released, density, out=np.zeros_like(density), where=density > 0
+        )
+        carried_pressure = np.abs(
+            self.weights(state)[:, 0] @ (_active_pressure(state) * kept_fraction)
+        )
+        is_over_limit = is_falling & (carried_pressure > s1)
+        factor = np.where(
+            is_over_limit, s1 / np.where(carried_pressure > 0, carried_pressure, 1.0), 1.0
+        )
+        re_formed = (1 - factor) * (density * kept_fraction).sum(axis=0)
         newly_formed = self.law.initial * np.maximum(s1 - s0, 0.0)
-        return _Release(kept * factor, np.where(is_falling, re_formed, newly_formed))
+        return _Release(kept_fraction * factor, np.where(is_falling, re_formed, newly_formed))
 
     @property
     def _has_moments(self) -> bool:
@@ -325,8 +335,8 @@ class Quadrature:
         after = replace(state, now=end, play=part.play, first_active=first_active)
         if part.length == 0:
             return after
-        gain = end.mature_length - now.mature_length
-        strip = Strip(end, part.direction, part.length, middle, growth, gain)
+        length_gain = end.mature_length - now.mature_length
+        strip = Strip(end, part.direction, part.length, middle, growth, length_gain)
         sigma = (s0 + s1) / 2 if forming is None else forming
         strips = state.strips.append(strip)
         pressure = np.vstack([state.pressure, sigma])

@@ -152,17 +152,17 @@ def advance_bonds(bonds, increment, sigma, eps) -> LineIncrement:
     x = path / eps
     f1, f2, decay = shape_functions(x)
     zeroth = x * f1
-    missing = sigma - m
+    density_deficit = sigma - m
     with np.errstate(over="ignore", invalid="ignore"):
         powers = integrate_powers(x, decay)
-    mean = z * f1 + sign * eps * x * (sigma * f2 - missing * (f1 - f2))
-    slope = sign * z * (f2 - f1) / eps + sigma * (f1 - f2) - missing * (f2 - x * (f1 - f2))
+    mean = z * f1 + sign * eps * x * (sigma * f2 - density_deficit * (f1 - f2))
+    slope = sign * z * (f2 - f1) / eps + sigma * (f1 - f2) - density_deficit * (f2 - x * (f1 - f2))
     # Without motion, the slope is the mean of those for both directions.
     slope = np.where(path > 0, slope, m / 2)
     after = np.stack(
         [
-            sigma - missing * decay,
-            z * decay + sign * eps * (sigma * zeroth - missing * x * decay),
+            sigma - density_deficit * decay,
+            z * decay + sign * eps * (sigma * zeroth - density_deficit * x * decay),
             decay * (s2 + 2 * sign * z * path + m * path**2) + sigma * eps**2 * powers.second,
         ]
     )
@@ -204,21 +204,21 @@ def move_bonds(law: Bonds, state: BondState, increment, sigma, eps) -> BondIncre
     if len(bonds) == 3:
         elastic, damaging, play = split_elastic(law, state.play, increment, eps)
         stretched = stretch_bonds(bonds, elastic)
-        moved = advance_bonds(stretched, damaging, sigma, eps)
-        mean = moved.mean
+        line_increment = advance_bonds(stretched, damaging, sigma, eps)
+        mean = line_increment.mean
         if np.any(elastic):
             elastic_mean = (bonds[1] + stretched[1]) / 2
             mean = elastic / increment * elastic_mean + damaging / increment * mean
-        return BondIncrement(moved.bonds, mean, moved.damage_integral, play)
+        return BondIncrement(line_increment.bonds, mean, line_increment.damage_integral, play)
     path, unit = length_and_direction(increment)
     along = unit @ bonds[1:3]
     across = bonds[1:3] - unit[:, None] * along
     f1, _, decay = shape_functions(path / eps)
-    moved = advance_bonds(np.stack([bonds[0], along, bonds[3]]), path, sigma, eps)
-    z = unit[:, None] * moved.bonds[1] + across * decay
-    after = np.stack([moved.bonds[0], *z, moved.bonds[2]])
-    mean = unit[:, None] * moved.mean + across * f1
-    return BondIncrement(after, mean, moved.damage_integral, state.play)
+    line_increment = advance_bonds(np.stack([bonds[0], along, bonds[3]]), path, sigma, eps)
+    z = unit[:, None] * line_increment.bonds[1] + across * decay
+    after = np.stack([line_increment.bonds[0], *z, line_increment.bonds[2]])
+    mean = unit[:, None] * line_increment.mean + across * f1
+    return BondIncrement(after, mean, line_increment.damage_integral, state.play)
 
 
 def press_bonds(law: Bonds, bonds, s0, s1):
@@ -239,15 +239,17 @@ def press_bonds(law: Bonds, bonds, s0, s1):
     (3, m) array
     """
     m, z, s2 = bonds
-    falls = s1 < s0
+    is_falling = s1 < s0
     remaining = np.divide(m * s1, s0, out=np.zeros_like(m), where=s0 > 0)
-    density = np.where(falls, remaining, m + law.initial * (s1 - s0))
-    needed = np.divide(z * z, s2, out=np.zeros_like(m), where=s2 > 0)
-    must_shrink = falls & (needed > remaining)
-    factor = np.where(must_shrink, remaining / np.maximum(needed, MIN_DIVISOR), 1.0)
+    density = np.where(is_falling, remaining, m + law.initial * (s1 - s0))
+    min_density = np.divide(z * z, s2, out=np.zeros_like(m), where=s2 > 0)
+    must_shrink = is_falling & (min_density > remaining)
+    factor = np.where(must_shrink, remaining / np.maximum(min_density, MIN_DIVISOR), 1.0)
     bound = law.length * s1
     stretched = factor * np.abs(z)
-    factor *= np.where(falls & (stretched > bound), bound / np.maximum(stretched, MIN_DIVISOR), 1.0)
+    factor *= np.where(
+        is_falling & (stretched > bound), bound / np.maximum(stretched, MIN_DIVISOR), 1.0
+    )
     return np.stack([density, z * factor, s2 * factor])
 
 
@@ -302,16 +304,18 @@ class FirstOrderBonds:
         path = length_and_direction(np.atleast_1d(dq))[0]
         speed = path / dt if dt > 0 else 0.0
         middle = grow(law, state.eps, speed, speed, path / 2, dt / 2)
-        moved = move_bonds(law, state, dq, (s0 + s1) / 2, middle)
-        bonds = moved.bonds
+        bond_increment = move_bonds(law, state, dq, (s0 + s1) / 2, middle)
+        bonds = bond_increment.bonds
         scale = law.static / law.length
-        dissipated = scale * moved.damage_integral / 2
+        dissipated = scale * bond_increment.damage_integral / 2
         is_lost = (s1 <= 0) & (np.abs(bonds).sum(axis=0) > 0)
         if is_lost.any():
             dissipated = dissipated + np.where(is_lost, scale * bonds[-1] / 2, 0.0)
             bonds = np.where(is_lost, 0.0, bonds)
         end = grow(law, state.eps, speed, speed, path, dt)
-        return Step(scale * moved.mean, dissipated, BondState(bonds, end, moved.play))
+        return Step(
+            scale * bond_increment.mean, dissipated, BondState(bonds, end, bond_increment.play)
+        )
 
     def press(self, state: BondState, s0, s1) -> Step:
         """Change the pressure on resting bonds linearly, by the rule of `press_bonds`.

@@ -174,8 +174,8 @@ def surviving_density(state: Strips) -> np.ndarray:
     """
     strips = state.strips
     remaining = np.exp(-(state.now.damage - strips.end.damage))
-    formed = -np.expm1(-strips.length / strips.bond_length)
-    return np.where(strips.length == 0, remaining, remaining * formed)
+    formed_fraction = -np.expm1(-strips.length / strips.bond_length)
+    return np.where(strips.length == 0, remaining, remaining * formed_fraction)
 
 
 def strip_weights(state: Strips, law: Bonds) -> np.ndarray:
@@ -216,9 +216,9 @@ def _vector_norms(vectors) -> np.ndarray:
     return np.sqrt((vectors * vectors).sum(axis=-1))
 
 
-def _resolve_stretch(strips: Strip, now: PathState) -> _StretchComponents:
+def _resolve_stretch(strips: Strip, path_state: PathState) -> _StretchComponents:
     """Resolve the stretch of bonds at the end of strips into the components along and across them."""
-    stretch = now.displacement - strips.end.displacement
+    stretch = path_state.displacement - strips.end.displacement
     along = (stretch * strips.direction).sum(axis=1)
     return _StretchComponents(along, _vector_norms(stretch - strips.direction * along[:, None]))
 
@@ -234,13 +234,13 @@ def _work_to_energy_ratio(law: Bonds) -> float:
     return law.order + 1 if law.reading == "stretch" else 1.0
 
 
-def _cohort_weights(cohorts: Strip, now: PathState, law: Bonds) -> np.ndarray:
+def _cohort_weights(cohorts: Strip, path_state: PathState, law: Bonds) -> np.ndarray:
     """Return force and energy of cohorts: (|u|/eps_0)^p exp(-D) or phi(R/eps_0), along u."""
-    stretch = now.displacement - cohorts.end.displacement
+    stretch = path_state.displacement - cohorts.end.displacement
     size = _vector_norms(stretch)
-    path = now.path - cohorts.end.path
+    path = path_state.path - cohorts.end.path
     if law.reading == "stretch":
-        force = _weight_function(law, size / law.length, now.damage - cohorts.end.damage)
+        force = _weight_function(law, size / law.length, path_state.damage - cohorts.end.damage)
     else:
         force = _weight_function(law, path / law.length, path / law.length)
     # The force jumps where the stretch changes sign; the mean of both sides is 0.
@@ -249,9 +249,9 @@ def _cohort_weights(cohorts: Strip, now: PathState, law: Bonds) -> np.ndarray:
     return np.column_stack([force[:, None] * unit, force * size / _work_to_energy_ratio(law)])
 
 
-def _linear_weights(strips: Strip, now: PathState, law: Bonds) -> np.ndarray:
+def _linear_weights(strips: Strip, path_state: PathState, law: Bonds) -> np.ndarray:
     """Integrate u and |u|^2/2 over strips in closed form, for friction.reading = "stretch" and p = 1."""
-    stretch = now.displacement - strips.end.displacement
+    stretch = path_state.displacement - strips.end.displacement
     eps = strips.bond_length
     x = strips.length / eps
     decay = np.exp(-x)
@@ -259,7 +259,7 @@ def _linear_weights(strips: Strip, now: PathState, law: Bonds) -> np.ndarray:
     zeroth = -np.expm1(-x)
     first = 1 - decay * (1 + x)
     second = 2 - decay * (x * x + 2 * x + 2)
-    remaining = np.exp(-(now.damage - strips.end.damage))
+    remaining = np.exp(-(path_state.damage - strips.end.damage))
     along = (stretch * strips.direction).sum(axis=1)
     square = (stretch * stretch).sum(axis=1)
     force = stretch * zeroth[:, None] + strips.direction * (eps * first)[:, None]
@@ -269,14 +269,14 @@ def _linear_weights(strips: Strip, now: PathState, law: Bonds) -> np.ndarray:
     )
 
 
-def _report_weights(strips: Strip, now: PathState, law: Bonds) -> np.ndarray:
+def _report_weights(strips: Strip, path_state: PathState, law: Bonds) -> np.ndarray:
     """Integrate strips for friction.reading = "report" at a constant bond length in closed form.
 
     The stretch is along the strips. The integrals are differences of P(p + 1, R/eps) and P(p + 2, R/eps), the
     regularised lower incomplete gamma function, on both sides of u = 0.
     """
-    along = _resolve_stretch(strips, now).along
-    path = now.path - strips.end.path
+    along = _resolve_stretch(strips, path_state).along
+    path = path_state.path - strips.end.path
     cut = np.clip(-along, 0.0, strips.length)
     borders = [np.maximum(path + y, 0) / law.length for y in (0.0, cut, strips.length)]
     p_end, p_cut, p_start = (gammainc(law.order + 1, x) for x in borders)
@@ -289,34 +289,36 @@ def _report_weights(strips: Strip, now: PathState, law: Bonds) -> np.ndarray:
     return np.column_stack([strips.direction * signed[:, None], energy])
 
 
-def _gauss_weights(strips: Strip, now: PathState, law: Bonds) -> np.ndarray:
+def _gauss_weights(strips: Strip, path_state: PathState, law: Bonds) -> np.ndarray:
     """Integrate strips by Gauss points on the pieces of `_divide_strips`."""
-    pieces = _divide_strips(strips, now, law)
+    pieces = _divide_strips(strips, path_state, law)
     n_strips = len(strips.length)
     rule = _rules_of_pieces(pieces.steep_end, law.order)
     start = pieces.start[:, None]
     length = pieces.length[:, None]
     distance = start + length * rule.points
-    sums = _sum_points(strips.select(pieces.strip), now, distance, length * rule.weights, law)
+    sums = _sum_points(
+        strips.select(pieces.strip), path_state, distance, length * rule.weights, law
+    )
     weights = [np.bincount(pieces.strip, column, n_strips) for column in sums.T]
     return np.stack(weights, axis=1)
 
 
-def _sum_points(strips: Strip, now: PathState, distance, weight, law: Bonds) -> np.ndarray:
+def _sum_points(strips: Strip, path_state: PathState, distance, weight, law: Bonds) -> np.ndarray:
     """Sum force and energy over the weighted points of each strip.
 
     distance: distance (n, points) [m] of the points from the end of their strip; weight (n, points) [m].
     """
-    at_end = (now.displacement - strips.end.displacement)[:, None]
+    at_end = (path_state.displacement - strips.end.displacement)[:, None]
     stretch = at_end + distance[..., None] * strips.direction[:, None]
     size = _vector_norms(stretch)
     if law.reading == "stretch":
         eps = strips.bond_length[:, None]
         x = size / eps
-        damage = now.damage - strips.end.damage[:, None] + distance / eps
+        damage = path_state.damage - strips.end.damage[:, None] + distance / eps
     else:
-        path = now.path - strips.end.path[:, None] + distance
-        x = path / _bond_lengths(strips, now, distance, law)
+        path = path_state.path - strips.end.path[:, None] + distance
+        x = path / _bond_lengths(strips, path_state, distance, law)
         damage = x
     with np.errstate(under="ignore"):
         force = weight / law.length * _weight_function(law, x, damage)
@@ -325,25 +327,25 @@ def _sum_points(strips: Strip, now: PathState, distance, weight, law: Bonds) -> 
     return np.column_stack([(unit * force[..., None]).sum(axis=1), energy])
 
 
-def _bond_lengths(strips: Strip, now: PathState, distance, law: Bonds):
+def _bond_lengths(strips: Strip, path_state: PathState, distance, law: Bonds):
     """Return the bond lengths (n, points) [m] for friction.reading = "report", which grow from zero (eq. 2.10)."""
     if not law.has_growth:
         return law.length
     fraction = distance / strips.length[:, None]
     growth = strips.growth[:, None]
-    age = now.growth - strips.end.growth[:, None] + fraction * growth
-    missing = (1 - grown_fraction(growth, fraction)) * strips.mature_gain[:, None]
-    mature_at_start = strips.end.mature_length[:, None] - missing
-    return np.maximum(now.mature_length - mature_at_start * np.exp(-age), MIN_POSITIVE)
+    age = path_state.growth - strips.end.growth[:, None] + fraction * growth
+    later_growth = (1 - grown_fraction(growth, fraction)) * strips.mature_gain[:, None]
+    mature_at_start = strips.end.mature_length[:, None] - later_growth
+    return np.maximum(path_state.mature_length - mature_at_start * np.exp(-age), MIN_POSITIVE)
 
 
-def _divide_strips(strips: Strip, now: PathState, law: Bonds) -> _IntegrationPieces:
+def _divide_strips(strips: Strip, path_state: PathState, law: Bonds) -> _IntegrationPieces:
     """Divide strips into pieces on which a Gauss rule is accurate, by the rules of the module."""
-    stretch = _resolve_stretch(strips, now)
+    stretch = _resolve_stretch(strips, path_state)
     parts = _split_at_zero_stretch(strips, stretch)
-    distances = _singularity_distances(strips, now, law, stretch, parts)
+    distances = _singularity_distances(strips, path_state, law, stretch, parts)
     eps = strips.bond_length[parts.strip]
-    growth = _active_growth(strips, now, law, parts)
+    growth = _active_growth(strips, path_state, law, parts)
     # For reading="report" the integrand only changes sign at u = 0.
     is_steep = law.reading == "stretch"
     starts_steep = parts.is_zero_at_start & is_steep
@@ -407,17 +409,23 @@ def _split_at_zero_stretch(strips: Strip, stretch: _StretchComponents) -> _Strip
     )
 
 
-def _active_growth(strips: Strip, now: PathState, law: Bonds, parts: _StripParts) -> np.ndarray:
+def _active_growth(
+    strips: Strip, path_state: PathState, law: Bonds, parts: _StripParts
+) -> np.ndarray:
     """Return the growth J (n,) over parts, excluding that of fully grown bonds."""
     if law.reading != "report":
         return np.zeros(parts.strip.size)
-    remaining = FULL_GROWTH - (now.growth - strips.end.growth[parts.strip])
+    remaining = FULL_GROWTH - (path_state.growth - strips.end.growth[parts.strip])
     growth = strips.growth[parts.strip] * parts.length / strips.length[parts.strip]
     return np.minimum(growth, np.maximum(remaining, 0.0))
 
 
 def _singularity_distances(
-    strips: Strip, now: PathState, law: Bonds, stretch: _StretchComponents, parts: _StripParts
+    strips: Strip,
+    path_state: PathState,
+    law: Bonds,
+    stretch: _StretchComponents,
+    parts: _StripParts,
 ) -> _SingularityDistances:
     """Return the distances of parts from points where the integrand is not smooth.
 
@@ -432,7 +440,7 @@ def _singularity_distances(
     nearest = np.where(is_smooth, np.inf, np.hypot(across, gap))
     origin = np.full(parts.strip.size, np.inf)
     if law.reading == "report" and is_fractional:
-        origin = now.path - strips.end.path[parts.strip]
+        origin = path_state.path - strips.end.path[parts.strip]
     return _SingularityDistances(np.minimum(nearest, origin + parts.start), origin)
 
 

@@ -59,9 +59,9 @@ def growth_at_temperature(
     """
     surface = np.asarray(surface, float)
     if not (surface > 0).all() or not np.isfinite(surface).all() or not reference > 0:
-        worst = float(surface.min()) if reference > 0 else reference
+        invalid_temperature = float(surface.min()) if reference > 0 else reference
         raise PatchfemError(
-            f"a temperature of {worst:g} K is not possible; temperatures must be above 0 K"
+            f"a temperature of {invalid_temperature:g} K is not possible; temperatures must be above 0 K"
         )
     difference = 1 / reference - 1 / surface
     rest_exponent = (rest_activation or 0.0) * difference
@@ -77,9 +77,9 @@ def _scale_rate(name: str, value: float, exponent, key: str):
     total = np.log(value) + exponent
     limits = np.finfo(float)
     if not ((total < np.log(limits.max)) & (total > np.log(limits.tiny))).all():
-        worst = float(np.asarray(total).flat[np.argmax(np.abs(total))]) / np.log(10)
+        decimal_exponent = float(np.asarray(total).flat[np.argmax(np.abs(total))]) / np.log(10)
         raise PatchfemError(
-            f"at the surface temperature {name} would be about 1e{worst:.0f}; a computer cannot "
+            f"at the surface temperature {name} would be about 1e{decimal_exponent:.0f}; a computer cannot "
             f"represent such a number; lower temperature.{key}, or bring temperature.surface closer to "
             "temperature.reference"
         )

@@ -100,9 +100,9 @@ def _integrate_path(low, high, n, unloading, is_loading):
     path = 0.0
     area = 0.0
     if is_loading and high > MAX_W:
-        flat = (high - max(low, MAX_W)) / n
-        path += flat
-        area += flat
+        saturated_path = (high - max(low, MAX_W)) / n
+        path += saturated_path
+        area += saturated_path
         high = min(high, MAX_W)
     is_whole = n % 1 == 0
     if high > 2 * low and low < FIRST_PIECE_LENGTH and not is_whole:
@@ -116,21 +116,21 @@ def _integrate_path(low, high, n, unloading, is_loading):
             area -= part_area
         low = end
     while low < high:
-        longest = (
+        max_size = (
             MAX_PIECE_LENGTH if is_whole else min(MAX_PIECE_LENGTH, max(low, FIRST_PIECE_LENGTH))
         )
-        size = min(longest, high - low)
+        size = min(max_size, high - low)
         part, part_area = _integrate_piece(low, size, n, unloading, is_loading)
         path += part
         area += part_area
-        low = low + size if size == longest else high
+        low = low + size if size == max_size else high
     return path, area
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def _scale_area(area, path, wanted):
+def _scale_area(area, path, requested_path):
     """Scale an area from the path that Newton's method reached to the requested path."""
-    return area * (wanted / path) if path > 0 else 0.0
+    return area * (requested_path / path) if path > 0 else 0.0
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -167,8 +167,8 @@ def _follow_path(y, x, n, s):
         w = max(w - residual * _loading_rate(w, n), start)
         if abs(residual) <= NEWTON_TOL * x:
             break
-    path, loaded = _integrate_path(start, w, n, 0.0, True)
-    return -expm1(-w), area + (_scale_area(loaded, path, x) if path > 0 else x * y)
+    path, loading_area = _integrate_path(start, w, n, 0.0, True)
+    return -expm1(-w), area + (_scale_area(loading_area, path, x) if path > 0 else x * y)
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
@@ -186,8 +186,8 @@ def rate_equation(numbers, stretch, velocity, direction):
     Rates
     """
     stiffness = numbers[1] / numbers[2]
-    gain = _z_slope(direction * stretch / numbers[2], numbers[3], numbers[4])
-    return Rates(stiffness * stretch, gain, stiffness, 0.0)
+    stretch_rate = _z_slope(direction * stretch / numbers[2], numbers[3], numbers[4])
+    return Rates(stiffness * stretch, stretch_rate, stiffness, 0.0)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -335,10 +335,10 @@ def state_rates(numbers, memory, motion, increment, velocity, states, rates):
     """
     y = motion[0] * states[0]
     if motion[1] == inf:
-        fall = max(y, 0.0) ** numbers[3]
+        rate_reduction = max(y, 0.0) ** numbers[3]
     else:
-        fall = (1 - 2 * numbers[4]) * max(-y, 0.0) ** numbers[3]
-    rates[0] = velocity / numbers[2] * (1 - fall)
+        rate_reduction = (1 - 2 * numbers[4]) * max(-y, 0.0) ** numbers[3]
+    rates[0] = velocity / numbers[2] * (1 - rate_reduction)
     return numbers[1] * states[0]
 
 

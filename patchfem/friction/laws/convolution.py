@@ -121,10 +121,10 @@ def average_pressure(
         block = positions[first : first + N_POSITIONS_PER_BLOCK]
         low = max(int(np.searchsorted(nodes, block.min() - cutoff)) - 1, 0)
         high = max(int(np.searchsorted(nodes, block.max())) + 1, low + 2)
-        near = slice(low, high) if nodes[low:high].size > 1 else slice(-2, None)
-        segments = is_bare[near.start :][: nodes[near].size - 1]
-        weights = _node_weights(block, nodes[near], segments, length, order)
-        averages[first : first + N_POSITIONS_PER_BLOCK] = weights @ sigma[near]
+        node_range = slice(low, high) if nodes[low:high].size > 1 else slice(-2, None)
+        segments = is_bare[node_range.start :][: nodes[node_range].size - 1]
+        weights = _node_weights(block, nodes[node_range], segments, length, order)
+        averages[first : first + N_POSITIONS_PER_BLOCK] = weights @ sigma[node_range]
     return averages
 
 

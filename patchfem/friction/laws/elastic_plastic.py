@@ -65,8 +65,8 @@ class ElasticPlastic:
         decay = np.exp(-(1 - elastic) * abs(dq) / self.length)
         springs = remaining + (springs - remaining) * decay
         after = np.where(s1 > 0, np.stack([y1, springs]), 0.0)
-        gain = self.stored_energy(after) - self.stored_energy(state)
-        return Step(self.static * mean, self.static * mean * dq - gain, after)
+        energy_gain = self.stored_energy(after) - self.stored_energy(state)
+        return Step(self.static * mean, self.static * mean * dq - energy_gain, after)
 
     def press(self, state, s0, s1) -> Step:
         """Change the pressure at rest; the energy of a stretch beyond the new limit is lost.

@@ -65,9 +65,9 @@ def mean_force(numbers, memory, rel_disp, increment, bond_length, dt):
             slope += 0.5 * numbers[2 + j]
         return force, slope
     for j in range(n):
-        moved = stretch_spring(memory[3 + j], increment, numbers[2 + n + j])
-        force += numbers[2 + j] * moved.integral
-        slope += numbers[2 + j] * moved.elastic * moved.elastic
+        spring_step = stretch_spring(memory[3 + j], increment, numbers[2 + n + j])
+        force += numbers[2 + j] * spring_step.integral
+        slope += numbers[2 + j] * spring_step.elastic * spring_step.elastic
     return force / increment, 0.5 * slope / increment / increment
 
 

@@ -65,14 +65,14 @@ def rate_equation(numbers, stretch, velocity, direction):
     -------
     Rates
     """
-    length, bend = _relaxation_length(numbers, velocity)
-    gain = 1 - direction * stretch / length
-    bent = direction * stretch * velocity * bend / (length * length)
+    length, length_derivative = _relaxation_length(numbers, velocity)
+    stretch_rate = 1 - direction * stretch / length
+    length_term = direction * stretch * velocity * length_derivative / (length * length)
     return Rates(
-        numbers[1] * stretch + (numbers[5] * gain + numbers[6]) * velocity,
-        gain,
+        numbers[1] * stretch + (numbers[5] * stretch_rate + numbers[6]) * velocity,
+        stretch_rate,
         numbers[1] - numbers[5] * direction * velocity / length,
-        numbers[5] * (gain + bent) + numbers[6],
+        numbers[5] * (stretch_rate + length_term) + numbers[6],
     )
 
 
@@ -85,25 +85,30 @@ def _relax(numbers, stretch, increment, dt):
     direction = 1.0 if increment > 0 else -1.0
     path = abs(increment)
     length = max(numbers[2], MIN_LIMIT_RATIO * numbers[3]) / numbers[1]
-    bend = 0.0  # derivative of the length with respect to the path
+    length_by_path = 0.0  # derivative of the length with respect to the path
     if dt > 0:
-        length, bend = _relaxation_length(numbers, path / dt)
-        bend /= dt
+        length, length_by_path = _relaxation_length(numbers, path / dt)
+        length_by_path /= dt
     x = path / length
     shapes = shape_functions(x)
     end = direction * length
-    rest = stretch - end
-    x_by_path = (1 - x * bend) / length
-    mean_slope = direction * bend * (1 - shapes.f1) + rest * (shapes.f2 - shapes.f1) * x_by_path
-    end_slope = direction * bend * (1 - shapes.decay) - rest * shapes.decay * x_by_path
+    deviation = stretch - end
+    x_by_path = (1 - x * length_by_path) / length
+    mean_slope = (
+        direction * length_by_path * (1 - shapes.f1)
+        + deviation * (shapes.f2 - shapes.f1) * x_by_path
+    )
+    end_slope = (
+        direction * length_by_path * (1 - shapes.decay) - deviation * shapes.decay * x_by_path
+    )
     by_time = 0.0
     if dt > 0:
-        length_by_time = -bend * path / dt
+        length_by_time = -length_by_path * path / dt
         by_time = direction * length_by_time * (1 - shapes.decay)
-        by_time += rest * shapes.decay * x / length * length_by_time
+        by_time += deviation * shapes.decay * x / length * length_by_time
     return _Relaxation(
-        end + rest * shapes.decay,
-        end + rest * shapes.f1,
+        end + deviation * shapes.decay,
+        end + deviation * shapes.f1,
         direction * end_slope,
         direction * mean_slope,
         shapes.decay,
@@ -193,9 +198,9 @@ def state_rates(numbers, memory, motion, increment, velocity, states, rates):
     -------
     float
     """
-    now = rate_equation(numbers, states[0], velocity, motion[0])
-    rates[0] = now.stretch_rate * velocity
-    return now.force
+    rates_at_state = rate_equation(numbers, states[0], velocity, motion[0])
+    rates[0] = rates_at_state.stretch_rate * velocity
+    return rates_at_state.force
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)

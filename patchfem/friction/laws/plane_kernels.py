@@ -95,9 +95,9 @@ def advance_straight(spring, stretch, increment):
     start = across / (w * (1 + cosine))  # tan(psi/2) at the start of slip
     end = start * decay
     square = 1 + end * end
-    lost = w * (slip - w * log1p(-start * start * expm1(-2 * slip / w) / square))
+    lost_integral = w * (slip - w * log1p(-start * start * expm1(-2 * slip / w) / square))
     # These are the integrals of the stretch over the path, along and across the increment.
-    u = elastic * (along + 0.5 * elastic) + lost
+    u = elastic * (along + 0.5 * elastic) + lost_integral
     v = elastic * across + 2 * w * w * atan(-start * expm1(-slip / w) / (1 + start * end))
     end_u = w * (1 - end * end) / square
     end_v = 2 * w * end / square
@@ -125,7 +125,7 @@ def advance_straight(spring, stretch, increment):
         slope,
         end_u * ux - end_v * uy,
         end_u * uy + end_v * ux,
-        k * lost,
+        k * lost_integral,
     )
 
 
@@ -158,7 +158,7 @@ def solve_plane_step(free, compliance, spring, stretch, guess, tolerance):
     step_x = 0.0
     step_y = 0.0
     damping = 1.0
-    smallest = -1.0
+    min_residual = -1.0
     fx = 0.0
     fy = 0.0
     for count in range(1, MAX_ITERATIONS):
@@ -172,10 +172,10 @@ def solve_plane_step(free, compliance, spring, stretch, guess, tolerance):
         if abs(rx) <= tolerance * xx + round_x and abs(ry) <= tolerance * yy + round_y:
             return PlaneStep(gx - xx * fx - xy * fy, gy - xy * fx - yy * fy, fx, fy, count)
         size = rx * rx * yy + ry * ry * xx
-        if smallest < 0.0 or size < smallest or damping < MIN_DAMPING:
+        if min_residual < 0.0 or size < min_residual or damping < MIN_DAMPING:
             x = dx
             y = dy
-            smallest = size
+            min_residual = size
             damping = 1.0
             a = 1 + xx * step.slope.xx + xy * step.slope.yx
             b = xx * step.slope.xy + xy * step.slope.yy

@@ -95,15 +95,15 @@ def _move_bonds(numbers, memory, increment, bond_length):
     """Advance the state of growing bonds by an increment; return the dissipated energy [J]."""
     if numbers[BREAKAWAY_INDEX] > 0:
         half = numbers[BREAKAWAY_INDEX] * bond_length
-        moved, memory[5] = elastic_bond_step(
+        bond_increment, memory[5] = elastic_bond_step(
             memory[1], memory[2], memory[3], memory[5], half, increment, 1.0, bond_length
         )
     else:
-        moved = bond_step(memory[1], memory[2], memory[3], increment, 1.0, bond_length)
-    memory[1] = moved.m
-    memory[2] = moved.z
-    memory[3] = moved.s2
-    return numbers[1] * moved.damage_integral / 2
+        bond_increment = bond_step(memory[1], memory[2], memory[3], increment, 1.0, bond_length)
+    memory[1] = bond_increment.m
+    memory[2] = bond_increment.z
+    memory[3] = bond_increment.s2
+    return numbers[1] * bond_increment.damage_integral / 2
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -147,11 +147,11 @@ def integrate_stretch(numbers, stretch, mean_square, increment, direction):
     """
     end = direction * numbers[2]
     x = direction * increment / numbers[2]
-    rest = stretch - end
+    deviation = stretch - end
     decay = exp_minus(x)
-    square = mean_square * decay + 2 * end * (end * (1 - decay) + rest * x * decay)
-    work = numbers[1] * end * (increment + rest * (1 - decay))
-    return IntegratedStretch(end + rest * decay, square, work)
+    square = mean_square * decay + 2 * end * (end * (1 - decay) + deviation * x * decay)
+    work = numbers[1] * end * (increment + deviation * (1 - decay))
+    return IntegratedStretch(end + deviation * decay, square, work)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -182,9 +182,9 @@ def start_motion(numbers, memory, direction, states):
     """
     for k in range(states.size):
         states[k] = memory[k]
-    floor = numbers[GROWTH_INDEX + 2] if numbers[GROWTH_INDEX] >= 0 else 0.0
+    min_speed = numbers[GROWTH_INDEX + 2] if numbers[GROWTH_INDEX] >= 0 else 0.0
     path = numbers[BREAKAWAY_INDEX] * memory[0] * (1 - direction * memory[5])
-    return path if path > 0 else inf, floor
+    return path if path > 0 else inf, min_speed
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -214,9 +214,9 @@ def state_rates(numbers, memory, motion, increment, velocity, states, rates):
     m = states[1]
     z = states[2]
     speed = motion[0] * velocity
-    floor = numbers[GROWTH_INDEX + 2]
+    min_speed = numbers[GROWTH_INDEX + 2]
     # A Runge-Kutta stage above the kink may overshoot to a speed below the floor.
-    healing_speed = max(speed, 0.5 * floor) if motion[2] > 0 else floor
+    healing_speed = max(speed, 0.5 * min_speed) if motion[2] > 0 else min_speed
     healing = numbers[GROWTH_INDEX] / healing_speed * (numbers[GROWTH_INDEX + 3] - eps)
     breaking = speed / eps
     rates[0] = healing + speed / numbers[GROWTH_INDEX + 1] * (numbers[GROWTH_INDEX + 4] - eps)
@@ -249,10 +249,10 @@ def end_motion(numbers, memory, motion, increment, velocity, states):
         play = memory[5] + increment / (numbers[BREAKAWAY_INDEX] * memory[0])
         memory[5] = motion[0] if is_at_end else min(max(play, -1.0), 1.0)
         return 0.0
-    moved = bond_step(memory[1], memory[2], memory[3], increment, 1.0, memory[0])
-    memory[1] = moved.m
-    memory[2] = moved.z
-    memory[3] = moved.s2
+    bond_increment = bond_step(memory[1], memory[2], memory[3], increment, 1.0, memory[0])
+    memory[1] = bond_increment.m
+    memory[2] = bond_increment.z
+    memory[3] = bond_increment.s2
     if numbers[BREAKAWAY_INDEX] > 0 and increment != 0:
         memory[5] = motion[0]
-    return 0.5 * numbers[1] * moved.damage_integral
+    return 0.5 * numbers[1] * bond_increment.damage_integral

@@ -118,13 +118,13 @@ def mean_force(numbers, memory, rel_disp, increment, bond_length, dt):
         m = points.m[j]
         z = points.z[j]
         if half > 0:
-            mean, gain = elastic_bond_mean(
+            mean, bond_slope = elastic_bond_mean(
                 m, z, points.play[j], half, increment, source, bond_length
             )
         else:
-            mean, gain = bond_mean(m, z, increment, source, bond_length)
+            mean, bond_slope = bond_mean(m, z, increment, source, bond_length)
         force += points.weight[j] * mean
-        slope += points.weight[j] * gain
+        slope += points.weight[j] * bond_slope
     return force, slope
 
 
@@ -149,19 +149,19 @@ def update_memory(numbers, memory, increment, force, v0, v1, dt, bond_length):
         s2 = points.s2[j]
         source = points.source[j]
         if half > 0:
-            moved, points.play[j] = elastic_bond_step(
+            bond_increment, points.play[j] = elastic_bond_step(
                 m, z, s2, points.play[j], half, increment, source, bond_length
             )
         else:
-            moved = bond_step(m, z, s2, increment, source, bond_length)
-        dissipated += points.weight[j] * moved.damage_integral / 2
+            bond_increment = bond_step(m, z, s2, increment, source, bond_length)
+        dissipated += points.weight[j] * bond_increment.damage_integral / 2
         points.displacement[j] += increment
         if end[j] <= 0:
-            dissipated += points.weight[j] * moved.s2 / 2
-            moved = BondStep(0.0, 0.0, 0.0, 0.0)
-        points.m[j] = moved.m
-        points.z[j] = moved.z
-        points.s2[j] = moved.s2
+            dissipated += points.weight[j] * bond_increment.s2 / 2
+            bond_increment = BondStep(0.0, 0.0, 0.0, 0.0)
+        points.m[j] = bond_increment.m
+        points.z[j] = bond_increment.z
+        points.s2[j] = bond_increment.s2
     memory[0] = grow(
         memory[0], v0, v1, abs(increment), dt, numbers[GROWTH_INDEX:FIRST_POINT_INDEX]
     )[0]
