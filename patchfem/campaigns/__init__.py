@@ -34,7 +34,7 @@ PUBLIC = {
     ),
     "fits.loop": (
         "FittedLoop",
-        "fit_loop",
+        "fit_hysteresis_loop",
     ),
     "fits.loop_path": ("LoopOptions",),
     "fits.patch": (

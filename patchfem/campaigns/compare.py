@@ -151,7 +151,7 @@ def _run_surface(model: Model, say) -> SurfaceResult:
 
 
 def surface_runs_to_dict(runs: SurfaceRuns) -> dict:
-    """Return the results with both surfaces as plain data in SI units."""
+    """Return the results with the surfaces before and after wear as a dict in SI units."""
     measures = {}
     for name, _, before, after in runs.measure_rows():
         measures[name] = {"before": _measure_to_dict(before), "after": _measure_to_dict(after)}

@@ -53,7 +53,7 @@ _PROPOSED_SETTING = re.compile(
 MIN_ELAPSED_TO_CPU_RATIO = 1.5
 EQUAL_COST_RATIO = 1.1  # Largest ratio of the CPU times of equally expensive runs.
 TIMING_SCATTER = 2e-3  # Scatter of the CPU time of repeated short runs [s].
-# Smallest ratio of the smallest to the largest error at which a setting is ineffective.
+# A setting is ineffective if the ratio of its smallest to its largest error exceeds this value.
 NO_EFFECT_RATIO = 0.9
 UNCHANGED_TOL = 1e-11  # Largest relative change of an unaffected measure.
 # Largest change of a measure by round-off, as a fraction of its floor.

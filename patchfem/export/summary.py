@@ -13,7 +13,7 @@ from ..disk.atomic_write import write_text
 from ..disk.installed import list_installed_versions
 from ..effects import EFFECTS
 from ..runs.patch import values
-from ..runs.results.result import Result, collect_used_settings, measure_engines
+from ..runs.results.result import Result, collect_used_settings, engine_by_measure
 from ..runs.rig import plan as rig_plan
 
 # Ratio of a stiffness to its error above which the loss factor is computed.
@@ -156,7 +156,7 @@ def summarise_run(result: Result) -> dict:
         (result.warnings, result.extra.get("notes", [])),
         result.seconds,
     )
-    numerics = collect_used_settings(result) | {"measures": measure_engines(result)}
+    numerics = collect_used_settings(result) | {"measures": engine_by_measure(result)}
     return (
         summary
         | {"numerics": numerics}

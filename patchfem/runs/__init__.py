@@ -88,11 +88,11 @@ PUBLIC = {
         "Result",
         "collect_used_settings",
         "describe_measure",
-        "measure_engines",
+        "engine_by_measure",
         "patch_surface",
         "shorten_file_names",
     ),
-    "rig.costs": ("count_merges",),
+    "rig.costs": ("count_cell_merges",),
     "rig.decays": (
         "make_laws_on_coarse_meshes",
         "tabulate_static_motions",

@@ -250,9 +250,9 @@ def _advise_mesh(
     n_nodes = max(context.patch.x.size for context, _ in solutions)
     cause = f"the {mesh_name} ({n_nodes} interface nodes) causes this error"
     if any(patch.mesh.file is not None for patch in patch_models):
-        return faces.use_scene_keys(model, f"{cause}; split the elements of contact.mesh")
+        return faces.replace_contact_keys(model, f"{cause}; split the elements of contact.mesh")
     if not all(patch.mesh.is_automatic for patch in patch_models):
-        return faces.use_scene_keys(model, f"{cause}; leave out {ELEMENT_SIZE}")
+        return faces.replace_contact_keys(model, f"{cause}; leave out {ELEMENT_SIZE}")
     tolerances = [] if is_at_limit else [_tolerance_for_finer_mesh(*place) for place in solutions]
     tolerances = [tolerance for tolerance in tolerances if tolerance is not None]
     if tolerances:
@@ -356,7 +356,7 @@ def _advise_steps(context: AccuracyContext, name: str, excess: dict, steps: int)
     if (
         model.kind == "rig"
         and model.accuracy.method != "exact"
-        and not engines.reason_not_exact(model)
+        and not engines.reason_not_event_driven(model)
     ):
         exact = 'set accuracy.method = "exact", which has no steps'
         if model.accuracy.steps_per_cycle is not None:

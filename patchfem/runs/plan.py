@@ -403,7 +403,7 @@ def _compute_law_groups(model: Model) -> dict:
 
 
 def _describe_grooves(model: Model) -> list:
-    """Return a sentence, as a list, on the grooves that the load climbs."""
+    """Return a list with a sentence on the grooves that the load climbs."""
     load = model.nominal_load
     if model.grooves is None or not load > 0:
         return []

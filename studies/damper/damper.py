@@ -22,7 +22,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 
-from patchfem.campaigns import LoopOptions, fit_loop
+from patchfem.campaigns import LoopOptions, fit_hysteresis_loop
 from patchfem.campaigns.fits.loop import LOAD_UNITS
 from patchfem.inputs import read_loop
 from patchfem.scene import loads
@@ -125,7 +125,7 @@ def main(file, names=tuple(LAWS)) -> list:
 
     for name in names:
         text, free = LAWS[name]
-        found = fit_loop(
+        found = fit_hysteresis_loop(
             loads(SCENE.format(text)), Path(file), free, options=LoopOptions(("force",), True)
         )
         miss = found.model - loop.reading

@@ -33,7 +33,7 @@ from drawing import drawing
 from study_text import read_answer
 
 import patchfem as pf
-from patchfem.campaigns import LoopOptions, fit_loop
+from patchfem.campaigns import LoopOptions, fit_hysteresis_loop
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.scene import loads
 
@@ -156,7 +156,7 @@ def read_as_rigid(one: Loop) -> tuple:
             path, rows, "%.9g", ",", header="time [s],displacement [um],force [N]", comments=""
         )
         free = ["friction.static=0.2..0.5,friction.bond_length=0.2 um..20 um"]
-        found = fit_loop(loads(BENCH), path, free, options=LoopOptions((), True))
+        found = fit_hysteresis_loop(loads(BENCH), path, free, options=LoopOptions((), True))
     return tuple(float(value) for value in found.keys.fit.values[:2])
 
 

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from scipy.stats import t as student
 
 from patchfem import SceneError, build
-from patchfem.campaigns import fit_loop
+from patchfem.campaigns import fit_hysteresis_loop
 from patchfem.campaigns.fits.loop import LOAD_UNITS
 from patchfem.campaigns.fits.loop_model import BenchModel
 from patchfem.core import PatchfemError
@@ -171,7 +171,7 @@ def test_exact_parameters_of_each_law_are_recovered(tmp_path, law):
     loop = write_loop(
         tmp_path / "loop.csv", time, slide, reference_force(law, time, slide, TRUTH[law])
     )
-    result = fit_loop(load_scene(tmp_path, law), loop, free_ranges(*TRUTH[law]))
+    result = fit_hysteresis_loop(load_scene(tmp_path, law), loop, free_ranges(*TRUTH[law]))
     assert result.keys.fit.values == pytest.approx(list(TRUTH[law].values()), rel=1e-6)
     assert result.rms < 1e-7 * LOAD and result.held_out_rms is None and result.step_error == 0
     assert (
@@ -203,7 +203,7 @@ def test_exact_parameters_of_bond_growth_are_recovered(tmp_path):
         ],
     )
     force = bench.run_bench(build(true_scene), None, 4, path=(time, slide, 0, 0.0)).force
-    result = fit_loop(
+    result = fit_hysteresis_loop(
         scene, write_loop(tmp_path / "loop.csv", time, slide, force), free_ranges(*names)
     )
     assert result.keys.fit.values == pytest.approx(
@@ -233,7 +233,7 @@ def test_order_of_bond_growth_fit_is_two(tmp_path):
     results = []
     for tolerance, pieces in ((1e-1, 1), (1e-3, None)):
         scene = load_scene(tmp_path, "growth", *sets, f"accuracy.tolerance={tolerance}")
-        result = fit_loop(scene, loop, free_ranges("friction.static"))
+        result = fit_hysteresis_loop(scene, loop, free_ranges("friction.static"))
         assert result.step_error <= 0.1 * tolerance * 31
         assert result.rms < 1.4 * result.step_error
         assert pieces is None or result.steps_per_row == pieces
@@ -260,7 +260,7 @@ def test_exact_ratio_column_and_patch_give_same_parameters(tmp_path):
     )
     (tmp_path / "patch.toml").write_text(text + LAWS["bonds"] + SINE, "utf-8")
     for scene in (load_scene(tmp_path, "bonds", "normal.load=7 N"), load(tmp_path / "patch.toml")):
-        result = fit_loop(scene, loop, free_ranges(*TRUTH["bonds"]))
+        result = fit_hysteresis_loop(scene, loop, free_ranges(*TRUTH["bonds"]))
         assert result.keys.fit.values == pytest.approx(list(TRUTH["bonds"].values()), rel=1e-6)
 
 
@@ -302,7 +302,7 @@ def test_exact_intervals_agree_with_normal_equations(tmp_path, law):
     The design matrix is computed from the reference force of this file at the fitted values.
     """
     time, slide, force = noisy_loop(law, 0)
-    result = fit_loop(
+    result = fit_hysteresis_loop(
         load_scene(tmp_path, law),
         write_loop(tmp_path / "loop.csv", time, slide, force),
         free_ranges(*TRUTH[law]),
@@ -343,7 +343,7 @@ def test_exact_intervals_agree_with_normal_equations(tmp_path, law):
 
 def test_exact_inseparable_parameters_are_reported(tmp_path):
     """The friction coefficient and the load are reported as inseparable; only their product is determined."""
-    result = fit_loop(
+    result = fit_hysteresis_loop(
         load_scene(tmp_path, "elastic-plastic"),
         write_loop(tmp_path / "loop.csv", *noisy_loop("elastic-plastic", 3, 0.1, 24)),
         free_ranges("friction.static", "friction.bond_length", "normal.load"),
@@ -365,7 +365,7 @@ def test_exact_parameters_without_effect_are_reported(tmp_path):
     loop = write_loop(
         tmp_path / "loop.csv", time, slide, elastic_plastic_force(slide, 0.31, 2.3e-6)
     )
-    result = fit_loop(
+    result = fit_hysteresis_loop(
         load_scene(tmp_path, "elastic-plastic"),
         loop,
         [*free_ranges("friction.static"), "slide.cycles=1..3,friction.bond_length=50 m..70 m"],
@@ -374,7 +374,9 @@ def test_exact_parameters_without_effect_are_reported(tmp_path):
         "slide.cycles has no effect on the computed data, so its value is not determined"
         in result.keys.warnings
     )
-    result = fit_loop(load_scene(tmp_path, "elastic-plastic"), loop, ["friction.static=0.1..0.25"])
+    result = fit_hysteresis_loop(
+        load_scene(tmp_path, "elastic-plastic"), loop, ["friction.static=0.1..0.25"]
+    )
     assert result.keys.fit.values[0] == 0.25 and "at its high bound 0.25" in result.keys.warnings[0]
 
 
@@ -389,13 +391,13 @@ def test_exact_excluded_rows_do_not_change_the_fit(tmp_path):
     cycle = 1 + (np.arange(81) > 40)
     wrong = write_loop(tmp_path / "wrong.csv", time, slide, force * cycle, cycle)
     scene = load_scene(tmp_path, "elastic-plastic")
-    result = fit_loop(
+    result = fit_hysteresis_loop(
         scene, wrong, free_ranges("friction.static", "friction.bond_length"), ["cycle=2.0"]
     )
     assert result.keys.fit.values == pytest.approx([0.31, 2.3e-6], rel=1e-6) and result.rms < 1e-6
     assert result.held_out_rms == pytest.approx(np.sqrt(np.mean(force[cycle == 2] ** 2)), rel=1e-6)
     assert result.held_out.sum() == 40
-    first = fit_loop(
+    first = fit_hysteresis_loop(
         scene,
         write_loop(tmp_path / "late.csv", time, slide, np.where(cycle == 1, 5.0, force), cycle),
         free_ranges("friction.static", "friction.bond_length"),
@@ -408,7 +410,7 @@ def test_always_doubtful_records_give_warnings(tmp_path):
     """Correlated rows, a nonzero first force and another amplitude than that of the scene give warnings."""
     time, slide = sine_path(40)
     late = elastic_plastic_force(slide, 0.31, 2.3e-6)[20:]
-    result = fit_loop(
+    result = fit_hysteresis_loop(
         load_scene(tmp_path, "elastic-plastic", "slide.amplitude=12 um"),
         write_loop(
             tmp_path / "loop.csv", time[20:], slide[20:], late + 3 * np.sin(np.arange(61) / 9)
@@ -440,7 +442,7 @@ def test_exact_missing_time_is_replaced_for_rate_independent_laws(tmp_path):
     )
     loop = tmp_path / "loop.csv"
     loop.write_text(text)
-    result = fit_loop(
+    result = fit_hysteresis_loop(
         load_scene(tmp_path, "elastic-plastic"),
         loop,
         free_ranges("friction.static", "friction.bond_length"),
@@ -450,7 +452,7 @@ def test_exact_missing_time_is_replaced_for_rate_independent_laws(tmp_path):
     with pytest.raises(
         PatchfemError, match=r"loop.csv:1: law 'tanh' needs the times of the rows of this record"
     ):
-        fit_loop(load_scene(tmp_path, "tanh"), loop, free_ranges("friction.static"))
+        fit_hysteresis_loop(load_scene(tmp_path, "tanh"), loop, free_ranges("friction.static"))
     triangle = '[slide]\nkind = "triangle"\namplitude = "10 um"\nspeed = "2 mm/s"\n'
     position = np.concatenate([np.linspace(0, 10, 11), np.linspace(9, -10, 20)])
     ratio = np.tanh(2 / 1.7)
@@ -459,7 +461,7 @@ def test_exact_missing_time_is_replaced_for_rate_independent_laws(tmp_path):
         "displacement [um],force [N]\n"
         + "\n".join(f"{q},{31 * s}" for q, s in zip(position, force))
     )
-    result = fit_loop(
+    result = fit_hysteresis_loop(
         load_scene(tmp_path, "tanh", "friction.static=0.31", slide=triangle),
         loop,
         free_ranges("friction.reference_speed"),
@@ -623,7 +625,7 @@ def test_refuses_invalid_hold_options_and_scenes(fit_command, tmp_path):
             '[contact]\nlength = "12.7 mm"\nwidth = "12.7 mm"\nheight = "6.35 mm"\nload = "80 N"\nsubstrate = '
             '"Ti-8Al-1Mo-1V"\n'
         )
-        fit_loop(loads(text), tmp_path / "loop.csv", ["contact.load=1 N..2 N"])
+        fit_hysteresis_loop(loads(text), tmp_path / "loop.csv", ["contact.load=1 N..2 N"])
 
 
 def test_exact_rest_speed_of_measured_motion_is_written(tmp_path):
@@ -641,7 +643,7 @@ def test_exact_rest_speed_of_measured_motion_is_written(tmp_path):
     loop = write_loop(
         tmp_path / "loop.csv", time, slide, elastic_plastic_force(slide, 0.31, 2.3e-6)
     )
-    result = fit_loop(scene, loop, free_ranges("friction.static"))
+    result = fit_hysteresis_loop(scene, loop, free_ranges("friction.static"))
     speed = np.abs(np.diff(slide) / np.diff(time)).max()
     text = fitted_scene_text(result.keys, loop.name, tmp_path)
     assert math.isclose(loads(text).friction.rest_speed, 1e-3 * speed, rel_tol=1e-9)

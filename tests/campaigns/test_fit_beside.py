@@ -18,7 +18,7 @@ from test_fit import (
     write_loop,
 )
 
-from patchfem.campaigns import LoopOptions, fit_loop
+from patchfem.campaigns import LoopOptions, fit_hysteresis_loop
 from patchfem.campaigns.fits.loop_path import count_warm_up_rows, prepend_warm_up
 from patchfem.core import PatchfemError
 from patchfem.inputs import read_loop
@@ -37,10 +37,12 @@ def test_exact_offset_of_force_is_recovered_from_steady_loop(tmp_path):
     cut = slice(93, 280)
     loop = write_loop(tmp_path / "loop.csv", time[cut], slide[cut], force[cut])
     scene = load_scene(tmp_path, "bonds")
-    result = fit_loop(scene, loop, free_ranges(*NAMES), options=LoopOptions(("force",), True))
+    result = fit_hysteresis_loop(
+        scene, loop, free_ranges(*NAMES), options=LoopOptions(("force",), True)
+    )
     assert result.keys.fit.values == pytest.approx([*TRUTH, 7.0], rel=1e-5)
     assert result.rms < 1e-5 * LOAD and result.keys.warnings == []
-    plain = fit_loop(scene, loop, free_ranges(*NAMES))
+    plain = fit_hysteresis_loop(scene, loop, free_ranges(*NAMES))
     assert plain.rms > 1.0 and any("--warm-up" in one for one in plain.keys.warnings)
 
 
@@ -50,7 +52,7 @@ def test_exact_offset_of_displacement_is_recovered(tmp_path):
     position = 1.1e-6 + slide
     force = elastic_plastic_force(np.concatenate([[0.0], position]), *TRUTH)[1:]
     loop = write_loop(tmp_path / "loop.csv", time, slide, force)
-    result = fit_loop(
+    result = fit_hysteresis_loop(
         load_scene(tmp_path, "elastic-plastic"),
         loop,
         free_ranges(*NAMES),
@@ -80,13 +82,13 @@ def test_refuses_warm_up_of_record_without_full_cycle(tmp_path):
     time, slide = sine_path(80, 1)
     loop = write_loop(tmp_path / "loop.csv", time[:30], slide[:30], np.ones(30))
     with pytest.raises(PatchfemError, match="returns to its first value and passes it"):
-        fit_loop(
+        fit_hysteresis_loop(
             load_scene(tmp_path, "bonds"), loop, free_ranges(*NAMES), options=LoopOptions((), True)
         )
     with pytest.raises(
         PatchfemError, match="--offset time: not a possible offset; use force or displacement"
     ):
-        fit_loop(
+        fit_hysteresis_loop(
             load_scene(tmp_path, "bonds"), loop, free_ranges(*NAMES), options=LoopOptions(("time",))
         )
 

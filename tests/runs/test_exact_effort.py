@@ -94,7 +94,7 @@ def test_exact_linear_rig_under_slow_drive():
     text = MODES + YAW + SLOW.replace(FREQUENCY, "0.1 Hz")
     result = pf.run(text)
     assert result.plan.engine == "exact"
-    assert costs.estimate_max_exact_seconds(result.plan.model) < 20
+    assert costs.estimate_max_event_driven_seconds(result.plan.model) < 20
     w = 2 * np.pi * np.array([143.0, 129.0])
     # Only the first mode contributes to the output.
     expected = 5 * 9.80665 / (w[0] ** 2 - (0.2 * np.pi) ** 2)
@@ -110,7 +110,7 @@ def test_exact_spring_block_under_slow_drive(kinetic):
     closed form, and the energy balance closes."""
     text = MODES + COULOMB_POINT + SLOW.replace(FREQUENCY, "0.01 Hz").replace("5 g", "18 g")
     result = pf.run(text, **({"friction.kinetic": str(kinetic)} if kinetic else {}))
-    assert costs.estimate_max_exact_seconds(result.plan.model) < 20
+    assert costs.estimate_max_event_driven_seconds(result.plan.model) < 20
     limit = 0.3 * 26 * 4.4482216152605
     k = 0.884 * (2 * np.pi * 143) ** 2
     expected = 0.884 * 18 * 9.80665 / k - limit / k
@@ -128,7 +128,7 @@ def test_always_undamped_rig_under_slow_drive_is_marched():
     text = MODES.replace("0.003", "0") + COULOMB_POINT + SLOW.replace("5 g", "18 g")
     plan = pf.plan(text)
     assert plan.engine == "march"
-    assert costs.estimate_max_exact_seconds(plan.model) > costs.MAX_EXACT_SECONDS_UNRESOLVED
+    assert costs.estimate_max_event_driven_seconds(plan.model) > costs.MAX_EXACT_SECONDS_UNRESOLVED
 
 
 def test_exact_averaged_law_with_extreme_damping_is_marched():

@@ -6,7 +6,7 @@ import pytest
 
 from patchfem import load, plan
 from patchfem.runs import choose_numerics
-from patchfem.runs.rig.bond_lists import estimate_list_cost
+from patchfem.runs.rig.bond_lists import estimate_bond_list_cost
 from patchfem.runs.run import run
 
 APPROACH_WITH_MOMENT = """[contact]
@@ -148,7 +148,7 @@ def test_always_plan_estimates_time_of_stuck_block():
     reference_seconds = 2.5e-7 * counts["iterations"] * counts["strips"] / 2
     assert (
         reference_seconds / 12
-        <= estimate_list_cost(model, choose_numerics(model))[1]
+        <= estimate_bond_list_cost(model, choose_numerics(model))[1]
         <= 12 * reference_seconds
     )
 

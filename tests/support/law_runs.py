@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from scene_texts import DRIVE, MODE
 
-from patchfem.campaigns import fit_loop
+from patchfem.campaigns import fit_hysteresis_loop
 from patchfem.model import build
 from patchfem.runs.bench import bench
 from patchfem.runs.run import run
@@ -131,7 +131,7 @@ def fit_law(folder, law: str, loop: tuple, free: str):
         out = csv.writer(file)
         out.writerow(["time [s]", "displacement [m]", "force [N]"])
         out.writerows([repr(float(value)) for value in row] for row in zip(*loop))
-    return fit_loop(load(path), folder / "loop.csv", [free])
+    return fit_hysteresis_loop(load(path), folder / "loop.csv", [free])
 
 
 def shrinking_sine(count: int = 400, cycles: int = 3, amplitude: float = 10e-6):

@@ -1,4 +1,4 @@
-"""Sentences that say which method of a backbone holds where, and which curve a designer should use."""
+"""Advice on a backbone: where each method is valid, and which curve a designer should use."""
 
 import numpy as np
 
@@ -53,7 +53,7 @@ def write_advice(joint: Joint, band: Band | None, curves: dict, missing: dict) -
 
 
 def _describe_slip(joint: Joint, curve) -> list:
-    """Describe at which amplitude friction would reach its limit, and up to which it dissipates nothing.
+    """Describe at which amplitude friction reaches its limit, and below which it dissipates nothing.
 
     The first amplitude follows from the stiffness of the sticking contact.
     """
@@ -101,7 +101,7 @@ def _largest_distance(value, low, high) -> np.ndarray:
 
 
 def _describe_agreement(band: Band, curves: dict) -> list:
-    """Describe up to which amplitude the methods agree within the numerical error."""
+    """State the largest amplitude up to which the methods agree within the numerical error."""
     if band.ring_down is None:
         return []
     curve = curves[band.method]

@@ -141,7 +141,7 @@ def find_free_motions(
 
 
 class _FreeMotionSearch:
-    """Solver of the free motions of a mode that can start from the stuck mode.
+    """Solver for the free motions of a mode, with a neighbour or the stuck mode as initial guess.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ class _FreeMotionSearch:
     def solve_from_neighbour(
         self, neighbour: FreeMotion | None, amplitude: float
     ) -> FreeMotion | None:
-        """Solve for the motion at an amplitude [m] from a neighbouring motion; None if it fails."""
+        """Solve at an amplitude [m] with a neighbouring motion as initial guess; None if this fails."""
         if neighbour is None:
             return None
         here = amplitude / neighbour.reach
@@ -195,7 +195,7 @@ class _FreeMotionSearch:
             return None
 
     def solve_from_stuck_mode(self, amplitude: float, *, is_first: bool) -> FreeMotion | None:
-        """Solve for the motion at an amplitude [m] from the stuck mode; None if it fails.
+        """Solve at an amplitude [m] with the stuck mode as initial guess; None if this fails.
 
         is_first: whether a search via a small amplitude is tried as well.
         """
@@ -265,7 +265,7 @@ class _FreeMotionSearch:
 
 
 def _follow_from_stuck_mode(equations: FreeBalance, first, small: float, here: float) -> np.ndarray:
-    """Solve for the free motion at a coordinate amplitude [m] from the stuck mode.
+    """Solve for the free motion at a coordinate amplitude [m], continued from the stuck mode.
 
     If this fails, solve first at the amplitude `small` [m] and continue from there.
     """

@@ -78,7 +78,7 @@ class _Limits:
 
 
 def make_band(joint: Joint, curves: dict) -> Band | None:
-    """Compute the band of the recommended curve; None without a curve.
+    """Compute the band of the recommended curve; None if there is no curve.
 
     Parameters
     ----------

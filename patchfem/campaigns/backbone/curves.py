@@ -38,7 +38,7 @@ FLUTTER_TOL = 1e-8  # Relative error of the flutter amplitude, below the digits 
 
 
 def choose_methods(method: str | None) -> tuple:
-    """Return the methods for a name, for "all", or the default ones for "" and None.
+    """Return the methods of a given name or of "all"; the default ones for "" and None.
 
     Raises
     ------

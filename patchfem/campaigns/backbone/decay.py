@@ -192,7 +192,7 @@ class _CoarserReleases:
         return self.computed[settings]
 
     def compute_change(self, coarsening, value) -> np.ndarray:
-        """Return the change (2, k) of frequency and damping by a given kind of coarsening."""
+        """Return the change (2, k) of frequency and damping due to a given kind of coarsening."""
         base = value if coarsening.reference is None else self.evaluate_run(coarsening.reference)
         runs = coarsening.runs if coarsening.source == "cells" else coarsening.runs[:1]
         return np.max([np.abs(self.evaluate_run(run) - base) for run in runs], axis=0)

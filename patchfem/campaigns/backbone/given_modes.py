@@ -69,7 +69,7 @@ def prepare_model(build: Callable, modes: str | Iterable = "") -> PreparedModel:
 
 
 class StickingContact(NamedTuple):
-    """Patch in contact, or None, and its tangential stiffness [N/m] while it sticks, None if rigid."""
+    """Solved patch of a sticking contact (or None), and its stiffness [N/m] (None if rigid)."""
 
     patch: object
     stiffness: float | None
@@ -92,7 +92,7 @@ def _press_contact(model: Model) -> StickingContact:
 
 
 def _assume_slides(modes: tuple, stiffness_per_mass: float) -> tuple:
-    """Return the modes with `slide` assumed where it is not given.
+    """Return the modes; a missing `slide` is set according to the assumed joint stiffness.
 
     stiffness_per_mass: stiffness of the sticking contact over the modal mass [1/s2].
     """

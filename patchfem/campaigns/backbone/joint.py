@@ -33,7 +33,7 @@ HARDENING_END = 3.0
 RELEASE_FACTOR = 1.15
 # First [m] and last [m] amplitude and their number for a linear rig.
 LINEAR_AMPLITUDES = (1e-6, 1e-3, 4)
-# Fraction of the amplitude at which the complete contact slips; at it nothing slips.
+# Fraction of the gross-slip amplitude at which there is no slip at all.
 STUCK_FRACTION = 1e-5
 QUASI_STATIC_ADVICE = "; use --method quasi-static"
 NO_CLOSED_FORM = (
@@ -53,7 +53,7 @@ class StuckMode(NamedTuple):
 
 
 class Joint(NamedTuple):
-    """Mode of a rig together with its contact.
+    """Mode of a rig coupled to its contact.
 
     Attributes
     ----------
@@ -96,7 +96,7 @@ class Joint(NamedTuple):
 
     @property
     def omega(self) -> float:
-        """Circular frequency [rad/s] with the contact stuck; without it if nothing is elastic."""
+        """Angular frequency [rad/s] of the stuck mode, or of the free mode if the former is 0."""
         return self.stuck_mode.omega or self.modes.omega[self.mode]
 
     @property

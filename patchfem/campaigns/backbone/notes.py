@@ -8,7 +8,7 @@ from ...runs.patch import faces
 from .joint import MIN_AMPLITUDE_FACTOR, Joint
 from .records import Curve, match_amplitudes
 
-# Largest amplitude of micro-slip over the amplitude at which the complete contact begins to slip.
+# Largest ratio of an amplitude of micro-slip to the amplitude at the onset of gross slip.
 MAX_MICRO_SLIP_RATIO = 0.3
 # Smallest ratio of a loss to its error with which the loss counts for an exponent.
 MIN_LOSS_RATIO = 4.0

@@ -1,4 +1,4 @@
-"""Quasi-static backbone of a mode, from the friction loops of its own deflection."""
+"""Quasi-static backbone of a mode, from the friction loops of its contact."""
 
 import numpy as np
 
@@ -73,7 +73,7 @@ def _select_rising_part(best, error) -> Curve:
 
 
 def _compute_in_closed_form(joint: Joint, amplitudes) -> Curve | None:
-    """Compute the curve of a single interface in closed form; None if its law has none."""
+    """Compute the curve of a single interface in closed form; None if its law has no closed form."""
     model = joint.model
     modes = joint.modes
     is_soft = (
@@ -93,7 +93,7 @@ def _compute_in_closed_form(joint: Joint, amplitudes) -> Curve | None:
         has_amplitude = np.abs(best[0] / amplitudes - 1) < AMPLITUDE_TOL
         if has_amplitude.all():
             break
-        # The shape at the output differs from that of the stuck mode.
+        # The deflection shape differs from the stuck mode shape, so that the output amplitude is missed.
         slides = slides * amplitudes / best[0]
     has_amplitude = np.abs(best[0] / amplitudes - 1) < AMPLITUDE_TOL
     best = np.where(has_amplitude, best, np.nan)

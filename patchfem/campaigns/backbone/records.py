@@ -48,7 +48,7 @@ class Curve(NamedTuple):
         return self._replace(**columns)
 
     def interpolate(self, amplitudes) -> dict:
-        """Return frequency and damping at amplitudes (k,) [m] by linear interpolation, by name."""
+        """Interpolate frequency and damping linearly at amplitudes (k,) [m]; return a dict by name."""
         names = ("frequency", "damping")
         return {name: np.interp(amplitudes, self.amplitude, getattr(self, name)) for name in names}
 
@@ -105,7 +105,7 @@ class LossExponents(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """Answer of a backbone: the recommended curve with its band, and advice.
+    """Recommended curve of a backbone with its band, and advice on its use.
 
     Attributes
     ----------
@@ -120,7 +120,7 @@ class Answer(NamedTuple):
 
     @property
     def advice(self) -> str:
-        """All sentences joined into one text."""
+        """Advice as one text, joined from its sentences."""
         return " ".join(self.sentences)
 
 

@@ -55,7 +55,7 @@ class RingDown(NamedTuple):
 
 
 class _MotionTable(NamedTuple):
-    """Interpolants of the free motions around an amplitude, over the log amplitude x at the output.
+    """Interpolants of the free motions around an amplitude, over the log output amplitude x.
 
     Each column is an interpolant: log energy [J], log loss per cycle [J], frequency [Hz], and log of the modal
     amplitude [m]; low and high are the limits of x.
@@ -99,7 +99,7 @@ class _MotionRows(NamedTuple):
 
 
 def predict_ring_down(joint: Joint, curve: Curve) -> RingDown | None:
-    """Predict the ring-down for a curve by balance; None if it is known at no amplitude.
+    """Predict the ring-down from a harmonic balance curve; None if no amplitude has a result.
 
     Parameters
     ----------
@@ -203,7 +203,7 @@ def _compute_free_motions(joint: Joint, laws: LawGroup, x, tolerance: float) -> 
 
 
 def _compute_rigid_motions(joint: Joint, curve: Curve, x, tolerance: float) -> _MotionRows:
-    """Compute motions of a rig whose contact stores no energy, from its curve by balance.
+    """Compute motions of a rig whose contact stores no energy, from its harmonic balance curve.
 
     Constant friction does not change the length of a half cycle, which is that of the free mode.
     """
@@ -311,7 +311,7 @@ def _solve_half_cycle(table: _MotionTable, ends: tuple, directions: tuple) -> fl
     scale = np.exp(_extend_energy(table, ends[0]))
 
     def excess(step: float) -> float:
-        """Return the energy given up in a half cycle less its loss, over the energy."""
+        """Return the energy decrease in a half cycle minus the loss, relative to the energy."""
         begin = ends[0] + directions[0] * step
         end = ends[1] + directions[1] * step
         middle = np.log(0.5 * (np.exp(begin) + np.exp(end)))
@@ -323,6 +323,6 @@ def _solve_half_cycle(table: _MotionTable, ends: tuple, directions: tuple) -> fl
 
 
 def _extend_energy(table: _MotionTable, x: float) -> float:
-    """Return the log energy at a log amplitude; beyond the table it has a slope of 2."""
+    """Interpolate the log energy at a log amplitude; extrapolate beyond the table with slope 2."""
     inside = min(max(x, table.low), table.high)
     return float(table.energy(inside)) + 2 * (x - inside)

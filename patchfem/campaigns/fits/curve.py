@@ -161,7 +161,7 @@ def _read_curve_columns(path):
 
 
 class CurveModel:
-    """Computed frequency [Hz] and damping ratio (2, k) of a rig at the measured amplitudes.
+    """Model that computes frequency [Hz] and damping ratio (2, k) of a rig at measured amplitudes.
 
     The methods take the free parameters, and raise PatchfemError if no curve exists for them.
 
@@ -189,7 +189,7 @@ class CurveModel:
         self._cached_curve = lru_cache(N_CACHED_CURVES)(self._compute_uncached)
 
     def compute_curve(self, method: str, values) -> np.ndarray:
-        """Compute the curve (2, k) by a method; NaN at amplitudes where the mode does not oscillate."""
+        """Compute the curve (2, k) by a given backbone method; NaN where the mode does not oscillate."""
         return self._cached_curve(tuple(map(float, values)), method)
 
     def build_model(self, values):
@@ -201,7 +201,7 @@ class CurveModel:
         return _compute_backbone_curve(model, self.distinct, method)[:, self.rows]
 
     def _compute_uncached(self, values: tuple, method: str) -> np.ndarray:
-        """Compute the curve for given free parameters, and report the progress."""
+        """Compute frequency and damping for given free parameters, and report the progress."""
         if self.say and perf_counter() - self.last_progress >= PROGRESS_SECONDS:
             self.last_progress = perf_counter()
             elapsed = self.last_progress - self.begin
@@ -210,7 +210,7 @@ class CurveModel:
         return self.compute_model_curve(self.build_model(values), method)
 
     def choose_methods(self, trials: list) -> None:
-        """Select the methods that can compute a curve, from trial values of the parameters.
+        """Select the backbone methods that succeed for trial values of the free parameters.
 
         The selection is that of the first trial for which the largest number of METHODS succeeds.
         """
@@ -235,12 +235,12 @@ class CurveModel:
             )
         self.methods = best_methods
 
-    def compute_reference(self, values) -> np.ndarray:
-        """Compute the curve by the reference method; NaN where the mode does not oscillate."""
+    def compute_reference_curve(self, values) -> np.ndarray:
+        """Compute frequency and damping by harmonic balance; NaN where the mode does not oscillate."""
         return self.compute_curve(self.methods[0], values)
 
-    def compute_quick(self, values) -> np.ndarray:
-        """Compute the curve by the fast method.
+    def compute_fast_curve(self, values) -> np.ndarray:
+        """Compute frequency and damping (2, k) by the last, i.e. fastest, of the available methods.
 
         Raises PatchfemError if the mode does not oscillate at one of the amplitudes.
         """
@@ -253,13 +253,13 @@ class CurveModel:
             )
         return curve
 
-    def compute_filled_reference(self, values) -> np.ndarray:
-        """Compute the curve by the reference method, and fill its gaps by the fast method.
+    def compute_reference_curve_without_gaps(self, values) -> np.ndarray:
+        """Compute frequency and damping by harmonic balance, with gaps filled by the fast method.
 
         In a gap, the value of the fast method is multiplied by the ratio of both methods at the
         nearest amplitude at which the reference method has a value.
         """
-        curve = self.compute_reference(values)
+        curve = self.compute_reference_curve(values)
         quick = self.compute_curve(self.methods[-1], values)
         known = np.flatnonzero(~np.isnan(curve[0]))
         nearest = known[_find_nearest_amplitudes(self.amplitude[known], self.amplitude)]
@@ -309,29 +309,29 @@ def fit_curve(
     curves = CurveModel(scene, ranges, measured.amplitude, say)
     keys = FreeKeys(scene, ranges)
     problem = keys.make_problem(
-        lambda values: measured.normalized_residual(curves.compute_quick(values))
+        lambda values: measured.normalized_residual(curves.compute_fast_curve(values))
     )
     space = problem.search_space
     other_trials = map(space.to_values, make_space_filling_points(MAX_TRIALS, len(ranges)))
     curves.choose_methods([problem.start, *other_trials])
     if say:
         say(f"{n_amplitudes} amplitudes computed by {' and '.join(curves.methods)}")
-    model = curves.compute_quick
+    model = curves.compute_fast_curve
     if len(curves.methods) > 1:
         models = TwoModels(
-            curves.compute_quick,
-            curves.compute_filled_reference,
+            curves.compute_fast_curve,
+            curves.compute_reference_curve_without_gaps,
             measured.normalized_residual,
             space,
         )
         model, start = _search_two_models(models, problem.start, starts, measured.amplitude)
-        model = model or curves.compute_filled_reference
+        model = model or curves.compute_reference_curve_without_gaps
         problem = replace(problem, start=start)
         starts = 1
     problem = replace(problem, residual=lambda values: measured.normalized_residual(model(values)))
     fit = problem.solve(starts, "series")
     widened = _widen_by_missing_modes(keys.ranges, problem, fit, curves, measured, model)
-    missing = measured.amplitude[np.isnan(curves.compute_reference(fit.values)[0])]
+    missing = measured.amplitude[np.isnan(curves.compute_reference_curve(fit.values)[0])]
     if missing.size:
         keys = replace(keys, notes=[_warn_of_substituted_values(missing)])
     return FittedCurve(
@@ -345,7 +345,7 @@ def fit_curve(
 
 
 def _search_two_models(models: TwoModels, start, starts: int, amplitude) -> tuple:
-    """Search with the corrected fast model; return this model, or None, and the best-fit parameters."""
+    """Fit with the corrected fast model; return this model (or None) and the best-fit parameters."""
     try:
         return models.search(start, starts)
     except NotConverged:
@@ -423,7 +423,7 @@ def _widen_by_missing_modes(
         )
     except PatchfemError as reason:
         return WidenedFit(fit, (f"{NO_MODE_ERROR}: {reason}",))
-    reference = curves.compute_reference(fit.values)
+    reference = curves.compute_reference_curve(fit.values)
     change = np.nan_to_num(richer_curve - reference)
     error = error_of_change(change, ratio=0.5, order=2.0)
     shifted = replace(

@@ -85,7 +85,7 @@ class FittedLoop:
         return float(np.sqrt(np.mean(residual[mask] ** 2)))
 
 
-def fit_loop(
+def fit_hysteresis_loop(
     scene: Scene,
     to: Path,
     free: Sequence,

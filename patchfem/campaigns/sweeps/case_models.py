@@ -133,7 +133,7 @@ class SweepScene:
         return []
 
     def read_axes(self) -> tuple[list, list[str]]:
-        """Return the axes of the table [sweep] and its validation errors; both are [] without it."""
+        """Return the axes of the table [sweep] and its validation errors; both are [] without a table."""
         try:
             return read_sweep_axes(self.text, self.path)
         except SceneError as error:

@@ -24,9 +24,9 @@ MAX_GROUPS = 3
 # CPU time [s] per case to compute the result columns of a batch (0.8 to 1.5 ms, measured on 2000 lumped
 # cases).
 BATCHED_CASE_SECONDS = 1.2e-3
-# Largest number of cases with individual summaries by default.
+# Default maximum number of cases for which individual summaries are written.
 MAX_CASES_WITH_SUMMARY = 1000
-# Largest number of cases with tables by default.
+# Default maximum number of cases for which tables are written.
 MAX_CASES_WITH_TABLES = 200_000
 # Bytes on disk per case: with summaries; with tables, page and result columns (measured on 10 000
 # cases); with result columns only (a million cases).

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ...campaigns.fits.curve import DEFAULT_STARTS, fit_curve, is_damping_curve_file
-from ...campaigns.fits.loop import fit_loop
+from ...campaigns.fits.loop import fit_hysteresis_loop
 from ...campaigns.fits.loop_path import LoopOptions
 from ...campaigns.fits.patch import check_amplitudes, fit_patch
 from ...campaigns.fits.problem import parse_ranges
@@ -125,7 +125,9 @@ def fit_into(
             files = describe_curve_fit(fit, folder.target)
         elif kind == "loop":
             loop_options = LoopOptions(options.offset, options.warm_up)
-            fit = fit_loop(scene, Path(to), free, options.hold, listener.say, loop_options)
+            fit = fit_hysteresis_loop(
+                scene, Path(to), free, options.hold, listener.say, loop_options
+            )
             files = describe_loop_fit(fit, folder.target)
         else:
             coefficient = fit_wear(build(scene), to, free, listener.progress)

@@ -240,7 +240,7 @@ class MotionObserver:
         if ENGINES[self.numerics.engine] is not MARCH:
             return _observe_solution(solve.solve_rig(model, numerics, self.patch, 0, self.report))
 
-        contact, run, *_ = march.march_without_evaluation(
+        contact, run, *_ = march.integrate_without_postprocessing(
             model, numerics, self.patch, 0, self.report
         )
         if run.outcome in UNBOUNDED_OUTCOMES:

@@ -86,12 +86,12 @@ def _slide_over_grooves_in_closed_form(task: SlideTask) -> SlideHistories:
         slope, phi = _evaluate_flank_friction(grooves, law, slide, np.append(0.0, speed))
         ratio = (slope + phi) / (1 - phi * slope)
 
-        def dissipated_force(displacement):
+        def loss_per_displacement(displacement):
             """Return the dissipated energy per displacement [N] at displacements (k - 1,) [m]."""
             slope, phi = _evaluate_flank_friction(grooves, law, displacement, speed)
             return load * phi * (1 + slope**2) / (1 - phi * slope)
 
-        loss = integrate_steps(slide, dissipated_force)
+        loss = integrate_steps(slide, loss_per_displacement)
     rise = load * grooves.height_difference(slide[:-1], slide[1:])
     for sample, sign in find_rest_ends(model, slide).items():
         ratio[sample] = grooves.force_ratio(slide[sample], sign, model.friction.static)
@@ -111,7 +111,7 @@ def _slide_over_grooves_in_closed_form(task: SlideTask) -> SlideHistories:
 
 
 def _find_last_moving_steps(increments) -> np.ndarray:
-    """Return, for each step, the index of the last moving step up to it; -1 if there is none."""
+    """Return for each step the last index up to it with a nonzero increment; -1 if there is none."""
     steps = np.where(increments != 0, np.arange(increments.size), -1)
     return np.maximum.accumulate(steps)
 

@@ -49,7 +49,7 @@ LIST_METHODS = (Method.LIST, Method.LISTS)
 
 @dataclass(frozen=True, slots=True)
 class BenchEngine:
-    """Method of a bench run, with its settings and its cost.
+    """Engine of a bench run: its computation method, settings and predicted cost.
 
     - method: Method.
     - seconds: predicted CPU time per sample [s].

@@ -161,7 +161,7 @@ def list_coarser_runs(model, patches: list, fine_run, steps: int) -> list:
 
 
 def find_bond_sum_error(model, engine) -> float:
-    """Return the error bound of the bond summation relative to the friction limit, or 0 without one."""
+    """Return the error of bond summation relative to the friction limit; 0 without bonds."""
     if engine.method in LIST_METHODS:
         return engine.choice.error
     if engine.method in (Method.STEPPED, Method.PLANE) and needs_bond_list(model.friction):

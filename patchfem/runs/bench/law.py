@@ -61,7 +61,7 @@ def find_rest_ends(model, slide) -> dict:
 
 
 def nodal_element_limit(model, patch):
-    """Return the friction limit (m,) [Pa] at the nodes of parallel elements, otherwise None."""
+    """Return the nodal friction limits (m,) [Pa] of parallel elements; None for other methods."""
     is_element_bench = (
         model.partial_slip
         and model.grooves is None

@@ -99,7 +99,7 @@ def compute_local_slip(model, slide, tau, sigma) -> np.ndarray:
 
 
 def _bond_length(model) -> float:
-    """Return the bond length [m], or 0 for a law without elastic stretch."""
+    """Return the bond length [m]; 0 for a law without elastic stretch."""
     if law_has_trait(model.friction.law, "averaged"):
         return 0.0
     return model.friction.bond_length or 0.0

@@ -151,7 +151,7 @@ def mean_loaded_pressure(patch) -> float:
 
 
 def count_shear_modes(model, patch) -> int | None:
-    """Return the number of shear modes of a bench run with bonds, or None without shear modes."""
+    """Return the number of shear modes of a bench run with bonds; None if it uses none."""
     if (
         not model.partial_slip
         or not law_has_trait(model.friction.law, "bonds")
@@ -162,7 +162,7 @@ def count_shear_modes(model, patch) -> int | None:
 
 
 def make_bond_lists_on_lower_piece(model, patch, choice, shear):
-    """Return the contact model with a bond list at each node, for pressure fixed to the lower piece.
+    """Return the contact model with a bond list per node, for a pressure fixed to the lower piece.
 
     Parameters
     ----------

@@ -85,7 +85,7 @@ def assemble_piece(body, layers: Layers):
 
 
 def piece_compliance(body, piece, ignore_cache: bool) -> InterfaceCompliance:
-    """Return the interface compliance of a piece, from the disk cache if it is there.
+    """Compute the interface compliance of a piece, or read it from the disk cache.
 
     It has the normal, tangential and coupling parts nn, tt and nt.
 

@@ -250,14 +250,14 @@ def merge_interface_sentences(model, list_sentences: Callable) -> list:
     out: dict = {}
     for face in solve_interface_patches(model):
         for text in list_sentences(face):
-            out.setdefault(use_scene_keys(model, text), []).append(face.name)
+            out.setdefault(replace_contact_keys(model, text), []).append(face.name)
     return [
         f"interface{'s' * (len(names) > 1)} {', '.join(names)}: {text}"
         for text, names in out.items()
     ]
 
 
-def use_scene_keys(model, text: str) -> str:
+def replace_contact_keys(model, text: str) -> str:
     """Replace keys of [contact] in a sentence by those of the interface in the scene.
 
     In a model without [contact], they are keys of [structure.interface.contact].

@@ -122,7 +122,7 @@ def condense_on_search_grid(patch_model) -> CondensedPair:
 
 
 class BaseGrids(NamedTuple):
-    """Coarsest grids of the pieces of a patch, graded to its contact.
+    """Coarsest grids of the pieces of a patch, graded towards the contact region.
 
     There is a single grid if the pieces are identical.
 
@@ -134,7 +134,7 @@ class BaseGrids(NamedTuple):
 
 
 def make_base_grids(patch_model) -> BaseGrids:
-    """Return the coarsest grids of a `PatchModel`, graded to its contact region.
+    """Return the coarsest grids of a `PatchModel`, graded towards its contact region.
 
     The result is cached, because the plan of a run and the run itself use the same grids.
     """
@@ -144,7 +144,7 @@ def make_base_grids(patch_model) -> BaseGrids:
 
 
 def _search_contact(patch_model) -> BaseGrids:
-    """Search for the contact region on grids that are graded to the previous result.
+    """Search for the contact region on grids that are graded towards the previous result.
 
     If a varying load moves the contact edges, the columns are short wherever the edges lie between
     LOAD_RANGE_FACTORS times the load. If wear moves them, no column is longer than
@@ -235,7 +235,7 @@ def make_search_layout(patch_model) -> Layout:
 
 
 def make_column_layout(patch_model, extents: list) -> Layout:
-    """Return the column layout of the coarsest mesh, graded to given contacts.
+    """Return the column layout of the coarsest mesh, graded towards given contact regions.
 
     extents: ContactExtents of one patch under several loads, or of several patches.
     """

@@ -88,8 +88,8 @@ def extrapolate_to_zero_cell_length(values, nested: bool = True) -> Limit:
         np.maximum(last_size / (MAX_RATIO - 1), previous_size / MAX_RATIO**2 * 2),
         np.maximum(last_size, previous_size / MAX_RATIO),
     )
-    # The error of the extrapolated value is the change of this value by the last mesh, but at least
-    # a quarter of the remainder.
+    # The error of the extrapolated value is its change due to the last refinement, but at least a
+    # quarter of the remainder.
     extrapolated = finest + remainder
     extrapolated_error = np.abs(remainder) / np.where(ratio >= MIN_REGULAR_RATIO, 4, 2)
     if len(values) < 4:

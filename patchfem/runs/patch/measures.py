@@ -26,7 +26,7 @@ from .values import (
     compute_static_values,
     edge_cell_lengths,
     open_rounded_length,
-    unresolved_rounding_pressure,
+    unresolved_edge_rounding_pressure,
 )
 
 # Smallest width/height of a piece for plane strain without doubt; the inverse holds for plane
@@ -112,7 +112,7 @@ def estimate_static_measures(
         fine, [patch for patch in coarse if patch is not None]
     )
     if coarse and finest["normal_load"] > 0:
-        missed_peak = unresolved_rounding_pressure(fine)
+        missed_peak = unresolved_edge_rounding_pressure(fine)
         estimates = extrapolate_static_measures(
             [*(compute_static_values(patch) for patch in reversed(coarse)), finest],
             estimate_hidden_errors(_compute_patch_resolution(fine, missed_peak), finest),
@@ -205,7 +205,9 @@ def _widen_errors_by_corner_pressure(measures_by_name: dict, fine: Patch, coarse
     error = pressure + CORNER_RISE_FACTOR * abs(pressure - coarse_pressure) - peak.value
     if not pressure or error <= peak.error:
         return {}
-    fraction_error = widen_error_by_peak_error(fraction.value, fraction.error, error / peak.value)
+    fraction_error = increase_error_by_peak_error(
+        fraction.value, fraction.error, error / peak.value
+    )
     return {
         "pressure_peak": replace(peak, error=float(error)),
         "loaded_fraction": replace(fraction, error=float(fraction_error)),
@@ -265,13 +267,13 @@ def extrapolate_static_measures(
         out = dict(zip(names, map(Estimate, best, error, best != series_values[-1])))
         peak, fraction = (out[name] for name in PEAK_MEASURES)
         relative = np.where(peak.value > 0, peak.error / peak.value, 0.0)
-        fraction_error = widen_error_by_peak_error(fraction.value, fraction.error, relative)
+        fraction_error = increase_error_by_peak_error(fraction.value, fraction.error, relative)
         out["loaded_fraction"] = fraction._replace(error=fraction_error)
     return out
 
 
-def widen_error_by_peak_error(fraction, error, relative_peak_error):
-    """Increase the error of loaded fractions to at least that caused by the error of the peak.
+def increase_error_by_peak_error(fraction, error, relative_peak_error):
+    """Increase the error of a loaded fraction to at least the part due to the peak pressure.
 
     A loaded fraction is the mean pressure divided by the peak pressure, so that both have the same
     relative error.
@@ -408,7 +410,7 @@ def compute_contact_resolution(pair, pieces, force, gap_range, can_rotate: bool)
 def _compute_patch_resolution(patch: Patch, missed_peak: float) -> Resolution:
     """Return how well the mesh of a solved patch resolves its contact.
 
-    missed_peak: pressure [Pa] from `unresolved_rounding_pressure`.
+    missed_peak: pressure [Pa] from `unresolved_edge_rounding_pressure`.
     """
     force = patch.pressure.sigma_n * patch.pieces.interface.weight
     can_rotate = "moment_balance" in patch.pressure.residuals
@@ -539,7 +541,7 @@ def _wedge_indentation_pressure(patch: Patch) -> float:
 
 
 def note_on_plane_state(patch_model, patch: Patch) -> list:
-    """Return a note, as a list, on the model error due to assuming plane strain or plane stress.
+    """Return a list with a note on the model error due to assuming plane strain or plane stress.
 
     The list is empty for a piece in plane strain that is far wider than tall, and for one in plane
     stress that is far taller than wide. No mesh refinement reduces this error.
@@ -589,7 +591,7 @@ def _describe_plane_state(patch_model) -> str:
 
 
 def note_on_plane_state_changes(patch_model, own_values: dict, other_values: dict) -> list:
-    """Return a note, as a list, on how the opposite plane state would change the measures.
+    """Return a list with a note on how the opposite plane state would change the measures.
 
     Parameters
     ----------

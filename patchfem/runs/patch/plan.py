@@ -183,7 +183,7 @@ def predict_contact_cost(patch_model, tolerance: float) -> Cost:
 
 
 def stiffness_chain(patch_model) -> dict:
-    """Return the stiffnesses [N/m] in series between holder and interface of a patch, by name.
+    """Return a dict of the stiffnesses [N/m] in series between holder and interface of a patch.
 
     An element that is not in the scene is "rigid".
     """
@@ -231,7 +231,7 @@ def compute_groups(model: Model) -> dict:
 
 
 def describe_interface_patch(name: str, interface) -> list:
-    """Return the sentences of a plan on the patch of an interface.
+    """Describe the patch of an interface in sentences for a plan.
 
     name: nodes of the interface.
     """
@@ -262,7 +262,7 @@ def describe_assembly(patch_model) -> str:
 
 
 def describe_patch_plan(dimensionless_groups: dict, patch_model) -> list:
-    """Return the sentences of a plan on tilt, asperity layer and assembly of a patch.
+    """Describe tilt, asperity layer and assembly of a patch in sentences for a plan.
 
     The tilt is compared with the opening tilt for flat pieces only.
     """
@@ -279,7 +279,7 @@ def describe_patch_plan(dimensionless_groups: dict, patch_model) -> list:
 
 
 def _describe_tilt(dimensionless_groups: dict, patch_model) -> list:
-    """Return a sentence, as a list, on the tilt relative to the tilt at which the contact opens."""
+    """Return a list with a sentence on the tilt relative to the tilt at which the contact opens."""
     tilt = dimensionless_groups.get("tilt_over_first_opening")
     gap = patch_model.gap
     if tilt is None:

@@ -414,7 +414,7 @@ class StripForceSolver:
 def solve_contact(
     patch_model, pieces: Compliance, gap, added=None, warm_start=None
 ) -> SolvedContact:
-    """Solve the contact problem of condensed pieces with the skin, load and holder of a model.
+    """Solve the contact of condensed pieces with the asperity layer, load and holder of a model.
 
     Parameters
     ----------
@@ -443,7 +443,9 @@ def solve_contact(
             pieces, *strip_press.solve_strip_contact(patch_model, pieces, gap, added, warm_start)
         )
     if skin is not None and skin.law != "linear":
-        return SolvedContact(*skin_press.solve_contact_through_asperities(patch_model, pieces, gap))
+        return SolvedContact(
+            *skin_press.solve_contact_with_asperity_layer(patch_model, pieces, gap)
+        )
     pieces = add_linear_skin_compliance(skin, pieces)
     angle = patch_model.gap.angle
     if loading.approach is not None:

@@ -35,7 +35,7 @@ from .measures import (
     Resolution,
     estimate_hidden_errors,
     extrapolate_static_measures,
-    widen_error_by_peak_error,
+    increase_error_by_peak_error,
 )
 from .press import PointSolution, Surface
 from .values import assemble_static_values, estimate_peak_pressures
@@ -43,7 +43,7 @@ from .values import assemble_static_values, estimate_peak_pressures
 MIN_LEVELS = 3  # Smallest number of refinement levels at which the order of convergence is known.
 # Largest number of points of a level; more would exceed the CPU time of a patch.
 MAX_POINTS = 60_000
-# Largest product of iterations and points of a level, limited for the same reason.
+# Largest product of iterations and points of a level, to limit the CPU time.
 MAX_WORK = 2.5e7
 MIN_POINTS = 500  # Smallest number of points of the coarsest level.
 # Ratio of the cell length at the ends to the length of the interface, on level 0.
@@ -174,7 +174,7 @@ def solve_on_points(patch_model, meets_tolerance) -> PointSolution | None:
 
 
 def predict_seconds(patch_model) -> float:
-    """Predict the CPU time [s] of `solve_on_points`, if only MAX_POINTS ends the refinement."""
+    """Predict the CPU time [s] of `solve_on_points` if it refines up to MAX_POINTS."""
     count = _count_first_level_points(patch_model)
     points = [count] * MIN_LEVELS
     while 2 * points[-1] <= MAX_POINTS:
@@ -217,7 +217,7 @@ def _combine_refinement_series(end_levels: list, point_levels: list) -> dict:
         # The loaded fraction is the mean pressure divided by the peak.
         mean = finest.values["loaded_fraction"] * finest.values["pressure_peak"]
         fraction = mean / peak.value
-        error = widen_error_by_peak_error(fraction, 0.0, peak.error / peak.value)
+        error = increase_error_by_peak_error(fraction, 0.0, peak.error / peak.value)
         out["loaded_fraction"] = Estimate(float(fraction), float(error))
     return out
 

@@ -110,7 +110,7 @@ def static_measures(model, patch, coarse) -> dict:
 
 
 def measure_floors(patch_model, tolerance: float, values: dict) -> dict:
-    """Return the error floors of the static measures by name, for one patch or for q patches.
+    """Return a dict of the error floors of the static measures, for one patch or for q patches.
 
     The floor of a measure that is a difference of larger terms is the tolerance times these terms:
     rotation times half the length for the approach, half the length for the centre of pressure, and
@@ -335,7 +335,7 @@ def _describe_results_on_mesh(model, patch) -> str:
 
 
 def note_on_normal_shear_coupling(patch_model, patch) -> list:
-    """Return a note, as a list, on the coupling of normal and shear displacement of dissimilar pieces.
+    """Return a list with a note on the coupling of normal and shear displacement of dissimilar pieces.
 
     The surfaces of dissimilar pieces slide on each other under pressure. If they stick, shear stresses
     prevent this sliding and stiffen the contact.

@@ -57,7 +57,7 @@ def asperity_layer_stiffness(patch_model, pressure: float) -> float:
 
 
 def note_on_asperity_stiffness(patch_model, pressure: float) -> list:
-    """Return a note, as a list, on how reliable the stiffness of Hertzian asperities is.
+    """Return a list with a note on how reliable the stiffness of Hertzian asperities is.
 
     The list is empty unless the asperities come from a profile or from rms values. pressure: mean
     pressure [Pa].
@@ -120,7 +120,7 @@ def cut_off_negligible_pressure(pressure) -> np.ndarray:
     return np.where(pressure > MIN_RELATIVE_PRESSURE * pressure.max(), pressure, 0.0)
 
 
-def solve_contact_through_asperities(patch_model, pieces: Compliance, gap) -> tuple:
+def solve_contact_with_asperity_layer(patch_model, pieces: Compliance, gap) -> tuple:
     """Solve the contact of two pieces with a smooth asperity layer between them.
 
     The gap of the ContactState is the separation of the mean planes; it is negative where the layer

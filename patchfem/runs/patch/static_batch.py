@@ -124,7 +124,7 @@ class BatchSolution(NamedTuple):
         return self.levels[0].pressure.sigma_n.max(axis=1)
 
     def plane_sentences(self, patch_model, case: int) -> list:
-        """Return a note, as a list, on the plane state of one patch of the batch."""
+        """Return a list with a note on the plane state of one patch of the batch."""
         if not self.plane_values:
             return []
         own_values, other_values = (

@@ -116,7 +116,7 @@ def choose_shared_meshes(
         bodies = grids.make_grids(patch_model, layout.scale_cells(cell_factor))
         if cell_factors:
             unscaled_bodies = unscaled_bodies or grids.make_grids(patch_model, layout)
-            # Both layouts have the largest number of columns.
+            # Both layouts already have the maximum allowed number of columns.
             if bodies[0].x.size >= unscaled_bodies[0].x.size:
                 continue
         pairs, error_ratio = _refine_until_tolerance_is_met(

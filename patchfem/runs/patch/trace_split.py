@@ -43,7 +43,7 @@ class TraceSplit:
     tables: str
 
     def describe(self, *, is_cutoff_given: bool = False, is_scene_written: bool = False) -> str:
-        """Return a text of several lines on the split, its validity and its scene tables."""
+        """Return a multi-line summary of the trace split, its validity and its scene tables."""
         cutoff = format_length(self.cutoff)
         reason = (
             f"under {format_quantity(self.pressure, 'Pa', 3)} the contact on a shorter wave is shorter than an element "
@@ -145,7 +145,7 @@ def split_trace(
 
 
 def _level_trace(patch_model, element: float) -> Profile:
-    """Return the trace of a patch, levelled over its length; element: length [m] that may be missing."""
+    """Return the trace of a patch, levelled over its length; up to `element` [m] may be missing."""
     ends = np.array([-0.5, 0.5]) * patch_model.pieces.length
     return profile.level_profile(patch_model.gap.profile, ends, element, is_material=False).profile
 

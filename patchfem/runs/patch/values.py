@@ -88,7 +88,7 @@ def _parabola_vertices(x, sigma, peak_node) -> np.ndarray:
 
 
 def _extrapolate_pressure_to_ends(x, sigma) -> np.ndarray:
-    """Extrapolate nodal pressures, which are cell means, to the end of the interface (q,) [Pa].
+    """Extrapolate cell-averaged nodal pressures to the ends of the interface; return (q,) [Pa].
 
     The curve with these means is a parabola if three nodes are loaded, or a line if two are.
     """
@@ -260,8 +260,8 @@ def edge_cell_lengths(x, active) -> np.ndarray:
     return np.diff(x)[active[1:] != active[:-1]]
 
 
-def unresolved_rounding_pressure(patch: Patch) -> float:
-    """Return the largest pressure [Pa] at rounded ends that the mesh does not resolve, or 0.
+def unresolved_edge_rounding_pressure(patch: Patch) -> float:
+    """Return the peak pressure [Pa] at rounded ends that the mesh does not resolve; 0 if it does.
 
     On a mesh that does not resolve the rounding, the cells at the contact edge carry the pressure
     of a sharp end, K = sigma_n sqrt(cell). The peak on the rounding then follows from

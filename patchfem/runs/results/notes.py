@@ -27,7 +27,7 @@ MAX_PROPOSED_HARMONICS = 500
 
 
 def note_on_groove_slope(model, patch) -> list:
-    """Return a note, as a list, on grooves under pieces that are compliant in shear.
+    """Return a list with a note on grooves under pieces that are compliant in shear.
 
     All points take the slope of the grooves at the displacement of the holders. The note reports
     how far a point may be from this displacement.
@@ -46,7 +46,7 @@ def note_on_groove_slope(model, patch) -> list:
 
 
 def note_on_heating(model, patch, response, work: float | None = None) -> list:
-    """Return a note, as a list, on the rise of the surface temperature in a run.
+    """Return a list with a note on the rise of the surface temperature in a run.
 
     The list is empty if the scene does not ask for the note.
 
@@ -69,7 +69,7 @@ def note_on_heating(model, patch, response, work: float | None = None) -> list:
 
 
 def warn_of_unformed_bonds(law, speed: float) -> list:
-    """Return a warning, as a list, if bonds of the printed law break before they have formed.
+    """Return a list with a warning if bonds of the printed law break before they have formed.
 
     speed: peak speed [m/s].
     """
@@ -89,7 +89,7 @@ def warn_of_unformed_bonds(law, speed: float) -> list:
 
 
 def warn_of_creep(law, outcome, measures: dict) -> list:
-    """Return a warning, as a list, if the mean position of a bounded motion drifts.
+    """Return a list with a warning if the mean position of a bounded motion drifts.
 
     The drift (Dahl's creep) is a property of the law, not of the joint.
 
@@ -113,7 +113,7 @@ def warn_of_creep(law, outcome, measures: dict) -> list:
 
 
 def warn_of_unbounded_bonds(law) -> list:
-    """Return a warning, as a list, if initial bonds of negative order have an infinite traction.
+    """Return a list with a warning if initial bonds of negative order have an infinite traction.
 
     Their traction is infinite at the first instant. Bonds that form later carry at most the
     fraction P(p + 1, R/eps_0) of mu_s N, with or without growth.
@@ -157,7 +157,7 @@ def note_on_growth(law, peak: float | None) -> list:
 
 
 def warn_of_work_check(values: dict, steps: int | None, harmonics: int | None = None) -> list:
-    """Return a warning, as a list, if the friction works from samples and from energies differ.
+    """Return a list with a warning if the friction works from samples and from energies differ.
 
     The trapezoidal rule for the samples is of second order. A difference below the error of the
     rule may be small by chance, so that the larger of both is used.
@@ -202,7 +202,7 @@ def advise_harmonics(n_harmonics: int, n_law_harmonics: float = 0.0) -> str:
 
 
 def note_on_surface_temperature(model, patch, work: float, duration: float) -> list:
-    """Return a note, as a list, on the rise of the surface temperature due to frictional heating.
+    """Return a list with a note on the rise of the surface temperature due to frictional heating.
 
     All heat is assumed to flow through the loaded area into a single half-space of the substrate;
     two identical pieces would warm by half as much. The list is empty without loaded area or motion.

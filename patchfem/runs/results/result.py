@@ -149,7 +149,7 @@ class SlipRule(NamedTuple):
     starts_at_rest: bool = False
 
 
-GRADUAL_SLIP = SlipRule()  # rule of a law without friction limit, after earlier cycles
+GRADUAL_SLIP = SlipRule()  # slip rule, after earlier cycles, of a law without friction limit
 
 
 def make_interface_frames(patch, time, tau, node_slip, slide, rule=GRADUAL_SLIP) -> dict:
@@ -237,7 +237,7 @@ def remove_unknown_errors(measures: dict, estimate: bool) -> dict:
 
 
 def collect_used_settings(result) -> dict:
-    """Return the numerical settings that a run used, by name.
+    """Return a dict of the numerical settings that a run used.
 
     These are the engine, the steps per cycle or the step tolerance, cycles and window, shear modes
     or elements of the pieces, the summation method for bonds, nodes and strips of the patch, and
@@ -272,8 +272,8 @@ def collect_used_settings(result) -> dict:
     return settings
 
 
-def measure_engines(result) -> dict:
-    """Return the engine or method that computed each measure of a run, by measure name.
+def engine_by_measure(result) -> dict:
+    """Return a dict of the engine or method that computed each measure of a run.
 
     For static measures of a patch it is the method on its meshes (`patch_rows`), for all others the
     engine of the run.

@@ -30,7 +30,7 @@ def measure_contact_length(patch) -> float:
 
 
 def warn_of_large_slide(patch, slide) -> list:
-    """Return a warning, as a list, if the displacement is large compared with the contact length.
+    """Return a list with a warning if the displacement is large compared with the contact length.
 
     slide: relative displacement (k,) [m].
     """

@@ -65,8 +65,11 @@ def choose_bond_summation(model: Model, numerics: Numerics):
     of all bonds would need too much memory. For a block held by the printed law it is reduced to
     STICKING_STROKE_RATIO.
     """
-    return numerics.choice or _choose_for_engine(
-        model, numerics, _estimate_stretch(model), bench_engine.find_requested_engine(model)
+    return numerics.choice or _choose_summation_for_engine(
+        model,
+        numerics,
+        _estimate_held_displacement(model),
+        bench_engine.find_requested_engine(model),
     )
 
 
@@ -80,7 +83,7 @@ def has_bond_list(model: Model, numerics: Numerics) -> bool:
     )
 
 
-def _choose_for_engine(model: Model, numerics: Numerics, stretch: float, engine: str):
+def _choose_summation_for_engine(model: Model, numerics: Numerics, stretch: float, engine: str):
     """Choose the bond summation for the requested engine, which may be "auto".
 
     `stretch` is the displacement of a block held by its bonds, in bond lengths.
@@ -100,8 +103,8 @@ def _choose_for_engine(model: Model, numerics: Numerics, stretch: float, engine:
     return engines.choose_engine(law, accuracy.tolerance, stroke, numerics.steps / 2, requested)
 
 
-def _estimate_stretch(model: Model, min_ratio: float = MIN_STUCK_RATIO) -> float:
-    """Return the displacement of a driven block that its bonds hold, in bond lengths.
+def _estimate_held_displacement(model: Model, min_ratio: float = MIN_STUCK_RATIO) -> float:
+    """Return the displacement, in bond lengths, of a driven block that sticks on its bonds.
 
     The stiffness of the bonds is mu_s N/eps_0. The result is inf if the friction limit is below
     `min_ratio` times the holding force, or if the printed law gives the bonds no stiffness.
@@ -127,7 +130,7 @@ def count_step_halvings(model: Model) -> int:
     f = model.friction
     if f is None or not law_has_trait(f.law, "bonds") or model.accuracy.steps_per_cycle is not None:
         return 0
-    stretch = _estimate_stretch(model)
+    stretch = _estimate_held_displacement(model)
     if stretch == inf or stretch**2 / 2 < MIN_SLIP_LENGTHS:
         return 0
     max_frequency = max(
@@ -148,7 +151,7 @@ def _find_bond_frequency(model: Model) -> float:
 
 
 def find_holding_ratio(model: Model, acceleration: float | None = None) -> float:
-    """Return the ratio of friction limit to holding force for bonds without stiffness, otherwise 0.
+    """Return friction limit over holding force for bonds without stiffness; 0 for other bonds.
 
     The printed law reaches its limit at any stroke, and bonds of order 0 have the same force at any
     stretch. A released block is loaded by its spring alone. With a growing bond list it either
@@ -175,7 +178,7 @@ def find_holding_ratio(model: Model, acceleration: float | None = None) -> float
     return f.static * model.nominal_load / holding_force if holding_force else inf
 
 
-def find_min_growing_ratio(model: Model) -> float:
+def find_min_list_growth_ratio(model: Model) -> float:
     """Return the smallest holding ratio at which a bond list grows in every step.
 
     It is 1 for a driven block if each step leaves a permanent strip, i.e. if the bonds grow or have
@@ -188,7 +191,7 @@ def find_min_growing_ratio(model: Model) -> float:
 
 
 def is_stuck_by_printed_law(model: Model) -> bool:
-    """Return whether the printed law holds a driven block.
+    """Return whether the friction law as printed in the report holds a driven block at rest.
 
     The block then reverses in almost every step, and each reversal adds a strip to its list.
     """
@@ -207,10 +210,10 @@ def is_stuck_after_release(model: Model) -> bool:
 
 def is_stuck_without_stiffness(model: Model) -> bool:
     """Return whether bonds of order 0, which have no stiffness, hold the block."""
-    return is_list_growing(model) and model.friction.reading != "report"
+    return is_bond_list_growing(model) and model.friction.reading != "report"
 
 
-def is_list_growing(model: Model) -> bool:
+def is_bond_list_growing(model: Model) -> bool:
     """Return whether the bond list gets a new entry in almost every time step.
 
     This is the case if a law without stiffness holds the block at some time of the run (see
@@ -219,7 +222,7 @@ def is_list_growing(model: Model) -> bool:
     if model.partial_slip:
         return False
     holding_ratio = find_holding_ratio(model, find_min_drive_acceleration(model.rig))
-    return holding_ratio > 0 and holding_ratio >= find_min_growing_ratio(model)
+    return holding_ratio > 0 and holding_ratio >= find_min_list_growth_ratio(model)
 
 
 def find_min_drive_acceleration(rig) -> float:
@@ -282,7 +285,7 @@ def _compute_constraint_force(rig, omega: float, accelerations, slides) -> float
         return inf
 
 
-def is_list_too_long(model: Model, numerics: Numerics, counters: dict) -> bool:
+def is_bond_list_too_long(model: Model, numerics: Numerics, counters: dict) -> bool:
     """Return whether the bond list is too long to halve the time step once more.
 
     This is the case if it gets a strip every few steps. Bonds that grow leave a strip in each step
@@ -299,7 +302,7 @@ def is_list_too_long(model: Model, numerics: Numerics, counters: dict) -> bool:
     if strips <= MIN_LONG_LIST or model.bonds.reading != "report":
         return False
     if sum_form(model.bonds) == FORM_REPORT_GROWING:
-        return is_list_growing(model)
+        return is_bond_list_growing(model)
     return strips > MAX_STRIPS_PER_STEP * numerics.cycles * numerics.steps
 
 
@@ -327,19 +330,21 @@ class ListCost(NamedTuple):
     seconds: float
 
 
-def estimate_list_cost(model: Model, numerics: Numerics) -> ListCost:
+def estimate_bond_list_cost(model: Model, numerics: Numerics) -> ListCost:
     """Predict the length of a bond list and the CPU time [s] of its run.
 
     A list that grows in every step contains all strips. Its CPU time is known within a factor of
-    about 12, because the number of iterations per step depends on the motion. `ListGuard` stops a
+    about 12, because the number of iterations per step depends on the motion. `BondListGuard` stops a
     run that takes too long.
     """
     steps = numerics.cycles * numerics.steps
-    if is_list_growing(model):
+    if is_bond_list_growing(model):
         return ListCost(steps, GROWING_STEP_SECONDS * steps**2 / 2)
     choice = choose_bond_summation(model, numerics)
     if choice.engine != "recursion" and numerics.choice is None:
-        choice = _choose_for_engine(model, numerics, _estimate_stretch(model, 1.0), choice.engine)
+        choice = _choose_summation_for_engine(
+            model, numerics, _estimate_held_displacement(model, 1.0), choice.engine
+        )
     max_strips = 8 * steps
     if choice.tail:
         max_strips = 2 * steps * max(1.0, choice.strips)
@@ -349,8 +354,8 @@ def estimate_list_cost(model: Model, numerics: Numerics) -> ListCost:
     return ListCost(strips, n_lists * steps * choice.seconds * fraction)
 
 
-class ListGuard:
-    """Progress callback that stops a march whose bond list takes too much CPU time.
+class BondListGuard:
+    """Progress callback that stops a time integration whose bond list takes too much CPU time.
 
     The cost per step does not decrease, because a list never becomes shorter. Therefore the whole
     run takes at least the elapsed time divided by the completed fraction.
@@ -362,7 +367,7 @@ class ListGuard:
         self.start = None
 
     def __call__(self, fraction: float) -> None:
-        """Report the completed fraction of the steps, and stop a march that takes too long.
+        """Report the completed fraction of the steps, and stop an integration that takes too long.
 
         Raises
         ------
@@ -411,7 +416,7 @@ def refuse_unresolved_bond_vibration(model: Model, numerics: Numerics) -> None:
         )
 
 
-def refuse_long_list(model: Model, numerics: Numerics) -> None:
+def refuse_long_bond_list(model: Model, numerics: Numerics) -> None:
     """Raise Missing if the sum over a bond list would take too much CPU time.
 
     The CPU time of a growing list is uncertain; its run is stopped only when it takes too long.
@@ -420,6 +425,6 @@ def refuse_long_list(model: Model, numerics: Numerics) -> None:
         return
     if not model.partial_slip:
         refuse_unresolved_bond_vibration(model, numerics)
-    entries, seconds = estimate_list_cost(model, numerics)
-    if seconds > MAX_LIST_SECONDS and not is_list_growing(model):
+    entries, seconds = estimate_bond_list_cost(model, numerics)
+    if seconds > MAX_LIST_SECONDS and not is_bond_list_growing(model):
         raise Missing(_describe_long_list(seconds, entries), "")

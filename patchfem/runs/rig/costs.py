@@ -129,7 +129,7 @@ def required_steps_per_cycle(model: Model) -> int:
 
 
 def steps_per_cycle(model: Model) -> int:
-    """Return the number of steps per cycle of a march, from the scene or else from the tolerance.
+    """Return the steps per cycle of a time integration, from the scene or else from the tolerance.
 
     The tolerance selects between 100 and MAX_MARCH_STEPS steps.
     """
@@ -138,7 +138,7 @@ def steps_per_cycle(model: Model) -> int:
     )
 
 
-def count_merges(model: Model) -> int:
+def count_cell_merges(model: Model) -> int:
     """Return how many times neighbouring slider cells are merged in pairs for the first run.
 
     The error is proportional to the square of the cell width. If it exceeds the tolerance, the run
@@ -156,12 +156,12 @@ def count_merges(model: Model) -> int:
 
 
 def find_interface_load(model: Model, interface) -> float:
-    """Return the normal load [N] on an interface; default: that of the whole model."""
+    """Return the normal load [N] on an interface (default: on the whole model)."""
     return model.nominal_load if interface.load is None else interface.load
 
 
 @lru_cache(8)
-def estimate_elements(model: Model) -> tuple:
+def estimate_element_count_and_stiffness(model: Model) -> tuple:
     """Estimate the number of friction elements and the largest stiffness in stick [N/m].
 
     A rigid element has no spring and counts with stiffness 0.
@@ -175,7 +175,7 @@ def estimate_elements(model: Model) -> tuple:
             n_elements = 1
         else:
             element = record.make_law(interface.numbers, load).element(load)
-            n_elements = int(element.numbers[1]) >> count_merges(model)
+            n_elements = int(element.numbers[1]) >> count_cell_merges(model)
             stiffness = float(element.numbers[2 : 2 + int(element.numbers[1])].sum())
         if model.partial_slip or interface.partial_slip:
             patch = interface.patch or model.patch
@@ -200,7 +200,7 @@ def count_intervals_by_cause(model: Model) -> tuple:
     """
     modes = model.rig.modes
     drive = model.rig.drive.signal
-    count, stiff = estimate_elements(model)
+    count, stiff = estimate_element_count_and_stiffness(model)
     modal = modal_system.make_modal_system(modes)
     n_interfaces = len(modal.interfaces)
     damping = modal.damping_norm
@@ -216,7 +216,7 @@ def count_intervals_by_cause(model: Model) -> tuple:
     return vibration, events
 
 
-def estimate_max_exact_seconds(model: Model) -> float:
+def estimate_max_event_driven_seconds(model: Model) -> float:
     """Return an upper estimate of the CPU time [s] of an event-driven run.
 
     All elements are assumed to stick all the time. The choice of an engine is based on this
@@ -237,13 +237,13 @@ def _estimate_extra_interval_seconds(model: Model) -> float:
     ) + cost_model.PIECE_INTERFACE_SECONDS * max(0, len(modes.interfaces) - 1)
 
 
-def estimate_exact_seconds(model: Model) -> float:
+def estimate_event_driven_seconds(model: Model) -> float:
     """Estimate the CPU time [s] of an event-driven run.
 
     The intervals due to vibration count only for the expected fraction of time in stick.
     """
     rig = model.rig
-    count, stiff = estimate_elements(model)
+    count, stiff = estimate_element_count_and_stiffness(model)
     laws = rig.friction.interfaces
     limit = sum(law.numbers.static * find_interface_load(model, law) for law in laws)
     drive_force = rig.drive.force or rig.first_mode.mass * find_max_acceleration(rig.drive.signal)
@@ -263,8 +263,8 @@ def estimate_exact_seconds(model: Model) -> float:
 
 
 def estimate_march_seconds(model: Model) -> float:
-    """Estimate the CPU time [s] of a march and the coarse runs of its error estimate."""
-    count = estimate_elements(model)[0]
+    """Estimate the CPU time [s] of a time integration and of the coarse runs for its error."""
+    count = estimate_element_count_and_stiffness(model)[0]
     n_interfaces = len(model.rig.friction.interfaces)
     step = cost_model.STEP_SECONDS + cost_model.STEP_ELEMENT_SECONDS * count
     return (
@@ -274,8 +274,8 @@ def estimate_march_seconds(model: Model) -> float:
     )
 
 
-def reason_to_march_events(model: Model) -> str:
-    """Return the reason to march instead of solving from event to event, or "".
+def explain_time_steps_over_events(model: Model) -> str:
+    """Return why time integration is chosen over the event-driven engine, or "" if it is not.
 
     The reason is that the events cost more CPU time than a march, and more than an exact solution
     is worth.
@@ -284,24 +284,24 @@ def reason_to_march_events(model: Model) -> str:
         max_seconds = MAX_EXACT_SECONDS_UNRESOLVED
     else:
         max_seconds = max(MAX_EXACT_SECONDS_OVER_MARCH, estimate_march_seconds(model))
-    if estimate_max_exact_seconds(model) <= max_seconds:
+    if estimate_max_event_driven_seconds(model) <= max_seconds:
         return ""
     return "time steps are faster than the exact solution"
 
 
-def reason_to_march_elements(model: Model) -> str:
-    """Return the reason to march with friction elements instead of solving exactly, or "".
+def explain_time_steps_over_element_events(model: Model) -> str:
+    """Return why time integration is chosen for elastic-plastic elements, or "" if it is not.
 
-    The reason is a fixed number of steps in the scene, or that of `reason_to_march_events`.
+    The reason is a fixed number of steps in the scene, or that of `explain_time_steps_over_events`.
     """
     if model.accuracy.steps_per_cycle is not None:
         return "accuracy.steps_per_cycle is set"
-    return reason_to_march_events(model)
+    return explain_time_steps_over_events(model)
 
 
-def refuse_long_exact_run(model: Model, numerics=None) -> None:
+def refuse_long_event_driven_run(model: Model, numerics=None) -> None:
     """Raise Missing if an event-driven run would take more than the allowed CPU time."""
-    seconds = estimate_max_exact_seconds(model)
+    seconds = estimate_max_event_driven_seconds(model)
     if seconds > MAX_EXACT_SECONDS:
         march = ', or use accuracy.method = "march"' * (estimate_march_seconds(model) < seconds)
         raise Missing(
@@ -313,7 +313,7 @@ def refuse_long_exact_run(model: Model, numerics=None) -> None:
         )
 
 
-def predict_exact_cost(model: Model, numerics, n_points: int) -> Cost:
+def predict_event_driven_cost(model: Model, numerics, n_points: int) -> Cost:
     """Predict the cost of an event-driven run.
 
     Parameters
@@ -325,11 +325,11 @@ def predict_exact_cost(model: Model, numerics, n_points: int) -> Cost:
     """
     steps = int(intervals_per_cycle(model) * numerics.cycles)
     times = {
-        "motion": estimate_exact_seconds(model),
+        "motion": estimate_event_driven_seconds(model),
         "histories": cost_model.KEPT_EVENT_SAMPLE_SECONDS * count_stored_samples(numerics),
     }
     code = EVENT_CODE if model.rig.friction.interfaces else LINEAR_CODE
-    if _estimate_interpreted_seconds(model) <= compiled.MAX_PYTHON_SECONDS:
+    if _estimate_python_loop_seconds(model) <= compiled.MAX_PYTHON_SECONDS:
         # A run in interpreted Python takes 86 MB without compiled code, and 152 MB with it, because
         # compiled code loads the LLVM library.
         if not _is_event_loop_cached(model):
@@ -340,13 +340,13 @@ def predict_exact_cost(model: Model, numerics, n_points: int) -> Cost:
     return Cost(times, predict_history_memory(model, numerics, EVENT_HISTORY), (), steps) + loading
 
 
-def _estimate_interpreted_seconds(model: Model) -> float:
+def _estimate_python_loop_seconds(model: Model) -> float:
     """Estimate the CPU time [s] of an event-driven run in interpreted Python, without merged cells."""
-    count, stiffness = estimate_elements(model)
+    count, stiffness = estimate_element_count_and_stiffness(model)
     each = events_cost.estimate_cycle_time(
         model.rig.modes, model.rig.drive.signal, stiffness, count if stiffness else 0
     )
-    return model.rig.drive.cycles * each * 2 ** count_merges(model)
+    return model.rig.drive.cycles * each * 2 ** count_cell_merges(model)
 
 
 def _is_event_loop_cached(model: Model) -> bool:
@@ -365,7 +365,7 @@ def count_stored_samples(numerics) -> float:
 
 
 def predict_history_memory(model: Model, numerics, history: HistoryBytes) -> tuple[MemoryPart, ...]:
-    """Predict the memory of the histories that a run stores, as a tuple of contributions.
+    """Predict the contributions to the memory of the histories that a run stores.
 
     Parameters
     ----------
@@ -389,9 +389,9 @@ def predict_history_memory(model: Model, numerics, history: HistoryBytes) -> tup
 
 
 def describe_element_engine(model: Model, engine: str) -> list:
-    """Return the sentence of a plan on the engine of friction elements and its CPU time."""
-    count = estimate_elements(model)[0]
-    exact = estimate_exact_seconds(model)
+    """Describe the engine of friction elements and its CPU time in a sentence for a plan."""
+    count = estimate_element_count_and_stiffness(model)[0]
+    exact = estimate_event_driven_seconds(model)
     march = estimate_march_seconds(model)
     return [
         f"{count} element{'s' * (count > 1)} by engine {engine}; computing time: about {exact:.2g} s with the "
@@ -399,8 +399,8 @@ def describe_element_engine(model: Model, engine: str) -> list:
     ]
 
 
-def reason_to_march_smooth_law(model: Model) -> str:
-    """Return the reason to march instead of using the smooth engine, or ""."""
+def explain_time_steps_over_smooth_engine(model: Model) -> str:
+    """Return why time integration is chosen over the smooth engine, or "" if it is not."""
     rig = model.rig
     accuracy = model.accuracy
     for key in MARCH_SETTINGS:

@@ -44,7 +44,7 @@ AMPLITUDES_PER_DECADE = 16  # Number of amplitudes per decade at which the mesh 
 
 
 def compute_decay_curve(solution: Solution) -> DecayCurve | None:
-    """Return the decay curve of a released rig with errors, or None if it has no points.
+    """Compute the decay curve of a released rig with error estimates; None if it has no points.
 
     The errors are those of the evaluation plus the changes in the coarse runs at the same
     amplitude. They are infinite outside the range of a coarse run. Points with a relative error
@@ -53,14 +53,14 @@ def compute_decay_curve(solution: Solution) -> DecayCurve | None:
     curve = _measure_decay_curve(solution)
     if not curve.time.size:
         return None
-    curve = _add_coarse_changes(curve, solution)
+    curve = _add_coarse_run_errors(curve, solution)
     known = (curve.frequency_error <= MAX_POINT_ERROR * curve.frequency) & (
         curve.damping_error <= MAX_POINT_ERROR * np.abs(curve.damping)
     )
     return curve.select(known) if known.any() else None
 
 
-def _add_coarse_changes(curve: DecayCurve, solution: Solution) -> DecayCurve:
+def _add_coarse_run_errors(curve: DecayCurve, solution: Solution) -> DecayCurve:
     """Add the differences from coarse runs to the errors of a decay curve."""
     for run, beside in solution.coarser:
         coarse = _measure_decay_curve(run).interpolate(curve.amplitude)
@@ -94,7 +94,7 @@ def _measure_decay_curve(run: Solution) -> DecayCurve:
 
 
 def make_laws_on_mesh(model, patch, meshed: tuple = ()):
-    """Return the friction laws of a rig, with one of its meshes.
+    """Return the friction laws of a rig, discretized on one of the meshes of its patches.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ def make_laws_on_mesh(model, patch, meshed: tuple = ()):
 
 
 def make_laws_on_coarse_meshes(model, coarse) -> list:
-    """Return the friction laws of a rig, with a coarser mesh of one patch at a time.
+    """Return a list of friction laws of a rig, each with one patch on its coarser mesh.
 
     `coarse` is the Patch of [contact] on a coarser mesh, or None.
     """

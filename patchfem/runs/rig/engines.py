@@ -29,10 +29,10 @@ from ...scene.rules.accuracy import has_effect, list_fixed_settings
 from ...slip import shear_modes
 from ..patch import faces
 from .costs import (
+    explain_time_steps_over_element_events,
+    explain_time_steps_over_events,
+    explain_time_steps_over_smooth_engine,
     intervals_per_cycle,
-    reason_to_march_elements,
-    reason_to_march_events,
-    reason_to_march_smooth_law,
 )
 
 # Factor on the merge width of bonds in the comparison run.
@@ -96,7 +96,7 @@ class Engine(NamedTuple):
         return [CoarserRuns((richer,), finer_errors, beside, "reduced")]
 
     def find_unsupported_feature(self, model: Model, *, steady: bool = False) -> str:
-        """Describe a property of a model that this engine cannot compute, or return "".
+        """Describe a property of a model that this engine cannot compute; "" if there is none.
 
         If `steady` is true, the drive is a sine of a response curve instead of the drive of the
         model.
@@ -106,8 +106,8 @@ class Engine(NamedTuple):
         )
 
 
-def reason_not_exact(model: Model, *, steady: bool = False) -> str:
-    """Return the reason why no event-driven engine can compute a model, or "".
+def reason_not_event_driven(model: Model, *, steady: bool = False) -> str:
+    """Return why no event-driven engine can compute a model; "" if one can.
 
     See `Engine.find_unsupported_feature` for `steady`.
     """
@@ -262,13 +262,13 @@ def _divide_steps(numerics, divisor: int):
 
 
 def _list_march_time_runs(model: Model, numerics) -> list:
-    """List the comparison runs of a march with half and with a quarter of its steps."""
+    """List the comparison runs of a time integration with half and with a quarter of its steps."""
     runs = (_divide_steps(numerics, 2), _divide_steps(numerics, 4))
     return [CoarserRuns(runs, partial(step_errors, steps=numerics.steps), source="steps")]
 
 
 def _list_march_space_runs(model: Model, numerics, patch, coarse, solution) -> list:
-    """List the comparison runs of a march with another discretization in space.
+    """List the comparison runs of a time integration with another spatial discretization.
 
     They have a coarser mesh, another number of shear modes or another bond summation, and a quarter
     of the steps.
@@ -353,7 +353,7 @@ def _list_engine_errors(model: Model, numerics, patch, coarse, solution) -> list
 
 
 def _list_steady_space_runs(model: Model, numerics, patch, coarse, solution) -> list:
-    """List the comparison runs of a steady motion on coarser meshes, and its own error estimates."""
+    """List the comparison runs of a steady motion on coarser meshes, and the errors by its engine."""
     coarser_runs = _list_engine_errors(model, numerics, patch, coarse, solution)
     if choose_steady_method(model).engine == PIECES.name:
         coarser_runs += _list_element_space_runs(model, numerics, patch, coarse, solution)
@@ -380,21 +380,21 @@ EXACT = Engine(
     "exact",
     _list_no_runs,
     _list_exact_space_runs,
-    why_not_cheapest=reason_to_march_events,
+    why_not_cheapest=explain_time_steps_over_events,
 )
 PIECES = Engine(
     "piecewise",
     "exact",
     _list_no_runs,
     _list_element_space_runs,
-    why_not_cheapest=reason_to_march_elements,
+    why_not_cheapest=explain_time_steps_over_element_events,
 )
 SMOOTH = Engine(
     "smooth",
     "",
     _list_smooth_time_runs,
     _list_engine_errors,
-    why_not_cheapest=reason_to_march_smooth_law,
+    why_not_cheapest=explain_time_steps_over_smooth_engine,
     min_relative_error=3e-8,
     max_balance_error=None,
     summary_numbers=("iterations",),
@@ -426,7 +426,7 @@ AUTOMATIC_ENGINES = (
 
 
 def describe_balance_error(engine: Engine, measures: dict) -> str:
-    """Describe an energy balance that is too inaccurate for the engine of a run, or return "".
+    """Return a message if the energy balance is too inaccurate for the engine of a run, else "".
 
     `measures` are the measures of the run by name, with their errors.
     """

@@ -255,7 +255,7 @@ class EventEvaluator(RunEvaluator):
         return compute_stuck_vibration(self.model.rig.modes, np.concatenate(springs), motion)
 
     def find_remaining_vibration(self, run, drive) -> dict:
-        """Return the strongest mode of vibration after the last slip of a release, as a dict."""
+        """Return a dict with the dominant vibration mode that remains after the last slip of a release."""
         if (
             self.model.rig.drive.kind != "free"
             or run.response is None

@@ -88,7 +88,7 @@ def compute_flutter_amplitude(run) -> tuple:
 
 
 class LimitCycles(NamedTuple):
-    """Limit cycles of a self-excited rig, or the reason why none is unstable.
+    """Limit cycles of a self-excited rig, and the reason if no unstable one is known.
 
     - cycles: limit cycles by increasing amplitude.
     - reason: reason why no unstable one is known.

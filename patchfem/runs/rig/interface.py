@@ -31,7 +31,7 @@ REDUCTION_TOL_FRACTION = 1e-3
 
 
 def make_contact(model: Model, numerics: Numerics, patch):
-    """Return the contact model of a march, with all interfaces and nonlinear springs.
+    """Return the contact model of a time integration, with all interfaces and nonlinear springs.
 
     It is a ContactModel for a single interface, a JointsModel for several interfaces or nonlinear
     springs, or a model of grooves.
@@ -210,7 +210,7 @@ def _make_bond_contact(model: Model, numerics: Numerics, patch, load: float):
 
 
 def _compute_shear_modes(patch, law, n_modes: int | None, model) -> tuple:
-    """Return the shear modes of a patch, and the forces of its points if these are few.
+    """Compute the shear modes of a patch, and the normal forces if it is reduced to few points.
 
     The forces (k,) [N] are normal forces; they are None if all nodes are points. Both are cached
     for all runs with the same Patch.

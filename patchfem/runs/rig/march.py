@@ -1,4 +1,4 @@
-"""Run of a rig by time integration with constant steps (march), and its Solution.
+"""Run of a rig by time integration with constant steps, and its Solution.
 
 In: a Model, its Numerics and its Patch. Out: a Solution. The measures come from samples, except the
 work of the energy balance and the harmonics of the loop.
@@ -26,7 +26,7 @@ from ...structure.drive_sizes import (
 )
 from . import levels as rig_levels
 from . import strips
-from .bond_lists import ListGuard, choose_bond_summation, has_bond_list
+from .bond_lists import BondListGuard, choose_bond_summation, has_bond_list
 from .evaluation import RunEvaluator, compute_work_check
 from .interface import make_contact
 from .solution import CycleLoop, Solution, compute_sampled_loop, first_interface_load
@@ -37,7 +37,7 @@ END_ERROR_FACTOR = 1.5
 
 
 class March(NamedTuple):
-    """Completed march of a rig with its contact model and CPU time.
+    """Completed time integration of a rig, with its contact model and CPU time.
 
     - contact: contact model of the march.
     - result: MarchResult.
@@ -64,12 +64,12 @@ def march_in_time(model, numerics, patch, frames: int = 0, say=None, progress=No
     say, progress : callable, optional
         Callbacks for a line of text and for the completed fraction.
     """
-    march = march_without_evaluation(model, numerics, patch, frames, say, progress)
+    march = integrate_without_postprocessing(model, numerics, patch, frames, say, progress)
     evaluator = MarchEvaluator(model, numerics, patch, march.contact)
     return evaluator.make_solution(march.result, march.seconds, prepare=march.prepare)
 
 
-def march_without_evaluation(
+def integrate_without_postprocessing(
     model, numerics, patch, frames: int = 0, say=None, progress=None
 ) -> March:
     """Integrate the motion of a rig in time steps without evaluating its measures.
@@ -88,7 +88,7 @@ def march_without_evaluation(
     begin = perf_counter()
     # Strips that slide independently have no common shear stress, so no output frames are stored.
     frames = 0 if rig.friction.strips_slide_apart else frames
-    progress = ListGuard(progress) if has_bond_list(model, numerics) else progress
+    progress = BondListGuard(progress) if has_bond_list(model, numerics) else progress
     # The histories of a patch that is reduced to a few points are not used.
     keeps_extremes = model.patch is not None and model.patch.mesh.can_gather_points
     run = engine.march(
@@ -114,7 +114,7 @@ def march_without_evaluation(
 
 
 class MarchEvaluator(RunEvaluator):
-    """Evaluation of the runs of a march."""
+    """Evaluation of the runs that are integrated with constant time steps."""
 
     def __init__(self, model, numerics, patch, contact):
         stick_tolerance = 0.0
@@ -281,7 +281,7 @@ class MarchEvaluator(RunEvaluator):
                 )
             mark = run.march_to_mark(round(rig.drive.levels.cycles), numerics.window)
             if rig.friction.strips_slide_apart:
-                mark = strips.average_mark_over_strips(mark, self.patch)
+                mark = strips.average_last_cycles_over_strips(mark, self.patch)
             return self.evaluate_level(level, mark, other)
 
         marks = zip(rig.drive.levels.amplitudes, done.marks)

@@ -22,7 +22,7 @@ from ..results.notes import (
 )
 from ..results.travel import warn_of_large_slide
 from . import event_driven, strips
-from .costs import reason_to_march_elements
+from .costs import explain_time_steps_over_element_events
 from .engines import ENGINES, PIECES
 from .solution import first_interface_load
 
@@ -132,12 +132,12 @@ def warn_of_peak_at_sweep_end(run, modes) -> list:
 
 
 def find_sweep_end(frequency: float, *ends: float) -> float | None:
-    """Return the end [Hz] of a sweep that equals a frequency [Hz], or None."""
+    """Return the end [Hz] of a sweep at which a frequency [Hz] lies; None if there is none."""
     return next((end for end in ends if abs(frequency - end) <= EQUAL_FREQUENCY_TOL * end), None)
 
 
 def _describe_nearest_resonance(modes: list, frequency: float, *, is_above: bool) -> str:
-    """Describe the nearest resonance above or below a frequency, or return "".
+    """Describe the nearest resonance above or below a frequency; "" if there is none.
 
     Parameters
     ----------
@@ -292,13 +292,13 @@ def _note_on_elements(run) -> list:
 
 
 def _note_on_marched_elements(run) -> list:
-    """Return a list with a note if friction elements are marched because they yield too often."""
+    """Return a list with a note if friction elements are integrated in time steps to save CPU time."""
     model = run.model
     if model.accuracy.method != "auto" or "steps_per_cycle" in run.numerics.pinned:
         return []
     pinned = run.patch is not None and not model.patch.mesh.is_automatic
     return [
-        f"time stepping is used, because {reason_to_march_elements(model)}; "
+        f"time stepping is used, because {explain_time_steps_over_element_events(model)}; "
         f'{"on a coarser mesh, or " * pinned}with accuracy.method = "exact" the motion is computed exactly'
     ]
 

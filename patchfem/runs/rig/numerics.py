@@ -11,7 +11,7 @@ import numpy as np
 from ...effects import law_has_trait
 from ...model.model import Model
 from ...structure.drive_sizes import count_repeat_cycles, find_min_decay_rate, is_sinusoidal
-from .costs import MARCH_SETTINGS, count_merges, steps_per_cycle
+from .costs import MARCH_SETTINGS, count_cell_merges, steps_per_cycle
 from .engines import MARCH, PIECES, SMOOTH, choose_engine
 
 # Largest fraction of a cycle by which round-off changes an integer number of cycles, so that a
@@ -116,7 +116,7 @@ def choose_numerics(model: Model) -> Numerics:
     if engine is SMOOTH:
         return replace(numerics, local=choose_step_tolerance(accuracy.tolerance))
     if engine is PIECES:
-        return replace(numerics, pairs=count_merges(model))
+        return replace(numerics, pairs=count_cell_merges(model))
     if engine is MARCH and accuracy.steps_per_cycle is None:
         # The steps are short enough for a unique solution, and the last one ends where the run
         # ends.

@@ -34,7 +34,7 @@ from .costs import (
     count_stored_samples,
     describe_element_engine,
     find_interface_load,
-    predict_exact_cost,
+    predict_event_driven_cost,
     predict_history_memory,
     predict_smooth_cost,
     steps_per_cycle,
@@ -69,7 +69,7 @@ MIN_STIFF_LINK_RATIO = 10.0
 
 
 def structure_stiffnesses(rig) -> dict:
-    """Return the stiffnesses [N/m] of the structure in the stiffness chain, by name."""
+    """Return a dict of the stiffnesses [N/m] of the structure in the stiffness chain."""
     return {"mode": rig.first_mode.stiffness} | (
         {"bonded": rig.springs.bonded} if rig.springs.bonded is not None else {}
     )
@@ -178,14 +178,14 @@ def predict_cost(model: Model, n_points: int) -> Cost:
 
 
 def _describe_method(model: Model, numerics) -> list:
-    """Return sentences of a plan on the method that computes the motion."""
+    """Describe the method that computes the motion in sentences for a plan."""
     if ENGINES[numerics.engine].finds_periodic_motion:
         return [f"the steady motion is found by {choose_steady_method(model).words}"]
     return describe_bond_summation(model, numerics)
 
 
 def predict_march_cost(model: Model, numerics, n_points: int) -> Cost:
-    """Predict the cost of a march and its coarse runs.
+    """Predict the cost of a time integration and its coarse runs.
 
     Parameters
     ----------
@@ -203,7 +203,7 @@ def predict_march_cost(model: Model, numerics, n_points: int) -> Cost:
     parts = []
     n_modes = 0
     if has_bonds and bond_lists.has_bond_list(model, numerics):
-        entries, seconds = bond_lists.estimate_list_cost(model, numerics)
+        entries, seconds = bond_lists.estimate_bond_list_cost(model, numerics)
         step_seconds = seconds / steps
         sizes["bond_list_about"] = int(entries)
         parts.append(
@@ -238,12 +238,12 @@ def predict_march_cost(model: Model, numerics, n_points: int) -> Cost:
 
 
 def choose_march_code(model: Model) -> EngineCode:
-    """Return the compiled code of a march, with its memory and compile time."""
+    """Return the compiled code of a time integration, with its memory and compile time."""
     return SHEAR_MARCH_CODE if model.partial_slip else MARCH_CODE
 
 
 def _predict_plain_step_seconds(model: Model, numerics, n_points: int, *, has_bonds: bool) -> float:
-    """Predict the CPU time [s] of a march step without shear modes or bond list."""
+    """Predict the CPU time [s] of a time step without shear modes or bond list."""
     rig = model.rig
     step = _predict_point_step_seconds(model.rig, model.friction)
     if model.grooves is not None:
@@ -260,7 +260,7 @@ def _predict_plain_step_seconds(model: Model, numerics, n_points: int, *, has_bo
 
 
 def _predict_point_step_seconds(rig, friction) -> float:
-    """Predict the CPU time [s] of a march step of interfaces without mesh.
+    """Predict the CPU time [s] of a time step of interfaces without mesh.
 
     It is larger for growing bonds, further modes and further interfaces.
     """
@@ -315,7 +315,7 @@ def compute_dimensionless_groups(model: Model) -> dict:
 
 
 def find_drive_and_knee(model: Model) -> dict:
-    """Return the drive and the largest drive at which friction bounds the resonance, as a dict.
+    """Return a dict with the drive and the largest drive at which friction bounds the resonance.
 
     The keys are "drive" and "knee", both accelerations of the base [m s-2]. The dict is empty
     unless a sine excites a single mode at resonance.
@@ -337,7 +337,7 @@ def find_drive_and_knee(model: Model) -> dict:
 
 
 def _find_participation_ratio(rig) -> float:
-    """Return the ratio of slide to base participation of the first mode that is not rigid.
+    """Return the ratio of the slide and base participation factors of the first elastic mode.
 
     It is the effect of friction relative to that of the drive. It is 1 if the scene lists no modes,
     or if the drive does not excite the mode.
@@ -349,7 +349,7 @@ def _find_participation_ratio(rig) -> float:
 
 
 def describe_stick(rig, sizes: dict, chain: dict) -> list:
-    """Return sentences of a plan on whether friction stops a driven block.
+    """Describe in sentences for a plan whether friction stops a driven block.
 
     For a single mode, they say from D whether the block sticks, and whether friction bounds its
     motion. There are none for other rigs.
@@ -403,7 +403,7 @@ def _describe_sliding(friction_ratio: float) -> str:
 
 
 def describe_bond_summation(model: Model, numerics) -> list:
-    """Return sentences of a plan on the bond summation or on the engine of elements."""
+    """Describe the bond summation or the engine of friction elements in sentences for a plan."""
     if not law_has_trait(model.friction.law, "bonds"):
         if PIECES.find_unsupported_feature(model):
             return []
@@ -412,7 +412,7 @@ def describe_bond_summation(model: Model, numerics) -> list:
     sentences = ["method of the sum over bonds: " + choice.describe()]
     if choice.engine == "recursion":
         return sentences
-    if bond_lists.is_list_growing(model):
+    if bond_lists.is_bond_list_growing(model):
         remedy = 'set friction.reading = "stretch" to give the block a finite stiffness'
         if bond_lists.is_stuck_without_stiffness(model):
             remedy = "set friction.order above 0 to give the block a stiffness"
@@ -421,7 +421,7 @@ def describe_bond_summation(model: Model, numerics) -> list:
             f"{remedy}"
         )
     elif (
-        seconds := bond_lists.estimate_list_cost(model, numerics)[1]
+        seconds := bond_lists.estimate_bond_list_cost(model, numerics)[1]
     ) > parameters.MAX_LIST_SECONDS:
         sentences.append(
             "`run` will refuse this scene: the sum over the list of bonds would need a computing time of about "
@@ -530,8 +530,8 @@ def _estimate_smooth_law_seconds(rig) -> float:
 
 # Function (model, numerics, points) -> Cost of each engine.
 COSTS = {
-    "exact": predict_exact_cost,
-    "piecewise": predict_exact_cost,
+    "exact": predict_event_driven_cost,
+    "piecewise": predict_event_driven_cost,
     "smooth": predict_smooth_cost,
     "march": predict_march_cost,
     "harmonic": predict_steady_cost,

@@ -32,7 +32,7 @@ class CoupledRun:
     - inputs: plan and Patch of the run.
     - numerics, solution: settings and Solution of the engine.
     - measures: measures by name.
-    - outcome: Outcome, or None before `add_outcome`.
+    - outcome: Outcome, or None before `add_outcome_and_errors`.
     - decay: decay curve of a release, or None.
     - notes: sentences on the decay and on limit cycles.
     """
@@ -92,8 +92,8 @@ def add_level_measures(run: CoupledRun) -> CoupledRun:
     return replace(run, measures=run.measures | measures)
 
 
-def add_outcome(run: CoupledRun) -> CoupledRun:
-    """Return the run with its outcome and its own error estimates.
+def add_outcome_and_errors(run: CoupledRun) -> CoupledRun:
+    """Return the run with its outcome, and with the engine's error estimates of its measures.
 
     The outcome is NOT_CONVERGED if the error of the energy balance is too large.
     """
@@ -115,14 +115,15 @@ def add_outcome(run: CoupledRun) -> CoupledRun:
         rig.drive.levels.cycles,
         find_decay_rate(rig.modes),
     )
-    # Without a stop in the scene, the motion only exceeded the largest one that the program allows.
+    # Without a stop in the scene, the motion has not hit anything: it exceeded the limit of the
+    # program.
     if outcome is Outcome.EXCEEDS_TRAVEL and rig.springs.travel == MAX_TRAVEL:
         outcome = Outcome.GROWS
         measures = remove_errors(measures)
     return replace(run, outcome=outcome, measures=measures)
 
 
-def add_reasons(run: CoupledRun) -> CoupledRun:
+def add_missing_value_reasons(run: CoupledRun) -> CoupledRun:
     """Return the run with a reason for each measure without a value."""
     measures = run.measures
     window = run.solution.window

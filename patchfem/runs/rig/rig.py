@@ -73,8 +73,8 @@ def run_rig(inputs: RunInputs) -> Result:
     run = CoupledRun(inputs, *run_refined(inputs, numerics))
     if run.solution.levels:
         run = postprocessing.add_level_measures(run)
-    run = postprocessing.add_outcome(run)
-    run = postprocessing.add_reasons(run)
+    run = postprocessing.add_outcome_and_errors(run)
+    run = postprocessing.add_missing_value_reasons(run)
     if rig.drive.kind == "free" and run.has_errors:
         run = postprocessing.add_decay_curve(run)
     if run.has_friction and find_decay_rate(rig.modes) < 0:
@@ -207,7 +207,7 @@ def _is_refinement_finished(model, run: RefinedRun, displacement_errors: list) -
         "steps_per_cycle" in numerics.pinned
         or steps > MAX_MARCH_STEPS
         or steps * numerics.cycles > MAX_RUN_STEPS
-        or bond_lists.is_list_too_long(model, numerics, book)
+        or bond_lists.is_bond_list_too_long(model, numerics, book)
         or bond_lists.has_doubling_failed(book, displacement_errors)
         or run.solution.outcome in EARLY_OUTCOMES
     )

@@ -79,7 +79,7 @@ class Runner:
         return solution
 
     def estimate_errors(self, coarser_runs: list, solution: Solution) -> list:
-        """Estimate the errors of a run from coarse runs, see `response.coarser.estimate_errors`."""
+        """Estimate the errors of a run from coarse runs (`response.coarser.estimate_errors`)."""
         errors, seconds = estimate_errors(
             lambda numerics: self._solve_coarse_run(numerics, solution),
             solution.values,
@@ -128,7 +128,7 @@ class Runner:
         return self._solve_around_peak(model, numerics, fine) or self.solve(numerics, model)
 
     def _solve_around_peak(self, model, numerics: Numerics, fine: Solution) -> Solution | None:
-        """Compute the response curve of a coarse run only around the peak of the run itself.
+        """Compute the response curve of a coarse run only in the neighbourhood of its own peak.
 
         The result is None if the run is not a response curve, or if the coarse run has its peak
         elsewhere.

@@ -144,7 +144,7 @@ def find_release_amplitude(window, period: float, window_amplitude: float) -> fl
 
 
 def first_interface_load(model, patch) -> float | None:
-    """Return the normal load [N] on the first interface, or None without friction."""
+    """Return the normal load [N] on the first interface; None without friction."""
     if model.friction is None:
         return None
     return patch.pressure.load if patch is not None else model.point.load
@@ -192,7 +192,7 @@ def compute_sampled_loop(
 
 
 def compute_peak_frequency(extra: dict, coarser=()) -> dict:
-    """Return the frequency [Hz] of the peak of a response curve with its error, as a dict.
+    """Return a dict with the frequency [Hz] of the peak of a response curve and its error.
 
     The measure has no value if the amplitude is 0. The dict is empty without a curve.
 

@@ -44,6 +44,6 @@ def solve_rig(model, numerics, patch, frames: int = 0, say=None, progress=None) 
 def refuse_long_run(model, numerics) -> None:
     """Raise Missing if a run would take too much CPU time."""
     if numerics.engine in ("exact", "piecewise"):
-        costs.refuse_long_exact_run(model)
+        costs.refuse_long_event_driven_run(model)
     elif numerics.engine == "march":
-        bond_lists.refuse_long_list(model, numerics)
+        bond_lists.refuse_long_bond_list(model, numerics)

@@ -15,7 +15,7 @@ def compute_strip_loads(patch) -> np.ndarray:
 
 
 def average_march_over_strips(march, patch):
-    """Average the histories of a march of independently sliding strips."""
+    """Average the histories of a time integration of independently sliding strips."""
     loads = compute_strip_loads(patch)
     offsets = patch.strips.offsets
     window = average_histories_over_strips(march.window, loads, offsets)
@@ -23,13 +23,13 @@ def average_march_over_strips(march, patch):
         march,
         response=average_histories_over_strips(march.response, loads, offsets),
         window=window,
-        marks=tuple(average_mark_over_strips(mark, patch) for mark in march.marks),
+        marks=tuple(average_last_cycles_over_strips(mark, patch) for mark in march.marks),
         step_force=(window.force[1:] + window.force[:-1]) / 2,
     )
 
 
-def average_mark_over_strips(mark, patch):
-    """Average the stored last cycles of a drive level of independently sliding strips."""
+def average_last_cycles_over_strips(mark, patch):
+    """Average the last cycles at the end of a drive level over independently sliding strips."""
     window = average_histories_over_strips(
         mark.window, compute_strip_loads(patch), patch.strips.offsets
     )

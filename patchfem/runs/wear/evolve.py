@@ -76,7 +76,7 @@ class WearMoment:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class WornPatch:
-    """Worn patch with the history of its wear, also on coarser meshes.
+    """Worn patch with its wear history, on the finest mesh and on coarser meshes.
 
     - patch, coarse: worn patch, and those on coarser meshes (None for a missing one).
     - state: final state; None if nothing was worn.
@@ -101,7 +101,7 @@ class WornPatch:
 
 
 class _UnboundedMotion(Exception):
-    """Raised if the motion of a worn model has no periodic cycle."""
+    """Exception for a worn model whose motion has no periodic cycle."""
 
 
 class _SlipPathFunction:

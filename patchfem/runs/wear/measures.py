@@ -90,7 +90,7 @@ def _make_wear_measure(name: str, value: float, error: float | None, engine: str
 
 
 def _measure_worn_through_cycle(model, evolved, error: float | None) -> dict:
-    """Return the measure worn_through_cycle, as a dict, if a coating is worn through.
+    """Return a dict with the measure worn_through_cycle if a coating is worn through.
 
     error: error of the largest worn depth [m].
     """
@@ -106,12 +106,12 @@ def _measure_worn_through_cycle(model, evolved, error: float | None) -> dict:
 
 
 def _note_on_earlier_run(model) -> list:
-    """Return a note, as a list, on the earlier run whose wear is continued."""
+    """Return a list with a note on the earlier run whose wear is continued."""
     return [] if model.wear.start is None else [model.wear.start.sentence]
 
 
 def _note_on_worn_through_coating(model, evolved) -> list:
-    """Return a note, as a list, on the coating that is worn through."""
+    """Return a list with a note on the coating that is worn through."""
     depth = evolved.state.depth
     coating = find_worn_through_coating(model, depth)
     strip, node = divmod(int(np.argmax(depth)), evolved.patch.x.size)
@@ -331,7 +331,7 @@ def _warn_of_friction_table(model, evolved) -> list:
 
 
 def _compute_worn_volume_and_depth(patch_model, patch, depth) -> dict:
-    """Return the worn volume [m3] and the largest worn depth [m] of a patch by name."""
+    """Return a dict of the worn volume [m3] and the largest worn depth [m] of a patch."""
     return {
         "worn_volume": float(np.vdot(depth, nodal_areas(patch_model, patch.pieces.interface))),
         "worn_depth_max": float(depth.max(initial=0.0)),
@@ -351,7 +351,7 @@ def _relative_slip_change(evolved, motion: dict) -> float:
 
 
 def _measure_point_volume(model, result, *, estimate: bool = True) -> dict:
-    """Return the worn volume of a single contact point under [normal], as a dict.
+    """Return a dict with the worn volume of a single contact point under [normal].
 
     It is the wear coefficient times load times slip path, over all cycles.
 
@@ -422,7 +422,7 @@ def _select_stored_moments(moments) -> np.ndarray:
 
 
 def _collect_wear_history(evolved) -> dict:
-    """Return the history of the wear measures over the cycles (j,) by name.
+    """Return a dict of the wear measures over the cycles (j,).
 
     The entries `cycle` and `EDGE_PEAK` are included.
     """

@@ -84,7 +84,7 @@ def estimate_jump_count(model) -> int:
 
 
 def _estimate_slip_path(model) -> float:
-    """Return the slip path [m] per cycle; for a rig it is that without friction."""
+    """Estimate the slip path [m] per cycle; for a rig, that of the motion without friction."""
     if model.rig is None:
         return (4.0 if model.slide.period else 1.0) * model.slide.amplitude
     signal = model.rig.drive.signal

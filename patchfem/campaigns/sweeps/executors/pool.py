@@ -191,7 +191,7 @@ class Pool:
 
 
 def _start_worker(work: Work, *, silent: bool) -> Worker:
-    """Start a worker process; raise Missing if the operating system refuses it."""
+    """Start a worker process; raise Missing if the operating system cannot create it."""
     try:
         return Worker(work, silent=silent)
     except OSError as error:

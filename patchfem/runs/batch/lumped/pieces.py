@@ -20,7 +20,7 @@ from ....response.errors import merged_cell_errors
 from ....response.measures import COORDINATE_ROUND_OFF, energy_balance
 from ....response.ringing import make_ringing_measures
 from ....structure.drive_sizes import find_max_acceleration, find_min_decay_rate
-from ...rig.costs import count_merges
+from ...rig.costs import count_cell_merges
 from ...rig.engines import EXACT, PIECES, choose_engine
 from ...rig.event_driven import (
     RigidElements,
@@ -82,7 +82,7 @@ def is_rigid_law(model) -> bool:
 
 def count_initial_merges(model) -> int:
     """Return the number of pairwise merges of slider cells for the first run."""
-    return 0 if is_rigid_law(model) else count_merges(model)
+    return 0 if is_rigid_law(model) else count_cell_merges(model)
 
 
 def make_case(model, n_merges: int = 0) -> Case:

@@ -107,7 +107,7 @@ class StableMotion(NamedTuple):
 
 
 class BalanceFinder:
-    """Steady motions of laws with memory or nonlinear springs, by harmonic balance.
+    """Solver for steady motions with memory laws or nonlinear springs, by harmonic balance.
 
     If several motions exist, the iteration starts from a given point of the response curve.
     """
@@ -268,7 +268,7 @@ class BalanceFinder:
         )
 
     def _compute_curve_measures(self, motion, drive) -> dict:
-        """Return the measures of a point of a response curve by name."""
+        """Return a dict of the measures of a point of a response curve."""
         response = make_cycle_response(motion, self.modes, drive, SAMPLES_PER_CYCLE)
         row = self.modes.output if self.modes.gauge is None else self.modes.gauge
         values = {

@@ -118,7 +118,7 @@ def make_curve_point(drive, solution, guess=None) -> CurvePoint:
     )
 
 
-def make_missing_point(drive) -> CurvePoint:
+def make_missing_curve_point(drive) -> CurvePoint:
     """Return the curve point of a drive for which no steady motion was found."""
     return CurvePoint(drive, {}, {}, "not found", np.nan, False, Outcome.NOT_CONVERGED)
 
@@ -265,8 +265,8 @@ def tabulate_curve(points, folds=()) -> dict:
     }
 
 
-def solve_levels(finder, drive):
-    """Compute the steady motions at all drive levels; return that of the largest amplitude.
+def solve_drive_levels(finder, drive):
+    """Compute the steady motions at all drive levels; return the one with the largest amplitude.
 
     Each level starts from the motion at the previous one, as in a test with increasing level. The
     Solution has the curve of all levels, the Level of each, and a function that computes another
@@ -289,7 +289,7 @@ def solve_levels(finder, drive):
         except NotConverged as failure:
             if finder.has_fallback:
                 raise
-            points.append(make_missing_point(sine))
+            points.append(make_missing_curve_point(sine))
             failures.append(failure)
             continue
         points.append(

@@ -69,7 +69,7 @@ class PeriodicMotion(NamedTuple):
 
 
 class MapFinder(TracedCurve):
-    """Base class for steady motions as fixed points of the map of a drive period.
+    """Base class of solvers for steady motions as fixed points of the map of a drive period.
 
     Subclasses compute the fixed point in `find_periodic_motion`. If several motions exist, the search starts
     from `guess`.
@@ -94,7 +94,7 @@ class MapFinder(TracedCurve):
         raise NotImplementedError
 
     def compute_steady_motion(self, drive, guess=None) -> tuple:
-        """Compute the steady motion under sinusoidal drive, and a guess for neighbouring drives."""
+        """Compute the steady motion under sinusoidal drive, and the guess for a neighbouring drive."""
         begin = perf_counter()
         motion = self.find_periodic_motion(drive, guess)
         numerics = replace(self.numerics, cycles=2.0, window=1)
@@ -186,7 +186,7 @@ class MapFinder(TracedCurve):
 
 
 def _collect_curve_measures(amplitude: float, acceleration: float, waves: dict) -> dict:
-    """Return the measures of a point of a response curve by name, without missing ones."""
+    """Return a dict of the known measures of a point of a response curve."""
     values = {
         COLUMN_MEASURES["amplitude"]: amplitude,
         COLUMN_MEASURES["acceleration_peak"]: acceleration,
@@ -196,7 +196,7 @@ def _collect_curve_measures(amplitude: float, acceleration: float, waves: dict) 
 
 
 class YieldFinder(MapFinder):
-    """Steady motions of elastic-plastic elements, by the map from yield event to yield event."""
+    """Solver for steady motions of elastic-plastic elements, by the map between yield events."""
 
     name = "yields"
     elements = YieldingElements
@@ -227,7 +227,7 @@ class YieldFinder(MapFinder):
 
 
 class EventFinder(MapFinder):
-    """Steady motions with Coulomb friction or without friction, by the map of stick-slip events."""
+    """Solver for steady motions with Coulomb friction or no friction, by the map of events."""
 
     name = "events"
     elements = RigidElements

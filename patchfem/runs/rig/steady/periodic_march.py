@@ -1,4 +1,4 @@
-"""Steady motion over grooves, by a march whose initial state is corrected to be periodic.
+"""Steady motion over grooves, by time integration from a corrected initial state.
 
 In: a Model with grooves, its Numerics and its Patch. Out: the Solution under a sine, and the
 response curve over frequency (`dynamics.harmonic.orbits`).
@@ -43,7 +43,7 @@ MULTIPLIER_TOL = 1e-2
 
 
 def march_out_of_grooves(model, numerics, patch, drive, contact) -> Solution | None:
-    """Return the Solution of a motion that leaves its grooves, or None if it stays in them.
+    """Return the Solution of a motion that leaves its grooves; None if it stays in them.
 
     A march from rest of N_CYCLES_IN_GROOVES cycles decides. The errors are the differences from a
     march with half the steps.
@@ -102,7 +102,7 @@ class CycleEvaluation(NamedTuple):
 
 
 class MarchFinder(TracedCurve):
-    """Steady motions over grooves, by marching and correcting the initial state."""
+    """Solver for steady motions over grooves, by time integration from a corrected initial state."""
 
     # The points of the curve have errors of the size of the tolerance, so that a refined peak
     # cannot have a smaller error.
@@ -122,7 +122,7 @@ class MarchFinder(TracedCurve):
         engine.warm_up(model.rig.modes, model.rig.drive.signal, self.contact, say)
 
     def _march_to_periodic(self, drive, guess, steps: int):
-        """March until the motion is periodic; return the run and its remaining change per period."""
+        """Integrate until the motion is periodic; return the run and its change per period."""
         run = engine.start_run(
             self.model.rig.modes, drive, self.contact, steps, self.model.rig.springs.travel
         )
@@ -142,7 +142,7 @@ class MarchFinder(TracedCurve):
         return run, change
 
     def _evaluate_cycle(self, run, steps: int, frames: int = 0) -> CycleEvaluation:
-        """Evaluate one cycle of a periodic march."""
+        """Evaluate one cycle of a periodic time integration."""
         mark, snapshots = orbits.march_cycle(run, frames)
         numerics = replace(self.numerics, steps=steps)
         evaluator = MarchEvaluator(self.model, numerics, self.patch, self.contact)
@@ -153,7 +153,7 @@ class MarchFinder(TracedCurve):
         return CycleEvaluation(values | {"drift_per_cycle": 0.0}, mark, snapshots, is_stuck)
 
     def compute_steady_motion(self, drive, guess=None) -> tuple:
-        """Compute the steady motion under sinusoidal drive, and the run from which to continue.
+        """Compute the steady motion under sinusoidal drive, and the guess for a neighbouring drive.
 
         If the lifted mass leaves its grooves, there is no steady motion. The Solution is then that
         of the motion that leaves them, and the run is None.
@@ -240,7 +240,7 @@ class MarchFinder(TracedCurve):
         return abs(value - half) > self.model.accuracy.tolerance * abs(value)
 
     def compute_curve_point(self, drive, guess=None) -> CurvePoint:
-        """Compute one point of a response curve, from a neighbouring motion or else from rest."""
+        """Compute one point of a response curve, starting from a neighbouring motion or from rest."""
         try:
             return make_curve_point(drive, *self.compute_steady_motion(drive, guess))
         except NotConverged:

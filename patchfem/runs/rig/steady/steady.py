@@ -10,7 +10,7 @@ from ....core import NotConverged, SineDrive
 from ..engines import PIECES, choose_steady_method
 from ..solution import Solution
 from . import balance, maps, periodic_march
-from .curves import solve_levels
+from .curves import solve_drive_levels
 from .peak import solve_peak
 
 
@@ -59,5 +59,5 @@ def _solve_drive(finder, model) -> Solution:
     if isinstance(drive, SineDrive):
         return finder.compute_steady_motion(drive)[0]
     if model.rig.drive.levels.amplitudes:
-        return solve_levels(finder, drive)
+        return solve_drive_levels(finder, drive)
     return solve_peak(*finder.trace_curve(drive), finder)
