@@ -21,13 +21,13 @@ def factorise(a):
             pivot -= a[j, k] * a[j, k]
         if not pivot > 0:
             return False
-        over = 1 / np.sqrt(pivot)
-        a[j, j] = over
+        inverse = 1 / np.sqrt(pivot)
+        a[j, j] = inverse
         for i in range(j + 1, n):
-            rest = a[i, j]
+            remainder = a[i, j]
             for k in range(j):
-                rest -= a[i, k] * a[j, k]
-            a[i, j] = rest * over
+                remainder -= a[i, k] * a[j, k]
+            a[i, j] = remainder * inverse
     return True
 
 

@@ -751,17 +751,17 @@ def find_largest_magnitude(poly, top, best, hulls):
     while True:
         hull = hulls[depth]
         largest = abs(hulls[depth, 0])
-        turns = 0
+        n_extrema = 0
         at = 0
         for k in range(1, top + 1):
             largest = max(largest, abs(hull[k]))
             if k > 1 and (hull[k] < hull[k - 1]) != (hull[k - 1] < hull[k - 2]):
-                turns += 1
+                n_extrema += 1
                 at = k
         known = largest <= best * (1 + 1e-14) or depth == MAX_HALVINGS
         # By Descartes' rule there is at most one extremum, and the ends have been checked.
-        if not known and turns < 2:
-            if turns == 1:
+        if not known and n_extrema < 2:
+            if n_extrema == 1:
                 sense = 1.0 if hull[1] > hull[0] else -1.0
                 before = hull[at - 1] - hull[at - 2]
                 after = hull[at] - hull[at - 1]

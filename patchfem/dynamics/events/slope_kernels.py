@@ -74,12 +74,12 @@ def move_slopes(u, piece, slopes, reversal_slopes, run, scratch):
         series = MotionSeries(workspace.drive[1], coefs)
         expand_motion(start, series, h, top, modal_system, workspace)
         for i in range(n):
-            place = coefs[top, i]
+            value = coefs[top, i]
             rate = top * coefs[top, i]
             for k in range(top - 1, 0, -1):
-                place = place * u + coefs[k, i]
+                value = value * u + coefs[k, i]
                 rate = rate * u + k * coefs[k, i]
-            slopes[0, i, s] = coefs[0, i] + u * place
+            slopes[0, i, s] = coefs[0, i] + u * value
             slopes[1, i, s] = rate / h
 
 

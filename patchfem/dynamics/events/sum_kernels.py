@@ -93,17 +93,17 @@ def add_piece_sums(u, piece, run):
     loss = 0.0
     power_size = 0.0
     for g in range(0, count, 4):  # four points fill a vector register
-        place = (
+        positions = (
             u * GAUSS_POINTS[count, g],
             u * GAUSS_POINTS[count, g + 1],
             u * GAUSS_POINTS[count, g + 2],
             u * GAUSS_POINTS[count, g + 3],
         )
         weight = GAUSS_WEIGHTS[count, g : g + 4]
-        drive = evaluate_at_four(workspace.drive[0], 0, top, place)
+        drive = evaluate_at_four(workspace.drive[0], 0, top, positions)
         base_rate = (0.0, 0.0, 0.0, 0.0)
         for i in range(n):
-            rate = evaluate_rates_at_four(workspace.coefficients, i, top, place)
+            rate = evaluate_rates_at_four(workspace.coefficients, i, top, positions)
             base_rate = (
                 base_rate[0] - modal_system.base[i] * rate[0],
                 base_rate[1] - modal_system.base[i] * rate[1],

@@ -126,14 +126,14 @@ def with_shear_modes(
         length = max(COULOMB_LENGTH_RATIO * tolerance, MIN_LENGTH_RATIO) * gross_slip_slide
     if law.growth[0] >= 0:
         weakening = law.growth[3] / law.growth[4] if law.growth[4] > 0 else np.inf
-    found = (
+    modes = (
         shear_modes(patch.slip_compliance, limit, length, count, weakening)
         if count is not None
         else find_sufficient_modes(
             patch.slip_compliance, limit, length, N_SHEAR_MODES, 0.1 * tolerance, weakening
         )
     )
-    return replace(model, law=law, shear=found, share=tuple(force[found.points] / force.sum()))
+    return replace(model, law=law, shear=modes, share=tuple(force[modes.points] / force.sum()))
 
 
 class FlankModel:
@@ -313,15 +313,15 @@ class ClimbingRun(GroovesRun):
         )
         self.ledger[Ledger.DRIVE_WORK] += self.find_interface_energy()
 
-    def move_to(self, place, rate) -> None:
+    def move_to(self, position, rate) -> None:
         """Set the modal coordinates and rates at the start of a cycle, like `Run.move_to`.
 
         The lifted mass gets the vertical velocity of the flank there.
 
         """
-        super().move_to(place, rate)
+        super().move_to(position, rate)
         self.contact.climb[ClimbIndex.RISE_SPEED] = (
-            float(self.model.grooves.slope(self.modes.slide @ place)) * self.modes.slide @ rate
+            float(self.model.grooves.slope(self.modes.slide @ position)) * self.modes.slide @ rate
         )
 
     def set_outcome(self, status: int) -> None:

@@ -45,9 +45,9 @@ LAW = LawNumbers()
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find_flank_slope(numbers, q):
     """Return the slope t [1] of the flank and its derivative [1/m] at a slide q [m]."""
-    steep = numbers[LAW.amplitude] * numbers[LAW.wave_number]
-    turn = numbers[LAW.wave_number] * q - numbers[LAW.phase]
-    return steep * sin(turn), steep * numbers[LAW.wave_number] * cos(turn)
+    max_slope = numbers[LAW.amplitude] * numbers[LAW.wave_number]
+    phase = numbers[LAW.wave_number] * q - numbers[LAW.phase]
+    return max_slope * sin(phase), max_slope * numbers[LAW.wave_number] * cos(phase)
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
@@ -75,7 +75,7 @@ def release_direction(numbers, turn):
 
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def start_motion(numbers, memory, way, y):
+def start_motion(numbers, memory, direction, y):
     """Return the path to the next kink of the state rates: infinite, as there is none.
 
     Parameters
@@ -84,7 +84,7 @@ def start_motion(numbers, memory, way, y):
         (9,) see `LawNumbers`.
     memory : ndarray
         (1,) the last force [N].
-    way : float
+    direction : float
         Direction of the motion, +-1.
     y : ndarray
         (l,) states of the law.

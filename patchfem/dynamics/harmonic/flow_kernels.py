@@ -37,12 +37,12 @@ def solve_cycle(num, q, speed, dt, z, steps, force, slopes):
         (2, M) becomes the derivatives of the force with respect to z and velocity.
     """
     n = q.size
-    whole = 0.0
+    duration = 0.0
     for i in range(n):
-        whole += dt[i]
-    start = law.relax_stretch(num[0], 0.0, q[0], whole).stretch
+        duration += dt[i]
+    start = law.relax_stretch(num[0], 0.0, q[0], duration).stretch
     last = inf
-    for turn in range(MAX_CYCLES):
+    for cycle in range(MAX_CYCLES):
         now = start
         kept = 1.0
         largest = abs(start)
@@ -56,10 +56,12 @@ def solve_cycle(num, q, speed, dt, z, steps, force, slopes):
         mismatch = abs(now - start)
         # The iteration ends when the periodicity error has reached
         # round-off or no longer decreases.
-        if mismatch <= 1e-14 * largest * min(1 - kept, 1.0) or (turn > 2 and mismatch > 0.5 * last):
+        if mismatch <= 1e-14 * largest * min(1 - kept, 1.0) or (
+            cycle > 2 and mismatch > 0.5 * last
+        ):
             break
         last = mismatch
-        start += (now - start) / (1 - kept) if turn and kept < 1 - 1e-9 else now - start
+        start += (now - start) / (1 - kept) if cycle and kept < 1 - 1e-9 else now - start
     for i in range(n):
         direction = 1.0 if speed[i] > 0 else -1.0
         rates = law.rate_equation(num[0], z[i], speed[i], direction)

@@ -135,14 +135,14 @@ class SampledSlide:
         """Reversals of the slide within the cycle."""
         n = self.samples
         angle = np.empty(n)
-        place = np.empty(n)
+        slide = np.empty(n)
         cell = np.empty(n, np.int64)
         re = np.ascontiguousarray(self.x.real)
         im = np.ascontiguousarray(self.x.imag)
         count, start = load_cycle_kernels().find_turning_points(
-            re, im, self.rate, angle, place, cell
+            re, im, self.rate, angle, slide, cell
         )
-        return TurningPoints(angle[:count], place[:count], cell[:count], start)
+        return TurningPoints(angle[:count], slide[:count], cell[:count], start)
 
 
 def evaluate_series(x, samples: int) -> np.ndarray:

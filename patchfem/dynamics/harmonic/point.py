@@ -99,7 +99,7 @@ class SteadyMotion:
 
         The result is () for an interface at rest.
         """
-        angles, places, _, _ = SampledSlide(
+        angles, slides, _, _ = SampledSlide(
             self.coefficients[0], self.omega, self.samples
         ).turning_points
         if not angles.size:
@@ -107,14 +107,14 @@ class SteadyMotion:
         k = np.arange(self.coefficients.shape[1])
         reversals = []
         # The cycle begins at the reversal, so its first sample is the reversal.
-        for index in (np.argmin(places), np.argmax(places)):
+        for index in (np.argmin(slides), np.argmax(slides)):
             track = SampledSlide(
                 self.coefficients[0] * np.exp(1j * k * angles[index]), self.omega, self.samples
             )
             sampled = [law.sample(track) for law in self.group.laws[0]]
             reversals.append(
                 (
-                    float(places[index]),
+                    float(slides[index]),
                     float(friction_force(self.group.laws[0], sampled)[0]),
                     float(find_slip(track, sampled)[0]),
                 )
@@ -319,15 +319,15 @@ def refine_steady_motion(motion: SteadyMotion, modes, drive) -> SteadyMotion:
 
 
 def _solve_harmonics(
-    modes, drive, group, h, x, wider, tolerance=DEFAULT_TOLERANCE, near=0
+    modes, drive, group, h, x, harmonics_ratio, tolerance=DEFAULT_TOLERANCE, near=0
 ) -> SteadyMotion:
     """Solve the balance with h harmonics, then add harmonics that follow from the force.
 
-    The harmonics that are added extend up to `wider` times h. The samples resolve the shortest stick phase.
+    The harmonics that are added extend up to `harmonics_ratio` times h. The samples resolve the shortest stick phase.
 
     near: number of samples of a neighbouring motion, 0 for none.
     """
-    samples = group.samples or max(group.samples_for(h * wider), near)
+    samples = group.samples or max(group.samples_for(h * harmonics_ratio), near)
     balance = make_balance(modes, group, samples)
     for _ in range(3):
         x, equations, count = _solve_balance(balance, x, drive, h)
@@ -340,11 +340,13 @@ def _solve_harmonics(
             )
             / 2
         )
-        needed_samples = group.samples or group.samples_for(h * wider, amplitudes)
+        needed_samples = group.samples or group.samples_for(h * harmonics_ratio, amplitudes)
         if needed_samples <= balance.contact.samples:
             break
         balance = balance.with_contact(balance.contact.with_samples(needed_samples))
-    return _add_harmonics(balance, SweepStart(x, equations, count), drive, h, wider, tolerance)
+    return _add_harmonics(
+        balance, SweepStart(x, equations, count), drive, h, harmonics_ratio, tolerance
+    )
 
 
 def _solve_balance(balance, x, drive, h: int):
@@ -505,7 +507,9 @@ class SweepStart(NamedTuple):
     slides: np.ndarray | None = None
 
 
-def _add_harmonics(balance, start: SweepStart, drive, h, wider, tolerance) -> SteadyMotion:
+def _add_harmonics(
+    balance, start: SweepStart, drive, h, harmonics_ratio, tolerance
+) -> SteadyMotion:
     """Add harmonics above h by fixed-point sweeps, and estimate the truncation error.
 
     The harmonics up to h are corrected with their Jacobian. The last sweep takes twice the samples.
@@ -513,7 +517,7 @@ def _add_harmonics(balance, start: SweepStart, drive, h, wider, tolerance) -> St
     x, equations, count, known_slides = start
     omega = drive.omega
     level = drive.acceleration
-    n_harmonics = h * wider
+    n_harmonics = h * harmonics_ratio
     solve = solve_linear(equations.jacobian)
     n_probed = max(n_harmonics, 2 * h)  # additional harmonics that estimate the truncation error
     q = np.zeros((len(balance.rows), n_probed + 1), complex)
@@ -527,7 +531,7 @@ def _add_harmonics(balance, start: SweepStart, drive, h, wider, tolerance) -> St
         force = balance.contact.compute_force_harmonics(q, omega, n_probed, n_force_samples)
         z = balance.compute_modal_motion(x, omega, level, h, force)
         correction = -solve(_find_residual(balance, x, omega, level, h, force, z))
-        if sweep and wider > 1:
+        if sweep and harmonics_ratio > 1:
             x = x + correction
         new = (z @ balance.rows.T).T
         new[:, : h + 1] = balance.unpack_slides(x, omega, h)
@@ -539,7 +543,7 @@ def _add_harmonics(balance, start: SweepStart, drive, h, wider, tolerance) -> St
             )
         )
         q = new
-        if n_force_samples > samples or (wider == 1 and sweep):
+        if n_force_samples > samples or (harmonics_ratio == 1 and sweep):
             break
         if sweep and changes[-1] <= SWEEP_TOL_RATIO * tolerance * size:
             n_force_samples = 2 * samples

@@ -178,11 +178,11 @@ def add_list_energies(work, before, limit, contact):
     """
     net = work - limit * (contact.status[STATUS.energy] - before)
     if contact.law[LAW.form] <= FORM_POWER and limit > 0:
-        owed = contact.status[STATUS.owed] - net / limit
+        carried_gain = contact.status[STATUS.owed] - net / limit
         contact.status[STATUS.owed] = min(
-            max(owed, 0.0), MAX_CARRIED_RATIO * contact.law[LAW.length]
+            max(carried_gain, 0.0), MAX_CARRIED_RATIO * contact.law[LAW.length]
         )
-        net = limit * (contact.status[STATUS.owed] - owed)
+        net = limit * (contact.status[STATUS.owed] - carried_gain)
     if net < 0:
         contact.status[STATUS.created] -= net
     else:

@@ -254,16 +254,16 @@ def read_state(contact, rel_disp, velocity):
     -------
     friction.protocol_kernels.Reading
     """
-    way = contact.flow[FlowIndex.FULL_SLIP_DIRECTION]
+    direction = contact.flow[FlowIndex.FULL_SLIP_DIRECTION]
     energy = 0.0
     slip = contact.flow[FlowIndex.TOTAL_SLIDE]
     for k in range(contact.b.size):
         energy += 0.5 * contact.kappa[k] * contact.b[k] ** 2
         slip -= contact.drag[FullSlipRow.MEAN_SLIDE, k + 1] * contact.b[k]
-    if way != 0.0:
+    if direction != 0.0:
         limit = contact.drag[FullSlipRow.FORCE, 0]
         energy += contact.eps[0] * limit
-        return Reading(way * limit, energy, slip - way * contact.eps[0])
+        return Reading(direction * limit, energy, slip - direction * contact.eps[0])
     sums = sum_bonds(contact)
     slip = slip - sums.stretch / sums.load if sums.load > 0 else rel_disp
     return Reading(sums.force, energy + sums.energy, slip)

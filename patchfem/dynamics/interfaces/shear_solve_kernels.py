@@ -230,10 +230,10 @@ def find_largest_residual(out, scale):
 
     The residuals of the shear modes are scaled by the slide per coordinate.
     """
-    worst = abs(out[0])
+    largest = abs(out[0])
     for k in range(1, out.size):
-        worst = max(worst, abs(out[k]) * scale[k])
-    return worst
+        largest = max(largest, abs(out[k]) * scale[k])
+    return largest
 
 
 @njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)

@@ -51,9 +51,9 @@ def mean_force(numbers, memory, q, dq, eps, dt):
     slope = cubic * (3 * b * b + 2 * b * q + q * q)
     if stiffness == 0.0:
         return force, slope
-    turn = 2 * pi / numbers[3]
-    half = 0.5 * turn * dq
-    centre = turn * (q + 0.5 * dq)
+    wave_number = 2 * pi / numbers[3]
+    half = 0.5 * wave_number * dq
+    centre = wave_number * (q + 0.5 * dq)
     # The error of the series is 1e-4^4/120 here, whereas the quotients would lose digits.
     if abs(half) < 1e-4:
         ratio = 1 - half * half / 6
@@ -61,7 +61,7 @@ def mean_force(numbers, memory, q, dq, eps, dt):
     else:
         ratio = sin(half) / half
         bend = (cos(half) - ratio) / half
-    force += stiffness / turn * sin(centre) * ratio
+    force += stiffness / wave_number * sin(centre) * ratio
     return force, slope + 0.5 * stiffness * (cos(centre) * ratio + sin(centre) * bend)
 
 
@@ -120,9 +120,9 @@ def read_memory(numbers, memory, q, v):
     stiffness = numbers[2]
     if stiffness == 0.0:
         return Reading(force, energy, q)
-    turn = 2 * pi / numbers[3]
+    wave_number = 2 * pi / numbers[3]
     return Reading(
-        force + stiffness / turn * sin(turn * q),
-        energy + 2 * stiffness * (sin(0.5 * turn * q) / turn) ** 2,
+        force + stiffness / wave_number * sin(wave_number * q),
+        energy + 2 * stiffness * (sin(0.5 * wave_number * q) / wave_number) ** 2,
         q,
     )

@@ -66,14 +66,14 @@ class Changes(NamedTuple):
 
 
 @njit(**NJIT_INLINE)
-def cycle_end_element(k, place, lane):
+def cycle_end_element(k, quantity, lane):
     """Return the workspace index of a quantity in a stored cycle end.
 
     Parameters
     ----------
     k : int
         0 for the latest cycle end.
-    place : int
+    quantity : int
         Place of the number (`rows_kernels.CycleEnd`).
     lane : int
 
@@ -81,18 +81,18 @@ def cycle_end_element(k, place, lane):
     -------
     int
     """
-    return (CYCLE_ENDS + k * CYCLE_END_SIZE + place) * LANES + lane
+    return (CYCLE_ENDS + k * CYCLE_END_SIZE + quantity) * LANES + lane
 
 
 @njit(**NJIT_INLINE)
-def last_changes(value, place, workspace, lane):
+def last_changes(value, quantity, workspace, lane):
     """Return the last three changes of a quantity from cycle to cycle.
 
     Parameters
     ----------
     value : float
         Present value of the number.
-    place : int
+    quantity : int
         Place of the number in the end of a cycle (`rows_kernels.CycleEnd`).
     workspace, lane
         See `rigid_kernels.friction_force`.
@@ -101,9 +101,9 @@ def last_changes(value, place, workspace, lane):
     -------
     Changes
     """
-    last = workspace[cycle_end_element(0, place, lane)]
-    second = workspace[cycle_end_element(1, place, lane)]
-    third = workspace[cycle_end_element(2, place, lane)]
+    last = workspace[cycle_end_element(0, quantity, lane)]
+    second = workspace[cycle_end_element(1, quantity, lane)]
+    third = workspace[cycle_end_element(2, quantity, lane)]
     return Changes(value - last, last - second, second - third)
 
 

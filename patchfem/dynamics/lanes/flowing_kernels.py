@@ -719,7 +719,7 @@ def plan_layer_step(workspace, lane, state, step):
 
 
 @njit(**NJIT_INLINE)
-def next_layer_part(workspace, lane, state, rest, plan, is_last):
+def next_layer_part(workspace, lane, state, remaining_step, plan, is_last):
     """Compute the next part of a step through a regularisation layer.
 
     Parameters
@@ -728,7 +728,7 @@ def next_layer_part(workspace, lane, state, rest, plan, is_last):
         See `rigid_kernels.friction_force`.
     state : FlowState
         State at the start of the part.
-    rest : AngleStep
+    remaining_step : AngleStep
         Remainder of the step.
     plan : LayerPlan
     is_last : bool
@@ -746,13 +746,21 @@ def next_layer_part(workspace, lane, state, rest, plan, is_last):
         end_speed = v + side * plan.width
         if side * v < -plan.edge_speed:
             end_speed = -side * plan.edge_speed
-        part = step_to_speed(workspace, lane, state, rest.s0, rest.c0, end_speed)
-        if 0.0 < part.angle < rest.angle:
+        part = step_to_speed(
+            workspace, lane, state, remaining_step.s0, remaining_step.c0, end_speed
+        )
+        if 0.0 < part.angle < remaining_step.angle:
             return part, False
     is_last = plan.flies or is_last
-    t = rest.angle if is_last else plan.angle / plan.n_parts
-    end_sine = rest.s1 if is_last else advance_angle(rest.s0, rest.c0, t)[0]
-    sines = (rest.s0, advance_angle(rest.s0, rest.c0, t / 2)[0], end_sine)
+    t = remaining_step.angle if is_last else plan.angle / plan.n_parts
+    end_sine = (
+        remaining_step.s1 if is_last else advance_angle(remaining_step.s0, remaining_step.c0, t)[0]
+    )
+    sines = (
+        remaining_step.s0,
+        advance_angle(remaining_step.s0, remaining_step.c0, t / 2)[0],
+        end_sine,
+    )
     end, work = runge_kutta_step(workspace, lane, state, SIGN_IN_LAYER, sines, t)
     return LayerPart(t, end, work), is_last
 
@@ -787,8 +795,10 @@ def resolve_layer_step(workspace, lane, step):
     work_sum = 0.0
     loss_sum = 0.0
     for n in range(plan.n_parts):
-        rest = AngleStep(s, c, step.s1, step.c1, angle - elapsed)
-        part, is_last = next_layer_part(workspace, lane, state, rest, plan, n == plan.n_parts - 1)
+        remaining_step = AngleStep(s, c, step.s1, step.c1, angle - elapsed)
+        part, is_last = next_layer_part(
+            workspace, lane, state, remaining_step, plan, n == plan.n_parts - 1
+        )
         t = part.angle
         end = part.end
         s2 = step.s1
@@ -801,9 +811,9 @@ def resolve_layer_step(workspace, lane, step):
         if workspace[StretchRowStart.IS_OBSERVED + lane] > 0.0:
             add_part_measures(workspace, lane, state, (s, c, a), end, (s2, c2, a1), t)
         if v * v1 <= 0.0 and v != 0.0:
-            place = find_hermite_root(v, v1, t * a, t * a1)
-            event = (elapsed + place * t) / angle
-            event_slide = hermite_cubic(state.slide, end.slide, t * v, t * v1, place)
+            fraction = find_hermite_root(v, v1, t * a, t * a1)
+            event = (elapsed + fraction * t) / angle
+            event_slide = hermite_cubic(state.slide, end.slide, t * v, t * v1, fraction)
         # Hermite's rule integrates sin x' and x'^2 over the part.
         work_sum += t * (s * v + s2 * v1 + t / 6 * (c * v + s * a - c2 * v1 - s2 * a1)) / 2
         loss_sum += t * (v * v + v1 * v1 + t / 3 * (v * a - v1 * a1)) / 2
@@ -875,24 +885,24 @@ def resolve_step(workspace, lane, step):
     elapsed = 0.0
     work = 0.0
     for part in range(MAX_PARTS):
-        rest = step.angle - elapsed
+        remaining_angle = step.angle - elapsed
         sine = step.s0 * cos(elapsed) + step.c0 * sin(elapsed)
-        middle = elapsed + rest / 2
+        middle = elapsed + remaining_angle / 2
         sines = (sine, step.s0 * cos(middle) + step.c0 * sin(middle), step.s1)
-        end, part_work = runge_kutta_step(workspace, lane, state, slip_sign, sines, rest)
-        first = find_first_event(workspace, lane, state, end, slip_sign, sines, rest)
+        end, part_work = runge_kutta_step(workspace, lane, state, slip_sign, sines, remaining_angle)
+        first = find_first_event(workspace, lane, state, end, slip_sign, sines, remaining_angle)
         fraction = first.fraction
         if part == MAX_PARTS - 1 or not (first.is_reversal or fraction < 1.0):
             break
         if fraction > 0.0:
             reached = state
             for _ in range(1 + N_CORRECTIONS):
-                event_angle = elapsed + fraction * rest
-                middle = elapsed + fraction * rest / 2
+                event_angle = elapsed + fraction * remaining_angle
+                middle = elapsed + fraction * remaining_angle / 2
                 event_sine = step.s0 * cos(event_angle) + step.c0 * sin(event_angle)
                 sines = (sine, step.s0 * cos(middle) + step.c0 * sin(middle), event_sine)
                 reached, part_work = runge_kutta_step(
-                    workspace, lane, state, slip_sign, sines, fraction * rest
+                    workspace, lane, state, slip_sign, sines, fraction * remaining_angle
                 )
                 v = reached.speed
                 z = reached.stretch
@@ -901,8 +911,8 @@ def resolve_step(workspace, lane, step):
                 if first.is_reversal:
                     distance = v
                     rate = flow_acceleration(workspace, lane, reached, event_sine)
-                if abs(distance) < rest * abs(rate):
-                    fraction = min(max(fraction - distance / (rest * rate), 0.0), 1.0)
+                if abs(distance) < remaining_angle * abs(rate):
+                    fraction = min(max(fraction - distance / (remaining_angle * rate), 0.0), 1.0)
             work += part_work
             elapsed = event_angle
             v = 0.0 if first.is_reversal else reached.speed

@@ -54,9 +54,11 @@ def resolve_lane_step(workspace, lane, step):
     # A jump of the acceleration inside the step adds this term to the
     # error of the trapezoidal rule.
     u = outcome.event
-    edge = outcome.jump * step.angle * (u * (1 - u) / 2 - 1 / 12)
-    workspace[RowStart.WORK_SUM + lane] += step.s1 * v1 - (step.s0 + u * (step.s1 - step.s0)) * edge
-    workspace[RowStart.LOSS_SUM + lane] += v1 * v1 - 2 * outcome.event_speed * edge
+    correction = outcome.jump * step.angle * (u * (1 - u) / 2 - 1 / 12)
+    workspace[RowStart.WORK_SUM + lane] += (
+        step.s1 * v1 - (step.s0 + u * (step.s1 - step.s0)) * correction
+    )
+    workspace[RowStart.LOSS_SUM + lane] += v1 * v1 - 2 * outcome.event_speed * correction
     workspace[RowStart.POWER_SUM + lane] += abs(step.s1 * v1)
     highest = max(x1, outcome.reversal_slide)
     lowest = min(x1, outcome.reversal_slide)

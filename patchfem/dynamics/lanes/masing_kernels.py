@@ -196,8 +196,8 @@ def clamped_abscissa(x, workspace, lane):
     -------
     float
     """
-    place = max(curve_abscissa(x, workspace, lane), MIN_ABSCISSA)
-    return min(place, 2.0 - workspace[SliderRowStart.ALL_SLIP + lane])
+    abscissa = max(curve_abscissa(x, workspace, lane), MIN_ABSCISSA)
+    return min(abscissa, 2.0 - workspace[SliderRowStart.ALL_SLIP + lane])
 
 
 @njit(**NJIT_INLINE)
@@ -813,30 +813,32 @@ def resolve_step(workspace, lane, step):
     event_kind = NO_EVENT
     reversal_slide = state.slide
     is_reversed = False
-    rest = step  # remainder of the step
+    remaining_step = step
     path = 0.0
     stick_angle = 0.0
     slip = irreversible_slide(state.slide, state.friction, workspace, lane)
     workspace[SliderRowStart.TANGENT_START + lane] = state.tangent
     workspace[SliderRowStart.STICK_FRACTION + lane] = 0.0
     for n_events in range(MAX_EVENTS + 1):
-        end = hermite_step(workspace, lane, state, rest)
-        a0, _ = acceleration_and_rate(workspace, lane, state, rest.s0, rest.c0)
+        end = hermite_step(workspace, lane, state, remaining_step)
+        a0, _ = acceleration_and_rate(workspace, lane, state, remaining_step.s0, remaining_step.c0)
         a1, _ = acceleration_and_rate(workspace, lane, end, step.s1, step.c1)
-        first = find_first_event(workspace, lane, state, a0, end, a1, rest.angle)
-        if first.kind == NO_EVENT or n_events == MAX_EVENTS or rest.angle <= 0.0:
+        first = find_first_event(workspace, lane, state, a0, end, a1, remaining_step.angle)
+        if first.kind == NO_EVENT or n_events == MAX_EVENTS or remaining_step.angle <= 0.0:
             break
-        t = first.fraction * rest.angle
-        se, ce = drive_after(rest.s0, rest.c0, t)
+        t = first.fraction * remaining_step.angle
+        se, ce = drive_after(remaining_step.s0, remaining_step.c0, t)
         slip_before = slip
         sign_before = workspace[RowStart.SLIP_SIGN + lane]
-        reached = hermite_step(workspace, lane, state, AngleStep(rest.s0, rest.c0, se, ce, t))
+        reached = hermite_step(
+            workspace, lane, state, AngleStep(remaining_step.s0, remaining_step.c0, se, ce, t)
+        )
         x = reached.slide
         v = 0.0 if first.kind == REVERSAL else reached.speed
         friction, tangent_before = branch_friction(x, workspace, lane)
         slip = irreversible_slide(x, friction, workspace, lane)
         path += abs(slip - slip_before)
-        rest = AngleStep(se, ce, step.s1, step.c1, rest.angle - t)
+        remaining_step = AngleStep(se, ce, step.s1, step.c1, remaining_step.angle - t)
         stick_angle += t if sign_before == 0.0 else 0.0
         if first.kind == REVERSAL:
             reversal_slide = x
@@ -853,11 +855,11 @@ def resolve_step(workspace, lane, step):
         kind = SLIP_CHANGE if changes_slip else first.kind
         if kind >= event_kind:
             event_kind = kind
-            event_fraction = 1 - rest.angle / step.angle
+            event_fraction = 1 - remaining_step.angle / step.angle
             event = state
             workspace[SliderRowStart.TANGENT_BEFORE + lane] = tangent_before
             workspace[SliderRowStart.TANGENT_AFTER + lane] = tangent
-            fraction = stick_angle / (step.angle - rest.angle) if changes_slip else 0.0
+            fraction = stick_angle / (step.angle - remaining_step.angle) if changes_slip else 0.0
             workspace[SliderRowStart.STICK_FRACTION + lane] = fraction
     last_slip = irreversible_slide(end.slide, end.friction, workspace, lane)
     workspace[SliderRowStart.STEP_SLIP + lane] = path + abs(last_slip - slip)

@@ -97,9 +97,9 @@ class StickFractions(NamedTuple):
 
 
 class CubicRoot(NamedTuple):
-    """Root of a cubic in [0, 1], with value, slope and integral of the cubic there."""
+    """Root of a cubic in [0, 1], with the value, slope and integral of the cubic at the root."""
 
-    place: float
+    position: float
     value: float
     slope: float
     integral: float
@@ -121,7 +121,7 @@ def find_cubic_root(y0, y1, m0, m1, lowest):
     y0, y1, m0, m1 : float
         Values and slopes of the cubic at both ends.
     lowest : float
-        Lower bound of the place; the upper bound is 1.
+        Lower bound of the position; the upper bound is 1.
 
     Returns
     -------
@@ -591,21 +591,21 @@ def resolve_release(workspace, lane, step):
     n0 = drive * step.s0 - stiffness * x
     n1 = drive * step.s1 - stiffness * x
     side = 1.0 if n1 > 0.0 else -1.0
-    reserve = static - side * n0
-    reserve1 = static - side * n1
-    if not reserve1 < 0.0:
+    margin = static - side * n0
+    end_margin = static - side * n1
+    if not end_margin < 0.0:
         return StepOutcome(x, 0.0, 0.0, x, 1.0, x, 0.0, x, x, 0.0)
-    lowest = -1.0 if reserve < 0.0 else 0.0
+    lowest = -1.0 if margin < 0.0 else 0.0
     slope = -step.angle * side * drive * step.c0
-    root = find_cubic_root(reserve, reserve1, slope, -step.angle * side * drive * step.c1, lowest)
+    root = find_cubic_root(margin, end_margin, slope, -step.angle * side * drive * step.c1, lowest)
     force = side * (static - root.value)
     net_force = force - side * workspace[RowStart.KINETIC + lane]
     force_rate = -side * root.slope / step.angle
     force_bend = -(force + stiffness * x)
-    rest = step.angle - root.place * step.angle
-    end = motion_from_rest(workspace, lane, rest, net_force, force_rate, force_bend)
+    remaining_angle = step.angle - root.position * step.angle
+    end = motion_from_rest(workspace, lane, remaining_angle, net_force, force_rate, force_bend)
     x1 = x + end.slide
-    return StepOutcome(x1, end.speed, side, x1, root.place, x, 0.0, x, x1, net_force)
+    return StepOutcome(x1, end.speed, side, x1, root.position, x, 0.0, x, x1, net_force)
 
 
 @njit(**NJIT_INLINE)
@@ -656,16 +656,16 @@ def resolve_stop(workspace, lane, step):
             0.0,
             0.0,
             stop_slide,
-            root.place,
+            root.position,
             stop_slide,
             0.0,
             stop_slide,
             stop_slide,
             -acceleration,
         )
-    rest = step.angle - root.place * step.angle
-    x1 = end.slide + 2 * friction * unit_force_slide(rest, damping, stiffness)
-    v1 = end.speed + 2 * friction * unit_force_speed(rest, damping, stiffness)
+    remaining_angle = step.angle - root.position * step.angle
+    x1 = end.slide + 2 * friction * unit_force_slide(remaining_angle, damping, stiffness)
+    v1 = end.speed + 2 * friction * unit_force_speed(remaining_angle, damping, stiffness)
     return StepOutcome(
-        x1, v1, -sign, x1, root.place, stop_slide, 0.0, stop_slide, stop_slide, 2 * friction
+        x1, v1, -sign, x1, root.position, stop_slide, 0.0, stop_slide, stop_slide, 2 * friction
     )

@@ -98,14 +98,14 @@ def prepare_lookup(workspace, lane):
     """Look up the first-loading curve of a lane at the prepared abscissa."""
     start = int(workspace[TableRowStart.YIELD_INDEX + lane])
     find_yield_from_guess(start, workspace[TableRowStart.CURVE_PLACE + lane], workspace, lane)
-    place = (
+    yield_index = (
         TABLE_START
         + TABLE_SIZE * lane
         + N_COLUMNS * int(workspace[TableRowStart.YIELD_INDEX + lane])
     )
-    workspace[TableRowStart.PREPARED_FORCE + lane] = workspace[place + YieldColumn.FORCE]
-    workspace[TableRowStart.PREPARED_SLOPE + lane] = workspace[place + YieldColumn.SLOPE]
-    workspace[TableRowStart.PREPARED_MOMENT + lane] = workspace[place + YieldColumn.MOMENT]
+    workspace[TableRowStart.PREPARED_FORCE + lane] = workspace[yield_index + YieldColumn.FORCE]
+    workspace[TableRowStart.PREPARED_SLOPE + lane] = workspace[yield_index + YieldColumn.SLOPE]
+    workspace[TableRowStart.PREPARED_MOMENT + lane] = workspace[yield_index + YieldColumn.MOMENT]
 
 
 @njit(**NJIT_INLINE)
@@ -140,9 +140,9 @@ def start_lookup(w, workspace, lane):
     workspace, lane
         See `rigid_kernels.friction_force`.
     """
-    place = find_yield(w, workspace, lane)
-    workspace[TableRowStart.START_FORCE + lane] = workspace[place + YieldColumn.FORCE]
-    workspace[TableRowStart.START_MOMENT + lane] = workspace[place + YieldColumn.MOMENT]
+    yield_index = find_yield(w, workspace, lane)
+    workspace[TableRowStart.START_FORCE + lane] = workspace[yield_index + YieldColumn.FORCE]
+    workspace[TableRowStart.START_MOMENT + lane] = workspace[yield_index + YieldColumn.MOMENT]
 
 
 @njit(**NJIT_INLINE)
@@ -168,10 +168,10 @@ def force_and_slope(w, workspace, lane, when):
     if when == PREPARED:
         slope = workspace[TableRowStart.PREPARED_SLOPE + lane]
         return workspace[TableRowStart.PREPARED_FORCE + lane] + slope * w, slope
-    place = find_yield(w, workspace, lane)
-    return workspace[place + YieldColumn.FORCE] + workspace[
-        place + YieldColumn.SLOPE
-    ] * w, workspace[place + YieldColumn.SLOPE]
+    yield_index = find_yield(w, workspace, lane)
+    return workspace[yield_index + YieldColumn.FORCE] + workspace[
+        yield_index + YieldColumn.SLOPE
+    ] * w, workspace[yield_index + YieldColumn.SLOPE]
 
 
 @njit(**NJIT_INLINE)
@@ -201,8 +201,10 @@ def mean_slip(w, force, workspace, lane, when):
             workspace[TableRowStart.START_FORCE + lane] * w
             - workspace[TableRowStart.START_MOMENT + lane]
         )
-    place = find_yield(w, workspace, lane)
-    return workspace[place + YieldColumn.FORCE] * w - workspace[place + YieldColumn.MOMENT]
+    yield_index = find_yield(w, workspace, lane)
+    return (
+        workspace[yield_index + YieldColumn.FORCE] * w - workspace[yield_index + YieldColumn.MOMENT]
+    )
 
 
 @njit(**NJIT_INLINE)
@@ -218,7 +220,8 @@ def loading_work(w, force, workspace, lane):
     -------
     float
     """
-    place = find_yield(w, workspace, lane)
+    yield_index = find_yield(w, workspace, lane)
     return (
-        w * (force + workspace[place + YieldColumn.FORCE]) - workspace[place + YieldColumn.MOMENT]
+        w * (force + workspace[yield_index + YieldColumn.FORCE])
+        - workspace[yield_index + YieldColumn.MOMENT]
     ) / 2

@@ -83,7 +83,7 @@ class CurveEvent(NamedTuple):
     The factor is that by which the spring of the stick acts on the correction after the event.
     """
 
-    place: float
+    fraction: float
     speed: float
     rate: float
     second_rate: float
@@ -392,7 +392,7 @@ def find_yield(curve, memory, side, length, top, highest):
     length : float
         Yield length [m].
     top : float
-        Upper bound of the place: the reversal after which the spring is unloaded again, otherwise 1.
+        Upper bound of the fraction: the reversal after which the spring is unloaded again, otherwise 1.
     highest : float
         Largest extension of the spring up to there [m].
 
@@ -400,13 +400,13 @@ def find_yield(curve, memory, side, length, top, highest):
     -------
     float
     """
-    reserve = side * (curve.x - memory) - length
-    u = top * min(max(-reserve / (highest - length - reserve), 0.0), 1.0)
+    excess = side * (curve.x - memory) - length
+    u = top * min(max(-excess / (highest - length - excess), 0.0), 1.0)
     if top < 1.0:
         # Near a reversal the displacement is a parabola, which a secant does not approximate.
         bend = abs(curve.m0 + top * (2 * curve.c2 + 3 * curve.c3 * top))
-        bow = curve.angle * max(bend, MIN_DIVISOR)
-        u = max(top - sqrt(2 * (highest - length) / bow), 0.0)
+        curvature = curve.angle * max(bend, MIN_DIVISOR)
+        u = max(top - sqrt(2 * (highest - length) / curvature), 0.0)
     for _ in range(N_NEWTON):
         residual = side * (slide_on_curve(curve, u) - memory) - length
         speed = side * speed_on_curve(curve, u)
@@ -489,10 +489,12 @@ def resolve_slip(workspace, lane, curve, end, is_reversed, reversal):
     x1 = end.slide
     v1 = end.speed
     if reversal < 1.0:
-        rest = curve.angle - reversal * curve.angle
+        remaining_angle = curve.angle - reversal * curve.angle
         stiffness = workspace[RowStart.STIFFNESS + lane] + spring
         event = event_on_curve(curve, reversal, 0.0, -spring)
-        change = slip_correction(rest, workspace[RowStart.DAMPING + lane], stiffness, event)
+        change = slip_correction(
+            remaining_angle, workspace[RowStart.DAMPING + lane], stiffness, event
+        )
         x1 += change.slide
         v1 += change.speed
     return StepOutcome(x1, v1, 0.0, memory, reversal, turn, 0.0, memory, turn, 0.0)
@@ -534,9 +536,9 @@ def resolve_stick(workspace, lane, curve, end, is_reversed, reversal):
         return StepOutcome(
             end.slide, end.speed, side, memory, u, event_slide, event_speed, memory, turn, 0.0
         )
-    rest = curve.angle - u * curve.angle
+    remaining_angle = curve.angle - u * curve.angle
     event = event_on_curve(curve, u, event_speed, spring)
-    change = slip_correction(rest, damping, stiffness, event)
+    change = slip_correction(remaining_angle, damping, stiffness, event)
     sign1 = side
     x1 = end.slide + change.slide
     v1 = end.speed + change.speed
@@ -545,14 +547,14 @@ def resolve_stick(workspace, lane, curve, end, is_reversed, reversal):
         # The slip reverses later than the stick would, or it does not reverse in this step.
         is_reversed = side * v1 < 0.0
         if is_reversed:
-            slip_angle = find_reversal_in_slip(event, spring, rest)
+            slip_angle = find_reversal_in_slip(event, spring, remaining_angle)
             change = slip_correction(slip_angle, damping, stiffness, event)
             turn = slide_on_curve(curve, u + slip_angle / curve.angle) + change.slide
             sign1 = 0.0
             memory1 = turn - side * length
             force = spring * (memory1 - memory)
             change = continue_in_stick(
-                change, damping, stiffness + spring, force, rest - slip_angle
+                change, damping, stiffness + spring, force, remaining_angle - slip_angle
             )
             x1 = end.slide + change.slide
             v1 = end.speed + change.speed

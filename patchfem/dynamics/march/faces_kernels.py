@@ -476,38 +476,38 @@ def solve_coupled_forces(start, system):
     """
     elements = system.elements
     n_iterations = 0
-    last_worst = np.inf
-    pace = NewtonSchedule(FIRST_NEWTON_SWEEP, 1, np.inf)
+    last_max_change = np.inf
+    schedule = NewtonSchedule(FIRST_NEWTON_SWEEP, 1, np.inf)
     increment = 0.0
     if HAS_STOPS:
         set_static_limits(elements)
     for sweep in range(MAX_SWEEPS):
-        worst = 0.0
+        max_change = 0.0
         if HAS_CONTACT:
             solution = solve_contact(start, system)
             increment = solution.increment
-            worst = solution.change
+            max_change = solution.change
             n_iterations += solution.iterations
         for e in range(elements.links.shape[1]):
             change, count = solve_element(e, sweep, elements, start.dt)
-            worst = max(worst, change)
+            max_change = max(max_change, change)
             n_iterations += count
         if not IS_COUPLED:
-            if worst == np.inf:
+            if max_change == np.inf:
                 return increment, -n_iterations
-            worst = 0.0
-        if worst <= 1.0:
+            max_change = 0.0
+        if max_change <= 1.0:
             if HAS_STOPS:
                 if release_slipping(elements):
-                    last_worst = np.inf
+                    last_max_change = np.inf
                     continue
             return increment, n_iterations
         if sweep > 1:
-            pace, count = accelerate_sweeps(
-                sweep, worst, last_worst, pace, system.modal_system, elements
+            schedule, count = accelerate_sweeps(
+                sweep, max_change, last_max_change, schedule, system.modal_system, elements
             )
             n_iterations += count
-        last_worst = worst
+        last_max_change = max_change
     return increment, -n_iterations
 
 
@@ -616,18 +616,18 @@ def copy_set_valued_forces(elements):
     Returns the largest force change relative to the tolerance.
     """
     stops = elements.stops
-    worst = 0.0
+    max_change = 0.0
     for i in range(stops.names.size):
         e = stops.element[i]
         force = stops.field[FaceRow.MEAN_FORCE, i]
-        worst = max(
-            worst,
+        max_change = max(
+            max_change,
             abs(force - elements.state[ElementRow.FORCE, e])
             / (elements.state[ElementRow.FORCE_TOL, e] + ROUND_OFF * abs(force)),
         )
         elements.state[ElementRow.FORCE, e] = force
         elements.state[ElementRow.INCREMENT, e] = stops.field[FaceRow.INCREMENT, i]
-    return worst
+    return max_change
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
@@ -690,22 +690,22 @@ def solve_with_events(start, table_row, system):
     elements = system.elements
     stops = elements.stops
     n_iterations = 0
-    last_worst = np.inf
+    last_max_change = np.inf
     increment = 0.0
     for i in range(stops.names.size):
         stops.field[FaceRow.START_SPEED, i] = elements.state[ElementRow.SPEED, stops.element[i]]
     for sweep in range(MAX_EVENT_SWEEPS):
-        worst = 0.0
+        max_change = 0.0
         if HAS_CONTACT:
             solution = solve_contact(start, system)
             increment = solution.increment
-            worst = solution.change
+            max_change = solution.change
             n_iterations += solution.iterations
         if HAS_SLOPES:
             for e in range(elements.links.shape[1]):
                 if elements.num[e, 0] != SET_VALUED:
                     change, count = solve_element(e, sweep, elements, start.dt)
-                    worst = max(worst, change)
+                    max_change = max(max_change, change)
                     n_iterations += count
         set_free_motion(elements)
         if sweep < MAX_EVENT_SWEEPS // 2:
@@ -715,15 +715,15 @@ def solve_with_events(start, table_row, system):
                 break
         if not stop_kernels.match_mean_forces(stops):
             break
-        worst = max(worst, copy_set_valued_forces(elements))
+        max_change = max(max_change, copy_set_valued_forces(elements))
         n_iterations += 1
-        if worst <= 1.0 or is_all_set_valued(elements):
+        if max_change <= 1.0 or is_all_set_valued(elements):
             loses_energy = stop_kernels.find_impulses(stops) >= 0.0
             return EventStep(increment, n_iterations, loses_energy)
         if IS_COUPLED:
-            if sweep > 4 and worst > SLOW_CONVERGENCE_RATIO * last_worst:
+            if sweep > 4 and max_change > SLOW_CONVERGENCE_RATIO * last_max_change:
                 take_newton_step_with_stops(elements, start.dt)
-        last_worst = worst
+        last_max_change = max_change
     return EventStep(increment, n_iterations, False)
 
 

@@ -195,8 +195,8 @@ def march(
     n = modes.omega.size
     energies = {name: get_rows(workspace, at)[0] for name, at in LEDGER_POSITIONS.items()}
     rates = get_rows(workspace, At.RIG_RATE)[:n]
-    places = get_rows(workspace, At.RIG_POSITION)[:n]
-    squares = (rates**2 + (modes.omega[:, None] * places) ** 2).sum(axis=0)
+    positions = get_rows(workspace, At.RIG_POSITION)[:n]
+    squares = (rates**2 + (modes.omega[:, None] * positions) ** 2).sum(axis=0)
     energies["stored"] = 0.5 * modes.mass * squares + get_rows(workspace, At.INTERFACE_ENERGY)[0]
     return MarchedCases(
         extremes=history[:, :2].transpose(2, 0, 1),

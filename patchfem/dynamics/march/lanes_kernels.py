@@ -74,10 +74,10 @@ def evaluate_force_shapes(x, is_long):
         d = d * d
         d = d * d
         d = d * d
-        over = 1 / max(x, MAX_SERIES_SLIDE)
-        one = (1 - d) * over
-        f1 = one if x > MAX_SERIES_SLIDE else f1
-        f2 = (1 - one) * over if x > MAX_SERIES_SLIDE else f2
+        inverse_x = 1 / max(x, MAX_SERIES_SLIDE)
+        mean_decay = (1 - d) * inverse_x
+        f1 = mean_decay if x > MAX_SERIES_SLIDE else f1
+        f2 = (1 - mean_decay) * inverse_x if x > MAX_SERIES_SLIDE else f2
         e = d if x > MAX_SERIES_SLIDE else e
     return f1, f2, e
 
@@ -154,8 +154,8 @@ def take_newton_step(workspace, lane, beta, is_long):
     p1 = workspace[At.NEWTON_STEP + LANES + lane]
     p2 = workspace[At.NEWTON_STEP + 2 * LANES + lane]
     length = workspace[At.BOND_LENGTH + lane]
-    fall = workspace[At.DESCENT + lane]
-    done = workspace[At.IS_SOLVED + lane]
+    descent = workspace[At.DESCENT + lane]
+    is_solved = workspace[At.IS_SOLVED + lane]
     half_stiffness1 = 0.5 * workspace[At.STIFFNESSES + lane]
     half_stiffness2 = 0.5 * workspace[At.STIFFNESSES + LANES + lane]
     # These are the residual g and the lower half of the Hessian h of the potential of the step.
@@ -183,7 +183,7 @@ def take_newton_step(workspace, lane, beta, is_long):
         h11 += a * a * slope
         h12 += a * b * slope
         h22 += b * b * slope
-    back = g0 * p0 + g1 * p1 + g2 * p2 > 0.5 * fall
+    overshoots = g0 * p0 + g1 * p1 + g2 * p2 > 0.5 * descent
     r00 = 1 / h00
     l1 = h01 * r00
     l2 = h02 * r00
@@ -198,21 +198,22 @@ def take_newton_step(workspace, lane, beta, is_long):
     max_shape2 = workspace[At.MAX_SHAPES + LANES + lane]
     slopes = h00 - 1 / beta
     size = abs(n0) + max_shape1 * abs(n1) + max_shape2 * abs(n2)
-    least = abs(y0) - max_shape1 * abs(y1) - max_shape2 * abs(y2)
+    min_slide = abs(y0) - max_shape1 * abs(y1) - max_shape2 * abs(y2)
     # If no point reverses in this step, the curvature of the forces follows from their slopes,
     # which are 0 while all points slip.
-    near = size <= NEWTON_TOL * length or (
-        least > size and slopes * size * size <= CURVATURE_TOL * workspace[At.LIMIT + lane] * length
+    is_near = size <= NEWTON_TOL * length or (
+        min_slide > size
+        and slopes * size * size <= CURVATURE_TOL * workspace[At.LIMIT + lane] * length
     )
-    on = 0.0 if done > 0.0 else 1.0
-    workspace[At.INCREMENTS + lane] = y0 + on * (-0.5 * p0 if back else n0)
-    workspace[At.INCREMENTS + LANES + lane] = y1 + on * (-0.5 * p1 if back else n1)
-    workspace[At.INCREMENTS + 2 * LANES + lane] = y2 + on * (-0.5 * p2 if back else n2)
-    workspace[At.NEWTON_STEP + lane] = 0.5 * p0 if back else n0
-    workspace[At.NEWTON_STEP + LANES + lane] = 0.5 * p1 if back else n1
-    workspace[At.NEWTON_STEP + 2 * LANES + lane] = 0.5 * p2 if back else n2
-    workspace[At.DESCENT + lane] = 0.5 * fall if back else -(g0 * n0 + g1 * n1 + g2 * n2)
-    workspace[At.IS_SOLVED + lane] = 1.0 if done > 0.0 or (near and not back) else 0.0
+    is_active = 0.0 if is_solved > 0.0 else 1.0
+    workspace[At.INCREMENTS + lane] = y0 + is_active * (-0.5 * p0 if overshoots else n0)
+    workspace[At.INCREMENTS + LANES + lane] = y1 + is_active * (-0.5 * p1 if overshoots else n1)
+    workspace[At.INCREMENTS + 2 * LANES + lane] = y2 + is_active * (-0.5 * p2 if overshoots else n2)
+    workspace[At.NEWTON_STEP + lane] = 0.5 * p0 if overshoots else n0
+    workspace[At.NEWTON_STEP + LANES + lane] = 0.5 * p1 if overshoots else n1
+    workspace[At.NEWTON_STEP + 2 * LANES + lane] = 0.5 * p2 if overshoots else n2
+    workspace[At.DESCENT + lane] = 0.5 * descent if overshoots else -(g0 * n0 + g1 * n1 + g2 * n2)
+    workspace[At.IS_SOLVED + lane] = 1.0 if is_solved > 0.0 or (is_near and not overshoots) else 0.0
 
 
 @njit(**NJIT_INLINE)
@@ -413,8 +414,8 @@ def add_step_sums(workspace, lane, half_mass):
     half_mass : float
         Half of the modal mass [kg].
     """
-    place = workspace[At.RIG_SLIDE + lane]
-    out = workspace[At.OUTPUT + lane]
+    slide = workspace[At.RIG_SLIDE + lane]
+    output = workspace[At.OUTPUT + lane]
     work = workspace[At.DRIVE_WORK + lane]
     workspace[At.WORK_IN + lane] += work
     workspace[At.DRIVE_WORK_SIZE + lane] += abs(work)
@@ -423,11 +424,11 @@ def add_step_sums(workspace, lane, half_mass):
         workspace[At.INTERFACE_ENERGY + lane] + half_mass * workspace[At.RATE_SQUARES + lane]
     )
     workspace[At.MAX_STORED + lane] = max(workspace[At.MAX_STORED + lane], stored_energy)
-    workspace[At.MAX_SLIDE + lane] = max(workspace[At.MAX_SLIDE + lane], abs(place))
-    workspace[At.MIN_OUTPUT + lane] = min(workspace[At.MIN_OUTPUT + lane], out)
-    workspace[At.MAX_OUTPUT + lane] = max(workspace[At.MAX_OUTPUT + lane], out)
+    workspace[At.MAX_SLIDE + lane] = max(workspace[At.MAX_SLIDE + lane], abs(slide))
+    workspace[At.MIN_OUTPUT + lane] = min(workspace[At.MIN_OUTPUT + lane], output)
+    workspace[At.MAX_OUTPUT + lane] = max(workspace[At.MAX_OUTPUT + lane], output)
     workspace[At.SLIP + lane] = (
-        place
+        slide
         - workspace[At.MEAN_SHAPES + lane] * workspace[At.PIECE_POSITION + lane]
         - workspace[At.MEAN_SHAPES + LANES + lane] * workspace[At.PIECE_POSITION + LANES + lane]
         - workspace[At.BOND_LENGTH + lane]
@@ -494,14 +495,14 @@ def update_extremes(workspace, dt):
     They are those of cubics as in `passing_kernels.find_cycle_output`.
 
     """
-    turns = 0.0
+    n_reversals = 0.0
     for lane in range(LANES):
-        turns += (
+        n_reversals += (
             1.0
             if workspace[At.LAST_OUTPUT_RATE + lane] * workspace[At.OUTPUT_RATE + lane] < 0.0
             else 0.0
         )
-    for lane in range(LANES if turns > 0.0 else 0):
+    for lane in range(LANES if n_reversals > 0.0 else 0):
         if workspace[At.LAST_OUTPUT_RATE + lane] * workspace[At.OUTPUT_RATE + lane] < 0.0:
             a = workspace[At.LAST_OUTPUT + lane]
             b = workspace[At.OUTPUT + lane]

@@ -246,7 +246,7 @@ def points_model(law, area, sigma, shear=None, pattern=None) -> ContactModel:
 
 
 def point_lists_model(
-    law, limit, sigma, shear, reach: float, merge: float, under: dict | None = None
+    law, limit, sigma, shear, reach: float, merge: float, pressure_fields: dict | None = None
 ) -> ContactModel:
     """Return the contact model of points that are coupled by shear modes and each have a bond list.
 
@@ -265,7 +265,7 @@ def point_lists_model(
         Cut-off in bond lengths.
     merge : float
         Widest merged strip in bond lengths at zero age; 0 merges nothing.
-    under : dict or None
+    pressure_fields : dict or None
         Result of `lower_pressure_fields` or `nodal_load_fields` for a varying pressure; `limit` and `sigma` are then a
         measure of it.
 
@@ -296,9 +296,9 @@ def point_lists_model(
         "pattern": np.zeros((2, 0)),
         "places": np.zeros(0),
     }
-    if under is not None:
-        at_first = under.pop("at first")
-        fields |= under
+    if pressure_fields is not None:
+        at_first = pressure_fields.pop("at first")
+        fields |= pressure_fields
         fields["statuses"][:, STATUS.pressure] = at_first
         fields["statuses"][:, STATUS.initial_pressure] = at_first
         limit = limit * at_first

@@ -256,15 +256,15 @@ class Run:
         self.work_sums += increase[12:]
         self.done += count * self.prop.steps
 
-    def move_to(self, place, rate) -> None:
+    def move_to(self, position, rate) -> None:
         """Set the modal coordinates and rates (n,) of the march at the start of a cycle.
 
         The contact slides to the new position slowly.
         """
-        path = np.array([self.modes.slide @ self.state[0], self.modes.slide @ place])
+        path = np.array([self.modes.slide @ self.state[0], self.modes.slide @ position])
         if path[0] != path[1]:
             self._slide_contact(path)
-        self.state[:] = (place, rate)
+        self.state[:] = (position, rate)
         self.done = 0
 
     def _slide_contact(self, path) -> None:

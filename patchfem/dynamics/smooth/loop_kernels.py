@@ -403,7 +403,7 @@ def end_direction(motion, record):
     size = motion.state.size
     interface = watch.read_interface(motion, motion.state)
     energy = interface.energy
-    lost = law.end_motion(
+    loss = law.end_motion(
         motion.numbers[0],
         motion.memory[0],
         motion.turn,
@@ -411,10 +411,10 @@ def end_direction(motion, record):
         interface.velocity,
         motion.state[2 * n : size - 3],
     )
-    if np.isnan(lost):
-        lost = motion.state[size - 1] - motion.scalars[Scalar.START_LOSS] - energy
+    if np.isnan(loss):
+        loss = motion.state[size - 1] - motion.scalars[Scalar.START_LOSS] - energy
         motion.scalars[Scalar.START_LOSS] = motion.state[size - 1] - energy
-    record.counters[Counter.FRICTION_LOSS] += lost
+    record.counters[Counter.FRICTION_LOSS] += loss
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
@@ -640,13 +640,13 @@ def find_stop_state(motion):
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def locate_first_event(motion, taken, event, fraction, travel):
+def locate_first_event(motion, step_length, event, fraction, travel):
     """Return the length of a tried step up to its first event, and that event.
 
     Parameters
     ----------
     motion : MotionArrays
-    taken : float
+    step_length : float
         Length of the tried step [s].
     event : int
         A number of `StepEvents`.
@@ -657,24 +657,24 @@ def locate_first_event(motion, taken, event, fraction, travel):
 
     Returns
     -------
-    taken : float
+    step_length : float
         Length of the step [s].
     event : int
     """
     while event != EVENT.none:
         if event < EVENT.release:
-            taken = locate_event(motion, taken, event, fraction, travel)
+            step_length = locate_event(motion, step_length, event, fraction, travel)
         else:
-            taken = locate_release(motion, taken, event, travel)
-        other, fraction = find_first_event(motion, taken, travel, event)
+            step_length = locate_release(motion, step_length, event, travel)
+        other, fraction = find_first_event(motion, step_length, travel, event)
         if other == EVENT.none:
             break
         event = other
-    return taken, event
+    return step_length, event
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
-def meets_tolerance(motion, taken, tolerance, record):
+def meets_tolerance(motion, step_length, tolerance, record):
     """Return whether a step that an event has shortened meets the tolerance.
 
     If not, the next step is shortened.
@@ -684,7 +684,7 @@ def meets_tolerance(motion, taken, tolerance, record):
     Parameters
     ----------
     motion : MotionArrays
-    taken : float
+    step_length : float
         Length of the step [s].
     tolerance : float
         Relative tolerance of a step.
@@ -694,9 +694,9 @@ def meets_tolerance(motion, taken, tolerance, record):
     -------
     bool
     """
-    error = steps.estimate_error(motion, taken, tolerance)
+    error = steps.estimate_error(motion, step_length, tolerance)
     if error > 1:
-        motion.scalars[Scalar.STEP] = taken * step_factor(error)
+        motion.scalars[Scalar.STEP] = step_length * step_factor(error)
         record.counters[Counter.REFUSED] += 1
         return False
     return True
@@ -718,7 +718,7 @@ def has_free_rows(record):
 
 
 @njit(error_model="numpy", cache=True, nogil=True, **NJIT_NO_REFCOUNT)
-def advance_motion(motion, record, until, edge, tolerance, travel):
+def advance_motion(motion, record, until, segment_end, tolerance, travel):
     """Advance the motion to a time, or to the end of a drive segment.
 
     Parameters
@@ -740,7 +740,7 @@ def advance_motion(motion, record, until, edge, tolerance, travel):
     """
     if motion.scalars[Scalar.STAGE] == 0:
         start_from_state(motion, record)
-    end = min(until, edge)
+    end = min(until, segment_end)
     stop_state = find_stop_state(motion)
     if motion.scalars[Scalar.SLOPE_SEGMENT] != motion.scalars[Scalar.SEGMENT]:
         # The slopes are evaluated again, because the drive has changed.
@@ -781,12 +781,12 @@ def advance_motion(motion, record, until, edge, tolerance, travel):
             start_direction(motion, -motion.turn[Turn.DIRECTION])
             stop_state = DIRECTION_CHANGED
             continue
-        taken, event = locate_first_event(motion, h, event, fraction, travel)
-        if event != EVENT.none and not meets_tolerance(motion, taken, tolerance, record):
+        step_length, event = locate_first_event(motion, h, event, fraction, travel)
+        if event != EVENT.none and not meets_tolerance(motion, step_length, tolerance, record):
             continue
-        watch.record_step(motion, taken, record)
-        accept_step(motion, taken, record)
-        if is_last and taken == remaining:
+        watch.record_step(motion, step_length, record)
+        accept_step(motion, step_length, record)
+        if is_last and step_length == remaining:
             motion.scalars[Scalar.TIME] = end
         if is_last and h == remaining:
             motion.scalars[Scalar.STEP] = max(next_step, motion.scalars[Scalar.STEP])

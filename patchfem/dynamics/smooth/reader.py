@@ -270,7 +270,7 @@ def measure_parts(response, drive, ends) -> tuple:
     Parameters
     ----------
     response : Response
-        At the places of all parts.
+        At the nodes of all parts.
     drive
     ends : array_like
         (2, 4) time [s], output [m], its rate [m/s] and friction work [J] where the cycles begin

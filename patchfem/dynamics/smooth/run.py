@@ -269,7 +269,7 @@ class Motion:
     def _enter_segment(self, piece: int) -> None:
         self.arrays.scalars[Scalar.SEGMENT] = piece
 
-    def run_to(self, time: float, times=(), whole: bool = False) -> np.ndarray:
+    def run_to(self, time: float, times=(), records_parts: bool = False) -> np.ndarray:
         """March the motion to a time, with samples at given times.
 
         Parameters
@@ -278,7 +278,7 @@ class Motion:
             Time at which the run stops [s].
         times : array_like, optional
             (s,) times of samples [s].
-        whole : bool, optional
+        records_parts : bool, optional
             Whether all steps are kept in `parts`.
 
         Returns
@@ -289,7 +289,7 @@ class Motion:
         times = np.asarray(times, float)
         width = self.record.turns.shape[1]
         samples = np.zeros((times.size, width))
-        parts = np.zeros((PARTS_PER_CALL if whole else 0, N_NODES, width))
+        parts = np.zeros((PARTS_PER_CALL if records_parts else 0, N_NODES, width))
         samples[:, 0] = times
         self.record = self.record._replace(samples=samples, parts=parts)
         self.record.counters[Counter.NEXT_SAMPLE] = 0

@@ -385,12 +385,12 @@ def record_step(motion, h, record):
     sampled = (
         at < record.samples.shape[0] and record.samples[at, 0] <= motion.scalars[Scalar.TIME] + h
     )
-    whole = record.parts.shape[0] > 0
-    if not (whole or sampled or can_output_reverse(motion)):
+    records_parts = record.parts.shape[0] > 0
+    if not (records_parts or sampled or can_output_reverse(motion)):
         widen_by_step(motion, h, record, 1)
         return
     steps.extend_step(motion, h)
     write_samples(motion, h, record)
     widen_by_step(motion, h, record, 1 if motion.modes.shape[1] == 1 else 4)
-    if whole:
+    if records_parts:
         write_step_parts(motion, h, record)
