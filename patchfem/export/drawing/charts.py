@@ -791,14 +791,14 @@ def spectra_charts(spectra, frequency: float | None) -> list:
     drawn_charts = []
     spectra = type(spectra)(*(column[has_drive] for column in spectra))
     hertz = spectra.frequency
-    unit, scale = choose_axis_unit([float(np.sqrt(spectra.place.max(initial=0.0)))], "m")
+    unit, scale = choose_axis_unit([float(np.sqrt(spectra.displacement.max(initial=0.0)))], "m")
     x_axis = make_axis("frequency", "Hz", True)
     drawn_charts.append(
         make_chart(
             "Displacement of the output",
             x_axis,
             make_axis("spectral density", f"{unit}^2/Hz", True),
-            [_positive_line(hertz, spectra.place * scale**2, "accent")],
+            [_positive_line(hertz, spectra.displacement * scale**2, "accent")],
         )
     )
     drawn_charts.append(
