@@ -28,7 +28,7 @@ class Samples:
     ----------
     motion
         Record with modal coordinates `z` and their rates `rate` (s, m, n), friction force `force` [N]
-        and slip `slip` [m] (s, n), and friction work `worked` (n,) [J] of these cycles.
+        and slip `slip` [m] (s, n), and friction work `friction_work` (n,) [J] of these cycles.
     modes
         Modal basis of the rig.
     omega : float
