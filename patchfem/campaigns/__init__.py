@@ -23,8 +23,8 @@ PUBLIC = {
         "find_fastest_settings",
         "find_measures_with_error",
         "compute_setting_costs",
-        "worst_error",
-        "worst_run_error",
+        "find_worst_error",
+        "find_worst_run_error",
     ),
     "fits.curve": (
         "DEFAULT_STARTS",
@@ -92,7 +92,7 @@ PUBLIC = {
     "sweeps.ranking": ("compute_sobol_indices",),
     "sweeps.sweep": (
         "RemainingTime",
-        "Work",
+        "WorkerData",
         "format_duration",
         "iterate_chunks",
     ),

@@ -529,13 +529,13 @@ def describe_fastest_setting(runs: list, tolerance: float) -> str:
             )
         return f"{fastest.words}: {cost}, with every measure within the tolerance {tolerance:g}"
     known = [run for run in runs if run.errors or run.distances]
-    best = min(known, key=lambda run: worst_error(run, names, tolerance))
-    worst = worst_error(best, names, tolerance)
+    best = min(known, key=lambda run: find_worst_error(run, names, tolerance))
+    worst = find_worst_error(best, names, tolerance)
     size = format_number(worst.fraction, 2)
     sizes = []
     for run in known:
         if worst.name in run.values:
-            sizes.append(worst_error(run, [worst.name], tolerance).fraction)
+            sizes.append(find_worst_error(run, [worst.name], tolerance).fraction)
     if worst.fraction >= NO_EFFECT_RATIO * max(sizes):
         return (
             f"no setting meets the tolerance {tolerance:g}: with every setting the error of {worst.name} is "
@@ -574,7 +574,7 @@ class WorstError(NamedTuple):
     name: str
 
 
-def worst_error(run: Cost, names: Sequence, tolerance: float) -> WorstError:
+def find_worst_error(run: Cost, names: Sequence, tolerance: float) -> WorstError:
     """Find the measure with the largest error relative to a tolerance.
 
     Parameters
@@ -597,9 +597,9 @@ def worst_error(run: Cost, names: Sequence, tolerance: float) -> WorstError:
     return worst
 
 
-def worst_run_error(run: Cost) -> WorstError:
+def find_worst_run_error(run: Cost) -> WorstError:
     """Find the measure of a run with the largest error relative to the tolerance of the run."""
-    return worst_error(run, list(run.values), run.tolerance)
+    return find_worst_error(run, list(run.values), run.tolerance)
 
 
 def find_measures_with_error(runs: list) -> list:

@@ -153,7 +153,9 @@ def _print_split(
         return
     print(
         f"{trace}: "
-        + divided.describe(is_cutoff_given=cutoff is not None, is_scene_written=out is not None)
+        + divided.describe_split(
+            is_cutoff_given=cutoff is not None, is_scene_written=out is not None
+        )
     )
     if out is not None:
         print(f"scene: {out}")

@@ -12,8 +12,8 @@ from ..campaigns.cost import (
     find_affected_measures,
     find_fastest_settings,
     find_measures_with_error,
-    worst_error,
-    worst_run_error,
+    find_worst_error,
+    find_worst_run_error,
 )
 from ..disk.atomic_write import write_rows, write_text
 from ..formatting import format_number
@@ -71,11 +71,13 @@ def format_cost(knob: str, runs: list, tolerance: float) -> list[str]:
     """
     if knob != TOLERANCE:
         names = find_measures_with_error(runs)
-        rows = [(run, worst_error(run, names, tolerance), "") for run in runs]
+        rows = [(run, find_worst_error(run, names, tolerance), "") for run in runs]
         last = [describe_fastest_setting(runs, tolerance)]
     else:
         groups = _group_by_tolerance(runs)
-        rows = [(group[0], worst_run_error(group[0]), _format_outcome(group)) for group in groups]
+        rows = [
+            (group[0], find_worst_run_error(group[0]), _format_outcome(group)) for group in groups
+        ]
         missed = [group[-1] for group in groups if not group[-1].meets_tolerance()][-1:]
         last = [
             f"tolerance {entry.tolerance:g}: {remedy}"
@@ -116,7 +118,7 @@ def _format_outcome(group: list) -> str:
     seconds = f"{settings} ({format_number(last.seconds, 2)} CPU s)"
     if last.meets_tolerance():
         return f"{missed}, but with {seconds}"
-    worst = worst_run_error(last)
+    worst = find_worst_run_error(last)
     return f"{missed}, nor with {seconds}: {format_number(worst.fraction, 2)} in {worst.name}"
 
 
@@ -192,7 +194,9 @@ def detailed_measures(runs: list, tolerance: float) -> list:
     """
     changed = find_affected_measures(runs) or find_measures_with_error(runs)
     names = find_measures_with_error(runs)
-    worst = {worst_error(run, names, tolerance).name for run in runs if run.errors or run.distances}
+    worst = {
+        find_worst_error(run, names, tolerance).name for run in runs if run.errors or run.distances
+    }
     ordered_names = (*MAIN_MEASURES, *sorted(worst.difference(MAIN_MEASURES)))
     return [name for name in ordered_names if name in changed] or changed
 
@@ -298,7 +302,7 @@ def cost_data(knob: str, runs: list, tolerance: float) -> dict:
     )
     out = []
     for run in runs:
-        worst = worst_run_error(run)
+        worst = find_worst_run_error(run)
         out.append(
             {name: getattr(run, name) for name in parts}
             | {
@@ -331,7 +335,7 @@ def cost_chart(knob: str, runs: list, tolerance: float) -> dict:
     """
     names = find_measures_with_error(runs)
     worst = [
-        worst_run_error(run) if knob == TOLERANCE else worst_error(run, names, tolerance)
+        find_worst_run_error(run) if knob == TOLERANCE else find_worst_error(run, names, tolerance)
         for run in runs
     ]
     points = [

@@ -208,7 +208,7 @@ def _make_plan(model: Model) -> Plan:
         )
     if model.patch is not None:
         chain |= patch_plan.stiffness_chain(model.patch)
-        groups |= patch_plan.compute_groups(model)
+        groups |= patch_plan.compute_patch_groups(model)
         patch_sentences += patch_plan.describe_patch_plan(groups, model.patch)
     interfaces = model.rig.friction.interfaces if model.rig is not None else ()
     for number, interface in enumerate(interfaces):

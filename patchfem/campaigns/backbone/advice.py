@@ -5,7 +5,7 @@ import numpy as np
 from ...effects import law_has_trait
 from ...formatting import format_length, format_quantity
 from .band import Band, forced_mode_ratio
-from .joint import Joint
+from .joint import JointMode
 from .notes import REPORT_OTHER_MODES
 from .records import ROUND_OFF_ERROR, match_amplitudes
 
@@ -19,12 +19,12 @@ PURPOSES = {
 }
 
 
-def write_advice(joint: Joint, band: Band | None, curves: dict, missing: dict) -> tuple:
+def write_advice(joint: JointMode, band: Band | None, curves: dict, missing: dict) -> tuple:
     """Write the advice on which curve to use, its band, and the ranges of validity of the methods.
 
     Parameters
     ----------
-    joint : Joint
+    joint : JointMode
     band : Band or None
     curves : dict of Curve
         By method.
@@ -41,7 +41,7 @@ def write_advice(joint: Joint, band: Band | None, curves: dict, missing: dict) -
     sentences = [
         f"Use method {band.method}, the bold curve of the page: {PURPOSES[band.method]}.",
         *_describe_slip(joint, curve),
-        _describe_width(band, curve),
+        _describe_band_width(band, curve),
         *_describe_agreement(band, curves),
         *_describe_ring_down(joint, band, curves, "decay" in missing),
         *_describe_static_curve(band, curves),
@@ -52,7 +52,7 @@ def write_advice(joint: Joint, band: Band | None, curves: dict, missing: dict) -
     return tuple(sentences)
 
 
-def _describe_slip(joint: Joint, curve) -> list:
+def _describe_slip(joint: JointMode, curve) -> list:
     """Describe at which amplitude friction reaches its limit, and below which it dissipates nothing.
 
     The first amplitude follows from the stiffness of the sticking contact.
@@ -79,7 +79,7 @@ def _describe_slip(joint: Joint, curve) -> list:
     return sentences
 
 
-def _describe_width(band: Band, curve) -> str:
+def _describe_band_width(band: Band, curve) -> str:
     """Describe where the band of the damping ratio is widest, and the largest deviation of the frequency."""
     frequency = _largest_distance(curve.frequency, band.frequency_low, band.frequency_high)
     damping = _largest_distance(curve.damping, band.damping_low, band.damping_high)
@@ -118,7 +118,7 @@ def _describe_agreement(band: Band, curves: dict) -> list:
     return [f"Up to {edge} the computed methods and the predicted ring-down agree {within}."]
 
 
-def _describe_ring_down(joint: Joint, band: Band, curves: dict, has_failed: bool) -> list:
+def _describe_ring_down(joint: JointMode, band: Band, curves: dict, has_failed: bool) -> list:
     """Describe how the damping of a ring-down differs from that of the curve, and why.
 
     has_failed: whether method decay was tried and has no curve.
@@ -202,7 +202,7 @@ def _describe_static_curve(band: Band, curves: dict) -> list:
     ]
 
 
-def _describe_coupling(joint: Joint, band: Band, curve) -> list:
+def _describe_coupling(joint: JointMode, band: Band, curve) -> list:
     """Describe the coupling of the mode with the other modes."""
     modes = joint.modes
     if modes.omega.size == 1:

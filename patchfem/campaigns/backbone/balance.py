@@ -16,7 +16,7 @@ from ...dynamics.harmonic.laws import evaluate_series
 from ...dynamics.harmonic.point import find_peak, make_balance
 from ...formatting import format_length
 from ...response.errors import error_of_change
-from .joint import MIN_AMPLITUDE_FACTOR, Joint
+from .joint import MIN_AMPLITUDE_FACTOR, JointMode
 from .records import AMPLITUDE_TOL, ROUND_OFF_ERROR, Curve, make_curve
 
 # Numbers of harmonics that are tried in turn, each with four times the samples of the previous one.
@@ -41,7 +41,7 @@ class FreeMotion(NamedTuple):
     reach: float
 
 
-def compute_balance_curve(joint: Joint, amplitudes) -> Curve:
+def compute_balance_curve(joint: JointMode, amplitudes) -> Curve:
     """Compute the backbone of a mode by harmonic balance, or exactly under rigid friction."""
     joint.require_steady_loops("balance")
     if joint.is_rigid:
@@ -74,7 +74,7 @@ def compute_balance_curve(joint: Joint, amplitudes) -> Curve:
 
 
 def _tabulate_free_motions(
-    group: LawGroup, joint: Joint, amplitudes, harmonics: int, count=None
+    group: LawGroup, joint: JointMode, amplitudes, harmonics: int, count=None
 ) -> np.ndarray:
     """Return frequency [Hz], damping ratio and energy loss [J] (3, k) of free motions.
 
@@ -83,7 +83,7 @@ def _tabulate_free_motions(
     Parameters
     ----------
     group : LawGroup
-    joint : Joint
+    joint : JointMode
     amplitudes : (k,) array
         At the output [m].
     harmonics : int
@@ -102,7 +102,7 @@ def _tabulate_free_motions(
 
 
 def find_free_motions(
-    group: LawGroup, joint: Joint, amplitudes, harmonics: int, amplitude_tol=ROUND_OFF_ERROR
+    group: LawGroup, joint: JointMode, amplitudes, harmonics: int, amplitude_tol=ROUND_OFF_ERROR
 ) -> list:
     """Find the free motions at amplitudes (k,) [m] of the output by harmonic balance.
 
@@ -115,7 +115,7 @@ def find_free_motions(
     ----------
     group : LawGroup
         Steady loops of the laws.
-    joint : Joint
+    joint : JointMode
     amplitudes : (k,) array
         Increasing [m].
     harmonics : int
@@ -147,7 +147,7 @@ class _FreeMotionSearch:
     ----------
     group : LawGroup
         Steady loops of the laws.
-    joint : Joint
+    joint : JointMode
     amplitudes : (k,) array
         Increasing, at the output [m].
     harmonics : int
@@ -156,7 +156,7 @@ class _FreeMotionSearch:
     """
 
     def __init__(
-        self, group: LawGroup, joint: Joint, amplitudes, harmonics: int, amplitude_tol: float
+        self, group: LawGroup, joint: JointMode, amplitudes, harmonics: int, amplitude_tol: float
     ):
         self.amplitude_tol = amplitude_tol
         modes = joint.modes
@@ -283,7 +283,7 @@ def half_peak_to_peak(harmonics) -> float:
     return (find_peak(motion) + find_peak(-motion)) / 2
 
 
-def _compute_rigid_curve(joint: Joint, amplitudes) -> Curve:
+def _compute_rigid_curve(joint: JointMode, amplitudes) -> Curve:
     """Compute the backbone of a mode under rigid friction in closed form.
 
     It begins at the amplitude above which the motion does not stop within a cycle.

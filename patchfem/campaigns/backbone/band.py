@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .joint import Joint
+from .joint import JointMode
 from .records import ROUND_OFF_ERROR, Curve, match_amplitudes
 from .ring_down import RingDown, predict_ring_down
 
@@ -77,12 +77,12 @@ class _Limits:
         self.high[points] = np.fmax(self.high[points], value + error)
 
 
-def make_band(joint: Joint, curves: dict) -> Band | None:
+def make_band(joint: JointMode, curves: dict) -> Band | None:
     """Compute the band of the recommended curve; None if there is no curve.
 
     Parameters
     ----------
-    joint : Joint
+    joint : JointMode
     curves : dict of Curve
         By method.
     """
@@ -120,7 +120,7 @@ def _include_curve(frequency: _Limits, damping: _Limits, curve: Curve, other: Cu
 
 
 def _include_ring_down(
-    joint: Joint, frequency: _Limits, damping: _Limits, curve: Curve, ring_down: RingDown
+    joint: JointMode, frequency: _Limits, damping: _Limits, curve: Curve, ring_down: RingDown
 ) -> None:
     """Widen the limits of a curve to contain a predicted ring-down."""
     every = slice(None)
@@ -139,7 +139,9 @@ def _include_ring_down(
     frequency.include(every, ring_down.frequency, margin)
 
 
-def _include_forced_modes(joint: Joint, frequency: _Limits, damping: _Limits, curve: Curve) -> None:
+def _include_forced_modes(
+    joint: JointMode, frequency: _Limits, damping: _Limits, curve: Curve
+) -> None:
     """Widen the limits by the motion of other modes under a harmonic force at the output.
 
     They move in phase with the force, by the ratio r to the resonant motion at the output. This shifts the phase
@@ -151,7 +153,7 @@ def _include_forced_modes(joint: Joint, frequency: _Limits, damping: _Limits, cu
     damping.include(every, curve.damping, ratio**2 * np.abs(curve.damping))
 
 
-def forced_mode_ratio(joint: Joint, curve: Curve) -> np.ndarray:
+def forced_mode_ratio(joint: JointMode, curve: Curve) -> np.ndarray:
     """Return the ratio (k,) of the motion of other modes to that of the mode under a force at the output.
 
     The force acts at the output and the friction at the contact, so each of them moves the other modes.

@@ -17,7 +17,7 @@ from .advice import write_advice
 from .balance import compute_balance_curve
 from .band import make_band
 from .decay import compute_decay_curve
-from .joint import Joint, build_joint
+from .joint import JointMode, build_joint
 from .linear import compute_constant_curve
 from .quasi_static import compute_static_curve
 from .records import (
@@ -128,12 +128,12 @@ def compute_backbone(
     return _assemble_backbone(joint, amplitudes, curves, missing)._replace(answer=answer)
 
 
-def compute_curve(joint: Joint, amplitudes, method: str, progress=None) -> Curve:
+def compute_curve(joint: JointMode, amplitudes, method: str, progress=None) -> Curve:
     """Compute the frequency and damping curve of a mode by a given method.
 
     Parameters
     ----------
-    joint : Joint
+    joint : JointMode
     amplitudes : (k,) array
         Increasing, at the output [m].
     method : str
@@ -179,7 +179,7 @@ def _widen_by_missing_modes(curve: Curve, richer: Curve) -> Curve:
     )
 
 
-def _assemble_backbone(joint: Joint, amplitudes, curves: dict, missing: dict) -> Backbone:
+def _assemble_backbone(joint: JointMode, amplitudes, curves: dict, missing: dict) -> Backbone:
     """Assemble the backbone from its curves at the requested amplitudes (k,) [m]."""
     exponents = LossExponents()
     first = curves.get("quasi-static", curves.get("balance"))
@@ -209,7 +209,7 @@ def _assemble_backbone(joint: Joint, amplitudes, curves: dict, missing: dict) ->
     )
 
 
-def _main_mode_name(joint: Joint) -> str:
+def _main_mode_name(joint: JointMode) -> str:
     """Return the name of the structural mode with the largest component in the coordinate."""
     modes = joint.modes
     if not joint.model.rig.structure.lists_modes:
@@ -218,7 +218,7 @@ def _main_mode_name(joint: Joint) -> str:
     return modes.names[int(np.argmax(shapes[:, joint.mode]))]
 
 
-def _mode_frequencies(joint: Joint) -> ModeFrequencies:
+def _mode_frequencies(joint: JointMode) -> ModeFrequencies:
     """Return the frequencies [Hz] of a mode without its contact and with a sticking contact.
 
     The first includes a bonded spring, with its stiffness at rest if it is nonlinear. The second
@@ -245,14 +245,14 @@ def _mode_frequencies(joint: Joint) -> ModeFrequencies:
     return ModeFrequencies(free, stuck, high - stuck)
 
 
-def _stuck_frequency(joint: Joint, stiffness: float) -> float:
+def _stuck_frequency(joint: JointMode, stiffness: float) -> float:
     """Return the frequency [Hz] of a mode with a sticking contact of a given stiffness [N/m]."""
     modes = joint.modes
     omega, _ = modes.compute_stuck_mode(modes.interfaces, np.array([stiffness]), joint.mode)
     return omega / (2 * np.pi)
 
 
-def _fit_exponents(joint: Joint, curve: Curve | None) -> LossExponents:
+def _fit_exponents(joint: JointMode, curve: Curve | None) -> LossExponents:
     """Fit the exponents of energy loss over amplitude in micro-slip and in gross slip.
 
     In micro-slip it is the slope from the first to the last point, in gross slip that of the last
@@ -287,7 +287,7 @@ def _loss_slope(curve: Curve, points) -> float | None:
     return float(np.log(high_loss / low_loss) / np.log(high / low))
 
 
-def _theoretical_exponent(joint: Joint) -> float | None:
+def _theoretical_exponent(joint: JointMode) -> float | None:
     """Return the theoretical loss exponent in micro-slip; None if no theory applies.
 
     It is chi + 3 for sliders (Segalman 2005), and 3 for bonds and for pieces whose pressure falls
@@ -302,7 +302,7 @@ def _theoretical_exponent(joint: Joint) -> float | None:
     return 3.0 if law_has_trait(friction.law, "bonds") or is_elastic else None
 
 
-def _flutter_amplitude(joint: Joint, method: str, curve: Curve) -> float | None:
+def _flutter_amplitude(joint: JointMode, method: str, curve: Curve) -> float | None:
     """Find the largest amplitude [m] at which the damping changes from positive to negative.
 
     The curve gives the two amplitudes that enclose the root. Brent's method on damping x amplitude,

@@ -11,7 +11,7 @@ from ...response.decay_curve import find_reversals_by_extrapolation
 from ...runs.rig import decays, solve
 from ...runs.rig.engines import ENGINES, SMOOTH
 from .decay_identification import identify_decay, measure_other_modes
-from .joint import Joint
+from .joint import JointMode
 from .records import ROUND_OFF_ERROR, Curve, make_curve
 from .release import Release, release_from_largest_decaying, run_release
 
@@ -35,12 +35,12 @@ class IdentifiedDecay(NamedTuple):
         return np.isfinite(self.value + self.run_error).all(axis=0)
 
 
-def compute_decay_curve(joint: Joint, amplitudes, progress=None) -> Curve:
+def compute_decay_curve(joint: JointMode, amplitudes, progress=None) -> Curve:
     """Compute the backbone of a mode from its decay after release at the largest amplitude.
 
     Parameters
     ----------
-    joint : Joint
+    joint : JointMode
     amplitudes : (k,) array
         Increasing, at the output [m].
     progress : callable, optional
@@ -88,7 +88,7 @@ def compute_decay_curve(joint: Joint, amplitudes, progress=None) -> Curve:
     return curve.at(known)
 
 
-def _list_spatial_coarsenings(joint: Joint, release: Release) -> list:
+def _list_spatial_coarsenings(joint: JointMode, release: Release) -> list:
     """List the runs of a release on coarser meshes or with fewer elements."""
     engine = ENGINES[release.numerics.engine]
     return engine.coarser_in_space(
@@ -120,7 +120,7 @@ def _note_growing_motion(amplitudes) -> list:
     ]
 
 
-def _note_unknown_modes(joint: Joint, known, other_modes) -> list:
+def _note_unknown_modes(joint: JointMode, known, other_modes) -> list:
     """Return a note on amplitudes at which the motion of other modes is not known."""
     unknown = known & np.isnan(other_modes)
     if joint.modes.omega.size == 1 or not unknown.any():
@@ -144,7 +144,7 @@ class RefinedRelease(NamedTuple):
     identified: IdentifiedDecay
 
 
-def _refine_time_steps(joint: Joint, release: Release, amplitudes) -> RefinedRelease:
+def _refine_time_steps(joint: JointMode, release: Release, amplitudes) -> RefinedRelease:
     """Halve the time steps of a release until its estimated errors meet the tolerance."""
     model, choice, _ = release
     engine = ENGINES[choice.engine]
@@ -170,13 +170,13 @@ class _CoarserReleases:
 
     Parameters
     ----------
-    joint : Joint
+    joint : JointMode
     release : Release
     amplitudes : (k,) array
         At the output [m].
     """
 
-    def __init__(self, joint: Joint, release: Release, amplitudes):
+    def __init__(self, joint: JointMode, release: Release, amplitudes):
         self.joint = joint
         self.release = release
         self.amplitudes = amplitudes
@@ -198,7 +198,7 @@ class _CoarserReleases:
         return np.max([np.abs(self.evaluate_run(run) - base) for run in runs], axis=0)
 
 
-def _identify_with_errors(joint: Joint, release: Release, amplitudes) -> IdentifiedDecay:
+def _identify_with_errors(joint: JointMode, release: Release, amplitudes) -> IdentifiedDecay:
     """Identify frequency and damping at amplitudes (k,) [m] from a release, with errors."""
     model, choice, solution = release
     decay = identify_decay(joint, solution.response)

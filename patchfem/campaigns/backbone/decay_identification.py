@@ -14,7 +14,7 @@ from ...response.decay_curve import (
     make_half_cycles,
 )
 from .balance import HARMONIC_COUNTS, find_free_motions
-from .joint import Joint
+from .joint import JointMode
 
 N_SAMPLES = 4096  # Number of samples of a cycle of a free motion.
 # Number of half cycles on either side over which the largest effect of other modes is taken.
@@ -23,7 +23,9 @@ EQUAL_HALF_CYCLES_TOL = 1e-7  # Largest relative difference of two half cycles w
 STUCK_FRACTION = 0.999  # Smallest stiffness over that without slip at which a contact sticks.
 
 
-def identify_decay(joint: Joint, motion: Response, find_reversals=locate_reversals) -> DecayCurve:
+def identify_decay(
+    joint: JointMode, motion: Response, find_reversals=locate_reversals
+) -> DecayCurve:
     """Identify frequency and damping of a decaying motion from its half cycles.
 
     With several modes, the reversals are those of the motion along the shape of the stuck mode, in
@@ -32,7 +34,7 @@ def identify_decay(joint: Joint, motion: Response, find_reversals=locate_reversa
 
     Parameters
     ----------
-    joint : Joint
+    joint : JointMode
     motion : Response
     find_reversals : callable
         Of `response.decay_curve`: finds the reversals between samples.
@@ -67,7 +69,7 @@ def identify_decay(joint: Joint, motion: Response, find_reversals=locate_reversa
     )
 
 
-def measure_other_modes(joint: Joint, motion: Response, amplitudes) -> np.ndarray:
+def measure_other_modes(joint: JointMode, motion: Response, amplitudes) -> np.ndarray:
     """Return the ratio (k,) of the motion of other modes to the amplitude of a decay.
 
     It is the distance of the modal coordinates, and of their rates / omega, from those of the free
@@ -78,7 +80,7 @@ def measure_other_modes(joint: Joint, motion: Response, amplitudes) -> np.ndarra
 
     Parameters
     ----------
-    joint : Joint
+    joint : JointMode
     motion : Response
         The decay.
     amplitudes : (k,) array
@@ -161,7 +163,7 @@ def _is_stuck(group: LawGroup, free) -> np.ndarray:
     return np.real(force * np.conj(slide)) >= stiffness * np.abs(slide) ** 2
 
 
-def _mode_coupling(joint: Joint) -> float:
+def _mode_coupling(joint: JointMode) -> float:
     """Return the coupling of other modes along the shape of the stuck mode, at most 1.
 
     It is the effect of other modes along this shape / their effect at the output. Dampers couple

@@ -52,7 +52,7 @@ class StuckMode(NamedTuple):
     shape: np.ndarray
 
 
-class Joint(NamedTuple):
+class JointMode(NamedTuple):
     """Mode of a rig coupled to its contact.
 
     Attributes
@@ -272,7 +272,7 @@ class Joint(NamedTuple):
         return error
 
 
-def build_joint(model: Model, name: str) -> Joint:
+def build_joint(model: Model, name: str) -> JointMode:
     """Solve the contact of a rig and combine it with one of its modes.
 
     Parameters
@@ -304,7 +304,7 @@ def build_joint(model: Model, name: str) -> Joint:
         patch, *others = patch_result.solve_with_coarser(model.patch, model.accuracy.tolerance)
         coarser = (*others, None)
     free_mode = StuckMode(None, np.eye(modes.omega.size)[number])
-    joint = Joint(model, patch, coarser, number, free_mode, np.zeros(len(modes.interfaces)))
+    joint = JointMode(model, patch, coarser, number, free_mode, np.zeros(len(modes.interfaces)))
     if not joint.is_linear:
         planned = joint._replace(stiffness=stuck_stiffnesses(model.rig, plan(model).chain))
         stiffness = _stuck_stiffness(planned)
@@ -314,7 +314,7 @@ def build_joint(model: Model, name: str) -> Joint:
     return joint
 
 
-def _check_mode(joint: Joint) -> None:
+def _check_mode(joint: JointMode) -> None:
     """Raise PatchfemError if a mode has no backbone."""
     model = joint.model
     modes = joint.modes
@@ -367,7 +367,7 @@ def _find_mode(rig, name: str) -> int:
     return k if modes.shapes is None else int(np.argmax(np.abs(modes.shapes[k])))
 
 
-def _stuck_stiffness(joint: Joint) -> np.ndarray:
+def _stuck_stiffness(joint: JointMode) -> np.ndarray:
     """Return the tangential stiffness (i,) [N/m] of each interface without slip.
 
     It is that of the loops of the laws if they have a closed form, that of a small loop on a bench

@@ -3,14 +3,14 @@
 import numpy as np
 
 from ...core import NotConverged
-from .joint import Joint
+from .joint import JointMode
 from .records import ROUND_OFF_ERROR, Curve, make_curve
 
 # Number of fixed-point steps to the negative damping that sustains the motion; they converge fast.
 N_STEPS = 8
 
 
-def compute_constant_curve(joint: Joint, amplitudes, method: str) -> Curve:
+def compute_constant_curve(joint: JointMode, amplitudes, method: str) -> Curve:
     """Return frequency and damping of a mode of a linear rig, the same at all amplitudes.
 
     By decay, frequency and damping ratio are those of the damped mode. For the other methods, a
@@ -19,7 +19,7 @@ def compute_constant_curve(joint: Joint, amplitudes, method: str) -> Curve:
 
     Parameters
     ----------
-    joint : Joint
+    joint : JointMode
     amplitudes : (k,) array
         At the output [m].
     method : str
@@ -40,7 +40,7 @@ def compute_constant_curve(joint: Joint, amplitudes, method: str) -> Curve:
     return make_curve(amplitudes, values, ROUND_OFF_ERROR * np.abs(values))
 
 
-def _find_mode_eigenvalue(joint: Joint, negative_damping: float) -> complex:
+def _find_mode_eigenvalue(joint: JointMode, negative_damping: float) -> complex:
     """Return the eigenvalue of z'' + (D - g) z' + Omega^2 z = 0 that belongs to the mode.
 
     Its eigenvector has the largest component of the mode.

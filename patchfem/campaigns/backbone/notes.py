@@ -5,7 +5,7 @@ import numpy as np
 from ...formatting import format_length
 from ...model.model import Model
 from ...runs.patch import faces
-from .joint import MIN_AMPLITUDE_FACTOR, Joint
+from .joint import MIN_AMPLITUDE_FACTOR, JointMode
 from .records import Curve, match_amplitudes
 
 # Largest ratio of an amplitude of micro-slip to the amplitude at the onset of gross slip.
@@ -34,7 +34,7 @@ REASONS_OF_DIFFERENCES = {
 }
 
 
-def note_linear_rig(joint: Joint) -> list:
+def note_linear_rig(joint: JointMode) -> list:
     """Return a list of notes if the scene has friction but no friction acts."""
     has_friction = joint.model.friction is not None or joint.model.rig.friction.interfaces
     if joint.is_linear and has_friction:
@@ -47,7 +47,7 @@ def note_wear(model: Model) -> list:
     return [] if model.wear is None else ["these curves are for unworn pieces: [wear] is ignored"]
 
 
-def note_missing_mesh(joint: Joint) -> list:
+def note_missing_mesh(joint: JointMode) -> list:
     """Return a list of notes on a contact with partial slip and without a coarser mesh."""
     model = joint.model
     if joint.is_linear:
@@ -61,7 +61,7 @@ def note_missing_mesh(joint: Joint) -> list:
     return [f"{MISSING_ERRORS}the interface has too few elements for a coarser mesh; {advice}"]
 
 
-def note_micro_slip(joint: Joint, amplitudes) -> list:
+def note_micro_slip(joint: JointMode, amplitudes) -> list:
     """Return a list of notes on why the exponent of micro-slip is not determined."""
     edge = MAX_MICRO_SLIP_RATIO * joint.slip_amplitude
     if amplitudes[0] > edge:
@@ -99,14 +99,14 @@ def note_gaps(amplitudes, curves: dict) -> list:
     return out
 
 
-def note_secant_stiffness(joint: Joint, amplitudes, curves: dict) -> list:
+def note_secant_stiffness(joint: JointMode, amplitudes, curves: dict) -> list:
     """Return a list of notes on the secant stiffness of a quasi-static curve with slip.
 
     It is given if no curve by harmonic balance exists.
 
     Parameters
     ----------
-    joint : Joint
+    joint : JointMode
     amplitudes : (k,) array
         Requested amplitudes [m].
     curves : dict of Curve

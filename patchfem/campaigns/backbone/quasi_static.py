@@ -9,7 +9,7 @@ from ...response.errors import add_errors
 from ...runs.bench.errors import estimate_bench_errors
 from ...runs.rig import decays
 from .bench_loops import LOOP_MEASURES, compute_steady_loop
-from .joint import Joint
+from .joint import JointMode
 from .records import AMPLITUDE_TOL, ROUND_OFF_ERROR, Curve, make_curve
 
 N_SAMPLES = 4096  # Number of samples of a friction loop per cycle; half as many give the error.
@@ -18,7 +18,7 @@ MAX_STEPS = 60
 MIN_FLOOR = 1e-10  # Smallest relative error of a friction loop on a bench.
 
 
-def compute_static_curve(joint: Joint, amplitudes) -> Curve:
+def compute_static_curve(joint: JointMode, amplitudes) -> Curve:
     """Compute the quasi-static backbone of a mode from the loops of its contact.
 
     Loops of laws without a closed form are computed on a bench.
@@ -72,7 +72,7 @@ def _select_rising_part(best, error) -> Curve:
     return make_curve(best[0], best[1:], error[1:]).at(slice(count))
 
 
-def _compute_in_closed_form(joint: Joint, amplitudes) -> Curve | None:
+def _compute_in_closed_form(joint: JointMode, amplitudes) -> Curve | None:
     """Compute the curve of a single interface in closed form; None if its law has no closed form."""
     model = joint.model
     modes = joint.modes
@@ -102,7 +102,7 @@ def _compute_in_closed_form(joint: Joint, amplitudes) -> Curve | None:
     return _select_rising_part(best, relative * np.abs(best))
 
 
-def _compute_from_loops(joint: Joint, slides, loops: list) -> np.ndarray:
+def _compute_from_loops(joint: JointMode, slides, loops: list) -> np.ndarray:
     """Compute amplitude, frequency, damping and loss (4, k) from hysteresis loops.
 
     The loops have displacement amplitudes (k,) [m].
@@ -114,7 +114,7 @@ def _compute_from_loops(joint: Joint, slides, loops: list) -> np.ndarray:
     return decays.tabulate_static_motions(modes, statics)
 
 
-def _compute_from_bench_loops(joint: Joint, amplitudes) -> Curve:
+def _compute_from_bench_loops(joint: JointMode, amplitudes) -> Curve:
     """Compute the curve from steady bench loops of the contact at the frequency of the mode."""
     slides = np.abs(joint.modes.interfaces[0] @ joint.shape) * amplitudes / joint.reach
     patches = [joint.patch]

@@ -17,7 +17,7 @@ from ...structure import drives
 from ...structure.drive_sizes import find_decay_rate
 from .balance import HARMONIC_COUNTS, find_free_motions
 from .decay_identification import identify_decay
-from .joint import MIN_AMPLITUDE_FACTOR, RELEASE_FACTOR, Joint
+from .joint import MIN_AMPLITUDE_FACTOR, RELEASE_FACTOR, JointMode
 
 # Number of cycles of the first decay; longer ones follow until the amplitude is small enough.
 FIRST_CYCLES = 50
@@ -60,12 +60,12 @@ class _GrowingRelease(NotConverged):
     """
 
 
-def run_release(joint: Joint, model: Model, choice) -> Release:
+def run_release(joint: JointMode, model: Model, choice) -> Release:
     """Compute the motion of a model of a released mode.
 
     Parameters
     ----------
-    joint : Joint
+    joint : JointMode
     model : Model
         As from `release_model`.
     choice : Numerics
@@ -78,12 +78,12 @@ def run_release(joint: Joint, model: Model, choice) -> Release:
     return Release(model, choice, solve.solve_rig(model, choice, joint.patch))
 
 
-def release_from_largest_decaying(joint: Joint, amplitudes, progress=None) -> DecayingRelease:
+def release_from_largest_decaying(joint: JointMode, amplitudes, progress=None) -> DecayingRelease:
     """Release the mode at the largest amplitude from which its motion decays.
 
     Parameters
     ----------
-    joint : Joint
+    joint : JointMode
     amplitudes : (k,) array
         Increasing, at the output [m].
     progress : callable, optional
@@ -110,7 +110,7 @@ def release_from_largest_decaying(joint: Joint, amplitudes, progress=None) -> De
     )
 
 
-def _is_growing(joint: Joint, motion: Response) -> bool:
+def _is_growing(joint: JointMode, motion: Response) -> bool:
     """Return whether the oscillation grows along the shape of the stuck mode."""
     shape = joint.shape
     _, reversals = locate_reversals(motion.time, motion.modal @ shape, motion.modal_rate @ shape)
@@ -122,7 +122,7 @@ def _is_growing(joint: Joint, motion: Response) -> bool:
     )
 
 
-def _release_to_smallest(joint: Joint, amplitudes, progress=None) -> Release:
+def _release_to_smallest(joint: JointMode, amplitudes, progress=None) -> Release:
     """Release the mode and compute its decay down to the smallest requested amplitude.
 
     The release begins at an amplitude at which the first reading is above the largest amplitude.
@@ -171,14 +171,14 @@ def _release_to_smallest(joint: Joint, amplitudes, progress=None) -> Release:
             cycles = int(min(np.clip(cycles + more, 2 * cycles, 8 * cycles), max_cycles))
 
 
-def _max_cycles(joint: Joint, engine: str) -> int:
+def _max_cycles(joint: JointMode, engine: str) -> int:
     """Return the largest number of cycles that a release may take."""
     if joint.modes.omega.size > 1:
         return MAX_CYCLES
     return MAX_CYCLES_TURNS if engine == PIECES.name else MAX_CYCLES_ONE_MODE
 
 
-def _prepare_release(joint: Joint, amplitude: float, cycles: int) -> tuple:
+def _prepare_release(joint: JointMode, amplitude: float, cycles: int) -> tuple:
     """Return the model and the numerical settings of a release at an amplitude [m]."""
     model = release_model(joint, amplitude)
     drive = replace(model.rig.drive, cycles=float(cycles))
@@ -191,13 +191,13 @@ def _prepare_release(joint: Joint, amplitude: float, cycles: int) -> tuple:
 
 
 def _raise_release_amplitude(
-    joint: Joint, release_amplitude: float, first_amplitude: float, largest: float
+    joint: JointMode, release_amplitude: float, first_amplitude: float, largest: float
 ) -> float:
     """Return a larger release amplitude [m] if the first amplitude of the decay is too small.
 
     Parameters
     ----------
-    joint : Joint
+    joint : JointMode
     release_amplitude : float
         Amplitude of the release so far [m].
     first_amplitude : float
@@ -214,7 +214,7 @@ def _raise_release_amplitude(
     return min(raised, limit, joint.model.rig.springs.travel)
 
 
-def release_model(joint: Joint, amplitude: float) -> Model:
+def release_model(joint: JointMode, amplitude: float) -> Model:
     """Return the model of a mode that is released at an output amplitude [m]."""
     model = decays.with_automatic_method(joint.model)
     period = 2 * np.pi / (joint.omega)
@@ -230,7 +230,7 @@ def release_model(joint: Joint, amplitude: float) -> Model:
     return replace(model, rig=rig)
 
 
-def _initial_state(joint: Joint, amplitude: float) -> InitialState:
+def _initial_state(joint: JointMode, amplitude: float) -> InitialState:
     """Return the initial state of a mode released at an output amplitude [m].
 
     It is the free motion by harmonic balance, in which no other mode is excited. If this is not

@@ -21,7 +21,7 @@ from scipy.optimize import brentq
 
 from ...dynamics.harmonic.forces import LawGroup
 from .balance import HARMONIC_COUNTS, find_free_motions, half_peak_to_peak
-from .joint import Joint
+from .joint import JointMode
 from .records import Curve
 
 N_SIDE_HALF_CYCLES = 1.5  # Half cycles on either side of an amplitude that give its decrement.
@@ -98,12 +98,12 @@ class _MotionRows(NamedTuple):
         return _MotionRows(*(column[points] for column in self))
 
 
-def predict_ring_down(joint: Joint, curve: Curve) -> RingDown | None:
+def predict_ring_down(joint: JointMode, curve: Curve) -> RingDown | None:
     """Predict the ring-down from a harmonic balance curve; None if no amplitude has a result.
 
     Parameters
     ----------
-    joint : Joint
+    joint : JointMode
     curve : Curve
         By balance.
     """
@@ -131,7 +131,7 @@ def predict_ring_down(joint: Joint, curve: Curve) -> RingDown | None:
     return ring_down if np.isfinite(ring_down.slow_damping).any() else None
 
 
-def _predict_at_amplitudes(joint: Joint, compute: Callable, x, damping) -> RingDown:
+def _predict_at_amplitudes(joint: JointMode, compute: Callable, x, damping) -> RingDown:
     """Predict the ring-down at log amplitudes x (k,) from free motions around each of them.
 
     compute: maps log amplitudes (k, m) and their tolerance to `_MotionRows`; damping: approximate damping ratio (k,).
@@ -140,18 +140,18 @@ def _predict_at_amplitudes(joint: Joint, compute: Callable, x, damping) -> RingD
     known = np.flatnonzero(damping > 0)
     if not known.size:
         return RingDown(*columns)
-    rows = _compute_around(compute, x[known], damping[known], SMOOTH_OFFSETS)
+    rows = _compute_motions_around(compute, x[known], damping[known], SMOOTH_OFFSETS)
     columns[:, known] = _predict_from_motions(rows, x[known])
     # Motions between the ends of the half cycles are needed where a slope changes within them.
     bent = known[_interpolation_error(rows) > joint.model.accuracy.tolerance]
     if bent.size:
         finer_damping = np.fmax(columns[1, bent], damping[bent])
-        rows = _compute_around(compute, x[bent], finer_damping, FINE_OFFSETS)
+        rows = _compute_motions_around(compute, x[bent], finer_damping, FINE_OFFSETS)
         columns[:, bent] = _predict_from_motions(rows, x[bent])
     return RingDown(*columns)
 
 
-def _compute_around(compute: Callable, x, damping, offsets) -> _MotionRows:
+def _compute_motions_around(compute: Callable, x, damping, offsets) -> _MotionRows:
     """Compute free motions around log amplitudes x (k,), at offsets (m,) in half cycles.
 
     compute: see `_predict_at_amplitudes`; damping: ratio (k,).
@@ -188,7 +188,7 @@ def _interpolation_error(rows: _MotionRows) -> np.ndarray:
     return np.where(np.isfinite(error), error, np.inf)
 
 
-def _compute_free_motions(joint: Joint, laws: LawGroup, x, tolerance: float) -> _MotionRows:
+def _compute_free_motions(joint: JointMode, laws: LawGroup, x, tolerance: float) -> _MotionRows:
     """Compute the free motions near log amplitudes x (k, m) by harmonic balance."""
     targets, places = np.unique(x, return_inverse=True)
     motions = find_free_motions(laws, joint, np.exp(targets), HARMONIC_COUNTS[0], tolerance)
@@ -202,7 +202,7 @@ def _compute_free_motions(joint: Joint, laws: LawGroup, x, tolerance: float) -> 
     return _MotionRows(*np.moveaxis(rows[places.reshape(x.shape)], -1, 0))
 
 
-def _compute_rigid_motions(joint: Joint, curve: Curve, x, tolerance: float) -> _MotionRows:
+def _compute_rigid_motions(joint: JointMode, curve: Curve, x, tolerance: float) -> _MotionRows:
     """Compute motions of a rig whose contact stores no energy, from its harmonic balance curve.
 
     Constant friction does not change the length of a half cycle, which is that of the free mode.
@@ -230,7 +230,7 @@ def _compute_rigid_motions(joint: Joint, curve: Curve, x, tolerance: float) -> _
     )
 
 
-def _measure_motion(joint: Joint, motion) -> np.ndarray | None:
+def _measure_motion(joint: JointMode, motion) -> np.ndarray | None:
     """Return log energy [J], log loss [J], frequency [Hz], log modal amplitude [m] and damping ratio.
 
     The energy that elastic-plastic elements store at a reversal is half of tip displacement times tip
@@ -308,7 +308,7 @@ def _solve_half_cycle(table: _MotionTable, ends: tuple, directions: tuple) -> fl
     ends: log amplitudes at the begin and at the end for a fall of 0; directions: their changes per half the fall.
     """
 
-    scale = np.exp(_extend_energy(table, ends[0]))
+    scale = np.exp(_interpolate_log_energy(table, ends[0]))
 
     def excess(step: float) -> float:
         """Return the energy decrease in a half cycle minus the loss, relative to the energy."""
@@ -316,13 +316,15 @@ def _solve_half_cycle(table: _MotionTable, ends: tuple, directions: tuple) -> fl
         end = ends[1] + directions[1] * step
         middle = np.log(0.5 * (np.exp(begin) + np.exp(end)))
         middle = np.clip(middle, table.low, table.high)
-        fall = np.exp(_extend_energy(table, begin)) - np.exp(_extend_energy(table, end))
+        fall = np.exp(_interpolate_log_energy(table, begin)) - np.exp(
+            _interpolate_log_energy(table, end)
+        )
         return float((fall - 0.5 * np.exp(table.loss(middle))) / scale)
 
     return brentq(excess, 0.0, MAX_HALF_CYCLE_LOSS / 2, xtol=1e-12)
 
 
-def _extend_energy(table: _MotionTable, x: float) -> float:
+def _interpolate_log_energy(table: _MotionTable, x: float) -> float:
     """Interpolate the log energy at a log amplitude; extrapolate beyond the table with slope 2."""
     inside = min(max(x, table.low), table.high)
     return float(table.energy(inside)) + 2 * (x - inside)

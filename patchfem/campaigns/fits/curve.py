@@ -186,7 +186,7 @@ class CurveModel:
         self.last_progress = self.begin
         self.n_computed = 0
         self.methods = list(METHODS)
-        self._cached_curve = lru_cache(N_CACHED_CURVES)(self._compute_uncached)
+        self._cached_curve = lru_cache(N_CACHED_CURVES)(self._compute_uncached_curve)
 
     def compute_curve(self, method: str, values) -> np.ndarray:
         """Compute the curve (2, k) by a given backbone method; NaN where the mode does not oscillate."""
@@ -200,7 +200,7 @@ class CurveModel:
         """Compute frequency and damping ratio of any model at the measured amplitudes."""
         return _compute_backbone_curve(model, self.distinct, method)[:, self.rows]
 
-    def _compute_uncached(self, values: tuple, method: str) -> np.ndarray:
+    def _compute_uncached_curve(self, values: tuple, method: str) -> np.ndarray:
         """Compute frequency and damping for given free parameters, and report the progress."""
         if self.say and perf_counter() - self.last_progress >= PROGRESS_SECONDS:
             self.last_progress = perf_counter()
@@ -267,7 +267,11 @@ class CurveModel:
 
 
 def fit_curve(
-    scene: Scene, to: Path, free: Sequence, say=None, starts: int = DEFAULT_STARTS
+    scene: Scene,
+    curve_file: Path,
+    free_parameters: Sequence,
+    say=None,
+    starts: int = DEFAULT_STARTS,
 ) -> FittedCurve:
     """Fit free parameters of a rig to measured frequency and damping as functions of amplitude.
 
@@ -277,9 +281,9 @@ def fit_curve(
     Parameters
     ----------
     scene : Scene
-    to : Path
+    curve_file : Path
         File of the measured curve, in the format of `read_damping_curve`.
-    free : sequence of str
+    free_parameters : sequence of str
         Free parameters with their ranges, "table.key=low..high".
     say : Callable, optional
         Called with a line of text that reports the progress.
@@ -298,12 +302,12 @@ def fit_curve(
         If no search converges.
     """
     begin = perf_counter()
-    ranges = parse_ranges(free)
-    measured = read_damping_curve(to)
+    ranges = parse_ranges(free_parameters)
+    measured = read_damping_curve(curve_file)
     n_amplitudes = measured.amplitude.size
     if 2 * n_amplitudes <= len(ranges):
         raise PatchfemError(
-            f"{to}: {n_amplitudes} amplitudes are too few to determine {len(ranges)} values; at least "
+            f"{curve_file}: {n_amplitudes} amplitudes are too few to determine {len(ranges)} values; at least "
             f"{len(ranges) // 2 + 1} are needed"
         )
     curves = CurveModel(scene, ranges, measured.amplitude, say)
@@ -336,11 +340,11 @@ def fit_curve(
         keys = replace(keys, notes=[_warn_of_substituted_values(missing)])
     return FittedCurve(
         keys=keys.make_fitted_keys(widened.fit, begin),
-        path=Path(to),
+        path=Path(curve_file),
         measured=measured,
         model=model(fit.values),
         method=curves.methods[0],
-        notes=_note_different_methods(to, curves.methods[0], measured) + widened.notes,
+        notes=_note_different_methods(curve_file, curves.methods[0], measured) + widened.notes,
     )
 
 

@@ -87,9 +87,9 @@ class FittedLoop:
 
 def fit_hysteresis_loop(
     scene: Scene,
-    to: Path,
-    free: Sequence,
-    hold: Sequence = (),
+    loop_file: Path,
+    free_parameters: Sequence,
+    held_out_rows: Sequence = (),
     say: Callable | None = None,
     options: LoopOptions = DEFAULT_OPTIONS,
 ) -> FittedLoop:
@@ -98,11 +98,11 @@ def fit_hysteresis_loop(
     Parameters
     ----------
     scene : Scene
-    to : Path
+    loop_file : Path
         File of the measured loop.
-    free : sequence of str
+    free_parameters : sequence of str
         Free parameters with their ranges, "table.key=low..high".
-    hold : sequence of str
+    held_out_rows : sequence of str
         Selectors "column=value,value" of rows that are predicted but not fitted.
     say : Callable, optional
         Called with a line of text that reports the progress.
@@ -128,17 +128,17 @@ def fit_hysteresis_loop(
                 f"with [slide], but this is a {scene.kind} scene; add [slide]"
             ]
         )
-    ranges = parse_ranges(free)
-    loop = read_loop(to, LOAD_UNITS)
+    ranges = parse_ranges(free_parameters)
+    loop = read_loop(loop_file, LOAD_UNITS)
     held_out = np.zeros(loop.reading.size, bool)
-    for selector in hold:
+    for selector in held_out_rows:
         held_out |= loop.select_rows(selector)
     offsets = make_offsets(options.offsets, loop)
     n_values = len(ranges) + len(offsets)
     n_used = np.count_nonzero(~held_out)
     if n_used <= n_values:
         raise PatchfemError(
-            f"{to}: only {n_used} rows are used for the fit (rows that are held out do not count), "
+            f"{loop_file}: only {n_used} rows are used for the fit (rows that are held out do not count), "
             f"too few to determine {n_values} values and their intervals"
         )
     bench = BenchModel(scene, loop, ranges, offsets, warm_up=options.warm, say=say)

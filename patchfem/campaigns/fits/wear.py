@@ -158,16 +158,18 @@ def _read_interval(measure) -> list | None:
     return [float(part) for part in parts]
 
 
-def fit_wear(model: Model, to: str, free, progress=None) -> FittedCoefficient:
+def fit_wear(
+    model: Model, measured_depth: str, free_parameters, progress=None
+) -> FittedCoefficient:
     """Fit the wear coefficient so that the computed worn depth equals the measured one.
 
     Parameters
     ----------
     model : Model
         Model with wear.
-    to : str
+    measured_depth : str
         Measured depth, in the format of `read_measured_depth`.
-    free : sequence of str
+    free_parameters : sequence of str
         Range of the coefficient, ("wear.coefficient=low..high",).
     progress : Callable, optional
         Called with the completed fraction of a run.
@@ -183,8 +185,8 @@ def fit_wear(model: Model, to: str, free, progress=None) -> FittedCoefficient:
     NotConverged
         If the runs do not converge to a coefficient.
     """
-    bounds = _parse_coefficient_range(free)
-    target = read_measured_depth(to)
+    bounds = _parse_coefficient_range(free_parameters)
+    target = read_measured_depth(measured_depth)
     if model.patch is None:
         raise PatchfemError(
             f"--to {target.name}: a [normal] contact has no worn depth; use [contact]", "normal"
@@ -250,9 +252,9 @@ def fit_wear(model: Model, to: str, free, progress=None) -> FittedCoefficient:
     )
 
 
-def _parse_coefficient_range(free) -> Range:
+def _parse_coefficient_range(free_parameters) -> Range:
     """Parse the range of the wear coefficient; raise PatchfemError for other parameters."""
-    ranges = parse_ranges(free)
+    ranges = parse_ranges(free_parameters)
     if [bound.key for bound in ranges] != [COEFFICIENT_KEY]:
         raise PatchfemError(
             f"--free: in a scene with [wear] only {COEFFICIENT_KEY} can be fitted, for example {COEFFICIENT_KEY}=1e-16 "

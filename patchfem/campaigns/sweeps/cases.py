@@ -146,12 +146,12 @@ class Cases:
             for index, value in enumerate(axis.values):
                 first.setdefault(value, index)
 
-        def patch_places(number: int) -> list:
+        def patch_axis_indices(number: int) -> list:
             """Return the axis indices of a case for the keys that change its patch."""
             values = self.values(number)
             return [first_indices[k][values[k]] for k in contact_axes]
 
-        return sorted(numbers, key=patch_places)
+        return sorted(numbers, key=patch_axis_indices)
 
     def compute_hashes(
         self, sweep_scene: SweepScene, numbers: Sequence[int] | None = None

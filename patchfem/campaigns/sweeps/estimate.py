@@ -59,7 +59,7 @@ def estimate_sweep(sweep_scene: SweepScene, cases: Cases) -> dict:
     if not plans:
         raise first_error
     batches = [choose_batch(case_plan.model, len(cases)) for case_plan in plans]
-    seconds = _predict_seconds(plans, batches, len(cases))
+    seconds = _predict_sweep_seconds(plans, batches, len(cases))
     if cases.is_random and len(cases.axes) > 1:
         seconds += RANKING_SECONDS
     compile_seconds = plans[0].compile_seconds
@@ -77,7 +77,7 @@ def estimate_sweep(sweep_scene: SweepScene, cases: Cases) -> dict:
     }
 
 
-def _predict_seconds(plans: list, batches: list, n_cases: int) -> float:
+def _predict_sweep_seconds(plans: list, batches: list, n_cases: int) -> float:
     """Predict the CPU time [s] of all cases on one core.
 
     Parameters

@@ -2,7 +2,7 @@
 
 If a worker dies, its chunk is split into halves and repeated.
 
-In: `Work`, case numbers and an executor of `executors/`. Out: results by chunk from `iterate_chunks`.
+In: `WorkerData`, case numbers and an executor of `executors/`. Out: results by chunk from `iterate_chunks`.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ MAX_MESH_CASES = 256  # Largest number of cases that determine the shared meshes
 
 
 @dataclass(frozen=True, slots=True)
-class Work:
+class WorkerData:
     """Data that a worker process needs to compute any case of a sweep.
 
     Each worker receives the data once. All functions must support pickling.
@@ -74,7 +74,7 @@ class WorkerDeath:
     reason: str
 
 
-def compile_for_first_case(work: Work) -> None:
+def compile_for_first_case(work: WorkerData) -> None:
     """Compile and import in advance the code that the first case of a sweep needs.
 
     This happens while the meshes are chosen. Errors are ignored here and reported by the run.
@@ -88,13 +88,13 @@ def compile_for_first_case(work: Work) -> None:
 
 
 def compute_chunk(
-    work: Work, numbers: Sequence[int], say: Callable | None = None
+    work: WorkerData, numbers: Sequence[int], say: Callable | None = None
 ) -> tuple[CaseResults | None, list]:
     """Compute the results of a chunk of cases.
 
     Parameters
     ----------
-    work : Work
+    work : WorkerData
     numbers : sequence of int
         Numbers of the cases.
     say : callable, optional
@@ -119,7 +119,7 @@ def compute_chunk(
 
 
 def compute_chunk_with_time(
-    work: Work, numbers: Sequence[int], say: Callable | None = None
+    work: WorkerData, numbers: Sequence[int], say: Callable | None = None
 ) -> tuple:
     """Compute the results of a chunk of cases, and measure the elapsed time.
 
@@ -141,13 +141,13 @@ def compute_chunk_with_time(
 
 
 def output_results(
-    work: Work, numbers: Sequence[int], results: CaseResults, extras: list
+    work: WorkerData, numbers: Sequence[int], results: CaseResults, extras: list
 ) -> tuple[CaseResults | None, list]:
     """Write the results of a chunk to the folder of the sweep, or return them.
 
     Parameters
     ----------
-    work : Work
+    work : WorkerData
     numbers : sequence of int
         Numbers of the cases.
     results : CaseResults
@@ -164,7 +164,7 @@ def output_results(
     return results, extras
 
 
-def _build_similar_models(work: Work, numbers: Sequence[int]) -> SimilarModels | None:
+def _build_similar_models(work: WorkerData, numbers: Sequence[int]) -> SimilarModels | None:
     """Return the models of cases that differ only in plain numbers; None if this is not possible.
 
     It is also None for patches in motion, and if `work.keep` is called with the result of each run.
@@ -187,7 +187,7 @@ def _build_similar_models(work: Work, numbers: Sequence[int]) -> SimilarModels |
     return replace(models, first=work.meshes.with_shared_meshes(models.first))
 
 
-def _build_case_model(work: Work, number: int):
+def _build_case_model(work: WorkerData, number: int):
     """Return the model of a case with the shared meshes, or the validation error of its scene."""
     try:
         model = work.sweep_scene.build_model(
@@ -198,7 +198,7 @@ def _build_case_model(work: Work, number: int):
     return model if work.meshes is None else work.meshes.with_shared_meshes(model)
 
 
-def choose_shared_meshes(work: Work) -> Work:
+def choose_shared_meshes(work: WorkerData) -> WorkerData:
     """Return the data of a sweep with meshes that are chosen for all cases together.
 
     Cases that are already computed are included in this choice.
@@ -214,7 +214,7 @@ def choose_shared_meshes(work: Work) -> Work:
     return replace(work, meshes=SharedMeshes(models, len(numbers) == len(work.cases)))
 
 
-def _find_min_chunk_size(work: Work) -> int:
+def _find_min_chunk_size(work: WorkerData) -> int:
     """Return the smallest number of cases per chunk for which a batch is efficient.
 
     The time of a smaller chunk does not predict the time of a large one.
@@ -284,13 +284,13 @@ class ChunkQueue:
 
 
 def iterate_chunks(
-    work: Work, numbers: Sequence[int], executor, say: Callable | None = None
+    work: WorkerData, numbers: Sequence[int], executor, say: Callable | None = None
 ) -> Iterator[tuple]:
     """Compute cases chunk by chunk, and yield the results as they arrive.
 
     Parameters
     ----------
-    work : Work
+    work : WorkerData
     numbers : sequence of int
         Numbers of the cases.
     executor : object

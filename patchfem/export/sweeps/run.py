@@ -16,7 +16,7 @@ from ...campaigns.sweeps.case_models import SweepScene
 from ...campaigns.sweeps.cases import Cases
 from ...campaigns.sweeps.estimate import MAX_CASES_WITH_SUMMARY, MAX_CASES_WITH_TABLES
 from ...campaigns.sweeps.executors.cluster import environment_versions
-from ...campaigns.sweeps.sweep import RemainingTime, Work, iterate_chunks
+from ...campaigns.sweeps.sweep import RemainingTime, WorkerData, iterate_chunks
 from ...core import Missing, PatchfemError
 from ...runs.batch.case_results import CaseResults
 from ...scene.axes import Axis, FormattedNumbers
@@ -211,7 +211,7 @@ def _compute_cases(
         if keep in ("results", "pages")
         else None
     )
-    work = Work(
+    work = WorkerData(
         jobs.sweep_scene,
         jobs.cases,
         None if keep == "none" else SummaryWriter(jobs.cases),
@@ -251,7 +251,7 @@ def compute_in_memory(
     """
     total = CaseResults.blank(len(cases))
     for numbers, results, *_ in iterate_chunks(
-        Work(sweep_scene, cases, estimate=estimate), range(len(cases)), executor, say
+        WorkerData(sweep_scene, cases, estimate=estimate), range(len(cases)), executor, say
     ):
         # These texts appear in no table.
         for part in (results.warnings, results.notes, results.numerics):

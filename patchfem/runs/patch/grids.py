@@ -140,10 +140,10 @@ def make_base_grids(patch_model) -> BaseGrids:
     """
     has_files = patch_model.mesh.file is not None or patch_model.gap.profile is not None
     key = ("base grids", patch_model if has_files else store.content_key(patch_model))
-    return store.get_or_compute(key, lambda: _search_contact(patch_model))
+    return store.get_or_compute(key, lambda: _search_contact_region(patch_model))
 
 
-def _search_contact(patch_model) -> BaseGrids:
+def _search_contact_region(patch_model) -> BaseGrids:
     """Search for the contact region on grids that are graded towards the previous result.
 
     If a varying load moves the contact edges, the columns are short wherever the edges lie between

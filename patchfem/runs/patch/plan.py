@@ -207,7 +207,7 @@ def stiffness_chain(patch_model) -> dict:
     return stiffnesses
 
 
-def compute_groups(model: Model) -> dict:
+def compute_patch_groups(model: Model) -> dict:
     """Compute the dimensionless groups of a patch, and with friction its slip length [m].
 
     tilt_over_first_opening is the tilt divided by the tilt at which flat pieces, modelled as bars,

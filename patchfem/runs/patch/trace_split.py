@@ -42,7 +42,9 @@ class TraceSplit:
     pressure: float
     tables: str
 
-    def describe(self, *, is_cutoff_given: bool = False, is_scene_written: bool = False) -> str:
+    def describe_split(
+        self, *, is_cutoff_given: bool = False, is_scene_written: bool = False
+    ) -> str:
         """Return a multi-line summary of the trace split, its validity and its scene tables."""
         cutoff = format_length(self.cutoff)
         reason = (
@@ -168,4 +170,4 @@ def advise_split(patch_model, element: float) -> list[str]:
         return []
     if unrepresented_fraction(_level_trace(patch_model, element), element) <= NEGLIGIBLE_LOST:
         return []
-    return [split.describe()]
+    return [split.describe_split()]

@@ -186,7 +186,7 @@ def choose_steady_method(model: Model) -> SteadyMethod:
     return STEADY_METHODS["yields"]
 
 
-def _list_no_runs(*_) -> list:
+def _no_comparison_runs(*_) -> list:
     """Return an empty list for engines that need no comparison runs of a kind."""
     return []
 
@@ -378,14 +378,14 @@ def _list_smooth_time_runs(model: Model, numerics) -> list:
 EXACT = Engine(
     "exact",
     "exact",
-    _list_no_runs,
+    _no_comparison_runs,
     _list_exact_space_runs,
     why_not_cheapest=explain_time_steps_over_events,
 )
 PIECES = Engine(
     "piecewise",
     "exact",
-    _list_no_runs,
+    _no_comparison_runs,
     _list_element_space_runs,
     why_not_cheapest=explain_time_steps_over_element_events,
 )
@@ -410,7 +410,7 @@ MARCH = Engine(
 HARMONIC = Engine(
     "harmonic",
     "harmonic",
-    _list_no_runs,
+    _no_comparison_runs,
     _list_steady_space_runs,
     max_balance_error=None,
     finds_periodic_motion=True,

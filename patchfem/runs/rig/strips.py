@@ -28,12 +28,12 @@ def average_march_over_strips(march, patch):
     )
 
 
-def average_last_cycles_over_strips(mark, patch):
+def average_last_cycles_over_strips(level_end, patch):
     """Average the last cycles at the end of a drive level over independently sliding strips."""
     window = average_histories_over_strips(
-        mark.window, compute_strip_loads(patch), patch.strips.offsets
+        level_end.window, compute_strip_loads(patch), patch.strips.offsets
     )
-    return replace(mark, window=window, step_force=(window.force[1:] + window.force[:-1]) / 2)
+    return replace(level_end, window=window, step_force=(window.force[1:] + window.force[:-1]) / 2)
 
 
 def average_histories_over_strips(response, loads, offsets):

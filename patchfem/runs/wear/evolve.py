@@ -465,7 +465,7 @@ def _replay_wear(patch_model, model, patch, other_patch, moments) -> tuple:
     """
     area = nodal_areas(patch_model, other_patch.pieces.interface)
 
-    def interpolate(path) -> np.ndarray:
+    def interpolate_slip_path(path) -> np.ndarray:
         """Interpolate a slip path to the nodes and strips of the other patch."""
         if patch_model.interface.strips is None:
             return np.interp(other_patch.x, patch.x, path)
@@ -476,7 +476,8 @@ def _replay_wear(patch_model, model, patch, other_patch, moments) -> tuple:
         return np.array([np.interp(offsets, row_offsets, column) for column in rows.T]).T
 
     jumps = [
-        (after.cycle - before.cycle, interpolate(after.used)) for before, after in pairwise(moments)
+        (after.cycle - before.cycle, interpolate_slip_path(after.used))
+        for before, after in pairwise(moments)
     ]
     depth = replay_jumps(
         make_contact_force_function(patch_model, other_patch.pair),

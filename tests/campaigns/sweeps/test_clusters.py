@@ -11,7 +11,7 @@ import pytest
 from command_line import run_cli
 from scene_texts import BENCH
 
-from patchfem.campaigns import Cases, SweepScene, Work, environment_versions
+from patchfem.campaigns import Cases, SweepScene, WorkerData, environment_versions
 from patchfem.campaigns.sweeps.executors import cluster
 from patchfem.campaigns.sweeps.executors.cluster import Cluster, _compute_on_worker
 from patchfem.campaigns.sweeps.sweep import compute_chunk
@@ -30,9 +30,11 @@ time.sleep(100)
 """
 
 
-def make_work(place: Path, text=BENCH, values="0.2,0.3,-1") -> Work:
+def make_work(place: Path, text=BENCH, values="0.2,0.3,-1") -> WorkerData:
     """Return the work of a sweep over the friction coefficient."""
-    return Work(SweepScene(place, text), Cases(tuple(read_axes([f"friction.static={values}"])[0])))
+    return WorkerData(
+        SweepScene(place, text), Cases(tuple(read_axes([f"friction.static={values}"])[0]))
+    )
 
 
 @pytest.fixture

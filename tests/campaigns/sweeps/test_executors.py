@@ -18,7 +18,7 @@ from patchfem.campaigns import (
     RemainingTime,
     Request,
     SweepScene,
-    Work,
+    WorkerData,
     iterate_chunks,
     read_sweep,
 )
@@ -37,13 +37,13 @@ SUPPORT = Path(__file__).parents[2] / "support"
 RIG = POINT + COULOMB + SHORT
 
 
-def make_work(text=BENCH, count=8, tell=None) -> Work:
+def make_work(text=BENCH, count=8, tell=None) -> WorkerData:
     """Return the work of a sweep over the friction coefficient."""
     axes, _ = read_axes([f"friction.static=0.05..0.6:{count}lin"])
-    return Work(SweepScene(Path("a.toml"), text), Cases(tuple(axes)), tell)
+    return WorkerData(SweepScene(Path("a.toml"), text), Cases(tuple(axes)), tell)
 
 
-def run_all_cases(work: Work, executor) -> tuple:
+def run_all_cases(work: WorkerData, executor) -> tuple:
     """Return the results in the order of the cases, and the values reported by `tell` by case."""
     count = len(work.cases)
     parts = list(iterate_chunks(work, range(count), executor))
@@ -141,7 +141,7 @@ class IdleExecutor:
 
     workers = 1
 
-    def run(self, work: Work, take, say=None):
+    def run(self, work: WorkerData, take, say=None):
         while (chunk := take()) is not None:
             yield chunk, 1.0, (None, [])
 

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from scene_texts import PATCH
 
-from patchfem.campaigns import Cases, SweepScene, Work, iterate_chunks
+from patchfem.campaigns import Cases, SweepScene, WorkerData, iterate_chunks
 from patchfem.campaigns.sweeps.executors import LocalExecutor
 from patchfem.campaigns.sweeps.executors.pool import Pool
 from patchfem.campaigns.sweeps.sweep import choose_shared_meshes
 from patchfem.runs.batch.case_results import join_case_results
 from patchfem.scene import read_axes
 
-WORK = Work(
+WORK = WorkerData(
     SweepScene(Path("a.toml"), PATCH),
     Cases(tuple(read_axes(["contact.tilt.angle=2e-5 rad,2e-4 rad", "contact.load=50 N,100 N"])[0])),
 )

@@ -10,7 +10,7 @@ Read `LocalExecutor` first.
 from collections.abc import Callable, Iterator
 
 from ....core import PatchfemError
-from ..sweep import Work, compute_chunk_with_time
+from ..sweep import WorkerData, compute_chunk_with_time
 from . import cluster, pool
 
 
@@ -19,12 +19,14 @@ class LocalExecutor:
 
     workers = 1
 
-    def run(self, work: Work, next_chunk: Callable, say: Callable | None = None) -> Iterator[tuple]:
+    def run(
+        self, work: WorkerData, next_chunk: Callable, say: Callable | None = None
+    ) -> Iterator[tuple]:
         """Compute the chunks that the callback `next_chunk` returns, and yield their results.
 
         Parameters
         ----------
-        work : Work
+        work : WorkerData
         next_chunk : callable
             Returns the case numbers of the next chunk, or None if none is left.
         say : callable, optional

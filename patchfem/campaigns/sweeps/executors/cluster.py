@@ -18,7 +18,7 @@ import numpy as np
 
 from .... import __version__
 from ....core import Missing, PatchfemError
-from ..sweep import Work, WorkerDeath, compute_chunk_with_time, output_results
+from ..sweep import WorkerData, WorkerDeath, compute_chunk_with_time, output_results
 
 _TLS = "DASK_DISTRIBUTED__COMM__TLS__"
 CERTIFICATES = f"{_TLS}CA_FILE, {_TLS}CLIENT__CERT and {_TLS}CLIENT__KEY"
@@ -101,12 +101,14 @@ class Cluster:
                 self.client.close()
                 raise self._worker_error(worker_versions, environment_versions())
 
-    def run(self, work: Work, next_chunk: Callable, say: Callable | None = None) -> Iterator[tuple]:
+    def run(
+        self, work: WorkerData, next_chunk: Callable, say: Callable | None = None
+    ) -> Iterator[tuple]:
         """Compute the chunks that the callback `next_chunk` returns, and yield their results.
 
         Parameters
         ----------
-        work : Work
+        work : WorkerData
         next_chunk : callable
             Returns the case numbers of the next chunk, or None if none is left.
         say : callable, optional
@@ -206,7 +208,7 @@ def _hash_source_files() -> str:
     return sha256(repr(sorted(texts)).encode()).hexdigest()[:8]
 
 
-def environment_versions(work: Work | None = None) -> dict:
+def environment_versions(work: WorkerData | None = None) -> dict:
     """Return the versions and file hashes that must be equal on a worker and in this process.
 
     Returns a dict of versions by name; `files` is the hash of the scene and the files that it names.
@@ -221,19 +223,19 @@ def environment_versions(work: Work | None = None) -> dict:
     return versions
 
 
-def _identity(work: Work) -> Work:
+def _identity(work: WorkerData) -> WorkerData:
     """Return the data of a sweep unchanged; a call as a Dask task stores them on the cluster."""
     return work
 
 
-def _compute_on_worker(work: Work, chunk: list, origin: tuple) -> tuple | dict:
+def _compute_on_worker(work: WorkerData, chunk: list, origin: tuple) -> tuple | dict:
     """Compute a chunk on a Dask worker; return (CPU time [s], results).
 
     If the worker has other versions or files, its `environment_versions` are returned instead.
 
     Parameters
     ----------
-    work : Work
+    work : WorkerData
     chunk : list
         Case numbers.
     origin : tuple

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ....core import Missing
-from ..sweep import Work, WorkerDeath
+from ..sweep import WorkerData, WorkerDeath
 
 ONE_THREAD = {
     name: "1"
@@ -50,7 +50,7 @@ class ComputedChunk(NamedTuple):
 class Worker:
     """Worker process that computes chunks sequentially."""
 
-    def __init__(self, work: Work, *, silent: bool = False):
+    def __init__(self, work: WorkerData, *, silent: bool = False):
         here, there = Pipe()
         words = [
             sys.executable,
@@ -70,7 +70,7 @@ class Worker:
         self.chunk = None
         self.pipe.send(work)
 
-    def send_work(self, work: Work) -> None:
+    def send_work(self, work: WorkerData) -> None:
         """Send the data of the sweep with the shared meshes to the worker process."""
         try:
             self.pipe.send(work)
@@ -112,12 +112,12 @@ class Pool:
         self.workers = workers
         self.waiting_workers = []
 
-    def begin(self, work: Work, count: int, say: Callable | None = None) -> None:
+    def begin(self, work: WorkerData, count: int, say: Callable | None = None) -> None:
         """Start worker processes in advance, so that they import their code while meshes are chosen.
 
         Parameters
         ----------
-        work : Work
+        work : WorkerData
             Data of the sweep without the shared meshes.
         count : int
             Number of cases.
@@ -133,12 +133,14 @@ class Pool:
         while self.waiting_workers:
             self.waiting_workers.pop().kill()
 
-    def run(self, work: Work, next_chunk: Callable, say: Callable | None = None) -> Iterator[tuple]:
+    def run(
+        self, work: WorkerData, next_chunk: Callable, say: Callable | None = None
+    ) -> Iterator[tuple]:
         """Compute the chunks that the callback `next_chunk` returns, and yield their results.
 
         Parameters
         ----------
-        work : Work
+        work : WorkerData
         next_chunk : callable
             Returns the case numbers of the next chunk, or None if none is left.
         say : callable, optional
@@ -190,7 +192,7 @@ class Pool:
             worker.send_chunk(chunk)
 
 
-def _start_worker(work: Work, *, silent: bool) -> Worker:
+def _start_worker(work: WorkerData, *, silent: bool) -> Worker:
     """Start a worker process; raise Missing if the operating system cannot create it."""
     try:
         return Worker(work, silent=silent)

@@ -24,7 +24,7 @@ def main() -> None:
         say = None if sys.argv[2] else _print_to_stderr
         while True:
             message = pipe.recv()
-            if isinstance(message, sweep.Work):
+            if isinstance(message, sweep.WorkerData):
                 # The data of the sweep arrive a second time, now with the shared meshes.
                 work = message
             else:

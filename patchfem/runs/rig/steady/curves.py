@@ -59,7 +59,7 @@ class CurvePoint(NamedTuple):
     guess: Any = None
 
     @property
-    def level(self) -> Level:
+    def drive_level(self) -> Level:
         """Drive level of the point with its measures; NaN if the motion is unbounded."""
         values = {COLUMN_MEASURES["amplitude"]: np.nan}
         if self.values:
@@ -304,7 +304,9 @@ def solve_drive_levels(finder, drive):
     def run_level(number: int, level: float) -> Level:
         """Compute the steady motion at another level [m s-2], starting from that of level `number`."""
         sine = SineDrive(level, drive.segments[0].omega, drive.moving)
-        return finder.compute_curve_point(sine, points[number].guess if number >= 0 else None).level
+        return finder.compute_curve_point(
+            sine, points[number].guess if number >= 0 else None
+        ).drive_level
 
     message = f"no steady motion was found at {len(failures)} of {len(points)} drive levels; at the first of them: "
     notes = tuple(f"{message}{one}" for one in failures[:1])
@@ -312,6 +314,6 @@ def solve_drive_levels(finder, drive):
         best[0],
         extra=best[0].extra | {"curve": tabulate_curve(points), "at": best[1]},
         run_level=run_level,
-        levels=tuple(point.level for point in points),
+        levels=tuple(point.drive_level for point in points),
         notes=(*best[0].notes, *notes),
     )
