@@ -120,9 +120,9 @@ def tolerance_sentence(measures: dict, tolerance, format_case, first: str = "") 
     tolerance_text = (
         f"the tolerance of {100 * limits[0]:g} %" if np.ptp(limits) == 0 else "their tolerance"
     )
-    lost = {name: is_over_tolerance(one, tolerance) for name, one in measures.items()}
-    lost = {name: missed for name, missed in lost.items() if missed.any()}
-    if not lost:
+    misses = {name: is_over_tolerance(one, tolerance) for name, one in measures.items()}
+    misses = {name: missed for name, missed in misses.items() if missed.any()}
+    if not misses:
         n_with_value = int(
             np.any(
                 [
@@ -151,21 +151,23 @@ def tolerance_sentence(measures: dict, tolerance, format_case, first: str = "") 
             return f"All {number} cases meet {tolerance_text}{floor}."
         subject_and_verb = "it meets" if n_with_value == 1 else "all of these meet"
         return f"{n_with_value} of {number} cases have an answer; {subject_and_verb} {tolerance_text}{floor}."
-    if first in measures and first not in lost:
-        return f"In {measure_label(first)} all {number} cases meet {tolerance_text}; {_others_sentence(len(lost))}."
+    if first in measures and first not in misses:
+        return f"In {measure_label(first)} all {number} cases meet {tolerance_text}; {_others_sentence(len(misses))}."
     error_ratios = {
         name: float(np.max(_error_ratio(measures[name], tolerance), initial=0.0, where=missed))
-        for name, missed in lost.items()
+        for name, missed in misses.items()
     }
     name = (
         first
-        if first in lost
-        else max([name for name in FIRST_MEASURES if name in lost] or lost, key=error_ratios.get)
+        if first in misses
+        else max(
+            [name for name in FIRST_MEASURES if name in misses] or misses, key=error_ratios.get
+        )
     )
-    relative_errors = np.where(lost[name], _relative_error(measures[name]), 0.0)
-    count = int(lost[name].sum())
+    relative_errors = np.where(misses[name], _relative_error(measures[name]), 0.0)
+    count = int(misses[name].sum())
     case = int(np.argmax(relative_errors))
-    others = len(lost) - 1
+    others = len(misses) - 1
     error_text = (
         f"{format_number(100 * relative_errors[case], 2)} % of its value"
         if relative_errors[case] <= ZERO_ERROR_RATIO

@@ -591,7 +591,7 @@ def history_charts(
             [make_line(since * per, window["displacement"] * scale, "accent")],
         )
     )
-    moves = np.any(window["base"])
+    base_moves = np.any(window["base"])
     drawn_charts.append(
         make_chart(
             title,
@@ -599,10 +599,13 @@ def history_charts(
             make_axis("acceleration", "g"),
             [
                 make_line(
-                    since * per, window["acceleration"] / G_N, "warm", "output" if moves else ""
+                    since * per,
+                    window["acceleration"] / G_N,
+                    "warm",
+                    "output" if base_moves else "",
                 ),
                 make_line(since * per, window["base"] / G_N, "soft", "base", dash="dashed")
-                if moves
+                if base_moves
                 else None,
             ],
         )

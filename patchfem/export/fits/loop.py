@@ -113,10 +113,10 @@ def _draw_charts(fit: FittedLoop) -> list:
     """Chart a measured and fitted friction loop, and the residual of each row."""
     loop = fit.loop
     name, unit = LABELS[loop.quantity]
-    along, size = choose_axis_unit(loop.displacement, "m")
-    up, scale = choose_axis_unit(loop.reading, "N") if unit == "N" else ("1", 1.0)
+    slide_unit, slide_scale = choose_axis_unit(loop.displacement, "m")
+    reading_unit, scale = choose_axis_unit(loop.reading, "N") if unit == "N" else ("1", 1.0)
     number = np.arange(loop.reading.size)
-    slide = loop.displacement * size
+    slide = loop.displacement * slide_scale
     reading = loop.reading * scale
     residual = (fit.model - loop.reading) * scale
     over_slide = []
@@ -135,14 +135,14 @@ def _draw_charts(fit: FittedLoop) -> list:
     return [
         charts.make_chart(
             "Measured and fitted",
-            charts.make_axis("slide", along),
-            charts.make_axis(name, up),
+            charts.make_axis("slide", slide_unit),
+            charts.make_axis(name, reading_unit),
             over_slide,
         ),
         charts.make_chart(
             "Residual",
             charts.make_axis("row"),
-            charts.make_axis("fitted - measured", up),
+            charts.make_axis("fitted - measured", reading_unit),
             over_rows,
         ),
     ]

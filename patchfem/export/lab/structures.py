@@ -222,8 +222,8 @@ def friction_elements(model: Model) -> Elements:
         patch = patch_result.solve_with_coarser(model.patch, model.accuracy.tolerance)[0]
         if patch.pressure.outcome is Outcome.NO_CONTACT:
             raise PatchfemError("the pieces do not touch, so no friction acts", "contact")
-    chosen = replace(numerics.choose_numerics(model), pairs=costs.count_cell_merges(model))
-    groups = event_driven.YieldingElements(model, chosen, patch).groups
+    settings = replace(numerics.choose_numerics(model), pairs=costs.count_cell_merges(model))
+    groups = event_driven.YieldingElements(model, settings, patch).groups
     stiffness = np.concatenate([group.stiffness for group in groups])
     limit = np.concatenate([group.stiffness * group.yield_displacement for group in groups])
     direction = np.repeat(rows, [group.stiffness.size for group in groups], axis=0)

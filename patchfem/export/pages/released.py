@@ -74,8 +74,10 @@ def describe_swing(time, output, error: float = 0.0, amplitude: float | None = N
     distance = np.abs(output - end)
     if not np.isfinite(distance).all() or not distance.max() > 0:
         return f"released at {format_length(start, 3)}, the output does not move"
-    moves = np.flatnonzero(np.abs(np.diff(output)) > ROUND_OFF_FRACTION * np.abs(output).max())
-    reversals = 1 + moves[:-1][np.diff(np.sign(np.diff(output)[moves])) != 0]
+    moving_steps = np.flatnonzero(
+        np.abs(np.diff(output)) > ROUND_OFF_FRACTION * np.abs(output).max()
+    )
+    reversals = 1 + moving_steps[:-1][np.diff(np.sign(np.diff(output)[moving_steps])) != 0]
     rest_limit = max(error, REST_FRACTION * abs(end), ZERO_FRACTION * np.abs(output).max())
     reversals = reversals[distance[reversals] > rest_limit]
     first_motion = (
@@ -87,9 +89,9 @@ def describe_swing(time, output, error: float = 0.0, amplitude: float | None = N
     tenth = np.ptp(output[time >= time[-1] - 0.1 * (time[-1] - time[0])]) / 2
     last = tenth if amplitude is None else min(tenth, amplitude)
     if last > rest_limit:
-        at = format_quantity(float(time[-1]), "s", 3)
+        end_time = format_quantity(float(time[-1]), "s", 3)
         return (
-            f"{first} and at the end, after {at}, still moves with an amplitude (half peak-to-peak of its last "
+            f"{first} and at the end, after {end_time}, still moves with an amplitude (half peak-to-peak of its last "
             f"whole cycle) of {format_length(float(last), 3)}"
         )
     last_moving = (
