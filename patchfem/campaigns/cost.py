@@ -62,7 +62,7 @@ ROUND_OFF_FRACTION = 1e-6
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Cost:
-    """Run of a cost curve: CPU time, measures and errors for a value of a numerical setting.
+    """Run with a given value of a numerical setting: CPU time, measures and errors.
 
     Attributes
     ----------
@@ -122,7 +122,7 @@ class Cost:
         return max(known, default=None)
 
     def needs_elapsed_time(self) -> bool:
-        """Return whether the elapsed time is so much longer than the CPU time that it is reported, too."""
+        """Return whether the elapsed time must be reported because it far exceeds the CPU time."""
         return self.wall_seconds > MIN_ELAPSED_TO_CPU_RATIO * self.seconds
 
     def has_same_results(self, other) -> bool:
@@ -201,7 +201,7 @@ def _replace_timing(cost: Cost, other: Cost) -> Cost:
 
 
 def _find_proposed_setting(setting: Setting, cost: Cost, max_seconds: float) -> Setting | None:
-    """Return the numerical setting that the warnings of a run propose, or None.
+    """Return the numerical setting that the warnings of a run propose; None if they propose none.
 
     Returns None if no warning proposes a larger value than the current one, or if the run would take
     more than `max_seconds`.
@@ -326,7 +326,7 @@ def _merge_identical_runs(first: Cost, second: Cost) -> Cost:
 def _time_setting(
     setting: Setting, say, previous_runs=(), *, can_split: bool = True
 ) -> Cost | None:
-    """Run a model with a numerical setting several times, and return its cost or None.
+    """Run a model with a numerical setting several times; return its cost, or None if it fails.
 
     The run is timed N_TIMINGS times; once if it is long and nothing was compiled, or if its results
     are identical to those of a previous run. None if the run fails.
@@ -460,7 +460,7 @@ def find_affected_measures(runs: list) -> list:
 
 
 def find_fastest_settings(runs: list, tolerance: float) -> dict:
-    """Return the label of the fastest run within the tolerance for each measure, or None.
+    """Return the label of the fastest run within the tolerance for each measure; None if none is.
 
     A coarse run that is accurate by chance is excluded: all finer runs must meet the tolerance as well.
     """
@@ -501,7 +501,7 @@ def _select_confirmed_runs(runs: list, names: Sequence, tolerance: float) -> lis
 
 
 def find_fastest_run(runs: list, tolerance: float) -> Cost | None:
-    """Return the run with the shortest CPU time that meets a tolerance, or None.
+    """Return the run with the shortest CPU time that meets a tolerance; None if no run meets it.
 
     Among equally expensive runs, the one with the coarsest setting is returned.
     """
@@ -564,7 +564,7 @@ def _format_cpu_time(run: Cost) -> str:
 
 
 class WorstError(NamedTuple):
-    """Measure of a run with the largest error relative to its allowed error.
+    """Measure with the largest error of a run, relative to the error that the tolerance allows.
 
     fraction: error over the allowed error at a tolerance of 1, to be compared with the tolerance;
     name: name of the measure, "" if no error is known.

@@ -78,7 +78,7 @@ def make_setting_values(model: Model, setting_name: str) -> list:
 
 
 def _list_split_meshes(model: Model) -> list:
-    """Return settings for the mesh of a file and for refinements with its edges halved."""
+    """Return settings for the mesh of a file and for its refinements with halved edges."""
     settings = []
     for level in range(3):
         words = "contact.mesh as it is"

@@ -30,7 +30,7 @@ MIN_SLOPE = 0.1
 
 
 class FreeMotion(NamedTuple):
-    """Free motion of a mode at a given amplitude, computed by harmonic balance.
+    """Periodic free motion of a mode at a given amplitude, computed by harmonic balance.
 
     free: a `harmonic.backbone.FreeMotion`; unknowns: (N,); reach: amplitude at the output / amplitude of
     the coordinate.

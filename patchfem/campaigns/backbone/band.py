@@ -31,7 +31,7 @@ VISCOUS_FALL = 0.6
 
 
 class Band(NamedTuple):
-    """Recommended curve of a backbone with a band that contains the results of tests.
+    """Recommended curve of a backbone, with a band that contains the results of tests.
 
     Attributes
     ----------

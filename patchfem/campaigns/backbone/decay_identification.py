@@ -135,7 +135,7 @@ def _max_stuck_displacements(group: LawGroup, free_motions: list) -> np.ndarray:
 
 
 def _distance_to_free_motion(free, shape, modal, scaled_rate) -> float:
-    """Return the distance between a modal state and a free motion, both scaled along the mode shape.
+    """Return the distance between a modal state and a free motion, scaled along the mode shape.
 
     The state consists of coordinates (n,) and rates / omega (n,).
 
@@ -156,7 +156,7 @@ def _distance_to_free_motion(free, shape, modal, scaled_rate) -> float:
 
 
 def _is_stuck(group: LawGroup, free) -> np.ndarray:
-    """Return whether the stiffness of each interface (i,) in a free motion is that without slip."""
+    """Return for each interface (i,) whether its stiffness in a free motion is that without slip."""
     force = free.forces[:, 1]
     slide = free.slides[:, 1]
     stiffness = STUCK_FRACTION * group.stiffness()

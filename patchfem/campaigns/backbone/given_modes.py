@@ -32,7 +32,7 @@ class PreparedModel(NamedTuple):
 
 
 def prepare_model(build: Callable, modes: str | Iterable = "") -> PreparedModel:
-    """Build the model of a backbone from a scene with or without modes.
+    """Build the model of a backbone from a scene, with its own modes or modes given beside it.
 
     Modes without `slide` get one with which the sticking joint contributes ASSUMED_JOINT_FRACTION of
     their stiffness. The frequencies of modes given beside the scene are those of the bolted joint.
@@ -49,7 +49,7 @@ def prepare_model(build: Callable, modes: str | Iterable = "") -> PreparedModel:
     notes = _note_ignored_tables(tables.ignored)
     if not tables.modes:
         return PreparedModel(joint.remove_joint(model), notes)
-    patch, stiffness = _press_contact(model)
+    patch, stiffness = _solve_sticking_contact(model)
     given_modes = tables.modes
     used_modes = given_modes
     if stiffness is not None:
@@ -75,8 +75,8 @@ class StickingContact(NamedTuple):
     stiffness: float | None
 
 
-def _press_contact(model: Model) -> StickingContact:
-    """Solve the contact of a rig with a single interface and return its stiffness while it sticks."""
+def _solve_sticking_contact(model: Model) -> StickingContact:
+    """Solve the contact of a rig with a single interface, and compute its sticking stiffness."""
     interfaces = model.rig.friction.interfaces
     if len(interfaces) != 1 or model.friction is None:
         return StickingContact(None, None)

@@ -86,7 +86,7 @@ class JointMode(NamedTuple):
 
     @property
     def coarse(self):
-        """Contact patch on the first coarser mesh, or None."""
+        """Contact patch on the first coarser mesh; None if there is none."""
         return self.coarser[0]
 
     @property

@@ -1,4 +1,4 @@
-"""Displacement path imposed on the model in a loop fit: optional lead-in, then the record."""
+"""Imposed displacement path in the fit of a friction loop: optional lead-in, then the record."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -93,7 +93,7 @@ class ImposedPath(NamedTuple):
 
 
 def prepend_warm_up(time, recorded, n_warm_up_rows: int, offset: float) -> ImposedPath:
-    """Return the imposed path: from displacement 0, through optional warm-up cycles, to the record.
+    """Return the imposed path: start at displacement 0, optional warm-up cycles, then the record.
 
     Parameters
     ----------

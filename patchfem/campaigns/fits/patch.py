@@ -90,7 +90,7 @@ class PatchLoops(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FittedPatch:
-    """Fitted single-point friction laws, by name, that can replace the patch of a scene.
+    """Single-point friction laws that are fitted to the patch of a scene and can replace it.
 
     best: the law with the smallest sum of squares.
     """

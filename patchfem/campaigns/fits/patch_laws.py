@@ -155,7 +155,7 @@ class LawProblem(NamedTuple):
 
 
 class _FrictionTable:
-    """Substitute for a [friction] table with values that need no validation.
+    """Substitute for a validated [friction] table, whose values are set without validation.
 
     The values lie within the bounds of the fit.
     """

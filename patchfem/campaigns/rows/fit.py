@@ -33,7 +33,7 @@ UNSTABLE_MEANINGS = {
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Fold:
-    """Cross-validation fold: a fit without the readings that have a given value in a column.
+    """Cross-validation fold: a fit that leaves out the readings with a given value in a column.
 
     name: the value; readings: mask (n,) of the left-out readings; search: fit of all others.
     """
@@ -337,7 +337,7 @@ def _split_placebo(text: str, ranges) -> list:
 
 
 def _predict_with_null_model(readings: Readings, name: str, fitted, groups: dict) -> NullPrediction:
-    """Predict all readings by a null model, the left-out ones by fits without them."""
+    """Predict all readings by a null model; left-out readings are predicted by fits without them."""
     logs, numbers = fit_null_model(readings, name, fitted)
     left_out_logs = np.full(fitted.size, np.nan)
     for group in groups.values():

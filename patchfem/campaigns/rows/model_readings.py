@@ -38,7 +38,7 @@ class ModelReadings:
         self.free_gains = [keys.index(key) if key in keys else None for key in GAIN_KEYS]
 
     def reset_motions(self) -> None:
-        """Discard the stored motions, so that the next motions start from rest."""
+        """Discard the stored motions, so that the next computations start from rest."""
         self.last_motions = {}
         self.last_readings = (None, {})
 

@@ -101,7 +101,7 @@ def make_residual(
 
 
 class _StoredDescents(DescentStorage):
-    """Storage of the descents of a search as lists of numbers, in a checkpoint of the caller.
+    """Descents of a search, stored as lists of numbers in a checkpoint of the caller.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ class _StoredDescents(DescentStorage):
         self.access_ends(f"{self.name}/{start}", numbers)
 
     def load(self, start: int) -> Descent | None:
-        """Return the stored descent from a starting point, or None."""
+        """Return the stored descent from a starting point; None if there is none."""
         stored = self.access_ends(f"{self.name}/{start}")
         if not stored:
             return None

@@ -101,7 +101,7 @@ def compute_sobol_indices(keys: Sequence[tuple], measures: dict, shape: tuple | 
 
 
 def _group_by_known_cases(measures: dict) -> list:
-    """Group measures that have values in the same cases."""
+    """Group the measures that have values in the same cases."""
     groups: dict = {}
     for name, values in measures.items():
         known = np.isfinite(values)
@@ -121,7 +121,7 @@ def _is_varying(values: np.ndarray, errors: np.ndarray) -> bool:
 
 
 def _compute_rank_fractions(values: np.ndarray) -> np.ndarray:
-    """Return the fraction of the cases with smaller values, which is uniform in [0, 1]."""
+    """Return the rank of each value as a fraction in [0, 1]; equal values have their mean rank."""
     _, same, counts = np.unique(values, return_inverse=True, return_counts=True)
     return ((np.cumsum(counts) - counts / 2) / values.size)[same]
 

@@ -51,7 +51,7 @@ def _draw_sobol_points(n_axes: int, count: int, seed: int) -> np.ndarray:
 
 
 def _map_to_values(axis: Axis | SampledRange, fractions: np.ndarray) -> Axis:
-    """Return the values of a key that correspond to uniform random numbers (n,) in [0, 1)."""
+    """Map uniform random numbers (n,) in [0, 1) to values of a swept key."""
     if isinstance(axis, SampledRange):
         return axis.make_axis(fractions.tolist())
     n_values = len(axis.texts)

@@ -143,7 +143,7 @@ def compute_chunk_with_time(
 def output_results(
     work: WorkerData, numbers: Sequence[int], results: CaseResults, extras: list
 ) -> tuple[CaseResults | None, list]:
-    """Write the results of a chunk to the folder of the sweep, or return them.
+    """Write the results of a chunk to the folder of the sweep if possible, otherwise return them.
 
     Parameters
     ----------
@@ -199,7 +199,7 @@ def _build_case_model(work: WorkerData, number: int):
 
 
 def choose_shared_meshes(work: WorkerData) -> WorkerData:
-    """Return the data of a sweep with meshes that are chosen for all cases together.
+    """Return the data of a sweep with meshes that are chosen for all its cases.
 
     Cases that are already computed are included in this choice.
     """

@@ -47,7 +47,7 @@ MAX_EVALUATIONS = 2e6  # Largest number of evaluations (points x samples) in thi
 
 
 def run_prescribed(inputs: RunInputs) -> Result:
-    """Compute a plan with prescribed displacement and return its Result."""
+    """Run a bench plan with prescribed displacement and return its Result."""
     model = inputs.plan.model
     patch = inputs.patch
     steps = steps_per_cycle(model)

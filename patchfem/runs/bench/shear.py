@@ -95,7 +95,7 @@ def compute_groove_fields(patch, contact, states) -> tuple:
 
 
 def _slide_bond_points(task: SlideTask) -> SlideHistories:
-    """Compute the friction histories of bonds at the points of elastic pieces by shear modes."""
+    """Compute the friction histories of bonds at points of elastic pieces, by shear modes."""
     model = task.model
     patch = task.patch
     law = model.bonds

@@ -100,7 +100,7 @@ def solve_contact_on_meshes(interface, tolerance: float) -> tuple:
 
 
 def recondense_interface_pieces(model) -> None:
-    """Condense the pieces of all interfaces without using cached stiffness matrices."""
+    """Condense the pieces of all interfaces again, without cached stiffness matrices."""
     store.clear_cache()
     for interface in model.rig.friction.interfaces if model.rig is not None else ():
         if interface.patch is not None:

@@ -43,7 +43,7 @@ class Limit(NamedTuple):
 
 
 def extrapolate_to_zero_cell_length(values, nested: bool = True) -> Limit:
-    """Extrapolate values on successively halved cells to vanishing cell length.
+    """Extrapolate values on successively refined meshes to vanishing cell length.
 
     Three values give a ratio of successive changes. If it is regular, the error of the value on the
     finest mesh is the remainder of the geometric series. With two values the error is twice their

@@ -136,7 +136,7 @@ def estimate_static_measures(
 
 
 def _select_more_accurate_point_measures(measures_by_name: dict, estimates: dict) -> dict:
-    """Return the measures that the points of a profile give more accurately than the mesh.
+    """Return the measures that profile points determine more accurately than the mesh.
 
     Peak measures are compared by their relative errors: a mesh that smooths the profile has a low
     peak pressure, and therefore a small absolute error.
@@ -336,7 +336,7 @@ def are_cells_halved(fine, coarse) -> bool:
 
 
 class Resolution(NamedTuple):
-    """Resolution of a contact by its mesh, which determines the errors that refinement hides.
+    """Resolution of a contact by its mesh, from which hidden discretization errors follow.
 
     The fields are numbers for one patch, or (q,) for q patches.
 
@@ -431,7 +431,7 @@ def _compute_patch_resolution(patch: Patch, missed_peak: float) -> Resolution:
 
 
 def estimate_hidden_errors(resolution: Resolution, finest: dict) -> dict:
-    """Estimate the errors of the static measures that mesh refinement does not show.
+    """Estimate the errors of the static measures that mesh refinement does not reveal.
 
     They are due to a contact of few nodes, to a coating thinner than the cells at a loaded corner,
     to a rounded end shorter than the cells, and to round-off.

@@ -273,7 +273,7 @@ def solve_patch_contact(patch_model, pair: CondensedPair, worn=None) -> Patch:
 
 
 def _gap_variants_at_step(node: int, gap, half_steps, worn) -> tuple:
-    """Return the changes (m,) [m] of the gap that put a node at a step on either side of it.
+    """Return the two changes (m,) [m] of the gap that put a node on either side of a step.
 
     The worn depth of the node belongs to a gap at half the height of the step. On the higher side
     of the step, the node takes the worn depth of its neighbour there; on the lower side likewise.

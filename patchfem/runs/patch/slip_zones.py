@@ -75,7 +75,7 @@ def _yielding_intervals(x, yield_displacement, amplitude: float) -> list:
 
 
 def _interpolate_zone_end(x, yield_displacement, amplitude: float) -> float:
-    """Interpolate the position [m] at which the yield displacement equals the amplitude."""
+    """Interpolate the position [m] at which the yield displacement equals a given amplitude."""
     fraction = (amplitude - yield_displacement[0]) / (yield_displacement[1] - yield_displacement[0])
     return float(x[0] + fraction * (x[1] - x[0]))
 

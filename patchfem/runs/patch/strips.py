@@ -24,7 +24,7 @@ from .skin import MIN_RELATIVE_PRESSURE, cut_off_negligible_pressure, make_skin_
 
 
 def solve_strip_contact(patch_model, pieces: Compliance, gap, added=None, warm_start=None) -> tuple:
-    """Solve the contact of two pieces that are divided into strips over their width.
+    """Solve the contact of two pieces that are divided over their width into strips.
 
     The strips do not interact: each one has the compliance of its fraction of the width.
 

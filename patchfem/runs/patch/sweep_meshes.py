@@ -233,7 +233,7 @@ def _count_extra_halvings(cases: list, tolerance: float) -> dict:
 def _make_common_layout(
     cases: list, has_intermediate_cases: bool, halvings_by_case: dict
 ) -> Layout | None:
-    """Return column layouts of the coarsest grids merged for all patches, or None on failure.
+    """Return column layouts of the coarsest grids merged for all patches; None on failure.
 
     Parameters
     ----------

@@ -1,12 +1,13 @@
 """Predicted cost of the engines of a rig, for the choice of an engine, for plans and for refusals.
 
-In: a Model. Out: CPU times, numbers of steps, memory (`Cost`), and reasons to march instead of
-solving exactly.
+In: a Model. Out: CPU times, numbers of steps, memory (`Cost`), and reasons for time
+integration with constant steps instead of an exact solution.
 
-An event-driven run is counted in time intervals of one power series, a march and a smooth run in
-steps; `cost_model` has the time of each. The free vibration of the modes on a stuck element needs
-intervals only during stick. The fraction of time in stick is about 1 if the friction limit exceeds
-the force of the drive, and nearly 0 if it is half of it.
+The cost of an event-driven run is counted in time intervals of one power series, that of a time
+integration or of the smooth engine in steps; `cost_model` has the CPU time of each. The free
+vibration of the modes on a stuck element needs intervals only during stick. The fraction of time in
+stick is about 1 if the friction limit exceeds the force of the drive, and nearly 0 if it is half of
+it.
 """
 
 from dataclasses import replace
@@ -39,12 +40,13 @@ from ..cost import EVENT_CODE, LINEAR_CODE, SMOOTH_CODE, Cost, MemoryPart
 if TYPE_CHECKING:
     from ...friction.protocol import Element
 
-# Largest CPU time [s] of an exact solution if a march, which has discretization errors, takes less.
+# Largest CPU time [s] of an exact solution if time integration, which has discretization errors,
+# takes less.
 MAX_EXACT_SECONDS_OVER_MARCH = 5.0
-# Largest CPU time [s] of an exact solution if a march cannot resolve the modes.
+# Largest CPU time [s] of an exact solution if time steps cannot resolve the modes.
 MAX_EXACT_SECONDS_UNRESOLVED = 60.0
 MAX_EXACT_SECONDS = 600.0  # Largest CPU time [s] of an exact solution; a longer one is refused.
-MAX_MARCH_STEPS = 6400  # Largest number of automatically chosen steps per cycle of a march.
+MAX_MARCH_STEPS = 6400  # Largest automatically chosen number of time steps per cycle.
 # Exponent of the ratio of friction limit to drive force, which estimates the fraction of time in
 # stick. At a ratio of 1/2, a fraction of 0.01 was measured.
 STICKING_EXPONENT = 6
@@ -55,7 +57,7 @@ MERGE_TOLERANCE = 1e-3  # Smallest tolerance at which cells are merged MAX_MERGE
 # Largest phase [rad] of the fastest vibration in a time interval, as in
 # `dynamics.events.series_kernels`.
 MAX_INTERVAL_PHASE = 2.0
-# Keys of [accuracy] that select a march instead of the smooth engine.
+# Keys of [accuracy] that select constant time steps instead of the smooth engine.
 MARCH_SETTINGS = (
     "steps_per_cycle",
     "tail",
@@ -65,8 +67,8 @@ MARCH_SETTINGS = (
 # Number of decay times of the slowest mode after which a motion is periodic up to round-off
 # (e^-30).
 N_DECAY_TIMES_TO_REPEAT = 30.0
-# Largest ratio of the steps of the smooth engine to those of a march at which the smooth engine is
-# used.
+# Largest ratio of the steps of the smooth engine to constant time steps at which the smooth engine
+# is used.
 MAX_STEP_RATIO = 3.5
 # A speed-dependent law is stiff for the fraction exp(STIFF_TIME_EXPONENT (1 - r)) of the time,
 # where r is the ratio of drive force to friction limit. Fractions of 0.5 at r = 1.07 and 0.1 at r =
@@ -277,8 +279,8 @@ def estimate_march_seconds(model: Model) -> float:
 def explain_time_steps_over_events(model: Model) -> str:
     """Return why time integration is chosen over the event-driven engine, or "" if it is not.
 
-    The reason is that the events cost more CPU time than a march, and more than an exact solution
-    is worth.
+    The reason is that the events cost more CPU time than time steps, and more than an exact
+    solution is worth.
     """
     if required_steps_per_cycle(model) > MAX_MARCH_STEPS:
         max_seconds = MAX_EXACT_SECONDS_UNRESOLVED
@@ -421,7 +423,7 @@ def explain_time_steps_over_smooth_engine(model: Model) -> str:
 
 
 def make_smooth_element(model: Model) -> "Element | None":
-    """Return the friction law of the interface as an Element of the smooth engine, or None.
+    """Return the friction law as an Element of the smooth engine; None if it is not supported.
 
     It is None if the bonds are summed in a list, or if the law averages the pressure over all
     points.

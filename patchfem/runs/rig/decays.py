@@ -189,7 +189,7 @@ def tabulate_static_motions(modes, motions: list) -> np.ndarray:
 
 
 def estimate_mesh_error(fine, coarse, compute) -> np.ndarray:
-    """Estimate the mesh error of quantities that are computed from the friction laws of patches.
+    """Estimate the mesh error of quantities that depend on the friction laws of patches.
 
     The change on a coarser mesh is extrapolated at second order. At a displacement at which no node
     slips, a coarser mesh changes nothing. Therefore the error is at least the change when the
@@ -213,7 +213,7 @@ def estimate_mesh_error(fine, coarse, compute) -> np.ndarray:
 
 
 def _spread_elements(stiffness, slide) -> tuple:
-    """Spread friction elements over the yield displacements between the nodes of a mesh."""
+    """Spread friction elements at mesh nodes over the yield displacements between the nodes."""
     order = np.argsort(slide, kind="stable")
     return spread_elements(stiffness[order], slide[order])
 

@@ -83,7 +83,7 @@ class Engine(NamedTuple):
     def list_runs_with_more_modes(self, model: Model, numerics) -> list:
         """List the comparison run with more modes of a reduced structure, if modes are neglected.
 
-        The comparison run of a march has a quarter of the steps.
+        The comparison run of a time integration has a quarter of the steps.
         """
         if model.rig.structure.richer_rig is None:
             return []
@@ -168,8 +168,8 @@ STEADY_METHODS = {
 def choose_steady_method(model: Model) -> SteadyMethod:
     """Choose the method that computes the steady motion of a model.
 
-    The maps of events or of yield events are exact. Grooves need a march whose initial state is
-    corrected to be periodic. Harmonic balance is used for all other models, for scenes that set
+    The maps of events or of yield events are exact. Grooves need a time integration whose initial
+    state is corrected to be periodic. Harmonic balance is used for all other models, for scenes that set
     `harmonics`, and if the map of yield events would need too many time intervals.
     """
     if not EXACT.find_unsupported_feature(model, steady=True):

@@ -84,7 +84,7 @@ class RunEvaluator:
         return self.compute_integrated_measures(run, drive).loops
 
     def collect_cycle_data(self, run, drive, *, stuck: bool) -> dict:
-        """Return fields of `LastCycles` that the engine knows more accurately than from samples.
+        """Return fields of `LastCycles` that the engine computes more accurately than from samples.
 
         Parameters
         ----------
@@ -197,7 +197,7 @@ class RunEvaluator:
         return errors
 
     def find_uniform_histories(self, run, drive):
-        """Return the histories of the whole run if they are uniformly sampled, otherwise None."""
+        """Return the histories of the whole run if they are uniformly sampled; None otherwise."""
         histories = getattr(run, "response", None)
         is_uniform = (
             ROWS_NEEDING_RUN
@@ -285,7 +285,7 @@ class RunEvaluator:
         )
 
     def evaluate_level(self, level: float, run, drive=None, relative_error: float = 0.0) -> Level:
-        """Evaluate a run as one level of the drive.
+        """Evaluate the measures of a run at one drive level.
 
         Parameters
         ----------
@@ -331,7 +331,7 @@ def thin_samples(window):
 
 
 def compute_sampled_work(response) -> dict:
-    """Return the friction work and the integral of its absolute value [J] as a dict.
+    """Return a dict with the friction work and the integral of its absolute value [J].
 
     Both follow from the samples of all interfaces by the trapezoidal rule.
     """

@@ -189,7 +189,7 @@ class EventEvaluator(RunEvaluator):
         )
 
     def find_friction_loops(self, run, drive) -> tuple:
-        """Return the friction loop of each interface, or that of the mean of independent strips."""
+        """Return the friction loop of each interface, or the mean loop of independent strips."""
         return (_compute_strips_loop(run, drive),) if self.strips_slide_independently else run.loops
 
     def collect_cycle_data(self, run, drive, *, stuck: bool) -> dict:

@@ -65,7 +65,7 @@ def add_level_errors(levels, coarser_runs: list, solutions: dict) -> tuple:
 
 
 def _find_level_values(solution, number: int) -> dict:
-    """Return the measures of a Solution at one drive level, or {} if the run ended earlier."""
+    """Return the measures of a Solution at one drive level; {} if the run ended earlier."""
     return solution.levels[number].values if number < len(solution.levels) else {}
 
 

@@ -39,9 +39,9 @@ END_ERROR_FACTOR = 1.5
 class March(NamedTuple):
     """Completed time integration of a rig, with its contact model and CPU time.
 
-    - contact: contact model of the march.
+    - contact: contact model of the time integration.
     - result: MarchResult.
-    - seconds: CPU time of the march [s].
+    - seconds: CPU time of the integration [s].
     - prepare: CPU time of each part of the preparation [s].
     """
 
@@ -148,7 +148,7 @@ class MarchEvaluator(RunEvaluator):
         return {name: late.get(name, 0.0) + between.get(name, 0.0) for name in late | between}
 
     def estimate_peak_excesses(self, window) -> dict:
-        """Estimate by how much the peaks of a motion exceed its samples, as a dict by measure."""
+        """Estimate how far the peaks of a motion exceed its samples; return a dict by measure."""
         return peak_sampling_errors(window, self.model.grooves is not None)
 
     def estimate_end_errors(self, window) -> dict:
@@ -159,7 +159,7 @@ class MarchEvaluator(RunEvaluator):
         return {name: END_ERROR_FACTOR * change for name, change in changes.items()}
 
     def choose_bond_summation(self):
-        """Return the bond summation of the run, or None for a law without bonds."""
+        """Return the bond summation of the run; None for a law without bonds."""
         friction = self.model.friction
         if friction is None or not law_has_trait(friction.law, "bonds"):
             return None

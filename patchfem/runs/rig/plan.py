@@ -56,10 +56,10 @@ STEADY_CODES = {
     "march": None,
 }
 # Expected number of points of a response curve, including those near its peak and bends.
-N_MAPPED_POINTS = 160  # Number of points of a curve by event maps or marches.
+N_MAPPED_POINTS = 160  # Number of points of a curve by event maps or time steps.
 # Number of points of a curve by harmonic balance, which follows its folds.
 N_BALANCE_POINTS = 250
-N_MARCHED_CYCLES = 400.0  # Expected number of cycles of all marches until a motion is periodic.
+N_MARCHED_CYCLES = 400.0  # Expected number of integrated cycles until a motion is periodic.
 # Largest relative difference between the frequencies of drive and mode at which the mode counts as
 # resonant.
 RESONANCE_TOL = 0.02
@@ -281,7 +281,7 @@ def _predict_point_step_seconds(rig, friction) -> float:
 
 
 def compute_dimensionless_groups(model: Model) -> dict:
-    """Return the dimensionless groups of the motion of a rig, as a dict.
+    """Return a dict of the dimensionless groups of the motion of a rig.
 
     - D: ratio of the static friction limit to the largest force of the drive, D of (2.3) at
       resonance.

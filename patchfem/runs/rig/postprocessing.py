@@ -27,7 +27,7 @@ from .solution import Solution
 
 @dataclass(frozen=True, eq=False, slots=True)
 class CoupledRun:
-    """Run of a rig whose result is being completed.
+    """Run of a rig whose Result is completed step by step.
 
     - inputs: plan and Patch of the run.
     - numerics, solution: settings and Solution of the engine.
@@ -52,7 +52,7 @@ class CoupledRun:
 
     @property
     def patch(self):
-        """Patch of [contact] with its static solution, or None."""
+        """Patch of [contact] with its static solution; None for a rig without one."""
         return self.inputs.patch
 
     @property

@@ -27,7 +27,7 @@ OTHER_PEAK_RATIO = 0.1
 
 
 class Runner:
-    """Solver of a rig with several numerical settings, which stores all coarse solutions.
+    """Solver of a rig with several numerical settings, which stores the solutions of coarse runs.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ class RunProgress:
         self.shown = 0.0
 
     def make_callback(self, steps: float):
-        """Return the progress callback for one run with the given steps per cycle, or None.
+        """Return the progress callback for one run with the given steps per cycle; None without one.
 
         It is None without a callback for all runs. The reported fraction never decreases.
         """

@@ -147,7 +147,7 @@ def compute_mean_worn_depth(patch, depth) -> float:
 
 
 def make_worn_model(model, patch, depth):
-    """Return the model with the grooves and the friction law of its mean worn depth.
+    """Return the model with the grooves and the friction law at the mean worn depth.
 
     It is unchanged if neither depends on wear.
 
@@ -310,7 +310,7 @@ def _most_worn_coating(model, depth) -> WornCoating:
 
 
 def _take_next_jump(model, problem: WearProblem, state: WearState) -> WearState:
-    """Compute the state after the next jump, which ends early if a coating is worn through.
+    """Compute the state after the next jump; the jump ends early if a coating is worn through.
 
     The cycle in which the coating is worn through is found by the Illinois variant of regula falsi.
     """
@@ -355,7 +355,7 @@ def _take_next_jump(model, problem: WearProblem, state: WearState) -> WearState:
 
 
 def find_cycle_of_next_table_row(wear, problem: WearProblem, state: WearState) -> float:
-    """Return the last cycle to which a jump may go because of the friction table.
+    """Return the last cycle that a jump may reach without skipping a row of the friction table.
 
     At this cycle, with the present wear rate, the mean worn depth reaches the next row of the
     table; or the row after it, if the next row is nearer than a tenth of their distance. A longer

@@ -141,7 +141,7 @@ class _SpringRow:
 
 
 def _spring_row_gap(patch, x) -> np.ndarray:
-    """Return the gap (m,) [m] of the row of springs, without tilt if the piece is free to rotate."""
+    """Return the gap (m,) [m] of the row of springs; tilt is left out if the piece can rotate."""
     try:
         gap = patch.gap.evaluate(x).heights
     except PatchfemError:  # The springs do not resolve the profile.

@@ -57,7 +57,7 @@ def choose_frame_count(tolerance: float) -> int:
 
 
 def slips_uniformly(model, per_point: bool = False) -> bool:
-    """Return whether all points of a patch, or all points of each of its strips, slip equally."""
+    """Return whether all points of a patch, or of each of its strips, slip by equal distances."""
     return (
         not model.partial_slip
         and model.side == "upper"
@@ -185,7 +185,7 @@ def _compute_rig_slip(model, patch, frames: int) -> CycleSlip:
 
 
 def _slip_amplitude_change(values: dict, cycle: _CycleHistories) -> float:
-    """Return the relative difference of the slip amplitudes of the last cycle and of the window.
+    """Return the relative difference between the slip amplitudes of the last cycle and the window.
 
     A mode that still beats causes this difference.
     """

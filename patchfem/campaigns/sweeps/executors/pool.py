@@ -113,7 +113,7 @@ class Pool:
         self.waiting_workers = []
 
     def begin(self, work: WorkerData, count: int, say: Callable | None = None) -> None:
-        """Start worker processes in advance, so that they import their code while meshes are chosen.
+        """Start worker processes early, so that they import their code while meshes are chosen.
 
         Parameters
         ----------
@@ -129,7 +129,7 @@ class Pool:
             self.waiting_workers.append(_start_worker(work, silent=say is None))
 
     def end(self) -> None:
-        """Kill the processes that still wait for the shared meshes."""
+        """Kill the worker processes that have not received the shared meshes yet."""
         while self.waiting_workers:
             self.waiting_workers.pop().kill()
 

@@ -119,7 +119,7 @@ def make_curve_point(drive, solution, guess=None) -> CurvePoint:
 
 
 def make_missing_curve_point(drive) -> CurvePoint:
-    """Return the curve point of a drive for which no steady motion was found."""
+    """Return the curve point of a drive at which no steady motion was found."""
     return CurvePoint(drive, {}, {}, "not found", np.nan, False, Outcome.NOT_CONVERGED)
 
 

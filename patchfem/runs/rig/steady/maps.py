@@ -59,7 +59,7 @@ class PeriodicMotion(NamedTuple):
 
     @property
     def regime_text(self) -> str:
-        """Regime as text, which names an unstable motion as such."""
+        """Regime of the motion as text, which says if the motion is unstable."""
         return self.regime if self.stable else f"{self.regime}, unstable"
 
     @property

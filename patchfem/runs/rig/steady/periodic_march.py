@@ -45,8 +45,8 @@ MULTIPLIER_TOL = 1e-2
 def march_out_of_grooves(model, numerics, patch, drive, contact) -> Solution | None:
     """Return the Solution of a motion that leaves its grooves; None if it stays in them.
 
-    A march from rest of N_CYCLES_IN_GROOVES cycles decides. The errors are the differences from a
-    march with half the steps.
+    This is decided by integrating N_CYCLES_IN_GROOVES cycles from rest. The errors are the
+    differences from an integration with half the steps.
 
     Parameters
     ----------
