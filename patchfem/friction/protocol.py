@@ -3,7 +3,7 @@
 A law under a pressure that changes along the path or in time has these methods. None of them changes the state that it
 is given. No traction remains without pressure, and at rest no traction exceeds mu sigma.
 
-- `start(sigma)`: state before any motion, under a pressure sigma (m,) [Pa]
+- `initial_state(sigma)`: state before any motion, under a pressure sigma (m,) [Pa]
 - `step(state, increment, s0, s1, dt)`: `Step` for an increment [m] in dt [s] under pressures from s0 to s1
 - `press(state, s0, s1)`: `Step` at rest while the pressure changes from s0 to s1
 - `traction(state)`, `stored_energy(state)`: traction [Pa] and elastic energy per area [J/m2] of a state
@@ -47,7 +47,7 @@ class LastTraction:
     __slots__ = ()
     can_change_load = True  # whether the load may change within a step
 
-    def start(self, sigma):
+    def initial_state(self, sigma):
         """Return the traction before any motion, which is 0."""
         return np.zeros_like(sigma)
 

@@ -35,8 +35,8 @@ class Iwan:
         k, s = today.iwan_elements(count)
         self.parts = [ElasticPlastic(float(a * b), float(b) * length) for a, b in zip(k, s)]
 
-    def start(self, sigma):
-        return [part.start(sigma) for part in self.parts]
+    def initial_state(self, sigma):
+        return [part.initial_state(sigma) for part in self.parts]
 
     def step(self, state, dq, s0, s1, dt) -> Step:
         return self._sum([part.step(one, dq, s0, s1, dt) for part, one in zip(self.parts, state)])

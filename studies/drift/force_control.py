@@ -84,7 +84,7 @@ def slides(
     length : float
         Scale of the search [m].
     """
-    state = engine.start(np.ones(1))
+    state = engine.initial_state(np.ones(1))
     load = 1.0
     force = 0.0
     slide = 0.0

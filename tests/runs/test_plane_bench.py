@@ -93,7 +93,7 @@ def test_exact_patch_on_plane_path_agrees_with_pointwise_law(write_path_scene, s
         [np.interp(time, corners, coordinates) for coordinates in corner_points], axis=1
     )
     law = FirstOrderBonds(Bonds(0.3, 2e-6))
-    state = law.start(flat, 2)
+    state = law.initial_state(flat, 2)
     tractions = [np.zeros((2, flat.size))]
     for increment, span in zip(np.diff(path, axis=0), np.diff(time)):
         state = law.step(state, increment, flat, flat, span).state

@@ -72,7 +72,7 @@ def test_exact_bouc_wen_of_exponent_one_is_dahl(ladder, today):
     path = np.random.default_rng(1).normal(0, 0.7, 200).cumsum()
     law = FirstOrderBonds(ladder.bonds())
     unit = np.ones(1)
-    state = law.start(unit)
+    state = law.initial_state(unit)
     force = [0.0]
     for dq in np.diff(path):
         state = law.step(state, dq * ladder.LENGTH, unit, unit, 1.0).state

@@ -55,7 +55,7 @@ def lower_pressure(x, wave, floor=0.0):
 def march_path(law, path, pressure, dt=1.0):
     """March `law` along the knots `path`; `pressure` maps a displacement to (m,) values; dt: scalar or per step."""
     times = np.broadcast_to(dt, len(path) - 1)
-    state = law.start(pressure(path[0]))
+    state = law.initial_state(pressure(path[0]))
     rows = []
     for k, dq in enumerate(np.diff(path)):
         step = law.step(state, float(dq), pressure(path[k]), pressure(path[k + 1]), float(times[k]))
@@ -74,7 +74,7 @@ class PathTractions(NamedTuple):
 def march_tractions(law, path, pressure, dt=1.0) -> PathTractions:
     """March like `march_path` without means and energies, which takes a tenth of the time for a sum over bonds."""
     times = np.broadcast_to(dt, len(path) - 1)
-    state = law.start(pressure(path[0]))
+    state = law.initial_state(pressure(path[0]))
     rows = []
     for k, dq in enumerate(np.diff(path)):
         arguments = state, float(dq), pressure(path[k]), pressure(path[k + 1]), float(times[k])

@@ -85,7 +85,7 @@ class Quadrature:
     law: Bonds
     tail: float = 1e-9
 
-    def start(self, sigma, directions: int = 1) -> Strips:
+    def initial_state(self, sigma, directions: int = 1) -> Strips:
         """Return unstretched, fully grown bonds of a given initial density.
 
         Parameters

@@ -271,7 +271,7 @@ class FirstOrderBonds:
 
     law: Bonds
 
-    def start(self, sigma, directions: int = 1) -> BondState:
+    def initial_state(self, sigma, directions: int = 1) -> BondState:
         """Return unstressed bonds of density m_0 under a pressure (m,) [Pa].
 
         PatchfemError is raised for a law that is not defined in two directions.

@@ -171,7 +171,7 @@ class Convolution:
     can_change_load: ClassVar[bool] = True  # the law has no stretch
     has_force_at_rest: ClassVar[bool] = True  # the traction persists while the interface rests
 
-    def start(self, sigma) -> ConvolutionState:
+    def initial_state(self, sigma) -> ConvolutionState:
         """Return the state before any motion: no traction, under a pressure sigma (m,) [Pa]."""
         return ConvolutionState(np.zeros_like(sigma), 0.0, 0.0)
 

@@ -29,7 +29,7 @@ class ElasticPlastic:
         stiffness = self.static * load / self.length
         return parallel_element([stiffness], [self.length])._replace(length=self.length)
 
-    def start(self, sigma):
+    def initial_state(self, sigma):
         """Return the initial state: traction/mu and density of springs, (2, m) [Pa].
 
         The springs are unstretched, of the density of the pressure sigma (m,) [Pa].

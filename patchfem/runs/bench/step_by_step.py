@@ -149,7 +149,10 @@ def _evaluate_law(
     size, n_directions = path.shape
     frames = set(task.frame_indices.tolist())
     sigma = points.pressure(0)
-    state = law.start(sigma) if n_directions == 1 else law.start(sigma, n_directions)
+    if n_directions == 1:
+        state = law.initial_state(sigma)
+    else:
+        state = law.initial_state(sigma, n_directions)
     force = np.zeros((size, n_directions))
     load = np.zeros(size)
     work = np.zeros(size)

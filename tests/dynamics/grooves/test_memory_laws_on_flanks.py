@@ -49,7 +49,7 @@ def solve_with_numpy_law(law, grooves, slide):
     """
     slope = grooves.slope
     normal = np.array([LOAD * np.hypot(1, slope(slide[0]))])
-    state = law.start(normal)
+    state = law.initial_state(normal)
     force = 0.0
     forces = []
     losses = []

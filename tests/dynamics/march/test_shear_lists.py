@@ -231,7 +231,7 @@ def test_order_points_under_moving_pressure_agree_with_numpy_law(reading, order)
     forces, energies, failed, contact = follow_path(model, path)
     numpy_law = Quadrature(law, 0.0)
     weight = LIMIT[0]
-    state = numpy_law.start(sigma)
+    state = numpy_law.initial_state(sigma)
     previous = sigma
     expected = [0.0]
     stored = [0.0]
@@ -287,7 +287,7 @@ def test_order_two_under_prescribed_load(order, grows):
         numpy_law = Quadrature(law, 0.0)
         loads = load(dt * np.arange(2 * steps + 1))
         assert response.extra["normal_load"] == pytest.approx(loads, abs=1e-9)
-        state = numpy_law.start(loads[:1])
+        state = numpy_law.initial_state(loads[:1])
         expected = [0.0]
         for k, dq in enumerate(np.diff(response.slide)):
             state = numpy_law.advance(state, dq, loads[k : k + 1], loads[k + 1 : k + 2], dt)

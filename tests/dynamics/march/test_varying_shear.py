@@ -71,7 +71,7 @@ def march_all_nodes(basis, drive, law, sets, response, steps: int) -> tuple:
     )
     z = v = 0.0
     u = np.zeros(sets.x.size)
-    state = law.start(loads[0])
+    state = law.initial_state(loads[0])
     slides = [0.0]
     forces = [0.0]
     bonds = isinstance(law, FirstOrderBonds)

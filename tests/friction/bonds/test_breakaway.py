@@ -120,7 +120,7 @@ def min_dissipation_on_random_paths(seed, points, count):
         )
     )
     sigma = rng.uniform(0, 2, points)
-    state = law.start(sigma)
+    state = law.initial_state(sigma)
     worst = 0.0
     for _ in range(count):
         after = rng.uniform(0, 2, points) * (rng.random(points) < 0.9)

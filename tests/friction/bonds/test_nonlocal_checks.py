@@ -61,7 +61,7 @@ def pad_traction(engine, depth, width, pressure_beyond=0.0, distance_beyond=0.0)
     """
     entries = np.unique(np.concatenate([[0.0], depth.max() - depth, [depth.max()]]))
     pressure = np.zeros_like(depth)
-    state = engine.start(pressure)
+    state = engine.initial_state(pressure)
     for a, b in pairwise(entries):
         pressure = (depth.max() - depth <= a + 1e-14).astype(float)
         for step in np.diff(np.linspace(a, b, max(2, int(np.ceil((b - a) / 0.5)) + 1))):

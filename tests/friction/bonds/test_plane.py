@@ -22,7 +22,7 @@ GROWING = Bonds(0.7, 1.0, 1.0, "stretch", 0.6, 2.0, 0.3, 1e-3, 0.8)
 
 def follow_polygon(law, path, sigma=UNIT_PRESSURE, dt=1.0, pressures=None):
     """Return the means (k, 2, m), tractions, dissipated (k, m) and stored energies, and the last state of a polygon path."""
-    state = law.start(sigma if pressures is None else pressures[0], 2)
+    state = law.initial_state(sigma if pressures is None else pressures[0], 2)
     rows = []
     for k, dq in enumerate(np.diff(path, axis=0)):
         s0, s1 = (sigma, sigma) if pressures is None else pressures[k : k + 2]
@@ -298,7 +298,7 @@ def test_exact_energies_are_independent_of_substeps(law):
 def test_refuses_breakaway_in_two_directions(law):
     """A law with breakaway is refused in two directions."""
     with pytest.raises(PatchfemError, match=r"breakaway in two directions is not supported yet"):
-        law(Bonds(1.0, 1.0, breakaway=0.1)).start(UNIT_PRESSURE, 2)
+        law(Bonds(1.0, 1.0, breakaway=0.1)).initial_state(UNIT_PRESSURE, 2)
 
 
 def test_exact_rest_changes_only_bond_length():

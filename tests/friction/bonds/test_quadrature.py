@@ -67,7 +67,7 @@ def test_exact_lost_contact_removes_older_bonds(reading):
     pressures[8, 1:] = 0.0
 
     engine = Quadrature(law, tail=0.0)
-    state = engine.start(pressures[0])
+    state = engine.initial_state(pressures[0])
     for k, dq in enumerate(np.diff(path)):
         state = engine.step(state, dq, pressures[k], pressures[k + 1], 1.0).state
     force_after = reference_traction(

@@ -172,7 +172,7 @@ def test_exact_zero_steps_do_not_change_state():
 def test_exact_load_change_at_rest_preserves_traction():
     """A change of pressure at rest keeps the traction; lost contact removes it and dissipates the stored energy."""
     law = FirstOrderBonds(Bonds(0.3, 1.0))
-    state = law.step(law.start(np.ones(1)), 0.5, np.ones(1), np.ones(1), 1.0).state
+    state = law.step(law.initial_state(np.ones(1)), 0.5, np.ones(1), np.ones(1), 1.0).state
     for s0, s1 in ((1.0, 3.0), (3.0, 0.2)):
         step = law.step(state, 0.0, np.array([s0]), np.array([s1]), 1.0)
         assert (

@@ -95,8 +95,10 @@ def test_exact_points_at_different_temperatures_are_independent(breakaway):
         )
         for t in temperatures
     ]
-    state = engine.start(sigma)
-    states = [point_step.start(sigma[i : i + 1]) for i, point_step in enumerate(separate_engines)]
+    state = engine.initial_state(sigma)
+    states = [
+        point_step.initial_state(sigma[i : i + 1]) for i, point_step in enumerate(separate_engines)
+    ]
     rng = np.random.default_rng(1)
     for dq in np.append(rng.normal(0, 1e-6, 60), [0.0, 2e-6]):
         new_sigma = sigma * rng.uniform(0.5, 1.5)

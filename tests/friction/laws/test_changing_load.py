@@ -26,8 +26,8 @@ def test_exact_sum_and_recursion_agree_under_varying_load():
         quadrature = Quadrature(law, 0.0)
         recursion = FirstOrderBonds(law)
         sigma = rng.uniform(0, 2, 4)
-        a = quadrature.start(sigma)
-        b = recursion.start(sigma)
+        a = quadrature.initial_state(sigma)
+        b = recursion.initial_state(sigma)
         for dq in np.diff(random_walk(2, 60, 0.8)):
             after = rng.uniform(0, 2, 4) * (rng.random(4) < 0.9)
             pressed = quadrature.press(a, sigma, after), recursion.press(b, sigma, after)
@@ -46,7 +46,7 @@ def test_exact_unloading_breaks_newest_bonds_first(order):
     """A falling load breaks the bonds that formed last, which carry the least, for orders other than one."""
     law = Quadrature(Bonds(1.0, 1.0, order, initial=0.0), 0.0)
     unit = np.ones(1)
-    state = law.start(np.ones(1))
+    state = law.initial_state(np.ones(1))
     for _ in range(10):
         state = law.step(state, 0.1, unit, unit, 1.0).state
     mass = 1 - np.exp(-1.0)
@@ -73,7 +73,7 @@ LAWS = [
 def test_exact_lift_off_erases_traction_and_memory(law):
     """A lift-off sets traction and stored energy to zero, and the law then follows a path as from its initial state."""
     unit = np.ones(1)
-    state = law.start(np.ones(1))
+    state = law.initial_state(np.ones(1))
     for dq in (0.7, 0.4, -0.2):
         state = law.step(state, dq, unit, unit, 1.0).state
     stored_energy = law.stored_energy(state)[0]
@@ -86,7 +86,7 @@ def test_exact_lift_off_erases_traction_and_memory(law):
     )
     assert lift_off.dissipated[0] == pytest.approx(stored_energy, abs=1e-15)
     state = law.press(lift_off.state, 0 * unit, unit).state
-    fresh_state = law.start(unit)
+    fresh_state = law.initial_state(unit)
     is_printed_law = isinstance(law, Quadrature) and law.law.reading == "report"
     for dq in (0.3, 0.3, -0.5):
         after_lift_off = law.step(state, dq, unit, unit, 1.0)
@@ -106,7 +106,7 @@ def test_exact_lift_off_erases_traction_and_memory(law):
 def test_exact_alternating_load_causes_no_drift(law, load_amplitude):
     """A load that alternates at rest leaves the traction at half the friction limit unchanged, so nothing slips."""
     unit = np.ones(1)
-    state = law.start(np.ones(1))
+    state = law.initial_state(np.ones(1))
     for _ in range(400):  # small steps up to half the friction limit
         after = law.step(state, 0.01, unit, unit, 0.01)
         if law.traction(after.state)[0] > 0.15:

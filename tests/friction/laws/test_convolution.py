@@ -111,7 +111,7 @@ def test_exact_long_sliding_reaches_averaged_law(law, order, direction):
     )
     averaged = Convolution(0.4, 1.0, order, nodes, sigma)
     end_state = averaged.step(
-        averaged.start(sigma), direction * 20.0, sigma, pressure(direction * 20.0), 1.0
+        averaged.initial_state(sigma), direction * 20.0, sigma, pressure(direction * 20.0), 1.0
     ).state
     assert (np.diff((sigma > 0).astype(int)) != 0).sum() >= 2
     assert (4 * fine - coarse) / 3 == pytest.approx(averaged.traction(end_state), abs=2e-6)
@@ -149,7 +149,7 @@ def test_exact_traction_persists_at_rest():
     """The traction persists at rest, and a falling pressure reduces it to the friction limit without dissipation."""
     law = Convolution(0.3, 1.0)
     unit = np.ones(1)
-    state = law.step(law.start(unit), -0.1, unit, unit, 1.0).state
+    state = law.step(law.initial_state(unit), -0.1, unit, unit, 1.0).state
     rest = law.step(state, 0.0, unit, unit, 5.0)
     assert rest.mean[0] == -0.3 and law.traction(rest.state)[0] == -0.3 and rest.dissipated[0] == 0
     for pressure, expected in ((2.0, -0.3), (0.5, -0.15), (0.0, 0.0)):

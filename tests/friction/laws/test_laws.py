@@ -33,7 +33,7 @@ def test_exact_elastic_plastic_loop_agrees_with_closed_form(amplitude, length, p
 def test_always_elastic_plastic_energy_balance_closes(rows, length):
     """The energy balance of an elastic-plastic point closes under varying pressure, and no dissipation is negative."""
     law = ElasticPlastic(0.4, length)
-    state = law.start(np.array([rows[0][1]]))
+    state = law.initial_state(np.array([rows[0][1]]))
     work = 0.0
     total_work = 0.0
     dissipated = 0.0
@@ -55,7 +55,7 @@ def test_exact_falling_pressure_dissipates_stored_energy():
     """Halving the pressure at rest limits the traction to 0.5 and dissipates the difference of the stored energy."""
     law = ElasticPlastic(1.0, 1.0)
     unit = np.ones(1)
-    state = law.step(law.start(unit), 0.8, unit, unit, 1.0).state
+    state = law.step(law.initial_state(unit), 0.8, unit, unit, 1.0).state
     for step in (law.step(state, 0.0, unit / 2, unit / 2, 1.0), law.press(state, unit, unit / 2)):
         assert law.traction(step.state)[0] == pytest.approx(0.5)
         assert step.dissipated[0] == pytest.approx(0.32 - 0.125) and law.stored_energy(step.state)[
@@ -69,7 +69,7 @@ def test_exact_rising_pressure_adds_unstressed_springs():
     """A rising pressure adds unstressed springs at unchanged traction; slip after unloading breaks the excess springs."""
     law = ElasticPlastic(1.0, 1.0)
     unit = np.ones(1)
-    state = law.step(law.start(unit), 0.8, unit, unit, 1.0).state
+    state = law.step(law.initial_state(unit), 0.8, unit, unit, 1.0).state
     state = law.press(state, unit, 2 * unit).state
     assert law.traction(state)[0] == 0.8 and law.stored_energy(state)[0] == pytest.approx(
         0.8**2 / 4
@@ -89,7 +89,7 @@ def test_exact_rising_pressure_adds_unstressed_springs():
 def test_exact_traction_follows_only_falling_pressure(law, expected):
     """The traction of Coulomb and tanh laws follows a falling pressure and is unchanged by a rising pressure."""
     unit = np.ones(1)
-    state = law.step(law.start(unit), 50.0, unit, unit, 1.0).state
+    state = law.step(law.initial_state(unit), 50.0, unit, unit, 1.0).state
     assert law.press(state, unit, 2 * unit).mean[0] == pytest.approx(expected)
     assert law.press(state, unit, unit / 3).mean[0] == pytest.approx(expected / 3)
     assert law.traction(law.press(state, unit, 0 * unit).state)[0] == 0
@@ -99,7 +99,7 @@ def test_exact_traction_follows_only_falling_pressure(law, expected):
 def test_always_coulomb_dissipates_all_work(rows):
     """Coulomb's law dissipates all of its work and stores no energy."""
     law = Coulomb(0.3)
-    state = law.start(np.array([rows[0][1]]))
+    state = law.initial_state(np.array([rows[0][1]]))
     for dq, s0, s1 in rows:
         step = law.step(state, dq, np.array([s0]), np.array([s1]), 1.0)
         state = step.state
@@ -113,7 +113,7 @@ def test_always_coulomb_dissipates_all_work(rows):
 @pytest.mark.parametrize("law", [Coulomb(0.3), ElasticPlastic(0.3, 1.0)])
 def test_exact_step_does_not_modify_input_state(law):
     """A step does not modify the state that it starts from, and a huge step gives finite tractions."""
-    state = law.start(np.ones(2))
+    state = law.initial_state(np.ones(2))
     before = np.array(state)
     law.step(state, 0.7, np.ones(2), np.ones(2), 1.0)
     assert np.array_equal(before, np.array(state))

@@ -81,7 +81,7 @@ def test_always_jump_and_rest_give_defined_traction():
     """A displacement in zero time gives the friction limit, and rest gives zero traction."""
     law = TanhLaw(0.3, 1e-3)
     sigma = np.array([2.0, 5.0])
-    jump = law.step(law.start(sigma), -1e-6, sigma, sigma, 0.0)
+    jump = law.step(law.initial_state(sigma), -1e-6, sigma, sigma, 0.0)
     assert jump.mean == pytest.approx(-0.3 * sigma) and jump.dissipated.min() > 0
     assert law.step(jump.state, 0.0, sigma, sigma, 1e-3).mean == pytest.approx(0.0 * sigma)
 
