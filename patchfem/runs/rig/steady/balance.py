@@ -210,7 +210,7 @@ class BalanceFinder:
             finer = refine_steady_motion(motion, self.modes, drive)
         except NotConverged:
             return errors
-        residual = max(motion.left, finer.left)
+        residual = max(motion.remaining_change, finer.remaining_change)
         finer_values = compute_measures(finer, drive) if np.isfinite(finer.error) else {}
         for name, error in finer_errors(values, finer_values).items():
             errors[name] = error + abs(values[name]) * residual
