@@ -52,7 +52,7 @@ def _harmonic(amplitude: float, steps: int = STEPS, path: float = 20.0) -> np.nd
 def last_cycle(model, amplitude: float, steps: int = STEPS) -> Cycle:
     """Return the last cycle of a law whose lengths are in metres and whose friction limit is 1."""
     path = LENGTH * _harmonic(amplitude, steps)
-    contact = model.build()
+    contact = model.allocate_contact()
     forces = np.zeros((path.size, 3))
     energies = np.zeros((path.size, 2))
     if loop_kernels.follow_path(
@@ -97,7 +97,7 @@ def printed_law_cycle(amplitude: float, order: float, steps: int, **growth) -> C
         Growth of the bond length.
     """
     law = bonds(order=order, reading="report", **growth)
-    c = bond_list_model(law, 1.0, cutoff_age(order, 1e-5), 0.01).build()
+    c = bond_list_model(law, 1.0, cutoff_age(order, 1e-5), 0.01).allocate_contact()
     path = LENGTH * _harmonic(amplitude, steps)
     dt = 1 / (HERTZ * steps)
     force = []

@@ -39,7 +39,7 @@ def follow_path(model, path, dt=0.3):
     contact.
     """
     loops = load_instances()
-    contact = model.build()
+    contact = model.allocate_contact()
     energies = np.zeros((path.size, 2))
     forces = np.zeros((path.size, 3))
     n_unconverged = loops.follow_path(

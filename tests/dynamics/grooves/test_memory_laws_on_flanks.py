@@ -88,7 +88,7 @@ def test_exact_slow_slide_agrees_with_numpy_law(law):
     model = ClimbingModel(grooves, LOAD, LAWS[law][0](2e-6))
     forces = np.zeros((101, 3))
     energies = np.zeros((101, 2))
-    contact = model.build()
+    contact = model.allocate_contact()
     assert follow_path(slide, 1e-3, model.kind, contact, 1e-9, energies, forces) == 0
     expected_force, expected_loss = solve_with_numpy_law(LAWS[law][1](2e-6), grooves, slide)
     np.testing.assert_allclose(forces[:-1, 1], expected_force, rtol=1e-9, atol=1e-9 * LOAD)

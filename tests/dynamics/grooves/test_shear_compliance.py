@@ -35,7 +35,7 @@ def follow_slide(model, slide):
     """Return the forces (k, 3) and energies (k, 2) of a model along a prescribed slide."""
     forces = np.zeros((slide.size, 3))
     energies = np.zeros((slide.size, 2))
-    contact = model.build()
+    contact = model.allocate_contact()
     assert follow_path(slide, 1e-3, model.kind, contact, 1e-9, energies, forces) == 0
     return forces, energies
 
