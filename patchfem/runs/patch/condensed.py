@@ -84,7 +84,7 @@ def assemble_piece(body, layers: Layers):
     return substructure.Substructure(body, layers)
 
 
-def compute_piece_compliance(body, piece, ignore_cache: bool) -> InterfaceCompliance:
+def condense_piece(body, piece, ignore_cache: bool) -> InterfaceCompliance:
     """Compute the interface compliance of a piece, or read it from the disk cache.
 
     It has the normal, tangential and coupling parts nn, tt and nt.
@@ -136,11 +136,9 @@ def condense(patch_model, grid, upper_grid=None, ignore_cache: bool = False) -> 
         upper = assemble_piece(
             upper_grid, make_elastic_layers(patch_model, patch_model.pieces.upper)
         )
-    lower_compliance = compute_piece_compliance(grid, piece, ignore_cache)
+    lower_compliance = condense_piece(grid, piece, ignore_cache)
     upper_compliance = (
-        lower_compliance
-        if upper is piece
-        else compute_piece_compliance(upper_grid, upper, ignore_cache)
+        lower_compliance if upper is piece else condense_piece(upper_grid, upper, ignore_cache)
     )
     joint = None
     x = grid.x

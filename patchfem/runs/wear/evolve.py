@@ -465,7 +465,7 @@ def _replay_wear(patch_model, model, patch, other_patch, moments) -> tuple:
     """
     area = nodal_areas(patch_model, other_patch.pieces.interface)
 
-    def interpolate_slip_path(path) -> np.ndarray:
+    def interpolate_path(path) -> np.ndarray:
         """Interpolate a slip path to the nodes and strips of the other patch."""
         if patch_model.interface.strips is None:
             return np.interp(other_patch.x, patch.x, path)
@@ -476,7 +476,7 @@ def _replay_wear(patch_model, model, patch, other_patch, moments) -> tuple:
         return np.array([np.interp(offsets, row_offsets, column) for column in rows.T]).T
 
     jumps = [
-        (after.cycle - before.cycle, interpolate_slip_path(after.used))
+        (after.cycle - before.cycle, interpolate_path(after.used))
         for before, after in pairwise(moments)
     ]
     depth = replay_jumps(
