@@ -168,7 +168,7 @@ def draw_film(series: Series, film) -> Figure:
         axis.set_title(
             f"frame {number + 1} of {len(frames)}: upper piece at {slides[number] * MM:.1f} um"
         )
-    axes[-1].set_xlabel(f"x [mm]  (displacement magnified {film.aside:g} times)")
+    axes[-1].set_xlabel(f"x [mm]  (displacement magnified {film.slide_factor:g} times)")
     return figure
 
 
