@@ -197,9 +197,9 @@ def condense(stencil, is_mirrored: bool) -> CondensedGrid:
                 half = half.copy()
                 half[0, :, 1] /= 2  # the middle column belongs to both halves
             inside = eliminate_inner_nodes(half, keep_left=True)
-            kept_factors = tuple(
-                _factorise_motion(stencil, inside, is_odd=odd) for odd in (False, True)
-            )
+            even_factor = _factorise_motion(stencil, inside, is_odd=False)
+            odd_factor = _factorise_motion(stencil, inside, is_odd=True)
+            kept_factors = (even_factor, odd_factor)
         else:
             inside = eliminate_inner_nodes(stencil)
             kept_factors = (_factorise(inside.schur, np.arange(2 * columns), 2 * columns),)
