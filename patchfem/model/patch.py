@@ -75,6 +75,11 @@ class PatchPieces:
     plane: str
 
     @property
+    def both(self) -> tuple:
+        """The lower and the upper piece."""
+        return self.lower, self.upper
+
+    @property
     def are_alike(self) -> bool:
         """Whether the pieces have the same height, materials, length and ends."""
         return self.lower == self.upper
@@ -84,6 +89,12 @@ class PatchPieces:
         """Whether a piece is longer than the interface."""
         limit = self.length * (1 + LENGTH_TOL)
         return self.lower.length > limit or self.upper.length > limit
+
+    @property
+    def surface_modulus(self) -> float:
+        """Combined modulus E* [Pa] of the two surfaces, 1/E* = sum of (1 - nu^2)/E."""
+        faces = [piece.face_material for piece in self.both]
+        return 1 / sum((1 - face.poisson**2) / face.young for face in faces)
 
     @property
     def shear_stiffness(self) -> float:
@@ -104,7 +115,7 @@ class PatchPieces:
             Function of a material that returns strain per stress [1/Pa].
         """
         total = 0.0
-        for piece in (self.lower, self.upper):
+        for piece in self.both:
             total += (piece.height - piece.thickness) * softness(piece.substrate)
             if piece.coating:
                 total += piece.thickness * softness(piece.coating.material)
@@ -246,9 +257,7 @@ class PatchModel:
         mesh file are not examined.
         """
         half_length = self.pieces.length / 2
-        corners = {
-            piece.corner_kind(half_length) for piece in (self.pieces.lower, self.pieces.upper)
-        }
+        corners = {piece.corner_kind(half_length) for piece in self.pieces.both}
         return self.mesh.file is None and "radius" not in corners and corners != {"sharp"}
 
     @property

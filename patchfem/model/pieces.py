@@ -69,15 +69,14 @@ def find_rounded_edges(patch: PatchModel) -> RoundedEdges:
     The contact is that of a rounded punch on a half plane under the nominal load without tilt
     (`closed_forms.contact`); the faces are as stiff as their coatings.
     """
-    pieces = (patch.pieces.lower, patch.pieces.upper)
+    pieces = patch.pieces.both
     half_length = patch.pieces.length / 2
     radii = [piece.end.size for piece in pieces if piece.corner_kind(half_length) == "radius"]
     load = patch.nominal_load / (patch.pieces.width * patch.pieces.pairs)
     if not radii or not load > 0:
         return RoundedEdges()
     flat = min(piece.length / 2 - piece.end.size for piece in pieces)
-    faces = [piece.face_material for piece in pieces]
-    modulus = 1 / sum((1 - face.poisson**2) / face.young for face in faces)
+    modulus = patch.pieces.surface_modulus
     radius = 1 / sum(1 / radius for radius in radii)
     half_width = contact.rounded_punch_half_width(load, flat, radius, modulus)
     half_width = min(half_width, half_length)

@@ -196,17 +196,11 @@ def compute_slip_measures(
     slide_steps = path_increments(window.slide[last_cycles], lateral_slide)
     time = window.time[last_cycles]
     is_at_rest = slide_steps <= COORDINATE_ROUND_OFF * np.abs(window.slide).max(initial=0.0)
-    excess = (
-        np.where(is_at_rest, 0.0, slip_steps / np.where(is_at_rest, 1.0, slide_steps))
-        - SLIP_FRACTION
-    )
+    excess = compute_slip_excess(slip_steps, slide_steps, is_at_rest)
     before = excess[:-1]
     after = excess[1:]
     rise = np.abs(after - before)
-    # Fraction of the time between two midpoints in which the interpolated excess is negative.
-    low = np.minimum(before, after)
-    high = np.maximum(before, after)
-    below = np.where(high < 0, 1.0, np.where(low >= 0, 0.0, -low / np.where(rise > 0, rise, 1.0)))
+    below = compute_negative_fraction(before, after)
     middles = (time[1:] + time[:-1]) / 2
     measures["stick_fraction"] = (
         float(np.average(below, weights=np.diff(middles))) if below.size else float(excess[0] < 0)
@@ -216,6 +210,30 @@ def compute_slip_measures(
         onset_times = middles[onsets] - before[onsets] / rise[onsets] * np.diff(middles)[onsets]
         measures |= slip_start_measure(2 * np.pi / drive.period * onset_times)
     return measures
+
+
+def compute_slip_excess(slip_steps, slide_steps, is_at_rest) -> np.ndarray:
+    """Return by how much slip/displacement of each step (k, ...) exceeds SLIP_FRACTION.
+
+    A step at rest counts as a step without slip.
+
+    Parameters
+    ----------
+    slip_steps, slide_steps : (k, ...)
+        Absolute increments of slip and of relative displacement [m].
+    is_at_rest : (k, ...)
+        Mask of the steps without motion.
+    """
+    ratio = slip_steps / np.where(is_at_rest, 1.0, slide_steps)
+    return np.where(is_at_rest, 0.0, ratio) - SLIP_FRACTION
+
+
+def compute_negative_fraction(before, after) -> np.ndarray:
+    """Return the fraction of each interval in which values interpolated linearly are negative."""
+    rise = np.abs(after - before)
+    low = np.minimum(before, after)
+    high = np.maximum(before, after)
+    return np.where(high < 0, 1.0, np.where(low >= 0, 0.0, -low / np.where(rise > 0, rise, 1.0)))
 
 
 def slip_round_off(window: Response) -> float:

@@ -161,10 +161,8 @@ def _select_named_measures(context: AccuracyContext, excess: dict) -> list[str]:
     known = context.measures
     main = [name for name in MAIN_MEASURES if name in excess]
     main = [name for name in main if known[name].error < abs(known[name].value)]
-    others = {
-        name: times for name, times in excess.items() if not name.startswith(RINGING_PREFIX)
-    } or excess
-    return main or [max(others, key=others.get)]
+    others = [name for name in excess if not name.startswith(RINGING_PREFIX)] or excess
+    return main or [max(others, key=excess.get)]
 
 
 def _format_warning(context: AccuracyContext, excess: dict, advice: str) -> str:
@@ -220,9 +218,8 @@ def _advise_strips(patch_model, excess: dict) -> str:
     The pressure peak of the outermost strip is computed at its centre, so that its error is of
     first order in the width of the strip. The errors of all other measures are of second order.
     """
-    ratio = max(
-        times if name in FIRST_ORDER_MEASURES else times**0.5 for name, times in excess.items()
-    )
+    orders = [1 if name in FIRST_ORDER_MEASURES else 2 for name in excess]
+    ratio = max(times ** (1 / order) for times, order in zip(excess.values(), orders))
     count = ceil(patch_model.interface.strips.count * ratio)
     if count > MAX_STRIPS:
         return NO_ADVICE
@@ -307,19 +304,14 @@ def _advise_on_motion(context: AccuracyContext, excess: dict, coarse) -> str:
     if cause == "mesh" and context.patch is not None:
         return _advise_mesh(model, [(context, coarse)])
     if cause == "mesh":
-        partial_slip_faces = [
-            face for face in faces.solve_interface_patches(model) if face.partial_slip
-        ]
-        return _advise_mesh(
-            model,
-            [
-                (_select_interface_measures(context, face), face.patches[1:])
-                for face in partial_slip_faces
-            ],
-        )
-    if (
-        cause == "reduced"
-    ):  # The error falls with the square of the number of modes of a reduced structure.
+        solutions = []
+        for face in faces.solve_interface_patches(model):
+            if face.partial_slip:
+                face_context = _select_interface_measures(context, face)
+                solutions.append((face_context, face.patches[1:]))
+        return _advise_mesh(model, solutions)
+    # The error falls with the square of the number of modes of a reduced structure.
+    if cause == "reduced":
         ratio = min(max(2.0, excess[name] ** 0.5), 16.0)
         n_modes = ceil(model.rig.modes.omega.size * ratio)
         return f"set structure.reduced.modes = {min(n_modes, model.rig.structure.max_modes)}"

@@ -190,18 +190,16 @@ def _make_plan(model: Model) -> Plan:
             raise
     chain = {"holder": "rigid", "pieces_shear": "rigid", "asperities": "rigid"}
     groups = {}
-    if model.rig is not None and model.rig.structure.without_joint is not None:
-        model = replace(
-            model,
-            rig=of_rig.remove_expected_joint(
-                model.rig, patch_plan.stiffness_chain(model.patch) | _interface_stiffnesses(model)
-            ),
-        )
+    rig = model.rig
+    if rig is not None and rig.structure.without_joint is not None:
+        stiffnesses = patch_plan.stiffness_chain(model.patch) | _interface_stiffnesses(model)
+        rig = of_rig.remove_expected_joint(rig, stiffnesses)
+        model = replace(model, rig=rig)
     motion_sentences = []
     patch_sentences = []
     law_sentences = []
-    if model.rig is not None:
-        chain = of_rig.structure_stiffnesses(model.rig) | chain
+    if rig is not None:
+        chain = of_rig.structure_stiffnesses(rig) | chain
         groups |= of_rig.compute_dimensionless_groups(model) if model.kind == "rig" else {}
         motion_sentences += engines.describe_unused_settings(
             model, engines.choose_engine(model).name
@@ -210,14 +208,14 @@ def _make_plan(model: Model) -> Plan:
         chain |= patch_plan.stiffness_chain(model.patch)
         groups |= patch_plan.compute_patch_groups(model)
         patch_sentences += patch_plan.describe_patch_plan(groups, model.patch)
-    interfaces = model.rig.friction.interfaces if model.rig is not None else ()
+    interfaces = rig.friction.interfaces if rig is not None else ()
     for number, interface in enumerate(interfaces):
         if interface.patch is not None:
             for name, link in patch_plan.stiffness_chain(interface.patch).items():
                 if link != "rigid":
                     chain[rows.add_interface_number(name, number)] = link
             patch_sentences += patch_plan.describe_interface_patch(
-                model.rig.friction.names[number], interface
+                rig.friction.names[number], interface
             )
     cost = _predict_cost(model)
     law_sentences += cost.words
@@ -227,12 +225,12 @@ def _make_plan(model: Model) -> Plan:
         chain |= _interface_stiffnesses(model)
         groups |= _compute_law_groups(model)
         law_sentences += _describe_grooves(model)
-    if model.rig is not None:
-        motion_sentences += of_rig.describe_stick(model.rig, groups, chain)
+    if rig is not None:
+        motion_sentences += of_rig.describe_stick(rig, groups, chain)
     if (
         cost.engine in SKIPPING_ENGINES
-        and drive_sizes.is_sinusoidal(model.rig.drive.signal)
-        and model.rig.drive.cycles >= MIN_SKIPPED_CYCLES
+        and drive_sizes.is_sinusoidal(rig.drive.signal)
+        and rig.drive.cycles >= MIN_SKIPPED_CYCLES
     ):
         law_sentences.append(UPPER_LIMIT_NOTE)
     forecast = forecast_tolerance(model)

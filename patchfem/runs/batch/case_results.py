@@ -5,7 +5,7 @@ In: measures, outcomes and messages of cases. Out: `CaseResults`, whose columns 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from math import prod
 from pathlib import Path
@@ -17,6 +17,7 @@ import numpy as np
 from ...core import Measure
 from ...inputs import measured
 from ...model.model import Model
+from ...model.similar_models import select_models
 
 # Smallest number of cases whose columns may be stored on disk: a measure takes 25 kB per 1000 cases.
 MIN_CASES_ON_DISK = 50_000
@@ -226,11 +227,29 @@ class CaseResults:
         return not np.isnan(self.values[name][case]) or case in self.reasons.get(name, ())
 
 
-def _renumber(values_by_case: dict, new_indices: dict) -> dict:
-    """Return a dict by case with new case indices, without the cases that have none."""
-    return {
-        new_indices[case]: value for case, value in values_by_case.items() if case in new_indices
-    }
+def _renumber(texts: dict, new_indices: dict) -> dict:
+    """Return texts by case with new case indices, without the cases that have none."""
+    return {new_indices[case]: text for case, text in texts.items() if case in new_indices}
+
+
+def solve_in_parts(
+    models: Sequence[Model], cases_per_call: int, solve: Callable[[Sequence[Model]], CaseResults]
+) -> CaseResults:
+    """Compute the case results of models in successive calls of `solve`.
+
+    Parameters
+    ----------
+    models : sequence of Model
+    cases_per_call : int
+        Largest number of models per call.
+    solve : callable
+        Function that returns the CaseResults of some of the models.
+    """
+    results = CaseResults.blank(len(models))
+    for first in range(0, len(models), cases_per_call):
+        cases = range(first, min(first + cases_per_call, len(models)))
+        results.insert(cases, solve(select_models(models, cases)))
+    return results
 
 
 def join_case_results(

@@ -141,9 +141,8 @@ def reason_not_in_lanes(model: Model) -> str:
 
 def solve(models: Sequence[Model], report=None) -> CaseResults:
     """Compute the case results of a group of elastic patches with bonds."""
-    reducible_models = [
-        replace(model, patch=model.patch.with_mesh(can_gather_points=True)) for model in models
-    ]
+    patches = [model.patch.with_mesh(can_gather_points=True) for model in models]
+    reducible_models = [replace(model, patch=patch) for model, patch in zip(models, patches)]
     batch = solved_patches.PatchBatch(
         MARCH.name, _reduce_patch, _compute_motions, MAX_CASES_PER_CALL
     )

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import replace
+from functools import partial
 from time import perf_counter
 from typing import NamedTuple
 
@@ -24,7 +25,7 @@ from ..patch.sweep_meshes import geometry_key
 from ..results.patch_rows import POSITIVE_MESH_MEASURES, TABLE
 from ..results.result import make_file_name_shortener, shorten_file_names
 from . import one_by_one
-from .case_results import CaseResults
+from .case_results import CaseResults, solve_in_parts
 
 # Largest number of cases whose nodal forces are held in memory at the same time.
 MAX_CASES_PER_CALL = 2048
@@ -109,11 +110,7 @@ def solve_patches_then_motions(
 
 def solve(models: Sequence[Model], report: Callable | None = None) -> CaseResults:
     """Compute the case results of a group of static patches."""
-    results = CaseResults.blank(len(models))
-    for start in range(0, len(models), MAX_CASES_PER_CALL):
-        cases = range(start, min(start + MAX_CASES_PER_CALL, len(models)))
-        results.insert(cases, _solve_cases(select_models(models, cases), report))
-    return results
+    return solve_in_parts(models, MAX_CASES_PER_CALL, partial(_solve_cases, report=report))
 
 
 def _solve_cases(models: Sequence[Model], report: Callable | None) -> CaseResults:
@@ -136,10 +133,8 @@ def _solve_cases(models: Sequence[Model], report: Callable | None) -> CaseResult
     is_unresolved = np.any(
         [estimate.error >= estimate.value for estimate in decisive_estimates], axis=0
     )
-    floors = {
-        name: np.broadcast_to(least, is_solved.shape)
-        for name, least in of_patch.measure_floors(first.patch, tolerance, values_by_name).items()
-    }
+    floors = of_patch.measure_floors(first.patch, tolerance, values_by_name)
+    floors = {name: np.broadcast_to(floor, is_solved.shape) for name, floor in floors.items()}
     for name, estimate in solution.estimates.items():
         results.add_measure(name, TABLE[name].unit)
         for columns, column in (

@@ -15,7 +15,8 @@ from ...response.measures import (
     COORDINATE_ROUND_OFF,
     MAX_SMOOTH_RATIO,
     MIN_SLIDE_RANGE,
-    SLIP_FRACTION,
+    compute_negative_fraction,
+    compute_slip_excess,
     relative_gap,
 )
 from ...response.spectrum import GAUSS_POINTS, GAUSS_WEIGHTS, distortion_ratio
@@ -51,9 +52,8 @@ class Samples:
         self.period = 2 * np.pi / omega
         self.dt = self.period / steps
         self.angle = 2 * np.pi * np.arange(steps * window + 1) / steps
-        self.slide, self.speed = (
-            _project_motion(modes.slide, modal_motion) for modal_motion in (motion.z, motion.rate)
-        )
+        self.slide = _project_motion(modes.slide, motion.z)
+        self.speed = _project_motion(modes.slide, motion.rate)
         self.span = window * self.period
 
     def acceleration(self) -> np.ndarray:
@@ -82,7 +82,7 @@ class Samples:
         load : (n,)
             Normal load [N].
         """
-        fundamental, third_harmonic = (self.modal_harmonic(number) for number in (1, 3))
+        fundamental = self.modal_harmonic(1)
         measures = {
             "absolute_acceleration_peak": find_interpolated_peaks(np.abs(self.acceleration()))[0],
             "friction_force_peak": np.abs(self.motion.force).max(axis=0),
@@ -98,16 +98,13 @@ class Samples:
                 energy=energies["power"] + energies["peak_stored"],
             ),
         }
-        acceleration_harmonics = [
-            np.abs(
-                self.acceleration_harmonic(self.modes.output, coefficients, number)
-                - (1j * self.amplitude if number == 1 else 0.0)
-            )
-            for number, coefficients in ((1, fundamental), (3, third_harmonic))
-        ]
+        output = self.modes.output
+        relative_acceleration = self.acceleration_harmonic(output, fundamental, 1)
+        first_harmonic = np.abs(relative_acceleration - 1j * self.amplitude)
+        third_harmonic = np.abs(self.acceleration_harmonic(output, self.modal_harmonic(3), 3))
         measures |= {
-            "absolute_acceleration_fundamental": acceleration_harmonics[0],
-            "acceleration_distortion": distortion_ratio(*acceleration_harmonics, 0.0),
+            "absolute_acceleration_fundamental": first_harmonic,
+            "acceleration_distortion": distortion_ratio(first_harmonic, third_harmonic, 0.0),
         }
         return measures | self.slip_measures() | self.loop_measures(fundamental, stiffness)
 
@@ -130,16 +127,11 @@ class Samples:
         rate_weights = np.append(left_slope * phase_factor, 0.0) + np.append(
             0.0, right_slope * phase_factor
         )
-        shape = motion.z.shape[1:]
-        flat_motions = [part.reshape(len(value_weights), -1) for part in (motion.z, motion.rate)]
-        return (
-            2
-            / self.span
-            * sum(
-                weight.real @ samples + 1j * (weight.imag @ samples)
-                for weight, samples in zip((value_weights, rate_weights), flat_motions)
-            ).reshape(shape)
-        )
+        integral = 0
+        for weight, part in ((value_weights, motion.z), (rate_weights, motion.rate)):
+            samples = part.reshape(len(weight), -1)
+            integral = integral + (weight.real @ samples + 1j * (weight.imag @ samples))
+        return 2 / self.span * integral.reshape(motion.z.shape[1:])
 
     def net_changes(self) -> tuple:
         """Return the changes of modal coordinates and rates (m, n) over the window."""
@@ -175,12 +167,11 @@ class Samples:
         """
         modes = self.modes
         rates = 2 / self.span * self.net_changes()[0] + 1j * self.omega * fundamental
-        inertia_residual = np.array(
-            [
-                -base * (-1j * self.amplitude) - self.acceleration_harmonic(unit, fundamental, 1)
-                for base, unit in zip(modes.base, np.eye(len(modes.base)))
-            ]
-        )
+        inertia_residuals = []
+        for base, unit in zip(modes.base, np.eye(len(modes.base))):
+            acceleration = self.acceleration_harmonic(unit, fundamental, 1)
+            inertia_residuals.append(-base * (-1j * self.amplitude) - acceleration)
+        inertia_residual = np.array(inertia_residuals)
         inertia_residual -= (2 * modes.zeta * modes.omega)[:, None] * rates + (modes.omega**2)[
             :, None
         ] * fundamental
@@ -220,19 +211,9 @@ class Samples:
                     direction * slide, direction * speed, force, rows, self.dt
                 ) * np.array([[direction], [1]])
         time = self.angle / self.omega
-        reversals = [
-            [
-                tuple(
-                    SimpleNamespace(slide=extremes[k, 0, c, run], force=extremes[k, 1, c, run])
-                    for k in range(2)
-                )
-                for c in range(self.window)
-            ]
-            for run in range(n_runs)
-        ]
-        for run in np.flatnonzero(
-            np.isnan(extremes[:, 1]).any(axis=(0, 1))
-        ):  # a run with a reversal at the end of a cycle is evaluated separately
+        reversals = _list_reversals(extremes)
+        # A run with a reversal at the end of a cycle is evaluated separately.
+        for run in np.flatnonzero(np.isnan(extremes[:, 1]).any(axis=(0, 1))):
             reversals[run] = find_reversals(
                 time,
                 self.slide[:, run],
@@ -258,29 +239,17 @@ class Samples:
         slip = self.motion.slip
         steps = np.abs(np.diff(self.slide, axis=0))
         is_at_rest = steps <= COORDINATE_ROUND_OFF * np.abs(self.slide).max(axis=0)
-        excess = (
-            np.where(
-                is_at_rest, 0.0, np.abs(np.diff(slip, axis=0)) / np.where(is_at_rest, 1.0, steps)
-            )
-            - SLIP_FRACTION
-        )
+        excess = compute_slip_excess(np.abs(np.diff(slip, axis=0)), steps, is_at_rest)
         before = excess[:-1]
         after = excess[1:]
-        rise = np.abs(after - before)
-        low = np.minimum(before, after)
-        high = np.maximum(before, after)
-        below = np.where(
-            high < 0, 1.0, np.where(low >= 0, 0.0, -low / np.where(rise > 0, rise, 1.0))
-        )
         step, run = np.nonzero((before < 0) & (after >= 0))
-        phase = self.angle[step] + 2 * np.pi / self.steps * (
-            0.5 - before[step, run] / rise[step, run]
-        )
+        rise = np.abs(after - before)[step, run]
+        phase = self.angle[step] + 2 * np.pi / self.steps * (0.5 - before[step, run] / rise)
         count = np.bincount(run, minlength=slip.shape[1])
         sums = [np.bincount(run, trig(2 * phase), slip.shape[1]) for trig in (np.cos, np.sin)]
         return {
             "slip_amplitude": np.ptp(slip, axis=0) / 2,
-            "stick_fraction": below.mean(axis=0),
+            "stick_fraction": compute_negative_fraction(before, after).mean(axis=0),
             "slip_start_phase": mean_slip_phase(count, *sums),
         }
 
@@ -325,6 +294,18 @@ def _project_motion(row, motion) -> np.ndarray:
     for k in range(1, len(row)):
         out += row[k] * motion[:, k]
     return out
+
+
+def _list_reversals(extremes) -> list:
+    """Return the two reversals of each cycle of each run from (2 directions, 2, cycles, runs) values."""
+    reversals = []
+    for run_extremes in np.moveaxis(extremes, 3, 0):
+        cycles = []
+        for cycle_extremes in np.moveaxis(run_extremes, 2, 0):
+            pair = (SimpleNamespace(slide=slide, force=force) for slide, force in cycle_extremes)
+            cycles.append(tuple(pair))
+        reversals.append(cycles)
+    return reversals
 
 
 def _find_largest_slide(slide, speed, force, rows, h: float) -> np.ndarray:

@@ -160,10 +160,9 @@ def add_patch_results(
         ErrorCauses of the motion measures by name.
     """
     slides = np.array([slide])
-    motion = {
-        name: replace(measure, causes=causes.get(name))
-        for name, measure in results.measures_with_errors(case).items()
-    }
+    motion = results.measures_with_errors(case)
+    for name, measure in motion.items():
+        motion[name] = replace(measure, causes=causes.get(name))
     outcome = check_pieces_overlap(
         Outcome(results.outcome[case]), model.patch, pressed.patch, slides
     )

@@ -20,11 +20,12 @@ N_GAUSS_POINTS = 8  # Number of Gauss points per time step along the flank of a 
 
 def slide_in_closed_form(task: SlideTask) -> SlideHistories:
     """Compute the friction histories of rigid sliding with a law without memory."""
-    if task.model.grooves is not None:
+    model = task.model
+    if model.grooves is not None:
         return _slide_over_grooves_in_closed_form(task)
     slide = task.slide
-    sigma, weight = nodal_pressure(task.model, task.patch)
-    law = make_numpy_law(task.model, task.patch)
+    sigma, weight = nodal_pressure(model, task.patch)
+    law = make_numpy_law(model, task.patch)
     limits = np.stack([law.limit(sigma, -1.0), law.limit(sigma, 1.0)])
     increments = np.diff(slide)
     fraction = law.limit_fraction(increments, np.diff(task.time))
@@ -38,7 +39,7 @@ def slide_in_closed_form(task: SlideTask) -> SlideHistories:
     losses = np.stack([np.zeros(fraction.size), work], axis=1)
     frames = task.frame_indices
     tau = fraction[frames, None] * limits[direction[frames]]
-    for sample, sign in find_rest_ends(task.model, slide).items():
+    for sample, sign in find_rest_ends(model, slide).items():
         breakaway = law.breakaway_traction(sigma, sign)
         force[sample] = weight @ breakaway
         tau[frames == sample] = breakaway
@@ -47,11 +48,11 @@ def slide_in_closed_form(task: SlideTask) -> SlideHistories:
     return SlideHistories(
         force,
         load,
-        compute_interface_slip(task.model, slide, force, load),
+        compute_interface_slip(model, slide, force, load),
         stack_energies(np.cumsum(work), np.zeros(fraction.size), losses),
         frames,
         tau,
-        compute_local_slip(task.model, slide[frames], tau, sigma),
+        compute_local_slip(model, slide[frames], tau, sigma),
     )
 
 
@@ -73,9 +74,8 @@ def _slide_over_grooves_in_closed_form(task: SlideTask) -> SlideHistories:
         last = _find_last_moving_steps(increments)
         direction = np.append(0.0, np.where(last < 0, 0.0, np.sign(increments)[last]))
         ratio = grooves.force_ratio(slide, direction, law.kinetic)
-        lowest, highest = (
-            grooves.force_ratio(slide[0], sign, model.friction.static) for sign in (-1.0, 1.0)
-        )
+        lowest = grooves.force_ratio(slide[0], -1.0, model.friction.static)
+        highest = grooves.force_ratio(slide[0], 1.0, model.friction.static)
         # Before the motion starts, the friction on the flank balances the load as far as its limit
         # allows.
         ratio[direction == 0] = np.clip(0.0, lowest, highest)

@@ -109,7 +109,6 @@ def list_merged_cell_runs(reference_run) -> CoarserRuns:
 
     `reference_run` is the run with which they are compared.
     """
-    runs = tuple(
-        reference_run._replace(springs=partial(join_cells, *merge)) for merge in CELL_MERGES
-    )
+    joins = [partial(join_cells, *merge) for merge in CELL_MERGES]
+    runs = tuple(reference_run._replace(springs=join) for join in joins)
     return CoarserRuns(runs, merged_cell_errors, reference_run, "cells")

@@ -37,12 +37,13 @@ def slide_step_by_step(task: SlideTask) -> SlideHistories:
         If the sum over bonds would take too long.
     """
     model = task.model
+    slide = task.slide
     law = make_numpy_law(model, task.patch)
     points = _make_pressed_points(task)
-    refuse_expensive_sum(model, law, task.slide.size, points.weight.size, task.slide)
+    refuse_expensive_sum(model, law, slide.size, points.weight.size, slide)
     take_step = _step_under_changing_load if model.load_varies else _step_law
     histories = _evaluate_law(
-        task, law, take_step, task.slide[:, None], points, find_rest_ends(model, task.slide)
+        task, law, take_step, slide[:, None], points, find_rest_ends(model, slide)
     )
     frames = task.frame_indices
     force = histories.force[:, 0]
@@ -51,11 +52,11 @@ def slide_step_by_step(task: SlideTask) -> SlideHistories:
     return SlideHistories(
         force,
         histories.load,
-        compute_interface_slip(model, task.slide, force, histories.load),
+        compute_interface_slip(model, slide, force, histories.load),
         histories.ledger,
         frames,
         tau,
-        compute_local_slip(model, task.slide[frames], tau, sigma),
+        compute_local_slip(model, slide[frames], tau, sigma),
     )
 
 

@@ -126,32 +126,31 @@ def require_closing_gap(patch_model, pieces: Compliance) -> None:
     foundation), this begins at a third of the length from the middle. A moment that does not
     increase with the load has no such effect.
     """
-    if not patch_model.loading.can_rotate or not patch_model.loading.offset:
+    loading = patch_model.loading
+    if not loading.can_rotate or not loading.offset:
         return
     flat = np.zeros(pieces.interface.x.size)
 
     def approach_under_unit_load(offset: float) -> float:
         """Return the approach [m] of flat pieces under 1 N at a given offset from the middle [m]."""
-        return press(
-            pieces, flat, 1.0, float(offset), spring=patch_model.loading.rotational_stiffness
-        ).approach
+        return press(pieces, flat, 1.0, float(offset), spring=loading.rotational_stiffness).approach
 
-    if approach_under_unit_load(patch_model.loading.offset) > 0:
+    if approach_under_unit_load(loading.offset) > 0:
         return
     from scipy.optimize import brentq
 
     limit = brentq(
         approach_under_unit_load,
         0.0,
-        patch_model.loading.offset,
-        xtol=1e-4 * abs(patch_model.loading.offset),
+        loading.offset,
+        xtol=1e-4 * abs(loading.offset),
     )
-    holder = "raise" if patch_model.loading.rotational_stiffness > 0 else "name"
+    holder = "raise" if loading.rotational_stiffness > 0 else "name"
     raise PatchfemError(
-        f"the line of the load lies {format_length(patch_model.loading.offset, 6)} off the middle; beyond "
+        f"the line of the load lies {format_length(loading.offset, 6)} off the middle; beyond "
         f"{format_length(limit, 3)} a "
         "larger load opens the gap at the middle of the piece, so an approach of "
-        f"{format_length(patch_model.loading.approach, 6)} belongs to several loads or to none; lower "
+        f"{format_length(loading.approach, 6)} belongs to several loads or to none; lower "
         f"contact.load_line.offset, {holder} contact.holder.rotational_stiffness, or give contact.load "
         "in place of the approach",
         "contact.approach.distance",

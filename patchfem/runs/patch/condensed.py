@@ -70,6 +70,11 @@ class CondensedPair:
         """Relative round-off error of the compliance; 0 if it is negligible."""
         return max(self.piece.round_off_error, self.upper.round_off_error)
 
+    @property
+    def meshes(self) -> tuple:
+        """Meshes of the lower and of the upper piece; the latter is None for identical pieces."""
+        return self.grid, None if self.upper is self.piece else self.upper_grid
+
     def forces(self, nodal) -> tuple:
         """Distribute interface forces (..., m) to the nodes of the lower and of the upper piece."""
         if self.joint is None:
@@ -179,10 +184,8 @@ def condense(patch_model, grid, upper_grid=None, ignore_cache: bool = False) -> 
 
 def condense_on_shared_meshes(patch_model) -> tuple:
     """Return the condensed pieces of a model on all levels of its shared meshes."""
-    return tuple(
-        condense_on_shared_level(patch_model, level)
-        for level in range(len(patch_model.mesh.shared.levels))
-    )
+    levels = range(len(patch_model.mesh.shared.levels))
+    return tuple(condense_on_shared_level(patch_model, level) for level in levels)
 
 
 def condense_on_shared_level(patch_model, level: int) -> CondensedPair:
@@ -248,7 +251,7 @@ def condense_on_same_meshes(patch_model, pair: CondensedPair) -> CondensedPair:
             pair.upper is pair.piece
         ):
             return condense_on_shared_level(patch_model, k)
-    return condense(patch_model, pair.grid, None if pair.upper is pair.piece else pair.upper_grid)
+    return condense(patch_model, *pair.meshes)
 
 
 def _rounded_end_gap(body, x) -> np.ndarray:

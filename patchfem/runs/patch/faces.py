@@ -183,21 +183,20 @@ def solve_faces_with_slip_fields(model, snapshots) -> tuple:
 
 def has_error_meshes(model) -> bool:
     """Return whether all patches with partial slip have a coarser mesh for the error estimate."""
-    return all(
-        face.patches[1] is not None for face in solve_interface_patches(model) if face.partial_slip
-    )
+    slipping_faces = (face for face in solve_interface_patches(model) if face.partial_slip)
+    return all(face.patches[1] is not None for face in slipping_faces)
 
 
 def static_measures_without_errors(model) -> dict:
     """Return the static measures of all patches of a model by name, without error estimates."""
     if model.patch is not None:
         return result.static_measures_without_errors(model)
+    values = {}
     with locate_errors(model.source):
-        return {
-            rows.add_interface_number(name, face.number): value
-            for face in solve_interface_patches(model)
-            for name, value in compute_static_values(face.patch).items()
-        }
+        for face in solve_interface_patches(model):
+            for name, value in compute_static_values(face.patch).items():
+                values[rows.add_interface_number(name, face.number)] = value
+    return values
 
 
 def static_measures(model) -> dict:
@@ -205,13 +204,12 @@ def static_measures(model) -> dict:
 
     From the second interface on, the name ends with the number of the interface.
     """
-    return {
-        rows.add_interface_number(name, face.number): measure
-        for face in solve_interface_patches(model)
-        for name, measure in result.static_measures(
-            face.model, face.patch, face.patches[1:]
-        ).items()
-    }
+    measures = {}
+    for face in solve_interface_patches(model):
+        face_measures = result.static_measures(face.model, face.patch, face.patches[1:])
+        for name, measure in face_measures.items():
+            measures[rows.add_interface_number(name, face.number)] = measure
+    return measures
 
 
 def collect_warnings(model) -> list:
@@ -247,14 +245,15 @@ def merge_interface_sentences(model, list_sentences: Callable) -> list:
     list_sentences : callable
         Function that returns the sentences on a Face.
     """
-    out: dict = {}
+    names_by_text: dict = {}
     for face in solve_interface_patches(model):
         for text in list_sentences(face):
-            out.setdefault(replace_contact_keys(model, text), []).append(face.name)
-    return [
-        f"interface{'s' * (len(names) > 1)} {', '.join(names)}: {text}"
-        for text, names in out.items()
-    ]
+            names_by_text.setdefault(replace_contact_keys(model, text), []).append(face.name)
+    sentences = []
+    for text, names in names_by_text.items():
+        plural = "s" * (len(names) > 1)
+        sentences.append(f"interface{plural} {', '.join(names)}: {text}")
+    return sentences
 
 
 def replace_contact_keys(model, text: str) -> str:

@@ -8,6 +8,7 @@ small tolerance contain those for a large one. `mesh_levels` decides how many gr
 """
 
 from dataclasses import dataclass
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -150,12 +151,7 @@ def _search_contact_region(patch_model) -> BaseGrids:
     LOAD_RANGE_FACTORS times the load. If wear moves them, no column is longer than
     MAX_WEAR_CELL_RATIO times the interface.
     """
-    varied_models = []
-    if patch_model.mesh.edge_motion == "load" and patch_model.loading.load is not None:
-        varied_models = [
-            patch_model.with_loading(load=load_factor * patch_model.loading.load)
-            for load_factor in LOAD_RANGE_FACTORS
-        ]
+    loaded_models = (patch_model, *make_load_variants(patch_model))
     layout = make_search_layout(patch_model)
     contact = None
     # Without a load there is no contact to search for.
@@ -166,7 +162,7 @@ def _search_contact_region(patch_model) -> BaseGrids:
             pair = condense(patch_model, *make_grids(patch_model, layout))
         x = pair.grid.x
         extents = []
-        for loaded_model in (patch_model, *varied_models):
+        for loaded_model in loaded_models:
             patch = solve_patch_contact(loaded_model, pair)
             extents.append(find_contact_extent(patch, patch_model.mesh.slip))
         contact = extents[0]
@@ -181,6 +177,14 @@ def _search_contact_region(patch_model) -> BaseGrids:
         if _have_bands_converged(layout, previous_layout):
             break
     return BaseGrids(make_grids(patch_model, layout), contact)
+
+
+def make_load_variants(patch_model) -> list:
+    """Return the patch at the ends of the range of a varying load; [] if no load moves its edges."""
+    load = patch_model.loading.load
+    if patch_model.mesh.edge_motion != "load" or load is None:
+        return []
+    return [patch_model.with_loading(load=factor * load) for factor in LOAD_RANGE_FACTORS]
 
 
 def _have_bands_converged(layout: Layout, previous_layout: Layout) -> bool:
@@ -262,24 +266,21 @@ def make_column_layout(patch_model, extents: list) -> Layout:
     bands = _make_edge_bands([extent.places for extent in extents], min_cell)
     # A node is placed on each step of the gap; the quantities there converge at first order in the
     # cell length.
-    bands += tuple((place, place, min_cell / STEP_CELL_FACTOR) for place in patch_model.gap.jumps)
+    step_cell = min_cell / STEP_CELL_FACTOR
+    bands += _make_point_bands(patch_model.gap.jumps, step_cell)
     rounded_edges, rounding_length = find_rounded_edges(patch_model)
-    loaded_edges = [
-        place for place in rounded_edges if span[0] - min_cell <= place <= span[1] + min_cell
-    ]
-    bands += tuple((place, place, min(min_cell, rounding_length / 4)) for place in loaded_edges)
+    for place in rounded_edges:
+        if span[0] - min_cell <= place <= span[1] + min_cell:
+            bands.append((place, place, min(min_cell, rounding_length / 4)))
     corner_factor = STEP_CELL_FACTOR if patch_model.has_singular_ends else 1
-    if _max_wave_cell(patch_model) < np.inf:
-        crests = [crest for extent in extents for crest in extent.crests]
-        bands += tuple(
-            (place, place, max(half / N_CELLS_PER_PEAK, min_cell / STEP_CELL_FACTOR))
-            for place, half in crests
-        )
-    bands += tuple(
-        (low, high, max((high - low) / N_CELLS_PER_SLIP_ZONE, MIN_CELL_RATIO * length))
-        for extent in extents
-        for low, high in extent.slip_zones
-    )
+    has_waves = _max_wave_cell(patch_model) < np.inf
+    for extent in extents if has_waves else ():
+        for place, half_width in extent.crests:
+            bands.append((place, place, max(half_width / N_CELLS_PER_PEAK, step_cell)))
+    for extent in extents:
+        for start, stop in extent.slip_zones:
+            cell = max((stop - start) / N_CELLS_PER_SLIP_ZONE, MIN_CELL_RATIO * length)
+            bands.append((start, stop, cell))
     corner_cell = max(
         min(
             coating / 16 if coating else np.inf,
@@ -287,16 +288,14 @@ def make_column_layout(patch_model, extents: list) -> Layout:
         ),
         MIN_CELL_RATIO * length,
     )
-    ends = {place for extent in extents for place in extent.corners}
-    bands += tuple((place, place, corner_cell) for place in sorted(ends))
+    ends = set(chain.from_iterable(extent.corners for extent in extents))
+    bands += _make_point_bands(sorted(ends), corner_cell)
     # The stresses are singular at the far corners, where a free side meets the holder.
-    bands += tuple(
-        (side * half, side * half, min(patch_model.pieces.height, length) / 20) for side in (-1, 1)
-    )
+    bands += _make_point_bands((-half, half), min(patch_model.pieces.height, length) / 20)
     return Layout(
         -half,
         half,
-        bands,
+        tuple(bands),
         span,
         max(max_loaded_cell, min_cell),
         max_cell,
@@ -304,28 +303,25 @@ def make_column_layout(patch_model, extents: list) -> Layout:
     )
 
 
-def _make_edge_bands(edge_positions: list, min_cell: float) -> tuple:
+def _make_point_bands(places, cell: float) -> list:
+    """Return bands that put a node with cells of given length [m] beside it at each place [m]."""
+    return [(place, place, cell) for place in places]
+
+
+def _make_edge_bands(edge_positions: list, min_cell: float) -> list:
     """Return the bands of short columns around the contact edges.
 
     If all contacts have equally many edges, each band covers the range over which its edge moves.
     """
-    if len({len(positions) for positions in edge_positions}) == 1:
-        return tuple(
-            (min(sweep), max(sweep), min_cell) for sweep in zip(*edge_positions, strict=True)
-        )
-    return tuple((place, place, min_cell) for positions in edge_positions for place in positions)
+    if len(set(map(len, edge_positions))) == 1:
+        return [(min(sweep), max(sweep), min_cell) for sweep in zip(*edge_positions)]
+    return _make_point_bands(chain.from_iterable(edge_positions), min_cell)
 
 
 def _min_coating_thickness(patch_model) -> float:
     """Return the thickness [m] of the thinner coating; 0 without a coating."""
-    return min(
-        (
-            piece.thickness
-            for piece in (patch_model.pieces.lower, patch_model.pieces.upper)
-            if piece.thickness
-        ),
-        default=0.0,
-    )
+    thicknesses = (piece.thickness for piece in patch_model.pieces.both)
+    return min(filter(None, thicknesses), default=0.0)
 
 
 def find_contact_extent(patch: Patch, slip=None) -> ContactExtent:
@@ -394,19 +390,15 @@ def _find_pressure_maxima(x, sigma) -> tuple:
 
 def make_grids(patch_model, layout: Layout) -> list:
     """Return the grids of both pieces with the columns of a layout; one grid for identical pieces."""
-    pieces = (patch_model.pieces.lower, patch_model.pieces.upper)
+    pieces = patch_model.pieces.both
     if patch_model.pieces.are_alike:
         pieces = pieces[:1]
     x = make_columns(patch_model, layout)
-    return [
-        extend_grid(
-            patch_model,
-            piece,
-            make_grid(patch_model, x, piece),
-            1 + CELL_GROWTH[patch_model.mesh.is_static],
-        )
-        for piece in pieces
-    ]
+    growth = 1 + CELL_GROWTH[patch_model.mesh.is_static]
+    grids = []
+    for piece in pieces:
+        grids.append(extend_grid(patch_model, piece, make_grid(patch_model, x, piece), growth))
+    return grids
 
 
 def make_columns(patch_model, layout: Layout) -> np.ndarray:

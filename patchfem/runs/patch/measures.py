@@ -299,6 +299,12 @@ def max_mesh_error_ratio(measures_by_name: dict, tolerance: float) -> float:
     return max(measures_by_name[name].error_ratio(tolerance) for name in MESH_MEASURES)
 
 
+def estimate_mesh_error_ratio(patches, tolerance: float) -> float:
+    """Return `max_mesh_error_ratio` of a patch that is solved on meshes from fine to coarse."""
+    measures = estimate_static_measures(*patches, tolerance=tolerance)
+    return max_mesh_error_ratio(measures, tolerance)
+
+
 def _reason_for_unbounded_pressure(patch: Patch) -> str:
     """Return why the peak pressure of a patch diverges under mesh refinement, or "" if it does not.
 

@@ -13,7 +13,7 @@ from ...model.pieces import make_piece_meshes
 from . import profile_points, slip_zones, store
 from .condensed import condense, condense_on_shared_meshes
 from .grids import MAX_CONDENSING_SECONDS, MIN_LEVELS, make_base_grids, predict_condensing_seconds
-from .measures import estimate_static_measures, max_mesh_error_ratio
+from .measures import estimate_mesh_error_ratio
 from .press import solve, solve_patch_contact
 
 # Tolerance at which a patch with prescribed partial slip may take as much CPU time as a patch in a
@@ -100,9 +100,7 @@ def _misses_tolerance_with_profile(patch_model, patches: tuple, tolerance: float
     has_trace = patch_model.mesh.is_automatic and patch_model.gap.profile is not None
     if not has_trace or patches[1] is None:
         return False
-    return (
-        max_mesh_error_ratio(estimate_static_measures(*patches, tolerance=tolerance), tolerance) > 1
-    )
+    return estimate_mesh_error_ratio(patches, tolerance) > 1
 
 
 def solve_on_pairs(patch_model, pairs, estimate: bool = True) -> tuple:
@@ -121,9 +119,8 @@ def solve_on_pairs(patch_model, pairs, estimate: bool = True) -> tuple:
     tuple
         Patches as in `solve_with_coarser`.
     """
-    return _pad_with_none(
-        solve_patch_contact(patch_model, pair) for pair in (pairs if estimate else pairs[:1])
-    )
+    needed_pairs = pairs if estimate else pairs[:1]
+    return _pad_with_none(solve_patch_contact(patch_model, pair) for pair in needed_pairs)
 
 
 def _pad_with_none(patches) -> tuple:
@@ -215,10 +212,7 @@ def solve_on_refined_meshes(
         # The solution on the points of the profile is used with all finer meshes.
         if points is not None:
             patches[0] = _attach_point_solution(patch, points)
-        is_within = (
-            max_mesh_error_ratio(estimate_static_measures(*patches, tolerance=tolerance), tolerance)
-            <= 1
-        )
+        is_within = estimate_mesh_error_ratio(patches, tolerance) <= 1
         resolves_slip = _resolves_slip_work(patch_model, patches, tolerance)
         if (
             seconds > MAX_CONDENSING_SECONDS[False]
@@ -231,12 +225,7 @@ def solve_on_refined_meshes(
             # points that do not converge do not do so on the next mesh either
             has_failed_on_points = points is None
             patches[0] = _attach_point_solution(patch, points)
-            is_within = (
-                max_mesh_error_ratio(
-                    estimate_static_measures(*patches, tolerance=tolerance), tolerance
-                )
-                <= 1
-            )
+            is_within = estimate_mesh_error_ratio(patches, tolerance) <= 1
         is_done = resolves_slip and (patches[0].points is not None or is_within)
         if is_done or seconds > max_condensing_seconds(patch_model, tolerance):
             return tuple(patches)
@@ -251,10 +240,8 @@ def _attach_point_solution(patch, points):
 
 def _meets_tolerance(patches: list, tolerance: float, points) -> bool:
     """Return whether all measures that control the mesh meet the tolerance."""
-    patch_measures = estimate_static_measures(
-        _attach_point_solution(patches[0], points), *patches[1:], tolerance=tolerance
-    )
-    return max_mesh_error_ratio(patch_measures, tolerance) <= 1
+    fine = _attach_point_solution(patches[0], points)
+    return estimate_mesh_error_ratio((fine, *patches[1:]), tolerance) <= 1
 
 
 def max_condensing_seconds(patch_model, tolerance: float | None = None) -> float:
@@ -330,14 +317,11 @@ def tolerance_for_finer_mesh(patch_model, patches, tolerance: float) -> float | 
         return None
     solved = [patch for patch in patches if patch is not None]
     if patches[0].points is not None:
-        measures = estimate_static_measures(*solved, tolerance=tolerance)
-        return tolerance / 10 if max_mesh_error_ratio(measures, tolerance) <= 1 else None
+        return tolerance / 10 if estimate_mesh_error_ratio(solved, tolerance) <= 1 else None
     for decade in range(1, MAX_DECADES + 1):
         tighter = tolerance * 10.0**-decade
-        measures = estimate_static_measures(*solved, tolerance=tighter)
-        is_done = max_mesh_error_ratio(measures, tighter) <= 1 and _resolves_slip_work(
-            patch_model, solved, tighter
-        )
+        is_within = estimate_mesh_error_ratio(solved, tighter) <= 1
+        is_done = is_within and _resolves_slip_work(patch_model, solved, tighter)
         if not is_done and seconds <= max_condensing_seconds(patch_model, tighter):
             return tighter
     return None
@@ -345,6 +329,5 @@ def tolerance_for_finer_mesh(patch_model, patches, tolerance: float) -> float | 
 
 def predict_next_mesh_seconds(patch) -> float:
     """Predict the CPU time [s] of condensing the pieces of a patch on the next finer mesh."""
-    pair = patch.pair
-    grids = [pair.grid] if pair.upper is pair.piece else [pair.grid, pair.upper_grid]
-    return predict_condensing_seconds([grid.refine() for grid in grids])
+    meshes = filter(None, patch.pair.meshes)
+    return predict_condensing_seconds([mesh.refine() for mesh in meshes])

@@ -73,15 +73,15 @@ def predict_grid_sizes(patch_model, tolerance: float) -> GridSizes:
     levels = _predict_mesh_levels(patch_model, tolerance)
     bodies = [body for body in levels[0] if body is not None]
     finest = tuple(map(count_nodes, bodies))
+    are_mirrored = map(is_mirror_symmetric, bodies)
+    n_bytes = sum(predict_bytes(*nodes, mirrored) for nodes, mirrored in zip(finest, are_mirrored))
     return GridSizes(
         (bodies[0].base_grid or bodies[0]).x.size,
         finest,
         len(levels),
         sum(map(predict_condensing_seconds, levels))
         * (UNSTRUCTURED_COST_FACTOR if patch_model.mesh.file is not None else 1.0),
-        sum(
-            predict_bytes(*nodes, is_mirror_symmetric(body)) for nodes, body in zip(finest, bodies)
-        ),
+        n_bytes,
         patch_model.pieces.has_overhang or patch_model.mesh.file is not None,
     )
 

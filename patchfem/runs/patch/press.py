@@ -234,10 +234,8 @@ def solve_patch_contact(patch_model, pair: CondensedPair, worn=None) -> Patch:
     except UnresolvedTrace as error:
         from .trace_split import advise_split
 
-        advice = "".join(
-            f"; or {text}" for text in advise_split(patch_model, float(np.diff(x).max()))
-        )
-        raise PatchfemError(f"{error}{advice}", error.key) from None
+        sentences = [str(error), *advise_split(patch_model, float(np.diff(x).max()))]
+        raise PatchfemError("; or ".join(sentences), error.key) from None
     gap = heights + pair.end_gap if worn is None else heights + pair.end_gap + worn
 
     def solve_gap(unloaded_gap) -> Patch:
@@ -266,9 +264,8 @@ def solve_patch_contact(patch_model, pair: CondensedPair, worn=None) -> Patch:
     row_over_cell = 1.0 if pair.row is None else pair.row / cell
     weight_shift = bare_fraction * edges.edge_offset_fraction(row_over_cell)
     shifts = _gap_variants_at_step(node, gap if worn is None else gap - worn, half_steps, worn)
-    variants = [
-        (0.5 - side * weight_shift, solve_gap(gap + shift)) for side, shift in zip((-1, 1), shifts)
-    ]
+    weights = (0.5 + weight_shift, 0.5 - weight_shift)
+    variants = ((weight, solve_gap(gap + shift)) for weight, shift in zip(weights, shifts))
     return replace(patch, step_variants=tuple(variants))
 
 

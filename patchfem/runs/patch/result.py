@@ -63,8 +63,7 @@ def make_piece_meshes_of_run(model) -> tuple:
     with locate_errors(model.source):
         if not model.patch.mesh.is_automatic:
             return make_piece_meshes(model.patch)
-        pair = solve_with_coarser(model.patch, model.accuracy.tolerance)[0].pair
-        return pair.grid, None if pair.upper is pair.piece else pair.upper_grid
+        return solve_with_coarser(model.patch, model.accuracy.tolerance)[0].pair.meshes
 
 
 def static_measures(model, patch, coarse) -> dict:
@@ -99,14 +98,13 @@ def static_measures(model, patch, coarse) -> dict:
         )
     values_by_name = {name: measure.value for name, measure in measures_by_name.items()}
     min_floors = measure_floors(patch_model, model.accuracy.tolerance, values_by_name)
-    measures_by_name = {
-        name: replace(measure, floor=max(measure.floor, min_floors[name]))
-        for name, measure in measures_by_name.items()
-    }
+    measures = {}
+    for name, measure in measures_by_name.items():
+        measures[name] = replace(measure, floor=max(measure.floor, min_floors[name]))
     # For worn strips, `wear.measures` adds the error due to their number.
     if patch.strips is None or coarse[0] is None or model.wear is not None:
-        return measures_by_name
-    return add_strip_count_errors(patch_model, coarse[0], measures_by_name)
+        return measures
+    return add_strip_count_errors(patch_model, coarse[0], measures)
 
 
 def measure_floors(patch_model, tolerance: float, values: dict) -> dict:
@@ -133,9 +131,10 @@ def measure_floors(patch_model, tolerance: float, values: dict) -> dict:
         "pressure_centre": arm,
         "moment": values["normal_load"] * arm,
     }
-    return {
-        name: np.maximum(TABLE[name].floor, tolerance * terms.get(name, 0.0)) for name in values
-    }
+    floors = {}
+    for name in values:
+        floors[name] = np.maximum(TABLE[name].floor, tolerance * terms.get(name, 0.0))
+    return floors
 
 
 def make_static_result(inputs: RunInputs) -> Result:
@@ -252,7 +251,7 @@ def _estimate_strains(patch_model, largest_pressure, approach) -> tuple:
 def _list_materials(patch_model) -> list:
     """Return the materials of the pieces and of their coatings."""
     out = []
-    for piece in (patch_model.pieces.lower, patch_model.pieces.upper):
+    for piece in patch_model.pieces.both:
         out.append(piece.substrate)
         if piece.coating:
             out.append(piece.coating.material)
@@ -365,8 +364,8 @@ def _compute_dundurs_beta(patch_model) -> float:
     is_plane_strain = patch_model.pieces.plane == "strain"
     shear = []
     kappa = []
-    for piece in (patch_model.pieces.lower, patch_model.pieces.upper):
-        face = piece.coating.material if piece.coating else piece.substrate
+    for piece in patch_model.pieces.both:
+        face = piece.face_material
         nu = face.poisson
         shear.append(face.young / (2 + 2 * nu))
         kappa.append(3 - 4 * nu if is_plane_strain else (3 - nu) / (1 + nu))

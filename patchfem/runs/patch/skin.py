@@ -30,17 +30,8 @@ def make_skin_law(patch_model):
             pressure = skin.normal_stiffness * skin.decay_length
         return asperity_laws.ExponentialAsperities(skin.decay_length, pressure)
     return asperity_laws.HertzAsperities(
-        skin.radius, skin.density, skin.height_deviation, combined_surface_modulus(patch_model)
+        skin.radius, skin.density, skin.height_deviation, patch_model.pieces.surface_modulus
     )
-
-
-def combined_surface_modulus(patch_model) -> float:
-    """Return the combined modulus E* [Pa] of the two surfaces, 1/E* = sum of (1 - nu^2)/E."""
-    faces = [
-        piece.coating.material if piece.coating else piece.substrate
-        for piece in (patch_model.pieces.lower, patch_model.pieces.upper)
-    ]
-    return 1 / sum((1 - face.poisson**2) / face.young for face in faces)
 
 
 def asperity_layer_stiffness(patch_model, pressure: float) -> float:

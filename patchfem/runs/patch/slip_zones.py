@@ -111,7 +111,8 @@ def max_slip_error_ratio(patches, slip, tolerance: float) -> float:
             }
         )
     errors = convergence_errors(*values)
-    return max(
-        Measure(value, "", errors[name], float(error_floor(name))).error_ratio(tolerance)
-        for name, value in values[0].items()
-    )
+    ratios = []
+    for name, value in values[0].items():
+        measure = Measure(value, "", errors[name], float(error_floor(name)))
+        ratios.append(measure.error_ratio(tolerance))
+    return max(ratios)

@@ -7,7 +7,7 @@ one.
 """
 
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
+from itertools import chain, pairwise
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -127,34 +127,29 @@ class BatchSolution(NamedTuple):
         """Return a list with a note on the plane state of one patch of the batch."""
         if not self.plane_values:
             return []
-        own_values, other_values = (
-            {name: float(column[case]) for name, column in values.items()}
-            for values in self.plane_values
-        )
-        return note_on_plane_state_changes(patch_model, own_values, other_values)
+        values = []
+        for columns in self.plane_values:
+            values.append({name: float(column[case]) for name, column in columns.items()})
+        return note_on_plane_state_changes(patch_model, *values)
 
     def measures(self, case: int, floors: Mapping | None = None) -> dict:
         """Return the static measures of one patch of the batch by name.
 
         floors: error floors (q,) by name that replace those of the measure table.
         """
-        return {
-            name: estimate.select(case).to_measure(
-                name, None if floors is None else float(floors[name][case])
-            )
-            for name, estimate in self.estimates.items()
-        }
+        measures = {}
+        for name, estimate in self.estimates.items():
+            floor = None if floors is None else float(floors[name][case])
+            measures[name] = estimate.select(case).to_measure(name, floor)
+        return measures
 
 
 def reason_not_batched(patch_model) -> str:
     """Return why a patch cannot be solved in a batch, or "" if it can."""
     if patch_model.mesh.shared is None:
         return "the case has a mesh of its own"
-    if not all(
-        isinstance(body, TensorGrid) or body is None
-        for level in patch_model.mesh.shared.levels
-        for body in level
-    ):
+    bodies = chain.from_iterable(patch_model.mesh.shared.levels)
+    if not all(isinstance(body, TensorGrid | None) for body in bodies):
         return "the meshes of the pieces are not plain grids"
     if patch_model.gap.profile is not None:
         return "a profile has its own averaging length"
@@ -270,16 +265,14 @@ def solve_similar_patches(patch_models, tolerance: float) -> list:
     """
     pairs = condense_on_shared_meshes(patch_models[0])
     solution = solve_patch_batch(collect_patch_loads(patch_models), tolerance)
+    levels = list(zip(pairs, solution.levels))
     out = [None] * len(patch_models)
     for case in np.flatnonzero(solution.is_solved).tolist():
         patch_model = patch_models[case]
         out[case] = SolvedPatch(
             solution.measures(case),
             solution.plane_sentences(patch_model, case),
-            tuple(
-                _extract_patch(patch_model, pair, level, case)
-                for pair, level in zip(pairs, solution.levels)
-            ),
+            tuple(_extract_patch(patch_model, pair, level, case) for pair, level in levels),
         )
     return out
 

@@ -74,7 +74,7 @@ def note_on_yielding_faces(patch_model, peak: float) -> dict:
     """
     notes = {}
     for side, piece in (("lower", patch_model.pieces.lower), ("upper", patch_model.pieces.upper)):
-        face = piece.coating.material if piece.coating else piece.substrate
+        face = piece.face_material
         known = yield_strength(face)
         if known is None or known in notes:
             continue

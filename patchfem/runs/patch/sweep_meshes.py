@@ -18,7 +18,7 @@ from ...mesh.tensor import TensorGrid
 from ...model.patch import SharedMeshes
 from . import grids, mesh_levels
 from .condensed import cache_condensed_pairs, condense
-from .measures import estimate_static_measures, max_mesh_error_ratio
+from .measures import estimate_mesh_error_ratio
 from .press import solve_patch_contact
 from .static_batch import max_mesh_error_ratios, solve_patches_on_pair
 
@@ -87,12 +87,7 @@ def choose_shared_meshes(
     if not patch_model.mesh.is_automatic:
         return name_shared_meshes(mesh_levels.make_file_meshes(patch_model))
     cases, are_all_patches = select_distinct_patches(patches)
-    load_variants = [
-        case.with_loading(load=cell_factor * case.loading.load)
-        for case in cases
-        if case.mesh.edge_motion == "load" and case.loading.load is not None
-        for cell_factor in grids.LOAD_RANGE_FACTORS
-    ]
+    load_variants = chain.from_iterable(map(grids.make_load_variants, cases))
     has_partial_slip = any(patch.interface.partial_slip for patch in patches)
     halvings = _count_extra_halvings(cases, tolerance) if has_partial_slip else {}
     # Halvings that all cases need become refinement levels.
@@ -123,19 +118,12 @@ def choose_shared_meshes(
             cases, bodies, tolerance, bool(cell_factors), grids.MIN_LEVELS + common_halvings
         )
         if error_ratio <= 1 or not cell_factors:
-            meshes = name_shared_meshes(
-                [
-                    (pair.grid, None if pair.upper is pair.piece else pair.upper_grid)
-                    for pair in pairs
-                ]
-            )
+            meshes = name_shared_meshes([pair.meshes for pair in pairs])
             cache_condensed_pairs(cases[0], meshes, pairs)
             return meshes
         # Largest factor on the cell lengths at which a mesh can meet the tolerance.
-        max_factor = cell_factor * error_ratio ** (-1 / MAX_ORDER)
-        cell_factors = tuple(
-            one for one in cell_factors if one <= max(max_factor, CELL_FACTORS[-1])
-        )
+        max_factor = max(cell_factor * error_ratio ** (-1 / MAX_ORDER), CELL_FACTORS[-1])
+        cell_factors = tuple(factor for factor in cell_factors if factor <= max_factor)
 
 
 def name_shared_meshes(levels) -> SharedMeshes:
@@ -189,24 +177,19 @@ def select_distinct_patches(patches, max_patches: int = MAX_CASES) -> tuple:
 
 def _load_and_shape_parameters(patch_model) -> tuple:
     """Return the parameters of load and shape in which patches of equal geometry differ."""
-    shapes = [
-        float(value)
-        for _, part in patch_model.gap.shapes
-        for _, value in part
-        if isinstance(value, (int, float))
-    ]
-    skin = [
-        float(value or 0.0)
-        for _, value in patch_model.interface.skin or ()
-        if isinstance(value, (int, float)) or value is None
-    ]
+    loading = patch_model.loading
+    shapes = []
+    for _, part in patch_model.gap.shapes:
+        shapes += [float(value) for _, value in part if isinstance(value, int | float)]
+    skin_values = [value for _, value in patch_model.interface.skin or ()]
+    skin = [float(value or 0.0) for value in skin_values if isinstance(value, int | float | None)]
     loading_numbers = (
-        patch_model.loading.load,
-        patch_model.loading.approach,
-        patch_model.loading.offset,
-        patch_model.loading.line_moment,
-        patch_model.loading.can_rotate,
-        patch_model.loading.rotational_stiffness,
+        loading.load,
+        loading.approach,
+        loading.offset,
+        loading.line_moment,
+        loading.can_rotate,
+        loading.rotational_stiffness,
         *(patch_model.mesh.slip or ()),
         *(patch_model.interface.strips or ()),
     )
@@ -283,11 +266,9 @@ def _find_contact_extent(patch_model, pair, patch):
 
 def _merge_layouts(layouts: list, has_intermediate_cases: bool) -> Layout:
     """Merge column layouts, taking the shortest cell of all layouts at each position."""
-    bands = {
-        band
-        for layout in layouts
-        for band in (*layout.bands, (*layout.span, layout.max_loaded_length))
-    }
+    bands = set()
+    for layout in layouts:
+        bands.update(layout.bands, [(*layout.span, layout.max_loaded_length)])
     if has_intermediate_cases:
         bands |= set(_interpolate_bands(layouts))
     first = layouts[0]
@@ -319,24 +300,17 @@ def _interpolate_bands(layouts: list) -> list:
     bands = []
     half_length = max(layout.stop for layout in layouts)
     for side in (-1, 1):
-        contact_ends = sorted(
-            {
-                (low, min_cell)
-                for layout in layouts
-                for low, high, min_cell in layout.bands
-                if low == high and low * side >= 0 and abs(low) < half_length
-            }
-        )
-        for (low, a), (high, b) in pairwise(contact_ends):
+        contact_ends = set()
+        for low, high, min_cell in chain.from_iterable(layout.bands for layout in layouts):
+            if low == high and low * side >= 0 and abs(low) < half_length:
+                contact_ends.add((low, min_cell))
+        for (low, a), (high, b) in pairwise(sorted(contact_ends)):
             count = (
                 1 if high == low else int(np.ceil(abs(np.log(a / b)) / np.log(MAX_CELL_RATIO))) or 1
             )
-            positions = np.linspace(low, high, count + 1)
-            cell_lengths = np.geomspace(a, b, count + 1)
-            bands += [
-                (*map(float, stretch), float(max(pair)))
-                for stretch, pair in zip(pairwise(positions), pairwise(cell_lengths), strict=True)
-            ]
+            positions = np.linspace(low, high, count + 1).tolist()
+            cell_lengths = np.geomspace(a, b, count + 1).tolist()
+            bands += zip(positions[:-1], positions[1:], map(max, pairwise(cell_lengths)))
     return bands
 
 
@@ -373,15 +347,12 @@ def _refine_until_tolerance_is_met(
         batch_ratios = max_mesh_error_ratios(cases, pairs, tolerance)
         largest_ratio = max((ratio for ratio in batch_ratios if ratio is not None), default=0.0)
         if largest_ratio <= 1:
-            largest_ratio = next(
-                (
-                    ratio
-                    for case, batch_ratio in zip(cases, batch_ratios)
-                    if batch_ratio is None
-                    and (ratio := _max_mesh_error_ratio(case, pairs, tolerance)) > 1
-                ),
-                largest_ratio,
-            )
+            for case, batch_ratio in zip(cases, batch_ratios):
+                if batch_ratio is None:
+                    ratio = _max_mesh_error_ratio(case, pairs, tolerance)
+                    if ratio > 1:
+                        largest_ratio = ratio
+                        break
         n_nodes = bodies[0].x.size
         seconds = grids.predict_condensing_seconds(bodies)
         max_seconds = mesh_levels.max_condensing_seconds(cases[0], tolerance)
@@ -393,11 +364,7 @@ def _refine_until_tolerance_is_met(
 def _max_mesh_error_ratio(patch_model, pairs: list, tolerance: float) -> float:
     """Return the largest ratio of error to allowed error of a patch; 0 if it is not solved."""
     try:
-        return max_mesh_error_ratio(
-            estimate_static_measures(
-                *mesh_levels.solve_on_pairs(patch_model, pairs), tolerance=tolerance
-            ),
-            tolerance,
-        )
+        patches = mesh_levels.solve_on_pairs(patch_model, pairs)
+        return estimate_mesh_error_ratio(patches, tolerance)
     except PatchfemError:
         return 0.0

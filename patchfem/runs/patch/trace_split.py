@@ -18,7 +18,6 @@ from ...model import profile
 from ...surface.fine import NEGLIGIBLE_LOST, unrepresented_fraction, wave_spectrum
 from ...surface.profile import Profile
 from ...surface.roughness.peaks import PERSSON, trace_moments
-from .skin import combined_surface_modulus
 
 PROFILE_KEY = "contact.profile.file"
 
@@ -97,7 +96,7 @@ def split_trace(
     element = element or patch_model.uniform_element_size
     trace = _level_trace(patch_model, element)
     pressure = loading.load / (pieces.length * pieces.width * pieces.pairs)
-    modulus = combined_surface_modulus(patch_model)
+    modulus = patch_model.pieces.surface_modulus
     is_given = cutoff is not None
     if not is_given:
         spectrum = wave_spectrum(trace)

@@ -316,10 +316,9 @@ def contact_reaches_steep_end(patch: Patch) -> bool:
 
 def _rounded_bodies(pair) -> list:
     """Return the meshes of the pieces whose interface ends are rounded."""
-    return [
-        body
-        for body in (pair.grid, pair.upper_grid)
-        if getattr(body, "end", None) is not None
-        and body.end.kind == "radius"
-        and body.interface_depths[-1] > 0
-    ]
+    bodies = []
+    for body in (pair.grid, pair.upper_grid):
+        end = getattr(body, "end", None)
+        if end is not None and end.kind == "radius" and body.interface_depths[-1] > 0:
+            bodies.append(body)
+    return bodies

@@ -130,13 +130,10 @@ def make_laws_on_coarse_meshes(model, coarse) -> list:
 
     `coarse` is the Patch of [contact] on a coarser mesh, or None.
     """
-    return [
-        *([] if coarse is None else [make_laws_on_mesh(model, coarse)]),
-        *(
-            make_laws_on_mesh(model, None, numbers)
-            for numbers in faces.group_interfaces_with_coarse_mesh(model)
-        ),
-    ]
+    laws = [] if coarse is None else [make_laws_on_mesh(model, coarse)]
+    for numbers in faces.group_interfaces_with_coarse_mesh(model):
+        laws.append(make_laws_on_mesh(model, None, numbers))
+    return laws
 
 
 def with_automatic_method(model):

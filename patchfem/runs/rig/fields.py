@@ -33,30 +33,21 @@ def collect_interface_fields(model, numerics, patch, solution) -> dict:
     """
     sigma = patch.pressure.sigma_n
     f = model.friction
+    window = solution.window
     # Strips that slide independently have no common shear stress.
     if model.patch.mesh.can_gather_points or (model.partial_slip and patch.strips is not None):
         return collect_rest_frame(patch)
     if model.rig.friction.load_varies:
         return _collect_varying_load_fields(patch, solution)
     if not solution.snapshots:
-        at = (
-            np.linspace(
-                max(
-                    0, len(solution.window.time) - 1 - len(solution.window.time) // numerics.window
-                ),
-                len(solution.window.time) - 1,
-                N_FRAMES,
-            )
-            .round()
-            .astype(int)
-        )
-        tau = np.outer(solution.window.force[at] / patch.pressure.load, sigma)
+        n_samples = len(window.time)
+        first = max(0, n_samples - 1 - n_samples // numerics.window)
+        at = np.linspace(first, n_samples - 1, N_FRAMES).round().astype(int)
+        tau = np.outer(window.force[at] / patch.pressure.load, sigma)
         if f is not None and law_has_trait(f.law, "averaged"):
-            tau = averaged_law.distribute_slip_force(model, patch, solution.window.force[at])
-        slip = np.repeat(solution.window.slip[at][:, None], sigma.size, axis=1)
-        return make_interface_frames(
-            patch, solution.window.time[at], tau, slip, solution.window.slide[at]
-        )
+            tau = averaged_law.distribute_slip_force(model, patch, window.force[at])
+        slip = np.repeat(window.slip[at][:, None], sigma.size, axis=1)
+        return make_interface_frames(patch, window.time[at], tau, slip, window.slide[at])
 
     snapshots = solution.snapshots
     if model.partial_slip and model.grooves is not None:
@@ -100,9 +91,8 @@ def _collect_varying_load_fields(patch, solution) -> dict:
     sets = solution.contact.sets
     weight = patch.pieces.interface.weight
     snapshots = solution.snapshots
-    time, slide = (
-        np.array([0.0] + [state[key] for state in snapshots]) for key in ("time", "slide")
-    )
+    time = np.array([0.0] + [state["time"] for state in snapshots])
+    slide = np.array([0.0] + [state["slide"] for state in snapshots])
     nodal = np.stack([patch.pressure.sigma_n * weight] + [state["nodal"] for state in snapshots])
     lift = np.array([0.0] + [state["heave"] for state in snapshots])[:, None]
     turn = np.array([0.0] + [state["turn"] for state in snapshots])[:, None]

@@ -86,28 +86,28 @@ def choose_numerics(model: Model) -> Numerics:
     """
     accuracy = model.accuracy
     rig = model.rig
+    drive = rig.drive
+    cycles = drive.cycles
     engine = choose_engine(model)
-    window = int(max(1, min(10, (rig.drive.cycles + WHOLE_CYCLE_TOL) // 10)))
+    window = int(max(1, min(10, (cycles + WHOLE_CYCLE_TOL) // 10)))
     # Under a random drive, the window is the whole record without its initial transient.
-    if rig.drive.waveform.is_random:
-        rate = find_min_decay_rate(rig.modes) * rig.drive.signal.period
-        start = min(rig.drive.cycles / 4, N_DECAY_TIMES / rate if rate else np.inf)
-        window = int(max(1, rig.drive.cycles - start + WHOLE_CYCLE_TOL))
-    beat_cycles = count_repeat_cycles(rig.drive.signal) or 0.0
-    if 1 < beat_cycles <= rig.drive.cycles:  # The window contains complete periods of the beat.
-        window = int(
-            beat_cycles * max(1, min(10, rig.drive.cycles // (10 * beat_cycles))) + WHOLE_CYCLE_TOL
-        )
-    if rig.drive.levels.amplitudes:
-        window = min(window, int(rig.drive.levels.cycles + WHOLE_CYCLE_TOL))
+    if drive.waveform.is_random:
+        rate = find_min_decay_rate(rig.modes) * drive.signal.period
+        start = min(cycles / 4, N_DECAY_TIMES / rate if rate else np.inf)
+        window = int(max(1, cycles - start + WHOLE_CYCLE_TOL))
+    beat_cycles = count_repeat_cycles(drive.signal) or 0.0
+    if 1 < beat_cycles <= cycles:  # The window contains complete periods of the beat.
+        window = int(beat_cycles * max(1, min(10, cycles // (10 * beat_cycles))) + WHOLE_CYCLE_TOL)
+    if drive.levels.amplitudes:
+        window = min(window, int(drive.levels.cycles + WHOLE_CYCLE_TOL))
     steps = steps_per_cycle(model)
-    if not is_sinusoidal(rig.drive.signal) and accuracy.steps_per_cycle is None:
-        steps = max(steps, int(np.ceil(MIN_SAMPLES / rig.drive.cycles)))
+    if not is_sinusoidal(drive.signal) and accuracy.steps_per_cycle is None:
+        steps = max(steps, int(np.ceil(MIN_SAMPLES / cycles)))
     pinned = {key for key in MARCH_SETTINGS if getattr(accuracy, key) is not None}
     numerics = Numerics(
         engine.name,
         steps,
-        rig.drive.cycles,
+        cycles,
         window,
         accuracy.shear_modes,
         model.side == "lower",
@@ -120,7 +120,7 @@ def choose_numerics(model: Model) -> Numerics:
     if engine is MARCH and accuracy.steps_per_cycle is None:
         # The steps are short enough for a unique solution, and the last one ends where the run
         # ends.
-        steps = round_steps_to_run_end(max(steps, min_unique_steps(model)), rig.drive.cycles)
+        steps = round_steps_to_run_end(max(steps, min_unique_steps(model)), cycles)
         return replace(numerics, steps=steps)
     return numerics
 

@@ -292,23 +292,24 @@ def compute_dimensionless_groups(model: Model) -> dict:
     sizes = {}
     f = model.friction
     rig = model.rig
+    drive = rig.drive
     laws = rig.friction.interfaces
     limits = [law.friction_limits(find_interface_load(model, law)) for law in laws]
     limit = sum(static for static, _ in limits)
     kinetic = sum(sliding for _, sliding in limits)
-    drive_force = rig.drive.force or rig.first_mode.mass * find_max_acceleration(rig.drive.signal)
+    drive_force = drive.force or rig.first_mode.mass * find_max_acceleration(drive.signal)
     if drive_force > 0:
         sizes["D"] = limit / drive_force
         if kinetic != limit:
             sizes["D_kinetic"] = kinetic / drive_force
-    ratio = rig.first_mode.frequency * rig.drive.signal.period if rig.drive.frequency else inf
+    ratio = rig.first_mode.frequency * drive.signal.period if drive.frequency else inf
     if abs(ratio - 1) < 0.2:
         bound = 4 / pi * kinetic * _find_participation_ratio(rig)
-        sizes |= {"knee_force": bound} if rig.drive.force else {"knee": bound / rig.first_mode.mass}
-    if f is not None and f.bond_length and f.stiffness is None and rig.drive.signal.moving:
+        sizes |= {"knee_force": bound} if drive.force else {"knee": bound / rig.first_mode.mass}
+    if f is not None and f.bond_length and f.stiffness is None and drive.signal.moving:
         sizes["drive_amplitude_over_bond_length"] = (
-            find_max_acceleration(rig.drive.signal)
-            / find_drive_omega(rig.drive.signal) ** 2
+            find_max_acceleration(drive.signal)
+            / find_drive_omega(drive.signal) ** 2
             / f.bond_length
         )
     return sizes

@@ -5,6 +5,7 @@ In: a Result. Out: its failed Findings, and the Result marked as `not_converged`
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import chain
 
 from ...core import Outcome
 from ..results.result import Result, remove_unknown_errors
@@ -29,7 +30,8 @@ CHECKS: tuple[Callable[[Evidence], Iterator[Finding]], ...] = (
 def run_failed_checks(result: Result) -> list:
     """Return the findings of all self-checks that fail for a Result."""
     run = Evidence(result)
-    return [finding for check in CHECKS for finding in check(run) if finding.has_failed]
+    findings = chain.from_iterable(check(run) for check in CHECKS)
+    return [finding for finding in findings if finding.has_failed]
 
 
 def mark_failed_checks(result: Result) -> Result:

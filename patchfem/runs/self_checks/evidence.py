@@ -71,13 +71,14 @@ class Evidence:
             or model.grooves is not None
         ):
             return False
-        if model.load_varies if model.rig is None else model.rig.friction.load_varies:
+        rig = model.rig
+        if model.load_varies if rig is None else rig.friction.load_varies:
             return False
         is_two_dimensional = model.slide is not None and model.slide.across is not None
-        has_several_interfaces = model.rig is not None and (
-            len(model.rig.modes.interfaces) > 1 or bool(model.rig.friction.names)
+        has_several_interfaces = rig is not None and (
+            len(rig.modes.interfaces) > 1 or bool(rig.friction.names)
         )
-        has_lateral_motion = model.rig is not None and model.rig.modes.lateral_faces is not None
+        has_lateral_motion = rig is not None and rig.modes.lateral_faces is not None
         has_varying_bonds = "temperature" in friction or "spread" in friction
         return not (
             is_two_dimensional or has_several_interfaces or has_lateral_motion or has_varying_bonds
@@ -96,20 +97,18 @@ class Evidence:
             or structure.get("measured", "free") != "free"
         ):
             return None
-        columns = {
-            key: np.array([parse_scene_number(mode[key]) for mode in structure["mode"]])
-            for key in ("frequency", "damping", "slide", "base", "accelerometer")
-        }
-        if self.scene["drive"]["kind"] == "force":
-            columns["base"] = -np.array(
-                [parse_scene_number(mode["output"]) for mode in structure["mode"]]
-            )
+
+        def column(key: str) -> np.ndarray:
+            """Return the numbers of all modes at a key."""
+            return np.array([parse_scene_number(mode[key]) for mode in structure["mode"]])
+
+        has_force = self.scene["drive"]["kind"] == "force"
         return SceneModes(
-            2 * np.pi * columns["frequency"],
-            columns["damping"],
-            columns["slide"],
-            columns["base"],
-            columns["accelerometer"],
+            2 * np.pi * column("frequency"),
+            column("damping"),
+            column("slide"),
+            -column("output") if has_force else column("base"),
+            column("accelerometer"),
             parse_scene_number(structure["moving_mass"]),
         )
 

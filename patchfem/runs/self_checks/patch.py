@@ -78,14 +78,13 @@ def check_stiffness_bounds(run: Evidence) -> Iterator[Finding]:
         or patch_model.pieces.has_overhang
     ):
         return
-    if any(
-        piece.length > patch_model.pieces.length * (1 + ROUND_OFF_TOL)
-        or piece.corner_kind(patch_model.pieces.length / 2) != "sharp"
-        for piece in (patch_model.pieces.lower, patch_model.pieces.upper)
-    ):
-        return
+    length = patch_model.pieces.length
+    for piece in patch_model.pieces.both:
+        is_longer = piece.length > length * (1 + ROUND_OFF_TOL)
+        if is_longer or piece.corner_kind(length / 2) != "sharp":
+            return
     flexibility = {"column": 0.0, "stress": 0.0, "shear": 0.0}
-    for piece in (patch_model.pieces.lower, patch_model.pieces.upper):
+    for piece in patch_model.pieces.both:
         for material, thickness in (
             (piece.substrate, piece.height - piece.thickness),
             (piece.coating and piece.coating.material, piece.thickness),
@@ -108,10 +107,9 @@ def check_stiffness_bounds(run: Evidence) -> Iterator[Finding]:
                 flexibility[name] += thickness / (modulus * run.area)
     normal = run.value("normal_stiffness")
     shear = run.value("tangential_stiffness")
-    slack = {
-        name: EVALUATION_TOL * run.value(name) + STATED_ERROR_FACTOR * run.error(name)
-        for name in ("normal_stiffness", "tangential_stiffness")
-    }
+    slack = {}
+    for name in ("normal_stiffness", "tangential_stiffness"):
+        slack[name] = EVALUATION_TOL * run.value(name) + STATED_ERROR_FACTOR * run.error(name)
     upper = 1 / flexibility["column"]
     yield Finding(
         "normal_stiffness",

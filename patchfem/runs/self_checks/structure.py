@@ -46,12 +46,11 @@ def check_modes(run: Evidence) -> Iterator[Finding]:
         and structure.get("measured", "free") == "free"
     ):
         masses = [parse_scene_number(mass) for mass in structure["masses"]]
-        trace = sum(
-            parse_scene_number(spring["stiffness"]) / masses[place - 1]
-            for spring in structure.get("spring", ())
-            for place in spring["between"]
-            if place
-        )
+        terms = []
+        for spring in structure.get("spring", ()):
+            stiffness = parse_scene_number(spring["stiffness"])
+            terms += [stiffness / masses[place - 1] for place in spring["between"] if place]
+        trace = sum(terms)
         found = float(np.sum(rig.modes.omega**2))
         yield Finding(
             "the sum of the squares of the natural frequencies",

@@ -210,13 +210,15 @@ def compute_wear(
         )
         raise PatchfemError(text, "wear")
     clock = perf_counter()
+    patch_model = model.patch
+    n_cycles = model.wear.cycles
     motion = _SlipPathFunction(model, patch)
     problem = WearProblem(
-        make_contact_force_function(model.patch, patch.pair),
+        make_contact_force_function(patch_model, patch.pair),
         motion,
-        nodal_areas(model.patch, patch.pieces.interface),
+        nodal_areas(patch_model, patch.pieces.interface),
         model.wear.coefficient,
-        model.wear.cycles,
+        n_cycles,
     )
     stop_reason = ""
     try:
@@ -225,35 +227,33 @@ def compute_wear(
             state, moments = _make_initial_state(model, patch, problem, motion)
         else:
             state, moments = initial
-            patch = solve_patch_contact(model.patch, patch.pair, frozen_array(state.depth))
+            patch = solve_patch_contact(patch_model, patch.pair, frozen_array(state.depth))
     except _UnboundedMotion as reason:
         worn = tuple(mesh and _add_earlier_wear(model, mesh) for mesh in coarse)
         stop_reason = f"nothing was worn: {reason}"
         seconds = perf_counter() - clock
         return WornPatch(patch, worn, None, (), (), None, 0.0, seconds, stop_reason)
-    while state.cycle < model.wear.cycles and find_worn_through_coating(model, state.depth) is None:
+    while state.cycle < n_cycles and find_worn_through_coating(model, state.depth) is None:
         try:
             state = _take_next_jump(model, problem, state)
         except _UnboundedMotion as reason:
             stop_reason = (
-                f"wear was computed only up to cycle {state.cycle:.6g} of {model.wear.cycles:.6g}: "
-                f"{reason}"
+                f"wear was computed only up to cycle {state.cycle:.6g} of {n_cycles:.6g}: {reason}"
             )
             break
-        patch = solve_patch_contact(model.patch, patch.pair, frozen_array(state.depth))
+        patch = solve_patch_contact(patch_model, patch.pair, frozen_array(state.depth))
         moments = (*moments, _record_moment(patch, state, motion))
         if store is not None:
             store(state, moments)
         if progress is not None:
-            progress(state.cycle / model.wear.cycles)
-    replayed = [
-        _replay_wear(model.patch, model, patch, mesh, moments)
-        for mesh in coarse
-        if mesh is not None
-    ]
-    strips_model, _ = with_other_strip_count(model.patch)
+            progress(state.cycle / n_cycles)
+    replayed = []
+    for mesh in coarse:
+        if mesh is not None:
+            replayed.append(_replay_wear(patch_model, model, patch, mesh, moments))
+    strips_model, _ = with_other_strip_count(patch_model)
     stripped = None
-    if replayed and strips_model is not model.patch:
+    if replayed and strips_model is not patch_model:
         stripped = _replay_wear(strips_model, model, patch, patch, moments)
     return WornPatch(
         patch,
@@ -475,10 +475,9 @@ def _replay_wear(patch_model, model, patch, other_patch, moments) -> tuple:
         row_offsets = strips.strip_offsets(width, len(rows))
         return np.array([np.interp(offsets, row_offsets, column) for column in rows.T]).T
 
-    jumps = [
-        (after.cycle - before.cycle, interpolate_path(after.used))
-        for before, after in pairwise(moments)
-    ]
+    jumps = []
+    for before, after in pairwise(moments):
+        jumps.append((after.cycle - before.cycle, interpolate_path(after.used)))
     depth = replay_jumps(
         make_contact_force_function(patch_model, other_patch.pair),
         area,
@@ -563,10 +562,10 @@ def load_wear_state(path: Path, key: str) -> tuple:
                 fields[name] = float(value)
         state = WearState(**fields)
         columns = [arrays[f"moment_{name}"] for name in MOMENT_FIELDS]
-        moments = tuple(
-            WearMoment(float(row[0]), *row[1:-1], float(row[-1]), values)
-            for *row, values in zip(*columns, json.loads(str(arrays["values"])), strict=True)
-        )
+        moments = []
+        all_values = json.loads(str(arrays["values"]))
+        for cycle, *nodal_fields, miss, values in zip(*columns, all_values, strict=True):
+            moments.append(WearMoment(float(cycle), *nodal_fields, float(miss), values))
     except FileNotFoundError:
         raise make_missing_state_error(path) from None
     except PatchfemError:
@@ -576,4 +575,4 @@ def load_wear_state(path: Path, key: str) -> tuple:
             f"{path.parent.name}: the state saved there cannot be read ({error}); run without "
             "--resume"
         ) from None
-    return state, moments
+    return state, tuple(moments)

@@ -216,10 +216,9 @@ def _measure_patch_wear(model, evolved, motion: dict, *, estimate: bool = True) 
         evolved.frame_error + _relative_slip_error(motion) + _relative_slip_change(evolved, motion)
     )
     fine_values = _compute_worn_volume_and_depth(model.patch, evolved.patch, state.depth)
-    coarse = [
-        _compute_worn_volume_and_depth(model.patch, patch, depth)
-        for patch, depth in zip(evolved.coarse, evolved.depths)
-    ]
+    coarse = []
+    for patch, depth in zip(evolved.coarse, evolved.depths):
+        coarse.append(_compute_worn_volume_and_depth(model.patch, patch, depth))
     other_model, ratio = with_other_strip_count(model.patch)
     strips = fine_values
     if evolved.stripped:
@@ -318,10 +317,9 @@ def _warn_of_friction_table(model, evolved) -> list:
             f"{format_length(table.depth[-1], 3)}, and beyond that depth friction is taken as constant; extend the table "
             f"wear.friction to a depth of at least {format_length(depths[-1], 3)}"
         )
-    rows_passed = [
-        sum(before < row < after for row in table.depth) for before, after in pairwise(depths)
-    ]
-    n_passed = max(rows_passed, default=0)
+    n_passed = 0
+    for before, after in pairwise(depths):
+        n_passed = max(n_passed, sum(before < row < after for row in table.depth))
     if model.wear.jumps and n_passed > 1:
         warnings.append(
             f"one jump of the wear passes {n_passed} rows of the table wear.friction at once, so the values of some "

@@ -104,10 +104,8 @@ def solve_and_check(
         sentence = f"{example} for example, so all cases were computed by the exact engine"
         sentences = dict.fromkeys(exact_cases, sentence)
     else:
-        sentences = {
-            case: f"{measure} of this case, so this case was computed by the exact engine"
-            for case, measure in differing.items()
-        }
+        consequence = "of this case, so this case was computed by the exact engine"
+        sentences = {case: f"{measure} {consequence}" for case, measure in differing.items()}
     for case, sentence in sentences.items():
         results.notes[case] = [*results.notes.get(case, ()), counts + sentence]
     return CheckedCases(results, is_exact, reach)

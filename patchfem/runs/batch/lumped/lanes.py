@@ -29,7 +29,7 @@ from ....model.similar_models import SimilarModels, collect_columns, select_mode
 from ....scene.rules.accuracy import list_fixed_settings
 from ...rig.motion_warnings import note_on_creep
 from .. import one_by_one
-from ..case_results import CaseResults
+from ..case_results import CaseResults, solve_in_parts
 from . import lumped
 from .lane_check import solve_and_check
 from .lane_numbers import LANE_LAWS, LaneCases, make_cases
@@ -102,11 +102,7 @@ def group_models(models: Sequence) -> dict[tuple, list]:
 
 def solve(models: Sequence[Model], report=None) -> CaseResults:
     """Compute the case results of a group of models in lanes."""
-    results = CaseResults.blank(len(models))
-    for first in range(0, len(models), MAX_CASES_PER_CALL):
-        cases = range(first, min(first + MAX_CASES_PER_CALL, len(models)))
-        results.insert(cases, _solve_cases(select_models(models, cases), report))
-    return results
+    return solve_in_parts(models, MAX_CASES_PER_CALL, partial(_solve_cases, report=report))
 
 
 def _solve_cases(models: Sequence[Model], report) -> CaseResults:

@@ -87,13 +87,14 @@ def count_initial_merges(model) -> int:
 
 def make_case(model, n_merges: int = 0) -> Case:
     """Return a model with a single point as a case of the event-driven batch."""
+    load = model.point.load
     if is_rigid_law(model):
-        return Case(model, RigidElements(model, None, None).groups, 0.0, model.point.load)
-    element = make_law(model.friction, model.point.load).element(model.point.load)
+        return Case(model, RigidElements(model, None, None).groups, 0.0, load)
+    element = make_law(model.friction, load).element(load)
     group = convert_to_elements(element)
     for _ in range(n_merges):
         group = merge_elements(group)
-    return Case(model, (group,), 1e-3 * element.length, model.point.load)
+    return Case(model, (group,), 1e-3 * element.length, load)
 
 
 def simulate_models(models, cycles: int, window: int, report=None, n_merges: int = 0) -> Runs:

@@ -28,9 +28,7 @@ def refusal_reason(model: Model) -> str:
     return sheared.refusal_reason(model) or lanes.reason_in_accuracy_settings(model)
 
 
-def group_key(model: Model) -> tuple:
-    """Return a hashable key; models with equal keys can be computed in one kernel call."""
-    return sheared.group_key(model)
+group_key = sheared.group_key
 
 
 def solve(models: Sequence[Model], report=None) -> CaseResults:
@@ -53,10 +51,8 @@ def compute_motions(
     """
     fine = [case.fine.groups[0] for case in solved_cases]
     coarse = [case.coarse.groups[0] for case in solved_cases]
-    rates = [
-        lane_steps.relative_stick_rate(model, elements.stiffness.sum())
-        for model, elements in zip(models, fine)
-    ]
+    stiffnesses = [elements.stiffness.sum() for elements in fine]
+    rates = list(map(lane_steps.relative_stick_rate, models, stiffnesses))
     steps = lane_steps.steps_for_rates(rates, lane_steps.PATCH_STEPS)
     max_size = load(f"{march.LANES_PACKAGE}.rows_kernels").N_YIELDS - 1
     sizes = [max(a.stiffness.size, b.stiffness.size) for a, b in zip(fine, coarse)]
@@ -77,15 +73,15 @@ def compute_motions(
     if lane_cases := np.flatnonzero(fits).tolist():
         lane_models = [models[case] for case in lane_cases]
         lane_pressed = [solved_cases[case] for case in lane_cases]
-        contacts = [
-            _patch_contact_parameters([elements[case] for case in lane_cases], lane_pressed)
-            for elements in (fine, coarse)
-        ]
+        fine_contacts = _patch_contact_parameters([fine[case] for case in lane_cases], lane_pressed)
+        coarse_contacts = _patch_contact_parameters(
+            [coarse[case] for case in lane_cases], lane_pressed
+        )
         checked = lane_check.solve_and_check(
             lane_models,
             lane_numbers.LaneCases(
-                *lane_numbers.make_cases(lane_models, contacts[0]),
-                lane_numbers.make_cases(lane_models, contacts[1]),
+                *lane_numbers.make_cases(lane_models, fine_contacts),
+                lane_numbers.make_cases(lane_models, coarse_contacts),
             ),
             steps[lane_cases],
             lambda indices, is_check: solve_exactly([lane_cases[index] for index in indices]),
@@ -107,16 +103,12 @@ def compute_motions(
 
 def _patch_contact_parameters(element_groups: list, solved_cases: list) -> np.ndarray:
     """Return the contact parameters (m, n) of n patches, with tables of their backbone curves."""
-    rows = [
-        (
-            elements.limit,
-            elements.limit,
-            case.patch.pressure.load,
-            elements.stiffness.sum(),
-            elements.yield_displacement[-1],
-        )
-        for elements, case in zip(element_groups, solved_cases)
-    ]
+    rows = []
+    for elements, case in zip(element_groups, solved_cases):
+        load = case.patch.pressure.load
+        stiffness = elements.stiffness.sum()
+        last_yield = elements.yield_displacement[-1]
+        rows.append((elements.limit, elements.limit, load, stiffness, last_yield))
     tables = march.make_curve_tables(
         [(elements.stiffness, elements.yield_displacement) for elements in element_groups]
     )
