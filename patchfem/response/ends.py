@@ -34,9 +34,8 @@ def estimate_window_error(window: Response, period: float, offset: float) -> dic
     forces = window.extra.get("forces", window.force[:, None])
     step_works = (forces[1:] + forces[:-1]) / 2 * np.diff(slides, axis=0)
     if "lateral_slides" in window.extra:
-        lateral_forces, lateral_slides = (
-            window.extra[f"lateral_{name}"] for name in ("forces", "slides")
-        )
+        lateral_forces = window.extra["lateral_forces"]
+        lateral_slides = window.extra["lateral_slides"]
         step_works = step_works + (lateral_forces[1:] + lateral_forces[:-1]) / 2 * np.diff(
             lateral_slides, axis=0
         )

@@ -188,9 +188,10 @@ def merged_cell_errors(fine: dict, *coarse: dict) -> dict:
     """
     errors = coarser_errors(fine, *coarse, ratio=4.0, order=2.0)
     first_order_errors = coarser_errors(fine, *coarse, ratio=4.0, order=1.0)
-    return errors | {
-        name: first_order_errors[name] for name in errors if find_definition(name).sample_error
-    }
+    for name in errors:
+        if find_definition(name).sample_error:
+            errors[name] = first_order_errors[name]
+    return errors
 
 
 class FrictionScale(NamedTuple):

@@ -46,10 +46,9 @@ def add_substep_samples(window: Response, law: LuGre, load: float) -> Response:
         fields are unchanged.
     """
     substeps = divide_steps(window.time, window.slide, window.slide_rate)
-    time, slide, speed = (
-        np.append(first, inside.ravel())
-        for first, inside in zip((window.time[0], window.slide[0], window.slide_rate[0]), substeps)
-    )
+    first_values = (window.time[0], window.slide[0], window.slide_rate[0])
+    columns = (np.append(first, inside.ravel()) for first, inside in zip(first_values, substeps))
+    time, slide, speed = columns
     duration = np.diff(time)
     increment = np.diff(slide)
     mean_speed = np.divide(increment, duration, out=np.zeros_like(increment), where=duration > 0)

@@ -159,20 +159,12 @@ def largest_hysteresis(levels, name: str = AMPLITUDE_MEASURE) -> tuple | None:
     drives = np.array([level.drive for level in levels])
     highest = int(np.argmax(drives))
     decreasing_levels = {round(level.drive, 9): level for level in levels[highest + 1 :]}
-    pairs = [
-        (level, decreasing_levels[round(level.drive, 9)])
-        for level in levels[:highest]
-        if round(level.drive, 9) in decreasing_levels
-    ]
-    if not pairs:
-        return None
-    differences = [
-        (
-            abs(rising.values[name] - falling.values[name]),
-            rising.errors.get(name, 0.0) + falling.errors.get(name, 0.0),
-        )
-        for rising, falling in pairs
-    ]
-    return max(
-        (difference for difference in differences if np.isfinite(difference[0])), default=None
-    )
+    differences = []
+    for rising in levels[:highest]:
+        falling = decreasing_levels.get(round(rising.drive, 9))
+        if falling is not None:
+            difference = abs(rising.values[name] - falling.values[name])
+            if np.isfinite(difference):
+                error = rising.errors.get(name, 0.0) + falling.errors.get(name, 0.0)
+                differences.append((difference, error))
+    return max(differences, default=None)

@@ -6,6 +6,7 @@ interpolated by cubics. The force is not interpolated at a reversal if it may ch
 between two samples there.
 """
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -35,9 +36,8 @@ def cycle_spans(time, period: float) -> list:
     Cycles are counted from the end, so that an incomplete cycle at the start is omitted.
     """
     count = int((time[-1] - time[0]) / period * (1 + 1e-9) + 1e-6)
-    return [
-        (time[-1] - (count - k) * period, time[-1] - (count - k - 1) * period) for k in range(count)
-    ]
+    ends = [time[-1] - k * period for k in range(count, -1, -1)]
+    return list(pairwise(ends))
 
 
 def reversal_force_rule(model) -> str:
@@ -249,9 +249,9 @@ def mean_drift(time, slide, rate, period: float) -> float:
     cycles = (end - start) / period
     if cycles < 1.5:
         return float(slide[-1] - slide[0]) / max(cycles, 1e-9)
-    first, last = (
-        time_mean(time, slide, rate, begin, begin + period) for begin in (start, end - period)
-    )
+    first = time_mean(time, slide, rate, start, start + period)
+    last_begin = end - period
+    last = time_mean(time, slide, rate, last_begin, last_begin + period)
     return float(last - first) / (cycles - 1)
 
 

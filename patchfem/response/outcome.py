@@ -311,10 +311,9 @@ def is_still_loading(window, period: float, tolerance: float) -> bool:
     near = period * (1 + 1e-9)
     first = time <= time[0] + near
     last = time >= time[-1] - near
-    means = [
-        np.abs(np.trapezoid(forces[part], time[part], axis=0)) / period for part in (first, last)
-    ]
-    return bool(np.any(means[1] - means[0] > tolerance * largest_force))
+    first_mean = np.abs(np.trapezoid(forces[first], time[first], axis=0)) / period
+    last_mean = np.abs(np.trapezoid(forces[last], time[last], axis=0)) / period
+    return bool(np.any(last_mean - first_mean > tolerance * largest_force))
 
 
 def check_piece_length(

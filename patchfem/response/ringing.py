@@ -401,9 +401,10 @@ def _initial_guesses(time, value, forced, poles, residual) -> list:
     span = time[-1]
     line = _find_largest_line(time, residual)
     near = [w for w in line + np.linspace(-1.2, 1.2, 7) * 2 * np.pi / span if w > np.pi / span]
-    residuals = [
-        _fit_poles(time, value, forced, np.append(poles, (omega, 0.5 / span)))[1] for omega in near
-    ]
+    residuals = []
+    for omega in near:
+        candidate = np.append(poles, (omega, 0.5 / span))
+        residuals.append(_fit_poles(time, value, forced, candidate)[1])
     omega = near[int(np.argmin(residuals))] if near else line
     return [np.array([omega, decay / span]) for decay in (0.1, 2.0)]
 

@@ -777,9 +777,8 @@ def larger_term(name: str, values: dict):
 
 def set_final_floors(measures: dict, tolerance: float) -> dict:
     """Return measures with error floors raised for differences of much larger terms."""
-    values = {
-        name: measure.value for name, measure in measures.items() if measure.value is not None
-    }
+    values = {name: measure.value for name, measure in measures.items()}
+    values = {name: value for name, value in values.items() if value is not None}
     updated = dict(measures)
     for name in values:
         if remove_interface_number(name) in TABLE:

@@ -159,11 +159,9 @@ def select_last_cycle(spans, end: float, period: float) -> list:
     period : float
         Period of the drive [s].
     """
-    return [
-        (begin, stop)
-        for begin, stop in spans
-        if end - 2 * period <= begin < end - period and stop < end
-    ]
+    first = end - 2 * period
+    last = end - period
+    return [span for span in spans if first <= span[0] < last and span[1] < end]
 
 
 def measure_ringing_in_sticks(

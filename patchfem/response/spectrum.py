@@ -110,10 +110,9 @@ def odd_harmonics(window, drive) -> tuple:
     window: Response over complete cycles of a drive that ends as a sinusoid.
     """
     segment = [part for part in drive.segments if part.start < window.time[-1]][-1]
-    first, third = (
-        acceleration_harmonic(window.time, window.output, window.output_rate, n * segment.omega)
-        for n in (1, 3)
-    )
+    motion = (window.time, window.output, window.output_rate)
+    first = acceleration_harmonic(*motion, segment.omega)
+    third = acceleration_harmonic(*motion, 3 * segment.omega)
     # the Fourier coefficient of a sin(omega (t - start) + phase) is -i a exp(i (phase - omega start))
     if drive.moving:
         first += (
@@ -260,9 +259,7 @@ def _acceleration_harmonic_n(window, drive, n: int) -> complex:
 
     Integration by parts avoids an error due to jumps of the acceleration.
     """
-    displacement, rate = (
-        window.extra.get(name, default)
-        for name, default in (("sensor", window.output), ("sensor_rate", window.output_rate))
-    )
+    displacement = window.extra.get("sensor", window.output)
+    rate = window.extra.get("sensor_rate", window.output_rate)
     harmonic = acceleration_harmonic(window.time, displacement, rate, n * drive.omega)
     return harmonic - 1j * drive.acceleration if n == 1 and drive.moving else harmonic
