@@ -296,7 +296,7 @@ def rms(values) -> float:
 
 def bounds(wanted, values) -> list:
     """Return "low", "high" or "" for every value: whether it lies within a thousandth of its range from an end."""
-    u = make_search_space([one.low for one in wanted], [one.high for one in wanted]).unit(
+    u = make_search_space([one.low for one in wanted], [one.high for one in wanted]).to_unit_cube(
         np.asarray(values)
     )
     return [
