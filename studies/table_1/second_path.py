@@ -87,8 +87,8 @@ def main(starts: int = 8) -> dict:
         found = fit_path(name == "point", starts)
         seconds = time.process_time() - begin
         each = {
-            "model": found.score(found.logs, found.left_out_logs),
-            "constant": found.score(*found.nulls["constant"][:2]),
+            "model": found.compute_scores(found.logs, found.left_out_logs),
+            "constant": found.compute_scores(*found.nulls["constant"][:2]),
         }
         for what, scored in each.items():
             for part in ("fitted", "held_out"):
