@@ -215,7 +215,7 @@ def run_contents(
         for name, values in fields.items():
             if name == "status":
                 flags = {
-                    "long_name": "contact status; a node slips if its slip has changed since the previous frame",
+                    "long_name": "contact status: 0 open, 1 stick, 2 slip (FILES.md defines slip)",
                     "flag_meanings": "open stick slip",
                     "flag_values": np.array([0, 1, 2], np.int8),
                 }

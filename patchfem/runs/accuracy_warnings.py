@@ -133,7 +133,7 @@ def tolerance_warnings(context: AccuracyContext, coarse=(), static_patches=()) -
         ):
             from .patch import trace_split
 
-            element = longest_loaded_cell(context.patch.x, context.patch.active)
+            element = longest_loaded_cell(at_rest.patch.x, at_rest.patch.active)
             warnings += trace_split.advise_split(model.patch, element)
     if moving:
         warnings.append(

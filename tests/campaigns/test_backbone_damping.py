@@ -1,4 +1,4 @@
-"""Backbones of modes with negative, zero and positive damping, for each friction law and method."""
+"""Backbones of modes with negative, zero and positive damping, for two friction laws, by harmonic balance and decay."""
 
 from functools import cache
 

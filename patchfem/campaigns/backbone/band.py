@@ -4,8 +4,8 @@ The recommended curve is that of `balance` where it exists: a steady vibration i
 contains its numerical error, the curve of a ring-down (computed, or predicted by `ring_down`), the quasi-static curve,
 and the effect of the other modes that a force at a single place excites.
 
-The band at an amplitude does not depend on the other given amplitudes. Between amplitudes that are far apart beside
-the onset of slip, linear interpolation of the band is less accurate than the band itself.
+With an elastic contact the band at an amplitude does not depend on the other given amplitudes. Between amplitudes that
+are far apart beside the onset of slip, linear interpolation of the band is less accurate than the band itself.
 """
 
 from typing import NamedTuple

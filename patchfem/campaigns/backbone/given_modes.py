@@ -63,7 +63,7 @@ def prepare_model(build: Callable, modes: str | Iterable = "") -> PreparedModel:
         )
     if any(mode.slide is None for mode in given_modes):
         notes += _note_slides(len(given_modes), stiffness)
-        if len(given_modes) > 1:
+        if sum(mode.slide is None for mode in given_modes) > 1:
             notes += (ASSUMED_SIGNS_NOTE,)
     return PreparedModel(model, notes)
 

@@ -8,7 +8,8 @@ stiffens as the amplitude falls makes a ring-down faster.
 
 The damping ratio of a ring-down is the logarithmic decrement of one cycle, from three half cycles around
 the amplitude. E and L are therefore computed at free motions within these half cycles, whose width follows
-from the damping ratio itself. The prediction at an amplitude does not depend on the other given amplitudes.
+from the damping ratio itself. With an elastic contact the prediction at an amplitude does not depend on the
+other given amplitudes. With a rigid contact it is interpolated between them.
 """
 
 from collections.abc import Callable
@@ -179,12 +180,12 @@ def _interpolation_error(rows: _MotionRows) -> np.ndarray:
     with np.errstate(invalid="ignore", divide="ignore"):
         energy_slope = np.diff(rows.energy, axis=1) / steps
         loss_slope = np.diff(rows.loss, axis=1) / steps
-    width = steps.max(axis=1)
-    energy_error = np.abs(np.diff(energy_slope, axis=1)[:, 0]) * width / 4
-    loss_error = np.abs(np.diff(loss_slope, axis=1)[:, 0]) * width / 4
-    # The energy falls by this fraction in half a cycle.
-    fall = np.abs(energy_slope).max(axis=1) * width / N_SIDE_HALF_CYCLES
-    error = energy_error / fall + loss_error
+        width = steps.max(axis=1)
+        energy_error = np.abs(np.diff(energy_slope, axis=1)[:, 0]) * width / 4
+        loss_error = np.abs(np.diff(loss_slope, axis=1)[:, 0]) * width / 4
+        # The energy falls by this fraction in half a cycle.
+        fall = np.abs(energy_slope).max(axis=1) * width / N_SIDE_HALF_CYCLES
+        error = energy_error / fall + loss_error
     return np.where(np.isfinite(error), error, np.inf)
 
 

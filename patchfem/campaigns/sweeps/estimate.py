@@ -122,18 +122,22 @@ def _split_shared_seconds(plans: list) -> tuple[float, list]:
     """Split the CPU time [s] of planned cases into a common part and a part for each case.
 
     The time to start the program and to compute fields does not apply to a case of a sweep. Pieces
-    that are equal in all cases are condensed only once.
+    that are equal in all cases are condensed only once, and equal contacts are solved only once.
     """
     shared_seconds = 0.0
     excluded_stages = {"start", "code", "fields"}
     patches = [case_plan.model.patch for case_plan in plans]
     if None not in patches:
         # The import is local because sweeps of a point contact need no mesh.
+        from ...runs.patch.store import content_key
         from ...runs.patch.sweep_meshes import geometry_key
 
         if len({geometry_key(patch) for patch in patches}) == 1:
             excluded_stages.add("condensing")
             shared_seconds = max(case_plan.cost.times["condensing"] for case_plan in plans)
+        if len({content_key(patch) for patch in patches}) == 1:
+            excluded_stages.add("points")
+            shared_seconds += max(case_plan.cost.times.get("points", 0.0) for case_plan in plans)
     single_seconds = []
     for case_plan in plans:
         times = case_plan.cost.times

@@ -21,7 +21,7 @@ MEANINGS = {
     "stress in the cell, and E is the strain energy of both pieces; the squares of all cells "
     "add up to the square of the total error; large values show where the mesh is too coarse; "
     "the total error is only an estimate, not a bound on the error of the stress",
-    "status": "contact status; a node slips if its slip has changed since the previous frame",
+    "status": "contact status: 0 open, 1 stick, 2 slip (FILES.md defines slip)",
 }
 CODES = {
     "part": dict(enumerate(PARTS)),

@@ -211,13 +211,17 @@ def _describe_sizes(sizes: dict) -> str:
 def _describe_remarks(part: Comparison) -> list:
     """Describe edges that the ratios exclude, and a valley that only the second trace has."""
     out = []
-    if part.tracks.spans or part.flanks is not None:
-        out += [
+    width = part.tracks.sizes.get("width")
+    if width is not None and width.high is not None:
+        out.append(
             "The intervals of the ends and of the width of the track are those on these two traces; its mean width needs "
-            "traces at several places, for its ends may be ragged.",
+            "traces at several places, for its ends may be ragged."
+        )
+    if part.tracks.spans or part.flanks is not None:
+        out.append(
             "Amplitude and slope are computed without the edges of the track; their ratios are those of the track and its "
-            "surroundings together, and slopes contain the noise of the instrument.",
-        ]
+            "surroundings together, and slopes contain the noise of the instrument."
+        )
     if part.tracks.valley is not None:
         place, depth = part.tracks.valley
         out.append(
