@@ -1,4 +1,4 @@
-"""Matched grooves of two surfaces, whose flanks the load climbs.
+"""Matched sinusoidal grooves of two surfaces; the contact rides up their flanks as it slides.
 
 The height is z = A (1 - cos(k q - phase)) and the slope of the flank t = dz/dq = A k sin(k q - phase).
 
@@ -52,7 +52,7 @@ class Grooves:
         return self.amplitude * self.wave_number
 
     def after_wear(self, depth: float, upper_share: float) -> "Grooves | None":
-        """Return the grooves after wear of both pieces; None once they are flat.
+        """Return the grooves after wear of both pieces, or None if they have become flat.
 
         Both pieces carry the grooves. A point of a piece wears in proportion to its height above the valleys, so the
         piece keeps a cosine with the same valleys. Above the valleys it has the volume A per area, so a mean worn depth
@@ -113,7 +113,7 @@ class Grooves:
         return load * self.wave_number**2 * self.amplitude
 
     def max_force(self, load: float, friction: float) -> float:
-        """Return the largest tangential force N (A k + mu)/(1 - mu A k) [N], inf if the flank locks.
+        """Return the largest tangential force N (A k + mu)/(1 - mu A k) [N], or inf if the flanks lock.
 
         The steepest flank carries it under a load N [N]; `friction` is the coefficient mu [1].
         """
@@ -122,13 +122,13 @@ class Grooves:
         return load * (self.max_slope + friction) / (1 - friction * self.max_slope)
 
     def height_difference(self, q0, q1):
-        """Return the height difference [m] between q0 and q1 [m] without cancellation."""
+        """Return the height difference [m] between q0 and q1 [m], computed without cancellation."""
         half_difference = 0.5 * self.wave_number * (q1 - q0)
         mean_angle = 0.5 * self.wave_number * (q1 + q0) - self.phase
         return 2 * self.amplitude * np.sin(mean_angle) * np.sin(half_difference)
 
     def friction_loss(self, q0, q1, friction: float):
-        """Return the energy per vertical force [J/N] that friction dissipates from q0 to q1 [m].
+        """Return the energy [J/N] that friction dissipates from q0 to q1 [m], per vertical force.
 
         It is the integral of mu (1 + t^2)/(1 - mu t sgn dq) |dq|, for either direction.
 
@@ -192,7 +192,7 @@ class Grooves:
 
 
 def _integrate_sine_powers(start, end, count: int) -> list:
-    """Return the integrals of powers of the sine from start to end (k,) [rad] by recursion."""
+    """Integrate powers of the sine from start to end (k,) [rad] by a recursion formula."""
     integrals = [end - start, 2 * np.sin(0.5 * (end - start)) * np.sin(0.5 * (end + start))]
     for j in range(2, count):
         boundary = np.cos(start) * np.sin(start) ** (j - 1) - np.cos(end) * np.sin(end) ** (j - 1)

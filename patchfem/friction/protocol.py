@@ -1,4 +1,4 @@
-"""Protocol of a friction law: NumPy form for benches, `Element` for compiled engines.
+"""Interface of a friction law: NumPy methods for prescribed motions, `Element` for compiled solvers.
 
 A law under a pressure that changes along the path or in time has these methods. None of them changes the state that it
 is given. No traction remains without pressure, and at rest no traction exceeds mu sigma.
@@ -19,7 +19,7 @@ import numpy as np
 
 
 class Step(NamedTuple):
-    """Result of a friction law for an increment of the relative displacement.
+    """Result of a friction law for one increment of the relative displacement.
 
     - mean: path mean (m,) [Pa] of the traction, positive against slip to +x
     - dissipated: energy per area (m,) [J/m2], negative only if the law creates energy
@@ -52,7 +52,7 @@ class LastTraction:
         return np.zeros_like(sigma)
 
     def press(self, state, s0, s1) -> Step:
-        """Reduce the traction at rest to the friction limit under a new pressure.
+        """Reduce the traction at rest to the friction limit that holds after a change of the pressure.
 
         No energy is dissipated.
 
@@ -77,12 +77,12 @@ class LastTraction:
         return state
 
     def stored_energy(self, state):
-        """Return the elastic energy per area (m,) [J/m2], which is 0 for a law without a stretch."""
+        """Return the elastic energy per area (m,) [J/m2], which is 0 because the law has no elastic stretch."""
         return np.zeros_like(state)
 
 
 class Element(NamedTuple):
-    """Friction law of one contact in the form that compiled engines take.
+    """Friction law of one contact in the form that the compiled solvers take.
 
     - kernels: module of the compiled functions in this package
     - numbers, memory: parameters (k,), of which the first is reserved for the engines, and initial memory (l,)

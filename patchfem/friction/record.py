@@ -1,4 +1,4 @@
-"""Friction law objects from the keys of the table [friction] of a scene."""
+"""Construction of friction laws from the keys of the table [friction] of a scene."""
 
 from importlib import import_module
 from math import inf
@@ -8,7 +8,7 @@ from .protocol import SteadyLoop
 
 
 def make_law(friction, load: float = 1.0):
-    """Return the friction law that the keys of a [friction] table define completely.
+    """Return the friction law defined by the keys of a [friction] table, all of which must be given.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ def make_law(friction, load: float = 1.0):
 
 
 def stick_stiffness(friction, load: float) -> float:
-    """Return the tangential stiffness [N/m] of a friction law under a load [N] before slip.
+    """Return the tangential stiffness [N/m] of a friction law before slip, under a load [N].
 
     It is infinite for a law that sticks rigidly, and 0 for a law that creeps.
     """
@@ -41,7 +41,7 @@ def stick_stiffness(friction, load: float) -> float:
 
 
 def steady_loop(friction, load: float, amplitude: float) -> SteadyLoop | None:
-    """Return the steady friction loop of a law in closed form; None if it has no closed form.
+    """Return the steady friction loop of a law in closed form, or None if there is no closed form.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Partial slip of pressed pieces under a tangential displacement of the holders.
+"""Partial slip of pressed pieces whose holders undergo a relative tangential displacement.
 
 In: the tangential compliance C (m, m) and the friction limit (m,) [N] of every node. Out: a model of the
 shear force against the displacement, and the traction and the slip of every node.

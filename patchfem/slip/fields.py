@@ -1,4 +1,4 @@
-"""Shear modes of a patch, and traction and slip of its nodes in given states."""
+"""Shear modes of a patch, and the traction and slip at its nodes in given states."""
 
 from typing import NamedTuple
 
@@ -9,14 +9,14 @@ from .shear_modes import N_SHEAR_MODES, find_fewest_modes, find_sufficient_modes
 
 
 class ShearFields(NamedTuple):
-    """Traction (f, m) [Pa] and irreversible slip (f, m) [m] of the nodes in f states."""
+    """Traction (f, m) [Pa] and irreversible slip (f, m) [m] at m nodes in f states."""
 
     traction: np.ndarray
     local_slip: np.ndarray
 
 
 def element_fields(patch, elements, states, length: float) -> ShearFields:
-    """Recover the fields of a patch from the states of its Jenkins elements.
+    """Compute traction and slip at the nodes of a patch from the states of its Jenkins elements.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def element_fields(patch, elements, states, length: float) -> ShearFields:
 
 
 def point_fields(patch, law: Bonds, shear, states) -> ShearFields:
-    """Recover the fields of a patch from the states of its bond points.
+    """Compute traction and slip at the nodes of a patch from the states of its bond points.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def point_fields(patch, law: Bonds, shear, states) -> ShearFields:
 def bond_shear_modes(
     patch, law: Bonds, count: int | None, tolerance: float, *, fewest: bool = False, sigma=None
 ):
-    """Return the ShearModes of a pressed patch for a bond law.
+    """Return the ShearModes of a pressed patch whose nodes follow a bond law.
 
     The friction limit [N] of a node is mu_s sigma_n times its area. Its bonds are springs in series with the pieces.
 

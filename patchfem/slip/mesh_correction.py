@@ -1,4 +1,4 @@
-"""Correction of partial slip for the mesh: elements are spread over ranges of yield displacements.
+"""Correction of partial slip for the mesh size: each element is spread over a range of yield displacements.
 
 Slip starts where a contact carries least and proceeds from node to node. At a relative displacement below the first yield
 displacement, a mesh shows no slip, and neither does a mesh of half as many nodes. The joint, however, dissipates energy
@@ -24,7 +24,7 @@ EQUAL_YIELD_TOL = 1e-6
 
 
 class SpreadElements(NamedTuple):
-    """Stiffness [N/m] and increasing yield displacements [m] of parallel elements, (t,) each."""
+    """Stiffness [N/m] and increasing yield displacements [m] of t parallel elements, (t,) each."""
 
     stiffness: np.ndarray
     yield_displacement: np.ndarray

@@ -1,4 +1,4 @@
-"""Partial slip of a patch under a rigid displacement q of the holders, in two reduced forms.
+"""Partial slip of a patch under a rigid relative displacement q of the holders, in two reduced forms.
 
 Node i has the relative displacement q - sum_j C_ij f_j, with C the shear compliance of the pieces and f_j the friction
 force of node j. Both forms hold while the contact set does not change:
@@ -67,7 +67,7 @@ MAX_DECAY_EXPONENT = 700.0  # largest exponent in the law, which keeps the expon
 
 @dataclass(frozen=True, eq=False)
 class JenkinsSet:
-    """Parallel Jenkins elements, equivalent to nodes that yield at fixed forces.
+    """Parallel Jenkins elements that are equivalent to coupled nodes which yield at given forces.
 
     - stiffness, yield_displacement (t,): [N/m] and [m]; the sum of their products is the friction limit
     - points (a,): nodes of the contact set
@@ -116,7 +116,7 @@ class JenkinsSet:
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
-    """Modes of D^1/2 C D^1/2, most compliant first, and the backbones of any number of modes.
+    """Modes of D^1/2 C D^1/2, most compliant first, and the backbone for any number of modes.
 
     A backbone is the friction force on first loading as a function of the relative displacement.
 
@@ -144,7 +144,7 @@ class Spectrum:
 
     @cached_property
     def displacements(self) -> np.ndarray:
-        """Relative displacements [m] at which backbones are compared, denser at small values."""
+        """Relative displacements [m] at which backbones are compared; small values are spaced more densely."""
         if self.tangential is None:
             displacement = self.shape @ (self.compliance * (self.shape.T @ self.limit))
         else:
@@ -167,11 +167,11 @@ class Spectrum:
 
     @cached_property
     def cache(self) -> dict:
-        """Computed backbones by number of modes."""
+        """Backbones that have been computed, by number of modes."""
         return {}
 
     def backbone(self, count: int, shape=None, limit=None) -> np.ndarray:
-        """Return the friction force [N] of `count` modes at `displacements`.
+        """Compute the friction force [N] of the first `count` modes at `displacements`.
 
         Newton's method starts from the cached backbone with the largest number of modes up to `count`.
 
@@ -206,7 +206,7 @@ class Spectrum:
         return backbone.force
 
     def relative_difference(self, backbone, other) -> float:
-        """Return the largest difference of two backbones / friction limit.
+        """Return the largest difference between two backbones, divided by the friction limit.
 
         It is infinite if the bonds are too short for Newton's method to converge.
         """
@@ -231,7 +231,7 @@ class ShearModes:
 
     @cached_property
     def backbone_error(self) -> float:
-        """Largest error of the backbone / friction limit.
+        """Largest error of the backbone, divided by the friction limit.
 
         The reference has four times as many modes, and at least N_ERROR_MODES.
         """
@@ -242,7 +242,7 @@ class ShearModes:
 
 
 def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float = 0.0) -> JenkinsSet:
-    """Return the Jenkins elements equivalent to elastically coupled nodes with yield forces.
+    """Return Jenkins elements that are equivalent to elastically coupled nodes with given yield forces.
 
     Parameters
     ----------
@@ -320,7 +320,7 @@ class _YieldSequence(NamedTuple):
 
     @property
     def is_sorted(self) -> bool:
-        """Whether the yield displacements increase from the last node to the first.
+        """Return whether the yield displacements increase from the last node to the first.
 
         The order is then right.
         """
@@ -343,7 +343,7 @@ class _YieldOrder(NamedTuple):
 
 
 def _find_order(c: np.ndarray, force: np.ndarray) -> _YieldOrder:
-    """Find the order in which nodes of the compliance c (n, n) [m/N] yield at forces (n,) [N].
+    """Find the order in which nodes with compliance c (n, n) [m/N] yield at given forces (n,) [N].
 
     While the first m nodes of an order stick, the rates of their forces solve the leading block of c = L L'. The force
     rates that all nodes lose by the yield of the m-th node are thus the m-th row of L^-1 times (L^-1 1)_m, and the yield
@@ -371,13 +371,13 @@ def _find_order(c: np.ndarray, force: np.ndarray) -> _YieldOrder:
 
 
 def _divide_or_inf(numerator: np.ndarray, denominator: np.ndarray) -> np.ndarray:
-    """Return quotients, infinite where the denominator is not positive."""
+    """Return quotients, or inf where the denominator is not positive."""
     infinite = np.full(numerator.size, np.inf)
     return np.divide(numerator, denominator, out=infinite, where=denominator > 0)
 
 
 def _yield_sequence(c: np.ndarray, force: np.ndarray, order: np.ndarray) -> _YieldSequence:
-    """Return the yield displacements of nodes that yield in a given order.
+    """Return the yield displacements of nodes for an assumed order of yielding.
 
     c: (n, n) compliance [m/N]; force: (n,) yield forces [N].
     """
@@ -394,7 +394,7 @@ def _yield_sequence(c: np.ndarray, force: np.ndarray, order: np.ndarray) -> _Yie
 
 
 def _exchange_neighbours(sequence: _YieldSequence) -> _YieldSequence | None:
-    """Exchange neighbours until the yield displacements are sorted; None after MAX_EXCHANGES per node.
+    """Exchange neighbours until the yield displacements are sorted; return None if MAX_EXCHANGES per node do not suffice.
 
     An exchange changes the yields of these two nodes alone. L with two rows exchanged becomes lower triangular again by
     a rotation of two of its columns, which also rotates L^-1 1 and L' force.
@@ -435,7 +435,7 @@ def _exchange_neighbours(sequence: _YieldSequence) -> _YieldSequence | None:
 
 
 def _factorise(c: np.ndarray) -> np.ndarray:
-    """Return the lower Cholesky factor of c (n, n); PatchfemError if c is not positive definite."""
+    """Return the lower Cholesky factor of c (n, n); raise PatchfemError if c is not positive definite."""
     factor, fault = dpotrf(c.T, lower=1)
     if fault:
         raise PatchfemError(INDEFINITE_MESSAGE)
@@ -443,7 +443,7 @@ def _factorise(c: np.ndarray) -> np.ndarray:
 
 
 def _eliminate_points(c: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """Return the order of `_YieldOrder` by eliminating each node from the inverse of c when it yields.
+    """Find the order for `_YieldOrder`: eliminate each node from the inverse of c when it yields.
 
     This takes n^3 products in all.
     """
@@ -465,7 +465,7 @@ def _eliminate_points(c: np.ndarray, force: np.ndarray) -> np.ndarray:
 
 
 def scale_limits(elements: JenkinsSet, factor: float) -> JenkinsSet:
-    """Return elements whose yield forces are multiplied by a factor > 0, with the same stiffness."""
+    """Return elements with the same stiffness whose yield forces are multiplied by a factor > 0."""
     return replace(
         elements,
         yield_displacement=frozen_array(factor * elements.yield_displacement),
@@ -505,7 +505,7 @@ def shear_modes(
 def _make_spectrum(
     tangential, limit, bond_length: float, weakening: float, *, first_modes_only: bool = False
 ) -> Spectrum:
-    """Return the Spectrum of the nodes that carry load; parameters as in `shear_modes`.
+    """Return the Spectrum of the nodes that carry load; the parameters are as in `shear_modes`.
 
     first_modes_only: whether the N_REFERENCE_MODES most compliant modes are enough if there are many nodes.
     """
@@ -526,7 +526,7 @@ def _make_spectrum(
 
 
 def _all_modes(tangential, index, limit, length: float) -> Spectrum:
-    """Return the Spectrum with all modes of the nodes `index` (a,) with friction limits (a,) [N]."""
+    """Return the Spectrum with all modes of the nodes `index` (a,), whose friction limits are (a,) [N]."""
     points = frozen_array(index, np.int64)
     if np.ptp(tangential) == 0:
         # Rigid pieces in series with one spring have only one mode.
@@ -561,7 +561,7 @@ def _first_modes(tangential, index, limit, length: float) -> Spectrum | None:
 
 
 def _submatrix(tangential, index) -> np.ndarray:
-    """Return the compliance (a, a) between the nodes `index` (a,), a view if they are adjacent."""
+    """Return the compliance (a, a) between the nodes `index` (a,), as a view if they are adjacent."""
     if index[-1] - index[0] >= index.size:
         return tangential[np.ix_(index, index)]
     span = slice(index[0], index[-1] + 1)
@@ -569,7 +569,7 @@ def _submatrix(tangential, index) -> np.ndarray:
 
 
 class EigenPairs(NamedTuple):
-    """Largest eigenvalues (count,), eigenvectors (n, count) and largest norm of a residual."""
+    """Largest eigenvalues (count,), their eigenvectors (n, count) and the largest norm of a residual."""
 
     values: np.ndarray
     vectors: np.ndarray
@@ -626,7 +626,7 @@ def find_sufficient_modes(
     weakening: float = 1.0,
     max_modes: int = 64,
 ) -> ShearModes:
-    """Return the most compliant modes, in a number for which the backbone error meets a tolerance.
+    """Return as many of the most compliant modes as the backbone needs to meet a tolerance.
 
     The number of modes is doubled until it suffices. The pieces alone need four modes, a soft layer of asperities many.
 
@@ -659,7 +659,7 @@ def find_fewest_modes(
     weakening: float = 1.0,
     max_modes: int = 64,
 ) -> ShearModes:
-    """Return the smallest number of modes, at least two, whose backbone meets a tolerance.
+    """Return the smallest set of modes, at least two, whose backbone meets a tolerance.
 
     The reference has four times as many modes, and at least N_REFERENCE_MODES. The difference may be
     MODE_ERROR_FRACTION of the tolerance.
@@ -689,7 +689,7 @@ def find_fewest_modes(
 
 
 def comparison_mode_count(count: int) -> int:
-    """Return the number of modes of a second run that shows the error of `count` modes.
+    """Return the number of modes for a second run, which is compared to estimate the error of `count` modes.
 
     It is half as many. Of two or three modes of a symmetric patch only the first acts, so it is then four times as many.
     """
@@ -738,7 +738,7 @@ def find_fewest_gauss_points(modes: ShearModes, x: np.ndarray, tolerance: float)
 
 
 def modes_at_gauss_points(modes: ShearModes, x: np.ndarray, count: int) -> GaussModes:
-    """Return the modes at `count` Gauss points of the rule weighted by the friction limit.
+    """Return the modes at `count` points of the Gauss rule whose weight is the friction limit.
 
     Parameters
     ----------
@@ -764,7 +764,7 @@ def modes_at_gauss_points(modes: ShearModes, x: np.ndarray, count: int) -> Gauss
 
 
 def gauss_rule(x: np.ndarray, weight: np.ndarray, count: int) -> tuple:
-    """Return positions and weights (count,) of the Gauss rule for a weighted sum over points.
+    """Return positions and weights (count,) of the Gauss rule for a weighted sum over given points.
 
     The rule is exact for polynomials up to the degree 2 count - 1. It follows from Lanczos' method, in which each vector
     is made orthogonal to all previous ones.
@@ -799,14 +799,14 @@ def gauss_rule(x: np.ndarray, weight: np.ndarray, count: int) -> tuple:
 
 
 class _Backbone(NamedTuple):
-    """Force (k,) [N] at k displacements, NaN if not converged, and modal coordinates (k, r)."""
+    """Friction force (k,) [N] at k displacements (NaN if not converged), and modal coordinates (k, r)."""
 
     force: np.ndarray
     coordinates: np.ndarray
 
 
 def _solve_backbone(limit, shape, compliance, length, displacements, start) -> _Backbone:
-    """Compute the friction force on first loading at relative displacements (k,) by Newton's method.
+    """Solve for the friction force on first loading at relative displacements (k,) by Newton's method.
 
     A node with the local displacement xi carries D (1 - exp(-xi/length)). The modal coordinates `start` (k, r) are the
     initial guess and are overwritten. No step moves a node back by more than MAX_BACKWARD_LENGTHS lengths, because the

@@ -1,4 +1,4 @@
-"""Worn depth of two pieces that slide on each other, over many cycles.
+"""Worn depth of two pieces that slide on each other for many cycles.
 
 In: contact forces of the worn pieces, slip path of every interface point in one cycle, wear coefficient. Out: the depth
 that wear adds to the gap. Archard's law is dh = kappa p ds, its energy form dh = alpha tau ds, for both pieces

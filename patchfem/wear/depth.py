@@ -1,4 +1,4 @@
-"""Worn depth over one jump of many cycles, solved together with the contact pressure.
+"""Worn depth after one jump over many cycles, solved together with the contact pressure.
 
 Archard's law: a node that slips over the path s per cycle under the force f on its area A wears by kappa s f/A per cycle.
 Where a node wears fast it loses pressure, within a time that falls with the length of a cell. A long explicit step would
@@ -15,7 +15,7 @@ STAGE_COEFFICIENT = 1 - np.sqrt(0.5)
 
 
 def wear_rates(coefficient: float, path, area) -> np.ndarray:
-    """Return the depth per force and cycle at the nodes of an interface.
+    """Return the worn depth per force and cycle at the nodes of an interface.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def wear_rates(coefficient: float, path, area) -> np.ndarray:
 
 
 def solve_jump(press: Callable, depth, rate, cycles: float) -> tuple:
-    """Return worn depth and contact forces after a jump over many cycles.
+    """Return the worn depth and the contact forces after a jump over many cycles.
 
     The method is the singly diagonally implicit Runge-Kutta method of two stages and order two (Alexander, SIAM J.
     Numer. Anal. 14, 1006, 1977). The worn volume is the sum of rate times cycles times area times force over the nodes,

@@ -1,4 +1,4 @@
-"""Jumps over many cycles of wear, of equal length or as long as the tolerance allows."""
+"""Jumps over many cycles of wear, either of equal length or as long as the tolerance allows."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -47,7 +47,7 @@ class WearProblem:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class WearState:
-    """State of a wear run.
+    """State of a wear computation after a number of cycles.
 
     - cycle: number of cycles since the start
     - depth, force: worn depth (m,) [m] and contact forces (m,) [N]
@@ -71,7 +71,7 @@ class WearState:
 
     @property
     def error(self) -> float:
-        """Error [m] of the worn depth that is due to the length of the jumps.
+        """Error [m] of the worn depth caused by the finite length of the jumps.
 
         It is the change of the depth when all jumps are halved, plus `path_error`.
         """
@@ -113,7 +113,7 @@ def take_jump(
     count: int | None = None,
     until: float = np.inf,
 ) -> WearState:
-    """Return the state after the next jump.
+    """Return the wear state after the next jump.
 
     A jump is solved as a whole and in two halves, and the halves are kept. A third of the difference is the error: of
     the depth relative to the largest depth, and of the contact forces relative to the load. The slip path is
@@ -165,7 +165,7 @@ def _correct_path(
     length: float,
     tolerance: float,
 ) -> tuple:
-    """Repeat a jump with the mean slip path of both ends; return the state and error / tolerance."""
+    """Repeat a jump with the mean of the slip paths at both ends; return the state and error / tolerance."""
     path = problem.path(after.depth)
     if path is state.path:
         return after, error
@@ -188,7 +188,7 @@ def _correct_path(
 def _take_halves(
     problem: WearProblem, state: WearState, path, length: float, tolerance: float
 ) -> tuple:
-    """Take a jump in two halves at a constant slip path; return the state and error / tolerance."""
+    """Take a jump in two halves with a constant slip path; return the state and error / tolerance."""
     rate = wear_rates(problem.coefficient, path, problem.area)
     coarse, coarse_force = solve_jump(problem.press, state.depth, rate, length)
     half, _ = solve_jump(problem.press, state.depth, rate, length / 2)
@@ -216,7 +216,7 @@ def _take_halves(
 
 
 def replay_jumps(press: Callable, area, coefficient: float, jumps, depth) -> np.ndarray:
-    """Return the worn depth on other nodes after the jumps of an earlier run.
+    """Compute the worn depth on other nodes by repeating the jumps of an earlier computation.
 
     Parameters
     ----------

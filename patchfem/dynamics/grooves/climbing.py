@@ -143,7 +143,8 @@ class FlankModel:
     """
 
     __slots__ = ()
-    # A climbing contact has no other elements, and the compiled loop treats the load as constant.
+    # A contact on the flanks of grooves has no further friction elements, and the compiled loop
+    # treats the load as constant.
     joints = ()
     laws = ()
     loading = ""

@@ -1,4 +1,4 @@
-"""Sum over bonds of eq. 2.17, and its engines.
+"""Friction law as a sum over bonds (eq. 2.17), and the algorithms that evaluate the sum.
 
 In: bond parameters, relative displacement and pressure. Out: traction and energies. Read `parameters`, then
 `recursion`, which is exact for reading="stretch" with p = 1, then `quadrature`, the direct sum for every order and

@@ -1,4 +1,4 @@
-"""Choice of the engine that sums eq. 2.17, and of its settings, by tolerance and cost.
+"""Choice of the algorithm (engine) that sums eq. 2.17, and of its settings, by tolerance and cost.
 
 The recursion is exact for reading="stretch" with p = 1. The list of strips (`list_kernels`) sums every law. It has two
 settings: the fraction of the friction limit that its cut-off may lose, and the width up to which it merges strips. The
@@ -48,7 +48,7 @@ MAX_MERGE_WIDTH = 0.02  # largest merge width in bond lengths
 
 @dataclass(frozen=True, slots=True)
 class EngineChoice:
-    """Engine that sums the bonds of eq. 2.17, with its settings, cost and error bound.
+    """Algorithm (engine) that sums the bonds of eq. 2.17, with its settings, cost and error bound.
 
     - engine: name of the engine
     - tail: fraction of the friction limit that the cut-off may lose
@@ -66,11 +66,11 @@ class EngineChoice:
     seconds: float
 
     def reach(self, order: float) -> float:
-        """Return the age [bond lengths] beyond which bonds are dropped; inf if none are dropped."""
+        """Return the age [bond lengths] beyond which bonds are dropped, or inf if none are dropped."""
         return cutoff_age(order, self.tail) if self.tail > 0 else inf
 
     def describe(self) -> str:
-        """Describe engine, list length, cost per step, settings and error bound in one line."""
+        """Describe engine, list length, cost per step, settings and error bound in one line of text."""
         if self.engine == "recursion":
             return f"recursion, exact, computing time {1e6 * self.seconds:.2g} us per time step"
         parts = [
@@ -85,7 +85,7 @@ class EngineChoice:
 
 
 def unsupported_reason(engine: str, reading: str, order: float) -> str:
-    """Return why an engine cannot sum a law, and which engine can.
+    """Return a sentence that states why an engine cannot sum a law, and which engine can.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def unsupported_reason(engine: str, reading: str, order: float) -> str:
 
 
 class RequestedEngine(NamedTuple):
-    """Engine and settings that a scene prescribes.
+    """Engine, and its settings, that a scene prescribes.
 
     - name: name of the engine, or "auto"
     - tail: fraction of the friction limit that the cut-off may lose, None if it is not prescribed
@@ -124,7 +124,7 @@ def choose_engine(
     steps: float,
     requested: RequestedEngine | None = None,
 ) -> EngineChoice:
-    """Choose the cheapest engine whose error bound meets a tenth of the tolerance.
+    """Choose the cheapest engine whose error bound is at most a tenth of the tolerance.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ def choose_engine(
 
 
 def _merge_error_factor(law: Bonds) -> float:
-    """Return the error bound of merging, divided by the square of the merge width."""
+    """Return the bound of the error caused by merging strips, divided by the merge width squared."""
     form = sum_form(law)
     if form == FORM_REPORT_GROWING:
         return MERGE_ERROR_REPORT_GROWING
@@ -185,7 +185,7 @@ def _merge_error_factor(law: Bonds) -> float:
 def _estimate(
     law: Bonds, name: str, tail: float, merge: float, stroke: float, steps: float
 ) -> EngineChoice:
-    """Estimate length, cost and error of a list with given settings; 0 switches a setting off."""
+    """Estimate length, cost and error of a bond list with given settings; a setting of 0 is switched off."""
     increment = stroke / max(steps, 1)
     strips = _estimate_strip_count(law, tail, merge, stroke, increment)
     seconds_per_strip = cost_model.STRIP_SECONDS[int(sum_form(law))]
@@ -208,7 +208,7 @@ def _estimate(
 def _estimate_strip_count(
     law: Bonds, tail: float, merge: float, stroke: float, increment: float
 ) -> float:
-    """Estimate the number of strips in a list, for strokes and increments in bond lengths."""
+    """Estimate the number of strips in a bond list; stroke and increment are in bond lengths."""
     form = sum_form(law)
     reach = cutoff_age(law.order, tail) if tail > 0 else MAX_DAMAGE
     strips = min(reach, MAX_DAMAGE) / max(increment, 1e-12) * max(1.0, increment / MAX_STRIP_LENGTH)

@@ -1,4 +1,4 @@
-"""Arrays of a compiled list of bonds: law, path state, status, table (see `list_rows_kernels`)."""
+"""Arrays of a compiled bond list: law, path state, status and table (see `list_rows_kernels`)."""
 
 from math import ceil, gamma
 
@@ -24,14 +24,14 @@ UNMERGED_CAPACITY = 20_000  # initial capacity, in strips, of a list whose strip
 
 
 def sum_form(law: Bonds) -> float:
-    """Return the form of the sum over bonds that a law needs, see `list_rows_kernels`."""
+    """Return the code of the formula by which a law is summed over bonds (see `list_rows_kernels`)."""
     if law.reading == "stretch":
         return FORM_MOMENTS if law.order == 1 else FORM_POWER
     return FORM_REPORT_GROWING if law.has_growth else FORM_REPORT
 
 
 def cutoff_age(order: float, tail: float) -> float:
-    """Return the age R/eps [1] beyond which bonds carry a negligible part of the friction limit.
+    """Return the age R/eps [1] beyond which bonds contribute a negligible fraction of the friction limit.
 
     It solves Q(p + 1, R/eps) = tail, with Q the regularised upper incomplete gamma function and p > -1.
     """
@@ -75,7 +75,7 @@ def law_numbers(law: Bonds, reach: float, merge: float, half_width: float = 0.0)
 
 
 def _jacobi_rule(power: float) -> np.ndarray:
-    """Return Gauss-Jacobi points in (0, 1), then their weights, for the weight t^power."""
+    """Return Gauss-Jacobi points in (0, 1) for the weight t^power, followed by their weights."""
     from scipy.special import roots_jacobi
 
     x, weights = roots_jacobi(N_JACOBI_POINTS, 0.0, power)
@@ -83,7 +83,7 @@ def _jacobi_rule(power: float) -> np.ndarray:
 
 
 def make_status(capacity: int, count: int | None = None) -> np.ndarray:
-    """Return the status of an empty list that can hold `capacity` strips.
+    """Return the status array of an empty list that can hold `capacity` strips.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def make_path_state(law: Bonds) -> np.ndarray:
 
 
 def gamma_table(law: Bonds) -> np.ndarray:
-    """Return P(p + 1, x) (k,) at multiples x of 1/32 for `list_math_kernels.interpolate_gammainc`.
+    """Tabulate P(p + 1, x) (k,) at multiples x of 1/32 for `list_math_kernels.interpolate_gammainc`.
 
     The table is empty if P has a closed form. It ends at x = 60 + 4 p, where P is 1 to the last digit.
     """
@@ -124,7 +124,7 @@ def gamma_table(law: Bonds) -> np.ndarray:
 
 
 def list_capacity(law: Bonds, reach: float, merge: float) -> int:
-    """Return the number of strips for which a bond list needs memory.
+    """Return the number of strips for which memory is allocated in a bond list.
 
     Parameters
     ----------

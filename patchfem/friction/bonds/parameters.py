@@ -15,7 +15,7 @@ MAX_LINEAR_GROWTH = 1e-9  # largest growth J of a step along which the growth is
 
 @dataclass(frozen=True, slots=True)
 class Bonds:
-    """Parameters of the bonds of the nonlocal friction law (eqs. 2.10 to 2.17).
+    """Parameters of the bonds in the nonlocal friction law (eqs. 2.10 to 2.17).
 
     - static: friction coefficient mu_s
     - length: bond length eps_0 [m]
@@ -44,12 +44,12 @@ class Bonds:
 
     @property
     def has_growth(self) -> bool:
-        """Whether the bond length changes by eq. 2.10; else it is eps_0."""
+        """Return whether the bond length changes by eq. 2.10; otherwise it is always eps_0."""
         return self.rest_growth is not None
 
 
 class ElasticSplit(NamedTuple):
-    """Elastic and damaging part of an increment [m], and the play [1] after it."""
+    """Elastic and damaging part of a displacement increment [m], and the play [1] after the increment."""
 
     elastic: float
     damaging: float
@@ -57,7 +57,7 @@ class ElasticSplit(NamedTuple):
 
 
 def grown_fraction(growth, back):
-    """Return the fraction of the growth of a bond that precedes a position within a step.
+    """Return the fraction of a bond's growth in a step that occurs before a given position in the step.
 
     The speed is constant in the step.
 
@@ -77,7 +77,7 @@ def grown_fraction(growth, back):
 
 
 def growth_path_ratio(law: Bonds, speed: float) -> float:
-    """Return the growth path of a new bond (eq. 2.10) divided by its steady length (eq. 2.11) at a speed [m/s].
+    """Return the slip distance over which a new bond grows (eq. 2.10) / its steady length (eq. 2.11) at a speed [m/s].
 
     With this ratio a, the friction for reading="report" is mu (eps/eps_0) G(a; p). Eqs. 2.18 to 2.21 hold for small a,
     within 1.5 % up to 0.1 for p = 0 and 1; for a above 1 the friction itself vanishes.
@@ -91,7 +91,7 @@ def growth_path_ratio(law: Bonds, speed: float) -> float:
 
 
 def split_elastic(law: Bonds, play, increment, eps) -> ElasticSplit:
-    """Split an increment of displacement into an elastic and a damaging part (play operator).
+    """Split a displacement increment into an elastic and a damaging part (play operator).
 
     Source: Visintin, Differential Models of Hysteresis, 1994.
 
@@ -119,14 +119,14 @@ def split_elastic(law: Bonds, play, increment, eps) -> ElasticSplit:
 
 
 def _integrate_slowness(speed: float, min_speed: float) -> float:
-    """Return the integral of 1/max(|v|, min_speed) over v from 0 to the speed."""
+    """Integrate 1/max(|v|, min_speed) over v from 0 to the given speed."""
     if abs(speed) < min_speed:
         return speed / min_speed
     return np.sign(speed) * (1 + log(abs(speed) / min_speed))
 
 
 def growth_exponents(law: Bonds, v0: float, v1: float, increment: float, dt: float) -> tuple:
-    """Integrate a_s/max(|v|, v_h) and |v|/l_k over a step, exactly for a linear velocity.
+    """Integrate a_s/max(|v|, v_h) and |v|/l_k over a step; the result is exact for a linear velocity.
 
     Parameters
     ----------

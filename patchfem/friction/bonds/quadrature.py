@@ -1,4 +1,4 @@
-"""Direct sum over all bonds on the path of a point (eq. 2.17), on a line or in a plane.
+"""Direct sum over all bonds along the path of a point (eq. 2.17), on a line or in a plane.
 
 Each step of the path leaves one straight strip of bonds, which formed under the mean pressure of the step (`strips`). In
 rigid sliding all points have the same path, so a strip has scalars of the path and one pressure per point. A line is a
@@ -41,7 +41,7 @@ MIN_DROPPED = 64
 
 
 class _DamagingPart(NamedTuple):
-    """Part of an increment in which bonds form and break.
+    """Part of a displacement increment in which bonds form and break.
 
     - length: its length [m]
     - direction: its unit vector (d,)
@@ -61,7 +61,7 @@ class _StepIntegrals(NamedTuple):
 
 
 class _Release(NamedTuple):
-    """Change of the bonds of all points when the pressure changes at rest.
+    """Change of the bonds at all points when the pressure changes at rest.
 
     - kept: factor on the bonds of the strips, (k, m) or (m,)
     - formed: density (m,) [Pa] of an unstretched cohort that is added
@@ -73,7 +73,7 @@ class _Release(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Quadrature:
-    """Friction law that evaluates the sum over bonds (eq. 2.17) directly by quadrature.
+    """Friction law that evaluates the sum over bonds (eq. 2.17) by quadrature.
 
     - law: parameters of the bonds
     - tail: largest fraction of the friction limit that the cut-off may leave out; 0 keeps every bond
@@ -86,7 +86,7 @@ class Quadrature:
     tail: float = 1e-9
 
     def initial_state(self, sigma, directions: int = 1) -> Strips:
-        """Return unstretched, fully grown bonds of a given initial density.
+        """Return the initial state: unstretched and fully grown bonds of a given density.
 
         Parameters
         ----------
@@ -166,7 +166,7 @@ class Quadrature:
         return Step(_drop_single_axis(mean), dq @ mean - energy_gain, after)
 
     def _mean_from_moments(self, state: Strips, dq, sigma, dt: float) -> np.ndarray:
-        """Return the mean traction (d, m) [Pa] by the closed form of `recursion`."""
+        """Compute the mean traction (d, m) [Pa] by the closed form in `recursion`."""
         middle = self._middle_length(state, dq, dt)
         bonds = BondState(self._moments(state), middle, state.play)
         increment = dq[0] if len(dq) == 1 else dq
@@ -174,7 +174,7 @@ class Quadrature:
         return self.law.static / self.law.length * np.reshape(mean, (len(dq), -1))
 
     def _mean_from_energy(self, state: Strips, energy_gain, dq, s0, s1, dt: float) -> np.ndarray:
-        """Return the mean traction (d, m) [Pa] of an increment from its energy balance."""
+        """Compute the mean traction (d, m) [Pa] in an increment from the energy balance."""
         mean, dissipated = self._integrate_step(state, dq, s0, s1, dt)
         path, direction = length_and_direction(dq)
         along = (dissipated + energy_gain) / path
@@ -183,7 +183,7 @@ class Quadrature:
         return mean + direction[:, None] * (along - direction @ mean)
 
     def _integrate_step(self, state: Strips, dq, s0, s1, dt: float) -> _StepIntegrals:
-        """Integrate traction and dissipation over an increment by panels of Gauss points.
+        """Integrate traction and dissipation over an increment, divided into panels with Gauss points.
 
         The dissipation holds for reading="stretch", where damage takes the fraction dR/eps of the stored energy.
         """
@@ -219,7 +219,7 @@ class Quadrature:
         return _StepIntegrals(mean, dissipated)
 
     def press(self, state: Strips, s0, s1) -> Step:
-        """Change the pressure on resting bonds linearly.
+        """Change the pressure linearly while the points are at rest.
 
         For reading="report" a bond keeps the pressure at which it formed, and none forms at rest. For reading="stretch"
         and p = 1 the rule is that of `recursion.press_bonds`; with another order, the last-formed bonds are lost first.
@@ -251,7 +251,7 @@ class Quadrature:
         )
 
     def _release_by_moments(self, state: Strips, s0, s1) -> _Release:
-        """Return the change of the bonds at rest, computed from the closed-form solution for their moments.
+        """Compute the change of the bonds at rest from the closed-form solution for their moments.
 
         A negative density removes unstretched bonds.
         """
@@ -262,7 +262,7 @@ class Quadrature:
         return _Release(kept_fraction, density - kept_fraction * m)
 
     def _release_last_formed(self, state: Strips, s0, s1) -> _Release:
-        """Return the change of the bonds at rest; where the pressure falls, the last-formed bonds are lost first.
+        """Compute the change of the bonds at rest; if the pressure falls, the last-formed bonds break first.
 
         Bonds form unstretched where the pressure rises, or where the remaining ones would carry more than mu_s sigma.
         """
@@ -289,17 +289,17 @@ class Quadrature:
 
     @property
     def _has_moments(self) -> bool:
-        """Whether the sum can be computed from the moments m, z, s2 of `recursion`."""
+        """Return whether the sum can be computed from the moments m, z and s2 of `recursion`."""
         return self.law.order == 1 and self.law.reading == "stretch"
 
     def _moments(self, state: Strips) -> np.ndarray:
-        """Return m, z, s2 of `recursion` (d + 2, m)."""
+        """Return the moments m, z and s2 of `recursion` as an array (d + 2, m)."""
         moments = self._sums(state) * self.law.length
         moments[-1] *= 2
         return np.vstack([_sum_strips(state, surviving_density(state)[:, None]), moments])
 
     def advance(self, state: Strips, dq, s0, s1, dt: float, forming=None) -> Strips:
-        """Advance the bonds by an increment without computing traction and energy.
+        """Advance the bonds by an increment, but compute no traction and energy.
 
         This takes at most a tenth of the time of `step`.
 
@@ -350,13 +350,13 @@ class Quadrature:
         return _DamagingPart(abs(damaging), np.sign([damaging]), play)
 
     def _middle_length(self, state: Strips, dq, dt: float) -> float:
-        """Return the bond length [m] in the middle of an increment, which new bonds have."""
+        """Return the bond length [m] in the middle of an increment, which is assigned to new bonds."""
         half = length_and_direction(dq)[0] / 2
         speed = 2 * half / dt if dt > 0 else 0.0
         return grow(self.law, state.now.mature_length, speed, speed, half, dt / 2)
 
     def _drop_old_strips(self, state: Strips) -> Strips:
-        """Remove the strips beyond the cut-off once they are at least half of all strips."""
+        """Remove the strips older than the cut-off age once they are at least half of all strips."""
         if self.tail <= 0:
             return state
         if self.law.reading == "stretch":
@@ -384,36 +384,36 @@ class Quadrature:
         return strip_weights(state, self.law)
 
     def _sums(self, state: Strips) -> np.ndarray:
-        """Return traction / mu_s [Pa] and stored energy / mu_s [J/m2], (d + 1, m)."""
+        """Return traction / mu_s [Pa] and stored energy / mu_s [J/m2] as an array (d + 1, m)."""
         return _sum_strips(state, self.weights(state))
 
     def traction(self, state: Strips) -> np.ndarray:
-        """Return the traction [Pa], positive against slip: (m,) along a line, (2, m) in a plane."""
+        """Return the traction [Pa], positive against slip: (m,) on a line, (2, m) in a plane."""
         return self.law.static * _drop_single_axis(self._sums(state)[:-1])
 
     def stored_energy(self, state: Strips) -> np.ndarray:
-        """Return the elastic energy per area (m,) [J/m2] at the present damage."""
+        """Return the elastic energy per area (m,) [J/m2] with the present damage of the bonds."""
         return self.law.static * self._sums(state)[-1]
 
 
 @cache
 def _gauss_points() -> tuple:
-    """Return the Gauss points in (-1, 1) and the weights of a panel."""
+    """Return the Gauss points of a panel in (-1, 1), and their weights."""
     return np.polynomial.legendre.leggauss(N_POINTS)
 
 
 def _active_pressure(state: Strips) -> np.ndarray:
-    """Return the pressure (k, m) [Pa] at which bonds formed, 0 where they no longer act."""
+    """Return the pressure (k, m) [Pa] at which bonds formed, or 0 for bonds that no longer act."""
     if not state.first_active.any():
         return state.pressure
     return state.pressure * (np.arange(len(state.pressure))[:, None] >= state.first_active)
 
 
 def _sum_strips(state: Strips, weights) -> np.ndarray:
-    """Sum weights (k, c) times the pressures of the bonds that still act, (c, m)."""
+    """Sum products of weights (k, c) and pressures over the strips of bonds that still act, (c, m)."""
     return weights.T @ _active_pressure(state)
 
 
 def _drop_single_axis(vectors):
-    """Return vectors (d, m) as an array (m,) along a line, unchanged in a plane."""
+    """Return vectors (d, m) as an array (m,) if d = 1 (motion on a line), and unchanged if d = 2."""
     return vectors[0] if len(vectors) == 1 else vectors

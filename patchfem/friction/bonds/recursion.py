@@ -1,4 +1,4 @@
-"""Bond law for friction.reading = "stretch" and p = 1, summed exactly by moments, on a line or in a plane.
+"""Bond law for friction.reading = "stretch" and p = 1, summed exactly by its moments, on a line or in a plane.
 
 With k = exp(-int dR/eps) the surviving fraction of a bond, u its stretch and 1/eps frozen when it forms, the sums over
 all bonds
@@ -44,7 +44,7 @@ MIN_DIVISOR = 1e-300  # smallest divisor; it keeps quotients finite where no bon
 
 
 class BondState(NamedTuple):
-    """State of the bonds of all points.
+    """State of the bonds at all points.
 
     - bonds: m [Pa], the components of z [Pa m] and s2 [Pa m2], (d + 2, m)
     - eps: bond length [m], common or per point (m,)
@@ -68,7 +68,7 @@ class ShapeFunctions(NamedTuple):
 
 
 class PowerIntegrals(NamedTuple):
-    """Integrals from 0 to x of y exp(-y) and y^2 exp(-y), and the integral of the second one over x."""
+    """Integrals of y exp(-y) and y^2 exp(-y) from 0 to x, and the integral of the second one over x."""
 
     first: np.ndarray
     second: np.ndarray
@@ -76,7 +76,7 @@ class PowerIntegrals(NamedTuple):
 
 
 class LineIncrement(NamedTuple):
-    """Increment along a line.
+    """Displacement increment along a line.
 
     - bonds: bonds (3, m) after it
     - mean, slope: path-mean z (m,) [Pa m] and its derivative over the increment (m,) [Pa]
@@ -90,7 +90,7 @@ class LineIncrement(NamedTuple):
 
 
 class BondIncrement(NamedTuple):
-    """Increment along a line or in a plane: as in `LineIncrement`, and the play after it."""
+    """Displacement increment on a line or in a plane: as in `LineIncrement`, and the play after it."""
 
     bonds: np.ndarray
     mean: np.ndarray
@@ -99,7 +99,7 @@ class BondIncrement(NamedTuple):
 
 
 def shape_functions(x) -> ShapeFunctions:
-    """Return the shape functions of paths x >= 0 of any shape, without cancellation."""
+    """Compute the shape functions at paths x >= 0 (array of any shape) without cancellation."""
     x = np.asarray(x, float)
     is_small = x < MAX_SERIES_PATH
     safe = np.where(is_small, 1.0, x)
@@ -114,7 +114,7 @@ def shape_functions(x) -> ShapeFunctions:
 
 
 def integrate_powers(x, decay) -> PowerIntegrals:
-    """Return the integrals of y exp(-y) and y^2 exp(-y) for x >= 0 and decay = exp(-x)."""
+    """Integrate y exp(-y) and y^2 exp(-y) from 0 to x >= 0, given decay = exp(-x)."""
     series = sum((-1) ** k * x**k / (factorial(k) * (k + 4)) for k in range(13))
     closed = 6 - decay * (x**3 + 3 * x * x + 6 * x + 6)
     cubic = np.where(x < MAX_POWER_SERIES_PATH, x**4 * series, closed)
@@ -123,7 +123,7 @@ def integrate_powers(x, decay) -> PowerIntegrals:
 
 
 def length_and_direction(increment) -> tuple:
-    """Return the length [m] and the unit vector (d,) of an increment (d,) [m]; 0 if it is zero."""
+    """Return the length [m] and unit vector (d,) of an increment (d,) [m]; the vector is 0 if the length is 0."""
     path = float(abs(increment[0]) if len(increment) == 1 else np.hypot(*increment))
     if path > 0:
         return path, np.asarray(increment, float) / path
@@ -131,7 +131,7 @@ def length_and_direction(increment) -> tuple:
 
 
 def advance_bonds(bonds, increment, sigma, eps) -> LineIncrement:
-    """Advance bonds by an increment along a line.
+    """Advance the bonds by an increment along a line.
 
     Parameters
     ----------
@@ -172,13 +172,13 @@ def advance_bonds(bonds, increment, sigma, eps) -> LineIncrement:
 
 
 def stretch_bonds(bonds, increment):
-    """Stretch all bonds (3, m) by an increment [m] along a line; none breaks or forms."""
+    """Stretch all bonds (3, m) by an increment [m] along a line; no bond breaks or forms."""
     m, z, s2 = bonds
     return np.stack([m, z + m * increment, s2 + increment * (2 * z + m * increment)])
 
 
 def move_bonds(law: Bonds, state: BondState, increment, sigma, eps) -> BondIncrement:
-    """Advance bonds by an increment along a line or in a plane.
+    """Advance the bonds by an increment along a line or in a plane.
 
     Along a line the elastic range of the law comes first. In a plane the part of z along the increment moves as on a
     line, and the part across it decays.
@@ -222,7 +222,7 @@ def move_bonds(law: Bonds, state: BondState, increment, sigma, eps) -> BondIncre
 
 
 def press_bonds(law: Bonds, bonds, s0, s1):
-    """Return the bonds after a change of the pressure at rest; the stored energy never rises.
+    """Return the bonds after the pressure has changed at rest; the stored energy never increases.
 
     Where the pressure falls, bonds without stretch are released first, as long as m >= z^2/s2; beyond that all
     stretches shrink. Where it rises, unstressed bonds of density m_0 (s1 - s0) form.
@@ -254,7 +254,7 @@ def press_bonds(law: Bonds, bonds, s0, s1):
 
 
 def refuse_directions(law: Bonds, directions: int) -> None:
-    """Raise PatchfemError for a law with breakaway in a plane, where it is not defined."""
+    """Raise PatchfemError if a law with breakaway is used in a plane, where it is not defined."""
     if directions > 1 and law.breakaway:
         raise PatchfemError(describe_unsupported("breakaway in two directions", "elastic range"))
 
@@ -318,7 +318,7 @@ class FirstOrderBonds:
         )
 
     def press(self, state: BondState, s0, s1) -> Step:
-        """Change the pressure on resting bonds linearly, by the rule of `press_bonds`.
+        """Change the pressure linearly while the points are at rest, by the rule in `press_bonds`.
 
         Energy that is no longer stored is lost.
 
@@ -339,7 +339,7 @@ class FirstOrderBonds:
         return Step(scale * bonds[1], released, state._replace(bonds=bonds))
 
     def traction(self, state: BondState):
-        """Return the traction mu_s z/eps_0 [Pa], positive against slip: (m,) or, in a plane, (2, m)."""
+        """Return the traction mu_s z/eps_0 [Pa], positive against slip: (m,) on a line, (2, m) in a plane."""
         z = state.bonds[1] if len(state.bonds) == 3 else state.bonds[1:-1]
         return self.law.static / self.law.length * z
 

@@ -1,4 +1,4 @@
-"""Fraction of the weight of a bond (report, 2.15) that a pad of finite width carries.
+"""Fraction of a bond's force (report, 2.15) that a pad of finite width carries.
 
 A bond strip spreads its force over W(eta/rho)/rho = exp(-eta^2/(2 rho^2))/(sqrt(2 pi) rho) across the path. Of a pad of
 width b only points on the pad carry it, so the resultant keeps E = (1/b) int_0^b int_0^b W((y - y1)/rho)/rho dy dy1.
@@ -9,7 +9,7 @@ from math import erf, expm1, pi, sqrt
 
 
 def carried_fraction(width: float, spread: float) -> float:
-    """Return the fraction of the friction force that a pad of finite width carries.
+    """Return the fraction of the friction force that acts on a pad of finite width.
 
     E = erf(x/sqrt 2) - sqrt(2/pi) (1 - exp(-x^2/2))/x [1] with x = b/rho, for a pad of width b [m] and a spread rho [m] of
     the bonds; the pressure is uniform across the path.

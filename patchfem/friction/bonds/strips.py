@@ -30,15 +30,14 @@ from scipy.special import gammainc, gammaln, roots_jacobi
 
 from .parameters import Bonds, grown_fraction
 
-N_GAUSS_POINTS = 8  # number of Gauss points of a piece
+N_GAUSS_POINTS = 8  # number of Gauss points on each piece of a strip
 MAX_PIECE_LENGTH = 0.25  # largest length of a piece in bond lengths
 # Largest number of pieces of a strip due to growth, with one piece per unit of J
 MAX_GROWTH_PIECES = 16
 FULL_GROWTH = 36.0  # growth J from which the starting length of a bond does not matter
 # Largest displacement of an unstressed cohort since it formed, relative to the path since then
 UNSTRESSED_TOL = 1e-14
-# Largest distance of the point u = 0 from a cut that counts as lying at u = 0, relative to the
-# length of the strip
+# A cut that is closer to u = 0 than this fraction of the strip length is treated as lying at u = 0
 REVERSAL_TOL = 1e-9
 # Smallest length of a piece, relative to the length of the part that is divided
 MIN_PIECE_FRACTION = 1e-15
@@ -46,7 +45,7 @@ MIN_POSITIVE = 1e-300  # smallest argument of a logarithm and smallest divisor
 
 
 class PathState(NamedTuple):
-    """State of the path at a point: scalars and (d,), or of k points: (k,) and (k, d).
+    """State of the path at one point (scalars and (d,) vectors) or at k points ((k,) and (k, d) arrays).
 
     - displacement: relative displacement [m] along the d = 1 or 2 directions
     - path: total path [m]
@@ -63,7 +62,7 @@ class PathState(NamedTuple):
 
 
 class Strip(NamedTuple):
-    """Straight strip of bonds, or k strips with arrays whose first axis is (k,).
+    """Straight strip of bonds, or k strips as arrays whose first axis has length k.
 
     - end: state of the path at the end of the strip
     - direction, length: unit vector (d,) and length [m]
@@ -81,12 +80,12 @@ class Strip(NamedTuple):
     mature_gain: np.ndarray
 
     def select(self, index) -> "Strip":
-        """Return the strips at an index, mask or slice."""
+        """Return the strips that an index, mask or slice selects."""
         end = PathState(*(column[index] for column in self.end))
         return Strip(end, *(column[index] for column in self[1:]))
 
     def append(self, strip: "Strip") -> "Strip":
-        """Return the strips with a further strip at the end."""
+        """Return the strips with one more strip at the end."""
         pairs = zip((*self.end, *self[1:]), (*strip.end, *strip[1:]))
         columns = [np.concatenate([old, np.asarray(new, float)[None]]) for old, new in pairs]
         n_end = len(PathState._fields)
@@ -95,7 +94,7 @@ class Strip(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Strips:
-    """Bonds along a path, in k strips.
+    """Bonds along a path, grouped into k strips.
 
     - strips: columns of the strips; the first strip is the cohort of the initial bonds
     - pressure (k, m): pressure [Pa] at which the bonds of each point formed; of a cohort its density times this pressure
@@ -114,14 +113,14 @@ class Strips:
 
 
 class _StretchComponents(NamedTuple):
-    """Stretch at the end of strips (k,) [m]: component along the strip, distance from its line."""
+    """Bond stretch at the end of strips (k,) [m]: component along the strip, distance from its line."""
 
     along: np.ndarray
     across: np.ndarray
 
 
 class _StripParts(NamedTuple):
-    """Parts of strips within which the stretch does not change its sign.
+    """Parts of strips in each of which the stretch has a constant sign.
 
     - strip: index of the strip
     - start, length: distance of the part from the end of the strip, and length [m]
@@ -136,7 +135,7 @@ class _StripParts(NamedTuple):
 
 
 class _SingularityDistances(NamedTuple):
-    """Distances (n,) [m] of parts from points where the integrand is not smooth; inf if there are none.
+    """Distances (n,) [m] from parts to points where the integrand is not smooth, or inf if there are none.
 
     - nearest: distance of the part from the nearest point of any kind
     - origin: distance of R = 0 from the end of the strip
@@ -147,7 +146,7 @@ class _SingularityDistances(NamedTuple):
 
 
 class _IntegrationPieces(NamedTuple):
-    """Pieces of strips, each with one Gauss rule (n,).
+    """Pieces of strips, each integrated by one Gauss rule (n,).
 
     - strip: index of the strip
     - start, length: distance of the piece from the end of the strip, and length [m]
@@ -168,7 +167,7 @@ class _GaussRule(NamedTuple):
 
 
 def surviving_density(state: Strips) -> np.ndarray:
-    """Return the density of surviving bonds / pressure at formation (k,), for friction.reading = "stretch".
+    """Return the density of surviving bonds / pressure at formation (k,) for friction.reading = "stretch".
 
     A cohort keeps exp(-D), and a strip this times 1 - exp(-length/eps), with D the damage since its end.
     """
@@ -179,7 +178,7 @@ def surviving_density(state: Strips) -> np.ndarray:
 
 
 def strip_weights(state: Strips, law: Bonds) -> np.ndarray:
-    """Return the force and the stored energy of each strip per mu_s sigma_n (eq. 2.17).
+    """Return the force and the stored energy of each strip, divided by mu_s sigma_n (eq. 2.17).
 
     Parameters
     ----------
@@ -210,7 +209,7 @@ def strip_weights(state: Strips, law: Bonds) -> np.ndarray:
 
 
 def _vector_norms(vectors) -> np.ndarray:
-    """Return the lengths (...) of vectors (..., d)."""
+    """Return the norms (...) of vectors (..., d)."""
     if vectors.shape[-1] == 1:
         return np.abs(vectors[..., 0])
     return np.sqrt((vectors * vectors).sum(axis=-1))
@@ -224,18 +223,18 @@ def _resolve_stretch(strips: Strip, path_state: PathState) -> _StretchComponents
 
 
 def _weight_function(law: Bonds, x, damage) -> np.ndarray:
-    """Return x^p exp(-damage)/Gamma(p + 1), the weight phi of eq. 2.14 if damage = x."""
+    """Return x^p exp(-damage)/Gamma(p + 1), which is the weight phi in eq. 2.14 if damage = x."""
     log_x = np.log(np.maximum(x, MIN_POSITIVE))
     return np.exp(law.order * log_x - damage - gammaln(law.order + 1))
 
 
 def _work_to_energy_ratio(law: Bonds) -> float:
-    """Return the ratio of force times stretch of a bond to its stored energy."""
+    """Return the ratio of force times stretch to stored energy for one bond."""
     return law.order + 1 if law.reading == "stretch" else 1.0
 
 
 def _cohort_weights(cohorts: Strip, path_state: PathState, law: Bonds) -> np.ndarray:
-    """Return force and energy of cohorts: (|u|/eps_0)^p exp(-D) or phi(R/eps_0), along u."""
+    """Return force and energy of bonds formed together: (|u|/eps_0)^p exp(-D) or phi(R/eps_0), along u."""
     stretch = path_state.displacement - cohorts.end.displacement
     size = _vector_norms(stretch)
     path = path_state.path - cohorts.end.path
@@ -270,7 +269,7 @@ def _linear_weights(strips: Strip, path_state: PathState, law: Bonds) -> np.ndar
 
 
 def _report_weights(strips: Strip, path_state: PathState, law: Bonds) -> np.ndarray:
-    """Integrate strips for friction.reading = "report" at a constant bond length in closed form.
+    """Integrate over strips in closed form for friction.reading = "report" and a constant bond length.
 
     The stretch is along the strips. The integrals are differences of P(p + 1, R/eps) and P(p + 2, R/eps), the
     regularised lower incomplete gamma function, on both sides of u = 0.
@@ -290,7 +289,7 @@ def _report_weights(strips: Strip, path_state: PathState, law: Bonds) -> np.ndar
 
 
 def _gauss_weights(strips: Strip, path_state: PathState, law: Bonds) -> np.ndarray:
-    """Integrate strips by Gauss points on the pieces of `_divide_strips`."""
+    """Integrate over strips by Gauss rules on the pieces from `_divide_strips`."""
     pieces = _divide_strips(strips, path_state, law)
     n_strips = len(strips.length)
     rule = _rules_of_pieces(pieces.steep_end, law.order)
@@ -305,7 +304,7 @@ def _gauss_weights(strips: Strip, path_state: PathState, law: Bonds) -> np.ndarr
 
 
 def _sum_points(strips: Strip, path_state: PathState, distance, weight, law: Bonds) -> np.ndarray:
-    """Sum force and energy over the weighted points of each strip.
+    """Sum force and energy over the weighted points in each strip.
 
     distance: distance (n, points) [m] of the points from the end of their strip; weight (n, points) [m].
     """
@@ -388,7 +387,7 @@ def _divide_strips(strips: Strip, path_state: PathState, law: Bonds) -> _Integra
 
 
 def _split_at_zero_stretch(strips: Strip, stretch: _StretchComponents) -> _StripParts:
-    """Split strips of bonds at the position of zero stretch."""
+    """Split strips of bonds at the position where the stretch is zero."""
     is_straight = stretch.across == 0
     cut = np.where(is_straight, np.clip(-stretch.along, 0.0, strips.length), 0.0)
     strip = np.tile(np.arange(cut.size), 2)
@@ -412,7 +411,7 @@ def _split_at_zero_stretch(strips: Strip, stretch: _StretchComponents) -> _Strip
 def _active_growth(
     strips: Strip, path_state: PathState, law: Bonds, parts: _StripParts
 ) -> np.ndarray:
-    """Return the growth J (n,) over parts, excluding that of fully grown bonds."""
+    """Return the growth J (n,) in parts of strips, excluding the growth of fully grown bonds."""
     if law.reading != "report":
         return np.zeros(parts.strip.size)
     remaining = FULL_GROWTH - (path_state.growth - strips.end.growth[parts.strip])
@@ -427,7 +426,7 @@ def _singularity_distances(
     stretch: _StretchComponents,
     parts: _StripParts,
 ) -> _SingularityDistances:
-    """Return the distances of parts from points where the integrand is not smooth.
+    """Return the distances from parts of strips to points where the integrand is not smooth.
 
     The point u = 0 at an end of a part does not count.
     """
@@ -453,14 +452,14 @@ def _legendre_rule() -> _GaussRule:
 
 @cache
 def _jacobi_rule(order: float) -> _GaussRule:
-    """Return the Gauss-Jacobi rule on (0, 1) for the weight t^order, with weights / t^order."""
+    """Return the Gauss-Jacobi rule on (0, 1) for the weight t^order, with weights divided by t^order."""
     x, weights = roots_jacobi(N_GAUSS_POINTS, 0.0, order)
     t = (1 + x) / 2
     return _GaussRule(t, weights / (2 ** (order + 1) * t**order))
 
 
 def _rules_of_pieces(steep_end, order: float) -> _GaussRule:
-    """Return the Gauss rules of the pieces into which strips are divided."""
+    """Return the Gauss rules for the pieces into which strips are divided."""
     legendre = _legendre_rule()
     jacobi = _jacobi_rule(order)
     steep_end = steep_end[:, None]
@@ -472,7 +471,7 @@ def _rules_of_pieces(steep_end, order: float) -> _GaussRule:
 def _subdivide_near_singularities(
     length: float, max_length: float, singular_points: list[complex]
 ) -> np.ndarray:
-    """Divide [0, length] into pieces not longer than their distance from the singular points.
+    """Divide [0, length] into pieces that are not longer than their distance from any singular point.
 
     The points are complex: position along the interval, and distance from its line. No piece is longer than
     `max_length`. Returns the ends (k,) of the pieces in increasing order.

@@ -1,4 +1,4 @@
-"""Growth of bonds on a warm surface (eq. 2.13), and frictional heating of the surface.
+"""Growth of bonds at an elevated surface temperature (eq. 2.13), and frictional heating of the surface.
 
 The report states a_s = a_0 exp(-T_a/T_s) and l_k = l_0 exp(T_l/T_s). Here both are referred to a temperature T_ref at
 which a_s and l_k are known, so that a surface at this temperature changes nothing:
@@ -21,7 +21,7 @@ MAX_EXP_ARGUMENT = 600.0
 
 
 class GrowthRates(NamedTuple):
-    """a_s [m s-2] and l_k [m] of eq. 2.10, floats or (m,)."""
+    """Growth parameters a_s [m s-2] and l_k [m] in eq. 2.10, as floats or arrays (m,)."""
 
     rest_growth: float | np.ndarray
     slip_growth: float | np.ndarray
@@ -35,7 +35,7 @@ def growth_at_temperature(
     rest_activation: float | None,
     slip_activation: float | None,
 ) -> GrowthRates:
-    """Return the growth rates at a surface temperature from those at a reference temperature.
+    """Convert the growth parameters at a reference temperature to those at a surface temperature.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def growth_at_temperature(
 
 
 def _scale_rate(name: str, value: float, exponent, key: str):
-    """Return a rate times exp(exponent); `name` and `key` are keys of the scene for messages."""
+    """Return a rate times exp(exponent); error messages cite the scene keys `name` and `key`."""
     total = np.log(value) + exponent
     limits = np.finfo(float)
     if not ((total < np.log(limits.max)) & (total > np.log(limits.tiny))).all():
@@ -93,7 +93,7 @@ def _scale_rate(name: str, value: float, exponent, key: str):
 def surface_temperature_rise(
     flux: float, time: float, conductivity: float, heat_capacity: float
 ) -> float:
-    """Return the temperature rise 2 q sqrt(t/(pi k rho c)) [K] of a half-space under a heat flux.
+    """Return the temperature rise 2 q sqrt(t/(pi k rho c)) [K] at the surface of a heated half-space.
 
     Source: Carslaw and Jaeger, section 2.9. Heat flows in one dimension, so it is an upper bound for a patch that is
     small compared with sqrt(k t/(rho c)).

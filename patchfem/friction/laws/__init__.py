@@ -1,1 +1,1 @@
-"""Friction laws, one per file; *_kernels modules hold their compiled forms."""
+"""Friction laws, one per file; the modules named *_kernels contain their compiled forms."""

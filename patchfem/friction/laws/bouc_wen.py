@@ -16,7 +16,7 @@ import numpy as np
 
 from ..protocol import Element, SteadyLoop
 
-N_GAUSS_POINTS = 20  # number of Gauss points of a piece
+N_GAUSS_POINTS = 20  # number of Gauss points on each piece of a half-loop
 N_INTEGRATION_PIECES = 10  # number of pieces for the integrals over a half-loop
 # Value of w = -ln(1 - y) from which 1 - y is below 1e-13 and dw/dx equals n to round-off
 MAX_W = 30.0
@@ -25,7 +25,7 @@ NEWTON_TOL = 1e-14  # largest change of w, relative to 1 + w, at which Newton's 
 
 
 class _HalfLoop(NamedTuple):
-    """Half of a steady Bouc-Wen loop, from -y to y.
+    """Half of a steady Bouc-Wen loop, between the states -y and y.
 
     - displacement: displacement [eps] of the stroke, and its derivative with respect to w
     - area: area [mu N eps] between loading and unloading
@@ -38,7 +38,7 @@ class _HalfLoop(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class BoucWen:
-    """Bouc-Wen law under a constant pressure; all points of a contact have the same z.
+    """Bouc-Wen law under a constant pressure; the state z is the same at all points of a contact.
 
     - static: mu [1]
     - length: eps [m]
@@ -51,7 +51,7 @@ class BoucWen:
     shape: float = 0.5
 
     def element(self, load: float) -> Element:
-        """Return the `protocol.Element` under a constant load [N], with limit mu N and length eps."""
+        """Return the `protocol.Element` under a constant load N [N], with limit mu N and bond length eps."""
         numbers = np.array([0.0, self.static * load, self.length, self.exponent, self.shape])
         return Element(
             "friction.laws.bouc_wen_kernels",
@@ -64,7 +64,7 @@ class BoucWen:
         )
 
     def _half_loop(self, w) -> _HalfLoop:
-        """Integrate the half-loop from -y to y, with w = -ln(1 - y) of any shape.
+        """Integrate the half-loop from -y to y, where w = -ln(1 - y) is an array of any shape.
 
         The area is the integral of v (1/(1 - v^n) - 1/(1 - (1 - 2 s) v^n)) from 0 to y.
         """
@@ -85,7 +85,7 @@ class BoucWen:
         return 1 / rate + np.exp(-w) / slope, y / rate * power * (1 - unloading) / slope
 
     def _loading_rate(self, w):
-        """Return dw/dx = (1 - y^n)/(1 - y) of w = -ln(1 - y), which is between 1 and n."""
+        """Return dw/dx = (1 - y^n)/(1 - y), where w = -ln(1 - y); its value is between 1 and n."""
         y = -np.expm1(-w)
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             log_y = np.where(w < 0.7, np.log(y), np.log1p(-np.exp(-w)))
@@ -95,9 +95,9 @@ class BoucWen:
 
 @cache
 def _gauss_rule() -> tuple:
-    """Return Gauss points and weights on (0, 1) after a substitution by the fourth root.
+    """Return Gauss points and weights on (0, 1) for the substitution x = r^4.
 
-    Fractional powers are smooth in that variable.
+    Fractional powers of x are smooth functions of r.
     """
     points, weights = np.polynomial.legendre.leggauss(N_GAUSS_POINTS)
     edges = np.linspace(0.0, 1.0, N_INTEGRATION_PIECES + 1)
@@ -139,7 +139,7 @@ def loop_from_keys(friction, load: float, amplitude) -> SteadyLoop:
 
 
 def from_keys(friction, load: float) -> BoucWen:
-    """Return the Bouc-Wen law of a [friction] table under a load N [N] of the whole contact.
+    """Return the Bouc-Wen law defined by a [friction] table, for a load N [N] on the whole contact.
 
     The bond length is mu N/stiffness; a load of 0 counts as 1 N.
     """

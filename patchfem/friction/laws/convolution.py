@@ -1,4 +1,4 @@
-"""Friction law with an average of the pressure behind each point; eq. 2.17 extends this law.
+"""Friction law that averages the pressure along the path behind each point; eq. 2.17 extends it.
 
 Source: Oden and Pires, J. Appl. Mech. 50, 67, 1983.
 
@@ -29,7 +29,7 @@ CUTOFF_WEIGHT = 1e-20
 
 
 class ConvolutionState(NamedTuple):
-    """State of the friction law with averaged pressure.
+    """State of the friction law that averages the pressure.
 
     - traction (m,): traction [Pa] of the last motion
     - displacement: relative displacement [m] since the start
@@ -42,7 +42,7 @@ class ConvolutionState(NamedTuple):
 
 
 class SlidingLimits(NamedTuple):
-    """Friction force / mu_s [N] of a rigid motion towards +x and towards -x, both >= 0."""
+    """Friction force / mu_s [N] in rigid sliding towards +x and towards -x, both >= 0."""
 
     forward: float
     backward: float
@@ -65,7 +65,7 @@ def _bond_gammainc(order: float, x):
 
 
 def _node_weights(positions, nodes, is_bare, length: float, order: float) -> np.ndarray:
-    """Return the weights (n, m) of the nodes in the averages at positions (n,), for motion to +x.
+    """Return the weights (n, m) of the nodes in the averages at positions (n,), for sliding towards +x.
 
     is_bare (m - 1,): whether a segment between two nodes has no pressure; nothing is averaged beyond it.
     """
@@ -91,7 +91,7 @@ def _node_weights(positions, nodes, is_bare, length: float, order: float) -> np.
 def average_pressure(
     positions, nodes, sigma, direction: float, length: float, order: float
 ) -> np.ndarray:
-    """Average the pressure behind positions with the weight phi, as in the equation of the module docstring.
+    """Average the pressure behind positions with the weight phi, by the equation in the module docstring.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def average_pressure(
 
 
 def sliding_limits(nodes, sigma, weight, length: float, order: float) -> SlidingLimits:
-    """Return the friction forces / mu_s of a rigid motion in both directions.
+    """Return the friction forces / mu_s in rigid sliding in both directions.
 
     They differ where the pressure is not symmetric: each lacks what its own trailing edge would carry.
 
@@ -152,7 +152,7 @@ def sliding_limits(nodes, sigma, weight, length: float, order: float) -> Sliding
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Convolution:
-    """Friction law whose traction follows from a weighted average of the pressure.
+    """Friction law whose traction is proportional to a weighted average of the pressure.
 
     - static, length, order: mu_s [1], eps [m] and p
     - nodes (m,): positions [m] of the points of the upper piece; None for a uniform pressure, whose average is the
@@ -172,7 +172,7 @@ class Convolution:
     has_force_at_rest: ClassVar[bool] = True  # the traction persists while the interface rests
 
     def initial_state(self, sigma) -> ConvolutionState:
-        """Return the state before any motion: no traction, under a pressure sigma (m,) [Pa]."""
+        """Return the state before any motion: zero traction, under a pressure sigma (m,) [Pa]."""
         return ConvolutionState(np.zeros_like(sigma), 0.0, 0.0)
 
     def limit_fraction(self, dq, dt):
@@ -180,7 +180,7 @@ class Convolution:
         return np.sign(dq)
 
     def limit(self, sigma, direction: float):
-        """Return the traction (m,) [Pa], >= 0, that resists a motion in a direction.
+        """Return the traction (m,) [Pa], >= 0, that resists sliding in a given direction.
 
         The pressure sigma (m,) [Pa] moves with the upper piece.
         """
@@ -217,7 +217,7 @@ class Convolution:
         return Step(mean, mean * dq, ConvolutionState(end, displacement, direction))
 
     def press(self, state: ConvolutionState, s0, s1) -> Step:
-        """Change the pressure at rest; a traction beyond the new limit is reduced to it.
+        """Change the pressure at rest; a traction above the new friction limit is reduced to this limit.
 
         Parameters
         ----------
@@ -239,7 +239,7 @@ class Convolution:
         return Step(traction, np.zeros_like(traction), after)
 
     def _average(self, displacement: float, sigma, direction: float):
-        """Return the average (m,) [Pa] of the pressure behind the points, 0 where sigma is 0."""
+        """Return the average (m,) [Pa] of the pressure behind the points, or 0 where sigma is 0."""
         if self.nodes is None:
             return sigma
         if self.lower_pressure is not None:

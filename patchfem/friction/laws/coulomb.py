@@ -1,4 +1,4 @@
-"""Coulomb friction under prescribed motion: the traction has the sign of the slip (eq. 2.1)."""
+"""Coulomb friction under prescribed motion: the sign of the traction is that of the slip (eq. 2.1)."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -10,7 +10,7 @@ from ..protocol import Element, LastTraction, Step
 
 @dataclass(frozen=True, slots=True)
 class Coulomb(LastTraction):
-    """Coulomb's law of kinetic friction; at rest the last traction persists.
+    """Coulomb's law of kinetic friction; at rest, the last traction is kept.
 
     - kinetic: coefficient mu_k of the motion
     - static: coefficient mu_s of the traction at the instant at which a rest ends, which does no work; None for mu_k
@@ -25,7 +25,7 @@ class Coulomb(LastTraction):
         return self.kinetic if self.static is None else self.static
 
     def element(self, load: float) -> Element:
-        """Return the Element under a constant load [N], with the static and the kinetic force.
+        """Return the Element under a constant load [N], with the static and kinetic friction force.
 
         It has no kernels, because a set-valued law has no slope.
         """
@@ -37,7 +37,7 @@ class Coulomb(LastTraction):
         return np.sign(dq)
 
     def limit(self, sigma, direction: float):
-        """Return the largest traction mu_k sigma (m,) [Pa] of a motion, equal for both directions."""
+        """Return the sliding traction mu_k sigma (m,) [Pa], which is equal in both directions."""
         return self.kinetic * sigma
 
     def step(self, state, dq: float, s0, s1, dt: float) -> Step:
@@ -66,7 +66,7 @@ class Coulomb(LastTraction):
         return Step(mean, mean * dq, self.kinetic * s1 * np.sign(dq))
 
     def breakaway_traction(self, sigma, direction: float):
-        """Return the traction mu_s sigma (m,) [Pa] at the instant at which a motion starts.
+        """Return the traction mu_s sigma (m,) [Pa] at the instant at which sliding starts.
 
         direction: sign of the motion.
         """
@@ -74,7 +74,7 @@ class Coulomb(LastTraction):
 
 
 def from_keys(friction, load: float) -> Coulomb:
-    """Return Coulomb's law of a [friction] table; load [N] is not used.
+    """Return Coulomb's law with the coefficients in a [friction] table; load [N] is not used.
 
     Without a kinetic coefficient the static one is used.
     """

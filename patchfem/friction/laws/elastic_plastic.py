@@ -12,7 +12,7 @@ from ..protocol import Element, SteadyLoop, Step
 
 @dataclass(frozen=True, slots=True)
 class ElasticPlastic:
-    """Law of eq. 3.12: springs of stiffness mu sigma/length that slip at mu sigma.
+    """Friction law of eq. 3.12: springs of stiffness mu sigma/length that slip at a traction mu sigma.
 
     An increase of the pressure adds unstretched springs. A decrease only lowers the limit; the springs beyond it break
     within one length of slip. So a change of the pressure creates no energy, and a force below the limit stays.
@@ -25,19 +25,19 @@ class ElasticPlastic:
     length: float
 
     def element(self, load: float) -> Element:
-        """Return the Element under a constant load [N]: a spring mu N/eps that slips at mu N."""
+        """Return the Element under a constant load N [N]: a spring mu N/eps that slips at the force mu N."""
         stiffness = self.static * load / self.length
         return parallel_element([stiffness], [self.length])._replace(length=self.length)
 
     def initial_state(self, sigma):
-        """Return the initial state: traction/mu and density of springs, (2, m) [Pa].
+        """Return the initial state (2, m) [Pa]: traction/mu, and density of the springs.
 
         The springs are unstretched, of the density of the pressure sigma (m,) [Pa].
         """
         return np.stack([np.zeros_like(sigma), sigma])
 
     def step(self, state, dq: float, s0, s1, dt: float) -> Step:
-        """Advance the elastic-plastic law by an increment under the mean pressure of the step.
+        """Advance the law by an increment at the mean pressure of the step.
 
         The traction is a ramp that is cut at mu sigma, whose path mean is exact.
 
@@ -69,7 +69,7 @@ class ElasticPlastic:
         return Step(self.static * mean, self.static * mean * dq - energy_gain, after)
 
     def press(self, state, s0, s1) -> Step:
-        """Change the pressure at rest; the energy of a stretch beyond the new limit is lost.
+        """Change the pressure at rest; energy of spring stretch beyond the new friction limit is lost.
 
         Parameters
         ----------
@@ -88,23 +88,23 @@ class ElasticPlastic:
         )
 
     def _limit_traction(self, state, sigma):
-        """Return traction/mu and density of springs under a changed pressure; 0 where the pressure is zero."""
+        """Return traction/mu and spring density after a pressure change, or 0 where the pressure is zero."""
         y, springs = state
         return np.clip(y, -sigma, sigma), np.where(sigma > 0, np.maximum(springs, sigma), 0.0)
 
     def traction(self, state):
-        """Return the traction (m,) [Pa] of a state, positive against slip to +x."""
+        """Return the traction (m,) [Pa] in a state, positive against slip to +x."""
         return self.static * state[0]
 
     def stored_energy(self, state):
-        """Return the elastic energy mu eps y^2/(2 density) (m,) [J/m2] of a state, y = traction/mu."""
+        """Return the elastic energy per area (m,) [J/m2], mu eps y^2/(2 density) with y = traction/mu."""
         y, springs = state
         energy = np.divide(y**2, 2 * springs, out=np.zeros_like(y), where=springs > 0)
         return self.static * self.length * energy
 
 
 def parallel_element(stiffness, yield_displacement) -> Element:
-    """Return the Element of parallel elastic-plastic elements (eq. 3.12, extended to reversals).
+    """Return one Element for parallel elastic-plastic elements (eq. 3.12, extended to reversals).
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ def parallel_element(stiffness, yield_displacement) -> Element:
 
 
 def masing_loop(stiffness, yield_displacement, amplitude) -> SteadyLoop:
-    """Return the steady loops of parallel elements.
+    """Return the steady loops of parallel elastic-plastic elements.
 
     At an amplitude u, an element has the force k min(u, w), and the area 4 k w (u - w) if it slips.
 
@@ -152,7 +152,7 @@ def masing_loop(stiffness, yield_displacement, amplitude) -> SteadyLoop:
 
 
 def loop_from_keys(friction, load: float, amplitude) -> SteadyLoop:
-    """Return the steady loop of the law of a [friction] table.
+    """Return the steady loop of the law that a [friction] table defines.
 
     Parameters
     ----------
@@ -171,5 +171,5 @@ def loop_from_keys(friction, load: float, amplitude) -> SteadyLoop:
 
 
 def from_keys(friction, load: float) -> ElasticPlastic:
-    """Return the elastic-plastic law of a [friction] table; load [N] is not used."""
+    """Return the elastic-plastic law that a [friction] table defines; load [N] is not used."""
     return ElasticPlastic(friction.static, friction.bond_length)

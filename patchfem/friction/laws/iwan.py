@@ -36,7 +36,7 @@ class Sliders(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Iwan:
-    """Iwan model of a contact as parallel sliders, per newton of normal load.
+    """Iwan model of a contact: parallel sliders, whose forces are per newton of normal load.
 
     - stiffness (t,): [1/m]
     - yield_displacement (t,): [m]
@@ -48,7 +48,7 @@ class Iwan:
     yield_displacement: np.ndarray
 
     def element(self, load: float) -> Element:
-        """Return the Element under a constant load [N]: the parallel elements of `elastic_plastic`."""
+        """Return the Element under a constant load [N]: the parallel elements from `elastic_plastic`."""
         return parallel_element(self.stiffness * load, self.yield_displacement)
 
 
@@ -71,7 +71,7 @@ def max_yield_displacement(force: float, stiffness: float, chi: float, beta: flo
 
 
 def slider_cells(force: float, stiffness: float, chi: float, beta: float) -> Sliders:
-    """Return the sliders that represent the cells of the power law, and the slider that yields last.
+    """Return sliders that represent the cells of the power law, followed by the slider that yields last.
 
     Each cell keeps the stiffness and the slip force of its part of the density, so the sums over all cells are exact, as
     is the force of first loading at every border of a cell. The width of the cells follows the square root of the
@@ -93,7 +93,7 @@ def slider_cells(force: float, stiffness: float, chi: float, beta: float) -> Sli
 
 @lru_cache(32)
 def _unit_sliders(chi: float, beta: float) -> Sliders:
-    """Return the `slider_cells` of unit stiffness and unit phi_max."""
+    """Return the `slider_cells` for a unit stiffness and phi_max = 1."""
     power_law_fraction = 1 / (1 + beta)
     log_min = np.log(MIN_CELL_RATIO)
     x = np.concatenate([[0.0], np.exp(np.linspace(log_min, 0.0, 20 * N_SLIDER_CELLS + 1))])
@@ -110,7 +110,7 @@ def _unit_sliders(chi: float, beta: float) -> Sliders:
 
 
 def from_keys(friction, load: float) -> Iwan:
-    """Return the Iwan law of a [friction] table under a load [N] of the whole contact.
+    """Return the Iwan law defined by a [friction] table, for a load N [N] on the whole contact.
 
     The stiffness [N/m] of the table is that under this load; a load of 0 counts as 1 N.
     """
@@ -119,7 +119,7 @@ def from_keys(friction, load: float) -> Iwan:
 
 
 def loop_from_keys(friction, load: float, amplitude) -> SteadyLoop:
-    """Return the steady loops of the continuous Iwan law, which has no cells, by Masing's rule.
+    """Return the steady loops of the continuous Iwan law (not divided into cells) by Masing's rule.
 
     The curve of first loading is Segalman's eq. 22.
 

@@ -16,7 +16,7 @@ from ..protocol import Element
 
 @dataclass(frozen=True, slots=True)
 class LuGre:
-    """LuGre law per newton of normal load; all points of a contact have the same z.
+    """LuGre law per newton of normal load; the state z is the same at all points of a contact.
 
     - static, kinetic: friction coefficients mu_s and mu_k
     - stiffness: [1/m]
@@ -50,7 +50,7 @@ class LuGre:
         )
 
     def limit(self, speed):
-        """Return the steady friction force divided by the load, g/N [1], at a speed [m/s].
+        """Return the steady friction force / load, g/N [1], at a speed [m/s].
 
         It is at least 1e-9 mu_s, because the rate of z divides by it.
         """
@@ -59,7 +59,7 @@ class LuGre:
 
 
 def from_keys(friction, load: float) -> LuGre:
-    """Return the LuGre law of a [friction] table under a load [N] of the whole contact.
+    """Return the LuGre law defined by a [friction] table, for a load N [N] on the whole contact.
 
     Stiffness and damping refer to this load.
 

@@ -1,4 +1,4 @@
-"""Points with the law `bonds.recursion` (eq. 2.17, reading="stretch", p = 1) as elements."""
+"""Elements for points with the bond law `bonds.recursion` (eq. 2.17, reading="stretch", p = 1)."""
 
 import numpy as np
 
@@ -30,7 +30,7 @@ def growth_numbers(law: Bonds) -> np.ndarray:
 
 
 def points_element(law: Bonds, area, sigma, pattern=None) -> Element:
-    """Return the element of points that all have the same relative displacement.
+    """Return the Element that combines points which all have the same relative displacement.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def _state_scales(law: Bonds) -> tuple | None:
 
 
 def unpack_bonds(element: Element, memory) -> np.ndarray:
-    """Return the state of the bonds that the memory of an element contains.
+    """Return the bond state that is stored in the memory of an element.
 
     Parameters
     ----------

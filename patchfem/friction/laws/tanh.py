@@ -1,4 +1,4 @@
-"""The rate law of eq. 2.4: friction depends on the slip velocity and carries no load at rest."""
+"""Rate law of eq. 2.4: friction depends on the slip velocity and is zero at rest."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -10,7 +10,7 @@ from ..protocol import Element, LastTraction, Step
 
 @dataclass(frozen=True, slots=True)
 class TanhLaw(LastTraction):
-    """Rate law tau = mu sigma tanh(v/v_0) (eq. 2.4) per point, at the mean velocity of a step.
+    """Rate law tau = mu sigma tanh(v/v_0) (eq. 2.4) at each point, for the mean velocity of a step.
 
     It never sticks: under a constant fraction f of the limit it creeps at v_0 atanh(f).
 
@@ -43,11 +43,11 @@ class TanhLaw(LastTraction):
         return np.where(np.greater(dt, 0), fraction, np.sign(dq))[()]
 
     def limit(self, sigma, direction: float):
-        """Return the largest traction mu sigma (m,) [Pa], equal for both directions."""
+        """Return the largest traction mu sigma (m,) [Pa], which is equal in both directions."""
         return self.static * sigma
 
     def step(self, state, dq: float, s0, s1, dt: float) -> Step:
-        """Advance the rate law by an increment at mean velocity and pressure; all work dissipates.
+        """Advance the rate law by an increment at mean velocity and pressure; all work is dissipated.
 
         Parameters
         ----------
@@ -70,5 +70,5 @@ class TanhLaw(LastTraction):
 
 
 def from_keys(friction, load: float) -> TanhLaw:
-    """Return the rate law of a [friction] table; load [N] is not used."""
+    """Return the rate law that a [friction] table defines; load [N] is not used."""
     return TanhLaw(friction.static, friction.reference_speed)
