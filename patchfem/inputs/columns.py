@@ -22,7 +22,7 @@ _NUMERIC_TEXT_PATTERN = re.compile(r"[0-9eE+.,\t -]*")
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Columns:
-    """Columns of a table; row i is on line i + 2 of the file, below the header on line 1.
+    """Columns of a table; row i is on line i + 2 of the file, because the header is on line 1.
 
     values: column -> (k,) in SI; labels: column that is not known as a number -> k strings; rows: k.
     """
@@ -70,7 +70,7 @@ def read_columns(path, table: TableFormat) -> Columns:
 
 
 def _iterate_row_blocks(path: Path, table: TableFormat) -> Iterator[list]:
-    """Yield the header, then blocks of rows without the blank lines at the end of the file."""
+    """Yield the header, then blocks of rows; blank lines at the end of the file are left out."""
     blank = []
     is_header = True
     for lines in read_line_blocks(path, table.contents, table.remedy):
@@ -87,7 +87,7 @@ def _iterate_row_blocks(path: Path, table: TableFormat) -> Iterator[list]:
 
 
 def _read_plain_block(lines: list, names: list, factors: dict) -> np.ndarray | None:
-    """Read rows that contain only numbers, in SI; return None if `_read_block` has to read them.
+    """Read rows that contain only numbers, in SI, or return None if `_read_block` has to read them.
 
     This path takes 0.3 us per row and a tenth of the memory of the other one.
     """

@@ -16,7 +16,7 @@ DAMAGE_ERRORS = (
     ValueError,  # includes UnicodeDecodeError
     LookupError,  # KeyError and IndexError
     OverflowError,
-    RuntimeError,  # from HDF5 and encrypted archives; includes NotImplementedError of zipfile
+    RuntimeError,  # raised by HDF5 and for encrypted archives; includes NotImplementedError of zipfile
     OSError,
     EOFError,
     struct.error,
@@ -27,7 +27,7 @@ DAMAGE_ERRORS = (
 
 @contextmanager
 def refuse_damage(message: str, remedy: str = "") -> Iterator[None]:
-    """Convert exceptions of code that reads a damaged file into a PatchfemError.
+    """Convert exceptions that are raised while a damaged file is read into a PatchfemError.
 
     Its message is `message`, the reason in brackets and `remedy`. Damaged bytes raise `DAMAGE_ERRORS`,
     or in pyuff a plain Exception.

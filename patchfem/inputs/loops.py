@@ -149,7 +149,7 @@ def find_standard_name(
 
 
 def _parse_label(text: str) -> float | str:
-    """Return a label as a number if it is one."""
+    """Return a label as a number if it is one, or else unchanged."""
     try:
         return float(text)
     except ValueError:

@@ -1,4 +1,4 @@
-"""Arrays of a MATLAB file of version 5 or later; the content decides on the version."""
+"""Arrays of a MATLAB file of version 5 or later; the version is found from the content."""
 
 import os
 

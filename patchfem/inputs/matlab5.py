@@ -87,7 +87,7 @@ _ENCODINGS = {
 
 
 class Array(NamedTuple):
-    """Value of a MATLAB variable, whose numbers are read on request.
+    """Value of a MATLAB variable, whose numbers are read only when they are needed.
 
     kind: "number", "sparse" or "text"; values(): full array of floats, or strings (k,); sparse(): sparse
     array of a sparse variable, None for others.
@@ -108,7 +108,7 @@ class _Element(NamedTuple):
 
 
 class _Variable(NamedTuple):
-    """Variable of a MATLAB file whose values are not read yet.
+    """Variable of a MATLAB file whose values have not been read yet.
 
     body: its bytes in the file; is_packed: whether they are compressed; kind: its class, with COMPLEX_FLAG
     if its numbers are complex; start: position of the values; size: bytes of the unpacked variable.
@@ -178,7 +178,7 @@ class _MatFile(NamedTuple):
         return _Variable(body, False, kind, shape, name.decode("latin-1"), offset, len(body))
 
     def check_header(self, variable: _Variable) -> _Variable | None:
-        """Check the shape and size of a variable; return None if its class cannot be read.
+        """Check the shape and size of a variable, or return None if its class cannot be read.
 
         Real, sparse, character, cell and structure arrays can be read. A variable that is too large raises
         PatchfemError.
@@ -238,7 +238,7 @@ class _MatFile(NamedTuple):
         name = variable.name[:40] if variable.name.isprintable() else "?"
 
         def read(convert: Callable):
-            """Unpack the variable and convert its data; refuse damaged ones."""
+            """Decompress the variable and convert its data; raise PatchfemError if they are damaged."""
             with refuse_damage(f"{self.path}: variable {name} is damaged", DAMAGE_REMEDY):
                 return convert(self.unpack(variable), variable)
 
@@ -375,7 +375,7 @@ def make_sparse_array(path, shape: tuple, reader: Callable) -> Array:
     """
 
     def read_full() -> np.ndarray:
-        """Read the matrix with all its zeros."""
+        """Read the matrix as a full array."""
         if prod(shape) > MAX_NUMBERS:
             raise PatchfemError(
                 f"{path}: a sparse variable of shape {shape}, more than {MAX_NUMBERS:.1e} numbers in "

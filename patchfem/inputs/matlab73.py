@@ -71,7 +71,7 @@ def _make_array(path, kind: str, shape: tuple, reader: Callable) -> Array:
     """Make an array whose values are read when they are first requested."""
 
     def read_values():
-        """Read the values; refuse damaged ones."""
+        """Read the values; raise PatchfemError if they are damaged."""
         with _refuse_damage(path):
             return reader()
 
@@ -79,7 +79,7 @@ def _make_array(path, kind: str, shape: tuple, reader: Callable) -> Array:
 
 
 def _read_dataset(path, dataset) -> Array | None:
-    """Return a real array, a string or a cell array of strings; None for other content."""
+    """Return a real array, a string or a cell array of strings, or None for other content."""
     if dataset.shape is None:
         return None
     kind = _read_matlab_class(dataset)
@@ -118,7 +118,7 @@ def _read_empty_array(path, dataset, kind: str) -> Array | None:
 
 
 def _read_cell_array(path, cells) -> Array | None:
-    """Return the first row of each string in a cell array; None if a cell is not a string."""
+    """Return the first row of each string in a cell array, or None if a cell is not a string."""
     if not isinstance(h5py.check_dtype(ref=cells.dtype), type):
         return None
     parts = [cells.file[reference] for reference in np.ravel(cells[()])[:MAX_VARIABLES]]
@@ -156,7 +156,7 @@ def _read_sparse_array(path, group) -> Array | None:
         return None
 
     def read_matrix():
-        """Read the sparse matrix; refuse damaged data."""
+        """Read the sparse matrix; raise PatchfemError if its data are damaged."""
         with _refuse_damage(path):
             rows = _read_optional_values(group, "ir").astype(np.int64)
             return make_sparse(rows, starts, _read_optional_values(group, "data"), shape)
@@ -170,7 +170,7 @@ def _read_optional_values(group, name: str) -> np.ndarray:
 
 
 def _check_size(path, dataset) -> None:
-    """Raise PatchfemError if a dataset has too many numbers, or unpacks to far more bytes."""
+    """Raise PatchfemError if a dataset has too many numbers, or is far larger when decompressed."""
     max_bytes = max(UNPACK_CHECK_BYTES, MAX_UNPACK_RATIO * dataset.id.get_storage_size())
     if dataset.size > MAX_NUMBERS or dataset.nbytes > max_bytes:
         raise PatchfemError(

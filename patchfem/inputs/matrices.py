@@ -66,7 +66,7 @@ def read_matrix(path, matrix_name: str) -> Matrix:
 
 
 class MatrixRounding(NamedTuple):
-    """Rounding of the numbers of a matrix file, with the standard deviations of its errors."""
+    """Rounding of the numbers in a matrix file, with the standard deviations of its errors."""
 
     digits: str
     deviation: np.ndarray
@@ -222,7 +222,7 @@ def _find_matrix_name(path, names, matrix_name: str) -> str:
 
 
 def _read_market(path: Path, matrix_name: str) -> Matrix:
-    """Read a Matrix Market file of numbers; a file without its header is read as Abaqus text.
+    """Read a Matrix Market file of numbers; a file without Matrix Market header is read as Abaqus text.
 
     `scipy.io.mmread` of SciPy 1.17 is not used: it reads the damaged number "1E-" as 1 and missing
     numbers of a full matrix as 0, and "1E-" at the end of a file ends its process (signal 11).

@@ -22,7 +22,7 @@ FLAG_MEANINGS = {"U": "unstable", "*": "the gauge gave no reading", "R": "repeat
 
 @dataclass(frozen=True, slots=True)
 class MeasuredRow:
-    """One measured condition in SI; a value that was not read is None.
+    """One measured condition in SI; a missing value is None.
 
     frequency [Hz], input [m s-2], acceleration [m s-2], displacement [m], all >= 0; flag: letters of
     `FLAG_MEANINGS`, may be empty.
@@ -71,7 +71,7 @@ def read_table(path: Path) -> list[MeasuredRow]:
 
 
 def _make_record_error(path: Path) -> PatchfemError:
-    """Make the error for a time record that was given where a table of responses is needed."""
+    """Return the error for a time record that was given in place of a table of responses."""
     options = ""
     if path.suffix.lower() == ".mat":
         options = ' --map "time=VARIABLE [s]" --map "displacement=VARIABLE [m]"'

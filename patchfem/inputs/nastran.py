@@ -26,7 +26,7 @@ _NUMBER_PATTERN = re.compile(r"([+-]?[\d.]+)(?:[ED]?([+-]?\d+))?\Z", re.IGNORECA
 
 
 class StringMatrix:
-    """A matrix of an OUTPUT4 file as strings: runs of consecutive rows of one column.
+    """Matrix of an OUTPUT4 file, stored as strings: runs of consecutive rows in one column.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def _refuse_output4(path) -> AbstractContextManager:
 
 
 def _count_words_per_number(number_type: int) -> int:
-    """Return the words per number of a type: 1 single, 2 double precision, 3 and 4 complex."""
+    """Return the words per number for a number type: 1 single, 2 double precision, 3 and 4 complex."""
     if number_type in (3, 4):
         raise ValueError("a matrix is complex; write only the real part")
     return {1: 1, 2: 2}[number_type]
@@ -202,7 +202,7 @@ def _find_numbers_end(lines: list, index: int) -> int:
 
 
 class DmigColumn(NamedTuple):
-    """A column of a DMIG matrix: line of its card, node, component, number of its first entry."""
+    """Column of a DMIG matrix: line of its card, node, component, and number of its first entry."""
 
     line: int
     node: int
@@ -211,7 +211,7 @@ class DmigColumn(NamedTuple):
 
 
 class DmigMatrix:
-    """DMIG matrix of a Nastran file, with entries of node, component and number."""
+    """DMIG matrix of a Nastran file, whose entries consist of node, component and number."""
 
     def __init__(self, path, form: int):
         self.path = path
@@ -267,12 +267,12 @@ class DmigMatrix:
 
 
 def complete_symmetric_matrix(triangle: sparse.csr_array) -> sparse.csr_array:
-    """Return the symmetric matrix for a given triangle."""
+    """Return the symmetric matrix of which one triangle is given."""
     return (triangle + (triangle - sparse.diags_array(triangle.diagonal())).T).tocsr()
 
 
 def rank_dofs(places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the sorted distinct degrees of freedom (n, 2) and the index (k,) of each given one.
+    """Return the sorted distinct degrees of freedom (n, 2), and the index (k,) of each input row in them.
 
     A degree of freedom is a row of node and direction.
     """
@@ -329,7 +329,7 @@ def read_dmig(path) -> dict[str, DmigMatrix]:
 
 
 def _start_card(path, matrices: dict, line: int, fields: list) -> DmigMatrix | None:
-    """Start a matrix with its header card, or a column; returns the matrix of a column."""
+    """Start a matrix from its header card, or one of its columns; return the matrix of the column."""
     name = fields[0].upper()
     if fields[1] == "0" and name not in matrices:
         if int(fields[3]) > 2:

@@ -60,7 +60,7 @@ class Records:
 
 
 def check_file(path: Path, remedy: str, location: str = "") -> None:
-    """Raise Missing if there is no file, and PatchfemError if it is too large.
+    """Raise Missing if the file does not exist, and PatchfemError if it is too large.
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ def find_channel(path, channels: list, source: str) -> Channel:
 
 
 def describe_channels(channels: list) -> str:
-    """List channels with number, name, degree of freedom and unit."""
+    """Return a list of the channels as text, with number, name, degree of freedom and unit."""
     texts = []
     for number, channel in enumerate(channels[:MAX_LISTED_CHANNELS], 1):
         place = f" at {channel.place}" if channel.place else ""

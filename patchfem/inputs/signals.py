@@ -1,4 +1,4 @@
-"""A recorded drive, or the spectrum of a random one, from a table or a universal file."""
+"""A recorded drive signal, or the spectrum of a random one, from a table or a universal file."""
 
 from pathlib import Path
 
@@ -26,7 +26,7 @@ SPECTRUM_FORMAT = TableFormat(
 
 
 def read_signal(path, quantity: str) -> tuple:
-    """Read a recorded drive.
+    """Read a recorded drive signal.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def read_signal(path, quantity: str) -> tuple:
 
 
 def read_spectrum(path) -> tuple:
-    """Read the spectrum of a random drive from a table of frequency and level.
+    """Read the spectrum of a random drive signal from a table of frequency and level.
 
     Returns
     -------
@@ -100,7 +100,7 @@ def read_spectrum(path) -> tuple:
 
 
 def _read_universal(path: Path, quantity: str) -> tuple:
-    """Read time and value of the only time response of a quantity in a universal file."""
+    """Read time and values of the only time response of a quantity in a universal file."""
     kind = OrdinateType[quantity.upper()]
     datasets = read_datasets(path)
     candidates = [

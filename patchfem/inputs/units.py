@@ -59,7 +59,7 @@ def normalize_unit(text: str) -> str:
 
 
 def find_unit_factor(quantity: str, unit: str, location: str = "") -> float:
-    """Return the factor that converts a value in a unit to SI.
+    """Return the factor that converts a quantity from a unit to SI.
 
     Parameters
     ----------

@@ -14,7 +14,7 @@ MIN_RUN_CYCLES = 0.25
 
 
 def build_signal(scene, modes: ModalBasis):
-    """Build the drive signal of a scene in the form that the engines use.
+    """Build the drive signal of a scene in the form that the solvers use.
 
     A displacement amplitude X of the base becomes the acceleration amplitude X omega^2, and a force F
     becomes F over the modal mass. A drive without a frequency of its own gets its cycle from the
@@ -30,7 +30,7 @@ def build_signal(scene, modes: ModalBasis):
 
 
 def has_levels(keys) -> bool:
-    """Return whether the amplitude of a drive is raised in levels."""
+    """Return whether the amplitude of the drive signal is raised in levels."""
     return find_waveform(keys).has_levels
 
 
@@ -48,7 +48,7 @@ def count_run_cycles(keys, signal) -> float:
 
 
 def _read_recorded_drive(scene) -> tuple:
-    """Read the columns of drive.file of a scene; an error names the line of this key."""
+    """Read the columns of the file drive.file; an error names the line of this key."""
     try:
         path = scene.resolve_path(scene.drive.file)
         if find_waveform(scene.drive).is_random:
@@ -60,7 +60,7 @@ def _read_recorded_drive(scene) -> tuple:
 
 @cache_by_file
 def read_drive_file(path: Path, kind: str) -> tuple:
-    """Read a recorded drive.
+    """Read a recorded drive signal.
 
     Parameters
     ----------

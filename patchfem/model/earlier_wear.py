@@ -62,7 +62,7 @@ class EarlierWear:
 
     @property
     def sentence(self) -> str:
-        """Sentence for the user on the state from which the run continues."""
+        """Sentence that tells the user from which state the run continues."""
         all_cycles = float(self.scene["wear"]["cycles"])
         cycles = f"{self.cycles:.6g}"
         if self.cycles < all_cycles * (1 - 1e-9):
@@ -74,12 +74,12 @@ class EarlierWear:
         )
 
     def depth_at(self, x) -> np.ndarray:
-        """Interpolate the worn depth (m,) [m] at x (m,) [m] on an interface of the same length."""
+        """Interpolate the worn depth (m,) [m] at positions x (m,) [m] on an interface of the same length."""
         self._require_same_length(x)
         return np.interp(x, self.x, self.depth)
 
     def require_same_surfaces(self, x, gap) -> None:
-        """Raise PatchfemError unless the unworn surfaces have the given gap (m,) [m] at x (m,) [m].
+        """Raise PatchfemError unless the unworn gap of the earlier run equals `gap` (m,) [m] at x (m,) [m].
 
         A straight line may be added to the gap, because the pieces may be tilted.
         """
@@ -95,7 +95,7 @@ class EarlierWear:
             )
 
     def measure_error(self, name: str, value: float) -> float | None:
-        """Return the error of a wear measure at the end of the earlier run; None if it is unknown.
+        """Return the error of a wear measure at the end of the earlier run, or None if it is unknown.
 
         `value` is the measure on the mesh of this run; its difference from that of the earlier run is
         added to the error of the latter.
@@ -106,7 +106,7 @@ class EarlierWear:
         return measure["error"] + abs(measure["value"] - value)
 
     def _require_same_length(self, x) -> None:
-        """Raise PatchfemError unless the interface of that run is as long as x (m,) [m]."""
+        """Raise PatchfemError unless the interface of the earlier run is as long as x (m,) [m]."""
         ends = (x[0], x[-1])
         if not np.allclose(self.x[[0, -1]], ends, rtol=MAX_LENGTH_DIFFERENCE, atol=0):
             raise PatchfemError(
@@ -117,7 +117,7 @@ class EarlierWear:
 
 
 def read_end_state(path: Path) -> EarlierWear:
-    """Read the end of an earlier run from its result.nc.
+    """Read the state at the end of an earlier run from its result.nc.
 
     Raises
     ------
@@ -166,7 +166,7 @@ def _read_state(path: Path) -> EarlierWear:
 
 
 def _has_depth_along_patch(earlier: EarlierWear) -> bool:
-    """Return whether position, depth and gap are finite columns and the positions increase."""
+    """Return whether position, depth and gap are finite and the positions increase."""
     x = earlier.x
     for column in (x, earlier.depth, earlier.gap):
         if column.ndim != 1 or column.shape != x.shape or not np.isfinite(column).all():
@@ -175,7 +175,7 @@ def _has_depth_along_patch(earlier: EarlierWear) -> bool:
 
 
 def read_earlier_wear(path: Path, tables: Tables) -> EarlierWear:
-    """Read the end of an earlier run; raise PatchfemError unless a scene has the same pieces."""
+    """Read the state at the end of an earlier run; raise PatchfemError unless both scenes have the same pieces."""
     earlier = read_end_state(path)
     pieces_before = _describe_pieces(earlier.scene)
     pieces_now = _describe_pieces(tomllib.loads(format_toml(tables)))
@@ -194,7 +194,7 @@ def read_earlier_wear(path: Path, tables: Tables) -> EarlierWear:
 
 
 def _describe_pieces(scene: dict) -> dict:
-    """Return the scene keys, with their values, that determine which pieces wear."""
+    """Return the scene keys, with their values, that describe the pieces that wear."""
     pieces = {
         f"contact.{key}": value
         for key, value in scene["contact"].items()

@@ -41,7 +41,7 @@ MESH_STARTS = {
 def find_file_faults(
     tables, folder: Path, is_valid: bool = True, notes: list | None = None
 ) -> list:
-    """Check the files that a scene names, and return their faults.
+    """Check the files that a scene names, and return the faults found in them.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def find_file_faults(
 
 
 class _FileKey(NamedTuple):
-    """Scene key of a file, with the tables that are needed to check the file.
+    """Scene key that names a file, with the tables that are needed to check the file.
 
     - prefix: prefix of the keys of an interface, "" for any other file.
     - key: key of the file; for the patch of an interface, its key in [contact].
@@ -92,7 +92,7 @@ class _FileKey(NamedTuple):
 
 
 def _select_interface(key: str, tables) -> _FileKey:
-    """Return the key of a file, and the tables with which it is checked; an interface has its own."""
+    """Return the key of a file and the tables used to check it; a file of an interface uses the tables of that interface."""
     prefix, separator, name = key.partition(".contact.")
     if not separator:
         return _FileKey("", key, tables)
@@ -115,7 +115,7 @@ def _check_reduction(tables, folder: Path) -> list:
 
 
 def _check_mesh(path: Path, tables, *, is_valid: bool) -> None:
-    """Read a mesh, or the start of a large one."""
+    """Check a mesh file by reading it, or only its beginning if it is large."""
     starts = MESH_STARTS.get(path.suffix)
     if starts is None or path.stat().st_size <= MAX_FULLY_READ_MESH_BYTES:
         files.read_pieces(path)
@@ -152,14 +152,14 @@ def _check_profile(path: Path, tables, *, is_valid: bool) -> tuple:
 
 
 def _check_slide(path: Path, tables, *, is_valid: bool) -> None:
-    """Check that the law and the contact can follow a path, including lateral motion."""
+    """Check that the friction law and the contact can follow a path, including lateral motion."""
     has_lateral = len(slide.read_path_file(path)) == 3
     if is_valid and has_lateral and (reason := limits.find_lateral_slide_obstacle(tables)):
         raise PatchfemError(reason)
 
 
 def _check_drive(path: Path, tables, *, is_valid: bool) -> None:
-    """Check the file of a recorded drive or of its spectrum by reading it."""
+    """Check the file of a recorded drive signal, or of its spectrum, by reading it."""
     if find_waveform(tables.drive).is_random:
         drive.signals.read_spectrum(path)
     elif is_valid or tables.drive.kind is not None:
@@ -167,7 +167,7 @@ def _check_drive(path: Path, tables, *, is_valid: bool) -> None:
 
 
 def _check_structure(path: Path, tables, *, is_valid: bool) -> None:
-    """Check structure.file: build the modes of arrays, but do not fit those of responses."""
+    """Check structure.file: compute modes from matrices, but do not fit modes to measured responses."""
     if structure_files.is_universal_file(path) or not is_valid:
         structure_files.read_content(path)
         return
@@ -193,7 +193,7 @@ def _check_wear_start(path: Path, tables, *, is_valid: bool) -> tuple:
 
 
 def _check_asperities(path: Path, tables, *, is_valid: bool) -> None:
-    """Check that a rough surface can have the peaks of a trace."""
+    """Check that a rough surface can have the asperity peaks found from a trace."""
     cutoff = None
     if is_valid:
         cutoff = patch.find_shortest_wavelength(

@@ -49,7 +49,7 @@ class ShapedGap(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Gap:
-    """Shapes that open the gap between the pieces.
+    """Shapes that together form the gap between the pieces.
 
     - shapes: pairs of the name of a shape and the keys of its table.
     - profile: file of measured heights.
@@ -77,7 +77,7 @@ class Gap:
 
     @property
     def tilt(self) -> float | None:
-        """Absolute angle [rad] between the pieces, None if they are not tilted."""
+        """Absolute angle [rad] between the pieces, or None if they are not tilted."""
         return next((abs(angle) for _, angle in self._values("angle")), None)
 
     @property
@@ -87,14 +87,14 @@ class Gap:
 
     @property
     def wave(self) -> float:
-        """Shortest wavelength [m] of the wavy shapes; inf if there are none.
+        """Shortest wavelength [m] of the wavy shapes, or inf if there are none.
 
         The cells of the mesh have to resolve it.
         """
         return min((wave for _, wave in self._values("wave")), default=inf)
 
     def _values(self, quantity: str) -> list:
-        """Return a property of every shape that has it, with the table of the shape."""
+        """Return the values of a property, each with the table of its shape, for all shapes that have this property."""
         pairs = []
         for name, keys in self.shapes:
             evaluate = getattr(gaps.SHAPE_PROPERTIES.get(name), quantity, None)
@@ -124,14 +124,14 @@ class Gap:
         return float(max(longest, self.average or profiles.find_sample_spacing(self.profile)))
 
     def half_step_heights(self, x) -> np.ndarray:
-        """Return half the height [m] of the step at a node, (m,); 0 at nodes that are no step edge."""
+        """Return half the height [m] of the step at each node, (m,), or 0 at nodes without a step edge."""
         heights = np.zeros(x.size)
         for _, (edge, height) in self._values("edge"):
             heights += np.where(x == edge, abs(height) / 2, 0.0)
         return heights
 
     def evaluate(self, x) -> ShapedGap:
-        """Return the gap of the unloaded pieces.
+        """Return the gap between the unloaded pieces.
 
         `x` [m] is (m,), or (m, 1) if numbers of the shapes are arrays (n,); then the gap is (m, n).
         """
@@ -168,7 +168,7 @@ def longest_loaded_cell(x, loaded_nodes) -> float:
 
 
 def build_gap(contact: Contact, lengths: ProfileLengths, resolve_path: Callable) -> Gap:
-    """Build the gap of a table [contact].
+    """Build the gap that a table [contact] describes.
 
     Parameters
     ----------
@@ -196,7 +196,7 @@ def build_gap(contact: Contact, lengths: ProfileLengths, resolve_path: Callable)
 
 
 def list_gap_shapes(contact: Contact) -> tuple:
-    """Return (name, table) of each shape of a table [contact] that is a term of the gap."""
+    """Return (name, table) of each shape in a table [contact] that contributes to the gap."""
     return tuple((name, keys) for name, keys in contact.shapes.items() if name in GAP_SHAPES)
 
 

@@ -55,7 +55,7 @@ class InterfaceLaw:
 
     @property
     def partial_slip(self) -> str:
-        """Name of the key that enables partial slip of the patch; "" if it slips as a whole."""
+        """Name of the key that enables partial slip of the patch, or "" if it slips as a whole."""
         return self.patch.interface.partial_slip if self.patch is not None else ""
 
     def friction_limits(self, load: float) -> FrictionLimits:
@@ -68,7 +68,7 @@ class InterfaceLaw:
 def make_effective_law(
     law: Friction, width: float | None, locate_key: Callable, load: float | None = None
 ) -> Friction:
-    """Return the keys of a friction law after effects that change its parameters.
+    """Return the keys of a friction law after applying the effects that change its parameters.
 
     `rest_growth` and `slip_growth` are taken at the surface temperature; `static` and `kinetic` are
     multiplied by the factor of the pad; `bond_length` follows from a stiffness.
@@ -106,7 +106,7 @@ def make_effective_law(
 
 
 def _scale_growth_rates(law: Friction, locate_key: Callable) -> tuple:
-    """Return the growth rates of bonds at rest and in slip at the surface temperature."""
+    """Return the growth rates of bonds, at rest and during slip, at the surface temperature."""
     heat = law.temperature
     try:
         return import_effect("friction.temperature").growth_at_temperature(
@@ -122,7 +122,7 @@ def _scale_growth_rates(law: Friction, locate_key: Callable) -> tuple:
 
 
 def complete_bond_length(law: Friction, load) -> Friction:
-    """Return the keys of a law with the bond length [m] that follows from a given stiffness.
+    """Return the keys of a law, with the bond length [m] computed from a given stiffness.
 
     Numbers of the law and the load [N] may be columns.
     """
@@ -185,7 +185,7 @@ def build_interface_laws(scene: Scene) -> tuple:
 
 
 def _build_interface(scene: Scene, number: int) -> InterfaceLaw:
-    """Build one interface of [[structure.interface]]."""
+    """Build the interface that one table [[structure.interface]] describes."""
     table = scene.structure.interface[number]
     return InterfaceLaw(
         key=f"structure.interface.{number}",
@@ -197,7 +197,7 @@ def _build_interface(scene: Scene, number: int) -> InterfaceLaw:
 
 
 def _build_interface_patch(scene: Scene, number: int) -> PatchModel | None:
-    """Build the patch of one interface; PatchfemError names the key of a file at fault."""
+    """Build the patch of one interface; a PatchfemError names the key of the file that cannot be used."""
     table = scene.structure.interface[number]
     if table.contact is None:
         return None
@@ -210,21 +210,21 @@ def _build_interface_patch(scene: Scene, number: int) -> PatchModel | None:
 
 
 def find_normal_load(scene: Scene) -> float | None:
-    """Return the (mean) normal load [N] of [friction]; None if an approach is prescribed."""
+    """Return the (mean) normal load [N] of [friction], or None if the approach is prescribed."""
     if scene.contact is not None:
         return scene.contact.load
     return scene.normal.load if scene.normal is not None else None
 
 
 def find_pad_width(scene: Scene) -> float | None:
-    """Return the width [m] of the contact across the path, None if the scene gives none."""
+    """Return the width [m] of the contact across the path, or None if the scene gives none."""
     if scene.contact is not None:
         return scene.contact.width
     return scene.normal.width if scene.normal is not None else None
 
 
 def make_interface_names(structure) -> list:
-    """Return the names of the interfaces between masses, such as "1-2"; [] if there are no masses."""
+    """Return the names of the interfaces between masses, such as "1-2", or [] if there are no masses."""
     names = ["-".join(map(str, interface.between)) for interface in structure.interface]
     return [
         name if names.count(name) == 1 else f"{name} ({number})"

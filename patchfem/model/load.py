@@ -43,7 +43,7 @@ class PointLoad:
         return np.where(load > MIN_LOAD_FRACTION * (self.load + self.amplitude), load, 0.0)
 
     def refine_samples(self, slide: SlidePath, time, rel_disp, steps: int) -> tuple:
-        """Add samples to a slide until they resolve the oscillation of the load as well.
+        """Add samples to a prescribed slide until they also resolve the oscillation of the load.
 
         The extremes of the load and the instants at which the contact is lost or made become samples.
 
@@ -86,7 +86,7 @@ class PointLoad:
         return grid, np.interp(grid, time, rel_disp)
 
     def _times_in_periods(self, time, steps: int) -> np.ndarray:
-        """Compute times [s] at `steps` phases per load period, and at loss and start of contact.
+        """Compute the times [s] of `steps` phases per load period, and of loss and start of contact.
 
         The periods cover the range of `time`.
         """
@@ -102,7 +102,7 @@ class PointLoad:
 
 
 def build_grooves(scene) -> grooves.Grooves | None:
-    """Build the grooves of [contact] or [normal]; None without grooves or if they are flat."""
+    """Build the grooves of [contact] or [normal], or return None if there are none or they are flat."""
     for name in ("contact", "normal"):
         table = getattr(scene, name)
         if table is not None and table.grooves is not None and table.grooves.amplitude:
@@ -114,7 +114,7 @@ def build_grooves(scene) -> grooves.Grooves | None:
 
 
 def build_point_load(scene) -> PointLoad | None:
-    """Build the load of [normal] or of the first interface, None if neither gives one."""
+    """Build the load of [normal] or of the first interface, or return None if neither gives one."""
     if scene.structure is not None and scene.structure.interface:
         return PointLoad(scene.structure.interface[0].normal_load)
     keys = scene.normal

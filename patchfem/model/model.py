@@ -35,7 +35,7 @@ MAX_SHOWN_EFFECTS = 160  # largest number of characters of the effects in the re
 
 
 class MeasuredFile(NamedTuple):
-    """File of measured responses that is compared with the results.
+    """File with measured responses that are compared with the results.
 
     - gains: factors of the acceleration and of the displacement.
     - reading: kind of the values.
@@ -103,7 +103,7 @@ class Model:
 
     @property
     def partial_slip(self) -> str:
-        """Name of the key that enables partial slip of the patch; "" if it slips as a whole."""
+        """Name of the key that enables partial slip of the patch, or "" if it slips as a whole."""
         return self.patch.interface.partial_slip if self.patch is not None else ""
 
     @property
@@ -120,7 +120,7 @@ class Model:
 
     @property
     def nominal_load(self) -> float:
-        """Normal load [N] of the patch or the point, 0 if there is neither."""
+        """Normal load [N] of the patch or the point, or 0 if there is neither."""
         if self.patch is not None:
             return self.patch.nominal_load
         return self.point.load if self.point is not None else 0.0
@@ -142,7 +142,7 @@ class Model:
 
 
 def build_without_sweep(scene: Scene) -> Model:
-    """Build the model of a scene without its [sweep].
+    """Build the model of a scene, ignoring its table [sweep].
 
     A swept key keeps the value that the scene gives it; a key that only [sweep] names has its first
     value.
@@ -216,7 +216,7 @@ def write_resolved(scene: Scene, model: Model) -> str:
 
 
 def _refuse_sweep(scene: Scene) -> None:
-    """Raise PatchfemError for a scene with [sweep]."""
+    """Raise PatchfemError if the scene has a table [sweep]."""
     count = prod(len(axis.texts) for axis in scene.sweep)
     first = " ".join(f'--set "{axis.key}={axis.texts[0]}"' for axis in scene.sweep)
     raise PatchfemError(
@@ -226,14 +226,14 @@ def _refuse_sweep(scene: Scene) -> None:
 
 
 def _find_edge_motion(scene: Scene, rig_model: Rig | None) -> str:
-    """Return what moves the edges of the contact: "wear", "load" or ""."""
+    """Return what moves the edges of the contact: "wear" or "load", or "" if they do not move."""
     if scene.wear is not None:
         return "wear"
     return "load" if rig_model is not None and rig_model.friction.load_varies else ""
 
 
 def _request_slip_mesh(model: PatchModel, path: SlidePath, law: Friction | None) -> PatchModel:
-    """Request a mesh that resolves partial slip under a prescribed slide; bond laws need none."""
+    """Request a mesh that resolves partial slip under a prescribed slide; bond laws need no such mesh."""
     if not model.interface.partial_slip or path.across is not None:
         return model
     if law is None or law_has_trait(law.law, "bonds") or not law.static or law.static <= 0:
@@ -267,5 +267,5 @@ def _build_measured(scene: Scene) -> MeasuredFile | None:
 
 @lru_cache(64)
 def _find_absent(effects: tuple) -> tuple:
-    """Return the known effects that a scene neglects."""
+    """Return the known physical effects that a scene neglects."""
     return tuple(list_absent_effects(effects))

@@ -33,7 +33,7 @@ class PatchPiece:
 
     @property
     def thickness(self) -> float:
-        """Thickness of the coating [m], 0 if the piece is bare."""
+        """Thickness of the coating [m], or 0 if the piece is bare."""
         return self.coating.thickness if self.coating else 0.0
 
     @property
@@ -47,7 +47,7 @@ class PatchPiece:
         return self.end.half_contact_length(self.length)
 
     def corner_kind(self, half_length: float) -> str:
-        """Return the kind of corner at a distance [m] from the middle; "flat" if the face extends beyond it."""
+        """Return the kind of corner at a distance [m] from the middle, or "flat" if the face extends beyond it."""
         if self.half_contact_length > half_length * (1 + LENGTH_TOL):
             return "flat"
         return self.end.kind
@@ -98,7 +98,7 @@ class PatchPieces:
 
     @property
     def shear_stiffness(self) -> float:
-        """Shear stiffness [N/m] of both pieces as blocks in series, for all equal pairs in parallel.
+        """Shear stiffness [N/m] of all equal pairs in parallel, in which the two pieces act as springs in series.
 
         Short blocks that are fixed at both faces are stiffer.
         """
@@ -107,7 +107,7 @@ class PatchPieces:
         )
 
     def series_compliance(self, softness: Callable) -> float:
-        """Compliance [m/N] of the layers of both pieces in series, for all equal pairs in parallel.
+        """Compliance [m/N] of all equal pairs in parallel, in which the layers of both pieces act in series.
 
         Parameters
         ----------
@@ -124,7 +124,7 @@ class PatchPieces:
 
 @dataclass(frozen=True, slots=True)
 class PatchLoading:
-    """Normal load or approach of the upper piece, and its holder.
+    """Normal load or approach of the upper piece, and the holder of this piece.
 
     - load: normal load [N]; None if the approach is prescribed.
     - approach: prescribed approach [m].
@@ -145,7 +145,7 @@ class PatchLoading:
 
     @property
     def moment(self) -> float | None:
-        """Moment of the load about the middle [N m]; None if the piece cannot rotate."""
+        """Moment of the load about the middle [N m], or None if the piece cannot rotate."""
         if not self.can_rotate:
             return 0.0 if self.rotational_stiffness > 0 else None
         return self.line_moment if self.line_moment is not None else self.load * self.offset
@@ -165,7 +165,7 @@ class PatchStrips(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class PatchInterface:
-    """Interface of a patch: layer of asperities, strips, and compliance in shear.
+    """Interface of a patch: asperity layer, strips and shear compliance.
 
     - has_shear: whether the pieces deform in shear.
     - partial_slip: key of the scene that allows partial slip, "" without partial slip.
@@ -229,7 +229,7 @@ class PatchMesh:
 
     @property
     def is_automatic(self) -> bool:
-        """Whether the mesh follows from the tolerance."""
+        """Whether the mesh is refined to the tolerance."""
         return self.element_size is None and self.file is None
 
 
@@ -291,23 +291,23 @@ class PatchModel:
         return load
 
     def with_element_size(self, size: float | None) -> "PatchModel":
-        """Return the patch with an element size [m]; None lets the tolerance choose the mesh."""
+        """Return a copy of the patch with an element size [m]; None: the mesh is refined to the tolerance."""
         gap = self.gap
         if not gap.is_rough and self.mesh.file is None:
             gap = replace(gap, average=size, limit=size)
         return replace(self, mesh=replace(self.mesh, element_size=size), gap=gap)
 
     def with_loading(self, **changes) -> "PatchModel":
-        """Return the patch with changed values of its loading."""
+        """Return a copy of the patch with changed values of its loading."""
         return replace(self, loading=replace(self.loading, **changes))
 
     def with_mesh(self, **changes) -> "PatchModel":
-        """Return the patch with changed settings of its mesh."""
+        """Return a copy of the patch with changed settings of its mesh."""
         return replace(self, mesh=replace(self.mesh, **changes))
 
 
 def build_patch(contact: Contact, kind: str, resolve_path: Callable) -> PatchModel:
-    """Build the patch of a table [contact].
+    """Build the patch that a table [contact] describes.
 
     Parameters
     ----------
@@ -336,13 +336,13 @@ def build_patch(contact: Contact, kind: str, resolve_path: Callable) -> PatchMod
 
 
 def replace_loading_and_shapes(patch: PatchModel, contact: Contact) -> PatchModel:
-    """Return a patch with the loading and the shapes of the gap of another table [contact]."""
+    """Return a copy of a patch with the loading and the gap shapes of another table [contact]."""
     gap = replace(patch.gap, shapes=list_gap_shapes(contact))
     return replace(patch, gap=gap, loading=_build_loading(contact))
 
 
 def build_pieces(contact: Contact) -> PatchPieces:
-    """Build the two pieces of a table [contact]."""
+    """Build the two pieces that a table [contact] describes."""
     lower = _build_piece(contact, contact.lower)
     upper = _build_piece(contact, contact.upper)
     return PatchPieces(
@@ -381,7 +381,7 @@ def _build_piece(contact: Contact, own) -> PatchPiece:
 
 
 def _build_loading(contact: Contact) -> PatchLoading:
-    """Build the loading of a table [contact]."""
+    """Build the loading that a table [contact] describes."""
     line = contact.load_line
     holder = contact.holder
     return PatchLoading(
@@ -396,7 +396,7 @@ def _build_loading(contact: Contact) -> PatchLoading:
 
 
 def _build_interface(contact: Contact, length: float, resolve_path: Callable) -> PatchInterface:
-    """Build the interface of a table [contact] over a length [m]."""
+    """Build the interface of length [m] that a table [contact] describes."""
     skin = contact.asperities
     if skin is not None and skin.law == "hertz":
         skin = peaks.complete_asperities(
@@ -428,7 +428,7 @@ def find_profile_lengths(contact: Contact, pieces: PatchPieces) -> ProfileLength
 
 
 def find_shortest_wavelength(contact: Contact, length: float) -> float | None:
-    """Return the shortest wavelength [m] of a profile that belongs to the gap.
+    """Return the shortest wavelength [m] of the profile that is included in the gap.
 
     Shorter waves belong to [contact.asperities]; None if all waves do. `length` [m] is that of the
     interface.

@@ -15,7 +15,7 @@ KEY_PREFIX = "contact.asperities."  # prefix of the keys in messages
 def complete_asperities(
     table: Asperities, resolve_path: Callable, cutoff: float | None = None
 ) -> Asperities:
-    """Add radius, density and standard deviation of height of the peaks to [contact.asperities].
+    """Add radius, density and height deviation of the asperity peaks to [contact.asperities].
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def complete_asperities(
 
 
 def read_spectral_moments(path: Path, cutoff: float | None = None) -> TraceMoments:
-    """Return the spectral moments of the waves below a cut-off [m] of the trace in a file.
+    """Read a trace from a file and return the spectral moments of its waves below a cut-off [m].
 
     Raises PatchfemError, which names the key, if no isotropic Gaussian surface has these moments.
     """

@@ -15,7 +15,7 @@ MESH_SIZE_TOL = 1e-6
 
 
 class RoundedEdges(NamedTuple):
-    """Positions at which the flat face and the contact of rounded pieces end.
+    """Positions at which the flat face and the contact of two rounded pieces end.
 
     - positions: ends [m] of the contact and of the flat part, in rising order; () without rounded
       ends.
@@ -27,7 +27,7 @@ class RoundedEdges(NamedTuple):
 
 
 def make_elastic_layers(patch: PatchModel, piece: PatchPiece) -> Layers:
-    """Return the elastic layers of a piece; a bare piece has its substrate as coating."""
+    """Return the elastic layers of a piece; if it is bare, the coating has the material of the substrate."""
     coating = piece.face_material
     substrate = piece.substrate
     return Layers(
@@ -116,7 +116,7 @@ def make_piece_meshes(patch: PatchModel) -> tuple:
 
 
 def _check_mesh_size(patch: PatchModel, side: str, body) -> None:
-    """Raise PatchfemError unless a body of a mesh file has the size of its piece."""
+    """Raise PatchfemError unless a body in the mesh file has the size of its piece."""
     piece = getattr(patch.pieces, side)
     for key, in_file, in_scene in (
         ("length", body.length, patch.pieces.length),

@@ -127,7 +127,7 @@ def find_sample_spacing(path: Path) -> float:
 
 
 def _filter_waviness(trace: Profile, cutoff: float) -> Profile:
-    """Return the waves of a trace that are longer than a cut-off [m], up to its ends."""
+    """Return the waves of a trace that are longer than a cut-off [m], extended to the ends of the trace."""
     if cutoff >= trace.length:
         raise PatchfemError(
             f"{format_length(cutoff)} is longer than the patch ({format_length(trace.length)}), so no "
@@ -143,7 +143,7 @@ def _filter_waviness(trace: Profile, cutoff: float) -> Profile:
 
 
 def _describe_short_waves(trace: Profile, cutoff: float) -> tuple:
-    """Return sentences about the waves shorter than a cut-off [m], () if there are none."""
+    """Return sentences about the waves shorter than a cut-off [m], or () if there are none."""
     fraction = fine_fraction(trace, cutoff)
     if not fraction > 0:
         return ()
@@ -157,7 +157,7 @@ def _describe_short_waves(trace: Profile, cutoff: float) -> tuple:
 
 
 def level_profile(path: Path, x, cell: float, *, is_material: bool) -> _LevelledProfile:
-    """Level the profile in a file over the nodes of an interface.
+    """Read a profile from a file, and subtract its least-squares line over an interface.
 
     Parameters
     ----------
@@ -210,7 +210,7 @@ def _fit_spline(trace: Profile):
 
 
 def _smooth_profile(trace: Profile, nodes) -> Profile:
-    """Return the cubic spline through the means of a trace over evenly spaced nodes (k,) [m]."""
+    """Return the cubic spline through local means of a trace at evenly spaced nodes (k,) [m]."""
     n_points = CURVE_POINTS_PER_CELL * (nodes.size - 1) + 1
     x = np.interp(np.arange(n_points) / CURVE_POINTS_PER_CELL, np.arange(nodes.size), nodes)
     means = replace(trace, x=frozen_array(nodes), z=average_at_nodes(trace, nodes))
@@ -218,7 +218,7 @@ def _smooth_profile(trace: Profile, nodes) -> Profile:
 
 
 def _read_without_spikes(path: Path, x, max_gap: float) -> Profile:
-    """Read a trace over the nodes, remove spikes and interpolate gaps up to `max_gap` [m]."""
+    """Read a trace that covers the nodes, remove spikes and interpolate gaps up to `max_gap` [m]."""
     trace = read_trace(path)
     try:
         return clean(place_over_patch(trace, x), max_gap)

@@ -38,7 +38,7 @@ MIN_SLIDE_FRACTION = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class DriveLevels:
-    """Amplitudes of a drive that is raised in levels; none for any other drive.
+    """Amplitudes of a drive signal that is raised in levels; empty for any other drive signal.
 
     - amplitudes: acceleration [m s-2], or force over the modal mass, of each level.
     - cycles: drive cycles of each level.
@@ -52,9 +52,9 @@ class DriveLevels:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RigDrive:
-    """Drive of a rig.
+    """Drive signal of a rig, with its kind, frequency and number of cycles.
 
-    - signal: drive as the engines take it: base acceleration or force over the modal mass.
+    - signal: drive signal in the form that the solvers use: base acceleration or force over the modal mass.
     - kind: ``"base"``, ``"force"`` or ``"free"``.
     - frequency: frequency [Hz] of a sine or of levels.
     - cycles: drive cycles of the whole run.
@@ -72,7 +72,7 @@ class RigDrive:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RigFriction:
-    """Interfaces of a rig.
+    """Friction interfaces of a rig.
 
     - interfaces: friction laws of the interfaces, empty in a linear rig.
     - names: names of the interfaces between masses, empty in other rigs.
@@ -115,7 +115,7 @@ class RigSprings:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FirstMode:
-    """First mode of the scene that is not rigid, for the rig without its bonded spring.
+    """First elastic mode of the scene, for the rig without the spring of the bonded joint.
 
     - frequency: natural frequency [Hz], 0 if all modes are rigid.
     - mass: moving mass [kg].
@@ -132,7 +132,7 @@ class FirstMode:
 
     @property
     def stiffness(self) -> float:
-        """Modal stiffness [N/m] referred to the contact, 0 if the mode does not move the contact.
+        """Modal stiffness [N/m] referred to the contact, or 0 if the mode does not move the contact.
 
         The mode moves the contact by its slide s per unit of its coordinate, so that
         (mass omega^2/2)(A/s)^2 is its energy at a slide of A.
@@ -140,7 +140,7 @@ class FirstMode:
         return self.contact_mass * (2 * np.pi * self.frequency) ** 2
 
     def fraction_of_other_modes(self, modal) -> float:
-        """Largest range of slide of the other modes as a fraction of that of the whole slide.
+        """Return the largest slide range due to the other modes, divided by the range of the whole slide.
 
         Parameters
         ----------
@@ -161,7 +161,7 @@ class FirstMode:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RigStructure:
-    """Data on the structure of a rig: its natural frequencies, and where its modes come from.
+    """Structure of a rig: its natural frequencies, and where its modes come from.
 
     - frequencies: natural frequencies [Hz], with the bonded spring, shape (n,).
     - lists_modes: whether the scene lists the modes.
@@ -186,7 +186,7 @@ class RigStructure:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Rig:
-    """Modes of a structure with its drive, its interfaces and its springs.
+    """Modes of a structure with the drive signal, the interfaces and the springs.
 
     - start: initial motion, None at rest.
     """
@@ -201,16 +201,16 @@ class Rig:
 
     @property
     def speed_scale(self) -> float:
-        """Expected speed [m/s] from drive and initial state; it sets the default rest speed (2.10)."""
+        """Expected speed [m/s] from drive signal and initial state; it sets the default rest speed (2.10)."""
         return estimate_peak_speed(self.drive.signal, self.start)
 
     @property
     def displacement_scale(self) -> float:
-        """Expected displacement [m]: the expected speed over the angular frequency of the drive."""
+        """Expected displacement [m]: the expected speed over the angular frequency of the drive signal."""
         return self.speed_scale / find_drive_omega(self.drive.signal)
 
     def with_signal(self, signal, **changes) -> "Rig":
-        """Return the rig under another drive signal; `changes` replace other fields of the drive."""
+        """Return a copy of the rig with another drive signal; `changes` replace other fields of the drive."""
         return replace(self, drive=replace(self.drive, signal=signal, **changes))
 
 
@@ -250,7 +250,7 @@ def build_rig(scene, joint: float | None = None) -> Rig:
 
 
 def _build(scene, own_modes: ModalBasis, interfaces: tuple, joint: float | None = None) -> Rig:
-    """Build the rig of a scene from its modes without the bonded spring."""
+    """Build the rig of a scene from its modes without the spring of the bonded joint."""
     modes = build_modes(scene, own_modes)
     friction = RigFriction(
         interfaces=interfaces,
@@ -270,7 +270,7 @@ def _build(scene, own_modes: ModalBasis, interfaces: tuple, joint: float | None 
 
 
 def _build_drive(scene, modes: ModalBasis) -> RigDrive:
-    """Build the drive of a rig from [drive]."""
+    """Build the drive signal of a rig from [drive]."""
     keys = scene.drive
     signal = build_signal(scene, modes)
     levels = DriveLevels()
@@ -291,7 +291,7 @@ def _build_drive(scene, modes: ModalBasis) -> RigDrive:
 
 
 def _build_springs(structure, modes: ModalBasis) -> RigSprings:
-    """Build the springs of a rig from [structure]."""
+    """Build the additional springs of a rig from [structure]."""
     bonded = structure.bonded
     interlock = None
     if bonded is not None and bonded.wavelength is not None:
@@ -306,7 +306,7 @@ def _build_springs(structure, modes: ModalBasis) -> RigSprings:
 
 
 def _build_first_mode(scene, own_modes: ModalBasis, modes: ModalBasis) -> FirstMode:
-    """Build the first mode that is not rigid.
+    """Build the record of the first elastic mode.
 
     `own_modes` are the modes without the bonded spring, `modes` the coordinates of the rig.
     """

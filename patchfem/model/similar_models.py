@@ -1,4 +1,4 @@
-"""Models that differ in plain numbers only, one by one or as columns of numbers.
+"""Models that differ only in numeric values, one by one or with these values as arrays.
 
 They are cases of a sweep: rigs under a sine, or patches that are pressed together.
 """
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SimilarModels(Sequence):
-    """Models that differ in plain numbers only.
+    """Models that differ only in numeric values.
 
     - plain_numbers: scene of the first model and the keys whose numbers differ.
     - first: model of that scene.
@@ -56,7 +56,7 @@ class SimilarModels(Sequence):
         return replace(self, values=self.values[indices], cases=self.cases[indices])
 
     def columns(self) -> Model:
-        """Merge the models into one whose differing numbers are arrays (n,)."""
+        """Merge the models into one in which the numbers that differ are arrays (n,)."""
         return replace_numbers(self.first, self.plain_numbers, list(self.values.T))
 
 
@@ -68,7 +68,7 @@ def select_models(models: Sequence[Model], indices: Sequence[int]) -> Sequence[M
 
 
 def collect_columns(models: Sequence[Model], row: Callable[[Model], tuple]) -> np.ndarray:
-    """Evaluate a function of the model for all models, as columns (k, n).
+    """Evaluate a function for all models, and return its values as columns (k, n).
 
     `row` is a function of a model that returns k numbers; its formulas take arrays as well.
     """
@@ -83,7 +83,7 @@ def collect_columns(models: Sequence[Model], row: Callable[[Model], tuple]) -> n
 def replace_numbers(
     model: Model, plain_numbers: PlainNumbers, values: Sequence, sets: tuple = ()
 ) -> Model:
-    """Return a model with other values of keys that are plain numbers.
+    """Return a model with other values of some numeric keys.
 
     The numbers are written into the tables of the scene, and the functions of `build` read these tables again. So every
     other key of a table keeps its effect. Parts that the numbers do not change are shared with `model`.
@@ -133,13 +133,13 @@ def replace_numbers(
 
 
 def _replace_law(rig: Rig, law: Friction) -> Rig:
-    """Return a rig whose interfaces have another friction law."""
+    """Return a copy of a rig whose interfaces have another friction law."""
     interfaces = tuple(replace(interface, numbers=law) for interface in rig.friction.interfaces)
     return replace(rig, friction=replace(rig.friction, interfaces=interfaces))
 
 
 def _replace_drive(rig: Rig, drive: Drive) -> Rig:
-    """Return a rig with the frequency and the amplitude of another table [drive]."""
+    """Return a copy of a rig with the frequency and the amplitude of another table [drive]."""
     omega = 2 * np.pi * drive.frequency
     amplitude = drive.acceleration
     if amplitude is None:
@@ -149,7 +149,7 @@ def _replace_drive(rig: Rig, drive: Drive) -> Rig:
 
 
 def _replace_modes(rig: Rig, structure: Structure) -> Rig:
-    """Replace the modes of a rig, which has no bonded spring, by those of another table [structure]."""
+    """Replace the modes of a rig without bonded spring by those of another table [structure]."""
     columns = [mode.frequency for mode in structure.mode]
     columns += [mode.damping for mode in structure.mode]
     frequency, damping = np.split(np.array(np.broadcast_arrays(*columns)), 2)

@@ -81,7 +81,7 @@ class SlidePath:
 
     @property
     def period(self) -> float | None:
-        """Period [s] of the motion, None if it does not repeat."""
+        """Period [s] of the motion, or None if it does not repeat."""
         if self.kind == "sine":
             return 1 / self.frequency
         return 4 * self.amplitude / self.speed if self.kind == "triangle" else None
@@ -122,7 +122,7 @@ class SlidePath:
         )
 
     def _sample_triangle(self, index, steps: int) -> SlideSamples:
-        """Sample a triangle; after a run-in it starts in the opposite direction."""
+        """Sample a triangle wave; after a run-in it starts in the opposite direction."""
         quarter = (index % steps) / steps * 4
         falling = np.where(quarter < 3, 2 - quarter, quarter - 4)
         rel_disp = np.where(quarter < 1, quarter, falling) * self.amplitude
@@ -136,7 +136,7 @@ class SlidePath:
         return SlideSamples(time, rel_disp, max(0, time.size - 1 - steps), 2 * np.pi / period)
 
     def steps(self, tolerance: float, pinned_steps: int | None, length: float | None) -> int:
-        """Return the number of steps per cycle that a tolerance needs.
+        """Return the number of steps per cycle that is needed for a tolerance.
 
         It is a multiple of four, so that reversals are samples. A constant slide, a dwell and a file
         count as one cycle; a file gets as many times the steps of a cycle as its path has strokes
@@ -171,7 +171,7 @@ class SlidePath:
         return 4 * ceil(max(cycles * per_cycle, min_steps) / 4)
 
     def _legs(self) -> tuple:
-        """Return time [s] and displacement [m] at the corners of a path of straight segments."""
+        """Return time [s] and displacement [m] at the corners of a path that consists of straight segments."""
         if self.corners is not None:
             return self.corners
         return np.array([0.0, self.amplitude / self.speed]), np.array([0.0, self.amplitude])
@@ -216,7 +216,7 @@ def build_slide(scene) -> SlidePath:
 
 
 def _list_dwell_corners(keys) -> tuple:
-    """Return time [s] and relative displacement [m] at corners of a dwell, without empty legs."""
+    """Return time [s] and displacement [m] at the corners of a motion with dwell; segments of zero duration are left out."""
     length = np.array([keys.distance, 0.0, keys.distance_after or 0.0])
     duration = np.array([keys.distance / keys.speed, keys.hold, length[2] / keys.speed])
     is_leg = duration > 0
@@ -225,7 +225,7 @@ def _list_dwell_corners(keys) -> tuple:
 
 
 def _compute_leg_lengths(rel_disp, across=None) -> np.ndarray:
-    """Compute the lengths [m] of the straight legs between corners, in one or two directions."""
+    """Compute the lengths [m] of the straight segments between corners, in one or two directions."""
     if across is None:
         return np.abs(np.diff(rel_disp))
     return np.hypot(np.diff(rel_disp), np.diff(across))
@@ -243,7 +243,7 @@ def read_path_file(path: Path) -> tuple:
 
 
 def _sample_legs(time, rel_disp, steps: int, across=None) -> SlideSamples:
-    """Sample straight legs between corners; `across` is the lateral displacement at the corners.
+    """Sample the straight segments between corners; `across` is the lateral displacement at the corners.
 
     Half of the steps are spread by length, half evenly over the legs that move. A leg at rest gets
     `STEPS_PER_HOLD` steps.

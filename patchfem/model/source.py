@@ -32,7 +32,7 @@ class Source:
     notes: tuple = ()
 
     def describes(self, model) -> bool:
-        """Return whether a model is still as built from the scene, with no part replaced."""
+        """Return whether a model is unchanged since it was built from the scene."""
         built = self.write.args[-1]
         names = [part.name for part in fields(built) if part.name != "source"]
         return all(getattr(model, name) is getattr(built, name) for name in names)
@@ -49,7 +49,7 @@ class Source:
 
 @contextmanager
 def locate_errors(source: Source) -> Iterator[None]:
-    """Add the file and the line to each PatchfemError of the block that names a key."""
+    """Add file and line to each PatchfemError that is raised in the block and names a key."""
     try:
         yield
     except PatchfemError as error:

@@ -1,4 +1,4 @@
-"""Modes of [structure] with the participation of the drive, and the initial state.
+"""Modes of [structure] with their participation in the drive signal, and the initial state.
 
 [structure] describes a rig by modes, by masses and springs, by matrices or by a file. The functions here
 give the same quantities for each description.
@@ -24,7 +24,7 @@ MIN_MODE_FRACTION = 1e-12
 
 
 def build_modes(scene, own_modes: ModalBasis | None = None) -> ModalBasis:
-    """Build the modes of a rig with its linear bonded spring.
+    """Build the modes of a rig, including the linear spring of the bonded joint.
 
     The field `base` is the participation of the drive. Of a moving base it is the participation of
     each coordinate in the base motion. Of a force F it is minus the motion of the driven place per
@@ -65,7 +65,7 @@ def build_modes(scene, own_modes: ModalBasis | None = None) -> ModalBasis:
 
 
 def build_own_modes(scene, joint: float | None = None) -> ModalBasis:
-    """Build the modes of a rig without the linear spring of the bonded joint.
+    """Build the modes of a rig, excluding the linear spring of the bonded joint.
 
     The joint is subtracted from modes that were measured while it stuck.
 
@@ -100,7 +100,7 @@ def build_own_modes(scene, joint: float | None = None) -> ModalBasis:
 
 
 def has_pressed_joint(scene) -> bool:
-    """Return whether the joint stiffness depends on a pressed patch and not only on the law."""
+    """Return whether the joint stiffness depends on a pressed patch in addition to the friction law."""
     contact = scene.contact
     if scene.friction is None or contact is None:
         return False
@@ -148,7 +148,7 @@ def compute_sticking_stiffness(interface: InterfaceLaw, load: float) -> float:
 
 
 def _build_given_modes(scene) -> ModalBasis:
-    """Build the modes that [structure] describes, without the bonded spring."""
+    """Build the modes that [structure] describes, excluding the spring of the bonded joint."""
     structure = scene.structure
     is_forced = scene.drive.kind == "force"
     if structure.mode:
@@ -171,7 +171,7 @@ def _build_given_modes(scene) -> ModalBasis:
 
 @memoize
 def _build_listed_modes(structure, is_forced: bool) -> ModalBasis:
-    """Build the modes of [[structure.mode]]."""
+    """Build the modes that the tables [[structure.mode]] describe."""
     basis = listed_modes.build_basis(structure.mode, structure.moving_mass)
     accelerometer = np.array([mode.accelerometer for mode in structure.mode], float)
     gauge = np.array([mode.gauge for mode in structure.mode], float)
@@ -182,7 +182,7 @@ def _build_listed_modes(structure, is_forced: bool) -> ModalBasis:
 
 
 def _split_into_strips(scene, modes: ModalBasis) -> ModalBasis:
-    """Add a relative displacement for each strip if a mode yaws the patch."""
+    """Add a relative displacement for each strip if some mode yaws the patch."""
     if not needs_strip_displacements(scene):
         return modes
     n_strips = scene.contact.strips.count
@@ -192,19 +192,19 @@ def _split_into_strips(scene, modes: ModalBasis) -> ModalBasis:
 
 
 def read_file_notes(scene) -> list:
-    """Return the sentences for the user on what was neglected or changed in structure.file."""
+    """Return sentences that tell the user what was neglected or changed in structure.file."""
     if scene.structure.file is None:
         return []
     return structure_files.read_scene_modes(scene).notes
 
 
 def _find_driven_mass(scene) -> int:
-    """Return the number of the mass on which a force acts or which is released."""
+    """Return the number of the mass on which the force acts or which is released."""
     return scene.drive.mass or scene.structure.output_mass or 1
 
 
 def build_start(scene, modes: ModalBasis) -> InitialState | None:
-    """Build the initial state of a rig; None if it starts at rest.
+    """Build the initial state of a rig, or return None if it starts at rest.
 
     Raises
     ------
@@ -222,7 +222,7 @@ def build_start(scene, modes: ModalBasis) -> InitialState | None:
 
 
 def compute_initial_state(scene, modes: ModalBasis) -> InitialState:
-    """Compute displacements and velocities at t = 0 in the coordinates of a rig.
+    """Compute displacements and velocities at t = 0 in the modal coordinates of a rig.
 
     [structure.start] gives them for each mode or mass. A release displaces one mass, or the output in
     the shape of a static force there. A step of the base displacement leaves the masses where they
@@ -255,7 +255,7 @@ def compute_initial_state(scene, modes: ModalBasis) -> InitialState:
 
 
 def _extend_boundary_values(structure, modes: ModalBasis, values):
-    """Add zeros for the modes of a reduced structure to initial values of its boundary."""
+    """Append zeros for the modes of a reduced structure to the initial values of its boundary."""
     if structure.reduced is None or values is None:
         return values
     return np.append(np.asarray(values, float), np.zeros(len(modes.names) - len(values)))
@@ -270,7 +270,7 @@ def compute_named_motions(modes: ModalBasis, modal) -> np.ndarray:
 
 
 def compute_natural_frequencies(structure, modes: ModalBasis) -> np.ndarray:
-    """Return the natural frequencies (n,) [Hz] with the bonded spring, 0 for rigid modes."""
+    """Return the natural frequencies (n,) [Hz] with the bonded spring; 0 for rigid-body modes."""
     if structure.mode and structure.bonded is None and structure.measured == "free":
         # Frequencies that the scene states are returned without the round-off of the modes.
         return np.array([mode.frequency for mode in structure.mode])
@@ -278,7 +278,7 @@ def compute_natural_frequencies(structure, modes: ModalBasis) -> np.ndarray:
 
 
 def find_first_elastic_mode(scene, own_modes: ModalBasis) -> tuple:
-    """Return the frequency [Hz] and the mass [kg] of the first mode that is not rigid.
+    """Return the frequency [Hz] and the modal mass [kg] of the first mode that is not rigid.
 
     The mass is structure.moving_mass, or else the modal mass at the output. If the mode does not move
     the output, it is the mass of all coordinates at the output. The frequency is 0 if all modes are
@@ -313,7 +313,7 @@ def needs_strip_displacements(scene) -> bool:
 
 
 def compute_strip_slides(modes: ModalBasis, offsets) -> np.ndarray:
-    """Compute the relative displacement of strips per modal coordinate: slide - y yaw.
+    """Compute the relative displacement of each strip per modal coordinate: slide - y yaw.
 
     A positive yaw turns +x towards +y, so that a piece at +y moves backwards. The friction forces f of
     the strips, which resist, exert the moment sum y f about +z on the upper piece.

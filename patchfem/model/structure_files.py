@@ -12,14 +12,14 @@ UNIVERSAL_EXTENSIONS = (".uff", ".unv")  # file extensions of universal files
 
 
 class FileModes(NamedTuple):
-    """Modes of a file, and sentences for the user on what was neglected or changed."""
+    """Modes from a file, with sentences for the user on what was neglected or changed."""
 
     modes: ModalBasis
     notes: list
 
 
 def read_scene_modes(scene) -> FileModes:
-    """Read the modes of structure.file of a scene; an error names the line of the key at fault."""
+    """Read the modes from structure.file; an error names the line of the key that cannot be used."""
     path = scene.resolve_path(scene.structure.file)
     try:
         return read_modes(path, scene.structure, scene.drive, needs_interface=scene.kind == "rig")
@@ -28,7 +28,7 @@ def read_scene_modes(scene) -> FileModes:
 
 
 def read_modes(path: Path, structure, drive, *, needs_interface: bool) -> FileModes:
-    """Read the modes of a file.
+    """Read the modes from a file.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def read_modes(path: Path, structure, drive, *, needs_interface: bool) -> FileMo
 
 
 def read_content(path: Path):
-    """Read a file without building modes: arrays by name, or the shapes of a universal file."""
+    """Read a file but build no modes: return arrays by name, or the shapes of a universal file."""
     try:
         return _read_file(path)
     except PatchfemError as error:
@@ -70,7 +70,7 @@ def read_content(path: Path):
 
 
 def is_universal_file(path: Path) -> bool:
-    """Return whether a file has the extension of a universal file."""
+    """Return whether a path has the extension of a universal file."""
     return path.suffix.lower() in UNIVERSAL_EXTENSIONS
 
 
@@ -84,7 +84,7 @@ def _read_file(path: Path):
 def _build_modes(
     path: Path, structure, drive_kind: str, mass: int | None, needs_interface: bool
 ) -> FileModes:
-    """Build modes from a file."""
+    """Build modes from the content of a file."""
     content = _read_file(path)
     is_forced = drive_kind == "force"
     if not is_universal_file(path):
@@ -102,7 +102,7 @@ def _build_modes(
 def _build_modes_from_arrays(
     content: dict, structure, is_forced: bool, mass: int | None, needs_interface: bool
 ) -> FileModes:
-    """Build the modes of matrices or modal data."""
+    """Build modes from matrices or modal data."""
     pairs = [interface.between for interface in structure.interface]
     driven_mass = mass if is_forced else None
     modes = arrays.build_basis(

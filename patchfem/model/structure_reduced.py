@@ -1,4 +1,4 @@
-"""Modes of [structure.reduced]: those that the scene keeps, and more for the error estimate."""
+"""Modes of [structure.reduced]: the modes that the scene keeps, and more for the error estimate."""
 
 import re
 from functools import lru_cache
@@ -36,7 +36,7 @@ class ReducedModes(NamedTuple):
 
 
 class _MatrixFile(NamedTuple):
-    """Matrix file of a scene: key, path, and a version that changes with the file."""
+    """Matrix file of a scene: its key, its path, and a version that changes with the file."""
 
     key: str
     path: Path
@@ -45,7 +45,7 @@ class _MatrixFile(NamedTuple):
 
 
 class _Coordinates(NamedTuple):
-    """Boundary rows (b,), motion (n,) with a unit motion of the base or None, and notes."""
+    """Boundary rows (b,), motion (n,) for a unit motion of the base or None, and notes."""
 
     boundary: np.ndarray
     moved: np.ndarray | None
@@ -53,7 +53,7 @@ class _Coordinates(NamedTuple):
 
 
 def build_reduced_modes(scene) -> ReducedModes:
-    """Reduce the structure of a scene; a PatchfemError names the line of the key at fault."""
+    """Reduce the structure of a scene; a PatchfemError names the line of the key that cannot be used."""
     structure = scene.structure
     table = structure.reduced
     is_base_driven = scene.drive.kind == "base"
@@ -111,7 +111,7 @@ def list_slide_pairs(structure) -> tuple:
 
 
 def _describe_reduction(reduction, modes: ModalBasis, table) -> str:
-    """Describe what the reduction keeps; its frequencies let a user notice wrong units."""
+    """Describe what the reduction keeps; the frequencies help the user notice wrong units."""
     n_modes = min(table.modes, reduction.modes.omega.size)
     n_boundary = len(reduction.boundary)
     kind = "fixed-interface" if table.method == reduced.CRAIG_BAMPTON else "free-interface"
@@ -140,7 +140,7 @@ def _find_files(table, locate) -> tuple:
 
 
 def _find_file(key: str, path: Path) -> _MatrixFile:
-    """Return the record of a matrix file with its present version."""
+    """Return the record of a matrix file in its present version."""
     try:
         stat = path.stat()
     except OSError as error:
@@ -152,7 +152,7 @@ def _find_file(key: str, path: Path) -> _MatrixFile:
 
 @lru_cache(maxsize=4)
 def _read_matrix(file: _MatrixFile) -> matrices.Matrix:
-    """Read a matrix file; an unchanged file is read once."""
+    """Read a matrix file; a file that has not changed is read only once."""
     try:
         return matrices.read_matrix(file.path, file.key)
     except PatchfemError as error:
@@ -169,7 +169,7 @@ def _reduce(
     unit: float,
     is_base_driven: bool,
 ) -> tuple:
-    """Reduce the matrices of files; return the Reduction and notes."""
+    """Reduce the matrices in the files; return the Reduction and notes."""
     matrix_list = [_read_matrix(file) for file in files]
     coordinates = _locate_coordinates(matrix_list, boundary, moved, is_base_driven)
     aligned = matrices.align_rows(*matrix_list)
@@ -188,7 +188,7 @@ def _reduce(
 
 
 def _note_rounding(files: tuple, aligned: list, stiffness, unit: float, shape) -> list:
-    """Write a note about each matrix whose digits leave the lowest frequency uncertain.
+    """Return a note about each matrix whose rounded numbers make the lowest frequency uncertain.
 
     The uncertainty of the square of the frequency is two standard deviations of shape^T A shape, with
     the shape (n,) of the lowest mode of unit modal mass; that of the frequency is half as large.
@@ -211,7 +211,7 @@ def _note_rounding(files: tuple, aligned: list, stiffness, unit: float, shape) -
 
 
 def check_reduction(folder: Path, table, *, is_base_driven: bool) -> None:
-    """Check matrices, boundary and moved coordinates; nothing is reduced.
+    """Check matrices, boundary and moved coordinates, but reduce nothing.
 
     Parameters
     ----------
@@ -233,14 +233,14 @@ def check_reduction(folder: Path, table, *, is_base_driven: bool) -> None:
 
 
 def check_matrix(path: Path, key: str) -> None:
-    """Raise PatchfemError if the file of a matrix cannot be read."""
+    """Raise PatchfemError if a matrix file cannot be read."""
     _read_matrix(_find_file(key, path))
 
 
 def _locate_coordinates(
     matrix_list: list, boundary: tuple, moved: tuple | None, is_base_driven: bool
 ) -> _Coordinates:
-    """Find the rows of the boundary, and of the coordinates that move with the base."""
+    """Find the rows of the boundary coordinates, and of those that move with the base."""
     try:
         stiffness = matrices.align_rows(*matrix_list)[0]
     except PatchfemError as error:
@@ -273,7 +273,7 @@ def _locate_coordinates(
 
 
 def _find_rows(name, matrix: matrices.Matrix, key: str) -> np.ndarray:
-    """Find the row indices, counted from 0, of coordinates that are named in a scene.
+    """Find the row indices, counted from 0, of the coordinates that a scene names.
 
     Parameters
     ----------
@@ -326,7 +326,7 @@ def _find_rows(name, matrix: matrices.Matrix, key: str) -> np.ndarray:
 
 
 def _list_rows_in_range(row_range: re.Match, n: int, full_key: str) -> np.ndarray:
-    """Return the row indices, counted from 0, of a range "a..b" or "a..b:n" of row numbers."""
+    """Return the row indices, counted from 0, for a range "a..b" or "a..b:n" of row numbers."""
     first = int(row_range[1])
     last = int(row_range[2])
     count = int(row_range[3] or 0) or last - first + 1
@@ -341,7 +341,7 @@ def _list_rows_in_range(row_range: re.Match, n: int, full_key: str) -> np.ndarra
 
 
 def _list_directions(matrix: matrices.Matrix, node: int) -> str:
-    """List the directions of a node, or the nodes of the files if they have no such node."""
+    """List the directions of a node, or the nodes in the files if the node does not exist."""
     directions = matrix.places[matrix.places[:, 0] == node, 1]
     if not directions.size:
         return f"their nodes are {matrix.places[0, 0]} to {matrix.places[-1, 0]}"

@@ -28,7 +28,7 @@ class WornFriction:
     bond_length: tuple | None
 
     def compute_worn_law(self, law: Friction, depth: float) -> Friction:
-        """Return a friction law with the parameters for a mean worn depth [m]."""
+        """Return a friction law whose parameters are changed for a mean worn depth [m]."""
         # With a given stiffness, the bond length follows from the coefficient.
         bond_length = self.bond_length if law.stiffness is None else self.coefficient
         factors = {
@@ -66,12 +66,12 @@ class WearModel:
     start: earlier_wear.EarlierWear | None = None
 
     def compute_earlier_depth(self, x, area) -> np.ndarray:
-        """Return the depth [m] worn before the first cycle at x (m,) [m], in the shape of `area`."""
+        """Return the depth [m] worn before the first cycle at x (m,) [m], distributed like `area`."""
         return np.zeros(np.shape(area)) if self.start is None else self.start.depth_at(x)
 
 
 def build_wear_model(scene: Scene) -> WearModel | None:
-    """Build the wear model of a scene; None if it has no [wear]."""
+    """Build the wear model of a scene, or return None if the scene has no [wear]."""
     wear = scene.wear
     if wear is None:
         return None

@@ -57,7 +57,7 @@ _OPENING_BRACKETS = {"]": "[", "}": "{"}
 
 
 class FormattedNumbers(Sequence):
-    """Sequence of numbers that are formatted as text only when they are accessed.
+    """Sequence of numbers, each formatted as text only when it is accessed.
 
     Parameters
     ----------
@@ -99,13 +99,13 @@ class Axis:
 
     @property
     def name(self) -> str:
-        """Key as the name of a variable, with underscores in place of dots."""
+        """Name of the variable for the key, with underscores in place of dots."""
         return re.sub(r"\W", "_", self.key)
 
 
 @dataclass(frozen=True, slots=True)
 class SampledRange:
-    """Swept key with the range from which random values are drawn.
+    """Swept key with the range from which its random values are drawn.
 
     - key: dotted key of the scene.
     - low, high: ends of the range in `unit`.
@@ -120,7 +120,7 @@ class SampledRange:
     log: bool
 
     def make_axis(self, fractions: Iterable[float]) -> Axis:
-        """Return the swept key with the values at given fractions of its range."""
+        """Return the swept key with the values at the given fractions of its range."""
         ends = _RangeEnds(self.low, self.high, self.unit)
         numbers = (_interpolate(ends, fraction, self.log) for fraction in fractions)
         texts = FormattedNumbers(array("d", numbers), self.unit)
@@ -146,7 +146,7 @@ class _WrittenRange(NamedTuple):
 
     @property
     def ends_text(self) -> str:
-        """Both ends as they are written."""
+        """Both ends as the user wrote them."""
         return f"{self.low}..{self.high}"
 
 
@@ -199,7 +199,7 @@ def read_lengths(text: str, name: str) -> list[float]:
 
 
 def read_table(table: Any) -> tuple[list[Axis | SampledRange], list[tuple[str, str]]]:
-    """Return the axes of a plain table [sweep], and (key, sentence) for each of its mistakes."""
+    """Return the axes of a table [sweep] read from TOML, and (key, sentence) for each of its mistakes."""
     if not isinstance(table, dict) or not table:
         example = '"contact.tilt.angle" = "1e-6 rad..1e-2 rad:9"'
         return [], [("sweep", f"keys with their values are needed, such as {example}")]
@@ -218,7 +218,7 @@ def read_table(table: Any) -> tuple[list[Axis | SampledRange], list[tuple[str, s
 
 
 def describe_ranges(texts: Iterable[str]) -> list[str]:
-    """Return a sentence about the range of each string ``table.key=value +- tolerance`` of drawn values."""
+    """Return a sentence on the range given by each string ``table.key=value +- tolerance``."""
     sentences = []
     for text in texts:
         key, _, values = (part.strip() for part in text.partition("="))
@@ -327,7 +327,7 @@ def _find_range(key: str, piece: str, *, is_sampled: bool) -> _WrittenRange | No
 
 
 def _range_about(text: str) -> str:
-    """Convert a value with tolerance such as "5 mm +- 1 mm" to a range; "" if there is no tolerance.
+    """Convert a value with tolerance such as "5 mm +- 1 mm" to a range, or return "" if there is no tolerance.
 
     Raises ValueError if the tolerance has another unit than the value.
     """
@@ -351,7 +351,7 @@ def _range_about(text: str) -> str:
 
 
 def _flatten_table(table: dict, table_key: str = "") -> list[tuple[str, Any]]:
-    """Return (dotted key, value) of a table whose keys may be dotted, in quotes or not."""
+    """Return (dotted key, value) for a table whose keys may be dotted or quoted."""
     pairs = []
     for key, value in table.items():
         path = f"{table_key}.{key}" if table_key else key
@@ -384,7 +384,7 @@ def _find_si_unit(key: str) -> str:
 
 
 def _holds_number(key: str) -> bool:
-    """Return whether the value of a key is one number, with or without unit."""
+    """Return whether the value of a key is a single number, with or without unit."""
     place = find_key(key)
     types = list_key_types(*place)
     is_single = find_inner_table(*place) is None and tuple not in map(get_origin, types)
@@ -418,7 +418,7 @@ def _split_at_commas(text: str) -> list[str]:
 
 
 def _make_value_reader(key: str) -> Callable[[str], float | str]:
-    """Return the function that converts a string of a key to SI; a string without a number is unchanged.
+    """Return a function that converts the string of a value to SI; a string that is not a number is unchanged.
 
     The function raises ValueError if the key does not accept the text.
     """
@@ -446,7 +446,7 @@ def _make_value_reader(key: str) -> Callable[[str], float | str]:
 
 
 def _read_ends(key: str, written_range: _WrittenRange) -> _RangeEnds:
-    """Return the ends of a range as exact fractions in the unit of the first."""
+    """Return the ends of a range as exact fractions in the unit of its first end."""
     kind = find_quantity_kind(*find_key(key))
     texts = written_range[:2]
     if kind is None:
@@ -513,7 +513,7 @@ def _make_span(key: str, written_range: _WrittenRange) -> SampledRange:
 
 
 def _interpolate(ends: _RangeEnds, fraction: Fraction | float, is_log: bool) -> float:
-    """Return the value at a fraction of a range of a key."""
+    """Return the value at a given fraction of the range of a key."""
     if not is_log:
         return float(ends.low + (ends.high - ends.low) * fraction)
     if fraction in (0, 1):

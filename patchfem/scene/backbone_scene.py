@@ -1,4 +1,4 @@
-"""Scenes of a backbone: modes given beside the scene, and tables that are ignored.
+"""Scenes of a backbone curve: modes given separately from the scene, and tables that are ignored.
 
 A backbone is the motion of a structure on its own. So `BackboneTables` takes [slide] out of the plain values
 of a scene, adds the [drive] that a rig must have, and writes given or assumed modes into [structure].
@@ -67,7 +67,7 @@ def parse_modes(modes: str | Iterable) -> tuple[GivenMode, ...]:
 
 
 def _parse_mode(frequency, damping, slide=None) -> GivenMode:
-    """Parse the parts of a mode; raise ValueError if a part has the wrong unit."""
+    """Parse frequency, damping and slide of a mode; raise ValueError if one has the wrong unit."""
     if isinstance(frequency, str):
         frequency = parse_quantity(frequency.strip(), "frequency")
     slide = None if slide is None else _parse_ratio(slide)
@@ -88,7 +88,7 @@ def _parse_ratio(value) -> float:
 
 
 def _write_mode(number: int, mode: GivenMode) -> dict[str, Any]:
-    """Return the table [[structure.mode]] of a given mode; `number` counts from 0."""
+    """Return the table [[structure.mode]] of a mode; `number` counts from 0."""
     name = MODE_NAMES[number] if number < len(MODE_NAMES) else f"mode-{number + 1}"
     return {
         "name": name,
@@ -101,7 +101,7 @@ def _write_mode(number: int, mode: GivenMode) -> dict[str, Any]:
 
 
 class BackboneTables:
-    """Change of the plain values of a scene into those of a rig whose backbone is computed.
+    """Function that changes the raw values of a scene into those of a rig whose backbone is computed.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ class BackboneTables:
         self.ignored: list[str] = []
 
     def __call__(self, raw: dict[str, Any]) -> None:
-        """Change the plain values of a scene."""
+        """Change the raw values of a scene."""
         self.ignored = [name for name in ("slide", "drive") if name in raw]
         raw.pop("slide", None)
         structure = raw.get("structure", {})

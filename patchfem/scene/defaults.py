@@ -106,13 +106,13 @@ def _complete_law(law: tables.Friction) -> tables.Friction:
 
 
 def _fill_missing_values(table: Any, values: dict[str, Any]) -> Any:
-    """Return a table in which missing values are replaced by given ones."""
+    """Return a copy of a table in which missing values are replaced by the given ones."""
     missing = {name: value for name, value in values.items() if getattr(table, name) is None}
     return table.model_copy(update=missing)
 
 
 def _reset_unused_keys(table: Any, unused: Iterable[str]) -> Any:
-    """Return a table in which given keys have their default values."""
+    """Return a copy of a table in which the given keys have their default values."""
     fields = type(table).model_fields
     names = attributes_by_key(type(table))
     return table.model_copy(update={names[key]: fields[names[key]].default for key in unused})

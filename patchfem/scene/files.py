@@ -12,7 +12,7 @@ from .rules.view import wrap_value
 
 
 def list_named_files(tables: Any) -> list[tuple[str, str]]:
-    """Return (dotted key, file) of every file that a scene, or its tables, names."""
+    """Return (dotted key, file) for every file that a scene, or its tables, names."""
     scene = {name: wrap_value(getattr(tables, name)) for name in _TABLES_WITH_FILES}
     structure = scene["structure"]
     faces = structure.interface or ()
@@ -43,7 +43,7 @@ _MATRIX_KEYS = ("stiffness", "mass", "damping")
 
 
 def _list_patch_files(table_key: str, contact: Any) -> list[tuple[str, Any]]:
-    """List the file keys of the patch with this table key, each with its file or UNKNOWN_VALUE."""
+    """List the file keys in the table of a patch, each with its file or UNKNOWN_VALUE."""
     asperities = contact.asperities
     return [
         (f"{table_key}.mesh", contact.mesh),

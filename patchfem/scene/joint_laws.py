@@ -40,7 +40,7 @@ WISHES = {
 
 
 class JointLaw(NamedTuple):
-    """Friction law that answers some questions about a joint.
+    """Friction law, with the questions about a joint that it answers.
 
     - known: words of KNOWLEDGE that the keys of the law need.
     - wanted: words of WISHES that the law answers.
@@ -183,7 +183,7 @@ JOINT_LAWS = (
 
 
 class Choice(NamedTuple):
-    """Friction law that answers a user's question: the row of JOINT_LAWS, and both answers as lists of words."""
+    """Friction law chosen for a user: the row of JOINT_LAWS, and both answers as lists of words."""
 
     row: JointLaw
     known: list[str]
@@ -223,7 +223,7 @@ def parse_choice(text: str, allowed_words: Iterable[str], option: str) -> list[s
 
 
 def choose_law(known: str, wanted: str) -> Choice:
-    """Choose the law that answers the most wishes; of several, the one with the fewest assumptions.
+    """Choose the law that fulfils the most wishes; among equals, the one with the fewest assumptions.
 
     Parameters
     ----------
@@ -241,7 +241,8 @@ def choose_law(known: str, wanted: str) -> Choice:
     wanted_words = parse_choice(wanted, WISHES, "--want")
 
     def count_costs(row: JointLaw) -> tuple[int, int, int]:
-        """Return what a law leaves to wish and to assume; the least of all rows is chosen."""
+        """Return minus the number of answered wishes, and the numbers of missing inputs and of
+        assumed keys; the law with the smallest tuple is chosen."""
         # A friction coefficient can be taken from tables; the other inputs must be measured.
         missing = set(row.known).difference(known_words, {"coefficient"})
         n_answered = len(set(row.wanted).intersection(wanted_words))
@@ -253,7 +254,7 @@ def choose_law(known: str, wanted: str) -> Choice:
 
 
 def format_question(question: str, meanings: dict[str, str]) -> str:
-    """Return a question with the words of its answers, one on each line."""
+    """Return a question with the possible answers and their meanings, one on each line."""
     width = max(map(len, meanings))
     answers = [f"  {word:<{width}}  {meaning}" for word, meaning in meanings.items()]
     return "\n".join([f"{question} (words, separated by commas)", *answers])

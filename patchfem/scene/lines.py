@@ -84,7 +84,7 @@ class _SyntaxError(Exception):
 
 
 class TooManyKeyParts(ValueError):
-    """Error for a key of more than MAX_KEY_PARTS parts in this `line`, counted from 1."""
+    """Error for a key on `line`, counted from 1, that has more than MAX_KEY_PARTS parts."""
 
     def __init__(self, line: int) -> None:
         super().__init__(f"a key has more than {MAX_KEY_PARTS} parts; write table.key")
@@ -205,12 +205,12 @@ class _Scanner:
         return match[0]
 
     def peek(self) -> str:
-        """Skip blanks and comments and return the next character; "" at the end."""
+        """Skip blanks and comments and return the next character, or "" at the end of the text."""
         self.position = _BLANK_PATTERN.match(self.text, self.position).end()
         return self.text[self.position : self.position + 1]
 
     def take(self, mark: str) -> bool:
-        """Consume a token if it is at the cursor, and return whether it was."""
+        """Consume a token if it is at the cursor, and return whether it was there."""
         if not self.text.startswith(mark, self.position):
             return False
         self.position += len(mark)

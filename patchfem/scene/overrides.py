@@ -43,7 +43,7 @@ PLAIN_KEYS = {
 
 
 class _ReadTable(NamedTuple):
-    """Cached result of reading a table with given assignments."""
+    """Cached result of reading a table under given assignments."""
 
     name: str
     raw: Any
@@ -52,7 +52,7 @@ class _ReadTable(NamedTuple):
 
 
 class BaseScene:
-    """Valid scene from which others differ in a few keys; text and tables are read only once.
+    """Valid scene from which others that differ in a few keys are made; its text and tables are read only once.
 
     None of the other scenes contains the table [sweep].
     """
@@ -70,7 +70,7 @@ class BaseScene:
         self._known: dict[tuple[str, ...], _ReadTable] = {}
 
     def override(self, sets: Iterable[str]) -> Scene:
-        """Return the scene with further assignments `table.key=value`.
+        """Return a copy of the scene with further assignments `table.key=value`.
 
         Tables that no key touches, or that had the same values before, are not read again; all rules are checked.
         Raises SceneError as `scene.loads` does, and if a file that the scene names does not exist.
@@ -97,7 +97,7 @@ class BaseScene:
         return scene
 
     def _reuse(self, draft: SceneDraft, group: tuple[str, ...]) -> bool:
-        """Reuse a table that was read before with the same assignments, if there is one."""
+        """Use a table again that was read before under the same assignments, if there is one."""
         known = self._known.get(group)
         if known is None:
             return False
@@ -107,7 +107,7 @@ class BaseScene:
         return True
 
     def plain_numbers(self, scene: Scene, keys: Sequence[str]) -> PlainNumbers | None:
-        """Return a fast generator of scenes that differ only in plain numbers.
+        """Return a fast generator of scenes that differ only in numeric values that affect no check.
 
         Parameters
         ----------
@@ -144,7 +144,7 @@ class NumberLocation(NamedTuple):
 
 
 class PlainKey(NamedTuple):
-    """Location of a plain number, and the limit below which no check depends on its value."""
+    """Location of a numeric value, and the limit below which the value affects no check of the scene."""
 
     location: NumberLocation
     limit: float
@@ -152,7 +152,7 @@ class PlainKey(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class PlainNumbers:
-    """Generator of scenes that differ in numbers on which no check depends.
+    """Generator of scenes that differ only in numeric values that affect no check.
 
     - scene: one of these scenes.
     - keys: the numbers that differ.
@@ -162,7 +162,7 @@ class PlainNumbers:
     keys: tuple[PlainKey, ...]
 
     def are_plain(self, values: np.ndarray) -> bool:
-        """Return whether no check depends on given values of the keys."""
+        """Return whether given values of the keys affect no check."""
         return bool(np.all((values > 0) & (values < [key.limit for key in self.keys])))
 
     def values_by_location(self, values: Sequence) -> dict[NumberLocation, Any]:
@@ -174,7 +174,7 @@ class PlainNumbers:
         return numbers
 
     def make_table(self, name: str, numbers: dict[NumberLocation, Any]) -> Any:
-        """Return a table of the scene with some numbers replaced."""
+        """Return a copy of a table of the scene with some numbers replaced."""
         table = getattr(self.scene, name)
         updates: dict[int | str | None, dict[str, Any]] = {}
         for location, value in numbers.items():
@@ -194,7 +194,7 @@ class PlainNumbers:
         return (*self.scene.sets[: len(self.scene.sets) - len(self.keys)], *sets)
 
     def make_scene(self, values: Sequence[float], sets: Sequence[str]) -> Scene:
-        """Create a scene with given values without reading and checking it.
+        """Create a scene with given values; it is neither parsed nor checked.
 
         `values` [SI] are those of the keys; `are_plain` must hold for them.
         """
@@ -248,7 +248,7 @@ def _is_plain_motion(scene: Scene) -> bool:
 
 
 def _find_plain_key(scene: Scene, key: str) -> PlainKey | None:
-    """Find a key of PLAIN_KEYS in a scene; None for others and for a value out of range."""
+    """Find a key of PLAIN_KEYS in a scene, or return None for another key or a value out of range."""
     pieces = split_key(key)
     table = getattr(scene, pieces[0], None)
     part: int | str | None = None
@@ -276,7 +276,7 @@ def _find_plain_key(scene: Scene, key: str) -> PlainKey | None:
 
 
 def _group_by_table(sets: tuple[str, ...]) -> list[tuple[str, ...]]:
-    """Return the assignments in groups, one for each table, in their order."""
+    """Return the assignments in groups, one for each table, in their original order."""
     groups: dict[str, tuple[str, ...]] = {}
     for assignment in sets:
         name = _find_table_name(assignment)
@@ -285,7 +285,7 @@ def _group_by_table(sets: tuple[str, ...]) -> list[tuple[str, ...]]:
 
 
 def _find_table_name(key: str) -> str:
-    """Return the name of the table of a dotted key, or of an assignment."""
+    """Return the name of the table to which a dotted key, or an assignment, belongs."""
     return key.partition("=")[0].partition(".")[0].strip()
 
 

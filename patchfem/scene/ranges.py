@@ -24,7 +24,7 @@ class Range:
 
     @property
     def unit(self) -> str:
-        """SI unit of the key; "1" for a plain number."""
+        """SI unit of the key, or "1" for a number without unit."""
         return quantities.find_si_unit(self.kind)
 
     def format_assignment(self, value: float) -> str:
@@ -76,7 +76,7 @@ def _read_range(text: str) -> Range:
 
 
 def _require_number_key(key: str) -> KeyDefinition:
-    """Find a key that holds one number; raise ValueError for any other."""
+    """Find a key that holds one number; raise ValueError for any other key."""
     definition = require_key(key)
     types = list_key_types(*definition)
     if find_inner_table(*definition) is not None or tuple in types or float not in types:

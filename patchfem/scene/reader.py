@@ -1,4 +1,4 @@
-"""Reading of the tables from the plain values of TOML and --set; mistakes name their line."""
+"""Reading of tables from TOML values and --set; each mistake is reported with its line."""
 
 from __future__ import annotations
 
@@ -139,7 +139,7 @@ def _report_unknown(
 
 
 def _list_inner_tables(model: type[Table]) -> list[str]:
-    """Return the keys of a table that hold a table and cannot hold a plain value."""
+    """Return the keys of a table that hold an inner table and do not accept a single value."""
     names = attributes_by_key(model).items()
     tables = [key for key, name in names if find_inner_table(model, name) is not None]
     return [key for key in tables if not is_table_or_value(model, attributes_by_key(model)[key])]
@@ -148,7 +148,7 @@ def _list_inner_tables(model: type[Table]) -> list[str]:
 def _suggest_name(
     draft: SceneDraft, model: type[Table], raw: dict[str, Any], key: str, table_key: str
 ) -> str:
-    """Return the key or table that was probably meant by an unknown one; "" if none is similar."""
+    """Return the key or table that was probably meant by an unknown one, or "" if none is similar."""
     is_table = _is_table(raw[key])
     if not table_key and not is_table:
         # --set may name a key without its table; the key then belongs to a
@@ -178,7 +178,7 @@ def _list_tables_with_key(model: type[Table], key: str) -> list[str]:
 
 
 def _is_table(value: Any) -> bool:
-    """Return whether a plain value is a table or an array of tables."""
+    """Return whether a value read from TOML is a table or an array of tables."""
     if isinstance(value, list) and value:
         return isinstance(value[0], dict)
     return isinstance(value, dict)
@@ -259,7 +259,7 @@ def _find_item(draft: SceneDraft, items: list[Any], path: str, written_key: str)
 
 
 def read_set_value(key: str, text: str) -> Any:
-    """Return the plain value of a string of --set; a string that is not TOML stays a string."""
+    """Parse the value of a --set option as TOML; return it as a string if it is not valid TOML."""
     model, name = find_key(key)
     is_text_key = model is not None and str in list_key_types(model, name)
     if _PLAIN_TEXT_PATTERN.fullmatch(text):
@@ -277,7 +277,7 @@ def read_set_value(key: str, text: str) -> Any:
 
 
 def _is_cut_by_comment(text: str) -> bool:
-    """Return whether TOML would read the end of a value as a comment."""
+    """Return whether TOML would take the end of a value for a comment."""
     if "#" not in text:
         return False
     try:

@@ -73,7 +73,7 @@ class Scene:
         return f"Scene of {self.path.name}: {self.kind}; {effects}{sets}"
 
     def with_(self, **sets: Any) -> Scene:
-        """Return a copy of the scene with other values of some keys.
+        """Return a copy of the scene with the values of the given keys replaced.
 
         Texts are written as in a scene, numbers are in SI. Raises SceneError as in `load`, and for a length without a unit
         that is longer than any joint.
@@ -224,12 +224,12 @@ def finish_scene(
 
 
 def move_scene(scene: Scene, path: Path) -> Scene:
-    """Return the scene for another path, with its file names relative to the new folder."""
+    """Return a copy of the scene for another path, with file names relative to the new folder."""
     return loads(scene.text, path, [*scene.sets, *make_relative_file_sets(scene, path.parent)])
 
 
 def read_sweep_axes(text: str, path: str | Path) -> tuple[list, list[str]]:
-    """Return the axes of the table [sweep] of a text, and the lines of the mistakes in it."""
+    """Return the axes of the table [sweep] in a text, and one line for each mistake in it."""
     raw, lines = parse_text(text, path)
     draft = SceneDraft(str(path), lines, raw)
     swept = _read_axes(draft, raw["sweep"]) if "sweep" in raw else []

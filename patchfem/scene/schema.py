@@ -39,7 +39,7 @@ def make_schema() -> dict:
 
 
 def _rebuild_validator(model: type[Table]) -> None:
-    """Build the pydantic validator of a table again after its inner tables."""
+    """Rebuild the pydantic validator of a table, after those of its inner tables."""
     for name in attributes_by_key(model).values():
         if inner := find_inner_table(model, name):
             _rebuild_validator(inner)
@@ -53,7 +53,7 @@ def _list_inner_models(model: type[Table]) -> set[type[Table]]:
 
 
 def _describe_table(model: type[Table], raw: dict) -> dict:
-    """Return the schema of a table: the meaning of keys, no null, defaults as in a scene."""
+    """Return the schema of a table: the meaning and default of each key; null is not allowed."""
     properties = raw["properties"]
     keys = attributes_by_key(model)
     schema = {
@@ -66,7 +66,7 @@ def _describe_table(model: type[Table], raw: dict) -> dict:
 
 
 def _describe_key(model: type[Table], key: str, raw: dict) -> dict:
-    """Return the schema of a key, from the one that pydantic makes."""
+    """Return the schema of a key, based on the one that pydantic makes."""
     schema = {word: raw[word] for word in raw if word not in ("title", "anyOf", "default")}
     types = [choice for choice in raw.get("anyOf", []) if choice.get("type") != "null"]
     if len(types) == 1:
@@ -86,7 +86,7 @@ def _describe_key(model: type[Table], key: str, raw: dict) -> dict:
 
 
 def _describe_selection(model: type[Table], key: str) -> str:
-    """Return which keys the values of a selector need, or which values need a key; "" otherwise."""
+    """Return which keys each value of a selector needs, or which values need a key, or "" if neither applies."""
     selector = next((row for row in SELECTORS.values() if issubclass(model, row.model)), None)
     if selector is None:
         return ""
@@ -111,7 +111,7 @@ def _describe_selection(model: type[Table], key: str) -> str:
 
 
 def _add_units(schema: dict, kind: str) -> None:
-    """Add to a schema the pattern of quantities with units."""
+    """Add the pattern of quantities with units to a schema."""
     if isinstance(schema.get("default"), int | float):
         schema["default"] = f"{schema['default']:g} {find_si_unit(kind)}"
     for part in (schema, *schema.get("anyOf", ()), schema.get("items", {})):
@@ -120,13 +120,13 @@ def _add_units(schema: dict, kind: str) -> None:
 
 
 def make_quantity_pattern(kind: str) -> str:
-    """Return the regular expression of a quantity of a kind of KINDS: a number, a blank, a unit."""
+    """Return a regular expression that matches a quantity (number, blank, unit) whose kind is `kind`."""
     units = sorted(UNIT_FACTORS[kind], key=len, reverse=True)
     return rf"^\s*{NUMBER_PATTERN}[ \t]+(?:{'|'.join(map(_make_unit_pattern, units))})\s*$"
 
 
 def _make_unit_pattern(unit: str) -> str:
-    """Return the regular expression of a unit in all its spellings."""
+    """Return a regular expression that matches all spellings of a unit."""
     parts = re.split(r"(\^2|\^3| |u)", unit)
     return "".join(UNIT_SPELLINGS.get(part, re.escape(part)) for part in parts)
 
@@ -144,7 +144,7 @@ def _describe_material(table: dict) -> dict:
 
 
 def _make_material_pattern() -> str:
-    """Return the regular expression of every spelling of every name of a material."""
+    """Return a regular expression that matches every spelling of every material name."""
     spellings = []
     for spelling, name in list_spellings().items():
         letters = map(_make_letter_pattern, spelling)
@@ -155,7 +155,7 @@ def _make_material_pattern() -> str:
 
 
 def _make_letter_pattern(letter: str) -> str:
-    """Return the regular expression of a letter in upper and lower case, or of another character."""
+    """Return a regular expression for a letter in upper and lower case, or for another character."""
     return f"[{letter}{letter.upper()}]" if letter.isalpha() else re.escape(letter)
 
 

@@ -1,4 +1,4 @@
-"""Values from Python as the strings of a scene, and as the ``table.key=value`` of --set."""
+"""Formatting of Python values as the text of a scene, and as ``table.key=value`` of --set."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ MAX_JOINT_LENGTH = 1.0  # largest length of a joint [m]; of its lengths, only a 
 
 
 def format_assignments(sets: dict[str, Any]) -> tuple[str, ...]:
-    """Return a ``table.key=value`` for each key; raise SceneError for values that no scene can hold.
+    """Return ``table.key=value`` for each key; raise SceneError for a value that no scene can contain.
 
     A text stands as in a scene without quotes. A number is in SI and gets the unit of its key. Booleans, lists, dicts
     and NumPy scalars and arrays are accepted too.
@@ -28,7 +28,7 @@ def format_assignments(sets: dict[str, Any]) -> tuple[str, ...]:
 
 
 def format_scene(tables: dict[str, Any]) -> str:
-    """Return a dict of tables as the text of a scene; raise SceneError for values it cannot hold.
+    """Return a dict of tables as the text of a scene; raise SceneError for a value that it cannot contain.
 
     Texts are as in a scene, numbers are in SI.
     """
@@ -46,7 +46,7 @@ def format_values(key: str, values: Any) -> list[str]:
 
 
 def require_units(scene: Any, values: dict[str, Any]) -> Any:
-    """Return a scene; raise SceneError if lengths were given as bare numbers that cannot be metres.
+    """Return a scene; raise SceneError if lengths were given as numbers without unit that cannot be metres.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def require_units(scene: Any, values: dict[str, Any]) -> Any:
 def find_oversized_lengths(
     values: dict[str, Any], patch_length: float | None = None, key_prefix: str = ""
 ) -> list[str]:
-    """Return a sentence on each plain number that would be an implausibly long length.
+    """Return a sentence on each number without unit that would be an implausibly large length.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def find_oversized_lengths(
 
 
 def _is_length(key: str, value: Any) -> bool:
-    """Return whether a key is a length and its value a plain number."""
+    """Return whether a key is a length whose value is a number without unit."""
     is_number = isinstance(value, Real) and not isinstance(value, bool)
     return is_number and _find_kind(key) == "length" and not key.endswith("radius")
 
@@ -111,7 +111,7 @@ def _to_plain_value(value: Any) -> Any:
 
 
 def _find_kind(key: str) -> str | None:
-    """Return the kind of quantity of a key; None for a plain value and an unknown key."""
+    """Return the kind of quantity of a key, or None for a number without unit and an unknown key."""
     place = find_key(key)
     return find_quantity_kind(*place) if place.model is not None else None
 
@@ -128,7 +128,7 @@ def _format_value(key: str, value: Any) -> str:
 
 
 def _format_toml(key: str, value: Any) -> str:
-    """Return a TOML value with all digits; a number of a key with a unit becomes a string in SI."""
+    """Return a TOML value with all digits; if the key has a unit, a number becomes a string in SI."""
     value = _to_plain_value(value)
     if isinstance(value, dict):
         pairs = [f"{name} = {_format_toml(f'{key}.{name}', item)}" for name, item in value.items()]

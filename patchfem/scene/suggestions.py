@@ -19,7 +19,7 @@ from .rules.selectors import SELECTORS, split_keys
 def suggest_key(
     model: type[Table], table_key: str, written_table: dict, key: str, *, is_set: bool = False
 ) -> str:
-    """Return the key of a table that is most similar to an unknown key; "" if none is similar.
+    """Return the key of a table that is most similar to an unknown key, or "" if none is similar.
 
     A key with a similar name, or with a word in common, comes first, then a key that the table lacks. Keys that accept
     the value come before those that do not.
@@ -57,7 +57,7 @@ def suggest_key(
 
 
 def suggest_table(model: type[Table], written_table: dict, key: str) -> str:
-    """Return the table that is most similar to an unknown table; "" if none is similar.
+    """Return the table that is most similar to an unknown table, or "" if none is similar.
 
     A table with a similar name is taken unless another has more of the keys inside.
 
@@ -86,7 +86,7 @@ def suggest_table(model: type[Table], written_table: dict, key: str) -> str:
 
 
 def _find_similar_names(key: str, names: Iterable[str]) -> list[str]:
-    """Return the most similar of some names in a list, which is empty if none is similar."""
+    """Return a list of the names that are most similar to a key, which is empty if none is similar."""
     return get_close_matches(key, names, 1, MIN_NAME_SIMILARITY)
 
 
@@ -106,7 +106,7 @@ def _accepts_value(model: type[Table], key: str, value: object) -> bool:
 
 
 def _list_missing_keys(model: type[Table], table_key: str, written_table: dict) -> list[str]:
-    """Return keys that a table lacks: always required, by a selector, or under a condition."""
+    """Return the keys that a table lacks: those needed always, by a selector or under a condition."""
     needed = list(list_required_keys(model))
     if table_key in SELECTORS:
         selector = SELECTORS[table_key]

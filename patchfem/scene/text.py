@@ -19,7 +19,7 @@ EFFECT_KEYS = ("kind", "law", "reading", "waveform")  # keys whose values are ef
 
 
 def format_toml(table: Table) -> str:
-    """Return tables as TOML: quantities in SI, defaults written out, unused keys left out."""
+    """Return tables as TOML: quantities in SI, with defaults, but without unused keys."""
     return "\n".join(_format_lines(table, "")).strip("\n") + "\n"
 
 

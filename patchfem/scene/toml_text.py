@@ -1,4 +1,4 @@
-"""Reading of the text of a scene: the file, the plain values, and messages about TOML syntax."""
+"""Reading of the text of a scene: the file, the TOML values, and messages about TOML syntax."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def read_text(path: str | Path) -> str:
 
 
 def parse_text(text: str, path: str | Path) -> ParsedText:
-    """Return the plain values of a text and the lines of its keys.
+    """Return the values of a TOML text and the lines of its keys.
 
     Raises SceneError if the text is not TOML, or lists more masses or modes than any run can use.
     """
@@ -123,7 +123,7 @@ def _describe_syntax(error: Exception, text: str, path: str | Path) -> str:
 
 
 def _advise_spelling(text: str, line: int) -> str:
-    """Return how to write a value that lacks quotes or a digit in TOML; "" for other values."""
+    """Return how to write a value that lacks quotes or a digit in TOML, or "" for other values."""
     match = _BARE_VALUE_PATTERN.match([*text.split("\n"), ""][line - 1])
     if match is None:
         return ""

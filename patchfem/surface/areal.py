@@ -85,7 +85,7 @@ def level_plane(scan: Areal) -> Areal:
 
 
 def level(scan: Areal, degree: int) -> Areal:
-    """Subtract the least-squares polynomial of a total degree in x and y from a scan.
+    """Subtract the least-squares polynomial in x and y, of a given total degree, from a scan.
 
     Raises PatchfemError if the measured heights do not determine it, such as all of them in one
     line.

@@ -117,7 +117,7 @@ def unrepresented_fraction(profile: Profile, element: float) -> float:
 
 
 def describe_lost_waves(profile: Profile, element: float, max_lost: float = MAX_LOST) -> str | None:
-    """Warn that elements are too long to resolve a trace; None if they are not.
+    """Return a warning that elements are too long to resolve a trace, or None if they are not.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ def is_note(text: str) -> bool:
 
 
 def place_over_patch(profile: Profile, x: np.ndarray, how: str = "auto") -> Profile:
-    """Return the part of a trace over a patch, with positions relative to the patch.
+    """Return the part of a trace that lies over a patch, with positions relative to the patch.
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ def _check_nodes(x) -> np.ndarray:
 
 
 def _max_missing(x) -> tuple[float, float]:
-    """Return the length [m] by which a trace may end inside the patch, which is half an element."""
+    """Return the length [m] by which a trace may end inside the patch, half an element."""
     return MAX_MISSING_ELEMENTS * float(x[1] - x[0]), MAX_MISSING_ELEMENTS * float(x[-1] - x[-2])
 
 

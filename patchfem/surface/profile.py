@@ -24,7 +24,7 @@ EVEN_TOL = 1e-6  # largest relative range of the steps of an evenly sampled trac
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Profile:
-    """Trace of heights z (n,) [m] at increasing positions x (n,) [m]; NaN if not measured.
+    """Trace of heights z (n,) [m] at increasing positions x (n,) [m]; heights that were not measured are NaN.
 
     Between samples the trace is straight. source: name of the trace for messages; notes: sentences
     on its treatment.

@@ -52,7 +52,7 @@ def make_quantity(
 
 
 def make_unknown(unit: str, text: str, reason: str) -> Quantity:
-    """Return a quantity that has no value, with the reason.
+    """Return a quantity whose value is unknown, with the reason.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ class Mean(NamedTuple):
 
 
 def average_quantities(quantities: list, text: str) -> Mean | None:
-    """Average a quantity over the measurements that have a value; None for fewer than two.
+    """Average a quantity over the measurements that have a value, or return None if fewer than two have one.
 
     The 95 % interval s t / sqrt(n) comes from their scatter by Student's t, or from their own
     intervals if these give a wider one, because a few values may agree by chance. It does not

@@ -65,7 +65,7 @@ def make_trace(path, x, z, lines, factors: tuple, stated: str = "") -> Profile:
 
 
 def require_finite(path, columns: tuple, names: tuple, lines, factors: tuple) -> None:
-    """Raise PatchfemError for columns that are not finite or too large.
+    """Raise PatchfemError if a column contains values that are non-finite or too large.
 
     A height z may be NaN.
 
@@ -145,7 +145,7 @@ def undo_rounding(path, x, factor: float, name: str = "x") -> Places:
 
 
 def printed_digit(x) -> float:
-    """Return the largest power of ten that divides all positions (n,); 0 if there is none."""
+    """Return the largest power of ten that divides all positions (n,), or 0 if there is none."""
     largest = int(np.floor(np.log10((x[-1] - x[0]) / 5)))
     for digit in 10.0 ** np.arange(largest, largest - 8, -1):
         if np.abs(x / digit - np.rint(x / digit)).max() < DIGIT_TOL:

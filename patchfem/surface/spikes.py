@@ -77,7 +77,7 @@ def _scatter_about_medians(z, known) -> float:
 
 
 def _far_distances(z, known, threshold: float) -> np.ndarray:
-    """Return the deviations of heights (m, n) from their medians, 0 for inconspicuous ones."""
+    """Return the deviations of heights (m, n) from their medians, with 0 for inconspicuous heights."""
     from scipy.ndimage import maximum_filter, minimum_filter
 
     span = np.maximum(z - minimum_filter(z, WINDOW), maximum_filter(z, WINDOW) - z)

@@ -386,7 +386,7 @@ class Contact(Table):
 
     @property
     def compliance_key(self) -> str:
-        """Key of the compliance that enables partial slip; "" if the patch slips as a whole."""
+        """Key of the compliance that enables partial slip, or "" if the patch slips as a whole."""
         if self.shear is not None:
             return "[contact.shear]"
         if self.asperities is not None and self.asperities.tangential_ratio is not None:
@@ -398,7 +398,7 @@ class Contact(Table):
 
 @cache
 def _list_shape_names() -> tuple[str, ...]:
-    """Return the names of the tables in [contact] that have the key `on`."""
+    """Return the names of the tables in [contact] that have a key `on`."""
     models = {name: find_inner_table(Contact, name) for name in Contact.model_fields}
     tables = {name: model for name, model in models.items() if model is not None}
     return tuple(name for name, model in tables.items() if "on" in attributes_by_key(model))

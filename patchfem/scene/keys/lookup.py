@@ -30,7 +30,7 @@ MATERIAL_REQUIREMENT = (
 
 
 class Limit(NamedTuple):
-    """Name and sign of a limit of a number."""
+    """Name and sign of a bound of a number."""
 
     name: str
     sign: str
@@ -45,7 +45,7 @@ LIMITS_BY_ERROR_TYPE = {  # limit that a value breaks, by the type of the pydant
 
 
 class KeyDefinition(NamedTuple):
-    """Table and attribute of a key; (None, "") for a key that no scene has."""
+    """Table and attribute of a key, or (None, "") if no scene has this key."""
 
     model: type[Table] | None
     name: str
@@ -118,7 +118,7 @@ def validate_value(key: str, value: Any, ignored: Iterable[str] = ()) -> dict[st
 
 @cache
 def is_table_or_value(model: type[Table], name: str) -> bool:
-    """Return whether a key of a table also takes a plain value, as a material or a coating does."""
+    """Return whether a key that holds a table also accepts a single value, as a material or a coating does."""
     inner = list_key_types(model, name)[1:]
     return find_inner_table(model, name) is Material or any(
         get_origin(part) is Literal for part in inner
@@ -127,7 +127,7 @@ def is_table_or_value(model: type[Table], name: str) -> bool:
 
 @cache
 def describe_requirement(model: type[Table] | None, name: str) -> str:
-    """Describe what a key requires, as a clause of a message; "" for a table and an unknown key."""
+    """Describe what a key requires, as a clause of a message, or return "" for a table and an unknown key."""
     if model is None:
         return ""
     types = list_key_types(model, name)
@@ -186,7 +186,7 @@ def describe_error(definition: KeyDefinition, error: Any, value: Any) -> str:
 
 
 def format_for_message(value: Any) -> str:
-    """Return a plain value as a message shows it, cut after MAX_SHOWN_CHARACTERS characters."""
+    """Return a value as a message shows it, cut after MAX_SHOWN_CHARACTERS characters."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, dict):

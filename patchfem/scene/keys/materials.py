@@ -341,13 +341,13 @@ MATERIALS: dict[str, MaterialRecord] = {
 
 
 def normalise_material_name(name: str) -> str:
-    """Return the name of a material without what does not count in its spelling."""
+    """Return the name of a material in a spelling without case, blanks and other irrelevant characters."""
     return re.sub(SEPARATORS, "", name.casefold())
 
 
 @cache
 def list_spellings() -> dict[str, str]:
-    """Return the dict from the normalised spelling of every known name to the name in MATERIALS."""
+    """Return a dict that maps the normalised spelling of each known name to the name in MATERIALS."""
     spellings = {}
     for name, record in MATERIALS.items():
         for spelling in (name, *record.other_names):
@@ -356,7 +356,7 @@ def list_spellings() -> dict[str, str]:
 
 
 def find_material_name(written_name: str) -> str | None:
-    """Return the name in MATERIALS that a written name means; None if it is unknown."""
+    """Return the name in MATERIALS that a written name refers to, or None if it is unknown."""
     spelling = normalise_material_name(written_name)
     name = list_spellings().get(spelling)
     if is_case_sensitive(spelling) and re.sub(SEPARATORS, "", written_name) != name:
@@ -365,12 +365,12 @@ def find_material_name(written_name: str) -> str | None:
 
 
 def is_case_sensitive(spelling: str) -> bool:
-    """Return whether a normalised spelling means a material only in the letter case of its name."""
+    """Return whether a normalised spelling denotes a material only in the letter case of its name."""
     return spelling in map(str.casefold, CASE_SENSITIVE_NAMES)
 
 
 def advise_on_material(written_name: str) -> str:
-    """Return the advice for an unknown material: the nearest ones, and all names."""
+    """Return a hint for an unknown material name: the most similar names and the list of all names."""
     spellings = list_spellings()
     written = normalise_material_name(written_name)
     near_spellings = get_close_matches(written, spellings, len(spellings), MIN_SIMILARITY)

@@ -176,12 +176,12 @@ def parse_quantity(text: object, kind: str) -> float:
 
 
 def split_quantity(text: str) -> tuple[str, str]:
-    """Return the number and the unit of a quantity that `parse_quantity` accepts, as they are written."""
+    """Return number and unit, as written, of a quantity that `parse_quantity` accepts."""
     return _QUANTITY_PATTERN.fullmatch(text).groups()
 
 
 def find_si_unit(kind: str | None) -> str:
-    """Return the SI unit of a kind; "1" for None, the kind of a plain number."""
+    """Return the SI unit of a kind of quantity, or "1" for None, which stands for a number without unit."""
     return next(iter(UNIT_FACTORS[kind])) if kind else "1"
 
 
@@ -191,7 +191,7 @@ def format_si(value: float, kind: str) -> str:
 
 
 def describe_requirement(kind: str) -> str:
-    """Return what a key of this kind requires, with an example, as the end of a message."""
+    """Return what a key with this kind of quantity requires, with an example, as the end of a message."""
     return f"{_add_article(kind)} with its unit is needed, such as '{EXAMPLE_QUANTITIES[kind]}'"
 
 

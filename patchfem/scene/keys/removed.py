@@ -44,7 +44,7 @@ REMOVED_OPTIONS = {  # advice for each removed (verb, option)
 
 
 def describe_removed_option(verb: str, option: str, name: str) -> str:
-    """State that an option was removed and what to do instead; "" for an option that was not.
+    """State that an option was removed and what to do instead, or return "" if it was not removed.
 
     Parameters
     ----------

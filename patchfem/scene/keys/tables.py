@@ -335,7 +335,7 @@ class Interface(Friction):
 
     @property
     def compliance_key(self) -> str:
-        """Key of the compliance that enables partial slip; "" if the interface slips as a whole."""
+        """Key of the compliance that enables partial slip, or "" if the interface slips as a whole."""
         key = self.contact.compliance_key if self.contact is not None else ""
         return key.replace("contact", "structure.interface.contact", 1)
 

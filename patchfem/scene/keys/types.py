@@ -37,7 +37,7 @@ MIN_NAME_SIMILARITY = 0.6
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """A validator of the value alone, in place of pydantic's BeforeValidator or AfterValidator.
+    """Validator that sees the value alone, used in place of pydantic's BeforeValidator or AfterValidator.
 
     Those inspect the signature of the function for every key of every table, which takes a twentieth of a short
     command.
@@ -59,7 +59,7 @@ CheckAfter = partial(Check, core_schema.no_info_after_validator_function)
 
 
 class Kind(str):
-    """Annotation of a key that holds a quantity of this kind of `quantities.UNIT_FACTORS`."""
+    """Annotation of a key whose value is a quantity of this kind (see `quantities.UNIT_FACTORS`)."""
 
 
 def _require_magnitude(value: float, smallest: float) -> float:
@@ -122,7 +122,7 @@ def _require_printable(value: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class KeyRecord:
-    """The documentation of a key.
+    """Documentation of a key.
 
     - meaning: meaning of the key in one sentence without a capital at its start. It states a default that
       follows from other keys.
@@ -166,7 +166,8 @@ AbsoluteTemperature = quantity("temperature", gt=0)
 PerMetre = quantity("participation")
 
 
-_NESTED_STATE = object()  # state of _OUTER_TABLE in which validators include those of inner tables
+# Value of _OUTER_TABLE while the validator of each table includes those of its inner tables.
+_NESTED_STATE = object()
 # Table whose validator is under construction.
 _OUTER_TABLE: ContextVar = ContextVar("outer", default=None)
 
@@ -239,7 +240,7 @@ def _find_default_values(model: type[Table]) -> dict[str, Any]:
 
 
 def advise_on_name(written_name: str, names: Iterable[str]) -> str:
-    """Return the advice for a wrong name: ``did you mean 'x'? use one of x, y``."""
+    """Return a hint for a wrong name: ``did you mean 'x'? use one of x, y``."""
     known = list(names)
     near = get_close_matches(written_name, known, 1, MIN_NAME_SIMILARITY)
     near = near or [name for name in known if name.lower() == written_name.lower()]
@@ -249,7 +250,7 @@ def advise_on_name(written_name: str, names: Iterable[str]) -> str:
 
 @cache
 def attributes_by_key(model: type[BaseModel]) -> dict[str, str]:
-    """Return the dict from key to attribute of a table; they differ for reserved words of Python."""
+    """Return a dict that maps each key of a table to its attribute; they differ for reserved words of Python."""
     return {field.alias or name: name for name, field in model.model_fields.items()}
 
 
@@ -276,7 +277,7 @@ def list_key_types(model: type[BaseModel], name: str) -> tuple[Any, ...]:
 
 
 def find_key_record(model: type[BaseModel], written_name: str) -> KeyRecord | None:
-    """Return the documentation of a key of a scene; None for a table, which has none."""
+    """Return the documentation of a key of a scene, or None for a table, which has no documentation."""
     marks = model.model_fields[attributes_by_key(model)[written_name]].metadata
     return next((mark for mark in marks if isinstance(mark, KeyRecord)), None)
 
@@ -293,14 +294,14 @@ def find_meaning(model: type[BaseModel], written_name: str) -> str:
 
 @cache
 def find_quantity_kind(model: type[BaseModel], name: str) -> str | None:
-    """Return the kind of quantity that an attribute or its items hold; None if they have no unit."""
+    """Return the kind of quantity that an attribute or its items hold, or None if they have no unit."""
     marks = (*model.model_fields[name].metadata, *list_key_types(model, name))
     return next((str(mark) for mark in marks if isinstance(mark, Kind)), None)
 
 
 @cache
 def find_inner_table(model: type[BaseModel], name: str) -> type[Table] | None:
-    """Return the model of an attribute that holds a table or array of tables; None for a value."""
+    """Return the model of an attribute that holds a table or array of tables, or None if it holds a value."""
     types = (part for part in list_key_types(model, name) if isinstance(part, type))
     return next((part for part in types if issubclass(part, Table)), None)
 
@@ -313,6 +314,6 @@ def is_array_attribute(model: type[BaseModel], name: str) -> bool:
 
 @cache
 def list_allowed_values(model: type[BaseModel], name: str) -> tuple[str, ...]:
-    """Return the values of an attribute that takes one of a few words; () for any other."""
+    """Return the values of an attribute that accepts one of a few words, or () for any other attribute."""
     literals = (part for part in list_key_types(model, name) if get_origin(part) is Literal)
     return get_args(next(literals, None)) or ()

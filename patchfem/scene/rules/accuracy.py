@@ -13,7 +13,7 @@ from .scene_draft import SceneDraft
 
 
 class SettingScope(NamedTuple):
-    """Kinds of scenes, engines and friction laws in which a key of [accuracy] has an effect.
+    """Kinds of scenes, solvers and friction laws for which a key of [accuracy] has an effect.
 
     - kinds: kinds of scenes.
     - methods: methods and engines. "auto" stands for the engines that the program may choose, "bench" for
@@ -57,7 +57,7 @@ def list_fixed_settings(accuracy: Accuracy) -> list[str]:
 
 
 class QuadratureFacts(TableFacts):
-    """Facts on which the rules for the sum over bonds depend."""
+    """Properties of the scene that the checks of the sum over bonds use."""
 
     def __init__(self, draft: SceneDraft, kind: str) -> None:
         super().__init__(draft, "accuracy", draft.tables.accuracy)
@@ -66,7 +66,7 @@ class QuadratureFacts(TableFacts):
 
     @property
     def is_named(self) -> bool:
-        """Whether accuracy.quadrature is set to a method, and not left at "auto"."""
+        """Whether accuracy.quadrature is set to a method instead of "auto"."""
         return bool(self.quadrature) and self.quadrature != "auto"
 
     @property
@@ -143,7 +143,7 @@ def find_unused_settings(tables: Tables, kind: str) -> dict[str, str]:
 
 
 def _find_reason_without_effect(setting: str, accuracy: Any, motion: MotionFeatures) -> str:
-    """Return why a setting has no effect on the laws and patches of a motion; "" if it has."""
+    """Return why a setting has no effect on the laws and patches of a motion, or "" if it has an effect."""
     trait = SETTING_SCOPES[setting].trait
     laws = [joint.law for joint in motion.joints]
     if trait and not any(law_has_trait(law.law, trait) for law in laws):

@@ -22,11 +22,11 @@ RUN_TABLES = ("contact", "normal", "friction", "slide", "structure", "drive", "w
 
 
 class SimpleFacts(TableFacts):
-    """Facts on which the rules of small tables depend."""
+    """Properties of the scene that the checks of small tables use."""
 
     @property
     def is_sine(self) -> bool:
-        """Whether the drive is a sine."""
+        """Whether the drive signal is a sine."""
         return find_waveform(self.draft.tables.drive).is_sine
 
     @property
@@ -88,7 +88,7 @@ SLIDE_RULES = (
 
 
 def check_scene(draft: SceneDraft) -> str:
-    """Report all mistakes of a scene; return the kind of scene, "" if the tables define none."""
+    """Report all mistakes of a scene; return the kind of scene, or "" if the tables define none."""
     check_patches(draft)
     _check_table(draft, "normal", NORMAL_RULES)
     check_laws(draft)

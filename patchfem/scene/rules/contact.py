@@ -21,11 +21,11 @@ MAX_ELEMENTS = 100_000
 
 
 class PatchFacts(TableFacts):
-    """Facts on which the rules of a patch depend."""
+    """Properties of the scene that the checks of a patch use."""
 
     @cached_property
     def flat_length(self) -> float:
-        """Length [m] over which both faces are flat and opposite; UNKNOWN_VALUE if there is none."""
+        """Length [m] over which both faces are flat and opposite, or UNKNOWN_VALUE if there is none."""
         return find_flat_length(self)
 
     @property
@@ -35,7 +35,7 @@ class PatchFacts(TableFacts):
 
     @property
     def flat_length_name(self) -> str:
-        """Words for the flat length in a message."""
+        """Words that a message uses for the flat length."""
         return "contact.length =" if self.flat_length == self.length else "the interface length of"
 
     @property
@@ -55,7 +55,7 @@ class PatchFacts(TableFacts):
 
     @property
     def has_free_roll(self) -> bool:
-        """Whether a load line over the width leaves the rotation about x free."""
+        """Whether a load line over the width permits rotation about x."""
         return bool(self.strips) and self.has("strips.offset")
 
 
@@ -208,7 +208,7 @@ def check_patches(draft: SceneDraft) -> None:
 
 
 def _check_shapes_have_a_piece(draft: SceneDraft, table_key: str, contact: Contact) -> None:
-    """Report gap shapes whose table lacks the key `on`, which `Contact.shapes` would leave out.
+    """Report gap shapes whose table lacks the key `on`, because `Contact.shapes` would leave them out.
 
     Only a shape that somebody adds to the package can lack this key.
     """
@@ -240,7 +240,7 @@ def _check_coatings(patch: PatchFacts) -> None:
 
 
 def _check_peaks(patch: PatchFacts) -> None:
-    """Report peaks of law 'hertz' that are not described, described in part or described twice."""
+    """Report asperity peaks of law 'hertz' that are not described, only partly described, or described twice."""
     table_key = f"{patch.table_key}.asperities"
     used = [
         keys

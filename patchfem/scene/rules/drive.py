@@ -22,16 +22,16 @@ KEYS_UNUSED_BY_KIND = {  # keys that have no meaning for a drive.kind, whatever 
 
 
 class DriveFacts(TableFacts):
-    """Facts on which the rules of [drive] depend."""
+    """Properties of the scene that the checks of [drive] use."""
 
     @cached_property
     def wave(self) -> Waveform:
-        """Record of the waveform; NO_WAVEFORM of a release."""
+        """Record of the waveform, or NO_WAVEFORM for a release."""
         return find_waveform(self.table)
 
     @property
     def is_driven(self) -> bool:
-        """Whether the drive is known and not a release."""
+        """Whether the kind of drive is known and is not a release."""
         return self.kind in ("base", "force")
 
     @property
@@ -46,7 +46,7 @@ class DriveFacts(TableFacts):
 
     @property
     def can_be_given_as_displacement(self) -> bool:
-        """Whether a displacement may be given instead of this acceleration."""
+        """Whether a displacement may be given instead of the base acceleration."""
         return self.is_accelerated and self.wave.accepts_key("displacement")
 
     @property
@@ -56,7 +56,7 @@ class DriveFacts(TableFacts):
 
     @property
     def is_random(self) -> bool:
-        """Whether the drive is a random record."""
+        """Whether the drive signal is a random record."""
         return self.wave.is_random
 
     @property
@@ -233,5 +233,5 @@ def list_unused_drive_keys(drive: Drive) -> set[str]:
 
 
 def _list_keys_unused_by_kind(drive: Drive) -> tuple[str, ...]:
-    """Return the keys of [drive] that have no meaning for its kind, whatever the waveform."""
+    """Return the keys of [drive] that have no meaning for its kind with any waveform."""
     return KEYS_UNUSED_BY_KIND.get(drive.kind, ())

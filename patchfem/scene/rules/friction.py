@@ -18,7 +18,7 @@ from .view import TableView
 
 
 class LawFacts(TableFacts):
-    """Facts on which the rules of a friction law depend."""
+    """Properties of the scene that the checks of a friction law use."""
 
     def __init__(
         self, draft: SceneDraft, table_key: str, law: Friction, contact: Contact | None
@@ -36,7 +36,7 @@ class LawFacts(TableFacts):
 
     @property
     def has_unsupported_kinetic(self) -> bool:
-        """Whether the scene gives a kinetic coefficient to a law that has none."""
+        """Whether the scene gives a kinetic coefficient for a law that does not use one."""
         return self.has("kinetic") and not self.has_key("kinetic")
 
     @property
@@ -46,7 +46,7 @@ class LawFacts(TableFacts):
 
     @property
     def order_requirement(self) -> str:
-        """Condition on the bond order as text."""
+        """Condition on the bond order, as text for a message."""
         if self.has_trait("averaged"):
             return "> -1"
         return (
@@ -73,7 +73,7 @@ class LawFacts(TableFacts):
 
     @property
     def load_change_description(self) -> str:
-        """Cause of a changing normal load as text."""
+        """Cause of the changing normal load, as text for a message."""
         return self.load_change or find_climbed_grooves(self.draft.tables)
 
 

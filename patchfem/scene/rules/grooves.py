@@ -13,7 +13,7 @@ from .scene_draft import SceneDraft
 
 
 class GrooveFacts(TableFacts):
-    """Facts on which the rules of grooves depend."""
+    """Properties of the scene that the checks of grooves use."""
 
     @property
     def law_table(self) -> Any:
@@ -37,7 +37,7 @@ class GrooveFacts(TableFacts):
 
     @property
     def key_preventing_recursion(self) -> str:
-        """Key of [friction] that rules out a recursive computation of the sum over bonds; "" if none does."""
+        """Key of [friction] that prevents computing the sum over bonds by recursion, or "" if none does."""
         law = self.scene.friction
         if not self.has_bonds or not (needs_bond_list(self.law_table) or law.breakaway):
             return ""
@@ -47,7 +47,7 @@ class GrooveFacts(TableFacts):
 
     @property
     def is_removed_law(self) -> bool:
-        """Whether an earlier version computed the law over grooves."""
+        """Whether an earlier version of patchfem could compute the law with grooves."""
         return (
             not self.key_preventing_recursion
             and self.law_table.law in removed.LAWS_REMOVED_OVER_GROOVES
@@ -70,7 +70,7 @@ class GrooveFacts(TableFacts):
 
     @property
     def lower_shape(self) -> str:
-        """Key of the first shape on the lower piece; "" if there is none."""
+        """Key of the first shape on the lower piece, or "" if there is none."""
         return next(iter(list_lower_shapes(self.draft.tables.contact)), "")
 
 
@@ -159,7 +159,7 @@ COMBINATION_RULES = (
 
 
 def check_grooves(draft: SceneDraft, kind: str) -> None:
-    """Report mistakes of the grooves of a scene."""
+    """Report mistakes in the grooves of a scene."""
     table_key = find_groove_key(draft)
     if not table_key or not kind:
         return
@@ -184,7 +184,7 @@ def check_grooves(draft: SceneDraft, kind: str) -> None:
 
 
 def find_groove_key(draft: SceneDraft) -> str:
-    """Return the key of the grooves of a scene; "" if it has none."""
+    """Return the key of the grooves of a scene, or "" if it has none."""
     for name in ("contact", "normal"):
         if draft.values[name].grooves:
             return f"{name}.grooves"
@@ -192,5 +192,5 @@ def find_groove_key(draft: SceneDraft) -> str:
 
 
 def find_groove_table(draft: SceneDraft) -> Any:
-    """Return the table of the grooves of a scene; UNKNOWN_VALUE if it has none."""
+    """Return the table of the grooves of a scene, or UNKNOWN_VALUE if it has none."""
     return draft.values.contact.grooves or draft.values.normal.grooves

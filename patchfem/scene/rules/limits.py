@@ -36,7 +36,7 @@ UNSUPPORTED_KEY = "structure.mode.lateral"  # key that no run supports yet
 
 
 class JointFacts(TableFacts):
-    """Facts on which the rules of one friction interface depend.
+    """Properties of the scene that the checks of one friction interface use.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ class JointFacts(TableFacts):
 
     @property
     def law_description(self) -> str:
-        """Law as text, with the reading or the order that makes it a sum over all bonds."""
+        """Friction law as text, with its `reading` or `order` if that requires the sum over all bonds."""
         return describe_law(self.table)
 
     @property
@@ -78,24 +78,24 @@ class JointFacts(TableFacts):
 
     @property
     def load_change_description(self) -> str:
-        """Cause of a changing normal load as text."""
+        """Cause of the changing normal load, as text for a message."""
         return describe_load_change(self.load_change)
 
     @cached_property
     def yaw(self) -> str:
-        """Key of the yaw of the first mode that yaws the patch; "" if no mode does."""
+        """Key of the yaw of the first mode that yaws the patch, or "" if no mode does."""
         return find_yaw_key(self.draft.tables)
 
     @property
     def key_preventing_recursion(self) -> str:
-        """Key of the law that rules out a recursive computation of the sum over bonds."""
+        """Key of the friction law that prevents computing the sum over bonds by recursion."""
         if self.reading == "report":
             return "reading"
         return "breakaway" if self.breakaway else "order"
 
     @property
     def has_others(self) -> bool:
-        """Whether the scene has further interfaces."""
+        """Whether the scene has further friction interfaces."""
         return len(self.scene.structure.interface) > 1
 
     @property
@@ -112,7 +112,7 @@ class JointFacts(TableFacts):
 
     @property
     def quadrature(self) -> str:
-        """Method of accuracy.quadrature that adds up single bonds; "" if the scene sets no such method."""
+        """Method of accuracy.quadrature that sums single bonds, or "" if the scene sets no such method."""
         name = self.scene.accuracy.quadrature
         is_sum = name in ("direct", "truncated", "merged")
         return name if is_sum and self.has_trait("bonds") and not self.compliance else ""
@@ -124,14 +124,14 @@ class JointFacts(TableFacts):
 
     @property
     def recursion_feature(self) -> str:
-        """Feature that requires a recursive computation of the sum over bonds, as text; "" if there is none."""
+        """Feature, as text, that requires computing the sum over bonds by recursion, or "" if there is none."""
         if self.has_lower_shape:
             return "a shape on the lower piece"
         return "friction.breakaway" if self.breakaway else ""
 
     @property
     def breakaway_circumstance(self) -> str:
-        """Circumstance in which a breakaway needs order = 1, as text; "" if there is none."""
+        """Circumstance in which a breakaway needs order = 1, as text, or "" if there is none."""
         if self.kind == "rig":
             return "in a rig"
         return f"and {self.compliance}" if self.compliance else ""
@@ -144,7 +144,7 @@ class JointFacts(TableFacts):
 
     @property
     def can_slip_in_strips(self) -> bool:
-        """Whether partial slip can be computed in each strip.
+        """Whether partial slip is supported in each strip separately.
 
         That needs elements under a constant load, the shear of the pieces, and no spring that couples the strips.
         """
@@ -155,7 +155,7 @@ class JointFacts(TableFacts):
 
     @property
     def lacks_partial_slip_of_strips(self) -> bool:
-        """Whether partial slip of the strips would be needed and cannot be computed."""
+        """Whether the scene needs partial slip of the strips but it is not supported."""
         return bool(self.contact.strips and self.compliance) and not self.can_slip_in_strips
 
 
@@ -363,7 +363,7 @@ PATCH_LAW_RULES = (
 
 
 def find_unsupported_lateral_modes(tables: Tables) -> Iterator[tuple[str, str]]:
-    """Yield key and message of each mode with lateral motion, which no run supports yet."""
+    """Yield key and message for each mode with lateral motion, which no run supports yet."""
     for index, mode in enumerate(tables.structure.mode if tables.structure else ()):
         if mode.lateral:
             yield f"structure.mode.{index}.lateral", "not supported yet"
@@ -409,7 +409,7 @@ def _check_interface(draft: SceneDraft, table_key: str, interface: Any) -> None:
 
 
 def _find_upper_piece_need(joint: JointFacts) -> str:
-    """Return the feature that requires shapes on the upper piece, as text; "" if there is none."""
+    """Return the feature that requires shapes on the upper piece, as text, or "" if there is none."""
     law = f"with law '{joint.law}'"
     if joint.has_trait("bonds"):
         needs_upper = joint.compliance and joint.breakaway
@@ -445,7 +445,7 @@ def _check_shape_sides(joint: JointFacts, only_upper: str) -> None:
 
 
 def find_lateral_slide_obstacle(tables: Tables) -> str:
-    """Return why a bench cannot follow a path file with lateral motion; "" if it can."""
+    """Return why a bench cannot follow a path file with lateral motion, or "" if it can."""
     law = tables.friction
     scene = TableView(tables)
     compliance = find_compliance_key(law, tables)

@@ -1,4 +1,4 @@
-"""Features that each engine supports, and why the chosen accuracy.method cannot run a scene."""
+"""Features that each solver supports, and why the chosen accuracy.method cannot run a scene."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .view import TableView
 
 
 class Joint(NamedTuple):
-    """Friction interface, described by the facts that decide which engines support it.
+    """Friction interface, described by the properties that decide which solvers support it.
 
     - law: table of its friction law.
     - compliance: key of the compliance that allows partial slip; "" if the patch slips as a whole.
@@ -30,7 +30,7 @@ class Joint(NamedTuple):
 
 
 class MotionFeatures(NamedTuple):
-    """Features of a scene that decide which engines can compute its motion.
+    """Features of a scene that decide which solvers can compute its motion.
 
     A feature that is a text is "" if the scene does not have it.
 
@@ -65,7 +65,7 @@ class MotionFeatures(NamedTuple):
 
 
 class EngineSupport(NamedTuple):
-    """Features that an engine supports.
+    """Features that a solver supports.
 
     - law: word of `effects.LAWS[...].supports` that every friction law must carry; "" for any law.
     - features: names of FEATURE_FINDERS, separated by blanks.
@@ -108,12 +108,12 @@ METHOD_KEY = "accuracy.method"
 
 
 def find_unsupported_feature(engine: str, motion: MotionFeatures) -> str:
-    """Return the first feature of a motion that an engine does not support; "" if none."""
+    """Return the first feature of a motion that a solver does not support, or "" if it supports all."""
     return find_first_unsupported(ENGINE_SUPPORT[engine], motion)
 
 
 def find_first_unsupported(support: EngineSupport, motion: MotionFeatures) -> str:
-    """Return the first unsupported feature of a motion as text; "" if there is none."""
+    """Return the first unsupported feature of a motion as text, or "" if all are supported."""
     joint = _find_unsupported_joint(support, motion)
     if joint is not None:
         compliance = f" with {joint.compliance}" if joint.compliance else ""
@@ -126,14 +126,14 @@ def find_first_unsupported(support: EngineSupport, motion: MotionFeatures) -> st
 
 
 def _find_unsupported_joint(support: EngineSupport, motion: MotionFeatures) -> Joint | None:
-    """Return the first interface whose friction law is not supported; None if all are."""
+    """Return the first interface whose friction law is not supported, or None if all are supported."""
     if not support.law:
         return None
     return next((joint for joint in motion.joints if not _is_supported(support.law, joint)), None)
 
 
 def _is_supported(word: str, joint: Joint) -> bool:
-    """Return whether an engine supports the friction law of an interface."""
+    """Return whether a solver supports the friction law of an interface."""
     if not law_supports(joint.law, word):
         return False
     if word == "exact":  # the event-driven solution supports only patches that slip as a whole
@@ -188,7 +188,7 @@ def find_motion_features(tables: Tables, kind: str) -> MotionFeatures:
 
 
 def find_compliance_key(law: Any, tables: Tables) -> str:
-    """Return the key that allows partial slip of the patch under a law; "" if there is none."""
+    """Return the key that allows partial slip of the patch under a law, or "" if there is none."""
     owner = law if isinstance(law, Interface) else tables.contact
     return owner.compliance_key if owner is not None else ""
 
@@ -200,7 +200,7 @@ def list_lower_shapes(contact: Any, table_key: str = "contact") -> list[str]:
 
 
 def find_nonlinear_spring(tables: Tables) -> str:
-    """Return the key of the nonlinear spring of the rig; "" if it has none."""
+    """Return the key of the nonlinear spring of the rig, or "" if it has none."""
     structure = TableView(tables).structure
     if structure.stiffening:
         return "[structure.stiffening]"
@@ -208,7 +208,7 @@ def find_nonlinear_spring(tables: Tables) -> str:
 
 
 def find_climbed_grooves(tables: Tables) -> str:
-    """Return the key of the grooves that the upper piece climbs; "" if there are none or they are flat."""
+    """Return the key of the grooves that the upper piece climbs, or "" if there are none or they are flat."""
     for name in ("contact", "normal"):
         if TableView(tables)[name].grooves.amplitude:
             return f"[{name}.grooves]"
@@ -216,7 +216,7 @@ def find_climbed_grooves(tables: Tables) -> str:
 
 
 def find_yaw_key(tables: Tables) -> str:
-    """Return the key of the yaw of the first mode that yaws the patch; "" if no mode does."""
+    """Return the key of the yaw of the first mode that yaws the patch, or "" if no mode does."""
     for index, mode in enumerate(TableView(tables).structure.mode):
         if mode.yaw:
             return f"structure.mode.{index}.yaw"
@@ -224,7 +224,7 @@ def find_yaw_key(tables: Tables) -> str:
 
 
 def find_load_change_key(tables: Tables) -> str:
-    """Return the key that makes the load of a rig vary; "" if the load is constant."""
+    """Return the key that makes the load of a rig vary, or "" if the load is constant."""
     scene = TableView(tables)
     if scene.normal.amplitude:
         return "normal.amplitude"
@@ -241,7 +241,7 @@ def describe_load_change(key: str) -> str:
 
 
 def _find_exact_obstacle(motion: MotionFeatures) -> str:
-    """Return why no exact solution of a motion exists; "" if there is one."""
+    """Return why no exact solution of a motion exists, or "" if there is one."""
     reasons = {engine: find_unsupported_feature(engine, motion) for engine in EXACT_ENGINES}
     if not all(reasons.values()):
         return ""
@@ -255,7 +255,7 @@ def _find_exact_obstacle(motion: MotionFeatures) -> str:
 
 
 def _find_harmonic_obstacle(motion: MotionFeatures) -> str:
-    """Return why harmonic balance cannot find the steady motion; "" if it can."""
+    """Return why harmonic balance cannot find the steady motion, or "" if it can."""
     drive = motion.drive
     is_transient = motion.waveform.name and not motion.waveform.has_steady_motion
     if drive is not None and (drive.kind == "free" or is_transient):
@@ -278,7 +278,7 @@ def _find_harmonic_obstacle(motion: MotionFeatures) -> str:
 
 
 def _find_harmonic_law_obstacle(motion: MotionFeatures) -> str:
-    """Return why harmonic balance cannot use the law of a rig; "" if it can."""
+    """Return why harmonic balance cannot use the law of a rig, or "" if it can."""
     law = motion.joints[0].law
     if len(motion.joints) > 1:
         return describe_unsupported(

@@ -18,7 +18,7 @@ def find_piece_length(contact: TableView, name: str) -> float:
 
 
 def find_flat_length(patch: TableView) -> float:
-    """Return the length [m] over which both faces are flat and opposite; UNKNOWN_VALUE if there is none."""
+    """Return the length [m] over which both faces are flat and opposite, or UNKNOWN_VALUE if there is none."""
     lengths = []
     for name in PIECE_NAMES:
         end = max(patch[name][key] or 0.0 for key in END_KEYS) if patch[name] else 0.0

@@ -18,7 +18,7 @@ from .view import TableView
 
 
 class TableFacts(TableView):
-    """Facts on which the rules of one table depend.
+    """Properties of the scene that the checks of one table use.
 
     Subclasses add what follows from the values as properties. The tables do not change while rules are applied, so that
     a property which several rules use is a `cached_property`.
@@ -45,12 +45,12 @@ class TableFacts(TableView):
 
     @cached_property
     def load_change(self) -> str:
-        """Name of the key that makes the load vary; "" if the load is constant."""
+        """Name of the key that makes the load vary, or "" if the load is constant."""
         return find_load_change_key(self.draft.tables)
 
     @cached_property
     def compliance(self) -> str:
-        """Key of the compliance that enables partial slip of the patch; "" if there is none."""
+        """Key of the compliance that enables partial slip of the patch, or "" if there is none."""
         return find_compliance_key(self.table, self.draft.tables)
 
     def has(self, *names: str) -> bool:
@@ -66,7 +66,7 @@ class TableFacts(TableView):
 
 
 class Rule(NamedTuple):
-    """Rule for a table: a condition, and the message if it holds.
+    """Rule for a table: a condition, and the message that is shown if it holds.
 
     - report: method of `SceneDraft` that takes the key and the sentence.
     - condition: function of the facts that is true where the sentence applies.

@@ -1,4 +1,4 @@
-"""A scene during reading: plain values, tables read so far, and every mistake with its line."""
+"""A scene during reading: raw values, tables read so far, and every mistake with its line."""
 
 from __future__ import annotations
 
@@ -84,18 +84,18 @@ class SceneDraft:
         return self.written_value(key) is not None
 
     def written_value(self, key: str) -> Any:
-        """Return the value at a dotted key as written; None if there is none."""
+        """Return the value at a dotted key as the user wrote it, or None if there is none."""
         return find_value(self.raw, key)
 
     def has_set_key(self, key: str) -> bool:
-        """Return whether the scene contains a key that is given as in --set, with items by name or number."""
+        """Return whether the scene contains a key in the form of --set, with items by name or number."""
         value: Any = self.raw
         for piece in split_key(key):
             value = find_item_or_value(value, piece)
         return value is not None
 
     def add_mistake(self, key: str, message: str) -> None:
-        """Add a mistake at the line of a key, or at that of the nearest table above it."""
+        """Add a mistake at the line of a key or, if the key is missing, of the nearest table above it."""
         order, location = self._locate(key)
         self._add(order, location, number_items_from_one(f"{self.display_key(key)}: {message}"))
 
@@ -110,7 +110,7 @@ class SceneDraft:
         self._add(0, self.path, f"missing [{name}]: {reason}")
 
     def add_set_mistake(self, text: str) -> None:
-        """Add a mistake for a --set that cannot be applied."""
+        """Add a mistake for a --set option that cannot be applied."""
         self._add(SET_MISTAKE_ORDER, "--set", text)
 
     def add_remark(self, key: str, sentence: str) -> None:
@@ -154,7 +154,7 @@ class SceneDraft:
 
 
 def find_value(value: Any, key: str) -> Any:
-    """Return the value at a dotted key of nested tables; None if there is none."""
+    """Return the value at a dotted key of nested tables, or None if there is none."""
     for piece in _split_at_dots(key):
         if isinstance(value, dict):
             value = value.get(piece)
@@ -166,7 +166,7 @@ def find_value(value: Any, key: str) -> Any:
 
 
 def find_item_or_value(holder: Any, piece: str) -> Any:
-    """Return the value at a key, name or number in a plain table or array; None if there is none."""
+    """Return the value at a key, name or number in a table or array read from TOML, or None if there is none."""
     if isinstance(holder, dict):
         return holder.get(piece)
     if not isinstance(holder, list):

@@ -1,4 +1,4 @@
-"""Rules of [structure]: a single description of the rig, existing masses, participations."""
+"""Rules of [structure]: the rig is described once, masses exist, participations are possible."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class CoordinateNumbers(NamedTuple):
 
 
 class StructureFacts(TableFacts):
-    """Facts on which the rules of [structure] depend."""
+    """Properties of the scene that the checks of [structure] use."""
 
     @cached_property
     def descriptions(self) -> list[str]:
@@ -68,7 +68,7 @@ class StructureFacts(TableFacts):
 
     @property
     def second_description(self) -> str:
-        """Second of the DESCRIPTION_KEYS that the scene sets; "" if it sets at most one."""
+        """Second of the DESCRIPTION_KEYS that the scene sets, or "" if it sets at most one."""
         return self.descriptions[1] if len(self.descriptions) > 1 else ""
 
     @property
@@ -78,7 +78,7 @@ class StructureFacts(TableFacts):
 
     @property
     def description(self) -> str:
-        """Only description of the structure; "" if there is none or several."""
+        """Description of the structure if there is exactly one, or "" otherwise."""
         return self.descriptions[0] if len(self.descriptions) == 1 else ""
 
     @property
@@ -98,13 +98,13 @@ class StructureFacts(TableFacts):
 
     @property
     def repeated_coordinate(self) -> Any:
-        """Boundary coordinate that is named twice; None if there is none."""
+        """Boundary coordinate that is named twice, or None if there is none."""
         boundary = self.table.reduced.boundary or ()
         return next((name for k, name in enumerate(boundary) if name in boundary[:k]), None)
 
     @property
     def extension(self) -> str:
-        """Extension of structure.file in lower case; "" if there is no file."""
+        """Extension of structure.file in lower case, or "" if there is no file."""
         return find_file_extension(self.file) if self.file else ""
 
     @property
@@ -341,7 +341,7 @@ def advise_modes(draft: SceneDraft) -> str:
 
 
 def _check_modes(draft: SceneDraft) -> None:
-    """Report modes of the same name, heavy damping and impossible participation factors."""
+    """Report modes of equal name, too much damping, and participation factors that are impossible."""
     modes = draft.values.structure.mode
     names: set[str] = set()
     for index, mode in enumerate(modes):
@@ -409,7 +409,7 @@ def describe_hidden_modes(tables: Tables) -> list[str]:
 
 
 def _check_instruments(draft: SceneDraft, modes: tuple) -> None:
-    """Report instruments that move differently from the output, if a key depends on the output."""
+    """Report sensors whose motion differs from that of the output, if any key refers to the output."""
     written = []
     for index, mode in enumerate(modes):
         output = mode.output
@@ -429,7 +429,7 @@ def _check_instruments(draft: SceneDraft, modes: tuple) -> None:
 
 
 def _find_output_dependent_key(draft: SceneDraft) -> str:
-    """Return the key whose effect depends on the motion of the output; "" if there is none."""
+    """Return the key whose effect depends on the motion of the output, or "" if there is none."""
     for key in ("structure.travel", "structure.stiffening"):
         if draft.has(key):
             return key
@@ -446,7 +446,7 @@ def _find_output_dependent_key(draft: SceneDraft) -> str:
 
 
 def _check_masses(draft: SceneDraft) -> None:
-    """Report springs, dampers, interfaces and outputs between masses that do not exist."""
+    """Report springs, dampers, interfaces and outputs that name masses that do not exist."""
     structure = draft.tables.structure
     if structure.masses is not None and not structure.masses:
         draft.add_mistake(
@@ -477,7 +477,7 @@ def _check_mass_pair(draft: SceneDraft, key: str, pair: tuple | None) -> None:
 
 
 def _check_lateral(draft: SceneDraft, key: str, interface: Any) -> None:
-    """Report a second direction that shares a coordinate with the first, or that cannot be used."""
+    """Report a second direction that has a coordinate in common with the first or cannot be used."""
     pair = interface.lateral
     _check_mass_pair(draft, key, pair)
     if pair is None:

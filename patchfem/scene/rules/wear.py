@@ -20,7 +20,7 @@ FACTOR_KEYS = ("coefficient_factor", "bond_length_factor")
 
 
 class WearFacts(TableFacts):
-    """Facts on which the rules of [wear] depend."""
+    """Properties of the scene that the checks of [wear] use."""
 
     def __init__(self, draft: SceneDraft, kind: str) -> None:
         super().__init__(draft, "wear", draft.tables.wear)
@@ -33,7 +33,7 @@ class WearFacts(TableFacts):
 
     @property
     def groove_key(self) -> str:
-        """Key of the grooves; "" if there are none."""
+        """Key of the grooves, or "" if there are none."""
         return find_groove_key(self.draft)
 
     @property
@@ -44,7 +44,7 @@ class WearFacts(TableFacts):
 
     @property
     def strip_compliance(self) -> str:
-        """Key of the compliance that enables partial slip of the strips; "" if there is none or no strips."""
+        """Key of the compliance that enables partial slip of the strips, or "" if there are no strips or no such key."""
         return self.compliance if self.scene.contact.strips else ""
 
     @property
@@ -60,7 +60,7 @@ class WearFacts(TableFacts):
 
     @property
     def depths(self) -> tuple:
-        """Worn depths [m] at which factors are given; () if they are not known."""
+        """Worn depths [m] at which factors are given, or () if they are not known."""
         return self.friction.depth or ()
 
     @property
@@ -229,7 +229,7 @@ START_RULES = (
 
 
 def check_wear(draft: SceneDraft, kind: str) -> None:
-    """Report mistakes of [wear]."""
+    """Report mistakes in [wear]."""
     if draft.tables.wear is None:
         return
     facts = WearFacts(draft, kind)
@@ -243,7 +243,7 @@ def check_wear(draft: SceneDraft, kind: str) -> None:
 
 
 def _check_factors(wear: WearFacts) -> None:
-    """Report factors whose number is not that of the depths, or that do not begin with 1."""
+    """Report lists of factors that differ in length from the depths or do not begin with 1."""
     for key in FACTOR_KEYS:
         factors = wear.friction[key]
         if factors and wear.depths and len(factors) != len(wear.depths):

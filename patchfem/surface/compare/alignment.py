@@ -1,4 +1,4 @@
-"""Alignment of a second trace to a first one: unworn floor, worn parts and final fit."""
+"""Alignment of a second trace to a first one: unworn reference surface, worn parts and final fit."""
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -104,7 +104,7 @@ class Alignment:
 
     @property
     def bend(self) -> float:
-        """Sag [m] of the second datum over the common length; it is subtracted."""
+        """Sag [m] of the second datum over the common length, which is subtracted from the depth."""
         return float(self.state[Parameter.BEND]) * (np.ptp(self.x) / 2 / self.half) ** 2
 
     @cached_property
@@ -131,18 +131,18 @@ class Alignment:
 
     @property
     def agreed_fraction(self) -> float:
-        """Fraction of the heights that agree in both traces, on this floor or on the rival one."""
+        """Fraction of the heights that agree in both traces, on this reference surface or on the rival one."""
         other = self if self.rival is None else self.rival
         return float(max(self.unworn.mean(), other.unworn.mean()))
 
     @property
     def detection_limit(self) -> float | None:
-        """Detection limit: mean depth [m] of a track over the middle third; None for short traces."""
+        """Detection limit: mean depth [m] of a track over the middle third, or None for short traces."""
         threshold = find_shallow_track(np.asarray(self.depth), self.noise)[1]
         return threshold if np.isfinite(threshold) else None
 
     def error_of(self, parameter: Parameter) -> float:
-        """Return the standard deviation of a fitted parameter, NaN if it was not fitted."""
+        """Return the standard deviation of a fitted parameter, or NaN if it was not fitted."""
         if parameter not in self.free:
             return float("nan")
         return float(self.errors.parameters[:, self.free.index(parameter)].std())
@@ -205,7 +205,7 @@ def align(before: Profile, after: Profile, shift: float, is_straight: bool = Fal
 
 
 def _choose_floor(floors: list, model):
-    """Choose the unworn floor: quiet, with an unworn end, few heights above it and many on it."""
+    """Choose the unworn reference surface: quiet, unworn at an end, few heights above it and many on it."""
     known = [floor for floor in floors if floor.unworn >= MIN_UNWORN] or floors
     if not known:
         return None
@@ -223,7 +223,7 @@ def _choose_floor(floors: list, model):
 
 
 def _fit_all_heights(model, state, free) -> Alignment:
-    """Fit the chosen floor to all heights outside the worn parts, until these no longer change.
+    """Fit the chosen reference surface to all heights outside the worn parts until these parts no longer change.
 
     Then the worn parts are widened to the ends of their flanks, and the fit is repeated.
     """
@@ -271,7 +271,7 @@ def _make_alignment(model, state, free, scale: float, worn) -> Alignment:
 
 
 def find_worn_samples(depth, scale: float) -> np.ndarray:
-    """Find the worn heights (n,) bool by single heights, running means of 4 and 16, and boxes.
+    """Find the worn heights (n,) bool from single heights, running means of 4 and 16, and rectangular tracks.
 
     A box over some of 60 parts of the trace shows a track that is shallower than the noise.
     """
@@ -293,7 +293,7 @@ def find_worn_samples(depth, scale: float) -> np.ndarray:
 
 
 def widen_to_flank_ends(depth, scale: float, worn) -> np.ndarray:
-    """Widen wide worn runs (n,) bool to the positions where their flanks leave the floor."""
+    """Widen wide worn runs (n,) bool to the positions where their flanks leave the reference surface."""
     out = worn.copy()
     noise = np.full(depth.size, scale)
     quiet = ~worn & (np.abs(depth) <= MAX_UNWORN * scale)
@@ -308,7 +308,7 @@ def widen_to_flank_ends(depth, scale: float, worn) -> np.ndarray:
 
 
 def find_shallow_track(depth, scale: float) -> tuple:
-    """Find a track shallower than the noise of single heights, from averages over 60 parts.
+    """Find a track that is shallower than the noise of single heights, from averages over 60 parts.
 
     Each box is fitted together with a cubic, which a datum may add. The best box is a track if its depth
     is eight times its standard deviation, which follows from the residuals and their correlation, so
@@ -345,7 +345,7 @@ def find_shallow_track(depth, scale: float) -> tuple:
 def _fit_line_through_ends(
     model, best: Alignment, state, free: tuple, flank: float
 ) -> Alignment | None:
-    """Fit a line through the ends of a trace; None unless only heights between them are worn.
+    """Fit a line through the ends of a trace, or return None unless all worn heights lie between them.
 
     Parameters
     ----------

@@ -40,7 +40,7 @@ MIN_BLOCKS = 12.0
 
 
 class Ambiguity(NamedTuple):
-    """Headline of an ambiguity, "" if there is none, and the reason why no depth is given."""
+    """Headline of an ambiguity, or "" if there is none, and the reason why no depth is given."""
 
     headline: str
     reason: str
@@ -70,7 +70,7 @@ def find_ambiguity(alignment: Alignment, *, is_referenced: bool, is_changed: boo
 
 
 def _have_different_areas(first: Alignment, second: Alignment) -> bool:
-    """Return whether two interpretations give different worn or grown areas, as printed."""
+    """Return whether two interpretations give different worn or grown areas in the printed digits."""
     has_other_loss = _describe_loss(first) != _describe_loss(second)
     return has_other_loss or _format_grown_area(first) != _format_grown_area(second)
 
@@ -82,7 +82,7 @@ def _name_ambiguity(bow: Alignment) -> str:
 
 
 def detrended_means(depth, unworn=None) -> np.ndarray:
-    """Average the (unworn) depths [m] in parts of the trace, and subtract a line from the means."""
+    """Average the (unworn) depths [m] over parts of the trace, and subtract a line from the means."""
     edges = part_edges(depth.size, N_PARTS)[:-1]
     unworn = np.ones(depth.size, bool) if unworn is None else unworn
     count = np.add.reduceat(unworn.astype(float), edges)
@@ -116,7 +116,7 @@ def may_be_drift(alignment: Alignment) -> bool:
 
 
 def describe_both(bow: Alignment, line: Alignment) -> str:
-    """State why no worn depth is given, with the numbers of both interpretations."""
+    """State why no worn depth is given, with the values of both interpretations."""
     if bow.bend and not _growth_exceeds_wear(bow):
         other = (
             f"the datum bent by {format_length(bow.bend, 3)} (sag over the common length) and "
@@ -188,7 +188,7 @@ def describe_drift(alignment: Alignment) -> str:
 def find_worn_flanks(
     before: Profile, after: Profile, shift: float, flanks: Flanks, *, is_straight: bool
 ) -> str:
-    """State why the flanks of a track are known to be worn; return "" if they may be unworn.
+    """State why the flanks of a track are known to be worn, or return "" if they may be unworn.
 
     The difference of both traces is straight over unworn flanks. If its long-wave part varies there by a
     tenth of the depth of the track, the flanks are worn or the datum is bent.

@@ -10,7 +10,7 @@ N_PARTS = 60
 
 
 class Boxes(NamedTuple):
-    """Boxes over the parts of a trace, orthogonal to the polynomials of a datum.
+    """Boxes over the parts of a trace, orthogonal to the polynomials that describe a datum.
 
     - shapes: boxes of Euclidean norm 1, (m, parts).
     - sizes: norms of the boxes of height 1, (m,).
@@ -49,7 +49,7 @@ def make_boxes(n_parts: int, n_beside: int, n_inside: int, degree: int) -> Boxes
 
 
 def part_edges(size: int, n_parts: int) -> np.ndarray:
-    """Return the first sample (n_parts + 1,) of each part of a trace, and the number of samples."""
+    """Return the first sample of each part of a trace, followed by the number of samples, (n_parts + 1,)."""
     return np.linspace(0, size, n_parts + 1).astype(int)
 
 

@@ -77,7 +77,7 @@ N_SPECK_ROUNDS = 2
 
 
 class Ratios(NamedTuple):
-    """Ratios of amplitude and slope after wear to before; `Size` of both surfaces, () if unknown."""
+    """Ratios of amplitude and slope after wear to before; `Size` of both surfaces, or () if it is unknown."""
 
     amplitude: Quantity
     slope: Quantity
@@ -93,7 +93,7 @@ class Motion(NamedTuple):
 
 
 class DirectionRatios(NamedTuple):
-    """Ratios of amplitude and slope along x to those along y; when: "before" or "after" wear."""
+    """Ratios of amplitude and slope along x to those along y; `when` is "before" or "after" wear."""
 
     when: str
     amplitude: Quantity
@@ -226,7 +226,7 @@ def _name_track_sizes(sizes) -> dict:
 
 
 def are_identical(before, after) -> bool:
-    """Return whether two surfaces have equal heights at equal positions, as if a file was given twice."""
+    """Return whether two surfaces have equal heights at equal positions, for example the same file."""
     if type(before) is not type(after):
         return False
     names = [name for name in "xyz" if hasattr(before, name)]
@@ -254,7 +254,7 @@ def _remove_specks(place: Place, is_straight: bool) -> Place:
 
 
 class _Wear(NamedTuple):
-    """Wear of aligned traces; fields as those of `Comparison`."""
+    """Wear of aligned traces; the fields have the names of those in `Comparison`."""
 
     worn: Worn
     tracks: Tracks
@@ -508,7 +508,7 @@ def _pool_sides(pairs: list, step: float) -> tuple:
 
 
 def _pool_with_scatter(pieces: list, step: float) -> Size:
-    """Pool like `_pool`, but limit the degrees of freedom by the scatter along the trace."""
+    """Pool pieces as in `_pool`, but limit the degrees of freedom by the scatter along the trace."""
     size = _pool(pieces, step)
     scatter = np.sum([estimate_freedom(piece, step, BAND) for piece in pieces], axis=0)
     freedom = tuple(min(value, limit) for value, limit in zip(size.freedom, scatter))
@@ -588,7 +588,7 @@ def compare_waves(scans: tuple, filled: tuple, direction: str) -> Comparison:
 
 
 def compare_directions(parts: list) -> list[DirectionRatios]:
-    """Compare direction x with y, before and after wear; return [] for a single direction.
+    """Compare direction x with y, before and after wear, or return [] if there is only one direction.
 
     Traces are read at the coarsest step of all of them, so that slopes compare.
     """
@@ -622,7 +622,7 @@ def compare_files(
     keep_spikes: bool = False,
     datum: str = "",
 ) -> list[Comparison]:
-    """Compare files in each direction that they show.
+    """Compare files in each direction along which they contain heights.
 
     Parameters
     ----------
@@ -695,7 +695,7 @@ def _check_surfaces(surfaces: list, shift: float | None, datum: str) -> bool:
 
 
 def _refuse_if(*rules: tuple) -> None:
-    """Raise PatchfemError with the message of the first rule (condition, message) that holds."""
+    """Raise PatchfemError with the message of the first rule (condition, message) whose condition holds."""
     for is_wrong, message in rules:
         if is_wrong:
             raise PatchfemError(f"compare: {message}")

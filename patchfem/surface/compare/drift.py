@@ -211,7 +211,7 @@ def _fit_covariances(centres, means, noise, degree: int) -> list:
 
 
 def _predict(covariance: _Covariance, centres, places, noise, degree: int) -> np.ndarray:
-    """Return the kriging matrix (m, k) from part means at (k,) to datum and drift at (m,)."""
+    """Return the kriging matrix (m, k) that maps part means at (k,) to datum and drift at (m,)."""
     root, length, ratio = covariance[:3]
     forms = _evaluate_datum(centres, degree)
     total = ratio * _matern(_distances(centres, centres), root, length) + np.diag(noise)

@@ -115,7 +115,7 @@ def draw_blocks(values, length: int, count: int) -> np.ndarray:
 
 
 def block_length(correlation: float, count: int) -> int:
-    """Return the block length of a bootstrap, of order count^(1/3).
+    """Return the block length for a bootstrap, of order count^(1/3).
 
     It is twice the length of least mean square error, as intervals suffer more from blocks that are
     too short (variance too small) than from few blocks (`student_factor`).
@@ -124,7 +124,7 @@ def block_length(correlation: float, count: int) -> int:
 
 
 def student_factor(blocks: float) -> float:
-    """Return the ratio of the interval of Student's t for a number of blocks to the normal interval."""
+    """Return the ratio of Student's t interval, for a number of blocks, to the normal interval."""
     from scipy.special import stdtrit
 
     return float(stdtrit(max(blocks - 1, 1.0), (1 + LEVEL) / 2)) / SIDE

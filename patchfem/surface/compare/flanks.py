@@ -60,7 +60,7 @@ class Flanks:
 
 
 class _Track(NamedTuple):
-    """Line through the flanks, depth (n,) [m] below it, and the samples of the track."""
+    """Line through the flanks, depth (n,) [m] below this line, and the samples of the track."""
 
     line: tuple
     depth: np.ndarray
@@ -73,7 +73,7 @@ class _Track(NamedTuple):
 
 
 def find_flanks(before: Profile, after: Profile) -> Flanks | None:
-    """Find the wear track in the second trace; return None if nothing exceeds the roughness.
+    """Find the wear track in the second trace, or return None if nothing exceeds the roughness.
 
     A line with a box (a rectangular track) is fitted to the means of 40 parts, for every box that leaves a
     tenth of the trace on either side. The best box is a track if it is deeper than in all random traces

@@ -115,7 +115,7 @@ def _shrink_scatter(smooth, deviation, near) -> np.ndarray:
 
 
 def _limit_corner(depth, window: slice, noise: float) -> float:
-    """Estimate how much deeper [m] a corner is than the fitted parabola; 0 for a round floor.
+    """Estimate how much deeper [m] a corner is than the fitted parabola, or 0 for a round floor of the track.
 
     A corner between slopes of +-s is 3/16 s h deeper than the least-squares parabola of half width h. The
     slopes are fitted beside the window, over its length, or a quarter of it if it is long. Those of a
@@ -162,7 +162,7 @@ def _parabolas(length: int) -> np.ndarray:
 
 
 def _fit_windows(depth, noise, correlation: float) -> _Windows:
-    """Find the longest window around each depth that a parabola fits; it may be a single sample.
+    """Find the longest window around each depth to which a parabola fits; it may be a single sample.
 
     Of the windows of a length, the one with the nearest middle is taken. A depth is read from the half
     of the window around it.
@@ -193,7 +193,7 @@ def _fit_windows(depth, noise, correlation: float) -> _Windows:
 
 
 def _fits_parabola(windows, noise, correlation: float) -> np.ndarray:
-    """Return which windows (m, length) a parabola fits to within the noise (m, length)."""
+    """Return for which windows (m, length) a parabola fits the depths to within the noise (m, length)."""
     length = windows.shape[1]
     base = _parabolas(length)
     residual = windows - (windows @ base) @ base.T

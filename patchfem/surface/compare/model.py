@@ -78,7 +78,7 @@ class TraceModel:
         self.middle = float(self.x[inside][0] + self.x[inside][-1]) / 2
 
     def start(self, shift: float) -> np.ndarray:
-        """Return a parameter vector that is zero except for the shift [m]."""
+        """Return a parameter vector that is zero except for its shift [m]."""
         return np.array([0.0, 0.0, shift, 0.0, 0.0])
 
     def places(self, state) -> np.ndarray:
@@ -109,7 +109,7 @@ class TraceModel:
         return depth, np.column_stack(columns)
 
     def limit_step(self, step, free) -> np.ndarray:
-        """Limit a step of shift and stretch so that no height moves by more than a few samples."""
+        """Limit a step in shift and stretch so that no height moves by more than a few samples."""
         limits = {
             Parameter.SHIFT: MAX_STEP * self.step,
             Parameter.STRETCH: MAX_STEP * self.step / self.half,

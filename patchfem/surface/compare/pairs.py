@@ -168,7 +168,7 @@ def compare_pairs(
 
 
 def collect_quantities(row: dict) -> dict:
-    """Collect the quantities {value, low, high, unit} of a pair by name.
+    """Collect the quantities {value, low, high, unit} of a pair in a dict by name.
 
     Ratios in the other direction of a scan are named after it, such as `amplitude_ratio_y`.
     """
@@ -183,13 +183,13 @@ def collect_quantities(row: dict) -> dict:
 
 
 def parse_quantity(data: dict) -> Quantity:
-    """Make a `Quantity` from its plain data."""
+    """Make a `Quantity` from its JSON data."""
     reason = data.get("reason", "")
     return Quantity(data["value"], data["low"], data["high"], data["unit"], "", reason)
 
 
 def average_pairs(rows: list) -> list[GroupMeans]:
-    """Average the quantities of the pairs of each group, as plain data of `compare_pairs`."""
+    """Average the quantities of the pairs in each group, given as the JSON data of `compare_pairs`."""
     groups = {}
     for row in rows:
         if row["outcome"] == "done":
@@ -212,7 +212,7 @@ def _average(parts: list) -> dict:
 
 
 def find_group(row: dict) -> Group:
-    """Find the group of a pair from its plain data."""
+    """Find the group of a pair from its JSON data."""
     label = row["labels"].get("group", "")
     if "worn_volume" in row:
         return Group(label, "", row["reference"] or "scans")

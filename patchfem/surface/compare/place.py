@@ -64,7 +64,7 @@ class Place(NamedTuple):
 
 
 class _Candidate(NamedTuple):
-    """Match with its alignment (None if it fails), and the match of the valleys."""
+    """Match with its alignment, which is None if it fails, and the match of the valleys."""
 
     match: Match
     alignment: Alignment | None
@@ -74,7 +74,7 @@ class _Candidate(NamedTuple):
 def find_place(
     before: Profile, after: Profile, shift: float | None = None, *, is_straight: bool = False
 ) -> Place:
-    """Find the common part of two traces, with the second one as given or mirrored.
+    """Find the common part of two traces, with the second one unchanged or mirrored.
 
     Traces of a periodic surface, and traces at a known shift, are not mirrored.
 
@@ -103,7 +103,7 @@ def find_place(
 def find_place_as_given(
     before: Profile, after: Profile, shift: float | None = None, *, is_straight: bool = False
 ) -> Place:
-    """Find the common part of two traces as given, by their valleys or part by part.
+    """Find the common part of two traces, neither mirrored, by their valleys or part by part.
 
     The correlation must exceed that of chance at a single shift, and the unworn heights must agree there
     within 10 % of the rms height, or within 30 % if their differences are white noise. Parameters are
@@ -136,7 +136,7 @@ def _search_place(before: Profile, after: Profile, is_straight: bool) -> _Candid
 def try_align(
     before: Profile, after: Profile, shift: float, is_straight: bool = False
 ) -> Alignment | None:
-    """Align two traces (`align`); return None if hardly any heights agree."""
+    """Align two traces (`align`), or return None if hardly any heights agree."""
     try:
         return align(before, after, shift, is_straight=is_straight)
     except PatchfemError:
@@ -146,7 +146,7 @@ def try_align(
 def _align_at_match(
     before: Profile, after: Profile, match: Match, is_straight: bool
 ) -> Alignment | None:
-    """Align two traces at a match; return None if their unworn heights do not agree there."""
+    """Align two traces at a match, or return None if their unworn heights do not agree there."""
     if not match.clearance > min(MIN_CLEARANCE, MIN_LOW_CLEARANCE):
         return None
     alignment = try_align(before, after, match.shift, is_straight)
@@ -177,7 +177,7 @@ def _align_at_mark(before: Profile, after: Profile, shift: float, is_straight: b
 
 
 def _has_enough_unworn(alignment: Alignment) -> bool:
-    """Return whether enough heights agree for a reference: for a straight datum, more than two flanks."""
+    """Return whether enough heights agree to serve as a reference; a straight datum needs more than two flanks."""
     return alignment.agreed_fraction > (2 * SHORT_FLANK if alignment.is_straight else MIN_UNWORN)
 
 
@@ -192,7 +192,7 @@ def _relative_noise(alignment: Alignment) -> float:
 
 
 def _is_same_place(alignment: Alignment, match: Match) -> bool:
-    """Return whether enough unworn heights agree closely enough for a common part of the surface."""
+    """Return whether so many unworn heights agree so closely that the traces have a common part."""
     if _agrees_closely(alignment, match):
         return True
     is_quiet = _is_quiet(alignment, MAX_WHITE_NOISE) and _has_enough_unworn(alignment)
@@ -206,7 +206,7 @@ def _has_high_agreement(alignment: Alignment) -> bool:
 
 
 def _agrees_closely(alignment: Alignment, match: Match, max_height: float = np.inf) -> bool:
-    """Return whether the traces agree so closely that no test for white noise is needed.
+    """Return whether the traces agree so closely that their noise need not be tested for whiteness.
 
     max_height [m] limits the height that the noise is compared with: the depth of a track does not
     count as roughness.

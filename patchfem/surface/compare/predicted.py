@@ -1,4 +1,4 @@
-"""Fit of a computed worn depth to the measured one: wear coefficient, place of the patch, differences.
+"""Fit of a computed worn depth to the measured one: wear coefficient, patch position, differences.
 
 By Archard's law the worn depth depends on the product of wear coefficient and cycles alone. The depths that a run
 passes through on its way are therefore those of smaller coefficients after all of its cycles, although the pressure
@@ -36,7 +36,8 @@ END_MARGIN_RATIO = 0.1
 # Largest ratio of the fitted wear coefficient to that of the run; above it,
 # the computed shape is a guess.
 MAX_RATIO = 2.0
-# Largest ratio in the search, so that a message can propose a coefficient for the next run.
+# Upper limit of the ratio in the search; it exceeds MAX_RATIO so that an error message can propose
+# a coefficient for the next run.
 SEARCHED_RATIO = 1e4
 # Largest ratio of measured to computed width of the wear; above it, the run does not
 # describe the measured contact.
@@ -137,7 +138,7 @@ class MeasuredDepth(NamedTuple):
 
 
 class Placement(NamedTuple):
-    """Computed wear at a place in the trace.
+    """Computed wear at a position in the trace.
 
     - ratio: coefficient divided by that of the run.
     - centre: middle of the patch in x of the second trace [m].
@@ -205,7 +206,7 @@ class PredictedWear:
 
     @property
     def is_extrapolated(self) -> bool:
-        """Whether the coefficient is larger than that of the run."""
+        """Whether the fitted coefficient is larger than that of the run."""
         return bool(self.coefficient.value > self.history.coefficient)
 
     @property
@@ -276,7 +277,7 @@ def _format_percent(part: float, total: float) -> str:
 
 
 def fit_computed_wear(comparison: Comparison, history: WearHistory) -> PredictedWear:
-    """Fit the computed depth of a run to the measured depth of two traces.
+    """Fit the computed worn depth of a run to the depth measured from two traces.
 
     Raises
     ------
@@ -350,7 +351,7 @@ def _average_computed_depth(history: WearHistory, edges, placement: Placement) -
 
 
 def _check_length(measured: MeasuredDepth, comparison: Comparison, history: WearHistory) -> None:
-    """Refuse traces that are too short for the patch, or that show a track wider than it."""
+    """Raise PatchfemError for traces that are too short for the patch or show a wider track than the patch."""
     patch = 2 * history.half
     length = float(measured.edges[-1] - measured.edges[0])
     if length < MIN_OVERLAP * patch:
@@ -428,7 +429,7 @@ def _search_placements(measured: MeasuredDepth, history: WearHistory) -> tuple:
 def _refine(
     measured: MeasuredDepth, history: WearHistory, start: Placement, *, is_fixed: bool = False
 ) -> Placement:
-    """Refine the coefficient and the position by least squares; with `is_fixed`, the position is held."""
+    """Refine the coefficient and the position by least squares; if `is_fixed`, the position is not changed."""
     from scipy.optimize import least_squares
 
     def make_placement(values) -> Placement:
@@ -446,7 +447,7 @@ def _refine(
 
 
 def _check_ratio(ratio: float, history: WearHistory) -> None:
-    """Refuse a measured depth that is much larger than that of the run, or lies before its first frame."""
+    """Raise PatchfemError if the measured depth is far above that of the run, or below that of its first frame."""
     if history.work[1] <= ratio <= MAX_RATIO:
         return
     size = f"{ratio:.3g} times" if ratio > 1 else f"1/{1 / ratio:.3g} of"
@@ -533,7 +534,7 @@ def _scale_last_depth(history: WearHistory) -> WearHistory:
 def _check_width(
     measured: MeasuredDepth, history: WearHistory, best: Placement, comparison: Comparison
 ) -> None:
-    """Refuse a measured track whose width is not that of the computed wear.
+    """Raise PatchfemError if the width of the measured track differs from that of the computed wear.
 
     A track may be wider than the wear of a run that wore far less, as the contact grows.
     """
@@ -563,7 +564,7 @@ def _compute_derivatives(
 
 
 def _project_out(draws, jacobian) -> np.ndarray:
-    """Return random errors (k, b) [m] without the part that the fitted coefficient and position absorb."""
+    """Return random errors (k, b) [m] minus the part that the fitted coefficient and position absorb."""
     return draws - draws @ np.linalg.pinv(jacobian).T @ jacobian.T
 
 
@@ -612,7 +613,7 @@ def _sum_variance(terms, weights) -> float:
 def _find_difference(
     x, measured: MeasuredDepth, computed, draws, history: WearHistory
 ) -> Difference | None:
-    """Find the part of the patch where both depths differ most; None if noise explains the difference.
+    """Find the part of the patch where both depths differ most, or return None if noise explains the difference.
 
     The sums over all parts, divided by the root of their length, are compared with those of the drawn
     errors (scan statistic).
@@ -641,7 +642,7 @@ def _find_difference(
 
 
 class _ScanMaximum(NamedTuple):
-    """Part with the largest sum divided by the square root of its length.
+    """Part of an array for which the sum divided by the square root of the length is largest.
 
     - peak: this quotient.
     - low, high: first bin of the part, and the bin after its last one.

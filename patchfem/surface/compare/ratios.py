@@ -242,7 +242,7 @@ def estimate_freedom(trace: Profile, step: float, band: tuple = BAND) -> tuple:
 
 
 def _is_in_band(count: int, step: float, band: tuple) -> np.ndarray:
-    """Return which of the Fourier frequencies of this number of samples lie in the band."""
+    """Return which Fourier frequencies, for a number of samples, lie in the band."""
     frequency = np.fft.rfftfreq(count, step)
     return (frequency >= 1 / band[1]) & (frequency <= 1 / band[0])
 

@@ -1,4 +1,4 @@
-"""Reference of the worn depth: unworn parts or valleys. Without one, wear may be hidden."""
+"""Reference of the worn depth: unworn parts or valleys. If there is none, wear may be hidden."""
 
 from typing import NamedTuple
 

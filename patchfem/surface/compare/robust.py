@@ -1,4 +1,4 @@
-"""Robust fit of a second surface to the heights of the first one that did not wear.
+"""Robust fit of a second surface to those heights of the first one that did not wear.
 
 A model (`model.TraceModel`, `scans.model.ScanModel`) gives the depth of the second surface below the
 first one, and its Jacobian, as a function of a few parameters. Least trimmed squares from elemental
@@ -38,7 +38,7 @@ SEED = 1985  # seed of the random subsets and of the random traces
 
 
 class Floor(NamedTuple):
-    """Candidate for the unworn surface: a fitted model on which many measured heights lie.
+    """Candidate for the unworn reference surface: a fitted model on which many measured heights lie.
 
     - state: parameters of the model, (k,).
     - scale: standard deviation [m] of the heights on the floor.
@@ -52,14 +52,14 @@ class Floor(NamedTuple):
 
 
 class Fit(NamedTuple):
-    """Fitted parameters (k,), and standard deviation [m] of the heights on the floor."""
+    """Fitted parameters (k,), and standard deviation [m] of the heights about the reference surface."""
 
     state: np.ndarray
     scale: float
 
 
 def estimate_scale(depth) -> float:
-    """Estimate the standard deviation [m] of noise from the depths of the sign with less scatter."""
+    """Estimate the standard deviation [m] of noise from the positive or the negative depths, whichever scatter less."""
     sides = depth[depth > 0], -depth[depth < 0]
     return min((robust_deviation(side) for side in sides if side.size > 3), default=0.0)
 
@@ -90,7 +90,7 @@ def concentrate(model, state, free, rounds: int = 12) -> np.ndarray:
 
 
 def fit_biweight(model, state, free, worn=None, rounds: int = 60, max_scale: float = np.inf) -> Fit:
-    """Fit the free parameters by Tukey's biweight.
+    """Fit the chosen parameters by Tukey's biweight.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def fit_biweight(model, state, free, worn=None, rounds: int = 60, max_scale: flo
 
 
 def find_floors(model, state, free, form) -> list:
-    """Find the floors on which heights of the second surface lie.
+    """Find the candidate reference surfaces on which heights of the second surface lie.
 
     Each further floor is sought in the blocks that lie on none of those before it.
 
@@ -164,7 +164,7 @@ def _make_floor(model, fit: Fit) -> Floor:
 
 
 def _drop_blocks(model, floor: Floor, blocks: list) -> list:
-    """Drop the blocks whose mode lies on a floor, and those with too few heights for a mode."""
+    """Drop blocks whose mode lies on a reference surface, and those with too few heights for a mode."""
     depth, _ = model.linearize(floor.state)
     kept = []
     for block in blocks:

@@ -77,7 +77,7 @@ class Match(NamedTuple):
 
 
 class Resampled(NamedTuple):
-    """Two traces with a common constant sampling interval and without their long waves.
+    """Two traces with a common constant sampling interval, from which the long waves are subtracted.
 
     first, second: (n,), (m,) heights [m]; step [m]; start: x of the first sample of the second trace
     less that of the first [m].
@@ -141,7 +141,7 @@ def search_shift_in_parts(before: Profile, after: Profile) -> Match | None:
 
 
 def resample_both(before: Profile, after: Profile) -> Resampled:
-    """Resample two traces to a common constant sampling interval and filter out their long waves.
+    """Resample two traces to a common constant sampling interval and subtract their long waves.
 
     Raises
     ------

@@ -65,7 +65,7 @@ TEXTS = {
 
 
 class Section(NamedTuple):
-    """Worn depth along a section.
+    """Cross-section of the worn depth, with its errors.
 
     - x, depth, noise: position, worn depth and its standard deviation, (n,) [m].
     - draws: bootstrap errors of the depth, (draws, n) [m].
@@ -125,7 +125,7 @@ def noise_threshold(count: int, n_tests: int = N_TESTS) -> float:
 
 
 def section_from_depths(x, depth, outside) -> Section:
-    """Make a section whose noise is estimated outside the track.
+    """Make a section whose noise is estimated from the depths outside the track.
 
     Parameters
     ----------

@@ -42,7 +42,7 @@ def describe_comparisons(parts: list, directions: list) -> list:
 
 
 def describe_ratio_change(ratio: Quantity) -> str:
-    """Describe the change that a ratio of after to before shows: reduced, increased, none or unknown."""
+    """Describe how a quantity changed from its ratio of after to before: reduced, increased, not at all or unknown."""
     if ratio.value is None:
         return "not known"
     if ratio.high < 1 - ROUNDING:
@@ -80,7 +80,7 @@ def is_elsewhere(part: Comparison) -> bool:
 
 
 def is_gain(part: Comparison) -> bool:
-    """Return whether one gain factor of the instrument explains the changes of heights, waves and slopes."""
+    """Return whether a single amplification of the instrument explains all changes of heights, waves and slopes."""
     changes = {
         describe_ratio_change(part.ratios.amplitude),
         describe_ratio_change(part.ratios.slope),
@@ -131,7 +131,7 @@ def _describe_wear(part: Comparison, name: str) -> str:
 
 
 def _describe_deposits(part: Comparison) -> str:
-    """Describe the material above the first trace; return "" if there is little."""
+    """Describe the material above the first trace, or return "" if there is little."""
     deposited = part.worn.deposited
     if deposited <= 0 or deposited <= MIN_DEPOSITED * (part.worn.area.value or 0.0):
         return ""
@@ -182,7 +182,7 @@ def _describe_other_tracks(part: Comparison) -> list:
 
 
 def _describe_track(part: Comparison) -> str:
-    """Return the beginning of the sentence on the longest track, "" if there is no track."""
+    """Return the beginning of the sentence on the longest track, or "" if there is no track."""
     if part.flanks is not None:
         span = _format_span(part.flanks.start, part.flanks.end)
         return f"a track from about x = {span} in the second trace (after wear); "
@@ -190,7 +190,7 @@ def _describe_track(part: Comparison) -> str:
 
 
 def _describe_sizes(sizes: dict) -> str:
-    """Return the beginning of a sentence on a track with these dimensions, "" if there is no track."""
+    """Return the beginning of a sentence on a track with these dimensions, or "" if there is no track."""
     if not sizes:
         return ""
     start = sizes["from"].value

@@ -72,7 +72,7 @@ def measure_track_roughness(comparison: Comparison) -> TrackRoughness:
 
 
 def _split_regions(comparison: Comparison) -> dict | None:
-    """Return the pieces of both traces in each region, None if there is no track."""
+    """Return the pieces of both traces in each region, or None if there is no track."""
     if not isinstance(comparison.before, Profile):
         return None
     if comparison.flanks is not None:

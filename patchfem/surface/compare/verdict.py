@@ -62,7 +62,7 @@ def compose_verdict(parts: list, directions: list = ()) -> tuple:
 
 
 class _Facts(NamedTuple):
-    """Conditions on which the rules for the headline depend.
+    """Conditions that the rules for the headline use.
 
     parts: list of `Comparison`; waves: change of the waves as a phrase; scan_headline: that of the two
     scans, "" of traces; is_worn: whether a worn depth is shown; is_flatter: whether a slope fell.
@@ -126,7 +126,7 @@ PLACE_RULES = (
 
 
 def _find_headline(parts: list) -> str:
-    """Return the headline: surfaces exchanged or apart, wear, waves, gain, and mirrored traces."""
+    """Return the headline: surfaces exchanged or from different parts, wear, waves, gain, mirrored traces."""
     facts = _collect_facts(parts)
     headline = facts.change
     for condition, words in PLACE_RULES:
@@ -149,7 +149,7 @@ def _find_headline(parts: list) -> str:
 
 
 def _describe_variant(parts: list[Comparison]) -> str:
-    """Describe what was mirrored or inverted; return "" if nothing was."""
+    """Describe what was mirrored or inverted, or return "" if nothing was."""
     if parts[0].change is not None:
         return scans.describe_variant(parts[0].change)
     is_mirrored = any(part.is_mirrored for part in parts)

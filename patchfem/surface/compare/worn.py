@@ -49,7 +49,7 @@ N_BESIDE = 5  # number of samples next to a track where the running median may s
 
 
 class Extent(NamedTuple):
-    """First and last worn position.
+    """First and last position at which the surface is worn.
 
     - before, after: both places in x of the first and of the second trace.
     - is_cut: whether each place is an end of the common part, so that the wear may go on there.
@@ -117,7 +117,7 @@ NO_TRACKS = Tracks(())
 
 
 def make_section(alignment: Alignment) -> Section:
-    """Make the section of an aligned trace."""
+    """Make the cross-section of an aligned trace: its worn depth with noise and errors."""
     errors = alignment.errors
     noise = alignment.noise_at
     return Section(alignment.x, alignment.worn_depth, noise, errors.depth, errors.correlation)
@@ -184,7 +184,7 @@ def limit_slight_wear(alignment: Alignment, section: Section) -> float:
 
 
 def _measure_within(section: Section, start: Quantity, end: Quantity) -> Quantity | None:
-    """Measure the mean worn depth between two positions; None if they coincide."""
+    """Measure the mean worn depth between two positions, or return None if they coincide."""
     is_inside = (section.x >= start.value) & (section.x <= end.value)
     width = float(section.widths[is_inside].sum())
     if width == 0:
@@ -196,7 +196,7 @@ def _measure_within(section: Section, start: Quantity, end: Quantity) -> Quantit
 
 
 def find_extent(alignment: Alignment, section: Section, tracks: Tracks) -> Extent | None:
-    """Find where the wear begins and ends; None if no wear is significant.
+    """Find where the wear begins and ends, or return None if no wear is significant.
 
     Parameters
     ----------
@@ -348,7 +348,7 @@ def split_at_tracks(
 
 
 def measure_flank_track(flanks: Flanks) -> Tracks:
-    """Measure a track below unworn flanks; its ends are known to within a part of the trace."""
+    """Measure a track below unworn flanks; the error of its ends is at most one part of the trace."""
     part = float(flanks.x[-1] - flanks.x[0]) / PARTS
     inside = np.asarray(flanks.depth)[(flanks.x >= flanks.start) & (flanks.x <= flanks.end)]
     fifth = max(inside.size // N_FIFTHS, 1)
@@ -391,7 +391,7 @@ def split_at_flanks(after: Profile, flanks: Flanks, longest: float) -> list:
 
 
 def _split_at_cuts(x, cuts: list, reach: float, longest: float) -> list:
-    """Return the samples (n,) bool of each long piece between the cuts [m]; all if none is long."""
+    """Return the samples (n,) bool of each long piece between the cuts [m], or all samples if no piece is long."""
     pieces = []
     for low, high in pairwise([-np.inf, *cuts, np.inf]):
         is_inside = (x > low + reach) & (x < high - reach)
@@ -411,7 +411,7 @@ def measure_flank_wear(flanks: Flanks) -> Worn:
 
 
 def make_unknown_worn(reason: str, deposited: float = 0.0) -> Worn:
-    """Return a `Worn` whose depths are unknown for a given reason.
+    """Return a `Worn` whose depths are unknown for the given reason.
 
     deposited [m2]: area above the first trace.
     """
@@ -421,7 +421,7 @@ def make_unknown_worn(reason: str, deposited: float = 0.0) -> Worn:
 
 
 def wear_balance(alignment: Alignment) -> float:
-    """Return (lost - grown) / (lost + grown) area of significant heights; 1 if nothing grew."""
+    """Return (lost - grown) / (lost + grown) area of significant heights, or 1 if nothing grew."""
     is_significant = np.abs(alignment.depth) > MAX_NOISE * alignment.noise_at
     clear = np.where(is_significant, alignment.depth, 0.0)
     total = float(np.abs(clear).sum())

@@ -32,7 +32,7 @@ _HEADER = re.compile(r"^\s*Lateral\s+(\w+)\s*,\s*Raw\s+(\w+)[^\n]*$", re.MULTILI
 
 
 def read_dektak(raw: RawFile) -> Profile:
-    """Read the trace of a Dektak export; a PatchfemError names the line at fault."""
+    """Read the trace of a Dektak export; a PatchfemError names the line that cannot be read."""
     path = raw.path
     text = decode_text(raw)
     header = _HEADER.search(text)
@@ -68,7 +68,7 @@ def read_dektak(raw: RawFile) -> Profile:
 
 
 def _parse_unit(word: str) -> float | None:
-    """Return the factor of a length unit to metres; None for any other text."""
+    """Return the factor of a length unit to metres, or None for any other text."""
     return 1e-10 if word.lower() == "a" else parse_length_unit(word)
 
 

@@ -69,7 +69,7 @@ _GERMAN = re.compile("breite|höhe|länge|größe|schritt", re.IGNORECASE)
 
 
 class Line(NamedTuple):
-    """Line of the header of a text file, with its comment sign removed."""
+    """Line in the header of a text file, with its comment sign removed."""
 
     number: int
     text: str
@@ -77,7 +77,7 @@ class Line(NamedTuple):
 
 
 class Cells(NamedTuple):
-    """Cells of a line of a text file, with the delimiter that separates them."""
+    """Cells in a line of a text file, with the delimiter that separates them."""
 
     cells: list
     delimiter: str | None
@@ -212,7 +212,7 @@ def has_column_names(cells: list) -> bool:
 
 
 def _find_names_with_units(line: str, *, is_comment: bool) -> list:
-    """Return the cells of a line that names the columns x and z with units, else [].
+    """Return the cells of a line that names columns x and z with units, or [] for another line.
 
     Further words after the last column of a comment are left out.
     """
@@ -235,7 +235,7 @@ def _find_names_with_units(line: str, *, is_comment: bool) -> list:
 
 
 def parse_column(cell: str) -> Column:
-    """Parse the name of a column with its unit, such as `x [um]`, `height (nm)` or `x in mm`."""
+    """Parse the heading of a column with its unit, such as `x [um]`, `height (nm)` or `x in mm`."""
     match = _COLUMN.fullmatch(cell) if len(cell) <= MAX_NAME else None
     if match is None:
         name = cell.strip().lower()
@@ -246,7 +246,7 @@ def parse_column(cell: str) -> Column:
 
 
 def split_cells(text: str) -> Cells:
-    """Split a line at the delimiter that leaves only numbers, else at the first delimiter.
+    """Split a line at the delimiter that leaves only numbers, or at the first delimiter if there is none.
 
     So a decimal comma is not taken for a delimiter.
     """

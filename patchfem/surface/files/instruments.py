@@ -33,7 +33,7 @@ CPU_LIMIT_SIGNAL = -24  # exit code of a process that exceeded its CPU time (SIG
 
 
 def read_instrument(raw: RawFile, units: tuple | None) -> Profile | Areal:
-    """Read a file in the format of an instrument with the package SurfaceTopography.
+    """Read a file in an instrument format with the package SurfaceTopography.
 
     Raises Missing without SurfaceTopography, and PatchfemError if it cannot read the file, if the
     file is too large, or if neither the file nor the caller states the units.

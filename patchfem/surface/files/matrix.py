@@ -186,7 +186,7 @@ def _find_step(path, axis: str, count: int, facts: dict, units: tuple | None) ->
 
 
 def _choose_unit(path, quantity: str, stated: str | None, given: str | None) -> Unit:
-    """Return the unit that the user gave, else that of the file, with a note if they differ."""
+    """Return the unit given by the user, or else that of the file, with a note if they differ."""
     if given is None or stated is None or parse_length_unit(given) == parse_length_unit(stated):
         return Unit(given or stated)
     note = f"{path}: the header gives {quantity} in {shorten(stated)}, but {given} is used, as given by --units"

@@ -79,7 +79,7 @@ def make_scan_from_points(
 
 
 def make_scan_from_matrix(path, x, y, z, stated: str = "", notes: tuple = ()) -> Profile | Areal:
-    """Make an areal scan of heights on a grid, or a trace if y has one position.
+    """Make an areal scan from heights on a grid, or a trace if y has only one position.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def make_scan_from_matrix(path, x, y, z, stated: str = "", notes: tuple = ()) ->
 
 
 def _find_axis(values) -> Axis:
-    """Find the distinct positions of points along an axis, apart from round-off."""
+    """Find the distinct positions of points along an axis, ignoring round-off."""
     order = np.argsort(values, kind="stable")
     is_new = np.diff(values[order]) > ROUND_OFF * max(float(np.ptp(values)), 1e-300)
     numbers = np.empty(values.size, np.int64)

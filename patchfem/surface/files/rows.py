@@ -28,7 +28,7 @@ _NUMBER_WORDS = ("no", "one", "two", "three", "four")
 
 
 class Columns(NamedTuple):
-    """Columns of numbers of a text file by role, with the line of each row."""
+    """Columns of numbers in a text file by role, with the line of each row."""
 
     values: dict
     lines: np.ndarray
@@ -159,7 +159,7 @@ def _find_delimiter(line: str, expected: str | None, count: int) -> str | None:
 
 
 def _load_table(body: str, delimiter: str | None, *, has_comma: bool) -> np.ndarray | None:
-    """Read rows of plain numbers at once; return None for rows that need a parser."""
+    """Read rows that contain only numbers at once, or return None for rows that need a parser."""
     if has_comma and "." in body:
         return None
     if has_comma:

@@ -70,7 +70,7 @@ def limit_resources(max_seconds: float) -> None:
 
 
 def read_topography(reader, max_points: int) -> tuple[dict, dict]:
-    """Return the arrays of a surface file, with what the file states about them."""
+    """Return the arrays of a surface file, with the metadata of the file."""
     import numpy as np
 
     channel = reader.default_channel

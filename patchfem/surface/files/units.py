@@ -35,13 +35,13 @@ UNITS_IGNORED = "the file states its own units; the units that you gave are igno
 
 
 def parse_length_unit(word: str) -> float | None:
-    """Return the factor to metres of a unit such as um, µm, [mm] or Mikrometer, else None."""
+    """Return the factor to metres of a unit such as um, µm, [mm] or Mikrometer, or None for other text."""
     word = word.strip().strip("[]()").strip().replace("µ", "u").replace("μ", "u")
     return UNITS.get(word) or SYNONYMS.get(word.lower())
 
 
 def parse_pixel_size(word: str) -> float | None:
-    """Return the pixel size [m] of a text such as 0.8 um, None for any other text."""
+    """Return the pixel size [m] from a text such as 0.8 um, or None for any other text."""
     number, _, unit = word.strip().partition(" ")
     try:
         size = float(number) * (parse_length_unit(unit) or math.nan)

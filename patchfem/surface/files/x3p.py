@@ -252,7 +252,7 @@ def _read_binary(package: Package, axes: list, shape: Shape) -> list:
 
 
 def _read_list(package: Package, axes: list, shape: Shape) -> list:
-    """Read the raw values (k,) of each absolute axis from main.xml, NaN for an empty datum."""
+    """Read the raw values (k,) of each absolute axis from main.xml; an empty datum becomes NaN."""
     datums = [
         (datum.text or "").strip() for datum in package.root.findall("Record3/DataList/Datum")
     ]

@@ -115,7 +115,7 @@ def _measure_lobe(rho, steps: tuple) -> Lobe:
 
 
 def autocorrelation_length(surface: Surface) -> float | None:
-    """Compute Sal [m]; None below two steps, or if the autocorrelation never falls to 0.2."""
+    """Compute Sal [m], or return None if it is below two steps or the autocorrelation never falls to 0.2."""
     length = surface.lobe.shortest
     return None if length is None or length < MIN_LENGTH_STEPS * max(surface.steps) else length
 

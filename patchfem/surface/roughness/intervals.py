@@ -92,7 +92,7 @@ class Intervals:
     def confidence_interval(
         self, row: Parameter, value: float | None
     ) -> tuple[float | None, float | None]:
-        """Return the confidence bounds of a parameter; (None, None) if they are unknown."""
+        """Return the confidence bounds of a parameter, or (None, None) if they are unknown."""
         if value is None or not row.kind or not self.spectrum.density.any():
             return None, None
         if (self.is_uneven and row.kind not in LATERAL) or (self.is_short and row.kind in SIZES):
@@ -180,7 +180,7 @@ def _estimate_widening(heights: Heights) -> float:
 
 
 def simulate_traces(spectrum: Spectrum, heights: Heights, degree: int | None) -> list[Heights]:
-    """Simulate Gaussian traces with a spectrum; each call returns the same traces.
+    """Simulate Gaussian traces with a given spectrum; each call returns the same traces.
 
     They are as long as the trace where MAX_SAMPLES samples suffice, on its step or a multiple of it
     that resolves all waves but 1 % of the mean square by six samples. Each is cut from a period of

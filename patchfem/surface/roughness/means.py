@@ -55,7 +55,7 @@ def _drop_interval(value: Quantity) -> Quantity:
 
 
 def _describe_caution(reports: list[RoughnessReport]) -> str:
-    """Return the reason why the means of these reports are of limited use, "" if there is none."""
+    """Return the reason why the means of these reports are of limited use, or "" if there is none."""
     if len({report.source for report in reports}) < len(reports):
         return "one file is given twice, so this file counts twice in the means"
     lengths = [report.sampling.length for report in reports]

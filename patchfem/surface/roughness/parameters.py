@@ -63,7 +63,7 @@ class Heights:
 
     @cached_property
     def core(self) -> "Core | None":
-        """Core of the Abbott curve, None for a flat trace."""
+        """Core of the Abbott curve, or None for a flat trace."""
         return fit_core(self)
 
 
@@ -83,12 +83,12 @@ def total_height(heights: Heights) -> float:
 
 
 def skewness(heights: Heights) -> float | None:
-    """Compute the mean cube of the heights over Rq^3 [1], None for a flat trace."""
+    """Compute the mean cube of the heights over Rq^3 [1], or return None for a flat trace."""
     return _moment(heights, 3)
 
 
 def kurtosis(heights: Heights) -> float | None:
-    """Compute the mean fourth power of the heights over Rq^4 [1], None for a flat trace."""
+    """Compute the mean fourth power of the heights over Rq^4 [1], or return None for a flat trace."""
     return _moment(heights, 4)
 
 
@@ -135,7 +135,7 @@ def mean_spacing(heights: Heights) -> float | None:
 
 
 def mean_element_height(heights: Heights) -> float | None:
-    """Compute Rc, the mean height [m] of the elements of `mean_spacing`; None if there are none."""
+    """Compute Rc, the mean height [m] of the elements of `mean_spacing`, or return None if there are none."""
     places = find_crossings(heights)
     if places.size < 3:
         return None
@@ -194,7 +194,7 @@ def _material_ratios(count: int) -> np.ndarray:
 
 
 def fit_core(heights: Heights) -> Core | None:
-    """Fit the straight core line of the Abbott curve (ISO 13565-2), None for a flat trace.
+    """Fit the straight core line of the Abbott curve (ISO 13565-2), or return None for a flat trace.
 
     The line is the least-squares line of that 40 % of the curve whose secant falls least (the first
     such part). It falls by Rk from ratio 0 to ratio 1. Rpk and Rvk are the heights of triangles

@@ -84,7 +84,7 @@ class TraceMoments(NamedTuple):
 
 
 def trace_moments(trace: Profile, cutoff: float | None = None) -> TraceMoments:
-    """Measure the moments of the waves of a trace below a cut-off [m], None for all waves.
+    """Measure the moments of the waves of a trace below a cut-off [m]; if it is None, of all waves.
 
     Spikes are left out. With a cut-off the roughness profile counts (ISO 16610-21, half a cut-off
     trimmed at each end); a trace no longer than the cut-off keeps all of its waves. Raises
@@ -124,7 +124,7 @@ def rms_moments(trace: Profile, every: int = 1) -> Moments:
 
 
 def _remove_spikes(trace: Profile) -> Profile:
-    """Remove the spikes of a trace, unless they are too many for spikes."""
+    """Remove the spikes of a trace, unless they are too numerous to be spikes."""
     clean = remove_spikes(trace)
     return clean if (clean.missing & ~trace.missing).mean() <= MAX_SPIKE_FRACTION else trace
 

@@ -319,7 +319,7 @@ def _make_band_quantity(row: Parameter, trace: Profile, intervals: Intervals) ->
 
 
 def _describe_spikes(surface: Profile | Areal) -> tuple:
-    """Describe the spikes of a surface in a sentence; return () if there are none."""
+    """Describe the spikes of a surface in a sentence, or return () if there are none."""
     is_spike = find_scan_spikes(surface) if isinstance(surface, Areal) else find_spikes(surface)
     count = int(is_spike.sum())
     if not count:
@@ -361,7 +361,7 @@ def _describe_resampling(part: Profile, trace: Profile, primary: Profile) -> tup
 
 
 def _describe_short_trace(roughness: Profile, cutoff: float) -> tuple:
-    """State that a roughness profile is shorter than one section; return () if it is not."""
+    """State that a roughness profile is shorter than one section, or return () if it is not."""
     if roughness.length >= cutoff * (1 - 1e-9):
         return ()
     return (

@@ -47,7 +47,7 @@ class Spectrum:
 
     @cached_property
     def dominant_wavelength(self) -> float | None:
-        """Wavelength [m] whose octave contains most of the mean square, None for a flat trace.
+        """Wavelength [m] whose octave contains most of the mean square, or None for a flat trace.
 
         It starts at the largest frequency times density, among waves of which the trace holds at
         least two, and moves to the centroid of the density within the width of the tapers around
@@ -76,7 +76,7 @@ class Spectrum:
         return float(ends[1] - ends[0])
 
     def density_between(self, low: float, high: float) -> np.ndarray:
-        """Return the density (k,) [m3] of the waves from `low` to `high` [m], 0 elsewhere."""
+        """Return the density (k,) [m3] of the waves from `low` to `high` [m]; it is 0 at other frequencies."""
         return np.where(
             (self.frequency >= 1 / high) & (self.frequency <= 1 / low), self.density, 0.0
         )

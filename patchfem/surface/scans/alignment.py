@@ -101,7 +101,7 @@ def align_scans(before: Areal, after: Areal) -> ScanAlignment:
 
 
 def _find_place(before: Areal, after: Areal) -> tuple:
-    """Align coarse images from every candidate placement, then refine the best one.
+    """Align coarse images, starting from every candidate placement, then refine the best one.
 
     Returns the placement, the second scan mirrored or inverted by it, and the state (6,).
     """
@@ -141,7 +141,7 @@ def _fit_images(before: Areal, after: Areal, state, step: float) -> tuple:
 
 
 def _find_unworn_planes(model: ScanModel, state) -> list:
-    """Find the planes whose heights may be unworn, at most two, the likeliest first.
+    """Find at most two planes whose heights may be unworn, the more likely one first.
 
     The score of a plane is the fraction of the heights on it less the fraction above it, because
     wear leaves nothing above the first scan. The flat bottom of a groove is as quiet as an unworn
@@ -173,7 +173,7 @@ def _are_apart(model: ScanModel, first: Floor, second: Floor) -> bool:
 
 
 def _fit_unworn(model: ScanModel, placement: Placement, plane: Floor) -> ScanAlignment:
-    """Fit the model to the unworn heights, detect wear, and repeat until the worn part stays."""
+    """Fit the model to the unworn heights and detect wear, repeatedly, until the worn part no longer changes."""
     model = model.cut(plane.state)
     model.smooth_slope(plane.scale)
     changed = None

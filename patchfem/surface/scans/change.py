@@ -120,7 +120,7 @@ def compare_scans(before: Areal, after: Areal, keep_spikes: bool = False) -> Cha
 
 
 def _align_and_measure(before: Areal, after: Areal, keep_spikes: bool) -> tuple:
-    """Return alignment, volumes and number of specks; PatchfemError without a common part."""
+    """Return alignment, volumes and number of specks; raise PatchfemError if the scans have no common part."""
     alignment = align_scans(before, after)
     is_significant = alignment.placement.significance > MIN_SIGNIFICANCE
     min_correlation = MIN_CORRELATION if is_significant else MIN_CORRELATION_UNSURE
@@ -180,7 +180,7 @@ def remove_spikes(scan: Areal) -> tuple:
 
 
 def refuse_hidden_wear(change: Change) -> Quantity:
-    """Return the quantity of wear that a plane may hide, which cannot be known."""
+    """Return the amount of wear that a plane may hide as an unknown quantity."""
     if change.volumes is None:
         return make_unknown("m", HIDDEN_WEAR_MEANING, change.why)
     if change.volumes.values["worn_volume"].low > 0:
@@ -324,7 +324,7 @@ def describe_variant(change: Change) -> str:
 
 
 def _choose_unit(volume: Quantity) -> tuple:
-    """Choose the factor and the unit of a volume: mm^3 from 0.001 mm^3 on, else um^3."""
+    """Choose the factor and the unit of a volume: mm^3 if it is at least 0.001 mm^3, or else um^3."""
     return (1e9, "mm^3") if max(volume.high, 0.0) >= 1e-12 else (1e18, "um^3")
 
 

@@ -24,7 +24,8 @@ MIN_UNWORN_FRACTION = 0.3  # smallest fraction of unworn heights in a tile that 
 MIN_BLOCK_FRACTION = 1 / 8
 # Largest side of a block relative to the shorter side of the map, which leaves nine blocks.
 MAX_BLOCK_FRACTION = 1 / 3
-# Number of parts along each side whose summed scores give the covariance of the alignment.
+# Number of blocks along each side of a scan; the covariance of the alignment is estimated from the
+# sum of the scores in each block.
 N_PARTS = 6
 # Number of lines of the map from which the correlation of neighbouring heights is estimated.
 N_LINES = 200

@@ -26,8 +26,10 @@ MIN_TILE_HEIGHTS = 12  # smallest number of heights in a tile; the mode of fewer
 ROUND_OFF = 1e-9  # fraction of the scatter of the heights; smaller differences are round-off
 # Standard deviation in pixels of the narrowest Gaussian filter that gives slopes.
 MIN_SMOOTHING = 0.7
-MAX_SMOOTHING = 8.0  # standard deviation in pixels of the widest Gaussian filter that gives slopes
-# Width, as a fraction of the shorter side, of the Gaussian filter whose mean contributes no slope.
+# Standard deviation in pixels of the widest Gaussian filter with which slopes are computed.
+MAX_SMOOTHING = 8.0
+# Width, as a fraction of the shorter side, of the Gaussian filter that gives the long waves; these
+# are subtracted before slopes are computed.
 LONG_WAVES = 0.05
 BORDER = 2  # width in pixels of the border of a scan, where cubic interpolation is inaccurate
 # Number of heights of a depth map that are computed at a time, which limits the memory.
@@ -84,7 +86,7 @@ def rotation(angle: float) -> np.ndarray:
 
 
 class _Linearized(NamedTuple):
-    """Depth (k,) [m] between two scans after removal of the plane, and its Jacobian (k, 6).
+    """Depth (k,) [m] between two scans after subtraction of the plane, and its Jacobian (k, 6).
 
     place: rotation [rad] and shifts [m] of the second scan.
     """

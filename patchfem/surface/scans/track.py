@@ -67,7 +67,7 @@ SIGNED_SIZES = ("from", "to", "area_net")  # sizes that may be negative
 
 @dataclass(frozen=True, eq=False)
 class ScanTrack:
-    """Measured wear track of two scans.
+    """Wear track measured from two scans.
 
     - values: sizes by the names of TEXTS.
     - scatter: standard deviation of a single group of sections by name.
@@ -279,7 +279,7 @@ def _find_deep_span(section, noise: float) -> tuple | None:
 
 
 def _measure_length(rotated: _RotatedMap, span: tuple, complete) -> _Length:
-    """Measure a wear track between the positions where its section has half the median area.
+    """Measure the length of a wear track, between the positions where its section has half the median area.
 
     The bounds are the lengths between three quarters and between one quarter of the median.
     """
@@ -361,7 +361,7 @@ def _measure_direction(angle: float, measured: list, along: list, step: float) -
 
 
 def _measure_volume(area: Quantity, length: _Length) -> dict:
-    """Return length and volume of the track; refuse both if it runs over the edge of the scans."""
+    """Return length and volume of the track, both unknown if it crosses the edge of the scans."""
     if length.is_cut:
         reason = (
             "the track leaves the region that both scans show, so its volume must be computed as "

@@ -1,4 +1,4 @@
-"""Volumes, fractions and depths of what wore off and of what grew, from a depth map."""
+"""Volumes, fractions and depths of lost and of deposited material, from a depth map."""
 
 from typing import NamedTuple
 
