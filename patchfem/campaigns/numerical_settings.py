@@ -14,7 +14,7 @@ NUMERICAL_SETTINGS = ("element_size", "steps_per_cycle", "shear_modes", "jumps")
 N_VALUES = 5  # Number of values of a setting, each twice as fine as the previous one.
 # Tolerances for a series of automatic meshes.
 TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5)
-# Tolerances for runs of a scene; smaller ones take long and are rarely met.
+# Tolerances for a series of runs; smaller ones take long and are rarely met.
 SCENE_TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4)
 MAX_CELLS = 1600  # Largest number of cells of a uniform mesh along the interface.
 MAX_STEPS = 12800  # Largest number of time steps per cycle.

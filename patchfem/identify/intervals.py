@@ -182,10 +182,10 @@ def _convert_ends(model: UnitCubeResidual, u, ends) -> np.ndarray:
 
 
 def _invert_normal_matrix(jacobian, column_norm) -> tuple:
-    """Invert the normal matrix J^T J in the determined directions.
+    """Invert the normal matrix J^T J in the subspace that the data determine.
 
-    Returns the pseudo-inverse (f, f), and the undetermined unit directions (d, f). `column_norm` (f,) are the
-    norms of the columns of J.
+    Returns the pseudo-inverse (f, f), and the unit vectors (d, f) of its null space. `column_norm`
+    (f,) are the norms of the columns of J.
     """
     if not column_norm.size:
         return np.zeros((0, 0)), np.zeros((0, 0))

@@ -20,11 +20,12 @@ from .intervals import FitIntervals, compute_intervals, make_unknown_intervals
 from .space import SearchSpace, UnitCubeResidual, make_search_space, make_space_filling_points
 
 COST_TOL = 1e-10  # relative change of the sum of squares per step at convergence
-QUICK_COST_TOL = 1e-4  # the same for a residual that is expensive to evaluate
+QUICK_COST_TOL = 1e-4  # COST_TOL of a residual that is expensive to evaluate
 MAX_EVALUATIONS = 100  # largest number of evaluations in one descent, without Jacobians
 # Largest root mean square residual of an exact fit, relative to the largest residual of the search.
 EXACT_FIT_RATIO = 1e-9
-# Largest sum of squares of descents to the same minimum, relative to the smallest one.
+# A descent has reached the best minimum if the ratio of its sum of squares to the smallest one is
+# at most this value.
 SAME_MINIMUM_RATIO = 1.02
 SAME_RESULT_TOL = 1e-6  # relative difference between the sums of squares of equal results
 # Largest distance from a bound at which a parameter is tried on the bound, relative to its range.

@@ -17,13 +17,13 @@ from .half_cycles import describe_missing_samples_at_end, find_half_cycles
 INPUT_QUANTITIES = ("force", "base_acceleration")  # possible inputs of a record
 # Components of a mode whose node and direction in a file of mode shapes a user can give (--map).
 SHAPE_QUANTITIES = ("slide", "output", "base", "normal", "pitch")
-# Largest relative excess of the damping ratio of the windowed estimate without a note.
+# Largest relative excess of the damping ratio of the windowed estimate for which no note is issued.
 MAX_DAMPING_EXCESS = 0.05
 # Largest half-width of the interval of a damping ratio, relative to the damping ratio.
 MAX_ERROR_RATIO = 2.0
-# Largest misfit of a driven response without a note.
+# Largest misfit of a driven response for which no note is issued.
 MAX_MISFIT = 0.1
-# Largest misfit of a free decay without a note.
+# Largest misfit of a free decay for which no note is issued.
 MAX_DECAY_MISFIT = 0.05
 
 

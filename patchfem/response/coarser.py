@@ -15,7 +15,7 @@ from .errors import coarser_errors
 
 
 class CoarserRuns(NamedTuple):
-    """Coarser runs for one source of error, with the rule that estimates errors from them.
+    """Coarser runs for one source of error, with the rule that estimates this error.
 
     - runs: settings of the runs (hashable arguments of `solve`), from fine to coarse.
     - rule: function (values of the reference run, *values of the coarse runs) that returns errors by
@@ -66,7 +66,7 @@ def estimate_errors(solve: Callable, fine: dict, coarse_runs, solved_runs: dict)
     begin = perf_counter()
 
     def solve_values(settings) -> dict:
-        """Return the measures of a run with given settings, which is computed only once."""
+        """Return the measures of a run with given settings, computed only once."""
         if settings not in solved_runs:
             solved_runs[settings] = solve(settings)
         return solved_runs[settings].values
@@ -81,7 +81,7 @@ def estimate_errors(solve: Callable, fine: dict, coarse_runs, solved_runs: dict)
 
 
 def make_spatial_coarsening(settings, reference=None, source: str = "mesh") -> CoarserRuns:
-    """Return the CoarserRuns of a coarser mesh with second-order convergence.
+    """Return the coarser run on a coarser mesh, with second-order convergence.
 
     Parameters
     ----------

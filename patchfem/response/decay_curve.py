@@ -35,22 +35,27 @@ SPAN_LENGTHS = (
     192,
     256,
 )
-MAX_SLOPE_DIFFERENCE = 2.0  # Largest difference of the slopes of two spans, in standard deviations.
-# Half-width of a 95 % interval in standard deviations, increased because the data determine the span.
+# Largest difference between the slopes fitted over two spans, in standard deviations.
+MAX_SLOPE_DIFFERENCE = 2.0
+# Half-width of a 95 % interval in standard deviations; above 1.96, because the span of the fit is
+# chosen by means of the same data.
 INTERVAL_DEVIATIONS = 2.5
-# Number of half cycles on either side for the estimate of the noise by third differences.
+# Number of half cycles on either side from whose third differences the noise is estimated.
 NOISE_HALF_WIDTH = 8
 # Number of points on either side over which the maximum of the sampling error is taken.
 SAMPLING_HALF_WIDTH = 4
-N_NEWTON_STEPS = 3  # Number of Newton steps for the time of a reversal.
+N_NEWTON_STEPS = 3  # Number of Newton steps to find the time of a reversal.
 VALUE_ROUND_OFF = 1e-12  # Relative round-off error of a value.
-# Largest speed of a sample that counts as a reversal, relative to the largest speed.
+# Largest speed at which a sample counts as a reversal, relative to the largest speed.
 REST_SPEED_TOL = 1e-12
-MIN_HALF_CYCLE = 1e-9  # Smallest half cycle above round-off, relative to the largest one.
-STEP_END_TOL = 1e-9  # largest distance of a reversal from its step due to round-off, in steps
-# Largest reversal, relative to the range in one period, that is attributed to a faster mode.
+# Smallest half cycle that is not attributed to round-off, relative to the largest one.
+MIN_HALF_CYCLE = 1e-9
+# Largest fraction of a step by which a reversal may lie outside its step due to round-off.
+STEP_END_TOL = 1e-9
+# Largest motion between two reversals, relative to the range in one period, that is attributed to a
+# faster mode.
 MAX_RIPPLE = 0.25
-RANGE_TOL = 1e-6  # Relative distance to which a curve is extrapolated beyond its ends.
+RANGE_TOL = 1e-6  # Relative distance by which a curve is extrapolated beyond its ends.
 
 
 class HalfCycles(NamedTuple):
@@ -69,7 +74,7 @@ class HalfCycles(NamedTuple):
 
 
 class DecayCurve(NamedTuple):
-    """Frequency and damping ratio of a decay as functions of amplitude, from large to small amplitudes.
+    """Frequency and damping ratio of a decay as functions of its decreasing amplitude.
 
     - time (k,): time [s].
     - amplitude (k,): amplitude [m].
@@ -113,7 +118,7 @@ class DecayCurve(NamedTuple):
         )._replace(amplitude=np.asarray(amplitudes))
 
     def add_sampling_error(self, other: "DecayCurve") -> "DecayCurve":
-        """Return the curve with errors increased by the error due to sampling the motion.
+        """Return the curve with its errors increased by the error due to sampling the motion.
 
         Parameters
         ----------
@@ -133,13 +138,13 @@ class DecayCurve(NamedTuple):
         return self._replace(**errors)
 
     def add_difference(self, first_curve: "DecayCurve", second_curve: "DecayCurve") -> "DecayCurve":
-        """Return the curve with errors increased by the difference of two other curves.
+        """Return the curve with its errors increased by the differences between two other curves.
 
         The error is infinite where either curve has no value.
         """
 
         def increased_error(name: str) -> np.ndarray:
-            """Return the error of a column plus the difference of the two curves."""
+            """Return the error of a quantity plus its difference between the two curves."""
             change = np.abs(getattr(first_curve, name) - getattr(second_curve, name))
             return getattr(self, f"{name}_error") + np.where(np.isnan(change), np.inf, change)
 
@@ -227,7 +232,7 @@ def measure_last_cycle_amplitude(time, position, speed, period: float) -> float 
 
 
 def find_reversals_by_extrapolation(time, position, speed) -> tuple:
-    """Locate the reversals of a motion by extrapolation from the adjacent steps.
+    """Return the reversals of a motion, extrapolated from the steps before and after them.
 
     The time of a reversal is the mean of the zeros of the speed on the cubics of the preceding and the
     following step. If the friction force changes sign at the reversal within less than a step, these cubics
@@ -297,7 +302,7 @@ def make_half_cycles(times, positions, size=None) -> HalfCycles:
 
 
 def fit_decay_curve(half_cycles: HalfCycles) -> DecayCurve:
-    """Compute frequency and damping ratio against amplitude from the half cycles of a decay.
+    """Compute frequency and damping ratio as functions of amplitude from half cycles.
 
     The curve of a computed decay has a point at each inner half cycle. That of a measured decay has points
     whose spans overlap by half. With fewer than three half cycles, the curve is empty.
@@ -328,7 +333,7 @@ def fit_decay_curve(half_cycles: HalfCycles) -> DecayCurve:
 
 
 def _select_overlapping_spans(span) -> np.ndarray:
-    """Return indices of inner half cycles whose spans (n,) overlap by half."""
+    """Return the indices of inner half cycles whose spans of lengths (n,) overlap by half."""
     selected = [0]
     while (next_index := selected[-1] + max(1, int(span[selected[-1]]))) < span.size:
         selected.append(next_index)
@@ -336,7 +341,7 @@ def _select_overlapping_spans(span) -> np.ndarray:
 
 
 def _smooth_values(values, indices, span) -> np.ndarray:
-    """Return the midpoint values of parabolas that are fitted over moving spans."""
+    """Return the midpoint values of parabolas that are fitted over spans around each index."""
     smoothed = np.empty(indices.size)
     for m in np.unique(span):
         has_span = span == m
@@ -347,7 +352,7 @@ def _smooth_values(values, indices, span) -> np.ndarray:
 
 
 class Slopes(NamedTuple):
-    """Slopes of a quantity per half cycle, with confidence half-widths and spans.
+    """Slopes of a quantity per half cycle, with half-widths of 95 % intervals and with spans.
 
     All arrays are (k,). A span is the number of half cycles on either side of a point.
     """

@@ -1,4 +1,4 @@
-"""Errors of the measures due to the last sample not lying at the requested end time.
+"""Errors of the measures because the last sample does not lie at the requested end time.
 
 In: the samples of the last cycles, and the distance of the last sample from the requested end.
 Out: errors by measure name. A march ends at a whole step, whereas a recorded drive or a sweep may
@@ -12,7 +12,7 @@ from .run_events import slips_and_displacements
 
 
 def estimate_window_error(window: Response, period: float, offset: float) -> dict:
-    """Return the changes of the measures for a window shifted by a number of time steps.
+    """Return the changes of the measures if the window is shifted by a number of time steps.
 
     The peak of a measure changes only if it lies at an end of the window.
 
@@ -61,7 +61,7 @@ def estimate_window_error(window: Response, period: float, offset: float) -> dic
 
 
 def _change_of_maximum_at_end(values) -> float:
-    """Return the change of a maximum over one step if it lies at an end of the samples, else 0."""
+    """Return the change of a maximum over one step if it is the first or last sample, else 0."""
     largest = int(np.argmax(values))
     if largest == 0:
         return abs(float(values[0] - values[1]))
@@ -71,7 +71,7 @@ def _change_of_maximum_at_end(values) -> float:
 
 
 def _change_of_drift(slide, cycles: float) -> float:
-    """Return the change of the drift per cycle [m] for a window shifted by one step.
+    """Return the change of the drift per cycle [m] if the window is shifted by one step.
 
     The drift is defined as in `loops.mean_drift`: by the ends of a window below 1.5 cycles, else by the
     means of two cycles.

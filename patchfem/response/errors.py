@@ -21,19 +21,22 @@ from .rows import error_floor, find_definition
 # Roache's safety factor for two runs; it also covers runs outside the asymptotic range.
 SAFETY_FACTOR = 3.0
 MIN_ORDER = 1.0  # Lowest order of convergence in an estimate.
-MAX_ORDER = 2.0  # Highest order of convergence in an estimate, that of the methods.
+# Highest order of convergence in an estimate, which is the order of the numerical methods.
+MAX_ORDER = 2.0
 # Largest plausible ratio of two successive changes (order 4); beyond it, the last change is accidentally
 # small.
 MAX_CHANGE_RATIO = 16.0
-# Lowest observed order at which an error counts as decreasing with the step size.
+# Lowest observed order of convergence at which an error is assumed to decrease with the step size.
 MIN_OBSERVED_ORDER = 0.5
 SUM_ROUND_OFF = 1e-12  # Relative round-off error of a long sum.
-MEAN_ROUND_OFF = 1e-13  # Round-off error of a mean over the motion, relative to the amplitude.
-ERROR_MEASURES = ("energy_balance", "work_check")  # Measures that are themselves errors.
+# Round-off error of the mean position of a motion, relative to its amplitude.
+MEAN_ROUND_OFF = 1e-13
+# Measures that are errors of the solution, so that their own error is their value.
+ERROR_MEASURES = ("energy_balance", "work_check")
 
 
 def signed_change(fine: dict, coarse: dict) -> dict:
-    """Return the fine-minus-coarse difference of each measure; phase differences are within +-pi/2."""
+    """Return the difference of each measure, fine minus coarse; phases differ by at most pi/2."""
     changes = {name: fine[name] - coarse[name] for name in fine.keys() & coarse.keys()}
     if "slip_start_phase" in changes:
         changes["slip_start_phase"] = (changes["slip_start_phase"] + np.pi / 2) % np.pi - np.pi / 2
@@ -41,7 +44,7 @@ def signed_change(fine: dict, coarse: dict) -> dict:
 
 
 def absolute_change(fine: dict, coarse: dict) -> dict:
-    """Return the absolute difference of each measure in two runs; phases are compared modulo pi."""
+    """Return the absolute difference of each measure between two runs; phases are modulo pi."""
     return {name: abs(difference) for name, difference in signed_change(fine, coarse).items()}
 
 
@@ -87,8 +90,9 @@ def convergence_error(last_change, previous_change=None):
 def convergence_errors(*values: dict) -> dict:
     """Estimate the error of each measure from runs with successive refinements by a factor of 2.
 
-    With more than three runs, the estimate from the coarser runs limits that from the finer ones if its
-    interval contains the value. The error decreases from run to run by the highest order at most.
+    With more than three runs, the estimate from the coarser runs is an upper limit for that from
+    the finer ones if its interval contains the value. From run to run, the error is assumed to
+    decrease by at most the factor of the highest order.
 
     Parameters
     ----------
@@ -103,7 +107,7 @@ def convergence_errors(*values: dict) -> dict:
 
 
 def _finest_error(changes: list) -> float:
-    """Estimate the error of a value from its changes between successive runs, fine to coarse."""
+    """Estimate the error of a value from its changes between successive runs, finest first."""
     if len(changes) == 1:
         return convergence_error(changes[0])
     error = convergence_error(*changes[-2:])
@@ -118,7 +122,7 @@ def _finest_error(changes: list) -> float:
 def step_errors(*values: dict, steps: int) -> dict:
     """Estimate the time-step error of each measure from runs with fewer steps.
 
-    Measures that depend on the number of samples have at least their resolution as error.
+    The error of a measure that is resolved only to a sample is at least this resolution.
 
     Parameters
     ----------
@@ -132,7 +136,7 @@ def step_errors(*values: dict, steps: int) -> dict:
         errors[name] += find_definition(name).sample_error / steps
     min_load = values[0].get("normal_load_least", 0.0)
     if values[0].get("open_fraction") == 0 and min_load > errors.get("normal_load_least", np.inf):
-        errors["open_fraction"] = 0.0  # the load remains positive between the samples
+        errors["open_fraction"] = 0.0  # The normal load remains positive between the samples.
     return errors
 
 
@@ -195,7 +199,7 @@ def merged_cell_errors(fine: dict, *coarse: dict) -> dict:
 
 
 class FrictionScale(NamedTuple):
-    """Reference values (limit, bond length, work) that convert a relative force error to errors.
+    """Reference values by which a relative force error is multiplied to obtain absolute errors.
 
     - static: coefficient of static friction [1].
     - limit: friction limit [N].
@@ -211,11 +215,11 @@ class FrictionScale(NamedTuple):
 
 
 def friction_errors(values: dict, fraction: float, scale: FrictionScale) -> dict:
-    """Return the errors of the measures due to a relative error of the friction force.
+    """Return the errors of the measures caused by a relative error of the friction force.
 
-    The error of each measure is this fraction of a reference value: of the scale of force or slip, of the
-    exchanged work, or of the energy of a bond at the limit. For other measures it is this fraction of the
-    value.
+    The error of a measure is `fraction` times a reference value: the friction limit, the bond
+    length, the exchanged work, or the energy of a bond at the limit. For other measures, it is
+    `fraction` times the value.
 
     Parameters
     ----------
@@ -245,7 +249,7 @@ def friction_errors(values: dict, fraction: float, scale: FrictionScale) -> dict
 
 
 def observed_orders(*values: dict) -> dict:
-    """Return the observed order of convergence [1] of each measure in the time step, at most 2.
+    """Return the observed order of convergence of each measure with the time step, at most 2.
 
     Parameters
     ----------
@@ -256,8 +260,8 @@ def observed_orders(*values: dict) -> dict:
     Returns
     -------
     dict
-        Orders by name, without measures whose order is below MIN_OBSERVED_ORDER or that a run does not
-        have. More steps may not make these more accurate.
+        Orders by name, without measures whose order is below MIN_OBSERVED_ORDER, because more steps
+        may not make these more accurate, or that are missing in a run.
     """
     if len(values) < 3:
         return {}
@@ -281,9 +285,10 @@ def add_errors(
     min_relative_error: float = 0.0,
     size: float = np.inf,
 ) -> dict:
-    """Return measures from values and their errors by source.
+    """Return the measures with given values, with total errors from their errors by source.
 
-    The error of a measure is the sum of its parts plus the fraction `min_relative_error` of the value.
+    The error of a measure is the sum of the errors by source plus the fraction `min_relative_error`
+    of the value.
 
     Parameters
     ----------
@@ -309,9 +314,9 @@ def add_errors(
 
 
 def split_errors(values: dict, errors, step_values=()) -> dict:
-    """Return the ErrorCauses of each measure: errors by source, and order of convergence.
+    """Return the contributions to the error of each measure, and its order of convergence.
 
-    If a coarse run does not have a measure, the error of the measure is its absolute value.
+    If a measure is missing in a coarse run, its error is its absolute value.
 
     Parameters
     ----------
@@ -342,7 +347,7 @@ def add_run_error_estimates(measures: dict, error_estimates: dict, end_errors: d
     error_estimates : dict
         Errors by name.
     end_errors : dict
-        Part of these errors due to a last sample that differs from the requested end.
+        Part of these errors that is caused by a last sample before or after the requested end time.
     """
     updated = dict(measures)
     for name, measure in measures.items():
@@ -364,7 +369,7 @@ def total_error(name: str, value, parts, min_relative_error: float, size):
     value : float or (n,)
         Value of the measure.
     parts : sequence
-        Errors to be added.
+        Errors by source that are added.
     min_relative_error : float
         Relative error that is added [1].
     size : float or (n,)
@@ -373,7 +378,7 @@ def total_error(name: str, value, parts, min_relative_error: float, size):
     error = sum(parts) + np.abs(value) * min_relative_error
     if name == "slip_start_phase":  # a phase modulo pi has an error of at most pi/2
         return np.minimum(error, np.pi / 2)
-    if name in ERROR_MEASURES:  # the value is itself an error
+    if name in ERROR_MEASURES:  # The value of such a measure is itself an error.
         return np.maximum(error, np.abs(value))
     if name == "drift_per_cycle":  # a difference of mean values has their round-off
         return error + max(MEAN_ROUND_OFF, min_relative_error) * np.abs(size)

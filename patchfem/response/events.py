@@ -1,7 +1,7 @@
 """Stick-slip events of a run, detected in samples, and the stick intervals between them.
 
-In: samples of slip and slide, or event rows. Out: `Events`, and stick intervals. `run_events`
-converts the log of the exact engine.
+In: samples of slip and relative displacement, or event rows. Out: `Events`, and stick intervals.
+`run_events` converts the log of an event-driven engine.
 """
 
 from dataclasses import dataclass
@@ -102,7 +102,7 @@ def detect_events(
 
 
 def compute_slip_states(time, slip, period: float, max_stick_slip: float = 0.0) -> tuple:
-    """Return relative slip speed [1] and stick-slip state between samples, (k - 1,) each.
+    """Return the relative slip speed [1] and the stick-slip state between samples.
 
     Parameters
     ----------
@@ -118,8 +118,8 @@ def compute_slip_states(time, slip, period: float, max_stick_slip: float = 0.0) 
     Returns
     -------
     tuple
-        Slip speed relative to its peak in the cycle, and the state: +1 or -1 for slip in this direction,
-        0 for stick.
+        Slip speed relative to its peak in the cycle, and the state, (k - 1,) each: +1 or -1 for
+        slip in this direction, 0 for stick.
     """
     step = np.diff(time)
     rate = np.divide(np.diff(slip), step, out=np.zeros(step.size), where=step > 0)
@@ -167,7 +167,7 @@ def _detect_interface_events(
 
 
 def find_stick_spans(events: Events, begin: float, end: float, always_slips) -> list:
-    """Return the intervals [(start, end)] [s] between events in which the first interface sticks.
+    """Return the start and end times [s] of the intervals in which the first interface sticks.
 
     With several interfaces, only the intervals with the same states of all other interfaces are returned,
     for the states that last longest in total.
@@ -178,7 +178,7 @@ def find_stick_spans(events: Events, begin: float, end: float, always_slips) -> 
     begin, end : float
         Start and end of the window [s].
     always_slips : (i,) of bool
-        Whether an interface without events slips all the time.
+        Whether each interface slips during the whole window if it has no events.
     """
     count = len(always_slips)
     sliding = [bool(slips) for slips in always_slips]

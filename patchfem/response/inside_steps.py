@@ -1,10 +1,10 @@
 """Friction force of the LuGre law within time steps.
 
 In: samples at the ends of steps, and the LuGre law. Out: the window with samples at the ends of
-substeps. The LuGre force has a peak above the kinetic limit at each reversal. For a large slide, the
-peak is shorter than a time step and is not visible at the ends of the steps. The law is therefore
-integrated along the cubics through slides and rates, with N_SUBSTEPS substeps per step, and with each
-reversal at the end of a substep.
+substeps. The LuGre force has a peak above the kinetic limit at each reversal. For a large
+displacement amplitude, the peak is shorter than a time step and is not visible at the ends of the
+steps. The law is therefore integrated along the cubics through relative displacements and rates,
+with N_SUBSTEPS substeps per step, and with each reversal at the end of a substep.
 """
 
 from dataclasses import replace
@@ -21,7 +21,7 @@ N_SUBSTEPS = 16
 
 
 class Steps(NamedTuple):
-    """Times [s], slides [m] and speeds [m/s] at the ends of substeps."""
+    """Times [s], relative displacements [m] and speeds [m/s] at the ends of substeps."""
 
     time: np.ndarray
     slide: np.ndarray
@@ -29,7 +29,7 @@ class Steps(NamedTuple):
 
 
 def add_substep_samples(window: Response, law: LuGre, load: float) -> Response:
-    """Return a window with samples of slide, slip and force at the ends of all substeps.
+    """Return a window with samples of displacement, slip and force at the ends of all substeps.
 
     Parameters
     ----------
@@ -69,16 +69,17 @@ def add_substep_samples(window: Response, law: LuGre, load: float) -> Response:
 
 
 def divide_steps(time, slide, speed) -> Steps:
-    """Divide time steps into substeps, on the cubics through slides and speeds.
+    """Divide time steps into substeps, with each reversal at the end of a substep.
 
-    If the speed changes sign in a step, half of the substeps lie before the reversal. A reversal closer to
-    a sample than one substep is not separated, because the displacements in shorter substeps would be
-    dominated by round-off.
+    The motion in a step is the cubic through displacements and speeds. If the speed changes sign in
+    a step, half of the substeps lie before the reversal. A reversal closer to a sample than one
+    substep is not separated, because the displacements in shorter substeps would be dominated by
+    round-off.
 
     Parameters
     ----------
     time, slide, speed : (k,)
-        Times [s], slides [m] and speeds [m/s].
+        Times [s], relative displacements [m] and speeds [m/s].
 
     Returns
     -------

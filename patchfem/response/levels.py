@@ -28,9 +28,10 @@ LEVEL_MEASURES = (
     "equivalent_damping",
 )
 AMPLITUDE_MEASURE = LEVEL_MEASURES[0]
-# Smallest ratio of third to first acceleration harmonic at which the distortion is visible.
+# Smallest ratio of the third to the first harmonic of the acceleration that indicates slip.
 MIN_DISTORTION = 0.03
-# Smallest factor of a jump between neighbouring levels, relative to the ratio of the drive levels.
+# Smallest ratio of a measure at neighbouring levels, divided by the ratio of the drive levels, that
+# counts as a jump.
 MIN_JUMP_FACTOR = 1.5
 
 
@@ -75,7 +76,7 @@ def make_onset_test(kind: str, length: float | None = None) -> Callable[[Level],
 
 
 def make_no_onset_reason(kind: str, length: float | None = None) -> str:
-    """Return the reason why a sequence of drive levels has no onset of slip."""
+    """Return the reason why no onset of slip was found in a sequence of drive levels."""
     amplitude_text = (
         f"has an amplitude of more than {format_length(length)} at the output" if length else ""
     )

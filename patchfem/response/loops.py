@@ -1,9 +1,10 @@
 """Friction loop of the last cycles: displacement range, stiffness, damping and drift.
 
-In: samples of slide, slide rate and force at any spacing, with two samples at each event of an exact
-run. Out: reversals, secant stiffness, the measures of the loop, and the drift per cycle. The slide is
-interpolated by cubics. The force is not interpolated at a reversal if it may change by its full range
-between two samples there.
+In: samples of the relative displacement (`slide`) of an interface, its rate and the friction force
+at any spacing, with two samples at each event of an event-driven run. Out: reversals, secant
+stiffness, the measures of the loop, and the drift per cycle. The displacement is interpolated by
+cubics. The force is not interpolated at a reversal if it may change by its full range between two
+samples there.
 """
 
 from itertools import pairwise
@@ -14,14 +15,15 @@ import numpy as np
 from ..effects import law_has_trait
 from .measures import COORDINATE_ROUND_OFF
 
-EVENT_TIME_TOL = 1e-9  # Largest time between the two samples at an event, in periods.
-REST_RATE_TOL = 1e-9  # Largest rate of an interface at rest, relative to the largest rate.
-# Largest displacement step at rest, relative to the largest step.
+EVENT_TIME_TOL = 1e-9  # Largest time between two samples at the same event, in periods.
+# Largest rate at which an interface counts as at rest, relative to the largest rate.
+REST_RATE_TOL = 1e-9
+# Largest displacement in a time step that counts as rest, relative to that in any step.
 MIN_REST_END_STEP = 1e-3
 
 
 class Reversal(NamedTuple):
-    """Displacement [m] at a reversal, and the friction force [N] there.
+    """Relative displacement [m] and friction force [N] at a reversal.
 
     The force is None if it is unknown, e.g. if the interface is at rest at an end of the window.
     """
@@ -31,7 +33,7 @@ class Reversal(NamedTuple):
 
 
 def cycle_spans(time, period: float) -> list:
-    """Return the complete cycles [(start, end)] [s] in sampled times (k,), oldest first.
+    """Return the start and end times [s] of the complete cycles in a window, oldest first.
 
     Cycles are counted from the end, so that an incomplete cycle at the start is omitted.
     """
@@ -41,7 +43,7 @@ def cycle_spans(time, period: float) -> list:
 
 
 def reversal_force_rule(model) -> str:
-    """Return the name of the rule for the friction force at a reversal."""
+    """Return which rule of `find_reversals` gives the friction force at a reversal."""
     law = model.friction.law
     soft = model.partial_slip or (
         model.rig is not None and model.rig.friction.interfaces[0].partial_slip
@@ -54,7 +56,7 @@ def reversal_force_rule(model) -> str:
 
 
 def find_reversals(time, slide, rate, force, period: float, rule: str = "rate") -> list:
-    """Return the smallest and the largest `Reversal` of the slide in each cycle.
+    """Return the smallest and the largest `Reversal` of the displacement in each cycle.
 
     Parameters
     ----------
@@ -64,9 +66,9 @@ def find_reversals(time, slide, rate, force, period: float, rule: str = "rate") 
         Period [s].
     rule : str
         Rule for the force at a reversal. "jumps": mean of the forces before and after the rest;
-        "slide": force at the sample with the largest slide, extrapolated linearly in the slide; "rate":
-        interpolated linearly in time. The force is None if the slide is largest at an end of the cycle
-        and does not reverse within one step of it.
+        "slide": force at the sample with the largest displacement, extrapolated linearly in the
+        displacement; "rate": force interpolated linearly in time. The force is None if the
+        displacement is largest at an end of the cycle and does not reverse within one step of it.
     """
     reversals = []
     time_tolerance = EVENT_TIME_TOL * period
@@ -133,10 +135,10 @@ def _find_velocity_zero(v, sample: int, *, first: bool) -> tuple:
 def _force_at_reversal(
     slide, force, sample: int, fraction: float, value: float, rule: str
 ) -> float | None:
-    """Return the friction force [N] at the largest slide; None if it is unknown.
+    """Return the friction force [N] at the largest relative displacement; None if unknown.
 
-    The largest slide `value` lies at the fraction `fraction` of the step after a sample; the rule is as in
-    `find_reversals`.
+    The largest displacement `value` lies in the step after a sample, at the fraction `fraction` of
+    the step; the rule is as in `find_reversals`.
     """
     if rule == "rate":
         return float(
@@ -152,7 +154,7 @@ def _force_at_reversal(
 
 
 def _force_around_rest(slide, force, sample: int, value: float) -> float | None:
-    """Return the mean of the friction forces [N] before and after an interval of rest, or None."""
+    """Return the mean of the friction forces [N] before and after rest; None if one is unknown."""
     step = np.abs(np.diff(slide))
     is_moving = step > MIN_REST_END_STEP * step.max(initial=0.0)
     is_moving &= np.maximum(
@@ -166,7 +168,7 @@ def _force_around_rest(slide, force, sample: int, value: float) -> float | None:
 
 
 def mean_half_range(reversals) -> float:
-    """Return half the range of the slide [m], averaged over the cycles."""
+    """Return half the range of the relative displacement [m], averaged over the cycles."""
     if not reversals:
         return 0.0
     return float(np.mean([high.slide - low.slide for low, high in reversals])) / 2
@@ -192,9 +194,9 @@ def interface_loop(amplitude: float, q: complex, f: complex, work: float, stiffn
     Parameters
     ----------
     amplitude : float
-        Half the range A of the slide in a cycle [m].
+        Half the range A of the relative displacement in a cycle [m].
     q, f : complex
-        First Fourier coefficients of slide [m] and force [N].
+        First Fourier coefficients of relative displacement [m] and friction force [N].
     work : float
         Friction work W per cycle [J].
     stiffness : float
@@ -231,7 +233,7 @@ def interface_loops(amplitude, q, f, work, stiffness) -> dict:
 
 
 def mean_drift(time, slide, rate, period: float) -> float:
-    """Return the drift of the mean position per cycle [m].
+    """Return the change of the mean position per cycle (drift) [m].
 
     The drift is the difference between the time means of the last and the first cycle, divided by the number
     of cycles between them. For windows below 1.5 cycles, it is the displacement between the ends of the

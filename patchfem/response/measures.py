@@ -12,14 +12,15 @@ from ..core import Response
 from ..dynamics import integrated
 from ..friction import path_work
 
-# Largest irreversible fraction of the displacement change at which an interface sticks.
+# Largest irreversible fraction of a change of displacement at which an interface counts as stuck.
 SLIP_FRACTION = 0.5
 COORDINATE_ROUND_OFF = 1e-13  # Round-off error relative to the largest modal coordinate.
 MIN_ENERGY_GAP = 1e-18  # Smallest significant difference of energies [J].
-# Round-off of the friction work relative to the energy that passes through the run.
+# Round-off error of the friction work, relative to the energy that is exchanged and stored in the
+# run.
 WORK_ROUND_OFF = 1e-10
 MIN_SLIDE_RANGE = 1e-15  # Largest range of the relative displacement [m] of an interface at rest.
-# Largest ratio of neighbouring second differences of a smooth curve.
+# Largest ratio of neighbouring second differences at which a curve counts as smooth.
 MAX_SMOOTH_RATIO = 4.0
 
 
@@ -43,7 +44,7 @@ def energy_balance(energies: dict):
 
 
 def relative_gap(sampled_work, balance_work, exchanged_work, energy=0.0):
-    """Return the relative difference of the friction work from samples and from the energy balance.
+    """Return the relative difference between sampled friction work and that in the balance.
 
     Parameters
     ----------
@@ -52,8 +53,9 @@ def relative_gap(sampled_work, balance_work, exchanged_work, energy=0.0):
     exchanged_work : float or (n,) array
         Sum of the absolute values of the friction work of all steps [J].
     energy : float or (n,) array, optional
-        Energy that passes through the whole run [J]. The fraction `WORK_ROUND_OFF` of it is added to
-        `exchanged_work`, so that the result for a stuck interface is not dominated by round-off.
+        Energy that is exchanged and stored in the whole run [J]. The fraction `WORK_ROUND_OFF` of
+        it is added to `exchanged_work`, so that the result for a stuck interface is not dominated
+        by round-off.
 
     Returns
     -------
@@ -164,9 +166,9 @@ def compute_slip_measures(
 ) -> dict:
     """Return slip amplitude [m], stick fraction [1] and phase of slip onset [rad].
 
-    The interface sticks while less than SLIP_FRACTION of the change of its slide is irreversible, or while
-    it is at rest. The transition time is interpolated linearly between the midpoints of the steps. The
-    phase, modulo pi, is that of the start of slip after stick.
+    The interface sticks while less than SLIP_FRACTION of the change of its relative displacement is
+    irreversible, or while it is at rest. The transition time is interpolated linearly between the
+    midpoints of the steps. The phase, modulo pi, is that of the start of slip after stick.
 
     Parameters
     ----------
@@ -176,7 +178,7 @@ def compute_slip_measures(
         Drive with `period` [s].
     steps_per_cycle : int
     lateral : tuple
-        Slide and slip (k,) [m] in the lateral direction; None if there is none.
+        Relative displacement and slip (k,) [m] in the lateral direction; None if there is none.
     """
     lateral_slide, lateral_slip = lateral
     if largest_distance(window.slide, lateral_slide) <= MIN_SLIDE_RANGE:
@@ -213,7 +215,7 @@ def compute_slip_measures(
 
 
 def compute_slip_excess(slip_steps, slide_steps, is_at_rest) -> np.ndarray:
-    """Return by how much slip/displacement of each step (k, ...) exceeds SLIP_FRACTION.
+    """Return the excess of the ratio slip/displacement of each step over SLIP_FRACTION.
 
     A step at rest counts as a step without slip.
 
@@ -229,7 +231,7 @@ def compute_slip_excess(slip_steps, slide_steps, is_at_rest) -> np.ndarray:
 
 
 def compute_negative_fraction(before, after) -> np.ndarray:
-    """Return the fraction of each interval in which values interpolated linearly are negative."""
+    """Return the fraction of each interval in which linearly interpolated values are negative."""
     rise = np.abs(after - before)
     low = np.minimum(before, after)
     high = np.maximum(before, after)
@@ -242,9 +244,9 @@ def slip_round_off(window: Response) -> float:
 
 
 def slip_start_measure(phases) -> dict:
-    """Return the mean drive phase [rad] of the starts of slip, as a dict.
+    """Return the mean phase of the drive [rad] at the onsets of slip, as a dict.
 
-    The dict is empty if the phases differ between the starts.
+    The dict is empty if the onsets have different phases.
     """
     phase = integrated.mean_slip_phase(
         len(phases), np.cos(2 * phases).sum(), np.sin(2 * phases).sum()
@@ -259,7 +261,7 @@ def compute_ledger_measures(ledger) -> dict:
 
 
 def work_difference(work, loops, jumps: bool = False) -> float:
-    """Return the relative difference [1] of the friction work from energies and from samples.
+    """Return the relative difference [1] between the friction works of energies and samples.
 
     The difference between the trapezoidal rule and `work` is divided by the sum of |work| over all steps.
     It decreases with the square of the step size.
@@ -269,10 +271,10 @@ def work_difference(work, loops, jumps: bool = False) -> float:
     work : (k,)
         Cumulative friction work of the energy balance [J].
     loops : sequence
-        (slide (k,) [m], force (k,) [N]) of every direction.
+        Relative displacement (k,) [m] and force (k,) [N] of every direction.
     jumps : bool
-        Whether the force jumps where the slide starts or reverses. The samples contain the force
-        before a jump; the force after it is computed from the work of the following step.
+        Whether the force jumps where the relative motion starts or reverses. The samples contain
+        the force before a jump; the force after it is computed from the work of the following step.
     """
     works = np.diff(work)
     total = 0.0

@@ -29,10 +29,11 @@ from .settling import (
 ESTIMATE_TOL = 0.02
 NOT_SETTLED_WARNING = "the interface sticks, but the amplitude has not settled"
 OPEN_LOOP = "the friction loop of the last cycle does not close"
-# Safety factor on the number of cycles for a decay, because the last amplitudes may beat.
+# Safety factor for the proposed number of cycles of a decay, because the last amplitudes may
+# contain a beat.
 CYCLES_SAFETY_FACTOR = 1.5
 MAX_PROPOSED_CYCLES = 1e6  # Largest number of cycles that a message proposes.
-# Round-off of an amplitude relative to the displacement a/omega^2 of the drive.
+# Round-off error of an amplitude, relative to the displacement a/omega^2 of the drive.
 AMPLITUDE_ROUND_OFF = 1e-12
 
 
@@ -51,8 +52,8 @@ def judge_outcome(
       steady motion will still change by more than ESTIMATE_TOL times the tolerance, the steady estimate is
       added. If a bounded motion is known to exist (`solution.bounded`), an increasing amplitude is
       TRANSIENT, not GROWS.
-    - Release or step: STEADY at rest, within the floor of the amplitude; otherwise as above, but a release
-      grows only if a mode gains energy.
+    - Release or step: STEADY if the amplitude is below its floor, i.e. at rest; otherwise as above,
+      but a release grows only if a mode gains energy.
     - Sweep or recorded signal: TRANSIENT without a steady estimate, unless the interface sticks.
     - Random drive: DONE if both halves of the record have the same mean square.
 
@@ -153,7 +154,7 @@ def is_drifting(drift, error, amplitude, tolerance, floor) -> np.ndarray:
 
 
 def _midpoint_drift(extremes, window: int) -> float:
-    """Return the drift per cycle [m] of the midpoint of the motion in the last two windows.
+    """Return the drift per cycle [m] of the midpoint of the motion between the last windows.
 
     On a belt, a window contains complete stick-slip cycles, whereas a cycle of the drive does not. The
     result is inf with fewer than two windows.
@@ -195,7 +196,7 @@ def _reject_drifting(
 
 
 def remove_errors(measures: dict) -> dict:
-    """Return the measures of a growing motion without errors, because later values differ anyway."""
+    """Return the measures of a growing motion without errors, because it has no final values."""
     return {name: replace(measure, error=None) for name, measure in measures.items()}
 
 
@@ -251,7 +252,7 @@ def classify_periodic(
 
 
 def is_still_changing(steady, error, amplitude, tolerance) -> np.ndarray:
-    """Return whether a motion that meets the tolerance will still change noticeably.
+    """Return whether a motion that counts as steady will still change noticeably.
 
     The limit is ESTIMATE_TOL times the tolerance.
 
@@ -307,7 +308,7 @@ def is_still_loading(window, period: float, tolerance: float) -> bool:
         return bool(
             np.any(is_increasing & (magnitude[-1] - magnitude[0] > tolerance * largest_force))
         )
-    # this factor includes a step whose end lies at the end of a cycle within round-off
+    # The factor includes a step that ends at the end of a cycle except for round-off.
     near = period * (1 + 1e-9)
     first = time <= time[0] + near
     last = time >= time[-1] - near
@@ -328,7 +329,7 @@ def check_piece_length(
     ----------
     outcome : Outcome or None
     max_displacement : float
-        Largest absolute slide of the run [m].
+        Largest absolute relative displacement in the run [m].
     length : float
         Length of the piece [m].
     """
@@ -338,7 +339,7 @@ def check_piece_length(
 
 
 def warn_if_ringing(solution, measures: dict, limits: tuple, drive, cycles: float) -> list:
-    """Return a list with a warning if the interface sticks but the amplitude still decays.
+    """Return a list with a warning if the amplitude still decays while the interface sticks.
 
     The warning contains the remaining change of the amplitude, and the number of cycles after which a free
     motion of the slowest mode is below the tolerance.
@@ -368,7 +369,7 @@ def warn_if_ringing(solution, measures: dict, limits: tuple, drive, cycles: floa
 
 
 def remaining_ringing(extremes, window: int, decay):
-    """Return the part of the amplitude [m] that is free vibration of a stuck interface.
+    """Return the part of the amplitude [m] that is free vibration while the interface sticks.
 
     The result is `remaining_free_motion`, but at least the change of the amplitude in the last window.
 
@@ -389,12 +390,12 @@ def remaining_ringing(extremes, window: int, decay):
 
 
 def warn_of_ringing(free_vibration: float, sizes: tuple, limits: tuple, cycles: float) -> list:
-    """Return a list with a warning on the free vibration of a stuck interface, if it is large.
+    """Return a list with a warning if the free vibration during stick is large.
 
     Parameters
     ----------
     free_vibration : float
-        Part of the amplitude that is free vibration [m] (see `remaining_ringing`).
+        Part of the amplitude that is free vibration [m], see `remaining_ringing`.
     sizes : tuple
         Amplitude and its floor [m].
     limits : tuple

@@ -15,7 +15,8 @@ from .measures import lateral_history
 from .rows import TABLE
 
 ACCELERATIONS = ("absolute_acceleration_fundamental", "acceleration_distortion")
-# Largest fraction of other modes in the slide at which the damping ratio belongs to mode 1.
+# Largest contribution of other modes to the relative displacement, as a fraction, at which the
+# damping ratio is attributed to mode 1.
 MAX_OTHER_MODES_FRACTION = 0.05
 IN_PLANE_REASON = (
     "the interface slides in a plane, but this measure is defined only for one direction"
@@ -50,7 +51,7 @@ OPEN_LOOP_REASON = (
 def find_missing(
     values, window, drive, has_loaded_interface: bool, other_modes_fraction: float = 0.0
 ) -> dict:
-    """Return the measures without a value of a run, each with the reason, by name.
+    """Return the measures for which a run has no value, each with the reason, by name.
 
     Parameters
     ----------
@@ -62,7 +63,7 @@ def find_missing(
     has_loaded_interface : bool
         Whether an interface carries a load.
     other_modes_fraction : float
-        Fraction of the slide due to modes other than the first [1].
+        Fraction of the relative displacement due to modes other than the first [1].
     """
     reasons = {}
     for name in CYCLE_MEASURES if has_loaded_interface else ACCELERATIONS:
@@ -81,9 +82,9 @@ def find_missing(
 
 
 def find_missing_secant(values) -> dict:
-    """Return the secant stiffness without a value if the friction force is not unique.
+    """Return a secant stiffness without a value if the friction force is not unique.
 
-    The force of rigid friction is undetermined if the interface sticks at the largest slide.
+    The force of rigid friction is undetermined if the interface sticks at the largest displacement.
 
     Parameters
     ----------
@@ -105,7 +106,7 @@ def find_missing_secant(values) -> dict:
 
 
 def find_missing_steady(values, outcome: Outcome, drive) -> dict:
-    """Return the steady amplitude without a value if a transient cannot be extrapolated.
+    """Return a steady amplitude without a value if the transient cannot be extrapolated.
 
     Parameters
     ----------
@@ -137,7 +138,7 @@ def _remove_value(measure: Measure, reason: str) -> Measure:
 
 
 def find_missing_drift(values, drive) -> dict:
-    """Return the drift without a value if the drive is not periodic.
+    """Return a drift without a value if the drive is not periodic.
 
     Without a period, mean values differ even if there is no drift.
 
@@ -160,7 +161,7 @@ def find_missing_drift(values, drive) -> dict:
 
 
 def find_missing_unbounded(values) -> dict:
-    """Return all measures except the load without values, for a motion without a bound."""
+    """Return all measures except the load without values, for an unbounded motion."""
     out = {name: _remove_value(measure, UNBOUNDED_REASON) for name, measure in values.items()}
     if "normal_load" in values:
         out["normal_load"] = replace(values["normal_load"], error=None)
@@ -168,7 +169,7 @@ def find_missing_unbounded(values) -> dict:
 
 
 def find_missing_loops(values, window, drive) -> dict:
-    """Return the areas of friction loops without values if the loops do not close.
+    """Return the areas of the friction loops without values if the loops are not closed.
 
     The area of a closed loop is the dissipated energy. In a motion that is not periodic, as after a
     release, the interface also stores or returns energy. If this exceeds the dissipation, the area has no

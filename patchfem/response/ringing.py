@@ -22,11 +22,12 @@ MAX_SAMPLES = 600  # Largest number of samples of a fit; more do not change the 
 MAX_STICKS = 20  # Largest number of fitted stick intervals; the last ones are used.
 MAX_SINUSOIDS = 3  # Largest number of decaying sinusoids of a fit.
 SAMPLES_PER_PERIOD = 24  # Sufficient number of samples per ringing period for a fit.
-# Smallest amplitude of ringing relative to the largest value of the signal.
+# Smallest amplitude that counts as ringing, relative to the largest value of the signal.
 MIN_SINUSOID = 1e-6
-MAX_RESIDUAL = 0.1  # Largest ratio of the rms residual to the rms ringing [1].
+# Largest ratio of the rms residual to the rms ringing at which a fit is accepted [1].
+MAX_RESIDUAL = 0.1
 MAX_DAMPING_RATIO = 0.5  # Largest damping ratio that counts as ringing [1].
-# Largest relative residual of a fit at which no other initial guess is tried.
+# A fit with a relative residual below this value is accepted without further initial guesses.
 EXACT_RESIDUAL = 1e-9
 FLOAT_EPSILON = float(np.finfo(float).eps)
 # CPU time of a residual evaluation in Python per sample and squared number of columns [s].
@@ -79,7 +80,7 @@ def fit_ringing(time, value, omega: float = 0.0, size: float | None = None) -> R
     unforced = value - columns @ np.linalg.lstsq(columns, value, rcond=1e-12)[0]
     if np.abs(unforced).max() <= MIN_SINUSOID * size:
         return None
-    # of a long stick interval, the beginning is used, because the ringing decays
+    # Only the beginning of a long stick interval is used, because the ringing decays.
     if time.size > MAX_SAMPLES:
         # the stride reduces the samples to SAMPLES_PER_PERIOD per ringing period
         stride = max(
@@ -229,7 +230,7 @@ def select_strongest(modes: list, kind: str) -> VibratingMode:
     """
 
     def energy(mode: VibratingMode) -> float:
-        """Return the mean square of a decaying sinusoid, whose amplitude is the field `kind`."""
+        """Return the energy of a decaying sinusoid whose amplitude is the field `kind`."""
         decay = 4 * np.pi * mode.damping * mode.frequency * (mode.end - mode.begin)
         return getattr(mode, kind) ** 2 * (-np.expm1(-decay) / decay if decay else 1.0)
 

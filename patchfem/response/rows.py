@@ -48,11 +48,12 @@ class LastCycles:
       computed.
     - is_sine: whether the drive is sinusoidal at the end of the run.
     - integrated: measures that the engine integrated.
-    - loop: first harmonics of slide [m] and force [N] and work per cycle [J], if they are not in
-      `integrated`; None if the window contains no complete cycle.
+    - loop: first harmonics of relative displacement [m] and friction force [N], and work per cycle
+      [J], if they are not in `integrated`; None if the window contains no complete cycle.
     - ledger (4, k): friction work and energies [J], or None.
-    - reversal_rule: rule for the force at a reversal of the slide (see `loops.find_reversals`).
-    - slide_round_off: largest half range of the slide that is round-off [m].
+    - reversal_rule: rule for the friction force at a reversal of the displacement (see
+      `loops.find_reversals`).
+    - slide_round_off: largest half range of the relative displacement that is round-off [m].
     - uniform_window: equally spaced samples of the window; None if `window` has such samples.
     - add_substeps: function (window, index of the interface) that returns the window with samples
       inside the time steps; None if these are not needed.
@@ -87,7 +88,7 @@ class LastCycles:
 
     @cached_property
     def samples(self) -> Response:
-        """Samples of the window, including samples inside the time steps if the engine has them."""
+        """Samples of the window, with those inside the time steps if the engine provides them."""
         window = self.window
         return window if self.add_substeps is None else self.add_substeps(window, self.interface)
 
@@ -123,7 +124,7 @@ class LastCycles:
 
     @cached_property
     def reversals(self) -> list:
-        """Smallest and largest `Reversal` of the slide in each complete cycle."""
+        """Smallest and largest `Reversal` of the displacement in each complete cycle."""
         if self.integrated.reversals:
             return [tuple(Reversal(*end) for end in pair) for pair in self.integrated.reversals]
         w = self.samples
@@ -133,7 +134,7 @@ class LastCycles:
 
     @cached_property
     def loop_harmonics(self) -> tuple | None:
-        """First harmonics of slide and force, and work per cycle [J].
+        """First harmonics of relative displacement and friction force, and work per cycle [J].
 
         None without a complete cycle.
         """
@@ -184,7 +185,7 @@ class LastCycles:
 
     @cached_property
     def final_energies(self) -> dict:
-        """Friction work and energies [J] at the end of the run as a dict; empty if not recorded."""
+        """Friction work and energies [J] at the end of the run by name; empty if not recorded."""
         return {} if self.ledger is None else compute_ledger_measures(self.ledger)
 
     @cached_property
@@ -200,7 +201,7 @@ class LastCycles:
         return measures
 
     def further_interfaces(self) -> list:
-        """Return the LastCycles of each interface after the first one.
+        """Return the last cycles of each interface after the first one.
 
         The work of an interface is taken from `integrated.loops` if they exist, else from the samples.
         """
@@ -239,9 +240,9 @@ class LastCycles:
         return lateral_history(self.window, name, self.interface)
 
     def evaluate_load(self, function: Callable) -> float | None:
-        """Return a function of the history of the normal load (k,) [N]; None for a constant load.
+        """Return the value of a function of the normal load (k,) [N]; None for a constant load.
 
-        function: function of the load history in the window.
+        function: function that is applied to the load history in the window.
         """
         load = self.window.extra.get("normal_load")
         return None if load is None or self.load is None else float(function(load))
@@ -262,7 +263,7 @@ def resultant_peak(force, lateral_force) -> float:
 
 
 def compute_drift(last_cycles: LastCycles) -> float:
-    """Return the drift of the slide per cycle [m] of an interface.
+    """Return the drift of the relative displacement of an interface per cycle [m].
 
     If the interface slides in a plane, the result is the magnitude of the drift vector.
     """
@@ -285,7 +286,7 @@ def compute_drift(last_cycles: LastCycles) -> float:
 
 
 def harmonic_force_ratio(values: dict):
-    """Return the magnitude [N/m] of the ratio of the first harmonics of friction force and slide.
+    """Return the ratio |F1/q1| [N/m] of the first harmonics of force and displacement.
 
     The in-phase part is the equivalent stiffness; the quadrature part is W/(pi A^2), with the loop area W
     and the slip amplitude A.
@@ -305,7 +306,7 @@ def harmonic_force_ratio(values: dict):
 
 
 def _drift_scale(values: dict):
-    """Return the amplitude [m] to which the drift of an interface is compared.
+    """Return the amplitude [m] with which the drift of an interface is compared.
 
     The scale is the slip amplitude, or without slip the amplitude of the motion.
 
@@ -321,7 +322,7 @@ def _drift_scale(values: dict):
 def _random_rows(
     name: str, unit: str, floor: float, definition: str, group: str = "motion"
 ) -> tuple:
-    """Return the definitions of a measure under random drive and of its statistical scatter."""
+    """Return the rows of a measure under a random drive and of its statistical scatter."""
     scatter = f"{name}_scatter"
     return (
         MeasureDefinition(
@@ -348,7 +349,8 @@ def _random_rows(
 # Measures that only single runs compute. If there are any, a sweep computes the cases of a rig one by one,
 # because batches compute only the measures of this package.
 SINGLE_RUN_ROWS: tuple[MeasureDefinition, ...] = ()
-CUBIC_CONVERGENCE_ORDER = 4.0  # Order of convergence of values on cubics between samples.
+# Order of convergence of values that are interpolated by cubics between samples.
+CUBIC_CONVERGENCE_ORDER = 4.0
 ROWS = (
     MeasureDefinition(
         "relative_displacement_amplitude",
@@ -689,7 +691,8 @@ DISPLACEMENT_MEASURES = (
     "slip_amplitude",
     "drift_per_cycle",
 )
-# Largest floor of a displacement error, relative to the displacement caused by the drive alone.
+# Upper limit of the floor of a displacement error, relative to the displacement caused by the drive
+# alone.
 MAX_DISPLACEMENT_FLOOR = 1e-5
 
 
@@ -751,7 +754,7 @@ def error_floor(name: str, size=np.inf):
 
 
 def larger_term(name: str, values: dict):
-    """Return the size of the terms whose difference a measure is, in the unit of the measure.
+    """Return the size of the terms if a measure is a difference, in the unit of the measure.
 
     Parameters
     ----------
@@ -776,7 +779,7 @@ def larger_term(name: str, values: dict):
 
 
 def set_final_floors(measures: dict, tolerance: float) -> dict:
-    """Return measures with error floors raised for differences of much larger terms."""
+    """Return measures with error floors of at least `tolerance` times the terms of a difference."""
     values = {name: measure.value for name, measure in measures.items()}
     values = {name: value for name, value in values.items() if value is not None}
     updated = dict(measures)

@@ -1,7 +1,7 @@
 """Stick-slip events of a coupled run, from an event log or from samples, and its ringing.
 
-In: the window of a run, its drive, and the EventLog if the exact engine recorded one. Out: `Events`,
-stick intervals, and the ringing during stick.
+In: the window of a run, its drive, and the EventLog if an event-driven engine recorded one. Out:
+`Events`, stick intervals, and the ringing during stick.
 """
 
 import numpy as np
@@ -41,7 +41,7 @@ EXACT_SOURCE = "the times of stick and slip are those of the exact solution"
 
 
 def slips_and_displacements(response) -> tuple:
-    """Return slip and relative displacement (k, i) [m] of each interface in a Response.
+    """Return the slip and the relative displacement (k, i) [m] of each interface.
 
     If an interface slides in a plane, the slip is the accumulated path length, and the displacement is that
     in the main direction.
@@ -64,7 +64,7 @@ def find_segment_borders(drive) -> list:
 
 
 def convert_event_log(log) -> Events:
-    """Return the events in the log of an exact engine."""
+    """Return the events in the log of an event-driven engine."""
     last_events = slice(-MAX_EVENTS, None)
     kind = KIND_BY_SHIFTED_LOG_NUMBER[log.kind[last_events] + LOG_OFFSET]
     slide = np.where(kind == SEGMENT_BORDER, np.nan, log.slide[last_events])
@@ -100,7 +100,7 @@ def list_events(window, drive, log=None, max_stick_slip: float = 0.0) -> Events:
 
 
 def list_slipping_interfaces(window, drive, log=None, max_stick_slip: float = 0.0) -> list:
-    """Return a list of whether each interface slips in a window.
+    """Return for each interface whether it slips in a window, as a list.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def list_slipping_interfaces(window, drive, log=None, max_stick_slip: float = 0.
 
 
 def find_stick_intervals(window, drive, log=None, max_stick_slip: float = 0.0) -> list:
-    """Return the intervals [(start, end)] [s] of a window in which the interface sticks.
+    """Return the start and end times [s] of the intervals of a window with stick.
 
     Parameters
     ----------

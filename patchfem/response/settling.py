@@ -12,9 +12,9 @@ CLASSES = Outcome.TRANSIENT, Outcome.STEADY, Outcome.GROWS
 STEADY_CLASS = 1  # Index of Outcome.STEADY in CLASSES.
 GROWS_CLASS = 2  # Index of Outcome.GROWS in CLASSES.
 MIN_WINDOWS = 3  # Smallest number of windows for an estimate of the free motion.
-# Largest speed of a sticking interface, relative to the largest speed in the run.
+# Largest speed at which an interface counts as stuck, relative to the largest speed in the run.
 SLIP_SPEED_TOL = 1e-3
-# Largest sine of the angle at which phasor differences count as collinear.
+# Largest sine of the angle between two phasor differences that count as collinear.
 COLLINEAR_SINE = 0.02
 # Smallest decay of the slowest mode over a third of the run at which a persistent beat counts as periodic.
 PERIODIC_TOL = 0.1
@@ -237,7 +237,7 @@ def window_amplitude_means(extremes, window: int) -> tuple:
 
 
 def remaining_free_motion(extremes, window: int, decay=0.0):
-    """Return the decaying free motion [m] that the last window still contains.
+    """Return the amplitude [m] of the decaying free motion that remains in the last window.
 
     A free motion near the drive frequency causes a beat. If the beat is shorter than a window, the amplitude
     of the window exceeds the mean amplitude of its cycles. This excess is free motion, unless it persists
@@ -286,7 +286,7 @@ def remaining_free_motion(extremes, window: int, decay=0.0):
 
 
 def beat_mean_amplitudes(extremes, window: int) -> tuple:
-    """Return the mean amplitudes around which short beats oscillate, and their errors [m].
+    """Return the mean amplitudes [m] of motions with short beats, and their errors [m].
 
     The amplitude is the mean over the last third of the windows. The error is the sum of the largest
     deviation of a window from it, twice the difference between the two halves, and the squared beat
@@ -333,7 +333,7 @@ def slip_period(time, rate) -> float:
     Parameters
     ----------
     time, rate : (k,)
-        Times [s] and rates of the slide [m/s].
+        Times [s] and rates of the relative displacement [m/s].
     """
     rate = np.asarray(rate, float)
     direction = np.sign(rate) * (np.abs(rate) > SLIP_SPEED_TOL * np.abs(rate).max(initial=0.0))

@@ -1,4 +1,4 @@
-"""Harmonics of the last cycles, distortion, and readings of instruments.
+"""Harmonics and distortion of the last cycles, and readings of instruments.
 
 In: a window of a run under a drive that ends as a sinusoid. Out: Fourier coefficients of motion,
 acceleration and friction force, the distortion of the acceleration, and the acceleration that an
@@ -7,8 +7,9 @@ instrument indicates. An instrument evaluates the computed motion and does not c
 
 import numpy as np
 
-ACCELERATION_ROUND_OFF = 1e-12  # Round-off error relative to the largest acceleration of the drive.
-MIN_HARMONIC = 1e-4  # Smallest first harmonic of a moving output [m s-2].
+# Round-off error of a harmonic, relative to the largest acceleration of the drive.
+ACCELERATION_ROUND_OFF = 1e-12
+MIN_HARMONIC = 1e-4  # Smallest first harmonic [m s-2] of an output that counts as moving.
 READINGS = ("peak", "fundamental", "rms", "lowpass")
 N_FILTER_HARMONICS = 64  # Number of harmonics of the filtered signal.
 N_FILTER_SAMPLES = 1024  # Number of samples per cycle of the filtered signal.
@@ -95,7 +96,7 @@ def acceleration_harmonic(time, value, rate, omega: float) -> complex:
 def _convert_to_acceleration(
     time, value, rate, omega: float, displacement_harmonic: complex
 ) -> complex:
-    """Return the Fourier coefficient of the acceleration from that of the displacement."""
+    """Convert a Fourier coefficient of the displacement to that of the acceleration."""
     span = time[-1] - time[0]
     phase_factors = np.exp(-1j * omega * time[[0, -1]])
     boundary_term = (rate[-1] + 1j * omega * value[-1]) * phase_factors[1] - (
@@ -163,9 +164,9 @@ def distortion_ratio(first_harmonic, third_harmonic, drive_acceleration):
 def friction_harmonic(window, modes, drive) -> complex:
     """Return the Fourier coefficient [N] of the friction force from the equations of motion.
 
-    With equation 3.4, F1 = m sum_i s_i r_i / sum_i s_i^2, where r = -base a1 - (z'')1 - D (z')1 - omega^2 z1
-    and s_i is the participation of mode i in the slide. The result includes impulses within a step, e.g. at
-    the end of slip.
+    With equation 3.4, F1 = m sum_i s_i r_i / sum_i s_i^2, where r = -base a1 - (z'')1 - D (z')1 -
+    omega^2 z1 and s_i is the participation factor of mode i for the relative displacement. The
+    result includes impulses within a step, e.g. at the end of slip.
 
     Parameters
     ----------

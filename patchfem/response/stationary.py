@@ -169,7 +169,7 @@ def mean_power(time, work) -> tuple:
 
 
 def is_stationary(window, drive) -> bool:
-    """Return whether both halves of a window have the same root mean square within scatter."""
+    """Return whether the root mean squares of both halves of a window agree within scatter."""
     displacement = make_record(window, drive).displacement
     half = displacement.size // 2
     first = displacement[:half]

@@ -21,14 +21,14 @@ class Segments(NamedTuple):
 
 
 class CrossDensities(NamedTuple):
-    """One-sided spectral densities of input and output, and their cross density, (q,) each."""
+    """One-sided spectral densities of input and output, and cross-spectral density, (q,) each."""
 
     input: np.ndarray
     output: np.ndarray
     cross: np.ndarray
 
     def coherence(self) -> np.ndarray:
-        """Return the coherence (q,): the fraction of the output that depends linearly on the input."""
+        """Return the coherence (q,): fraction of output power that is linear in the input."""
         magnitude = np.abs(self.cross)
         return (magnitude / np.maximum(self.input, 1e-300)) * (
             magnitude / np.maximum(self.output, 1e-300)
@@ -65,7 +65,7 @@ def transform_segments(step: float, records, size: int, *, has_window: bool = Tr
 
 
 def average_segments(input_transforms, output_transforms) -> CrossDensities:
-    """Return spectral densities averaged over the segments of an input and an output."""
+    """Return the CrossDensities of an input and an output, averaged over their segments."""
     return CrossDensities(
         input=2 * np.mean(np.abs(input_transforms) ** 2, axis=0),
         output=2 * np.mean(np.abs(output_transforms) ** 2, axis=0),

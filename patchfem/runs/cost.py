@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from operator import add
 from typing import NamedTuple
 
-# Label of the memory of compiled code. A run that must compile it also needs address space for the
-# compiler (`memory.free_bytes`).
+# Name under which the memory of compiled code is reported. A run that must compile it also needs
+# address space for the compiler (`memory.free_bytes`).
 COMPILED_CODE_LABEL = "compiled code"
 
 

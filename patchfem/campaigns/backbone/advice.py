@@ -10,7 +10,7 @@ from .notes import REPORT_OTHER_MODES
 from .records import ROUND_OFF_ERROR, match_amplitudes
 
 AGREEMENT = 0.02  # Largest relative difference of the damping at which two methods agree.
-MIN_REPORTED_LOSS = 0.05  # Smallest fall of the amplitude per cycle that is reported.
+MIN_REPORTED_LOSS = 0.05  # Smallest decrease of the amplitude per cycle that is reported.
 MIN_REPORTED_RATIO = 0.05  # Smallest relative motion of other modes that is reported.
 PURPOSES = {
     "balance": "it is the steady vibration in resonance, such as a test in phase resonance or a response near its peak",

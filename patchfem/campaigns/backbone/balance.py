@@ -23,9 +23,10 @@ from .records import AMPLITUDE_TOL, ROUND_OFF_ERROR, Curve, make_curve
 HARMONIC_COUNTS = (9, 19, 39)
 # Largest number of samples per cycle: more take too long, and 39 harmonics need fewer.
 MAX_SAMPLES = 65536
-N_SAMPLES = 4096  # Number of samples of a cycle from which the largest displacement is read.
+N_SAMPLES = 4096  # Number of samples per cycle from which the largest displacement is determined.
 MAX_STEPS = 8  # Largest number of secant steps to the motion of the requested output amplitude.
-# Smallest slope of log output over log modal amplitude with which a secant step is taken.
+# Smallest slope of log(output) with respect to log(modal amplitude) at which a secant step is
+# taken.
 MIN_SLOPE = 0.1
 
 
@@ -319,7 +320,7 @@ def _compute_rigid_curve(joint: JointMode, amplitudes) -> Curve:
         loss = 4 * kinetic * amplitude * abs(row[joint.mode] / modes.output[joint.mode])
     relative_error = np.array([cycle.error / cycle.amplitude for cycle in cycles])
     # The damping of the structure does not depend on the amplitude, so that only the frictional
-    # damping takes its error.
+    # damping has an error.
     structure_rate = modes.damping_matrix[joint.mode, joint.mode]
     friction_damping = damping - structure_rate / (4 * np.pi * frequency)
     frequency_error = (relative_error + ROUND_OFF_ERROR) * frequency

@@ -20,13 +20,14 @@ PREFERRED_METHODS = ("balance", "quasi-static", "decay")  # Order in which a cur
 # Fraction of the distance of the predicted ring-down from the curve by which the band is widened, because the prediction
 # is of second order in the loss of a half cycle.
 RING_DOWN_MARGIN = 0.4
-# Motion of other modes in a ring-down over its amplitude, per relative change of its shape in a cycle, which excites them,
-# and of a release that was to excite one mode alone.
+# Ratio of the motion of other modes to the amplitude of a ring-down, per relative change of its
+# shape in a cycle, which excites these modes, and after a release that should excite a single mode.
 SHAPE_EXCITATION = 0.1
 RELEASE_EXCITATION = 1e-3
 # Factor on the effect of other modes under a force at the output, which is of first order in the damping.
 FORCED_MODE_FACTOR = 1.2
-# Fall of the frequency of a ring-down over frequency and damping ratio squared: 1/2 and terms of higher order.
+# Relative decrease of the frequency of a ring-down, divided by the square of the damping ratio: 1/2
+# and terms of higher order.
 VISCOUS_FALL = 0.6
 
 
@@ -134,7 +135,8 @@ def _include_ring_down(
     damping.include(every, ring_down.damping, margin + curve.damping_error)
     margin = np.abs(ring_down.frequency - curve.frequency) + curve.frequency_error
     margin += others * np.abs(curve.damping) * curve.frequency
-    # Viscous damping lowers the frequency by the fraction zeta^2/2, and constant friction leaves it.
+    # Viscous damping lowers the frequency by the fraction zeta^2/2, and constant friction does not
+    # change it.
     margin += VISCOUS_FALL * ring_down.damping**2 * curve.frequency
     frequency.include(every, ring_down.frequency, margin)
 

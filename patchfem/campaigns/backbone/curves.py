@@ -32,9 +32,11 @@ from .records import (
     ModeFrequencies,
 )
 
-# Smallest amplitude of gross slip over the amplitude at which the complete contact begins to slip.
+# Ratio of the smallest amplitude of gross slip to the amplitude at which the complete contact
+# begins to slip.
 MIN_GROSS_SLIP_RATIO = 3.0
-FLUTTER_TOL = 1e-8  # Relative error of the flutter amplitude, below the digits that are printed.
+# Relative error of the flutter amplitude, smaller than the digits that are printed.
+FLUTTER_TOL = 1e-8
 
 
 def choose_methods(method: str | None) -> tuple:
@@ -328,7 +330,7 @@ def _flutter_amplitude(joint: JointMode, method: str, curve: Curve) -> float | N
     try:
         return float(np.exp(brentq(net_loss, low, high, xtol=FLUTTER_TOL)))
     except (NotConverged, PatchfemError):
-        # No further point is known, so the root is that of the chord between the two points.
+        # No further point is known, so the root of the chord between the two points is used.
         amplitudes = curve.amplitude[bracket]
         fraction = loss_low / (loss_low - loss_high)
         return float(amplitudes[0] + fraction * (amplitudes[1] - amplitudes[0]))

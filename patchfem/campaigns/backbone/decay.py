@@ -16,7 +16,8 @@ from .records import ROUND_OFF_ERROR, Curve, make_curve
 from .release import Release, release_from_largest_decaying, run_release
 
 MAX_DOUBLINGS = 3  # Largest number of times that the time steps are halved.
-# Largest motion of other modes over amplitude at which the decay counts as that of a single mode.
+# Largest ratio of the motion of other modes to the amplitude at which a decay counts as that of a
+# single mode.
 MAX_OTHER_MODES = 0.1
 
 

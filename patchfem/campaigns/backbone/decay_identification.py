@@ -20,7 +20,8 @@ N_SAMPLES = 4096  # Number of samples of a cycle of a free motion.
 # Number of half cycles on either side over which the largest effect of other modes is taken.
 N_BEAT_HALF_CYCLES = 8
 EQUAL_HALF_CYCLES_TOL = 1e-7  # Largest relative difference of two half cycles without slip.
-STUCK_FRACTION = 0.999  # Smallest stiffness over that without slip at which a contact sticks.
+# Smallest ratio of the stiffness to that without slip at which a contact counts as stuck.
+STUCK_FRACTION = 0.999
 
 
 def identify_decay(

@@ -19,17 +19,18 @@ from ...runs.rig.plan import stuck_stiffnesses
 from .bench_loops import compute_steady_loop
 
 AMPLITUDES_PER_DECADE = 8  # Number of default amplitudes per decade.
-# Smallest default amplitude over the amplitude at which the complete contact slips.
+# Ratio of the smallest default amplitude to the amplitude at which the complete contact slips.
 MIN_AMPLITUDE_FACTOR = 1e-2
-# Largest default amplitude over the amplitude at which the complete contact slips.
+# Ratio of the largest default amplitude to the amplitude at which the complete contact slips.
 MAX_AMPLITUDE_FACTOR = 15.0
-# Smallest default amplitude under rigid friction over the static deflection by friction.
+# Ratio of the smallest default amplitude under rigid friction to the static deflection by friction.
 MIN_RIGID_FACTOR = 2.0
-# Largest amplitude over that at which a softening spring no longer returns the block.
+# Ratio of the largest amplitude to that at which a softening spring no longer returns the block.
 SOFTENING_END = 0.7
-# Largest amplitude over that at which a hardening spring is as stiff as the mode.
+# Ratio of the largest amplitude to that at which a hardening spring is as stiff as the mode.
 HARDENING_END = 3.0
-# Release amplitude over largest amplitude, because the first half cycles depend on the release.
+# Ratio of the release amplitude to the largest amplitude; above 1, because the first half cycles
+# depend on the release.
 RELEASE_FACTOR = 1.15
 # First [m] and last [m] amplitude and their number for a linear rig.
 LINEAR_AMPLITUDES = (1e-6, 1e-3, 4)

@@ -10,10 +10,11 @@ from .records import Curve, match_amplitudes
 
 # Largest ratio of an amplitude of micro-slip to the amplitude at the onset of gross slip.
 MAX_MICRO_SLIP_RATIO = 0.3
-# Smallest ratio of a loss to its error with which the loss counts for an exponent.
+# Smallest ratio of a loss to its error at which the loss is used to determine an exponent.
 MIN_LOSS_RATIO = 4.0
 MAX_LISTED_AMPLITUDES = 6  # Largest number of amplitudes that a sentence lists individually.
-REPORT_OTHER_MODES = 1e-3  # Smallest motion of other modes over amplitude that is reported.
+# Smallest ratio of the motion of other modes to the amplitude that is reported.
+REPORT_OTHER_MODES = 1e-3
 # Smallest ratio of two values that is reported as a ratio and not as a percentage.
 MIN_REPORTED_RATIO = 2.0
 MISSING_ERRORS = (

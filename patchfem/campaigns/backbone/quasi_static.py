@@ -15,7 +15,8 @@ from .records import AMPLITUDE_TOL, ROUND_OFF_ERROR, Curve, make_curve
 N_SAMPLES = 4096  # Number of samples of a friction loop per cycle; half as many give the error.
 # Largest number of corrections of the displacement until the amplitude is the requested one.
 MAX_STEPS = 60
-MIN_FLOOR = 1e-10  # Smallest relative error of a friction loop on a bench.
+# Relative error that is added to the estimated errors of a computed friction loop.
+MIN_FLOOR = 1e-10
 
 
 def compute_static_curve(joint: JointMode, amplitudes) -> Curve:

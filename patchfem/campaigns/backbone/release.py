@@ -26,16 +26,18 @@ MAX_CYCLES_ONE_MODE = 12800
 MAX_CYCLES = 3200  # Largest number of cycles with several modes, for which each cycle takes longer.
 # Largest number of cycles of one mode with elastic elements, of which only reversals are stored.
 MAX_CYCLES_TURNS = 102400
-# Number of amplitudes at which the free motion of a release is computed, up to that of the release.
+# Number of amplitudes, up to the initial one, at which the free motion after a release is computed.
 N_START_STEPS = 12
 MAX_RAISED = 3  # Largest number of repeated releases, each from a higher amplitude.
 MAX_RAISE_FACTOR = 8.0  # Largest ratio of the amplitudes of two successive releases.
-# Final amplitude of the decay over the smallest requested one, such that coarser runs reach it too.
+# Ratio of the final amplitude of the decay to the smallest requested one, such that coarser runs
+# reach it too.
 FINAL_AMPLITUDE_FACTOR = 0.8
 # Number of periods of the free mode within which the first half cycles of a decay appear.
 N_FREE_CYCLES = 3.0
 ANNOUNCED_SECONDS = 20.0  # Smallest expected CPU time [s] of a decay that is announced.
-COARSER_RUNS_FACTOR = 2.0  # CPU time of a decay with its coarser runs over that without them.
+# Ratio of the CPU time of a decay with its coarser runs to that without them.
+COARSER_RUNS_FACTOR = 2.0
 
 
 class Release(NamedTuple):
@@ -153,7 +155,7 @@ def _release_to_smallest(joint: JointMode, amplitudes, progress=None) -> Release
         if not decay.time.size:
             if cycles >= max_cycles or end >= free_swings:
                 return release
-            # The cycles are those of the stuck mode; a half cycle in slip can last hundreds of
+            # The unit is the cycle of the stuck mode; a half cycle in slip can last hundreds of
             # them.
             cycles = min(8 * cycles, max_cycles)
             continue

@@ -25,14 +25,16 @@ from .balance import HARMONIC_COUNTS, find_free_motions, half_peak_to_peak
 from .joint import JointMode
 from .records import Curve
 
-N_SIDE_HALF_CYCLES = 1.5  # Half cycles on either side of an amplitude that give its decrement.
+# Number of half cycles on either side of an amplitude from which its decrement is computed.
+N_SIDE_HALF_CYCLES = 1.5
 # Amplitudes of the free motions around an amplitude, in half cycles before or after it. Three suffice for a
 # smooth contact; seven, at all reversals and middles of the half cycles, resolve an onset of slip.
 SMOOTH_OFFSETS = N_SIDE_HALF_CYCLES * np.linspace(-1, 1, 3)
 FINE_OFFSETS = N_SIDE_HALF_CYCLES * np.linspace(-1, 1, 7)
-# Largest difference of a free motion from its requested amplitude, over the smallest range of the half cycles.
+# Largest difference of a free motion from its requested amplitude, relative to the smallest range
+# of the half cycles.
 OFFSET_TOL = 0.05
-MAX_HALF_CYCLE_LOSS = 1.5  # Largest fall of the logarithm of the amplitude in half a cycle.
+MAX_HALF_CYCLE_LOSS = 1.5  # Largest decrease of the logarithm of the amplitude in half a cycle.
 
 
 class RingDown(NamedTuple):
@@ -183,7 +185,7 @@ def _interpolation_error(rows: _MotionRows) -> np.ndarray:
         width = steps.max(axis=1)
         energy_error = np.abs(np.diff(energy_slope, axis=1)[:, 0]) * width / 4
         loss_error = np.abs(np.diff(loss_slope, axis=1)[:, 0]) * width / 4
-        # The energy falls by this fraction in half a cycle.
+        # The energy decreases by this fraction in half a cycle.
         fall = np.abs(energy_slope).max(axis=1) * width / N_SIDE_HALF_CYCLES
         error = energy_error / fall + loss_error
     return np.where(np.isfinite(error), error, np.inf)

@@ -25,12 +25,14 @@ from .problem import FittedKeys, FreeKeys, parse_ranges
 
 # Number of time steps between two rows from which the steps are no longer halved.
 MAX_STEPS_PER_ROW = 64
-# Largest change of the force, over the tolerance, that is negligible in a fit.
+# Largest ratio of a change of the force to the tolerance at which the change is negligible in a
+# fit.
 STEP_FRACTION = 0.1
-MIN_INDEPENDENT = 0.6  # Smallest fraction of independent rows without a warning about correlation.
-# Residual over peak force up to which round-off dominates the residual.
+# Smallest fraction of independent rows for which no warning about correlation is issued.
+MIN_INDEPENDENT = 0.6
+# Ratio of the residual to the peak force up to which round-off dominates the residual.
 MIN_RMS = 1e-6
-# Largest force in the first row, over the peak force, of a record that begins at rest.
+# Largest ratio of the force in the first row to the peak force for a record that begins at rest.
 MAX_FIRST_FORCE = 0.2
 LOAD_UNITS = {
     "time": UNIT_FACTORS["time"],

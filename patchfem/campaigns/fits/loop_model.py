@@ -22,7 +22,8 @@ from .problem import format_assignments, solve_contact
 # Largest number of free [contact] parameters whose bounds and middles determine the shared meshes;
 # they require 3**3 models.
 MAX_MESH_KEYS = 3
-REST_SPEED_FRACTION = 1e-3  # Rest speed of growing bonds over the largest measured speed.
+# Ratio of the rest speed of growing bonds to the largest measured speed.
+REST_SPEED_FRACTION = 1e-3
 AMPLITUDE_TOL = 0.02  # Largest relative difference of two amplitudes that is not reported.
 
 
@@ -52,7 +53,7 @@ class BenchModel:
         self.loop = loop
         self.ranges = ranges
         self.say = say
-        self.base = BaseScene(scene)  # The scene text is parsed only once.
+        self.base = BaseScene(scene)  # The scene is parsed only once.
         self.offsets = [offset.name for offset in offsets]
         self.n_warm_up_rows = count_warm_up_rows(loop) if warm_up else 0
         self.notes: list = []
@@ -188,7 +189,7 @@ class BenchModel:
             try:
                 models.append(build(self.build_scene(parameters)))
             except PatchfemError:
-                continue  # The search counts the same error as a failed evaluation.
+                continue  # The search counts this error as a failed evaluation too.
         self.first_error = first_error
         self.meshes = meshes.SharedMeshes(models, False)
         return self.meshes

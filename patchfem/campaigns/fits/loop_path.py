@@ -11,7 +11,8 @@ from ...inputs.loops import Loop
 from ...scene.ranges import Range
 
 OFFSETS = ("force", "displacement")
-POSITION_TOL = 1e-6  # Largest difference of equal positions over the displacement range.
+# Largest difference of positions that count as equal, relative to the displacement range.
+POSITION_TOL = 1e-6
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -25,10 +25,11 @@ from .patch_laws import FITTED_LAWS, MIN_LOSS, LawProblem, LoopCurves
 # Number of amplitudes per decade, which resolves every regime of a law.
 AMPLITUDES_PER_DECADE = 8
 MIN_AMPLITUDES = 12  # Smallest number of amplitudes of any range.
-# Smallest amplitude over slip force/stiffness; smaller ones cause no slip.
+# Smallest ratio of the amplitude to slip force/stiffness; smaller ones cause no slip.
 MIN_AMPLITUDE_FACTOR = 1e-2
-MAX_AMPLITUDE_FACTOR = 2.0  # Largest amplitude over the yield displacement of the last element.
-MAX_FIRST_FACTOR = 0.2  # Upper limit of the first amplitude over slip force/stiffness.
+# Largest ratio of the amplitude to the yield displacement of the last element.
+MAX_AMPLITUDE_FACTOR = 2.0
+MAX_FIRST_FACTOR = 0.2  # Upper limit of the ratio of the first amplitude to slip force/stiffness.
 # Inverse of the smallest fraction of slipping elements at which the mesh resolves the loss.
 N_RESOLVED_ELEMENTS = 16
 # Largest root mean square difference of the loss between two meshes without refinement.

@@ -24,18 +24,19 @@ from ...scene.keys.quantities import parse_quantity
 from ...scene.ranges import Range
 from .problem import parse_ranges
 
-# Names of the worn depths in compare.json, the more accurate one first.
+# Names of the wear depths in compare.json, the more accurate one first.
 QUANTITIES = ("worn_depth_mean", "worn_depth_max")
 MAX_RUNS = 6  # Largest number of wear runs; the correction converges within two or three runs.
 # Largest size of a file that is read [bytes]; files of `compare` are far smaller.
 MAX_FILE_BYTES = 1 << 20
-DEPTH_TOL = 0.1  # Largest relative error of the computed depth over the tolerance of the scene.
+# Largest ratio of the relative error of the computed depth to the specified tolerance.
+DEPTH_TOL = 0.1
 COEFFICIENT_KEY = "wear.coefficient"
 
 
 @dataclass(frozen=True, slots=True)
 class MeasuredDepth:
-    """Measured worn depth with its interval.
+    """Measured wear depth with its interval.
 
     name: one of QUANTITIES; value, low, high: [m]; source: "--to" or a file.
     """
@@ -57,7 +58,7 @@ class FittedCoefficient:
         Coefficient and its interval [m2/N].
     measured : MeasuredDepth
     model : float
-        Worn depth that is computed with the fitted coefficient [m].
+        Wear depth that is computed with the fitted coefficient [m].
     bounds : Range
         Bounds of the search.
     runs : int
@@ -74,13 +75,13 @@ class FittedCoefficient:
 
 
 class WearCurve(NamedTuple):
-    """Worn depth (j,) [m] as a function of the completed fraction of the cycles (j,)."""
+    """Wear depth (j,) [m] as a function of the completed fraction of the cycles (j,)."""
 
     fraction: np.ndarray
     depth: np.ndarray
 
     def make_inverse(self) -> Callable:
-        """Return a function that interpolates the fraction of the cycles at a given worn depth."""
+        """Return a function that interpolates the fraction of the cycles at a given wear depth."""
         is_growing = np.concatenate([[True], np.diff(self.depth) > 0])
         depth = self.depth[is_growing]
         fraction = self.fraction[is_growing]
@@ -200,7 +201,7 @@ def fit_wear(
     patch = mesh_levels.solve_with_coarser(model.patch, model.accuracy.tolerance, False)[0]
 
     def compute(coefficient: float) -> WearCurve:
-        """Compute the worn depth over the cycles for a wear coefficient [m2/N]."""
+        """Compute the wear depth over the cycles for a wear coefficient [m2/N]."""
         return _compute_wear_curve(model, patch, coefficient, target.name, progress)
 
     curve = compute(bounds.high)
@@ -264,7 +265,7 @@ def _parse_coefficient_range(free_parameters) -> Range:
 
 
 def _compute_wear_curve(model: Model, patch, coefficient: float, name: str, progress) -> WearCurve:
-    """Compute the worn depth over the cycles for a wear coefficient [m2/N].
+    """Compute the wear depth over the cycles for a wear coefficient [m2/N].
 
     `patch` is the solved contact of the unworn pieces, and `name` one of QUANTITIES.
     """

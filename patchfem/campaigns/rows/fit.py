@@ -267,7 +267,7 @@ def _predict_from_rest(model_readings: ModelReadings, values, conditions) -> np.
 
 
 class _RowsFitter(NamedTuple):
-    """Fitter of the free parameters to subsets of the readings of a table.
+    """Fits of the free parameters to subsets of a table of readings.
 
     report: callback that is called with 1 after each descent, or None.
     """

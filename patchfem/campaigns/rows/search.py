@@ -93,7 +93,7 @@ def make_residual(
     )
 
     def residual(values):
-        """Return the log ratios (r,) of the selected readings for free parameters (n,)."""
+        """Return the log ratios (r,) of computed to measured readings for parameters (n,)."""
         logs = readings.compute_log_ratios(*model_readings(values, conditions))[is_used]
         return np.where(is_lower_bound, np.minimum(logs, 0.0), logs)
 

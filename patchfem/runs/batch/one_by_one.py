@@ -51,7 +51,7 @@ def solve(
                 on_result(case, result)
         except CASE_ERRORS as error:
             results.fail(case, str(error) or NO_MEMORY_MESSAGE)
-        # a program fault in one case must not discard the results of the other cases
+        # An unexpected exception in one case must not discard the results of the other cases.
         except Exception as error:
             results.fail(case, f"internal fault, please report it: {type(error).__name__}: {error}")
         else:

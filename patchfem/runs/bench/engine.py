@@ -126,7 +126,7 @@ def choose_bench_engine(
 
 
 def steps_per_cycle(model) -> int:
-    """Return the number of steps per cycle of a bench run, from the scene or else from the tolerance.
+    """Return the number of steps per cycle of a bench run, as given or from the tolerance.
 
     The path over grooves needs at least N_SAMPLES_PER_RADIAN samples per radian of their phase.
     """

@@ -304,7 +304,7 @@ def make_column_layout(patch_model, extents: list) -> Layout:
 
 
 def _make_point_bands(places, cell: float) -> list:
-    """Return bands that put a node with cells of given length [m] beside it at each place [m]."""
+    """Return bands with a node at each position [m] between cells of a given length [m]."""
     return [(place, place, cell) for place in places]
 
 

@@ -176,7 +176,7 @@ def select_distinct_patches(patches, max_patches: int = MAX_CASES) -> tuple:
 
 
 def _load_and_shape_parameters(patch_model) -> tuple:
-    """Return the parameters of load and shape in which patches of equal geometry differ."""
+    """Return the load and gap parameters that may differ between patches of one mesh geometry."""
     loading = patch_model.loading
     shapes = []
     for _, part in patch_model.gap.shapes:

@@ -67,7 +67,8 @@ def _parabola_vertices(x, sigma, peak_node) -> np.ndarray:
     peak_node : (q,)
         Index of the largest nodal pressure; an inner node.
     """
-    # At an end of the interface, the parabola replaces its missing neighbour.
+    # At an end of the interface, the value of the missing neighbour is extrapolated with the
+    # parabola.
     rows = np.arange(peak_node.size)
     nodes = np.clip(peak_node[:, None] + [-1, 0, 1], 1, x.size - 2)
     left = x[nodes] - x[nodes - 1]

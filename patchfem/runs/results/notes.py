@@ -113,10 +113,11 @@ def warn_of_creep(law, outcome, measures: dict) -> list:
 
 
 def warn_of_unbounded_bonds(law) -> list:
-    """Return a list with a warning if initial bonds of negative order have an infinite traction.
+    """Return a list with a warning if the traction of the initial bonds is infinite at first.
 
-    Their traction is infinite at the first instant. Bonds that form later carry at most the
-    fraction P(p + 1, R/eps_0) of mu_s N, with or without growth.
+    The traction is infinite at the first instant if the order of the friction law is negative.
+    Bonds that form later carry at most the fraction P(p + 1, R/eps_0) of mu_s N, with or without
+    growth.
     """
     if law.order >= 0 or law.initial == 0:
         return []
@@ -157,7 +158,7 @@ def note_on_growth(law, peak: float | None) -> list:
 
 
 def warn_of_work_check(values: dict, steps: int | None, harmonics: int | None = None) -> list:
-    """Return a list with a warning if the friction works from samples and from energies differ.
+    """Return a list with a warning if sampled friction work differs from that in the energies.
 
     The trapezoidal rule for the samples is of second order. A difference below the error of the
     rule may be small by chance, so that the larger of both is used.
@@ -173,8 +174,8 @@ def warn_of_work_check(values: dict, steps: int | None, harmonics: int | None = 
     if check is None or check.value is None or check.value <= MAX_WORK_CHECK:
         return []
     ratio = max(check.value, check.error or 0.0) / MAX_WORK_CHECK
-    # One more halving is proposed, because in a motion with stops the difference is of second order
-    # only on average.
+    # One more halving of the time step is proposed, because in a motion with stick the difference
+    # of the two works is of second order in the step only on average.
     halvings = 1 + ceil(log2(ratio) / 2)
     if harmonics:
         remedy = advise_harmonics(harmonics)

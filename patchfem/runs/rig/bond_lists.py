@@ -204,7 +204,7 @@ def is_stuck_by_printed_law(model: Model) -> bool:
 
 
 def is_stuck_after_release(model: Model) -> bool:
-    """Return whether growing bonds of the printed law hold a block after its release."""
+    """Return whether growing bonds of the law as published hold a block after its release."""
     return model.rig.drive.kind == "free" and find_holding_ratio(model) >= MIN_STUCK_RATIO
 
 

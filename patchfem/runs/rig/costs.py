@@ -423,7 +423,7 @@ def explain_time_steps_over_smooth_engine(model: Model) -> str:
 
 
 def make_smooth_element(model: Model) -> "Element | None":
-    """Return the friction law as an Element of the smooth engine; None if it is not supported.
+    """Return the friction law as an Element for the smooth engine; None if not supported.
 
     It is None if the bonds are summed in a list, or if the law averages the pressure over all
     points.

@@ -35,12 +35,12 @@ from .costs import (
     intervals_per_cycle,
 )
 
-# Factor on the merge width of bonds in the comparison run.
+# Ratio of the width within which bonds are merged in the comparison run to that in the run itself.
 MERGE_WIDTH_FACTOR = 0.5
 # Largest ratio of the neglected tail of a sum over bonds to the tolerance at which no run with a
 # smaller tail is made; the automatic tail is a tenth of this.
 MAX_UNCHECKED_TAIL_RATIO = 1e-2
-TAIL_FACTOR = 0.1  # Factor on the neglected tail in the comparison run.
+TAIL_FACTOR = 0.1  # Ratio of the neglected tail in the comparison run to that in the run itself.
 # Largest number of time intervals per period at which the map of yield events is used.
 MAX_MAPPED_INTERVALS = 1e5
 

@@ -26,8 +26,8 @@ from .costs import explain_time_steps_over_element_events
 from .engines import ENGINES, PIECES
 from .solution import first_interface_load
 
-# Smallest relative excess of the largest motion in the window over the amplitude of the last cycle
-# at which a release counts as still decaying.
+# The motion after a release counts as still decaying if its largest amplitude in the window exceeds
+# that of the last cycle by more than this fraction.
 MIN_DECAY_EXCESS = 1e-3
 EQUAL_FREQUENCY_TOL = 1e-9  # Largest relative difference at which two frequencies count as equal.
 SINGLE_POINT_WARNING = (

@@ -338,10 +338,11 @@ def find_drive_and_knee(model: Model) -> dict:
 
 
 def _find_participation_ratio(rig) -> float:
-    """Return the ratio of the slide and base participation factors of the first elastic mode.
+    """Return the ratio of two participation factors of the first elastic mode.
 
-    It is the effect of friction relative to that of the drive. It is 1 if the scene lists no modes,
-    or if the drive does not excite the mode.
+    They are the factors for the relative displacement of the interface and for the base motion. The
+    ratio is the effect of friction relative to that of the drive. It is 1 if the scene lists no
+    modes, or if the drive does not excite the mode.
     """
     first = int(np.flatnonzero(rig.modes.omega > 0)[0]) if rig.first_mode.frequency else 0
     slide = abs(float(rig.modes.slide[first]))

@@ -52,7 +52,7 @@ class CoupledRun:
 
     @property
     def patch(self):
-        """Patch of [contact] with its static solution; None for a rig without one."""
+        """Patch of the table [contact] with its static solution; None without that table."""
         return self.inputs.patch
 
     @property

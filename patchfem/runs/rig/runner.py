@@ -145,7 +145,7 @@ class Runner:
             solution = self.solve(numerics, replace(model, rig=rig.with_signal(drive)))
         except (
             NotConverged
-        ):  # The complete curve may start at a frequency at which a motion is found.
+        ):  # The complete curve may start at a frequency at which the solver converges.
             return None
         name = "relative_displacement_amplitude"
         if "at" not in solution.extra or name not in solution.values:

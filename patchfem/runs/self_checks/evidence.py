@@ -99,7 +99,7 @@ class Evidence:
             return None
 
         def column(key: str) -> np.ndarray:
-            """Return the numbers of all modes at a key."""
+            """Return the values of a scene key for all modes."""
             return np.array([parse_scene_number(mode[key]) for mode in structure["mode"]])
 
         has_force = self.scene["drive"]["kind"] == "force"

@@ -32,7 +32,7 @@ MIN_EXTRAPOLATION_ERROR = 7e-6
 
 
 class SteadyRanges(NamedTuple):
-    """Steady amplitudes of n cases with errors, and a mask of the cases without a result.
+    """Steady amplitudes of n cases, their errors, and a mask of the cases without a result.
 
     - value, error: steady amplitude of the slide and its error, (n,) each [m]; NaN if not needed.
     - is_open: mask (n,) of the cases whose steady amplitude remains unknown.

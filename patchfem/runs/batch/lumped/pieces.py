@@ -32,7 +32,8 @@ from ...rig.event_driven import (
 from .columns import MAIN_MEASURE, N_FINAL_WINDOWS, Runs
 from .threads import apply_in_threads
 
-# Number of cycles that contain each stick interval of a periodic motion as a whole.
+# Number of computed cycles of a periodic motion, such that they contain each of its stick intervals
+# without interruption.
 N_STICK_CYCLES = 3
 MIN_CYCLES = 20  # smallest number of cycles of a run
 MAX_CYCLES = 4000  # largest number of cycles of a run, limited by the memory of the extremes
@@ -251,9 +252,10 @@ def _evaluate_runs(cases: list, finished: list, cycles: int, window: int, steady
 
 
 def _find_ringing(case: Case, run, steady: bool) -> dict | None:
-    """Return the ringing measures of a run; {} without ringing, None if a single run is needed.
+    """Return the ringing measures of a run; {} without ringing, None if they are unknown.
 
-    The ringing is taken from the run or, if `steady`, from a continuation of a few cycles with samples.
+    The ringing is taken from the run or, if `steady`, from a continuation of a few cycles with
+    samples. If the result is None, the case must be run again outside the batch.
     """
     if run.ring is not None:
         return make_ringing_measures(*run.ring, run.acceleration)

@@ -60,7 +60,7 @@ class CurvePoint(NamedTuple):
 
     @property
     def drive_level(self) -> Level:
-        """Drive level of the point with its measures; NaN if the motion is unbounded."""
+        """Level record of the point; its amplitude is NaN if the motion is unbounded."""
         values = {COLUMN_MEASURES["amplitude"]: np.nan}
         if self.values:
             values = {name: self.values.get(name) for name in LEVEL_MEASURES}
