@@ -3,7 +3,7 @@
 In: models of a group. Out: `CaseResults`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 
 from ...model.model import Model
 from ..patch import static_batch
@@ -25,7 +25,9 @@ def refusal_reason(model: Model) -> str:
     return static_batch.reason_not_batched(model.patch)
 
 
-group_key = patches.group_key
+def group_key(model: Model) -> Hashable:
+    """Return a hashable key; patches of models with equal keys can be solved together."""
+    return patches.group_key(model)
 
 
 def solve(models: Sequence[Model], report=None) -> CaseResults:
