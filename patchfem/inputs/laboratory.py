@@ -127,7 +127,7 @@ def _read_table(path: Path, exported_names: Mapping) -> list:
 
 
 def _strip_cell(cell: str) -> str:
-    """Return a cell without the blanks and quotation marks around it."""
+    """Return the text of a cell after removing the blanks and quotation marks around it."""
     return cell.strip().strip('"').strip()
 
 

@@ -387,7 +387,7 @@ def make_sparse_array(path, shape: tuple, reader: Callable) -> Array:
 
 
 def make_texts(texts) -> np.ndarray:
-    """Make an array of strings without blanks at their ends."""
+    """Make an array of strings; blanks at their ends are removed."""
     texts = [text.rstrip() for text in texts]
     array = np.empty(len(texts), dtype=object)
     array[:] = texts

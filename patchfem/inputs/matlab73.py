@@ -109,7 +109,7 @@ def _read_dataset(path, dataset) -> Array | None:
 
 
 def _read_empty_array(path, dataset, kind: str) -> Array | None:
-    """Return an array without values; the dataset contains its shape."""
+    """Return an array with no values, whose shape is stored in the dataset."""
     shape = tuple(int(size) for size in np.ravel(dataset[()])[:2])
     has_values = max(shape, default=1) > 0 and min(shape, default=1) > 0
     if kind in ("cell", "struct") or has_values:
@@ -165,7 +165,7 @@ def _read_sparse_array(path, group) -> Array | None:
 
 
 def _read_optional_values(group, name: str) -> np.ndarray:
-    """Return a dataset of a group, or None; MATLAB leaves out datasets without values."""
+    """Return the values of a dataset in a group, or an empty array if MATLAB left the dataset out."""
     return group[name][()] if name in group else np.zeros(0)
 
 

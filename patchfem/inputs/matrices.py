@@ -158,7 +158,7 @@ def align_rows(*matrices: Matrix) -> list[Matrix]:
 
 
 def _append_empty_rows(values, n: int) -> sparse.csr_array:
-    """Return a matrix (n, n) that has empty rows and columns after those of the given matrix."""
+    """Return a matrix (n, n): the given matrix, followed by empty rows and columns."""
     if values.shape[0] < n:
         values = values.copy()
         values.resize((n, n))
@@ -166,7 +166,7 @@ def _append_empty_rows(values, n: int) -> sparse.csr_array:
 
 
 def _insert_empty_rows(values, rows: np.ndarray, n: int) -> sparse.csr_array:
-    """Expand a matrix to (n, n) by inserting empty rows and columns between its own."""
+    """Expand a matrix to (n, n) by inserting empty rows and columns at the positions that it lacks."""
     matrix = values.tocoo()
     i, j = matrix.coords
     return sparse.coo_array((matrix.data, (rows[i], rows[j])), (n, n)).tocsr()

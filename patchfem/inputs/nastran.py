@@ -351,7 +351,7 @@ def parse_real(text: str) -> float:
 
 
 def _split_card(line: str, *, is_wide: bool) -> list[str]:
-    """Split a Nastran card into its fields, without the first one."""
+    """Split a Nastran card into its fields, and leave out the first field."""
     count = 4 if is_wide else 8
     width = 64 // count
     fields = line.split(",")[1:]

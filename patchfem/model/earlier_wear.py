@@ -149,7 +149,7 @@ def read_end_state(path: Path) -> EarlierWear:
 
 
 def _read_state(path: Path) -> EarlierWear:
-    """Read the last state of a result.nc without checking it."""
+    """Read the last state in a result.nc file; the values are not checked."""
     import h5py
 
     with h5py.File(path, "r") as file:

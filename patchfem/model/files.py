@@ -92,7 +92,7 @@ class _FileKey(NamedTuple):
 
 
 def _select_interface(key: str, tables) -> _FileKey:
-    """Return the key of a file and the tables used to check it; a file of an interface uses the tables of that interface."""
+    """Return the key of a file and the tables used to check it: those of its own interface, if it has one."""
     prefix, separator, name = key.partition(".contact.")
     if not separator:
         return _FileKey("", key, tables)
@@ -102,7 +102,7 @@ def _select_interface(key: str, tables) -> _FileKey:
 
 
 def _check_reduction(tables, folder: Path) -> list:
-    """Check the matrices of [structure.reduced] together without reducing them."""
+    """Check that the matrices of [structure.reduced] fit together; they are not reduced."""
     table = tables.structure and tables.structure.reduced
     matrices = [file for key, file in list_named_files(tables) if "reduced" in key]
     if not table or not all(file_exists(folder / file) for file in matrices):

@@ -94,7 +94,7 @@ class Gap:
         return min((wave for _, wave in self._values("wave")), default=inf)
 
     def _values(self, quantity: str) -> list:
-        """Return the values of a property, each with the table of its shape, for all shapes that have this property."""
+        """Return a property of every shape that has this property, each value with the table of its shape."""
         pairs = []
         for name, keys in self.shapes:
             evaluate = getattr(gaps.SHAPE_PROPERTIES.get(name), quantity, None)

@@ -1,4 +1,4 @@
-"""The normal load on a point, constant or oscillating, and the grooves that it climbs."""
+"""The normal load on a contact point, constant or oscillating, and the grooves on which the point climbs."""
 
 from __future__ import annotations
 

@@ -151,7 +151,7 @@ def build_without_sweep(scene: Scene) -> Model:
 
 
 def build(scene: Scene) -> Model:
-    """Build the model of a valid scene, including the files that it names.
+    """Build the model of a valid scene, and read the files that it names.
 
     Only effects that the scene names are imported.
 

@@ -358,7 +358,7 @@ def build_pieces(contact: Contact) -> PatchPieces:
 
 
 def _build_piece(contact: Contact, own) -> PatchPiece:
-    """Build one piece; keys of the table of this piece take precedence over those of [contact]."""
+    """Build one piece; keys in the table of this piece take precedence over those in [contact]."""
     if own is None:
         return PatchPiece(
             contact.height, contact.substrate, contact.coating, contact.length, SHARP_END

@@ -1,4 +1,4 @@
-"""The unsolved rig of a scene: modes, drive, initial state, interfaces and springs."""
+"""The unsolved rig of a scene: modes, drive signal, initial state, interfaces and springs."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace

@@ -216,7 +216,7 @@ def build_slide(scene) -> SlidePath:
 
 
 def _list_dwell_corners(keys) -> tuple:
-    """Return time [s] and displacement [m] at the corners of a motion with dwell; segments of zero duration are left out."""
+    """Return time [s] and displacement [m] at the corners of a dwell; segments of zero duration are left out."""
     length = np.array([keys.distance, 0.0, keys.distance_after or 0.0])
     duration = np.array([keys.distance / keys.speed, keys.hold, length[2] / keys.speed])
     is_leg = duration > 0

@@ -270,7 +270,7 @@ def compute_named_motions(modes: ModalBasis, modal) -> np.ndarray:
 
 
 def compute_natural_frequencies(structure, modes: ModalBasis) -> np.ndarray:
-    """Return the natural frequencies (n,) [Hz] with the bonded spring; 0 for rigid-body modes."""
+    """Return the natural frequencies (n,) [Hz] with the bonded spring; they are 0 for rigid-body modes."""
     if structure.mode and structure.bonded is None and structure.measured == "free":
         # Frequencies that the scene states are returned without the round-off of the modes.
         return np.array([mode.frequency for mode in structure.mode])

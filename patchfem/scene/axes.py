@@ -129,7 +129,7 @@ class SampledRange:
 
 
 class _RangeEnds(NamedTuple):
-    """Ends of a range of values in a common unit."""
+    """Both ends of a range of values, in a common unit."""
 
     low: Fraction | float
     high: Fraction | float

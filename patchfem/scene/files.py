@@ -70,7 +70,7 @@ def list_absent_files(tables: Any, folder: Path) -> list[tuple[str, str]]:
 
 
 def require_files(scene: Any) -> Any:
-    """Return a scene after checking that the files that it names exist."""
+    """Return the scene itself; raise an error if a file that it names does not exist."""
     absent = list_absent_files(scene, scene.path.parent)
     if absent:
         draft = SceneDraft(str(scene.path), find_key_lines(scene.text), {})

@@ -261,7 +261,7 @@ def format_question(question: str, meanings: dict[str, str]) -> str:
 
 
 def describe_choice(choice: Choice) -> list[str]:
-    """Return sentences on the chosen law, its accuracy and limits, and the answers that it does not use."""
+    """Return sentences on the chosen law, its accuracy and limits, and the user's answers that it ignores."""
     row = choice.row
     missing = [word for word in row.known if word not in choice.known]
     # Every law has a coefficient (key `static`); another word may be a key of the law.

@@ -1,4 +1,4 @@
-"""Scenes that differ from a base scene in a few keys, made without parsing its TOML again."""
+"""Scenes that differ from a base scene in a few keys, made by a method that parses its TOML only once."""
 
 from __future__ import annotations
 

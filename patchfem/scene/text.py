@@ -19,7 +19,7 @@ EFFECT_KEYS = ("kind", "law", "reading", "waveform")  # keys whose values are ef
 
 
 def format_toml(table: Table) -> str:
-    """Return tables as TOML: quantities in SI, with defaults, but without unused keys."""
+    """Return tables as TOML: quantities are in SI, defaults are written out, and unused keys are left out."""
     return "\n".join(_format_lines(table, "")).strip("\n") + "\n"
 
 

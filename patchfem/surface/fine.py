@@ -1,4 +1,4 @@
-"""Fraction of the height of a trace in waves that are too short for the elements."""
+"""Fraction of the height of a trace that lies in waves too short for the elements."""
 
 from typing import NamedTuple
 

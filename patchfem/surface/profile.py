@@ -65,7 +65,7 @@ def level(profile: Profile) -> Profile:
 
 
 def resample_evenly(profile: Profile) -> Profile:
-    """Resample a trace to a constant sampling interval without gaps, for filters and spectra.
+    """Resample a trace to a constant sampling interval, with gaps closed, for filters and spectra.
 
     Missing heights are bridged by straight lines. An uneven trace is resampled at the 10th
     percentile of its steps, so that nothing between its samples is lost. The notes state both.

@@ -206,7 +206,7 @@ def _merge_equal_places(path, x, z, lines) -> Merged:
 
 
 def check_span(path, x, z, stated: str = "") -> tuple:
-    """Raise PatchfemError for heights that span more than the length of the trace.
+    """Raise PatchfemError if the heights span more than the length of the trace.
 
     Parameters
     ----------

@@ -380,7 +380,7 @@ class Contact(Table):
 
     @property
     def shapes(self) -> dict:
-        """Tables of the given shapes of the gap by name; the key `on` of a table names the piece."""
+        """Tables of the gap shapes that the scene contains, by name; the key `on` of a table names the piece."""
         tables = {name: getattr(self, name) for name in _list_shape_names()}
         return {name: table for name, table in tables.items() if table is not None}
 

@@ -341,7 +341,7 @@ MATERIALS: dict[str, MaterialRecord] = {
 
 
 def normalise_material_name(name: str) -> str:
-    """Return the name of a material in a spelling without case, blanks and other irrelevant characters."""
+    """Return the name of a material with case folded and separators removed, for comparisons."""
     return re.sub(SEPARATORS, "", name.casefold())
 
 

@@ -1,4 +1,4 @@
-"""Conversion of quantities ``"<number> <unit>"`` of a scene to SI and back, without guesses.
+"""Conversion of quantities ``"<number> <unit>"`` in a scene to SI and back; units are never guessed.
 
 The kind of a quantity follows from the key, so `g` is standard gravity in an acceleration and a gram in a mass.
 """

@@ -111,12 +111,12 @@ QUADRATURE_RULES = (
 
 
 def check_quadrature(draft: SceneDraft, kind: str) -> None:
-    """Report a quadrature that does not fit the sum over bonds; remark if there is no sum."""
+    """Report a quadrature that does not fit the sum over bonds; add a remark if there is no such sum."""
     apply_rules(draft, QUADRATURE_RULES, QuadratureFacts(draft, kind))
 
 
 def check_settings(draft: SceneDraft, kind: str) -> None:
-    """Remark on numerical settings that are fixed and have no effect in this scene."""
+    """Add a remark on each numerical setting that is fixed but has no effect in this scene."""
     if kind and draft.tables.accuracy is not None:
         for setting, where in find_unused_settings(draft.tables, kind).items():
             draft.add_remark(

@@ -215,7 +215,7 @@ def _require_friction(draft: SceneDraft, tables: set[str], has_rig: bool) -> Non
 
 
 def _remark_unused(draft: SceneDraft, kind: str) -> None:
-    """Report keys that have no effect without sliding or without friction."""
+    """Add remarks on keys that have no effect because the scene has no sliding or no friction."""
     if kind == "patch" and draft.tables.contact is not None:
         shapes = draft.tables.contact.shapes.items()
         keys = [f"{name}.on" for name, shape in shapes if shape.on == "lower" and name != "tilt"]

@@ -1,4 +1,4 @@
-"""Features that each solver supports, and why the chosen accuracy.method cannot run a scene."""
+"""Features that each solver (engine) supports, and why accuracy.method cannot run a scene."""
 
 from __future__ import annotations
 
@@ -146,7 +146,7 @@ def _is_supported(word: str, joint: Joint) -> bool:
 
 
 def check_method(draft: SceneDraft, kind: str) -> None:
-    """Report an accuracy.method that cannot solve the scene; remark on one that is not used."""
+    """Report an accuracy.method that cannot solve the scene; add a remark on a method that is not used."""
     method = draft.values.accuracy.method
     if method in list_unused_methods(kind):
         draft.add_remark(

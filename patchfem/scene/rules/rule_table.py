@@ -1,4 +1,4 @@
-"""Tables of rules: a row holds the condition, the key at fault and the sentence shown.
+"""Tables of rules: a row holds a condition, the key that causes the mistake, and the sentence shown.
 
 A mistake goes one way to the screen: `apply_rules` hands the key and the sentence of a row to the `SceneDraft`, which
 finds the line of the key. A new rule is a new row.

@@ -114,7 +114,7 @@ class SceneDraft:
         self._add(SET_MISTAKE_ORDER, "--set", text)
 
     def add_remark(self, key: str, sentence: str) -> None:
-        """Add a remark on a key that is not a mistake; `sentence` follows the name of the key."""
+        """Add a remark on a key whose value is no mistake; `sentence` follows the name of the key."""
         remark = number_items_from_one(f"{self.display_key(key)} {sentence}")
         if remark not in self.remarks:
             self.remarks.append(remark)

@@ -98,7 +98,7 @@ def list_dependent_keys(selector: Selector) -> frozenset[str]:
 
 
 def check_selector(facts: TableFacts, selector: Selector) -> None:
-    """Report keys that the value of a selector requires or excludes; remark on unused ones.
+    """Report keys that the value of a selector requires or excludes; add a remark on each unused key.
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ UNKNOWN_VALUE = _Unknown("nan")
 
 
 class TableView:
-    """Wrapper of a table whose missing values are UNKNOWN_VALUE.
+    """Wrapper of a table in which missing values are UNKNOWN_VALUE.
 
     A rule compares the values of a view without asking first whether they are there. A field of a sentence, such as
     `{length:g}`, names an attribute of the view. AttributeError for a name that the table does not have.

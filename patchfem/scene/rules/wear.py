@@ -44,7 +44,7 @@ class WearFacts(TableFacts):
 
     @property
     def strip_compliance(self) -> str:
-        """Key of the compliance that enables partial slip of the strips, or "" if there are no strips or no such key."""
+        """Key of the compliance that enables partial slip of the strips, or "" if there is no such key."""
         return self.compliance if self.scene.contact.strips else ""
 
     @property

@@ -116,7 +116,7 @@ def may_be_drift(alignment: Alignment) -> bool:
 
 
 def describe_both(bow: Alignment, line: Alignment) -> str:
-    """State why no worn depth is given, with the values of both interpretations."""
+    """Explain, with the values of both interpretations, why no worn depth is given."""
     if bow.bend and not _growth_exceeds_wear(bow):
         other = (
             f"the datum bent by {format_length(bow.bend, 3)} (sag over the common length) and "
@@ -171,7 +171,7 @@ def _describe_loss(alignment: Alignment) -> str:
 
 
 def describe_drift(alignment: Alignment) -> str:
-    """State why no worn depth is given if the datum may drift, with both interpretations."""
+    """Explain, with both interpretations, why no worn depth is given if the datum may drift."""
     along = np.linspace(-1, 1, alignment.depth.size)
     span = float(np.ptp(detrended_means(np.asarray(alignment.depth) - alignment.bend * along**2)))
     bent = ""

@@ -394,7 +394,7 @@ def _compute_aligned_ratios(alignment: Alignment, tracks: Tracks, step: float) -
 
 
 def _compare_separate(place: Place, direction: str) -> Comparison:
-    """Compare two traces that have no part of the surface in common."""
+    """Compare two traces from different parts of a surface."""
     before = place.before
     after = place.after
     reason = place.reason
@@ -532,7 +532,7 @@ def _length_fractions(pieces) -> np.ndarray:
 
 
 def _note_stretch(alignment: Alignment) -> list:
-    """Return a note if the stretch between the traces is significant, else an empty list."""
+    """Return a list with a note if the stretch between the traces is significant, or an empty list if it is not."""
     value = alignment.stretch
     error = alignment.error_of(Parameter.STRETCH)
     if not abs(value) >= max(SIDE * 2 * error, MIN_STRETCH):

@@ -160,7 +160,7 @@ def _matern(distance, root: float, length: float) -> np.ndarray:
 
 
 def _evaluate_datum(place, degree: int) -> np.ndarray:
-    """Return the polynomials (m, degree + 1) of the datum at positions (m,) from 0 to 1."""
+    """Return the polynomials (m, degree + 1) that describe the datum at positions (m,) from 0 to 1."""
     return np.vander(2 * place - 1, degree + 1)
 
 

@@ -71,7 +71,7 @@ def estimate_noise(depth, unworn, slope, curvature, min_noise: float) -> np.ndar
 
 
 def correlation_length(values, present, longest: int | None = None) -> float:
-    """Estimate the correlation length of values, 1 + 2 sum of the autocorrelation, in samples.
+    """Estimate the correlation length, in samples: 1 + 2 times the sum of the autocorrelation.
 
     The sum ends at the first lag whose autocorrelation is within the noise of its estimate (initial
     positive sequence).

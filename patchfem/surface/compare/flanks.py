@@ -67,7 +67,7 @@ class _Track(NamedTuple):
     span: slice
 
     def sum_and_peak(self) -> tuple:
-        """Return the sum and the maximum of the depths of the track [m]."""
+        """Return the sum and the maximum of the depths [m] in the track."""
         inside = self.depth[self.span]
         return float(inside.sum()), float(inside.max())
 

@@ -43,7 +43,7 @@ AVERAGED_QUANTITIES = (
 
 
 class TableLine(NamedTuple):
-    """A line of a table of pairs.
+    """Line in a table of pairs.
 
     line: its number; names: both files as written; paths: where they are; direction: "x", "y" or "";
     labels: the other cells by column.

@@ -177,7 +177,7 @@ def _align_at_mark(before: Profile, after: Profile, shift: float, is_straight: b
 
 
 def _has_enough_unworn(alignment: Alignment) -> bool:
-    """Return whether enough heights agree to serve as a reference; a straight datum needs more than two flanks."""
+    """Return whether enough heights agree for a reference; a straight datum needs more than two flanks."""
     return alignment.agreed_fraction > (2 * SHORT_FLANK if alignment.is_straight else MIN_UNWORN)
 
 

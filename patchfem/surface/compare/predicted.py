@@ -101,7 +101,7 @@ class WearHistory:
 
     @property
     def half(self) -> float:
-        """Half of the length of the patch [m]."""
+        """Half of the patch length [m]."""
         return float(np.ptp(self.x)) / 2
 
 

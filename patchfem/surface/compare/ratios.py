@@ -65,7 +65,7 @@ def _measure_heights(z, step: float, band: tuple) -> Size:
 
 
 def resample(trace: Profile, step: float) -> tuple:
-    """Resample a trace to a sampling interval [m] unless its own is larger, and level it.
+    """Resample a trace to a sampling interval [m], unless its present interval is larger, and level it.
 
     Returns the heights (n,) [m] and their step.
     """
@@ -85,7 +85,7 @@ def fill_scan(scan: Areal) -> tuple:
 
 
 def measure_scan_size(scan: Areal, missing, direction: str, band: tuple = BAND) -> Size:
-    """Measure the amplitude and the slope of the lines of a scan in one direction.
+    """Measure amplitude and slope along the lines of a scan that run in one direction.
 
     Mean squares are averaged over the lines. Neighbouring lines are nearly equal, so the degrees of
     freedom of a line are multiplied by the number of independent lines.

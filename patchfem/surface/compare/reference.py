@@ -92,7 +92,7 @@ def _shallow_runs(alignment: Alignment) -> list:
 
 
 def _has_wear(alignment: Alignment, relative, places: list) -> bool:
-    """Return whether a deep run is wider than an interpolation error, or as deep as a scratch."""
+    """Return whether some deep run is wider than an interpolation error, or as deep as a scratch."""
     if _shallow_runs(alignment) or _is_wide(relative, places):
         return True
     for first, last in places:
@@ -103,7 +103,7 @@ def _has_wear(alignment: Alignment, relative, places: list) -> bool:
 
 
 def _is_wide(relative, places: list) -> bool:
-    """Return whether a deep run has more samples above half its depth than interpolation errors have."""
+    """Return whether more samples of a deep run exceed half its depth than in an interpolation error."""
     parts = [relative[first : last + 1] for first, last in places]
     return any((deep > deep.max() / 2).sum() >= SPECK_SAMPLES for deep in parts)
 

@@ -59,7 +59,7 @@ class Fit(NamedTuple):
 
 
 def estimate_scale(depth) -> float:
-    """Estimate the standard deviation [m] of noise from the positive or the negative depths, whichever scatter less."""
+    """Estimate the standard deviation [m] of noise from the depths of one sign, that with less scatter."""
     sides = depth[depth > 0], -depth[depth < 0]
     return min((robust_deviation(side) for side in sides if side.size > 3), default=0.0)
 

@@ -162,7 +162,7 @@ def resample_both(before: Profile, after: Profile) -> Resampled:
 
 
 def decorrelation_lag(z) -> int:
-    """Return the lag, in samples, of the first zero of the autocorrelation of a trace."""
+    """Return the lag, in samples, at which the autocorrelation of a trace first falls to zero."""
     zeros = np.flatnonzero(_autocorrelate(z - z.mean())[: z.size] <= 0)
     return int(zeros[0]) if zeros.size else z.size // 2
 
@@ -206,7 +206,7 @@ def _cut_to_valleys(z) -> np.ndarray:
 
 
 def _draw_chance(first, best_score) -> Chance:
-    """Return mean and standard deviation of the best scores of random traces with the spectrum of the first."""
+    """Return mean and standard deviation of the best scores of random traces that have the spectrum of `first`."""
     random = np.random.default_rng(SEED)
     z = np.array([best_score(_randomize_phases(first, random)) for _ in range(N_RANDOM)])
     return Chance(float(z.mean()), float(z.std(ddof=1)))

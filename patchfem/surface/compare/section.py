@@ -260,7 +260,7 @@ def _select_end(deviances, candidates, low: int, count: int) -> FlankEnd:
 
 
 def _widen_by_level_error(flank: FlankEnd, depth, noise, draws, correlation, worn) -> FlankEnd:
-    """Widen the interval of the end of a flank by the error of the reference level.
+    """Widen the interval for the end of a flank by the error of the reference level.
 
     The ends are found again with the depths raised and lowered by this error. A flank of slope s moves
     by error / s, and one of curvature c that runs out flat by the square root of 2 error / c. The error
@@ -551,7 +551,7 @@ def _measure_pile_up(section: Section, span: tuple, name: str) -> Quantity:
 
 
 def _measure_floor(section: Section, start: float, width: float) -> Quantity:
-    """Measure the floor: largest depth of the parabola through the deepest fifth of the width.
+    """Measure the floor of a track: largest depth of the parabola through the deepest fifth of the width.
 
     All fifths whose mean depth differs from the largest one by noise alone count, and their floors
     are averaged. The interval is that of the same parabolas through the drawn errors, together with

@@ -42,7 +42,7 @@ def describe_comparisons(parts: list, directions: list) -> list:
 
 
 def describe_ratio_change(ratio: Quantity) -> str:
-    """Describe how a quantity changed from its ratio of after to before: reduced, increased, not at all or unknown."""
+    """Describe the change that a ratio of after to before shows: reduced, increased, none or unknown."""
     if ratio.value is None:
         return "not known"
     if ratio.high < 1 - ROUNDING:
@@ -80,7 +80,7 @@ def is_elsewhere(part: Comparison) -> bool:
 
 
 def is_gain(part: Comparison) -> bool:
-    """Return whether a single amplification of the instrument explains all changes of heights, waves and slopes."""
+    """Return whether a single amplification factor explains the changes of heights, waves and slopes."""
     changes = {
         describe_ratio_change(part.ratios.amplitude),
         describe_ratio_change(part.ratios.slope),

@@ -40,7 +40,7 @@ TOO_SHORT = "the traces show too little of the surface inside or outside the tra
 
 
 class TrackRoughness(NamedTuple):
-    """Roughness of the regions of a trace.
+    """Roughness in the regions of a trace.
 
     - cutoff: [m], or None.
     - regions: {region: {"before" or "after": {name: Quantity}}}, {} if unknown.

@@ -271,7 +271,7 @@ def measure_tracks(alignment: Alignment, section: Section, longest: float) -> Tr
 
 
 def _raise_upper_ends(sizes: dict, floor_error: float) -> dict:
-    """Increase the upper bounds of depths and lost areas of a track by an error [m] of the floor."""
+    """Raise the upper bounds of depths and lost areas of a track by the error [m] of its floor."""
     area_error = floor_error * sizes["width"].value
     raised = dict(sizes)
     for name in ("depth_mean", "depth_floor", "step", "area_gross", "area_net"):
@@ -283,7 +283,7 @@ def _raise_upper_ends(sizes: dict, floor_error: float) -> dict:
 
 
 def _name_other(track: dict) -> dict:
-    """Replace "the longest track" by "this track" in the definitions of the dimensions of a track."""
+    """Replace "the longest track" by "this track" in the definitions of track dimensions."""
     return {
         name: size._replace(text=size.text.replace(" the longest track", " this track"))
         for name, size in track.items()
@@ -313,7 +313,7 @@ def _find_valley(
 def split_at_tracks(
     alignment: Alignment, tracks: Tracks, longest: float, *, is_flat: bool = False
 ) -> list:
-    """Split aligned traces into pairs of pieces between and within tracks, without track edges.
+    """Split aligned traces into pairs of pieces, between and within tracks, and leave out the track edges.
 
     The steps at the edges have waves of every length. Half of the longest wave on either side, or three
     samples, is left out. If no piece is three waves long, the whole common part is returned.
@@ -374,7 +374,7 @@ def measure_flank_track(flanks: Flanks) -> Tracks:
 
 
 def split_at_flanks(after: Profile, flanks: Flanks, longest: float) -> list:
-    """Split the second trace into pieces without the edges of its track.
+    """Split the second trace into pieces, and leave out the edges of its track.
 
     Parameters
     ----------

@@ -138,7 +138,7 @@ def _read_variables(raw: RawFile, places: list, z, factors: LengthFactors) -> Pr
 
 
 def _load_npy(raw: RawFile) -> np.ndarray:
-    """Load the array of an .npy file without copying its bytes."""
+    """Load the array of an .npy file; its bytes are not copied."""
     path = raw.path
     file = io.BytesIO(raw.data)
     try:

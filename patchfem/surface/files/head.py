@@ -91,14 +91,14 @@ class Fact(NamedTuple):
 
 
 class Column(NamedTuple):
-    """Role of a column of a text file ("x", "y", "z", ...) and its unit."""
+    """Role of a column in a text file ("x", "y", "z", ...) and its unit."""
 
     role: str
     unit: str | None
 
 
 class ColumnNames(NamedTuple):
-    """Names and units of the columns of a text file, with the line that states them."""
+    """Names and units of the columns in a text file, with the line that states them."""
 
     number: int
     names: list

@@ -121,7 +121,7 @@ def _is_even(values) -> bool:
 
 
 def _find_height_factor(path, facts: dict, units: tuple | None) -> Scale:
-    """Find the factor of the heights to metres."""
+    """Find the factor that converts the heights to metres."""
     stated = facts.get("value", UNKNOWN).word or facts.get("factor", UNKNOWN).word or None
     scale = facts.get("factor", UNKNOWN).number
     if facts.get("scaled", UNKNOWN).word.lower() == "yes":

@@ -92,7 +92,7 @@ def fetch(path) -> RawFile:
 
 
 def _read_limited(file, head: bytes, size: int) -> bytes:
-    """Read a file up to a size limit without allocating all of it at once."""
+    """Read a file in blocks, up to a size limit, so that memory is allocated only as needed."""
     parts = [head]
     remaining = size - len(head)
     while remaining > 0 and (part := file.read(min(remaining, BLOCK_BYTES))):
@@ -130,7 +130,7 @@ def _unpack(path: Path, name: Path, data: bytes) -> RawFile:
 
 
 def _gunzip(path, data: bytes) -> bytes:
-    """Decompress a gzip file after a first pass that checks its size without storing it."""
+    """Decompress a gzip file after a first pass that checks its size and stores nothing."""
     limit = min(MAX_BYTES, max(MIB, MAX_UNPACK_RATIO * len(data)))
     try:
         with gzip.open(io.BytesIO(data)) as file:

@@ -135,7 +135,7 @@ def read_matrix(path, body: str, head: Head) -> np.ndarray:
 
 
 def _iterate_lines(body: str) -> Iterator[str]:
-    """Iterate over the lines of a text file without storing all of them."""
+    """Iterate over the lines of a text file; they are not stored."""
     start = 0
     while start < len(body):
         stop = body.find("\n", start)

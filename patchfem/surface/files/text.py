@@ -176,7 +176,7 @@ def _find_places(line: str, names: list, *, has_units: bool) -> Places:
 def _find_factors(
     line: str, columns: dict, named: ColumnNames, facts: dict, given: tuple | None
 ) -> Factors:
-    """Find the factors of the columns to metres; units of the user overrule those of the file, with a note."""
+    """Find the factors that convert the columns to metres; a unit of the user overrules the file, with a note."""
     factors = []
     notes = ()
     for role, k in columns.items():

@@ -305,7 +305,7 @@ def _text(node: Element, path: str, default: str = "") -> str:
 
 
 class _SafeTree(TreeBuilder):
-    """Builder of an XML tree with limited size and without namespaces."""
+    """Builder of an XML tree whose size is limited and whose names have no namespace."""
 
     def __init__(self, path) -> None:
         super().__init__()
@@ -313,7 +313,7 @@ class _SafeTree(TreeBuilder):
         self.count = 0
 
     def doctype(self, *_) -> None:
-        """Refuse a document type: its entities may fill the memory or name other files."""
+        """Reject a document type, because its entities may fill the memory or name other files."""
         raise PatchfemError(
             f"{self.path}: main.xml declares entities or a document type, which no surface needs; "
             "export the surface anew"

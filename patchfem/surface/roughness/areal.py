@@ -38,7 +38,7 @@ class Surface:
 
     @cached_property
     def slopes(self) -> tuple:
-        """Slopes between neighbouring points along y and along x, NaN where heights are missing."""
+        """Slopes between neighbouring points along y and along x; they are NaN where heights are missing."""
         return tuple(np.diff(self.z, axis=axis) / step for axis, step in enumerate(self.steps))
 
     @cached_property
@@ -57,7 +57,7 @@ def rms_gradient(surface: Surface) -> float:
 
 
 def developed_area_ratio(surface: Surface) -> float:
-    """Compute Sdr, the ratio of the area of the surface to that of its plane, minus one [1].
+    """Compute Sdr [1]: the area of the surface divided by that of its plane, minus one.
 
     Each cell of four heights is cut into two triangles, along either diagonal; its area is the mean
     of both.

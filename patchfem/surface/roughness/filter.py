@@ -71,7 +71,7 @@ def _trim(source: str, cutoff: float, axis: np.ndarray, name: str) -> slice:
 
 
 def mean_surface(z: np.ndarray, cutoffs: tuple) -> np.ndarray:
-    """Compute the Gaussian mean surface (m, n) of heights z (m, n), NaN where missing.
+    """Compute the Gaussian mean surface (m, n) of heights z (m, n); missing heights are NaN in both.
 
     Cut-offs in steps along y and x.
     """

@@ -84,7 +84,7 @@ class TraceMoments(NamedTuple):
 
 
 def trace_moments(trace: Profile, cutoff: float | None = None) -> TraceMoments:
-    """Measure the moments of the waves of a trace below a cut-off [m]; if it is None, of all waves.
+    """Measure the moments of the waves of a trace that are shorter than a cut-off [m]; None: of all waves.
 
     Spikes are left out. With a cut-off the roughness profile counts (ISO 16610-21, half a cut-off
     trimmed at each end); a trace no longer than the cut-off keeps all of its waves. Raises

@@ -83,7 +83,7 @@ class Spectrum:
 
 
 def chi_square_factor(freedom: float, probability: float) -> float:
-    """Return the ratio of the bound of a mean square to its estimate."""
+    """Return the factor from the estimate of a mean square to its bound."""
     from scipy.special import chdtri
 
     return float(freedom / chdtri(freedom, 1 - probability))

@@ -215,7 +215,7 @@ def _fit_unworn(model: ScanModel, placement: Placement, plane: Floor) -> ScanAli
 
 
 def _correlate_unworn(model: ScanModel, fit) -> float:
-    """Correlate the unworn heights of both scans after removal of the plane of the first scan."""
+    """Correlate the unworn heights of both scans after subtracting the plane of the first scan."""
     depth, jacobian = model.linearize(fit.state)
     unworn = np.abs(depth) <= MAX_UNWORN * fit.scale
     height = model.before.z[model.rows, model.columns][unworn]

@@ -166,7 +166,7 @@ def _collect_registration(alignment: ScanAlignment) -> dict:
 
 
 def remove_spikes(scan: Areal) -> tuple:
-    """Return a scan without its spikes (`find_scan_spikes`), and the number of them."""
+    """Return a copy of a scan in which spikes are removed (`find_scan_spikes`), and the number of them."""
     spikes = find_scan_spikes(scan)
     count = int(spikes.sum())
     if not count:

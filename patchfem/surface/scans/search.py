@@ -187,7 +187,7 @@ class _ImageCorrelator:
         self.lags = np.ix_(self.rows % size[0], self.columns % size[1])
 
     def correlate(self, z, known) -> np.ndarray:
-        """Return the correlation at every lag, -1 where the images overlap too little."""
+        """Return the correlation at every lag; it is -1 where the images overlap too little."""
         from scipy.fft import irfft2, rfft2
 
         self._prepare_transforms(z.shape)
