@@ -159,7 +159,7 @@ def compare(
 
 
 class _RunRequest(NamedTuple):
-    """Additional requests of a comparison: a scene to solve, and a run whose wear is overlaid."""
+    """Additional requests of a comparison: a scene to run, and a run whose computed wear is overlaid."""
 
     scene: Path | None
     sets: tuple
@@ -209,7 +209,7 @@ def _write_comparison(
 def _compare_table(
     path: Path, direction: str, settings: dict, target: Path, json_: bool, quiet: bool
 ) -> None:
-    """Compare all pairs of a table; exit code 3 if some fail, 2 if all of them do.
+    """Compare all pairs in a table; the exit code is 3 if some pairs fail and 2 if all pairs fail.
 
     Parameters
     ----------
@@ -248,7 +248,7 @@ def _compare_table(
 
 
 def _refuse_surface_options(options: dict):
-    """Refuse options for measured surfaces if results folders are compared."""
+    """Raise UsageError for options for measured surfaces if results folders are compared."""
     for name, value in options.items():
         if value:
             raise UsageError(
@@ -276,7 +276,7 @@ def _compare_runs(before: Path, after: Path, out, json_: bool):
 
 
 def _press_surfaces(scene: Path, sets, part, target: Path, quiet: bool):
-    """Run a scene with each surface as its profile; the traces are written into the folder."""
+    """Run a scene with each surface as its profile; write the traces into the folder."""
     if not isinstance(part.before, profile.Profile):
         raise UsageError(
             "compare --scene: the contact can be computed only for traces; write one line of heights of "

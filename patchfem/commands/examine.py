@@ -46,7 +46,7 @@ OPTIONAL_PACKAGES = {
 
 
 class Finding(NamedTuple):
-    """Result of a check: its name, whether it passed, the finding, and the remedy or ""."""
+    """Result of a check: its name, whether it passed, the finding, and the remedy ("" if none is needed)."""
 
     name: str
     fine: bool
@@ -55,7 +55,7 @@ class Finding(NamedTuple):
 
 
 def check_installation() -> list[Finding]:
-    """Check everything that a run may need; a picture is drawn in a separate process."""
+    """Check everything that a run may need, including pictures, which a separate process draws."""
     return [*_packages(), _cache(), _threads(), _window(), _film(), *_extras()]
 
 
@@ -74,7 +74,7 @@ def _packages() -> Iterator[Finding]:
 
 
 def _version(name: str) -> str:
-    """Return the version of a package; "" if it is not installed."""
+    """Return the version of a package, or "" if it is not installed."""
     try:
         return version(name)
     except PackageNotFoundError:
@@ -82,7 +82,7 @@ def _version(name: str) -> str:
 
 
 def _cache() -> Finding:
-    """Check the cache of compiled code; without it every command compiles again."""
+    """Check the cache of compiled code, without which every command would compile again."""
     folder = compiled.cache_folder()
     reason = compiled.explain_cache_folder()
     sizes = [path.stat().st_size for path in folder.rglob("*") if path.is_file()]

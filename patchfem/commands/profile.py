@@ -124,7 +124,7 @@ def profile(
 def _print_split(
     trace: Path, scene_path: Path, cutoff: float | None, out: Path | None, *, json_: bool
 ):
-    """Print the tables that divide a trace between the mesh of a scene and a layer; write the new scene."""
+    """Print the tables that divide a trace between the mesh and a layer of asperities; write the new scene."""
     target = scene_path if out is None else out
     refuse_existing(out)
     relative_path = Path(os.path.relpath(trace, target.parent)).as_posix()

@@ -100,7 +100,7 @@ def run(
 
 
 def _draw(stored_run, target: Path) -> None:
-    """Write the page at the end, so that an error in it does not lose results or messages."""
+    """Write the page of a run after its results, so that an error in the page does not lose them."""
     try:
         folder.write_run_page(stored_run, target)
     except (OSError, MemoryError, atomic_write.WriteError) as error:

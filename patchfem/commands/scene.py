@@ -57,12 +57,12 @@ def check(scene: Path, /, *, set_: Sets = (), json_: Json = False):
 
 
 def _read_sweep(scene: Path, sets, what: CaseOptions) -> tuple:
-    """Return what the cases of a sweep share, and the cases."""
+    """Return the data that all cases of a sweep share, and the cases."""
     return parse_request.read_sweep(scene, sets, what.request())
 
 
 def _find_file_mistakes(tables, folder: Path, is_complete: bool, notes: list) -> list:
-    """Return the mistakes of the files that a scene names, and add notes of a run to `notes`.
+    """Return the mistakes in the files that a scene names, and append notes on the run to `notes`.
 
     Without such files nothing is imported.
     """
@@ -194,7 +194,7 @@ def _print_plan(plan_data: dict, probe: bool, verbose: bool) -> None:
 
 
 def _format_link(name: str, bonded: bool) -> str:
-    """Return the name of a link of the stiffness chain as words.
+    """Return the name of a spring in the chain of stiffnesses as words.
 
     It is "bonds" only for a law that has bonds.
     """

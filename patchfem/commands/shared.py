@@ -14,7 +14,7 @@ from .streams import make_printable
 
 
 def flag_option(text: str, *names: str) -> type:
-    """Return the type of a valueless option; `text` is its help text."""
+    """Return the type of an option without a value; `text` is its help text."""
     return Annotated[
         bool, Parameter(name=names or None, negative=(), help=text, show_default=False)
     ]
@@ -56,7 +56,7 @@ NoPage = flag_option("leave out report.html", "--no-page")
 
 
 def choose_folder(out: Path | None, name: str) -> Path:
-    """Return the folder of the results: the given one, or else out/<name>."""
+    """Return the folder for the results: the one that is given, or out/<name> if none is given."""
     return out if out is not None else Path("out") / name
 
 
@@ -67,7 +67,7 @@ def refuse_existing(out: Path | None) -> None:
 
 
 def parse_quantity(text: str, kind: str, option: str) -> float | None:
-    """Return the value of an option as a quantity in SI; None if it is "".
+    """Return the value of an option as a quantity in SI, or None if the option is "".
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def parse_quantity(text: str, kind: str, option: str) -> float | None:
 
 
 def parse_units(units: str) -> tuple | None:
-    """Return the units of x and z in --units; None if the option is not given."""
+    """Return the units of x and z in --units, or None if the option is not given."""
     return tuple(word.strip() for word in units.split(",")) if units else None
 
 
@@ -103,18 +103,18 @@ class CommandExit(Exception):
 
 
 class NotConvergedExit(CommandExit):
-    """Raised if the results are written but marked not_converged: exit code 3."""
+    """Raised if the results are written but have the outcome not_converged: exit code 3."""
 
     def __init__(self):
         super().__init__(3)
 
 
 class UsageError(Exception):
-    """Raised for a request that the command line itself refuses: exit code 2."""
+    """Raised for an invalid combination of command-line arguments: exit code 2."""
 
 
 def print_message(text: str) -> None:
-    """Print a line on stderr; a stream that cannot be written is ignored."""
+    """Print a line on stderr; do nothing if the stream cannot be written."""
     try:
         print(text, file=sys.stderr, flush=True)
     except (OSError, ValueError):
@@ -122,7 +122,7 @@ def print_message(text: str) -> None:
 
 
 def note(text: str) -> None:
-    """Print a note on stderr, without characters from files that would move the cursor."""
+    """Print a note on stderr, without control characters that could move the cursor."""
     print_message(make_printable(f"note: {text}"))
 
 
@@ -148,7 +148,7 @@ def load_model(path: Path, sets):
 
 
 def load_model_without_sweep(path: Path, sets):
-    """Build the model of a scene without its [sweep] table; a note reports this."""
+    """Build the model of a scene without its [sweep] table, and print a note on this."""
     scene = load_scene(path, sets)
     if scene.sweep:
         note(
@@ -188,7 +188,7 @@ class progress_bar:
 
 
 class ProgressLines:
-    """Progress as lines: the completed fraction and the remaining time, one per SECONDS at most.
+    """Progress as lines that state the completed fraction and the remaining time, at most one per SECONDS.
 
     The speed is measured from the first call, because compilation before this call says nothing
     about the work.

@@ -29,7 +29,7 @@ PROGRAM = (
 def _article(
     key: str, author: str, title: str, journal: str, where: str, year: int, doi: str = ""
 ) -> tuple:
-    """Return the entry of an article; where: "volume:pages"."""
+    """Return the bibliography entry of a journal article; `where` has the form "volume:pages"."""
     volume, pages = where.split(":")
     fields = {
         "author": author,
@@ -183,7 +183,7 @@ SOURCES = (
 
 
 def bibtex(effect_names: Iterable[str] = ()) -> str:
-    """Return BibTeX of the report, of this program and of the sources of some effects."""
+    """Return BibTeX entries for the report, for this program and for the sources of the named effects."""
     names = {name.replace("structure.interface.", "friction.") for name in effect_names}
     entries = [
         REPORT,
@@ -194,6 +194,6 @@ def bibtex(effect_names: Iterable[str] = ()) -> str:
 
 
 def _entry(kind: str, key: str, fields: dict) -> str:
-    """Return an entry as BibTeX."""
+    """Return a bibliography entry in BibTeX format."""
     lines = ",\n".join(f"  {name} = {{{text}}}" for name, text in fields.items())
     return f"@{kind}{{{key},\n{lines}\n}}\n"

@@ -55,7 +55,7 @@ def new(
 
 
 def _write_scene(text: str, out: Path | None, description: list[str], verb: str) -> None:
-    """Write a scene to a new file and print its description and the next command; print it if there is no file."""
+    """Write a scene to a file and print its description and the next command; without a file, print it."""
     if out is None:
         print(text, end="")
         return
@@ -66,7 +66,7 @@ def _write_scene(text: str, out: Path | None, description: list[str], verb: str)
 
 
 def _write_joint(kind: str, out: Path | None, known: str, wanted: str) -> None:
-    """Write the scene of a joint for the answers to two questions; an answer that is "" is asked for."""
+    """Write the scene of a joint that follows from two answers; ask the user for an answer that is ""."""
     if kind != "joint":
         raise UsageError("--ask, --know and --want are for a joint: patchfem new joint --ask")
     refuse_existing(out)

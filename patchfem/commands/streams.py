@@ -39,7 +39,7 @@ def prepare_streams() -> None:
 
 
 def make_printable(text: str) -> str:
-    """Return a text as one line, with a question mark for each character that cannot be printed.
+    """Return a text as one line in which question marks replace characters that cannot be printed.
 
     A word of more than 400 characters is shortened to its beginning and its end.
     """

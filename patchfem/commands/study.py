@@ -152,7 +152,7 @@ def backbone(
 
 @dataclass(frozen=True)
 class RowFitOptions:
-    """Options of a fit of a rig to rows."""
+    """Options of a fit of a rig to a table of measured responses."""
 
     leave_out: text_option(
         "column for cross-validation, such as frequency, input or run: each value of the column is left "

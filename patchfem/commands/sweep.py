@@ -40,7 +40,7 @@ BYTES_PER_CASE = 1000  # size of a lumped case in sweep.csv and sweep.nc [bytes]
 @Parameter(name="*")
 @dataclass
 class CaseOptions:
-    """Which cases."""
+    """Options that select the cases."""
 
     over: repeated_option(
         "key and its values: table.key=v1,v2,... or, for 9 values in a range, table.key=1 mm..9 mm:9 (:9log "
@@ -84,7 +84,7 @@ class CaseOptions:
         return bool(self.over or self.cases or self.random or self.sobol)
 
     def words(self, *more: str) -> tuple:
-        """Return the options that select the cases, as words that identify them."""
+        """Return the options that select the cases, as strings that identify the selection."""
         random_options = f"draw={self.random},{self.sobol},{self.seed}"
         return (
             *self.over,
@@ -95,7 +95,7 @@ class CaseOptions:
         )
 
     def request(self):
-        """Return the request; raise UsageError if the options are incompatible."""
+        """Return the request for cases; raise UsageError if the options are incompatible."""
         if self.random and self.sobol:
             raise UsageError("--random and --sobol: use only one of them")
         if min(self.random, self.sobol, self.seed) < 0:
@@ -132,7 +132,7 @@ class WorkerOptions:
     ) = False
 
     def part(self) -> tuple | None:
-        """Return (i, n) of a shard; None if there is none."""
+        """Return (i, n) of a shard, or None if there is no shard."""
         if not self.shard:
             return None
         i, _, n = self.shard.partition("/")
@@ -233,7 +233,7 @@ def sweep(
 
 
 class OutputOptions(NamedTuple):
-    """How the results of a sweep are printed.
+    """Options for printing the results of a sweep.
 
     target: its folder; page: whether it has one; tells: "json", "words", or only its "faults";
     begin: time at its start [s].
@@ -246,7 +246,7 @@ class OutputOptions(NamedTuple):
 
 
 class Progress:
-    """Completed cases and remaining time on stderr.
+    """Display of the completed cases and the remaining time on stderr.
 
     On a terminal it is a line that is updated, elsewhere a line every WAIT seconds. While no case
     is complete, the elapsed time is shown after WAIT seconds and then after intervals of twice the
@@ -287,7 +287,7 @@ class Progress:
                 wait *= 2
 
     def _show(self, text: str) -> None:
-        """Show a line."""
+        """Show a line on stderr."""
         self.shown_at = perf_counter()
         print(
             f"\r\x1b[K{text}" if self.open else text,
@@ -304,7 +304,7 @@ class Progress:
 
 
 def _print_stored_results(results, output: OutputOptions) -> None:
-    """Print the results of a sweep from its folder."""
+    """Print the results of a sweep that are stored in its folder."""
     _print_results(
         len(results),
         results.messages,
@@ -314,7 +314,7 @@ def _print_stored_results(results, output: OutputOptions) -> None:
 
 
 def _print_results(number: int, messages: dict, answer: dict, output: OutputOptions) -> None:
-    """Print the results of a sweep, with its answer first.
+    """Print the results of a sweep, beginning with its main result.
 
     Parameters
     ----------

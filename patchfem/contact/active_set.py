@@ -26,7 +26,7 @@ N_REFINEMENTS = 2  # number of steps of iterative refinement; a third step chang
 
 
 class ContactProblem(NamedTuple):
-    """Contact of n nodes of a body pressed by a rigid holder with r free motions.
+    """Contact of n nodes of a body that is pressed by a rigid holder with r unconstrained motions.
 
     - gap (n,): Gap [m] between the undeformed surfaces; negative where they overlap under a given approach.
     - motions (n, r): Closing of each node per unit of each free motion. The first one is the approach [m],
@@ -74,7 +74,7 @@ def patch_problem(x, gap, load=None, moment=None, spring: float = 0.0) -> Contac
 
 
 class SetSolution(NamedTuple):
-    """Solution of the contact equations on a given active set, with forces of either sign.
+    """Solution of the contact equations for a given active set; the forces may have either sign.
 
     - force, opening (n,): Forces [N] and gap under load [m].
     - scale (n,): Sum of the magnitudes of the terms of each opening [m], to which its rounding error is
@@ -91,7 +91,7 @@ class SetSolution(NamedTuple):
 
 
 class _SetEquations:
-    """Equations of an active set, with the rigid motions orthogonalized.
+    """Equations for a given active set, with the rigid motions orthogonalized.
 
     The motions R T are orthogonal in the norm of C^-1 on the set plus the springs (modified Gram-Schmidt), so each
     motion is found from a single division. Two neighbouring nodes at the far end of the interface then lose no digits.
@@ -181,7 +181,7 @@ class _SetEquations:
 def solve_on_set(
     compliance, problem: ContactProblem, active: np.ndarray, n_refinements: int = 0
 ) -> SetSolution:
-    """Solve for forces and holder motion with given nodes in contact; forces may have either sign.
+    """Solve for the forces and the holder motion for given nodes in contact; forces may have either sign.
 
     Parameters
     ----------
@@ -205,7 +205,7 @@ def solve_on_set(
 
 
 def refine_solution(compliance, problem, solution: SetSolution, active) -> SetSolution:
-    """Improve a solution by iterative refinement on its active set if its violation falls.
+    """Improve a solution by iterative refinement on its active set if this reduces its violation.
 
     Parameters
     ----------
@@ -303,7 +303,7 @@ def solve_primal_dual(
 def solve_primal(
     compliance, problem: ContactProblem, force: np.ndarray, max_iterations: int | None = None
 ) -> tuple:
-    """Solve by the primal active-set method, which ends after finitely many steps.
+    """Solve by the primal active-set method, which terminates after finitely many steps.
 
     Each step moves the forces towards the minimum of the energy on the active set. If a force becomes zero on the way
     (ratio test), the step ends there and its node leaves the set. Otherwise the step reaches the minimum, and the node
@@ -424,7 +424,7 @@ def find_rest_motion(problem: ContactProblem) -> np.ndarray:
 
 
 def guess_contact_set(compliance, problem: ContactProblem) -> np.ndarray:
-    """Guess the nodes in contact from the gap of rigid pieces in equilibrium.
+    """Guess the nodes in contact from the gap between rigid pieces in equilibrium.
 
     The load closes the gap by the geometric mean of what a point load and a uniform load would. Under a prescribed
     approach these are the nodes that overlap.

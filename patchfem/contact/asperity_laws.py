@@ -26,7 +26,7 @@ class LinearAsperities:
         return self.k * np.maximum(0.0, -np.asarray(s, float))
 
     def stiffness(self, s: np.ndarray) -> np.ndarray:
-        """Stiffness -dP/ds (m,) [Pa/m]; 0 where the layer is not compressed."""
+        """Stiffness -dP/ds (m,) [Pa/m], which is 0 where the layer is not compressed."""
         return np.where(np.asarray(s) < 0, self.k, 0.0)
 
 
@@ -67,13 +67,13 @@ class ExponentialAsperities(SmoothAsperities):
         return np.log(self.reference) - s / self.u0, np.full(np.shape(s), 1 / self.u0)
 
     def separation(self, pressure: np.ndarray) -> np.ndarray:
-        """Separation s = -u0 log(P/reference) [m] that carries `pressure` [Pa] > 0."""
+        """Separation s = -u0 log(P/reference) [m] at which the law gives `pressure` [Pa] > 0."""
         return -self.u0 * np.log(pressure / self.reference)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class HertzAsperities(SmoothAsperities):
-    """Asperity layer of Hertzian peaks with Gaussian heights (Greenwood and Williamson 1966).
+    """Asperity layer whose Hertzian peaks have Gaussian heights (Greenwood and Williamson 1966).
 
     P = 4/3 E* sqrt(R) eta int_s^inf (z - s)^3/2 phi(z) dz, mean height 0. radius: R [m] of a peak; density: eta [1/m2];
     deviation [m] of the peak heights; modulus: E* [Pa] of the pair, 1/E* = (1 - nu_1^2)/E_1 + (1 - nu_2^2)/E_2. All >
@@ -98,7 +98,7 @@ class HertzAsperities(SmoothAsperities):
         return self._log_pressure_factor + log, decay_rate / self.deviation
 
     def separation(self, pressure: np.ndarray) -> np.ndarray:
-        """Separation s [m] that carries `pressure` [Pa] > 0.
+        """Separation s [m] at which the law gives `pressure` [Pa] > 0.
 
         Newton's method on the concave log P; it starts from the steep side, so it is monotone.
         """

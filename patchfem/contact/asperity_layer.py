@@ -38,7 +38,7 @@ MAX_PRESSURE_RISE = 0.01
 
 
 class AsperityProblem(NamedTuple):
-    """Contact of strips through a compliant layer of asperities with a smooth law.
+    """Contact of strips through a compliant asperity layer whose pressure law is smooth.
 
     - asperities: Pressure law of the layer.
     - compliance: Compliance of the pieces.
@@ -57,17 +57,17 @@ class AsperityProblem(NamedTuple):
         return self.contact.target[0] / self.area.sum()
 
     def separation(self, force: np.ndarray, motion: np.ndarray) -> np.ndarray:
-        """Return the separations (n,) [m] of the mean planes under forces [N] and a motion."""
+        """Return the separations (n,) [m] of the mean planes for given forces [N] and a given motion."""
         return self.contact.gap - self.contact.motions @ motion + self.compliance.product(force)
 
     def imbalance(self, force: np.ndarray, motion: np.ndarray) -> np.ndarray:
-        """Return the load and the moments (r,) that are not balanced by given forces and motion."""
+        """Return the part of load and moments (r,) that the forces and the springs do not balance."""
         contact = self.contact
         return contact.target - contact.motions.T @ force - contact.springs * motion
 
 
 class AsperitySolution(NamedTuple):
-    """Forces, separations and motion of a contact through asperities, with the iterations."""
+    """Forces, separations and motion of a contact through asperities, and the iteration count."""
 
     force: np.ndarray
     separation: np.ndarray
@@ -76,7 +76,7 @@ class AsperitySolution(NamedTuple):
 
 
 class _StripResponse(NamedTuple):
-    """Linearized response of the nodes of one strip with its asperity layer.
+    """Linearized response of the nodes in one strip with its asperity layer.
 
     - nodes (k,): Indices among all nodes.
     - root (k,): D^1/2.
@@ -149,7 +149,7 @@ def _newton_step(problem: AsperityProblem, slope, mismatch, imbalance) -> tuple:
 
 
 def _solve_newton(problem: AsperityProblem, separation, motion) -> AsperitySolution | None:
-    """Solve by Newton's method from separations and motion; None if it does not converge."""
+    """Solve by Newton's method from initial values, or return None if it does not converge."""
     contact = problem.contact
     asperities = problem.asperities
     for iteration in range(1, MAX_NEWTON_STEPS + 1):
@@ -191,7 +191,7 @@ def _solve_newton(problem: AsperityProblem, separation, motion) -> AsperitySolut
 
 
 def _guess_separation(problem: AsperityProblem) -> np.ndarray | None:
-    """Guess the separations of a strip under its approach; None if it does not touch.
+    """Guess the separations in a strip under its approach, or return None if it does not touch.
 
     No node can carry more force than the one that flattens its overlap.
     """
@@ -269,7 +269,7 @@ def solve_at_motion(problem: AsperityProblem, motion: np.ndarray) -> AsperitySol
 
 
 def _try_approach(problem: AsperityProblem, motion: np.ndarray) -> AsperitySolution | None:
-    """Solve the strips under a motion; None where the pressure is too large to compute."""
+    """Solve the strips under a motion, or return None if the pressure is too large to compute."""
     try:
         return solve_at_motion(problem, motion)
     except PatchfemError:
@@ -313,7 +313,7 @@ def _minimise_dual(problem: AsperityProblem, approach: float, length: float) -> 
 def _search_dual(
     problem: AsperityProblem, start: AsperitySolution, direction, min_imbalance
 ) -> tuple:
-    """Search for the best solution along a direction of the holder motion by bisection.
+    """Search for the best solution along one direction of the holder motion by bisection.
 
     Returns the solution and the number of iterations.
 
@@ -346,7 +346,7 @@ def _search_dual(
 
 
 def _linearised_start(problem: AsperityProblem) -> tuple:
-    """Return initial separations and motion from a law linearized at the mean pressure."""
+    """Return initial separations and motion from a law that is linearized at the mean pressure."""
     contact = problem.contact
     mean_pressure = problem.mean_pressure
     mean_separation = problem.asperities.separation(np.array([mean_pressure]))
@@ -370,7 +370,7 @@ def _linearised_start(problem: AsperityProblem) -> tuple:
 
 
 def solve_asperity_layer(problem: AsperityProblem) -> AsperitySolution:
-    """Solve strips with a smooth asperity layer under a load and moments of free rotations.
+    """Solve strips with a smooth asperity layer under a load and the moments about released rotations.
 
     Parameters
     ----------

@@ -66,7 +66,7 @@ def _quadratic_program(compliance, problem: ContactProblem) -> _QuadraticProgram
 def project_forces(
     force: np.ndarray, rigid: np.ndarray, target: np.ndarray, max_iterations: int = 100
 ) -> np.ndarray:
-    """Project forces onto nonnegative forces with prescribed resultants.
+    """Project forces onto the nonnegative forces that have prescribed resultants.
 
     They are max(0, force + rigid q), where q maximises a concave, piecewise quadratic function. Newton's method with an
     exact line search finds it after finitely many pieces.
@@ -198,7 +198,7 @@ def solve_by_gradients(
 
 
 def _guess_forces(program: _QuadraticProgram, start, n_nodes: int, eigenvalue_bound: float):
-    """Return initial nodal forces, whose resultants are not corrected yet.
+    """Return initial nodal forces, whose resultants are not yet corrected.
 
     start: (n_nodes,) forces [N] of the nodes, or None. The springs of the holder begin without force.
     """
@@ -211,14 +211,14 @@ def _guess_forces(program: _QuadraticProgram, start, n_nodes: int, eigenvalue_bo
 
 
 def _energy_slope(program: _QuadraticProgram, in_contact, displacement) -> np.ndarray:
-    """Return the energy gradient (n,) [m] with its least-squares rigid motion removed."""
+    """Return the gradient (n,) [m] of the energy, from which the least-squares rigid motion is subtracted."""
     slope = program.gap + displacement
     motion = _fit_motion(program.rigid[in_contact], slope[in_contact])
     return slope - program.rigid @ motion
 
 
 def _restore_resultants(force: np.ndarray, rigid: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Correct forces so that they have the prescribed resultants and stay nonnegative.
+    """Correct forces so that they have the prescribed resultants and are nonnegative.
 
     Nodes without force stay unloaded, unless the loaded nodes alone cannot carry the resultants.
     """

@@ -24,7 +24,7 @@ MAX_SLOTS = 100_000  # largest number of stored contact sets; no problem needs m
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ContactSet:
-    """Contact set, with forces and gaps as linear functions of the rigid displacement.
+    """Set of nodes in contact, with forces and gaps as linear functions of the rigid displacement.
 
     - in_contact (m,): whether a node is in contact.
     - unknowns (3, m): force [N] of nodes in contact and gap [m] of the others, coefficients of 1, d, t.
@@ -37,14 +37,14 @@ class ContactSet:
     energy: np.ndarray
 
     def values(self, d: float, t: float) -> np.ndarray:
-        """Return nodal forces [N] in contact and gaps [m] elsewhere at a rigid displacement.
+        """Return the forces [N] at nodes in contact and the gaps [m] at other nodes.
 
         d [m], t [rad]: motion of the holder.
         """
         return self.unknowns[0] + d * self.unknowns[1] + t * self.unknowns[2]
 
     def forces(self, d: float, t: float) -> np.ndarray:
-        """Return the nodal forces (m,) [N] at a rigid displacement; negative round-off becomes 0.
+        """Return the nodal forces (m,) [N] at a rigid displacement, with negative round-off set to 0.
 
         d [m], t [rad]: motion of the holder.
         """
@@ -92,7 +92,7 @@ class ContactSets:
         self.reference = self._make_set(reference.in_contact)
 
     def _make_set(self, in_contact) -> ContactSet:
-        """Compute the linear functions of forces and gaps for the nodes (m,) in contact."""
+        """Compute forces and gaps as linear functions for given nodes (m,) in contact."""
         index = np.flatnonzero(in_contact)
         right = np.stack([self.opening, -np.ones(self.x.size), self.x], axis=1)
         force = np.zeros_like(right)
@@ -118,7 +118,7 @@ class ContactSets:
         )
 
     def make_arrays(self, max_bytes: float = MAX_STORED_BYTES) -> SetArrays:
-        """Return the arrays with which compiled code searches contact sets, from the preloaded one.
+        """Return the arrays in which compiled code searches contact sets, starting from the preloaded one.
 
         max_bytes: size of the contact sets that can be stored [bytes].
         """

@@ -20,7 +20,7 @@ MAX_ASPECT = 4.0
 
 
 class ContactEdge(NamedTuple):
-    """End of the contact region between two nodes of the interface.
+    """End of the contact region, which lies between two nodes of the interface.
 
     - node: Last node in contact.
     - side: 1 where the contact ends towards +x, else -1.
@@ -52,7 +52,7 @@ def edge_offset_fraction(aspect):
 
 
 def edge_offset(inner, outer, fraction, row_height: float | None = None):
-    """Return the inward offset [m] of an edge from the position that its cell fraction gives.
+    """Return the inward offset [m] of an edge from the position that follows from its cell fraction.
 
     The cell length is interpolated between both cells by the fraction, so an edge does not jump where cells of two
     lengths meet.
@@ -71,7 +71,7 @@ def edge_offset(inner, outer, fraction, row_height: float | None = None):
 
 
 def _find_ends(active: np.ndarray) -> list:
-    """Find the nodes at which the contact set ends inside the interface, with their sides."""
+    """Return the nodes at which the contact set ends inside the interface, and the side of each end."""
     return [
         (int(change), 1) if active[change] else (int(change) + 1, -1)
         for change in np.flatnonzero(active[1:] != active[:-1])
@@ -79,7 +79,7 @@ def _find_ends(active: np.ndarray) -> list:
 
 
 def compute_edge_fraction(force: float, force_rate: float, gap: float, gap_rate: float) -> float:
-    """Return the fraction of a cell that an edge has passed; 1/2 if it is undetermined.
+    """Return the fraction of a cell that an edge has passed, or 1/2 if it is undetermined.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ def find_edges(normal, x, force, gap, softness=None, row_height: float | None = 
 
 
 def snap_to_steps(edges: list, x, gap, jumps) -> list:
-    """Snap contact edges to a step at which the gap opens if they lie less than one cell away from it.
+    """Move a contact edge to a step at which the gap opens if it is less than one cell away from it.
 
     Parameters
     ----------
@@ -218,7 +218,7 @@ def contact_intervals(x, force, edges: list) -> np.ndarray:
 
 
 def set_stiffness(compliance, active, motion, edges: list) -> float:
-    """Return the stiffness of a contact whose edges lie between nodes.
+    """Return the stiffness of a contact whose edges may lie between nodes.
 
     The stiffness motion . C_AA^-1 motion of the nodes A in contact is that of edges half a cell beyond the last nodes.
     Every edge that lies elsewhere adds the change along the parabola through the sets with one node less and one more.
@@ -263,9 +263,9 @@ def set_stiffness(compliance, active, motion, edges: list) -> float:
 
 
 def parabola_change(shift: float, gain: float, loss: float) -> float:
-    """Interpolate a change at a shift of a contact edge by a parabola.
+    """Return the change at a given shift of a contact edge, interpolated by a parabola.
 
-    These are `gain` at 1, -`loss` at -1 and 0 at 0.
+    The change is `gain` at 1, -`loss` at -1 and 0 at 0.
 
     Parameters
     ----------

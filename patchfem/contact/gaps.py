@@ -11,7 +11,7 @@ import numpy as np
 
 
 class ShapeProperties(NamedTuple):
-    """Functions that return the properties of a shape from its table; None for a property it does not have.
+    """Functions that compute properties of a shape from its table, each None if the shape lacks it.
 
     - angle: angle [rad] by which the shape rotates the piece.
     - edge: position and height [m] of a jump of the gap.
@@ -44,7 +44,7 @@ def crown(x: np.ndarray, radius: float) -> np.ndarray:
 
 
 def step(x: np.ndarray, height: float, at: float) -> np.ndarray:
-    """Return a gap that jumps from 0 to a height; a node on the edge has half the height.
+    """Return a gap that jumps from 0 to a height; at a node on the jump, it is half the height.
 
     Parameters
     ----------

@@ -44,7 +44,7 @@ class Tableau(NamedTuple):
 
 
 class StoredSets(NamedTuple):
-    """Contact sets in k slots, which are found by 64-bit hashes.
+    """Contact sets in k slots, which are looked up by 64-bit hashes.
 
     The name of a set is the exclusive or of the names of its nodes.
 
@@ -82,7 +82,7 @@ class Polygons(NamedTuple):
 
 
 class SetArrays(NamedTuple):
-    """Arrays of a preloaded interface, of its stored contact sets and of the search for them.
+    """Arrays for a preloaded interface, for its stored contact sets and for the search for them.
 
     - compliance (m, m) [m/N]; x (m,) [m].
     - opening (m,): openings of the reference state without forces [m].
@@ -102,7 +102,7 @@ class SetArrays(NamedTuple):
 
 
 def make_set_arrays(compliance, x, opening, reference, in_contact, n_slots: int) -> SetArrays:
-    """Return the arrays of a search for contact sets, with no set stored yet.
+    """Return the arrays for a search for contact sets, in which no set is stored yet.
 
     Parameters
     ----------
@@ -151,5 +151,5 @@ def make_set_arrays(compliance, x, opening, reference, in_contact, n_slots: int)
 
 
 def hash_set(sets: SetArrays, in_contact) -> int:
-    """Return the 64-bit hash of the contact set with given nodes (m,)."""
+    """Return the 64-bit hash of a contact set that consists of given nodes (m,)."""
     return int(np.bitwise_xor.reduce(sets.stored.node_names[in_contact], initial=0))

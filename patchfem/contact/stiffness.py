@@ -24,7 +24,7 @@ def tangential_stiffness(tangential: np.ndarray, active: np.ndarray) -> float:
 
 
 def coupled_stiffness(pieces: Compliance, coupling: np.ndarray, active: np.ndarray) -> float:
-    """Return the tangential stiffness [N/m] of dissimilar bodies in full stick.
+    """Return the tangential stiffness [N/m] of a contact between dissimilar bodies in full stick.
 
     Approach and rotation are fixed.
 

@@ -29,7 +29,7 @@ def factorise(matrix: np.ndarray) -> np.ndarray:
 
 @dataclass(eq=False, slots=True)
 class WarmStart:
-    """Contact set and Cholesky factors of a previous solution, which the next solution reuses.
+    """Contact set and Cholesky factors of a previous solution, which are reused in the next solution.
 
     - contact_set (s, m): Nodes in contact, from which the next pressing starts.
     - factors: Cholesky factors by the active nodes of a strip and by the diagonal added to it, oldest first.
@@ -52,7 +52,7 @@ class WarmStart:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class StripCompliance:
-    """Compliance of s strips of m nodes, each symmetric positive definite.
+    """Compliance of s strips with m nodes each; the matrix of a strip is symmetric positive definite.
 
     - common (m, m): Compliance [m/N] that all strips share.
     - added (s, m): What each strip adds to the diagonal [m/N].
@@ -134,7 +134,7 @@ class StripCompliance:
         return solve
 
     def _factor(self, strip: int, is_active: np.ndarray, nodes: np.ndarray) -> np.ndarray:
-        """Return the Cholesky factor of the active nodes of a strip, cached if possible."""
+        """Return the Cholesky factor for the active nodes of a strip, from the cache if possible."""
         if self.warm_start is None:
             return factorise(self.block(strip, nodes))
         diagonal = b"" if self.added is None else self.added[strip].tobytes()
@@ -142,5 +142,5 @@ class StripCompliance:
         return self.warm_start.factor(key, lambda: self.block(strip, nodes))
 
     def add_to_diagonal(self, diagonal: np.ndarray) -> "StripCompliance":
-        """Return a compliance with given diagonal terms (m,) [m/N] added in every strip."""
+        """Return the compliance after addition of diagonal terms (m,) [m/N] in every strip."""
         return StripCompliance(self.common + np.diag(diagonal), self.added)

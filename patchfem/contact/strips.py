@@ -69,7 +69,7 @@ class StripLayout(NamedTuple):
 
 
 class HolderLoads(NamedTuple):
-    """Load and moments on the holder; None for a motion that is prescribed instead.
+    """Load and moments on the holder; each is None if the corresponding motion is prescribed instead.
 
     - load: Normal load [N] of all strips, or None under an approach.
     - moment: Moment sum f x [N m] of a free rotation about y, or None.
@@ -92,7 +92,7 @@ class HolderPosition(NamedTuple):
 
 
 class StripModel(NamedTuple):
-    """Equal strips that are pressed by one rigid holder.
+    """Model of equal strips that are pressed by one rigid holder.
 
     - compliance: Compliance [m/N] of each strip; rigid pieces (0) need asperities.
     - layout: Nodes of the strips.
@@ -170,7 +170,7 @@ class StripsState:
 
     @property
     def centre_y(self) -> float:
-        """Transverse position [m] of the resultant of the pressure; 0 without load."""
+        """Transverse position [m] of the resultant of the pressure, or 0 if there is no load."""
         return self.roll_moment / self.load if self.load else 0.0
 
     @property
@@ -193,7 +193,7 @@ class StripsState:
 
 
 def strip_offsets(width: float, count: int) -> np.ndarray:
-    """Return the centres y (count,) [m] of equal strips over the width [m] of one pair.
+    """Return the centres y (count,) [m] of equal strips that divide the width [m] of a pair of pieces.
 
     y is 0 in the middle of the width. PatchfemError for less than one strip or no width.
     """
@@ -213,7 +213,7 @@ class StripProperties(NamedTuple):
 
 
 def split_into_strips(pieces: Compliance, count: int) -> StripProperties:
-    """Return compliance and areas of one of several equal strips of a patch.
+    """Return the compliance and the nodal areas of one strip if a patch is split into equal strips.
 
     A strip is `count` times as compliant as the whole width.
     """
@@ -363,7 +363,7 @@ def _strip_opening(strips: StripModel, gap, solution, position: HolderPosition) 
 
 
 def _holder_problem(layout: StripLayout, gap, loads: HolderLoads) -> ContactProblem:
-    """Formulate the contact problem of all strips, with a free motion for each given load."""
+    """Formulate the contact problem of all strips, with an unknown motion for each given load."""
     n_strips = layout.offsets.size
     motions = (
         (loads.load, np.ones(gap.size), 0.0),
@@ -445,7 +445,7 @@ def _press_with_asperities(strips: StripModel, problem: ContactProblem, approach
 
 
 def _refuse_controls(strips: StripModel, gap, loads: HolderLoads, approach) -> None:
-    """Raise PatchfemError for prescribed loads and motions without a solution."""
+    """Raise PatchfemError for prescribed loads and motions for which there is no solution."""
     asperities = strips.asperities
     load = loads.load
     moment = loads.moment
@@ -470,7 +470,7 @@ def _refuse_controls(strips: StripModel, gap, loads: HolderLoads, approach) -> N
 
 
 def _refuse_roll(offsets, loads: HolderLoads) -> None:
-    """Raise PatchfemError for a free roll that the strips cannot balance.
+    """Raise PatchfemError if the strips cannot balance the moment about a released roll.
 
     This is a roll without load or second strip, or with a load line beyond the strips.
     """
@@ -492,7 +492,7 @@ def _refuse_roll(offsets, loads: HolderLoads) -> None:
 
 
 def _refuse_loose_holder(force, loads: HolderLoads) -> None:
-    """Raise NotConverged where the nodes in contact do not determine a free rotation."""
+    """Raise NotConverged if the nodes in contact do not determine a released rotation."""
     is_loaded = force > MIN_RELATIVE_FORCE * force.max()
     is_rotation_free = loads.moment is not None and loads.spring == 0
     if is_rotation_free and is_loaded.any(axis=0).sum() < 2:
@@ -505,7 +505,7 @@ def _refuse_loose_holder(force, loads: HolderLoads) -> None:
 
 
 def _refuse_strip_residuals(asperities, residuals) -> None:
-    """Raise NotConverged, with the remedy for this pressure law, where a residual is too large."""
+    """Raise NotConverged if a residual is too large; the message has the remedy for this pressure law."""
     if isinstance(asperities, SmoothAsperities):
         place = "contact.asperities"
         remedy = (
@@ -526,7 +526,7 @@ def _make_state(
     n_iterations: int = 0,
     residuals=(),
 ) -> StripsState:
-    """Assemble the state of strips from a contact solution."""
+    """Assemble the contact state of strips from a solution."""
     _, layout, asperities = strips
     is_pressed = force.sum() > 0
     stiffness = None
@@ -547,7 +547,7 @@ def _make_state(
 def strips_stiffness(
     c: np.ndarray, weight: np.ndarray, state: StripsState, ratio: float = 1.0
 ) -> float:
-    """Return the stiffness of all strips together, asperities and pieces in series.
+    """Return the stiffness of all strips together, with asperity layer and pieces in series.
 
     Parameters
     ----------

@@ -59,17 +59,17 @@ class ContactSolution(NamedTuple):
 
     @property
     def closing(self) -> float:
-        """Approach [m] beyond the gap of the problem; 0 where it is prescribed."""
+        """Approach [m] in addition to the gap of the problem, or 0 if the approach is prescribed."""
         return float(self.motion[0]) if self.motion.size else 0.0
 
     @property
     def theta(self) -> float:
-        """Rotation [rad] about y beyond that in the gap of a patch."""
+        """Rotation [rad] about y in addition to the one that the gap of a patch contains."""
         return -float(self.motion[1]) if self.motion.size > 1 else 0.0
 
 
 class PlainSolution(NamedTuple):
-    """Contact solution of a patch as plain arrays, with the number of iterations."""
+    """Contact solution of a patch as NumPy arrays, with the number of iterations."""
 
     force: np.ndarray
     motion: np.ndarray
@@ -77,7 +77,7 @@ class PlainSolution(NamedTuple):
 
 
 def _solve_by_fallbacks(compliance, problem: ContactProblem, max_iterations: int) -> tuple:
-    """Solve a contact problem by slower methods if the primal-dual method cycles.
+    """Solve a contact problem by slower methods if the primal-dual method does not converge.
 
     Returns the SetSolution and the number of iterations. The methods are, in turn: primal-dual from all nodes,
     primal-dual from the result of conjugate gradients, and primal.
@@ -98,7 +98,7 @@ def _solve_by_fallbacks(compliance, problem: ContactProblem, max_iterations: int
 
 
 def _solve_on_one_node(compliance, problem: ContactProblem, rest_rotation: float):
-    """Solve a patch that is in contact at a single node; None if no node qualifies.
+    """Solve a patch that touches at a single node, or return None if no node qualifies.
 
     The node lies under the load line. Any rotation that leaves the other nodes open is a solution. It is that without
     rotation of the holder if the other nodes are open then, else the mean of the two limits.
@@ -185,7 +185,7 @@ def solve(
 
 
 def solve_forces(c, x, gap, target, start=None, spring: float = 0.0) -> PlainSolution:
-    """Solve the contact problem of a patch that is given as plain arrays.
+    """Solve the contact problem of a patch that is given as NumPy arrays.
 
     Parameters
     ----------
@@ -292,7 +292,7 @@ def refuse_unsolvable(x, gap, load: float, moment: float | None, spring: float) 
 
 
 def refuse_tipping(load_line: float, middle: float, half_length: float) -> None:
-    """Raise PatchfemError unless the load line lies within the patch.
+    """Raise PatchfemError unless the line of action of the load passes through the patch.
 
     Parameters
     ----------
@@ -444,7 +444,7 @@ def _solve_and_check(
 
 
 def explain_singular_set(c: np.ndarray, problem: ContactProblem) -> str:
-    """Return the error message for a contact set with singular equations.
+    """Return the error message for a contact set whose equations are singular.
 
     A prescribed rotation is determined by any node in contact, so only the compliance itself can be at fault.
 

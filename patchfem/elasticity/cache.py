@@ -30,7 +30,7 @@ MESH_SOURCE_FILES = (*COMMON_SOURCE_FILES, "dissect.py", "fronts.py", "substruct
 
 
 def cache_folder() -> Path:
-    """Return the folder of the disk cache, which need not exist.
+    """Return the path of the disk cache, which need not exist.
 
     It is patchfem/operators below PATCHFEM_CACHE, XDG_CACHE_HOME or ~/.cache.
     """
@@ -90,7 +90,7 @@ def _hash_source(digest, source: tuple) -> str:
 
 
 def load_arrays(key: str, shapes: dict) -> dict | None:
-    """Read the arrays that are stored under a key of the disk cache.
+    """Read the arrays that the disk cache stores under a key.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def load_arrays(key: str, shapes: dict) -> dict | None:
 
 
 def store_arrays(key: str, arrays: dict) -> None:
-    """Store arrays under a key of the disk cache; do nothing if it is not writable."""
+    """Store arrays under a key of the disk cache; do nothing if the cache is not writable."""
     if user_cache.prepare_folder(cache_folder()):
         return
     content = BytesIO()
@@ -130,7 +130,7 @@ def store_arrays(key: str, arrays: dict) -> None:
 
 
 def _delete_oldest_files() -> None:
-    """Delete the least recently used files until the disk cache is within its limit.
+    """Delete the least recently used files until the disk cache is no larger than its limit.
 
     Temporary files that killed processes have left behind are deleted in the same way.
     """

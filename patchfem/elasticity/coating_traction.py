@@ -11,7 +11,7 @@ from .recovery import Cells, make_points
 
 @dataclass(frozen=True, eq=False, slots=True)
 class CoatingTraction:
-    """Forces and tractions that a coating exerts on its substrate along their interface.
+    """Forces and tractions that a coating exerts on its substrate along their common line.
 
     - ``node``: (b,) nodes by increasing x
     - ``length``: (b,) tributary length of each node along the line [m]
@@ -70,7 +70,7 @@ def compute_coating_traction(cells: Cells, u) -> CoatingTraction | None:
 
 
 def _find_bonded_edges(cells: Cells) -> np.ndarray:
-    """Return the edges (e, 2) that a coating cell shares with a substrate cell."""
+    """Return the edges (e, 2) that are shared by a coating cell and a substrate cell."""
     edges = np.concatenate(
         [
             np.stack([block, np.roll(block, -1, axis=1)], axis=2).reshape(-1, 2)
@@ -90,7 +90,7 @@ def _find_bonded_edges(cells: Cells) -> np.ndarray:
 
 
 def _select_coating(cells: Cells, nodes) -> Cells:
-    """Select the coating cells that touch given nodes.
+    """Return the coating cells that touch given nodes.
 
     No other cell exerts a force of the coating on these nodes.
     """

@@ -32,7 +32,7 @@ MIRROR_SIGNS = np.array([-1.0, 1.0])
 
 @dataclass(frozen=True, eq=False, slots=True)
 class KeptNodeFactor:
-    """Cholesky factor of the stiffness of the retained nodes; of a mirrored grid, for symmetric or antisymmetric motion.
+    """Cholesky factor of the stiffness of the retained nodes; in a mirrored grid, for one symmetry of motion.
 
     - ``unknowns``: (k,) kept unknowns that can move, those of the interface last
     - ``lower_factor``: (k, k) lower Cholesky factor
@@ -57,7 +57,7 @@ class KeptNodeFactor:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class CondensedGrid:
-    """Stiffness of a grid, condensed to the nodes of its first row.
+    """Stiffness of a grid that is condensed to the nodes of its first row.
 
     - ``stencil``: stiffness of the whole grid (`tensor_stiffness`)
     - ``inner_factor``: factors of the inner nodes of the grid, or of its right half if `is_mirrored`
@@ -86,7 +86,7 @@ class CondensedGrid:
         return self._join_halves(*parts) if self.is_mirrored else parts[0]
 
     def _join_halves(self, even, odd) -> np.ndarray:
-        """Combine the compliances of symmetric and antisymmetric motion to that of the full interface.
+        """Combine the compliances for symmetric and antisymmetric motion to that of the full interface.
 
         A force on the right half is the sum of an even and an odd pair of forces, each of half its
         size. The displacements on the left are the mirror images of those on the right, with the
@@ -156,7 +156,7 @@ class CondensedGrid:
             return np.concatenate([left[: columns - half], even + odd])
 
     def _solve_part(self, load, has_inner_loads: bool) -> np.ndarray:
-        """Solve one part of a grid; the loads of symmetric motion precede those of antisymmetric motion."""
+        """Solve one part of a grid; loads of symmetric motion precede those of antisymmetric motion."""
         nodes = load.reshape(-1, *load.shape[2:])
         nodes = self.inner_factor.forward(nodes) if has_inner_loads else nodes.copy()
         ring = self.inner_factor.ring

@@ -17,7 +17,7 @@ N_LANDMARKS = 4
 
 
 def graph_coordinates(graph) -> np.ndarray:
-    """Return coordinates of graph nodes: their graph distances to distant landmarks.
+    """Return coordinates of graph nodes, which are their graph distances to distant landmarks.
 
     Each landmark is the node farthest from the earlier ones. The components of the graph
     have separate ranges of coordinates.
@@ -117,7 +117,7 @@ def _split_parts(sorted_nodes, pairs, part_of_node) -> np.ndarray:
 
 
 def minimum_vertex_cover(pairs, side) -> np.ndarray:
-    """Return the smallest set of nodes that contains a node of every pair.
+    """Return the smallest set of nodes that contains at least one node of every pair.
 
     By Koenig's theorem it consists of the nodes of side 0 that alternating paths from the
     unmatched nodes of side 0 do not reach, and of the nodes of side 1 that these paths reach.
@@ -158,7 +158,7 @@ def minimum_vertex_cover(pairs, side) -> np.ndarray:
 
 
 def _sort_by_key(points, key) -> tuple[np.ndarray, np.ndarray]:
-    """Sort nodes by key, and nodes of equal key along their longest extent.
+    """Sort nodes by key; sort nodes with equal keys along the direction of their longest extent.
 
     Returns the sorted nodes (n,), and the position at which each key begins, and n.
     """

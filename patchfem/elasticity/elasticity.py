@@ -30,7 +30,7 @@ class Layers:
     plane: str
 
     def lame(self, is_coating) -> np.ndarray:
-        """Return lambda and mu (2, ...) [Pa] of cells; `is_coating` (...) selects those of the coating."""
+        """Return lambda and mu (2, ...) [Pa] of cells; `is_coating` (...) marks those of the coating."""
         constants = [lame(*pair, self.plane) for pair in (self.substrate, self.coating)]
         return np.moveaxis(np.array(constants)[np.asarray(is_coating, int)], -1, 0)
 
@@ -61,7 +61,7 @@ def lame(young: float, poisson: float, plane: str) -> tuple[float, float]:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Piece:
-    """Piece on a tensor grid with a fixed far face; its stiffness is assembled on first use.
+    """Piece on a tensor grid with a fixed far face, whose stiffness is assembled on first use.
 
     A piece whose compliance is in the disk cache is often never assembled.
 
@@ -84,7 +84,7 @@ class Piece:
 
     @property
     def is_mirrored(self) -> bool:
-        """Whether the piece is mirror-symmetric in x, to round-off of the coordinates."""
+        """Return whether the piece is mirror-symmetric in x, to round-off of the coordinates."""
         grid = self.nodes.reshape(self.x.size, -1, 2)
         return bool(np.abs(grid * [-1, 1] - grid[::-1]).max() <= 1e-13 * np.ptp(self.x))
 
@@ -98,12 +98,12 @@ class Piece:
 
     @property
     def round_off_error(self) -> float:
-        """Relative round-off error of the compliance [1]; 0 before the piece is factorised."""
+        """Relative round-off error of the compliance [1], which is 0 before the piece is factorised."""
         return self.computed["factor"].round_off_error if "factor" in self.computed else 0.0
 
     @property
     def factor(self) -> CondensedGrid:
-        """Stiffness of the piece condensed to its interface.
+        """Stiffness of the piece after condensation to its interface.
 
         NotConverged, with a remedy, if the stiffness cannot be factorised.
         """
@@ -159,7 +159,7 @@ def describe_remedy(layers: Layers, min_length: float, size, *, has_coating: boo
 
 
 def make_piece(x, depth, coating_rows: int, layers: Layers) -> Piece:
-    """Create a piece on a tensor grid of bilinear quadrilaterals, without its stiffness.
+    """Create a piece on a tensor grid of bilinear quadrilaterals; its stiffness is not yet assembled.
 
     Parameters
     ----------
@@ -274,7 +274,7 @@ class InterfaceCompliance(NamedTuple):
 
 
 def interface_compliance(piece) -> InterfaceCompliance:
-    """Compute the compliances of a piece at its interface per unit width.
+    """Compute the compliances of a piece at its interface, per unit width.
 
     Parameters
     ----------

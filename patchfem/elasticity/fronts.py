@@ -46,7 +46,7 @@ class Fronts:
 
     @property
     def n_entries(self) -> int:
-        """Number of stored numbers, 8 bytes each."""
+        """Number of stored floating-point numbers of 8 bytes."""
         return sum(part.size for part in (*self.triangles, *self.lower_blocks))
 
     def compliance(self) -> np.ndarray:
@@ -72,11 +72,11 @@ class Fronts:
 
 
 class ZeroEnergyMotion(NotConverged):
-    """Exception for a stiffness matrix with a rigid-body or other zero-energy mode."""
+    """Exception for a stiffness matrix that has a rigid-body mode or another zero-energy mode."""
 
 
 class SparseFactor:
-    """Cholesky factors of a sparse matrix that is given without a mesh.
+    """Cholesky factors of a sparse matrix that does not come from a mesh.
 
     The order of elimination follows from the graph of the matrix (`dissect.graph_coordinates`).
     Unknowns with the same neighbours form one node of this graph. `min_pivot` and the
@@ -110,7 +110,7 @@ class SparseFactor:
 def factorise(
     matrix: csc_matrix, firsts, per_node: int = UNKNOWNS_PER_NODE, min_pivot: float = 0.0
 ) -> Fronts:
-    """Factorise a symmetric positive definite matrix in the given order of its unknowns.
+    """Factorise a symmetric positive definite matrix; its unknowns are eliminated in the given order.
 
     Parameters
     ----------
@@ -211,7 +211,7 @@ def _list_unknowns(nodes, per_node: int) -> np.ndarray:
 
 
 def _find_later_nodes(lower: csc_matrix, firsts, per_node: int) -> list:
-    """Find the uneliminated nodes that each front is coupled to (symbolic factorization).
+    """Return the uneliminated nodes to which each front is coupled (symbolic factorization).
 
     A later node may be coupled with a front only once earlier nodes are eliminated. Each list is in
     ascending order.
@@ -236,7 +236,7 @@ def _find_later_nodes(lower: csc_matrix, firsts, per_node: int) -> list:
 def _make_front(
     lower: csc_matrix, start: int, stop: int, size: int, position, per_node: int
 ) -> np.ndarray:
-    """Assemble a frontal matrix from the matrix columns of the nodes that it eliminates."""
+    """Assemble a frontal matrix from the matrix columns of the nodes that are eliminated in it."""
     front = np.zeros((size, size), order="F")
     pointer = lower.indptr[per_node * start : per_node * stop + 1]
     entries = slice(pointer[0], pointer[-1])

@@ -33,7 +33,7 @@ BYTES_PER_NUMBER = 8  # size [bytes] of a double-precision number
 
 
 class RegionHalf(NamedTuple):
-    """One half of a rectangular part of a grid, with its position in the part."""
+    """One half of a rectangular part of a grid, and its position in the part."""
 
     shape: "RegionShape"
     column: int
@@ -60,7 +60,7 @@ class RegionShape(NamedTuple):
         return self.rows + self.bottom
 
     def halves(self) -> tuple[RegionHalf, ...]:
-        """Return both halves of a part, cut across its longer side; none for a leaf."""
+        """Return both halves of a part, which is cut across its longer side, or none if it is a leaf."""
         if self.columns * self.rows <= MAX_LEAF_CELLS or max(self.columns, self.rows) < 2:
             return ()
         if self.columns >= self.rows:
@@ -76,7 +76,7 @@ class RegionShape(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class NodeNumbering:
-    """Nodes of a part of a grid in the order of the rows of its matrix.
+    """Nodes in a part of a grid, in the order of the rows of its matrix.
 
     - ``own``: (o, 2) column and row of the nodes that are eliminated with the part
     - ``ring``: (b, 2) column and row of the nodes that are kept
@@ -91,7 +91,7 @@ class NodeNumbering:
 
 @lru_cache(maxsize=4096)
 def number_nodes(shape: RegionShape) -> NodeNumbering:
-    """Number the nodes of a part: first those eliminated with it, then those on its boundary."""
+    """Number the nodes of a part: first those that are eliminated with it, then those on its boundary."""
     grid = np.arange((shape.columns + 1) * shape.n_free_rows).reshape(
         shape.columns + 1, shape.n_free_rows
     )
@@ -123,7 +123,7 @@ def number_nodes(shape: RegionShape) -> NodeNumbering:
 
 
 class StiffnessBlocks(NamedTuple):
-    """Stiffness blocks of g parts of equal shape, for eliminated and for boundary unknowns.
+    """Stiffness blocks for eliminated and for boundary unknowns, in g parts of equal shape.
 
     ::
 
@@ -160,7 +160,7 @@ def _zero_blocks(shape: RegionShape, n_parts: int) -> StiffnessBlocks:
 
 
 class LeafCouplings(NamedTuple):
-    """Stencil entries that form one block of the matrix of a leaf of the dissection.
+    """Stencil entries that form one block in the matrix of a leaf of the dissection.
 
     - ``axes``: (6, k) indices into the stencil of a grid whose first node is the corner of the leaf
     - ``entry``: (k,) position of each in the flattened block
@@ -172,7 +172,7 @@ class LeafCouplings(NamedTuple):
 
 @lru_cache(maxsize=1024)
 def _leaf_couplings(shape: RegionShape) -> tuple[LeafCouplings, ...]:
-    """Return the stencil entries of each stored block of a leaf of the dissection.
+    """Return the stencil entries for each stored block in the matrix of a leaf of the dissection.
 
     A coupling joins an unknown of a node n with one of a node m, which is n itself or one of its
     eight neighbours. The stencil has six axes: the column and row of n, the steps along columns and
@@ -222,7 +222,7 @@ def _leaf_couplings(shape: RegionShape) -> tuple[LeafCouplings, ...]:
 
 
 def _assemble_leaves(stencil, shape: RegionShape, corners) -> StiffnessBlocks:
-    """Assemble the matrices of leaves of one shape from the stencil of the grid.
+    """Assemble the matrices of leaves that have the same shape from the stencil of the grid.
 
     corners: (g, 2) column and row of the first node of every leaf.
     """
@@ -286,7 +286,7 @@ def _split_ring(shape: RegionShape, half: RegionHalf) -> UpdateRuns:
 
 
 def _add_updates(shape: RegionShape, updates) -> StiffnessBlocks:
-    """Assemble the matrices of parts of one shape from the updates of their halves.
+    """Assemble the matrices of parts that have the same shape from the updates of their halves.
 
     A part that is cut along a column has the nodes of two rings. Where the rings meet, the updates
     are added. The part eliminates the nodes o of the cut and keeps the nodes r of its ring; a dot
@@ -343,7 +343,7 @@ def _eliminate_inner_unknowns(blocks: StiffnessBlocks) -> None:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FactorStack:
-    """Factors of g eliminated parts of equal shape.
+    """Factors for g eliminated parts of equal shape.
 
     - ``own``, ``ring``: (g, o) and (g, b) eliminated and ring nodes in the grid, column * rows + row
     - ``own_factor``: (g, 2o, 2o) transposed Cholesky factors L^T of the eliminated unknowns
@@ -371,7 +371,7 @@ class GridFactor:
 
     @property
     def n_entries(self) -> int:
-        """Number of stored numbers, 8 bytes each."""
+        """Number of stored floating-point numbers of 8 bytes."""
         factors = sum(stack.own_factor.size + stack.ring_factor.size for stack in self.stacks)
         return self.schur.size + factors
 
@@ -429,7 +429,7 @@ class GridFactor:
 
 
 class LevelParts(NamedTuple):
-    """Parts of equal shape on one level of the dissection of a grid.
+    """Parts of equal shape that belong to one level in the dissection of a grid.
 
     - ``corners``: (g, 2) column and row of the first node of every part
     - ``halves``: for each half, its shape and the slice of its stack on the next level; empty for
@@ -441,7 +441,7 @@ class LevelParts(NamedTuple):
 
 
 def _dissect_levels(root: RegionShape) -> list[dict[RegionShape, LevelParts]]:
-    """Halve a grid until only leaves remain, and return the parts of every level."""
+    """Halve a grid repeatedly until only leaves remain, and return the parts on every level."""
     corners_by_shape = {root: np.zeros((1, 2), np.int64)}
     levels = []
     while corners_by_shape:
@@ -461,7 +461,7 @@ def _dissect_levels(root: RegionShape) -> list[dict[RegionShape, LevelParts]]:
 
 
 def eliminate_inner_nodes(stencil, *, keep_left: bool = False) -> GridFactor:
-    """Eliminate all nodes of a grid except its first row and, on request, its first column.
+    """Eliminate all nodes of a grid except its first row and, if requested, its first column.
 
     Parameters
     ----------
@@ -615,7 +615,7 @@ def predict_work(nx: int, ny: int, is_mirrored: bool) -> WorkEstimate:
 
 
 def _count_unknowns(shape: RegionShape) -> tuple[int, int]:
-    """Count the unknowns that are eliminated with a part of a grid, and those on its boundary."""
+    """Count the unknowns that are eliminated with a part of a grid, and the unknowns on its boundary."""
     kept_sides = shape.left + shape.right
     kept_lines = 1 + (shape.bottom and shape.n_free_rows > 1)
     ring = kept_sides * shape.n_free_rows + (shape.columns + 1 - kept_sides) * kept_lines

@@ -49,7 +49,7 @@ dtrsm = _BLAS.dtrsm
 
 
 def cho_factor(matrix) -> np.ndarray:
-    """Return the lower Cholesky factor (n, n) of a symmetric matrix; its upper half is not set.
+    """Return the lower Cholesky factor (n, n) of a symmetric matrix; its upper half is undefined.
 
     Raises
     ------

@@ -100,7 +100,7 @@ class Mortar:
 
 
 def join_pieces(lower: PieceInterface, upper: PieceInterface) -> Mortar:
-    """Join two pieces on the grid along the interface that suits their meshes.
+    """Join two pieces on a common grid that is chosen from the candidates along the interface.
 
     If one piece overhangs the other, only the common part of their interfaces carries pressure, and
     its ends become nodes of the grid.
@@ -208,13 +208,13 @@ def transfer_matrix(x, piece_x) -> csr_array:
 
 
 def _hat_functions(x, cell, positions) -> np.ndarray:
-    """Return the values (2, k) of both hat functions of cells (k,) at positions (k,) in them."""
+    """Return the values (2, k) of both hat functions in cells (k,) at positions (k,) in these cells."""
     width = x[cell + 1] - x[cell]
     return np.stack([(x[cell + 1] - positions) / width, (positions - x[cell]) / width])
 
 
 def common_interval(x_lower, x_upper) -> tuple[float, float]:
-    """Return the ends [m] of the interval that the nodes [m] of both pieces cover.
+    """Return the ends [m] of the interval that is covered by the interface nodes [m] of both pieces.
 
     Raises
     ------
@@ -233,7 +233,7 @@ def common_interval(x_lower, x_upper) -> tuple[float, float]:
 
 
 def clip_nodes(x, begin: float, end: float) -> np.ndarray:
-    """Return the nodes between two ends, with the ends added.
+    """Return the nodes between two ends, and the ends themselves.
 
     Nodes closer to a new end than half a cell are left out, because tiny cells would arise.
 
@@ -442,7 +442,7 @@ def join_on_grid(grids: Grids, side: str, lower: PieceInterface, upper: PieceInt
 
 
 def _check_interface(interface: PieceInterface, side: str) -> None:
-    """Raise PatchfemError unless the nodes of a piece ascend and each has its compliances."""
+    """Raise PatchfemError unless nodes of a piece are in ascending order and each has its compliances."""
     size = interface.x.size
     has_shape = all(part.shape == (size, size) for part in interface.compliance)
     if size < 3 or not np.all(np.diff(interface.x) > 0) or not has_shape:

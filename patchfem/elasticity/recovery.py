@@ -23,7 +23,7 @@ MIN_PLANE_DETERMINANT = 0.1
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Cells:
-    """Cells of one piece, in blocks of equal element type.
+    """Cells of one piece, in blocks of the same element type.
 
     - ``points``: (N, 2) x and depth [m] of the nodes
     - ``blocks``: arrays (c, 3) or (c, 4) of node numbers; the cells are numbered block after block
@@ -61,7 +61,7 @@ def get_cells(piece) -> Cells:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class CellPoints:
-    """Points in the cells of one block, with the shape functions of scikit-fem.
+    """Points in the cells of one block, with the values of the shape functions of scikit-fem.
 
     - ``corners``: (n, c) nodes of the cells
     - ``element``: values of the element at the points of its reference cell
@@ -182,7 +182,7 @@ class Recovery:
 
 
 def fit_recovery(cells: Cells) -> Recovery:
-    """Fit a plane to the cell centres around every node, in each of its materials.
+    """Fit a plane to the cell-centre stresses around every node, separately for each material.
 
     A patch that is too thin for a plane, as at edges and corners, takes in the cells around it. If
     it stays thin, as in a coating of one row, the fit has no slope across it.
@@ -250,7 +250,7 @@ def _fit_planes(patches: Patches, points, centres) -> tuple[Patches, np.ndarray]
 
 @dataclass(frozen=True, eq=False, slots=True)
 class StressError:
-    """Estimated error of the stress in the energy norm.
+    """Estimate of the error of the stress in the energy norm.
 
     - ``error``: (frames, t) squared norm of the error of every cell [J/m]
     - ``energy``: (frames,) squared norm of the computed stress, twice the stored energy [J/m]
@@ -260,7 +260,7 @@ class StressError:
     energy: np.ndarray
 
     def relative_error(self, *others: "StressError") -> tuple[np.ndarray, np.ndarray]:
-        """Return the errors relative to the energy norm of the stress in all pieces.
+        """Return the errors divided by the energy norm of the stress in all pieces.
 
         Parameters
         ----------

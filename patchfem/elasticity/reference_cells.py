@@ -12,7 +12,7 @@ from . import cache as disk_cache
 
 
 class ElementValues(NamedTuple):
-    """Shape functions of an element at points of its reference cell.
+    """Shape functions of an element at points in its reference cell.
 
     - ``shape``: (g, n) values
     - ``gradient``: (g, 2, n) derivatives with respect to the local coordinates

@@ -24,7 +24,7 @@ from .plane_form import plane_elasticity
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Substructure:
-    """Piece on an unstructured mesh with a fixed far face; stiffness factorised on demand.
+    """Piece on an unstructured mesh with a fixed far face, whose stiffness is factorised on demand.
 
     A piece whose compliance is in the disk cache is never assembled.
 
@@ -38,12 +38,12 @@ class Substructure:
 
     @property
     def order(self) -> np.ndarray:
-        """Free nodes (n,) in the order of elimination, those of the interface last by x."""
+        """Unfixed nodes (n,) in the order of elimination; those of the interface come last, sorted by x."""
         return self._cached_value("order")
 
     @property
     def factor(self) -> Fronts:
-        """Cholesky factors of the stiffness of the free unknowns.
+        """Cholesky factors of the stiffness of the unfixed degrees of freedom.
 
         NotConverged, with a remedy, if the stiffness cannot be factorised.
         """
@@ -51,7 +51,7 @@ class Substructure:
 
     @property
     def round_off_error(self) -> float:
-        """Relative round-off error of the compliance [1]; 0 before the piece is factorised."""
+        """Relative round-off error of the compliance [1], which is 0 before the piece is factorised."""
         return self.computed.get("round_off_error", 0.0)
 
     def solve(self, load) -> np.ndarray:
@@ -92,7 +92,7 @@ class Substructure:
 
 
 def elimination_order(mesh: PieceMesh) -> tuple[np.ndarray, np.ndarray]:
-    """Order the free nodes of a piece for elimination, those of the interface last.
+    """Order the unfixed nodes of a piece for elimination, with those of the interface last.
 
     Parameters
     ----------

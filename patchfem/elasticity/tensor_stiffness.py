@@ -63,7 +63,7 @@ def tensor_stencil(x, depth, lam, mu) -> np.ndarray:
 
 
 def apply_stencil(stencil, u) -> np.ndarray:
-    """Return the nodal forces (nx, rows, 2, r) [N/m] of displacements u (nx, rows, 2, r) [m]."""
+    """Return the nodal forces (nx, rows, 2, r) [N/m] for displacements u (nx, rows, 2, r) [m]."""
     columns, rows = stencil.shape[:2]
     forces = np.zeros_like(u)
     for dc in (-1, 0, 1):

@@ -87,7 +87,7 @@ def backbone_data(backbone: Backbone) -> dict:
 
 
 def _band_data(backbone: Backbone) -> dict | None:
-    """Return the band of a backbone as lists in SI units; None if it has no band."""
+    """Return the uncertainty band of a backbone curve as lists in SI units, or None if it has none."""
     band = backbone.answer.band
     if band is None:
         return None
@@ -168,7 +168,7 @@ def write_backbone(
 
 
 def backbone_charts(curves: dict, band: Band | None = None) -> list:
-    """Chart frequency and damping ratio of a backbone against amplitude, with errors.
+    """Return charts of frequency and damping ratio of a backbone against amplitude, with errors.
 
     The recommended curve is bold and lies in its band; the others are thin. A frequency whose error
     is larger than itself would stretch the axis, so it is left out.
@@ -214,14 +214,14 @@ def backbone_charts(curves: dict, band: Band | None = None) -> list:
 
 
 def _damping_floor(curves: dict, *, is_log: bool) -> float:
-    """Return the lower end of bars and bands of the damping ratio; -inf on a linear axis."""
+    """Return the lower limit of error bars and bands of the damping ratio, or -inf on a linear axis."""
     if not is_log:
         return -np.inf
     return BAR_FLOOR_FACTOR * min(float(curve.damping.min()) for curve in curves.values())
 
 
 def _band_mark(band: Band, scale: float, name: str, floor: float = -np.inf) -> dict:
-    """Return the mark of the band of the frequency or of the damping ratio."""
+    """Return the chart mark of the uncertainty band of the frequency or of the damping ratio."""
     low = np.maximum(getattr(band, f"{name}_low"), floor)
     high = getattr(band, f"{name}_high")
     colour = COLOURS[band.method]
@@ -229,7 +229,7 @@ def _band_mark(band: Band, scale: float, name: str, floor: float = -np.inf) -> d
 
 
 class CurveStyle(NamedTuple):
-    """Colour, legend and line width of a curve; a width of None adds points and error bars."""
+    """Colour, legend and line width of a curve; if the width is None, points and error bars are drawn."""
 
     method: str
     legend: str
@@ -237,7 +237,7 @@ class CurveStyle(NamedTuple):
 
 
 def _curve_style(method: str, band: Band | None) -> CurveStyle:
-    """Return how the curve of a method is drawn: bold if it is recommended, thin if another is."""
+    """Return the style of the curve of a method: bold if the method is recommended, thin if another one is."""
     if band is None:
         return CurveStyle(method, method, None)
     if method == band.method:
@@ -246,7 +246,7 @@ def _curve_style(method: str, band: Band | None) -> CurveStyle:
 
 
 def _curve_marks(style: CurveStyle, x, y, errors, is_log: bool) -> list:
-    """Return the chart marks of a backbone curve: a line, and error bars unless a width is given."""
+    """Return the chart marks of a backbone curve: a line, and error bars if the style has no line width."""
     colour = COLOURS[style.method]
     if style.width is not None:
         return [charts.make_line(x, y, colour, style.legend, width=style.width)]
@@ -354,7 +354,7 @@ def _format_point(curve: Curve, k: int) -> FormattedPoint:
 
 
 def _format_stuck(backbone: Backbone) -> str:
-    """Format the frequency of the mode while the contact sticks, with its error if known."""
+    """Format the frequency of the mode while the contact sticks, with its error if the error is known."""
     _, stuck, error = backbone.frequencies
     if error:
         return formatting.format_value(stuck, error, unit="Hz")
@@ -405,7 +405,7 @@ def _describe_ends(mode: str, curve: Curve) -> str:
 
 
 def _describe_largest_damping(curve: Curve) -> list:
-    """Describe the largest damping ratio of a curve in a sentence, as a list."""
+    """Return a list with a sentence on the largest damping ratio of a curve."""
     count = curve.amplitude.size
     if count < 2:
         return []
@@ -419,7 +419,7 @@ def _describe_largest_damping(curve: Curve) -> list:
 
 
 def format_backbone(backbone: Backbone) -> list:
-    """Return the results of a backbone as lines of text: sentences, a table, missing curves."""
+    """Return the results of a backbone as lines of text: sentences, a table, and methods that have no curve."""
     head = f"{'method':<13}{'amplitude':>12}{'frequency':>26}{'damping ratio':>26}"
     out = [*summarise_backbone(backbone), head]
     for method, curve in backbone.curves.items():

@@ -123,7 +123,7 @@ def _create_parent_folder(out: Path | None) -> Iterator[None]:
 
 
 def _make_folder(folder: Path, out: Path) -> None:
-    """Create a folder, or raise Missing."""
+    """Create a folder; raise Missing if this fails."""
     try:
         folder.mkdir(parents=True)
     except OSError as error:

@@ -105,7 +105,7 @@ def _group_by_tolerance(runs: list) -> list[list]:
 
 
 def _format_outcome(group: list) -> str:
-    """State whether a tolerance is met by the run itself or by settings tried next."""
+    """State whether a tolerance is met by the run itself or by the settings that were tried next."""
     first = group[0]
     last = group[-1]
     if first.meets_tolerance():
@@ -179,7 +179,7 @@ def _format_errors(run: Cost, name: str) -> str:
 
 
 def _format_relative(difference: float | None, size: float) -> str:
-    """Format a difference relative to a size, or "-" if one of them is missing."""
+    """Format a difference relative to a size, or return "-" if one of them is missing."""
     if difference is None or not size:
         return "-"
     ratio = difference / size
@@ -379,14 +379,14 @@ def cost_chart(knob: str, runs: list, tolerance: float) -> dict:
 
 
 class Point(NamedTuple):
-    """Run of a cost curve, with the relative error of its worst measure."""
+    """Point of a cost curve: a run with the relative error of its least accurate measure."""
 
     run: Cost
     error: float
 
 
 def _axis_range(values: list, min_ratio: float) -> list:
-    """Return the ends of a logarithmic axis with room for labels around its values."""
+    """Return both ends of a logarithmic axis that leaves room for labels around its values."""
     room = max(max(values) / min(values), min_ratio) ** AXIS_MARGIN
     return [min(values) / room, max(values) * room]
 

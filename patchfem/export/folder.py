@@ -85,7 +85,7 @@ def run_into(
 
 
 def _partial_result(error: NotConverged) -> Result:
-    """Return the results of a run that failed to converge, with the reason as a warning."""
+    """Return the partial results of a run that did not converge, with the reason as a warning."""
     result = error.partial_result
     return replace(
         result,

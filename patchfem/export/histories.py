@@ -64,7 +64,7 @@ def result_contents(result: Result) -> netcdf.Contents:
 
 
 def largest_multiplier(extra: dict) -> float:
-    """Return the largest magnitude of the Floquet multipliers of a run."""
+    """Return the largest absolute value of the Floquet multipliers of a run."""
     return float(np.abs(np.asarray(extra["multipliers"])).max(initial=0.0))
 
 
@@ -124,7 +124,7 @@ def collect_histories(result: Result) -> tuple:
 
 
 def _interface_histories(result: Result) -> dict:
-    """Return the histories (i, k) of all interfaces of a rig of masses, and of its output."""
+    """Return the histories (i, k) of all i interfaces and of the output of a rig that consists of masses."""
     response = result.response
     columns = {
         "relative_displacement": ("slides", response.slide),
@@ -156,7 +156,7 @@ def _interface_histories(result: Result) -> dict:
 
 
 def _coordinate_description(rig) -> str:
-    """Describe the coordinates of a run if they are not modes, else return ""."""
+    """Describe the coordinates of a run, or return "" if they are modal coordinates."""
     if rig is None or rig.structure.lists_modes or rig.modes.shapes is None:
         return ""
     if any(str(name).startswith("mode ") for name in rig.modes.names):

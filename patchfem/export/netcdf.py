@@ -253,7 +253,7 @@ def run_contents(
 def add_events(
     data: Contents, time, interface, kind, slide, count: int, meanings, source: str
 ) -> Contents:
-    """Add the table of events (e,) to the contents of a file.
+    """Add a table of e events to the contents of a file.
 
     Parameters
     ----------

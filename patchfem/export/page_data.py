@@ -67,7 +67,7 @@ class Verdict:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class PressedPatch:
-    """Solved patch that a page shows; empty if there is none.
+    """Solved patch that a page shows; the fields are empty if the run has no patch.
 
     Attributes
     ----------
@@ -142,7 +142,7 @@ class Wear:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Evaluations:
-    """Curves, levels, spectra and decay of a run; None for those that it does not have."""
+    """Curves, levels, spectra and decay of a run, each of them None if the run has none."""
 
     curve: object = None
     decay: object = None
@@ -178,11 +178,11 @@ class Measured:
     reading_factor: float = 1.0
 
     def is_comparable(self) -> bool:
-        """Return whether the drive has a frequency, so that measured rows can be compared."""
+        """Return whether the drive signal has a frequency, so that measured rows can be compared with the run."""
         return self.input is not None and self.frequency is not None
 
     def factors(self) -> tuple:
-        """Return the indicated amplitudes per unit of peak acceleration and displacement."""
+        """Return the readings of the sensors per unit of peak acceleration and of peak displacement."""
         acceleration, displacement = self.gains
         return acceleration * self.reading_factor, displacement
 
@@ -306,7 +306,7 @@ def _bench_motion(result: Result, tables: dict) -> Motion:
 
 
 def _read_recorded_loop(folder: Path, slide: dict, response) -> tuple | None:
-    """Read times [s], slides [m] and forces [N] from the file of a slide; None if it has no forces."""
+    """Read times [s], displacements [m] and forces [N] from the slide file; None if it contains no forces."""
     if slide["kind"] != "file":
         return None
     try:
@@ -359,7 +359,7 @@ def _rig_motion(result: Result) -> Motion:
 
 
 def _measured_responses(result: Result) -> Measured | None:
-    """Return the measured responses of the scene; None if there are none."""
+    """Return the measured responses that the scene contains, or None if it contains none."""
     model = result.plan.model
     if model.measured is None:
         return None

@@ -32,7 +32,7 @@ class Variable(NamedTuple):
 
 @contextmanager
 def reading_errors(path: Path, form: str) -> Iterator[None]:
-    """Raise PatchfemError with the name of the file for any error while it is read.
+    """Convert any error while a file is read to a PatchfemError that contains the name of the file.
 
     form: what the file should be. Only code that reads and checks shapes belongs into this context,
     no computation.

@@ -132,7 +132,7 @@ class Picture(NamedTuple):
 
 
 def find_picture(name: str, data: RunData) -> Picture | None:
-    """Return the picture with a given name; None if the run has no data for it."""
+    """Return the picture with a given name, or None if the run has no data for it."""
     return PICTURES[name](data)
 
 
@@ -188,7 +188,7 @@ def _decay_picture(data: RunData) -> Picture | None:
 
 
 def _levels_picture(data: RunData) -> Picture | None:
-    """Return the picture of the amplitude at the end of each level of a drive with levels."""
+    """Return the picture of the amplitude at the end of each level of a stepped drive signal."""
     if data.evaluations.levels is None:
         return None
     return Picture(
@@ -330,7 +330,7 @@ def _stress_picture(data: RunData) -> Picture | None:
 
 
 def _mesh_sentence(data: RunData) -> str:
-    """State that the plotted stress misses pressure peaks at the surface; "" if it does not."""
+    """State that the plotted stress misses pressure peaks at the surface, or return "" if it does not."""
     sigma = data.patch.fields["normal_stress"][0]
     mesh_pressure = data.patch.bodies["pressure"]
     if sigma.size == mesh_pressure.size:
@@ -344,7 +344,7 @@ def _mesh_sentence(data: RunData) -> str:
 
 
 def _corner_sentence(bodies: dict) -> str:
-    """Describe the corner in which the largest stress of both pieces is unbounded; else ""."""
+    """Describe the corner at which the largest stress of both pieces is unbounded; "" if there is none."""
     parts = zip(bodies["depth"], bodies["coating"], bodies["mises"])
     depth, coating, stress = max(parts, key=lambda fields: fields[2].max())
     column, row = np.unravel_index(np.argmax(stress), stress.shape)
@@ -516,7 +516,7 @@ PICTURES = {
 
 
 def _unsettled_sentence(data: RunData) -> str:
-    """State that a motion is not steady; "" if it is."""
+    """State that a motion is not steady, or return "" if it is steady."""
     outcome = data.verdict.summary["outcome"]
     return (
         ""
@@ -529,7 +529,7 @@ def _unsettled_sentence(data: RunData) -> str:
 
 
 def _measured_section(data: RunData) -> list:
-    """Return the section that compares computed and measured values, as a list."""
+    """Return a list with the section that compares computed and measured values."""
     responses = data.measured
     measures = data.verdict.summary["measures"]
     if not responses.is_comparable():
@@ -757,7 +757,7 @@ def run_page(result: Result, bodies: dict | None = None, film: dict | None = Non
 
 
 def draw_axes(result: Result, names: tuple, onto=None, bodies: dict | None = None):
-    """Draw the first of the named pictures that a run has data for, as matplotlib Axes.
+    """Draw the first of the named pictures for which the run has data, as matplotlib Axes.
 
     Parameters
     ----------

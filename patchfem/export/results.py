@@ -145,7 +145,7 @@ class Folder:
             refuse_others(place, self.shown, (*FILES, LOCK), "patchfem results")
 
     def _dropped_note(self) -> str:
-        """Return the note that saved states of an earlier run are deleted, or ""."""
+        """Return a note that the saved states of an earlier run are deleted, or "" if there are none."""
         if not any(is_state(part.name) for part in self.path.iterdir()):
             return ""
         return (
@@ -167,12 +167,12 @@ class Folder:
 
 
 def is_state(name: str) -> bool:
-    """Return whether a file name denotes the saved state of an interrupted run."""
+    """Return whether a file with this name contains the saved state of an interrupted run."""
     return STATES.fullmatch(name) is not None
 
 
 def refuse_others(folder: Path, user_path, allowed, kind: str, dots: bool = False) -> None:
-    """Raise PatchfemError for a path that is no folder or contains foreign files.
+    """Raise PatchfemError if a path is not a folder, or if the folder contains files of another kind.
 
     Parameters
     ----------

@@ -120,7 +120,7 @@ def _parse_int(digits: str) -> int:
 
 @cache
 def _summary_model() -> type:
-    """Return the pydantic model of the entries on which readers of a summary rely."""
+    """Return the pydantic model that checks the entries on which readers of a summary rely."""
     from pydantic import BaseModel
 
     class Number(BaseModel):
@@ -167,7 +167,7 @@ def summarise_run(result: Result) -> dict:
 
 
 def runaway_data(result: Result) -> dict:
-    """Return the drive [m s-2] of an unsettled motion, and the drive that friction can bound.
+    """Return the drive signal [m s-2] of an unsettled motion, and the largest one that friction can limit.
 
     It is {"run_away": {"drive", "knee"}}: the acceleration of the base, and the one above which
     friction alone does not limit the amplitude at resonance.
@@ -213,7 +213,7 @@ def loop_entry(result: Result) -> dict:
 
 
 def contact_entry(result: Result) -> dict:
-    """Return where a solved patch without strips is in contact [m], as a dict.
+    """Return the intervals [m] in which a solved patch without strips is in contact, as a dict.
 
     It is {"contact": {"from", "to": ends of the interface, "stretches": [[begin, end] of each part
     in contact]}}.
@@ -235,7 +235,7 @@ def contact_entry(result: Result) -> dict:
 
 
 def count_cycles(result: Result) -> float | None:
-    """Return the number of cycles of the drive, or of the slide; None if the run has none."""
+    """Return the number of cycles of the drive signal or of the slide, or None if the run has none."""
     r = result.response
     period = result.extra.get("period")
     if r is not None and period and result.plan.kind != "bench":

@@ -23,7 +23,7 @@ ZERO_ERROR_RATIO = 10.0  # ratio of error to value above which the value counts 
 
 
 def is_over_tolerance(measure: dict, tolerance) -> np.ndarray:
-    """Return whether (n,) the error of a measure exceeds tolerance * |value| + floor.
+    """Return whether the error in each case (n,) exceeds tolerance * |value| + floor.
 
     This is the limit of the warning of a single run.
 
@@ -42,7 +42,7 @@ def is_over_tolerance(measure: dict, tolerance) -> np.ndarray:
 
 
 def is_within_by_floor(measure: dict, tolerance) -> np.ndarray:
-    """Return whether (n,) an error meets the tolerance only by the floor of its measure.
+    """Return whether each error (n,) meets the tolerance only because of the floor of its measure.
 
     The value must exceed this floor, so that a reader sees it with its error. The arguments are
     those of `is_over_tolerance`.
@@ -58,13 +58,13 @@ def is_within_by_floor(measure: dict, tolerance) -> np.ndarray:
 
 
 def format_floor(measure: dict, cases: np.ndarray) -> str:
-    """Return the largest floor of a measure in some cases (n,) as text."""
+    """Return the largest absolute error floor of a measure in some cases (n,) as text."""
     floors = np.broadcast_to(np.asarray(measure.get("floors", 0.0), float), cases.shape)
     return format_quantity(float(floors[cases].max()), measure.get("unit", "1"), 2)
 
 
 def count_over_tolerance(measures: dict, tolerance) -> dict:
-    """Count the cases that exceed the tolerance, for each measure that has any.
+    """Count the cases that exceed the tolerance, for each measure with at least one such case.
 
     measures: {name: as for `is_over_tolerance`}.
 
@@ -88,7 +88,7 @@ def count_over_tolerance(measures: dict, tolerance) -> dict:
 
 
 def tolerance_sentence(measures: dict, tolerance, format_case, first: str = "") -> str:
-    """State how many cases miss the tolerance for the worst main measure.
+    """State in how many cases the main measure with the most misses exceeds the tolerance.
 
     It also states the worst case, and how many other measures miss the tolerance.
 
@@ -196,7 +196,7 @@ def _error_ratio(measure: dict, tolerance) -> np.ndarray:
 
 
 def _relative_error(measure: dict) -> np.ndarray:
-    """Return the ratio (n,) of the error to |value|; inf if the value is 0."""
+    """Return the ratio (n,) of the error to |value|, which is inf if the value is 0."""
     values, errors = (np.asarray(measure[name], float) for name in ("values", "errors"))
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(errors > 0, errors / np.abs(values), 0.0)

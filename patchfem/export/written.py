@@ -17,7 +17,7 @@ def measure_label(name: str) -> str:
 
 
 def shorten_number(text: str) -> str:
-    """Return a value as written, with at most six digits.
+    """Return a value as it is written in the scene, with at most six digits.
 
     For example, 3.16227766016838e-06 rad becomes 3.16228e-06 rad.
     """
@@ -57,7 +57,7 @@ def drop_repeated_unit(text: str, next_text: str) -> str:
 
 
 def _round_long_number(text: str, digits: int) -> str:
-    """Shorten a number with many digits."""
+    """Round a number that is written with many digits."""
     match = NUMBER_PATTERN.match(text)
     if match is None or len(match[1]) < MIN_LONG_NUMBER:
         return text

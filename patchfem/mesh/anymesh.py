@@ -17,9 +17,9 @@ from .grading import LENGTH_TOL, tributary_lengths
 # Largest slope of a rounded edge within the interface; the normal and the vertical gap then differ
 # by half a percent
 MAX_SLOPE = 0.1
-# Tags of the cells of a pair
+# Tags of the cells of both pieces
 CELL_TAGS = ("upper_substrate", "upper_coating", "lower_substrate", "lower_coating")
-# Tags of the edges of a pair
+# Tags of the edges on the interfaces and the far faces of both pieces
 EDGE_TAGS = ("upper_interface", "lower_interface", "upper_far", "lower_far")
 
 
@@ -44,7 +44,7 @@ class TaggedMesh:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class PieceMesh:
-    """Mesh of triangles and quadrilaterals of one piece.
+    """Mesh of one piece that consists of triangles and quadrilaterals.
 
     - ``points``: (N, 2) x and depth >= 0 [m]
     - ``triangles``: (t, 3), ``quads``: (q, 4) nodes, counterclockwise in (x, depth)
@@ -67,7 +67,7 @@ class PieceMesh:
 
     @property
     def interface_depths(self) -> np.ndarray:
-        """Depth of the interface nodes (m,) [m], >= 0, which rounded edges add to the gap."""
+        """Depth of the interface nodes (m,) [m], >= 0, which is added to the gap at rounded edges."""
         return self.points[self.interface, 1]
 
     @property
@@ -98,7 +98,7 @@ class PieceMesh:
 
     @property
     def coating_thickness(self) -> float:
-        """Mean thickness of the coating [m], area over extent along x; 0 if there is no coating."""
+        """Mean thickness of the coating [m] (its area over its extent along x), or 0 if there is none."""
         if not self.is_coating.any():
             return 0.0
         n_triangles = len(self.triangles)
@@ -109,7 +109,7 @@ class PieceMesh:
 
     @property
     def base_grid(self):
-        """Tensor grid from which the mesh is made; None for an unstructured mesh."""
+        """Tensor grid from which the mesh is made, or None if the mesh is unstructured."""
         return None
 
     def areas(self) -> np.ndarray:
@@ -122,7 +122,7 @@ class PieceMesh:
         return tributary_lengths(self.x)
 
     def refine(self) -> "PieceMesh":
-        """Return the piece with every edge halved and every cell split into four.
+        """Return the piece after every edge is halved and every cell is split into four.
 
         New nodes of the interface and of the far face lie half way between the old ones.
         """
@@ -171,14 +171,14 @@ class PairMesh:
 
     @property
     def has_matching_nodes(self) -> bool:
-        """Whether both pieces have their interface nodes at the same x, to 1e-9 of the length."""
+        """Return whether the interface nodes of both pieces have the same x, to 1e-9 of the length."""
         a = self.lower.x
         b = self.upper.x
         return a.size == b.size and bool(np.abs(a - b).max() <= LENGTH_TOL * self.lower.length)
 
 
 def cell_edges(mesh: PieceMesh) -> tuple[np.ndarray, np.ndarray]:
-    """Return the edges of all cells, counterclockwise, those of triangles first.
+    """Return the counterclockwise edges of all cells, first those of the triangles.
 
     An edge between two cells occurs twice, once in either direction.
 
@@ -244,7 +244,7 @@ def build_pair(mesh: TaggedMesh, source) -> PairMesh:
 
 
 def freeze_piece(mesh: PieceMesh) -> PieceMesh:
-    """Return a piece with read-only arrays."""
+    """Return a copy of a piece whose arrays are read-only."""
     return PieceMesh(
         frozen_array(mesh.points),
         frozen_array(mesh.triangles, np.int64),
@@ -274,7 +274,7 @@ def _check_tags(mesh: TaggedMesh, source) -> None:
 
 
 def _check_numbers(mesh: TaggedMesh, source) -> None:
-    """Raise PatchfemError unless cells refer to existing nodes and the nodes lie in a plane."""
+    """Raise PatchfemError unless the cells refer to existing nodes and all nodes lie in a plane."""
     n_points = len(mesh.points)
     for group in (mesh.triangles, mesh.quads, *(mesh.nodes[edge] for edge in EDGE_TAGS)):
         if group.size and (group.min() < 0 or group.max() >= n_points):
@@ -298,7 +298,7 @@ def _check_numbers(mesh: TaggedMesh, source) -> None:
 
 
 def _select_piece(mesh: TaggedMesh, side: str) -> tuple[np.ndarray, np.ndarray]:
-    """Select the cells of a tagged mesh that belong to a piece, and their nodes."""
+    """Return the cells of a tagged mesh that belong to a piece, and the nodes of these cells."""
     is_cell = np.isin(mesh.names, (f"{side}_substrate", f"{side}_coating"))
     n_triangles = len(mesh.triangles)
     triangles = mesh.triangles[is_cell[:n_triangles]]
@@ -307,7 +307,7 @@ def _select_piece(mesh: TaggedMesh, side: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _build_piece(mesh: TaggedMesh, side: str, is_cell, used, source) -> PieceMesh:
-    """Build a piece from its cells and the nodes that they use, with y as depth; check it."""
+    """Build a piece from its cells and their nodes, with y converted to depth, and check it."""
     n_triangles = len(mesh.triangles)
     points = mesh.points[used, :2] * [1.0, -1.0 if side == "lower" else 1.0]
     triangles = np.searchsorted(used, mesh.triangles[is_cell[:n_triangles]])
@@ -342,7 +342,7 @@ def _build_piece(mesh: TaggedMesh, side: str, is_cell, used, source) -> PieceMes
 
 
 def _signed_areas(corners) -> np.ndarray:
-    """Return the areas (c,) of cells with corners (c, n, 2), > 0 if counterclockwise."""
+    """Return the areas (c,) of cells with corners (c, n, 2), positive if these are counterclockwise."""
     # Coordinates relative to a corner of the cell lose no digits if the origin is far away.
     first_corner = corners[:, :1]
     a = corners - first_corner
@@ -369,7 +369,7 @@ def _turn_counterclockwise(points, cells, source) -> np.ndarray:
 
 
 def _check_interface(points, nodes, side: str, source) -> None:
-    """Raise PatchfemError unless an interface is the line y = 0 or slopes gently from it.
+    """Raise PatchfemError unless an interface is the line y = 0 or has a small slope against it.
 
     nodes: interface nodes by increasing x. Nodes must not coincide, and none may lie beyond y = 0.
     """
@@ -412,7 +412,7 @@ def _check_interface(points, nodes, side: str, source) -> None:
 
 
 def _check_connections(mesh: PieceMesh, side: str, source) -> None:
-    """Raise PatchfemError unless the cells of a piece are connected edge to edge.
+    """Raise PatchfemError unless the cells of a piece are connected through common edges.
 
     The interface and the far face must lie on the border of the piece.
     """

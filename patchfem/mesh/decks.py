@@ -26,7 +26,7 @@ MAX_SET_SIZE_RATIO = 4
 
 
 class DeckBlock(NamedTuple):
-    """Keyword of a deck with its parameters and data lines."""
+    """Keyword in a deck with its parameters and data lines."""
 
     keyword: str
     parameters: dict
@@ -34,7 +34,7 @@ class DeckBlock(NamedTuple):
 
 
 class Deck:
-    """Nodes, elements and sets of an Abaqus or CalculiX deck."""
+    """Nodes, elements and sets in an Abaqus or CalculiX deck."""
 
     def __init__(self):
         self.nodes: dict[int, list[float]] = {}
@@ -169,7 +169,7 @@ def read_deck(text: str) -> TaggedMesh:
 
 
 def _split_blocks(text: str):
-    """Yield the keyword blocks of a deck; comments and empty lines are skipped."""
+    """Yield the keyword blocks in a deck; skip comments and empty lines."""
     block = DeckBlock("", {}, [])
     for line in text.splitlines():
         if not line.strip() or line.startswith("**"):

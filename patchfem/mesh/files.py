@@ -31,7 +31,7 @@ MIN_ENTRY_BYTES = {b"$Nodes": 6, b"$Elements": 4}
 
 
 def write_mesh(lower, path: Path, upper=None) -> None:
-    """Write a pair as a tagged mesh, from which `read_pieces` builds the same pieces.
+    """Write a pair as a tagged mesh from which `read_pieces` builds the same pieces.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def write_mesh(lower, path: Path, upper=None) -> None:
 
 
 def read_bodies(path: Path) -> tuple:
-    """Read a tagged mesh of any format as two tensor grids, or else as two unstructured meshes.
+    """Read a tagged mesh of any format as two tensor grids if possible, otherwise as unstructured meshes.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def read_pieces(path: Path) -> PairMesh:
 
 
 class _Tags(NamedTuple):
-    """The tags of a meshio mesh.
+    """Tags in a meshio mesh.
 
     - ``names``: name by (1 for lines or 2 for cells, code)
     - ``codes``: an array for each block of cells, or None
@@ -173,7 +173,7 @@ def _read_tags(path: Path, mesh) -> _Tags:
 
 
 def _convert_mesh(path: Path, mesh) -> TaggedMesh:
-    """Convert a meshio mesh: collect triangles, quads and edge nodes by their tags."""
+    """Convert a meshio mesh: group triangles, quads and edge nodes by their tags."""
     tags = _read_tags(path, mesh)
     cells = {"triangle": [np.empty((0, 3), np.int64)], "quad": [np.empty((0, 4), np.int64)]}
     labels = {"triangle": [np.empty(0, "U1")], "quad": []}
@@ -207,7 +207,7 @@ def _convert_mesh(path: Path, mesh) -> TaggedMesh:
 
 
 def _select_group(groups: list) -> str:
-    """Return the group of a family that is a tag of a piece, else its first group."""
+    """Return the group of a family that is a tag of a piece, or its first group if none is."""
     names = [name.strip().lower() for name in groups]
     return next((name for name in names if name in CELL_TAGS | EDGE_TAGS), names[0])
 

@@ -44,7 +44,7 @@ class Layout:
         )
 
     def scale_cells(self, factor: float) -> "Layout":
-        """Return the layout with all cell lengths, and the slope, multiplied by a factor."""
+        """Return the layout after all cell lengths, and their slope, are multiplied by a factor."""
         return replace(
             self,
             bands=tuple((low, high, length * factor) for low, high, length in self.bands),
@@ -55,14 +55,14 @@ class Layout:
 
 
 def _distance_from_interval(x, low: float, high: float) -> np.ndarray:
-    """Return the distance of positions (k,) from an interval."""
+    """Return the distances of positions (k,) from an interval."""
     if low == high:
         return np.abs(x - low)
     return np.maximum(0.0, np.maximum(low - x, x - high))
 
 
 def graded_levels(layout: Layout, *, is_even: bool = False, min_cells: int = 1) -> np.ndarray:
-    """Divide an interval into cells of given target lengths.
+    """Divide an interval into cells whose lengths approximate given target lengths.
 
     The levels lie at equal steps of the integral of 1/length, so the lengths of neighbouring cells
     differ by a factor of about 1 + slope at most.
@@ -103,16 +103,16 @@ def graded_levels(layout: Layout, *, is_even: bool = False, min_cells: int = 1) 
 
 
 def tributary_lengths(x) -> np.ndarray:
-    """Return the tributary length (m,) [m] of nodes at ascending positions (m,) [m].
+    """Return the tributary lengths (m,) [m] of nodes at ascending positions (m,) [m].
 
-    It is half the sum of the lengths of the cells on either side of a node.
+    Each is half the sum of the lengths of the cells on either side of a node.
     """
     half_cells = np.diff(x) / 2
     return np.append(half_cells, 0.0) + np.insert(half_cells, 0, 0.0)
 
 
 def divide_into_columns(layout: Layout, required_levels=()) -> np.ndarray:
-    """Divide a layout into an even number of columns, four at least.
+    """Divide a layout into an even number of at least four columns.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def divide_into_columns(layout: Layout, required_levels=()) -> np.ndarray:
 
 
 def divide_into_rows(layout: Layout, coating_thickness: float) -> tuple[np.ndarray, int]:
-    """Return the depths of the rows of cells, at least two in the coating and three below it.
+    """Return the depths that bound the rows of cells, at least two in the coating and three below it.
 
     Parameters
     ----------

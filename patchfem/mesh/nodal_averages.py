@@ -14,7 +14,7 @@ MAX_ORDERED_CELLS = 8
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Patches:
-    """Cells around each point, with the weights of their average.
+    """Cells around each point, with the weights in the average over them.
 
     - ``starts``: (s + 1,) index into `cells` at which each point begins
     - ``cells``, ``weights``: (k,) point by point
@@ -34,7 +34,7 @@ class Patches:
         return np.add.reduceat(self.weights[:, None] * values[self.cells], self.starts[:-1])
 
     def group_by_size(self) -> "GroupedPatches":
-        """Return the patches grouped by their number of cells, so that groups are summed at once.
+        """Return the patches in groups with equal numbers of cells, so that each group is summed at once.
 
         The result acts on values with the cells on the last axis.
         """
@@ -49,7 +49,7 @@ class Patches:
         return GroupedPatches(counts.size, groups, other_points, other_patches)
 
     def select(self, points) -> "Patches":
-        """Return the patches of the points with given indices (p,)."""
+        """Return the patches around the points with given indices (p,)."""
         counts = np.diff(self.starts)[points]
         starts = np.append(0, np.cumsum(counts))
         shifts = self.starts[:-1][points] - starts[:-1]
@@ -58,7 +58,7 @@ class Patches:
 
 
 class PatchGroup(NamedTuple):
-    """Points (p,) with the same number c of cells each, and the cells and weights (c, p)."""
+    """Points (p,) that have the same number c of cells, and their cells and weights (c, p)."""
 
     points: np.ndarray
     cells: np.ndarray
@@ -104,7 +104,7 @@ class GroupedPatches:
 
 
 def collect_patches(point, cell, weight=None) -> Patches:
-    """Group pairs of a point and a cell by point.
+    """Group (point, cell) pairs by point.
 
     Parameters
     ----------

@@ -75,7 +75,7 @@ def join_meshes(lower, upper) -> tuple[np.ndarray, list[CellBlock]]:
 
 
 def _far_edges(body: PieceMesh) -> np.ndarray:
-    """Return the edges between nodes of the far face; an isolated node is joined to itself."""
+    """Return the edges between nodes on the far face; an isolated node is connected to itself."""
     edges = np.unique(np.sort(cell_edges(body)[0], axis=1), axis=0)
     edges = edges[np.isin(edges, body.far).all(axis=1)]
     isolated_nodes = np.setdiff1d(body.far, edges)

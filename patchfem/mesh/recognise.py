@@ -16,7 +16,7 @@ MIN_FACE_COSINE = np.cos(np.radians(30.0))
 
 
 def recognise_grids(pair: PairMesh) -> tuple[TensorGrid, TensorGrid | None] | None:
-    """Return a checked pair as tensor grids, if both are tensor grids with equal columns.
+    """Return a checked pair as tensor grids if both pieces are tensor grids with equal columns.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def recognise_grids(pair: PairMesh) -> tuple[TensorGrid, TensorGrid | None] | No
 
 
 def recognise_grid(mesh: PieceMesh) -> TensorGrid | None:
-    """Return a checked piece as a tensor grid, None if it is not one.
+    """Return a checked piece as a tensor grid, or None if it is not one.
 
     The cells are then the quads between columns and rows of nodes, the interface is the first row,
     the coating consists of whole rows below it, and the far face is the last row, fixed at every
@@ -103,7 +103,7 @@ def measure_clamped_length(mesh: PieceMesh) -> tuple[float, float]:
 
 
 def find_holes(mesh: PieceMesh) -> tuple[int, float]:
-    """Count the holes inside a piece and measure their area; a notch of the outline is no hole.
+    """Count the holes inside a piece and measure their area; a notch in the outline is not a hole.
 
     A loop of the border that is clockwise surrounds a hole; its area follows from the shoelace
     formula. Holes that touch at a node count as one. A hole that touches the outline is a notch.
@@ -126,7 +126,7 @@ def find_holes(mesh: PieceMesh) -> tuple[int, float]:
 
 
 def _border_edges(mesh: PieceMesh) -> np.ndarray:
-    """Return the edges (b, 2) that belong to one cell only, counterclockwise around it."""
+    """Return the edges (b, 2) that belong to a single cell, counterclockwise around this cell."""
     edges, _ = cell_edges(mesh)
     _, first, counts = np.unique(
         np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True

@@ -19,7 +19,7 @@ from .tensor import ROW_GROWTH, TensorGrid, graded_rows, merge_levels, split_lev
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ShapedGrid(PieceMesh):
-    """A piece as a mesh of quads, and the grid that it is made from.
+    """Piece as a mesh of quads, and the grid from which the mesh is made.
 
     - ``inner``: tensor grid over the interface
     - ``outer``: (k,) distances [m] of the columns beyond either end of the interface, the first 0
@@ -32,7 +32,7 @@ class ShapedGrid(PieceMesh):
 
     @property
     def coating_thickness(self) -> float:
-        """Thickness of the coating [m]; 0 if there is no coating."""
+        """Thickness of the coating [m], or 0 if there is no coating."""
         return self.inner.coating_thickness
 
     @property
@@ -42,11 +42,11 @@ class ShapedGrid(PieceMesh):
 
     @property
     def base_grid(self) -> TensorGrid:
-        """The tensor grid over the interface."""
+        """Tensor grid over the interface."""
         return self.inner
 
     def refine(self) -> "ShapedGrid":
-        """Return the piece with every cell split in two in both directions.
+        """Return the piece after every cell is split in two in both directions.
 
         The nodes of the face follow its shape.
         """
@@ -55,7 +55,7 @@ class ShapedGrid(PieceMesh):
         )
 
     def coarsen(self) -> "ShapedGrid":
-        """Return the piece with its cells merged two by two in both directions."""
+        """Return the piece after its cells are merged two by two in both directions."""
         return _move_columns(
             self.inner.coarsen(), merge_levels(self.outer), self._piece_length(), self.end
         )

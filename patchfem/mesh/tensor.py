@@ -21,7 +21,7 @@ MIN_SUBSTRATE_ROWS = 3  # smallest number of rows below the coating
 
 @dataclass(frozen=True, eq=False, slots=True)
 class TensorGrid:
-    """A graded tensor grid of one piece.
+    """Graded tensor grid of one piece.
 
     - ``x``: (nx,) columns of nodes [m], 0 in the middle
     - ``depth``: (ny,) rows of nodes [m], 0 at the interface
@@ -49,7 +49,7 @@ class TensorGrid:
 
     @property
     def coating_thickness(self) -> float:
-        """Thickness of the coating [m]; 0 if there is no coating."""
+        """Thickness of the coating [m], or 0 if there is no coating."""
         return float(self.depth[self.coating_rows])
 
     @property
@@ -62,12 +62,12 @@ class TensorGrid:
         return tributary_lengths(self.x)
 
     def is_coating_cell(self) -> np.ndarray:
-        """Return whether each cell is coating, (nx - 1, ny - 1) bool, as columns by rows."""
+        """Return whether each cell (column, row) belongs to the coating, as bool (nx - 1, ny - 1)."""
         row = np.arange(self.depth.size - 1) < self.coating_rows
         return np.broadcast_to(row, (self.x.size - 1, row.size))
 
     def coarsen(self) -> "TensorGrid":
-        """Return the grid with its cells merged two by two in both directions.
+        """Return the grid after its cells are merged two by two in both directions.
 
         An odd number of columns is merged into columns of equal width. A single thin column at an
         end would make the coarse grid finer there than elsewhere.
@@ -78,14 +78,14 @@ class TensorGrid:
         return self._with_rows(x, merge_levels)
 
     def refine(self) -> "TensorGrid":
-        """Return the grid with every cell split in two in both directions, graded smoothly.
+        """Return the grid after every cell is split in two in both directions with smooth grading.
 
         The rows of the coating stay in the coating.
         """
         return self._with_rows(split_levels(self.x), split_levels)
 
     def _with_rows(self, x, change) -> "TensorGrid":
-        """Return the grid with given columns, and rows changed by a function for each layer."""
+        """Return the grid with given columns, and with rows to which a function is applied in each layer."""
         coating_depth = change(self.depth[: self.coating_rows + 1])
         substrate_depth = change(self.depth[self.coating_rows :])
         depth = np.concatenate([coating_depth, substrate_depth[1:]])

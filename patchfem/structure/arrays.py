@@ -112,7 +112,7 @@ def _refuse_long_directory(path: Path) -> None:
 
 
 def _refuse_large(name: str, shape: tuple) -> None:
-    """Raise PatchfemError for an array that is larger than the matrices of the largest rig."""
+    """Raise PatchfemError if an array is larger than the matrices of the largest rig that is allowed."""
     if prod(shape) > MAX_COORDINATES**2:
         raise PatchfemError(
             f"{name} of shape {'x'.join(map(str, shape))} is larger than {MAX_COORDINATES} coordinates "
@@ -121,7 +121,7 @@ def _refuse_large(name: str, shape: tuple) -> None:
 
 
 def _drop_dimensions(values) -> np.ndarray:
-    """Turn a matrix of a .mat file with one row or column into a vector."""
+    """Convert a matrix of a .mat file that has a single row or column to a vector."""
     return values if values.ndim == 2 and min(values.shape) > 1 else values.ravel()
 
 
@@ -226,7 +226,7 @@ def _build_basis_from_matrices(
 
 
 def _to_matrix(values, name: str):
-    """Convert a single number to a matrix of one row; pass other arrays and None through."""
+    """Convert a single number to a matrix with one row; return other arrays and None unchanged."""
     if values is None or np.ndim(values) == 2:
         return values
     if np.size(values) != 1:
@@ -296,7 +296,7 @@ def _build_basis_from_modes(
 
 
 def _read_damping(data: dict, omega) -> tuple:
-    """Read damping ratios (n,), and the damping matrix (n, n) [1/s] unless it is diagonal."""
+    """Read damping ratios (n,), and the damping matrix (n, n) [1/s] if it is not diagonal."""
     n = omega.size
     damping = _read_numbers(data, "damping", (n,), (n, n))
     if damping.ndim == 1:
@@ -312,7 +312,7 @@ def _read_damping(data: dict, omega) -> tuple:
 
 
 def _read_numbers(data: dict, name: str, *shapes) -> np.ndarray:
-    """Convert an array of a file to finite real numbers.
+    """Convert an array from a file to finite real numbers.
 
     Parameters
     ----------
@@ -337,14 +337,14 @@ def _read_numbers(data: dict, name: str, *shapes) -> np.ndarray:
 
 
 def _has_shape(values, shape: tuple) -> bool:
-    """Return whether an array has a given shape, in which None means any length."""
+    """Return whether an array has a given shape, in which None stands for any length."""
     if len(shape) != values.ndim:
         return False
     return all(length in (None, size) for length, size in zip(shape, values.shape))
 
 
 def _read_names(data: dict, n: int) -> tuple | None:
-    """Read the names of n coordinates; None if the file has none."""
+    """Read the names of n coordinates; return None if the file contains no names."""
     if "names" not in data:
         return None
     # A cell of a .mat file is an array with one string.

@@ -23,7 +23,7 @@ PARTICIPATION_FIELDS = (
 
 
 def add_spring(basis: ModalBasis, stiffness: float, damping: float = 0.0) -> ModalBasis:
-    """Add a spring and a damper along the slide of the first interface.
+    """Add a spring and a damper that act along the sliding direction of the first interface.
 
     The stiffness diag(omega^2) + k s s^T/mass is made diagonal again; the damping matrix couples the new
     modes in general. `shapes` of the result leads back to the named modes or masses of `basis`.
@@ -47,7 +47,7 @@ def add_spring(basis: ModalBasis, stiffness: float, damping: float = 0.0) -> Mod
 
 
 def remove_springs(basis: ModalBasis, stiffness, damping: float = 0.0) -> ModalBasis:
-    """Subtract the springs and the damper with which modes were measured.
+    """Subtract the springs and the damper that were present when the modes were measured.
 
     The remaining stiffness is diag(omega^2) - sum k_i s_i s_i^T/mass.
 
@@ -96,7 +96,7 @@ def remove_springs(basis: ModalBasis, stiffness, damping: float = 0.0) -> ModalB
 
 
 def _advise_on_slides(omega, joint) -> str:
-    """Return the factor by which the slides of all modes must fall so that a joint can be removed.
+    """Return advice by which factor to multiply `slide` of all modes so that a joint can be removed.
 
     joint: (n, n) stiffness of the joint over the mass [rad2 s-2]; "" if no factor suffices.
     """
@@ -109,7 +109,7 @@ def _advise_on_slides(omega, joint) -> str:
 
 
 def _change_coordinates(basis: ModalBasis, omega, shapes, damper) -> ModalBasis:
-    """Transform a modal basis to new modes, with an additional damping matrix.
+    """Transform a modal basis to new modes, and add a damping matrix.
 
     Parameters
     ----------

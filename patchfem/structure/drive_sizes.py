@@ -18,7 +18,7 @@ TIME_TOL = 1e-6
 
 
 class DriveKeys(NamedTuple):
-    """Keys of [drive], with the quantities that are needed to build a drive from them.
+    """Keys of [drive], with the other quantities that are needed to build a drive signal.
 
     - keys: keys of [drive] in SI units.
     - mass: modal mass [kg].
@@ -33,17 +33,17 @@ class DriveKeys(NamedTuple):
 
     @property
     def moving(self) -> bool:
-        """Whether the base accelerates; if not, a force acts."""
+        """Return whether the base is accelerated; otherwise, a force acts."""
         return self.keys.kind == "base"
 
     @property
     def levels(self) -> tuple:
-        """Acceleration, or force per modal mass, of each drive level [m s-2]; () if there are no levels."""
+        """Acceleration, or force per modal mass, of each drive level [m s-2]; () if the scene sets no levels."""
         mass = 1.0 if self.moving else self.mass
         return tuple(level / mass for level in self.keys.levels or ())
 
     def acceleration(self, omega: float) -> float:
-        """Return the amplitude [m s-2] of the drive at a circular frequency [rad/s].
+        """Return the amplitude [m s-2] of the drive signal at a circular frequency [rad/s].
 
         It is the amplitude of the acceleration, the amplitude of the displacement times omega^2, or
         that of the force over the modal mass.
@@ -56,19 +56,19 @@ class DriveKeys(NamedTuple):
 
 
 def count_cycles_per_level(keys) -> float:
-    """Return the number of drive cycles per level, an integer, so that each level begins at a cycle start."""
+    """Return the integer number of drive cycles per level, so that each level begins with a new cycle."""
     cycles = keys.cycles if keys.cycles is not None else keys.duration * keys.frequency
     return float(max(1, round(cycles)))
 
 
 def find_first_period(modes: ModalBasis) -> float:
-    """Return the period [s] of the first elastic mode, 1 s if all modes are rigid."""
+    """Return the period [s] of the first elastic mode, or 1 s if all modes are rigid."""
     elastic = modes.omega[modes.omega > 0]
     return float(2 * np.pi / elastic[0]) if elastic.size else 1.0
 
 
 def find_min_decay_rate(modes: ModalBasis) -> float:
-    """Return the lowest decay rate [1/s] of a damped coordinate, 0 if none is damped.
+    """Return the lowest decay rate [1/s] of a damped coordinate, or 0 if none is damped.
 
     The rate is half the diagonal entry of the damping matrix. Modes with several sets of values (...,
     n) give a rate (...,) for each set.
@@ -79,7 +79,7 @@ def find_min_decay_rate(modes: ModalBasis) -> float:
 
 
 def find_decay_rate(modes: ModalBasis) -> float:
-    """Return the decay rate [1/s] of the slowest mode; negative if a coordinate grows.
+    """Return the decay rate [1/s] of the slowest mode, which is negative if a coordinate grows.
 
     It is `find_min_decay_rate`, or minus the largest growth rate.
     """
@@ -88,7 +88,7 @@ def find_decay_rate(modes: ModalBasis) -> float:
 
 
 def find_max_acceleration(drive) -> float:
-    """Return the largest acceleration [m s-2] of a drive, or force over modal mass; it is >= 0."""
+    """Return the largest absolute acceleration [m s-2], or force per modal mass, of a drive signal."""
     if isinstance(drive, SineDrive):
         return drive.acceleration
     if drive.segments:
@@ -97,12 +97,12 @@ def find_max_acceleration(drive) -> float:
 
 
 def find_drive_omega(drive) -> float:
-    """Return the angular frequency [rad/s] of the cycle of a drive."""
+    """Return the circular frequency [rad/s] at which the cycles of a drive signal repeat."""
     return 2 * np.pi / drive.period
 
 
 def estimate_peak_speed(drive, start: InitialState | None = None) -> float:
-    """Estimate the largest speed [m/s] of a motion from its drive and its initial conditions.
+    """Estimate the peak speed [m/s] of a motion from its drive signal and its initial conditions.
 
     It is the largest of the acceleration over omega, the initial velocities, and the initial
     displacements times omega.
@@ -118,12 +118,12 @@ def estimate_peak_speed(drive, start: InitialState | None = None) -> float:
 
 
 def find_max_frequency_ratio(drive) -> float:
-    """Return the ratio of the highest frequency of a drive to the frequency of its cycle."""
+    """Return the ratio of the highest frequency of a drive signal to the frequency of its cycles."""
     return 1.0 if drive.segments else drive.max_frequency_ratio
 
 
 def is_sinusoidal(drive) -> bool:
-    """Return whether the last segment of a drive is a sine.
+    """Return whether the last segment of a drive signal is a sine.
 
     Phases and ratios of first harmonics are defined only then.
     """
@@ -131,7 +131,7 @@ def is_sinusoidal(drive) -> bool:
 
 
 def is_periodic(drive) -> bool:
-    """Return whether a drive repeats after each of its cycles until it ends.
+    """Return whether a drive signal repeats after each of its cycles until it ends.
 
     Steady amplitudes and values per cycle need no more than this. Drives other than sines state it by
     their attribute `is_periodic`.
@@ -140,7 +140,7 @@ def is_periodic(drive) -> bool:
 
 
 def count_repeat_cycles(drive) -> float | None:
-    """Return the number of cycles after which a drive repeats, None if it never does."""
+    """Return the number of cycles after which a drive signal repeats, or None if it never does."""
     return 1.0 if is_periodic(drive) else getattr(drive, "beat", None)
 
 
@@ -150,7 +150,7 @@ def has_full_cycle(span: float, drive) -> bool:
 
 
 def is_release(drive) -> bool:
-    """Return whether the motion is a release in the absence of a drive."""
+    """Return whether the drive signal is zero, so that the motion is a free motion after a release."""
     return len(drive.segments) == 1 and find_max_acceleration(drive) == 0
 
 
@@ -175,7 +175,7 @@ def choose_samples_per_cycle(drive, cycles: float, *, needs_history: bool = Fals
 
 
 def _build_sine(drive: DriveKeys) -> SineDrive:
-    """Build the drive with waveform "sine"."""
+    """Build the drive signal for waveform "sine"."""
     omega = 2 * np.pi * drive.keys.frequency
     return SineDrive(float(drive.acceleration(omega)), float(omega), drive.moving)
 

@@ -35,7 +35,7 @@ MIN_TAYLOR_RATE = 40
 
 @dataclass(frozen=True, eq=False, slots=True)
 class PiecewiseDrive:
-    """Drive that consists of successive constant and sinusoidal segments.
+    """Drive signal that consists of successive constant and sinusoidal segments.
 
     - period: duration [s] of a cycle.
     - is_periodic: whether the segments repeat after each period until the run ends; a drive that ends
@@ -48,7 +48,7 @@ class PiecewiseDrive:
     is_periodic: bool = False
 
     def values(self, t):
-        """Evaluate the drive [m s-2] at times t (k,) >= 0 [s]; the later segment holds at a border."""
+        """Evaluate the drive signal [m s-2] at times t (k,) >= 0 [s]; at a border, use the later segment."""
         t = np.asarray(t, float)
         starts = [segment.start for segment in self.segments]
         active = np.searchsorted(starts, t, side="right") - 1
@@ -61,7 +61,7 @@ class PiecewiseDrive:
 
 
 def make_step(acceleration: float, period: float, *, moving: bool = True) -> PiecewiseDrive:
-    """Build a drive that is constant from t = 0 on.
+    """Build a drive signal that is constant from t = 0 on.
 
     Parameters
     ----------
@@ -80,14 +80,14 @@ def make_step(acceleration: float, period: float, *, moving: bool = True) -> Pie
 
 
 def make_release(period: float) -> PiecewiseDrive:
-    """Build a drive that is zero, for free motion after a release."""
+    """Build a drive signal that is zero, for free motion after a release."""
     return PiecewiseDrive((DriveSegment(0.0),), period, False)
 
 
 def make_levels(
     accelerations, omega: float, cycles: float, *, moving: bool = True
 ) -> PiecewiseDrive:
-    """Build a sinusoidal drive of continuous phase whose amplitude changes between levels.
+    """Build a sinusoidal drive signal of continuous phase whose amplitude changes between levels.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def make_levels(
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SweepDrive:
-    """Sinusoidal drive whose frequency is swept between two values and then stays constant.
+    """Sinusoidal drive signal whose frequency is swept between two values and then stays constant.
 
     The drive is sin(2 pi int f dt) times its amplitude.
 
@@ -147,7 +147,7 @@ class SweepDrive:
 
     @property
     def rate(self) -> float:
-        """Largest rate of change [1/s] of the drive, which limits the step of a Taylor series.
+        """Largest rate of change [1/s] of the drive signal, which limits the step of a Taylor series.
 
         It is the highest circular frequency, or a larger rate if the sweep is short.
         """
@@ -191,7 +191,7 @@ class SweepDrive:
         return 2 * np.pi * (cycles + (t - inside) * self.high)
 
     def values(self, t):
-        """Evaluate the drive [m s-2] at times t (k,) >= 0 [s]."""
+        """Evaluate the drive signal [m s-2] at times t (k,) >= 0 [s]."""
         amplitude = self.acceleration
         if self.displacement is not None:
             amplitude = self.displacement * (2 * np.pi * self.frequency(t)) ** 2
@@ -200,7 +200,7 @@ class SweepDrive:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RecordedDrive:
-    """Recorded drive, interpolated linearly between its rows and zero after the last.
+    """Recorded drive signal, interpolated linearly between its rows and zero after the last row.
 
     - time: times (k,) [s], rising from 0; at least two.
     - value: acceleration, or force over the modal mass, at these times [m s-2].
@@ -227,7 +227,7 @@ class RecordedDrive:
 
     @property
     def breaks(self) -> np.ndarray:
-        """Times [s] at which the slope changes: those of all rows but the first."""
+        """Times [s] at which the slope changes, which are those of all rows except the first."""
         return self.time[1:]
 
     @property
@@ -246,7 +246,7 @@ class RecordedDrive:
 
     @property
     def max_frequency_ratio(self) -> float:
-        """Ratio 1, because a recorded drive has the same cycle as the rig."""
+        """Ratio 1, because a recorded drive signal has the same cycle as the rig."""
         return 1.0
 
     @property
@@ -255,18 +255,18 @@ class RecordedDrive:
         return float(self.time[-1])
 
     def values(self, t):
-        """Evaluate the drive [m s-2] at times t (k,) >= 0 [s]."""
+        """Evaluate the drive signal [m s-2] at times t (k,) >= 0 [s]."""
         return np.interp(np.asarray(t, float), self.time, self.value, right=0.0)
 
 
 def _build_levels(drive: DriveKeys) -> PiecewiseDrive:
-    """Build the drive with waveform "levels"."""
+    """Build the drive signal for waveform "levels"."""
     omega = 2 * np.pi * drive.keys.frequency
     return make_levels(drive.levels, omega, count_cycles_per_level(drive.keys), moving=drive.moving)
 
 
 def _build_step(drive: DriveKeys) -> PiecewiseDrive:
-    """Build the drive with waveform "step"."""
+    """Build the drive signal for waveform "step"."""
     if drive.moving and drive.keys.acceleration is None:
         # The jump of the base displacement is included in the initial state.
         return make_release(drive.period)
@@ -274,7 +274,7 @@ def _build_step(drive: DriveKeys) -> PiecewiseDrive:
 
 
 def _build_sweep(drive: DriveKeys) -> SweepDrive:
-    """Build the drive with waveform "sweep"."""
+    """Build the drive signal for waveform "sweep"."""
     keys = drive.keys
     low = keys.from_
     high = keys.to
@@ -295,7 +295,7 @@ def _build_sweep(drive: DriveKeys) -> SweepDrive:
 
 
 def _build_recorded(drive: DriveKeys) -> RecordedDrive:
-    """Build the drive with waveform "file"."""
+    """Build the drive signal for waveform "file"."""
     time, value = drive.read_file()
     scale = 1.0 if drive.moving else 1 / drive.mass
     return RecordedDrive(time, scale * value, drive.period, drive.moving)

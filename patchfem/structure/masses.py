@@ -25,7 +25,7 @@ def make_slide_rows(pairs, n: int) -> np.ndarray:
 def build_basis(
     masses, springs, dampers, interfaces, output: int, driven_mass: int | None = None
 ) -> ModalBasis:
-    """Compute the modal basis (mass 1 kg) of masses joined by springs and dampers.
+    """Compute the modal basis (modal mass 1 kg) of masses that are joined by springs and dampers.
 
     A mass that no spring holds has a rigid mode.
 
@@ -61,14 +61,14 @@ def build_basis(
 
 
 def _make_weighted_rows(elements, n: int) -> np.ndarray:
-    """Return rows whose product rows^T rows is the matrix of given springs or dampers."""
+    """Return rows such that rows^T rows is the stiffness or damping matrix of given elements."""
     rows = make_slide_rows([pair for pair, _ in elements], n)
     coefficients = np.array([coefficient for _, coefficient in elements], float)
     return rows * np.sqrt(coefficients)[:, None]
 
 
 def set_lateral_displacements(basis: ModalBasis, laterals) -> ModalBasis:
-    """Use the last interfaces of a basis as the lateral directions of the first ones.
+    """Declare the last interfaces of a basis to be the lateral directions of the first ones.
 
     Parameters
     ----------

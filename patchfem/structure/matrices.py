@@ -45,7 +45,7 @@ def build_basis(
     damper_rows=None,
     **rows,
 ) -> ModalBasis:
-    """Compute the modal basis (mass 1 kg) of a rig from its matrices.
+    """Compute the modal basis (modal mass 1 kg) of a rig from its matrices.
 
     The modes are sorted by frequency; rigid ones have omega exactly 0.
 
@@ -143,7 +143,7 @@ def split_damping(D, omega) -> tuple:
 
 
 def decouple_modes(rows) -> tuple:
-    """Compute the modes of the stiffness rows^T rows over unit mass.
+    """Compute the modes of the stiffness matrix rows^T rows with a unit mass matrix.
 
     The singular value decomposition gives omega to round-off of the largest omega; an eigenvalue
     problem would give its square to round-off of the largest square.
@@ -169,7 +169,7 @@ def decouple_modes(rows) -> tuple:
 
 
 def trim_round_off(matrix, scale, round_off: float = ENTRY_TOL) -> np.ndarray:
-    """Make a matrix symmetric and set entries that are round-off to zero.
+    """Make a matrix symmetric, and set entries to zero that are as small as round-off.
 
     Parameters
     ----------
@@ -188,7 +188,7 @@ def trim_round_off(matrix, scale, round_off: float = ENTRY_TOL) -> np.ndarray:
 
 
 def _compute_modes(root, K) -> tuple:
-    """Compute ascending circular frequencies (n,) [rad/s] and shapes (n, n) of a stiffness K."""
+    """Compute ascending circular frequencies (n,) [rad/s] and mode shapes (n, n) for a stiffness K."""
     per_mass = _require_finite(_divide_by_root(root, _divide_by_root(root, K).T))
     squares, shapes = eigh((per_mass + per_mass.T) / 2)
     min_square = len(K) * EIGENVALUE_TOL * np.abs(squares).max(initial=0.0)
@@ -212,7 +212,7 @@ def _require_finite(per_mass) -> np.ndarray:
 
 
 def _factor_mass(M):
-    """Return the Cholesky factor (n, n) of a mass matrix M, or roots (n,) if M is diagonal."""
+    """Return the Cholesky factor (n, n) of a mass matrix M, or its square roots (n,) if M is diagonal."""
     diagonal = np.diag(M)
     scale = np.sqrt(np.maximum(diagonal, 0.0))
     if not (M - np.diag(diagonal)).any():
@@ -303,7 +303,7 @@ def _symmetrize(matrix, name: str, shape=None) -> np.ndarray:
 
 
 def _project_damping_matrix(phi, C) -> np.ndarray:
-    """Project a damping matrix C on shapes; raise PatchfemError if it adds energy."""
+    """Project a damping matrix C on mode shapes; raise PatchfemError if C adds energy."""
     size = np.abs(phi)
     D = trim_round_off(phi.T @ C @ phi, size.T @ np.abs(C) @ size)
     values = eigh(D, eigvals_only=True)
@@ -316,14 +316,14 @@ def _project_damping_matrix(phi, C) -> np.ndarray:
 
 
 def _project_damper_rows(phi, damper_rows) -> np.ndarray:
-    """Project individual dampers on mode shapes, as a matrix that never adds energy."""
+    """Return the modal damping matrix of individual dampers, which never adds energy."""
     rates = damper_rows @ phi
     size = np.abs(damper_rows) @ np.abs(phi)
     return trim_round_off(rates.T @ rates, size.T @ size)
 
 
 def _decouple_equal_frequencies(phi, omega, D) -> tuple:
-    """Rotate mode shapes of equal frequency so that the damping D does not couple them."""
+    """Rotate mode shapes of equal frequency so that the damping matrix D does not couple them."""
     first = 0
     for last in range(1, len(omega) + 1):
         if last < len(omega) and omega[last] - omega[first] <= EQUAL_FREQUENCY_TOL * omega[last]:
@@ -355,7 +355,7 @@ def _check_row(row, n: int, name: str) -> np.ndarray:
 
 
 def _find_shape_signs(phi, output) -> np.ndarray:
-    """Return the sign (n,) of each shape for which the output moves in positive direction.
+    """Return the sign (n,) of each mode shape that makes the output move in the positive direction.
 
     At a node of the shape the largest entry is made positive instead.
     """

@@ -72,7 +72,7 @@ class LinearFit(NamedTuple):
 
 
 class FittedPoles(NamedTuple):
-    """Poles that are fitted to frequency responses.
+    """Poles that have been fitted to frequency responses.
 
     - w: natural frequencies (n,) [rad/s], ascending.
     - zeta: damping ratios (n,).
@@ -316,7 +316,7 @@ def add_mode(theta, w: float, zeta: float) -> np.ndarray:
 
 
 def _refine_with_noise(fit: ModalFit, theta, cost):
-    """Refine the parameters to round-off, with weights from the noise of the responses.
+    """Refine the parameters to round-off, with weights that follow from the noise of the responses.
 
     The variance a^2 + b^2 level^2 of the noise is fitted to the residual.
     """
@@ -357,7 +357,7 @@ def _remove_weak_modes(fit: ModalFit, theta):
 
 
 def _find_starts(fit: ModalFit, theta):
-    """Yield initial poles of a further mode at the largest peaks of the residual.
+    """Yield initial poles of an additional mode at the largest peaks of the residual.
 
     The peaks are those of the residual, and those of the residual in proportion to the responses. The
     damping ratio follows from the half-power width of a peak.
@@ -383,7 +383,7 @@ def _find_starts(fit: ModalFit, theta):
 
 
 def _find_half_power_width(omega, spectrum, peak: int) -> float:
-    """Return the width [rad/s] of a peak of a power spectrum at half its maximum."""
+    """Return the width [rad/s] of a peak in a power spectrum at half its maximum."""
     below = above = peak
     while below > 0 and spectrum[below] > spectrum[peak] / 2:
         below -= 1
@@ -504,7 +504,7 @@ def _format_direction(direction) -> str:
 
 
 def _choose_reference(measured: dict):
-    """Return the reference with a driving-point response and the most responses."""
+    """Return the reference that has a driving-point response and the most responses."""
     candidates = [reference for direction, reference in measured if direction == reference]
     if not candidates:
         references = sorted({reference for _, reference in measured})

@@ -13,7 +13,7 @@ PATCH_MOTIONS = ("normal", "pitch", "lateral", "yaw")
 
 
 def build_basis(modes, mass: float) -> ModalBasis:
-    """Build the modal basis of modes that a scene lists.
+    """Build the modal basis from the modes that a scene lists.
 
     Parameters
     ----------

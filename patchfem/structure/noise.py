@@ -24,7 +24,7 @@ SPECTRAL_LINE_TOL = 1e-9
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RandomRecord(RecordedDrive):
-    """Sampled record of a stationary random drive."""
+    """Sampled record of a stationary random drive signal."""
 
     band: tuple = (0.0, 0.0)
 
@@ -86,7 +86,7 @@ def draw_random_record(
 
 
 def _build_random(drive: DriveKeys) -> RandomRecord:
-    """Build the drive with waveform "random"."""
+    """Build the drive signal for waveform "random"."""
     keys = drive.keys
     if keys.file is not None:
         frequency, density = drive.read_file()

@@ -77,7 +77,7 @@ class MeasuredModes:
 
 
 def _list_directions(motion: dict) -> str:
-    """List the first nodes and directions of a file for a message."""
+    """Return the first nodes and directions in a file as text for a message."""
     names = [f"{node}:{DIRECTION_NAMES[axis]}" for node, axis in sorted(motion)]
     text = ", ".join(names[:MAX_LISTED_NODES])
     n_more = len(names) - MAX_LISTED_NODES
@@ -85,7 +85,7 @@ def _list_directions(motion: dict) -> str:
 
 
 def build_basis(shapes: MeasuredModes, mass: float, places: dict, *, is_forced: bool) -> ModalBasis:
-    """Build the modal basis of measured modes.
+    """Build the modal basis from measured modes.
 
     A fixed-base mode phi of a rig whose moving mass m is all in one rigid block participates in the base
     motion by phi^T M r = m phi(block). Modal tests give no mass matrix, so base_at must be that block.
@@ -148,7 +148,7 @@ def build_basis(shapes: MeasuredModes, mass: float, places: dict, *, is_forced: 
 
 
 def note_missing_mass(basis: ModalBasis) -> list:
-    """Return a note if the modes of a file represent too little of the moving mass."""
+    """Return a note if the modes in a file represent too small a part of the moving mass."""
     mass_fraction = float(np.sum(basis.base**2))
     if mass_fraction >= MIN_MASS_FRACTION:
         return []

@@ -49,7 +49,7 @@ CRAIG_BAMPTON = "craig-bampton"
 
 
 class ComputedModes(NamedTuple):
-    """Natural modes that a reduction of sparse matrices computes.
+    """Natural modes that are computed in the reduction of sparse matrices.
 
     - omega: circular frequencies (m,) [rad/s], ascending.
     - participation: participation (m, a) of each mode in each static shape, before it was subtracted
@@ -84,7 +84,7 @@ class Reduction(NamedTuple):
     lowest: np.ndarray
 
     def select_modes(self, n_modes: int) -> np.ndarray:
-        """Return the linear combinations of the shapes that keep only the first modes.
+        """Return the linear combinations of the shapes that retain only the first modes.
 
         The static shapes take over what the other modes contribute to a static response.
 
@@ -174,7 +174,7 @@ def reduce_matrices(K, M, C, boundary, modes: int, method: str, moved=None) -> R
 
 
 def _project(matrix, shapes, round_off: float) -> np.ndarray:
-    """Project a sparse matrix (n, n) on shapes (n, p), with round-off set to zero."""
+    """Project a sparse matrix (n, n) on shapes (n, p), and set entries to zero that are round-off."""
     size = np.abs(shapes)
     scale = size.T @ (abs(matrix) @ size)
     return matrices.trim_round_off(shapes.T @ (matrix @ shapes), scale, round_off)
@@ -204,7 +204,7 @@ def _refuse_indefinite(matrix, name: str) -> None:
 
 
 def _factorize(K) -> SparseFactor | None:
-    """Factorize a stiffness matrix K; return None if it has rigid-body modes."""
+    """Factorize a stiffness matrix K, or return None if it has rigid-body modes."""
     try:
         return SparseFactor(K, MIN_PIVOT)
     except ZeroEnergyMotion:
@@ -250,7 +250,7 @@ def _compute_lowest_modes(K, M, count: int, factor: SparseFactor, shift: float =
 
 
 def _compute_craig_bampton_shapes(K, M, boundary, count: int, load) -> tuple:
-    """Compute fixed-interface modes, constraint modes and the residual static shape of a load.
+    """Compute fixed-interface modes, constraint modes and the residual static shape for a load.
 
     K and M are the stiffness and the mass matrix. Returns the shapes (n, p) and their `ComputedModes`.
     """
@@ -285,7 +285,7 @@ def _compute_craig_bampton_shapes(K, M, boundary, count: int, load) -> tuple:
 
 
 def _compute_free_interface_shapes(K, M, boundary, count: int, load) -> tuple:
-    """Compute free modes, and residual attachment modes of the boundary and of a load.
+    """Compute free-interface modes, and residual attachment modes for the boundary and for a load.
 
     K and M are the stiffness and the mass matrix. Returns the shapes (n, p) and their `ComputedModes`.
     """
@@ -329,7 +329,7 @@ def _subtract_modes(static, modes, M) -> tuple:
 
 
 def _expand_rows(shapes, rows, n: int) -> np.ndarray:
-    """Expand shapes to n coordinates, with zeros in the other rows."""
+    """Expand shapes that are given in some rows to n coordinates; set the other rows to zero."""
     expanded = np.zeros((n, shapes.shape[1]))
     expanded[rows] = shapes
     return expanded
@@ -344,7 +344,7 @@ def build_basis(
     ratio: float = 0.0,
     names=None,
 ) -> ModalBasis:
-    """Build the modal basis (mass 1 kg) of a reduction with its first modes.
+    """Build the modal basis (modal mass 1 kg) from the first modes of a reduction.
 
     The named coordinates, to which `shapes` of the basis leads, are those of the boundary, followed by
     the modes.
@@ -404,7 +404,7 @@ def build_basis(
 
 
 def _factor_stiffness(stiffness, mass) -> np.ndarray:
-    """Return rows (s, c) whose product rows^T rows is a stiffness matrix.
+    """Return rows (s, c) such that rows^T rows is a stiffness matrix.
 
     Without rigid motions they are a Cholesky factor. Eigenvalues would have round-off of the largest
     one, which leaves few digits of the lowest.

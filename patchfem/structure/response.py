@@ -6,7 +6,7 @@ from ..core import ModalBasis, PatchfemError
 
 
 def compute_receptance(basis: ModalBasis, omega, rows_out, rows_in) -> np.ndarray:
-    """Compute the exact receptance matrix of a rig, even if the damping couples its modes.
+    """Compute the exact receptance matrix of a rig, also if the damping couples its modes.
 
     H = rows_out (diag(omega_r^2) - omega^2 + i omega D)^-1 rows_in^T / mass
 
@@ -51,7 +51,7 @@ def compute_receptance(basis: ModalBasis, omega, rows_out, rows_in) -> np.ndarra
 
 
 def _refuse_infinite(omega: float) -> None:
-    """Raise PatchfemError for an infinite response at a circular frequency [rad/s]."""
+    """Raise PatchfemError if the response is infinite at a circular frequency [rad/s]."""
     raise PatchfemError(
         f"structure: the response at {omega / (2 * np.pi):.9g} Hz is infinite, because a mode has "
         "neither damping nor stiffness there"

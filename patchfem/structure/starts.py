@@ -12,7 +12,7 @@ def start_at_rest(basis: ModalBasis) -> InitialState:
 
 
 def start_from_values(basis: ModalBasis, displacement=None, velocity=None) -> InitialState:
-    """Convert initial values of the named modes or masses into coordinates of a basis.
+    """Convert initial values for the named modes or masses into the coordinates of a basis.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def start_from_values(basis: ModalBasis, displacement=None, velocity=None) -> In
 
 
 def _convert_to_coordinates(basis: ModalBasis, values) -> np.ndarray:
-    """Return the coordinates (n,) of a basis that give values (p,) of its named modes or masses."""
+    """Return the coordinates (n,) in a basis for values (p,) that are prescribed for its modes or masses."""
     n = basis.omega.size
     if values is None:
         return np.zeros(n)
@@ -54,7 +54,7 @@ def _convert_to_coordinates(basis: ModalBasis, values) -> np.ndarray:
 
 
 def start_from_output_displacement(basis: ModalBasis, displacement: float) -> InitialState:
-    """Return the initial state at rest with a displacement [m] of the output, deflected by a static force there.
+    """Return the state at rest in which a static force at the output displaces the output by a value [m].
 
     The coordinates are proportional to output_i / omega_i^2. If rigid modes move the output, a force
     moves only these, in proportion to output_i.

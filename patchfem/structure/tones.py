@@ -21,7 +21,7 @@ MAX_DENOMINATOR = 10**6
 
 @dataclass(frozen=True, eq=False, slots=True)
 class TonesRecord(RecordedDrive):
-    """Record of tones, whose cycle is that of the first tone.
+    """Record of a sum of tones, whose cycle is that of the first tone.
 
     - beat: number of cycles after which all tones repeat.
     - max_frequency: highest frequency [Hz].
@@ -37,7 +37,7 @@ class TonesRecord(RecordedDrive):
 
 
 def make_tones(frequencies, accelerations, phases, duration: float) -> TonesRecord:
-    """Build a drive of several tones.
+    """Build a drive signal that is a sum of tones.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def count_beat_cycles(frequencies) -> float:
 
 
 def _build_tones(drive: DriveKeys) -> TonesRecord:
-    """Build the drive with waveform "tones"."""
+    """Build the drive signal for waveform "tones"."""
     keys = drive.keys
     duration = keys.duration if keys.duration is not None else keys.cycles / keys.frequencies[0]
     phases = keys.phases or (0.0,) * len(keys.frequencies)

@@ -29,14 +29,14 @@ MAX_FREQUENCY_CHANGE = 1e-6
 
 
 class _UnitFactors(NamedTuple):
-    """Units of length and force of a file per SI unit, from dataset 164."""
+    """Units of length and force in a file per SI unit, from dataset 164."""
 
     length: float = 1.0
     force: float = 1.0
 
 
 class _Mode(NamedTuple):
-    """Mode of dataset 55.
+    """Mode that is read from dataset 55.
 
     - frequency: natural frequency [Hz].
     - zeta: damping ratio.
@@ -123,7 +123,7 @@ def _read_modes(datasets: list, factors: _UnitFactors) -> MeasuredModes:
 
 
 def _collect_motion(dataset: dict) -> dict:
-    """Return the motion of a shape in each direction (node, axis)."""
+    """Return the component of a mode shape in each direction (node, axis)."""
     motion = {}
     for axis in range(len(DIRECTION_NAMES)):
         column = dataset.get(f"r{axis + 1}")
@@ -134,7 +134,7 @@ def _collect_motion(dataset: dict) -> dict:
 
 
 def _read_normal_mode(number: int, dataset: dict, values) -> _Mode:
-    """Read a real mode; half its hysteretic damping replaces a missing viscous damping ratio."""
+    """Read a real mode; if its viscous damping ratio is missing, use half its hysteretic damping."""
     zeta = dataset["modal_damp_vis"]
     notes = ()
     if not zeta and dataset["modal_damp_his"]:
@@ -148,7 +148,7 @@ def _read_normal_mode(number: int, dataset: dict, values) -> _Mode:
 
 
 def _read_complex_mode(number: int, dataset: dict, values) -> _Mode:
-    """Read a complex mode as the real mode that is nearest to it."""
+    """Read a complex mode, and convert it to the nearest real mode."""
     rotated = _rotate_to_real(values)
     imaginary = np.linalg.norm(rotated.imag) / max(np.linalg.norm(rotated), 1e-300)
     note = (
@@ -168,7 +168,7 @@ def _read_complex_mode(number: int, dataset: dict, values) -> _Mode:
 
 
 def _rotate_to_real(values):
-    """Rotate the phase of a complex shape so that the sum of its squares is real and positive."""
+    """Rotate the phase of a complex mode shape so that the sum of its squares is real and positive."""
     return values * np.exp(-0.5j * np.angle(np.sum(values**2)))
 
 
@@ -226,7 +226,7 @@ def _check_response(dataset: dict, name: str, frequency) -> int:
 
 
 def _find_unit_factor(label: str | None, notes: list) -> float:
-    """Return the SI units per unit of an axis label; `notes` receives a note on an unknown one."""
+    """Return the SI units per unit of an axis label; append a note on an unknown unit to `notes`."""
     label = (label or "").strip()
     if label.lower() not in SI_LABELS and label not in UNIT_FACTORS:
         note = f"structure.file: the unit label '{label}' is not known; the values are taken as SI"
@@ -236,7 +236,7 @@ def _find_unit_factor(label: str | None, notes: list) -> float:
 
 
 def _find_direction(node: int, direction: int) -> tuple:
-    """Return the sign and the (node, axis) of a direction +-1 to +-6 of a universal file."""
+    """Return the sign and the (node, axis) for a direction +-1 to +-6 in a universal file."""
     if not 1 <= abs(direction) <= len(DIRECTION_NAMES):
         raise PatchfemError(
             f"structure.file: direction {direction} of node {node} is unknown; +-1 to +-6 for x, y, z, "

@@ -6,7 +6,7 @@ import numpy as np
 
 
 class NestedStretches(NamedTuple):
-    """Arrays for the solution of contacts on runs of consecutive nodes.
+    """Arrays for the solution of contacts in which consecutive nodes touch.
 
     A stretch begins at a left end, from which on the Cholesky factor is kept.
 
@@ -27,7 +27,7 @@ class NestedStretches(NamedTuple):
 
 
 class CaseSolutions(NamedTuple):
-    """Contact solutions of q cases on m nodes.
+    """Contact solutions for q cases on m nodes.
 
     - first, stop (q,): the stretch in contact, from `first` on and before `stop`, which is 0 for none.
     - force (q, m) [N].
@@ -46,7 +46,7 @@ class CaseSolutions(NamedTuple):
 
 
 class Cases(NamedTuple):
-    """Contact problems of q cases, and the arrays to which their solutions are written.
+    """Contact problems for q cases, and the arrays to which their solutions are written.
 
     - first_try (q,): left end that is tried first.
     - end_limit (q,): node before which the contact is expected to end.

@@ -30,7 +30,7 @@ MIN_PARABOLA_NODES = 3
 
 
 class ContactBatch(NamedTuple):
-    """Contact solutions of q cases: nodes in contact, forces, gaps and holder motions.
+    """Contact solutions for q cases: nodes in contact, forces, gaps and holder motions.
 
     - first, stop (q,): the nodes in contact, from `first` on and before `stop`.
     - force (q, m) [N]; opening (q, m) [m]; closing (q,) [m]; theta (q,) [rad].
@@ -55,7 +55,7 @@ class ContactBatch(NamedTuple):
 
 
 class _LeftEndSolutions(NamedTuple):
-    """Solutions of n cases whose contacts begin at the same node.
+    """Solutions of n cases in which the first node in contact is the same.
 
     - lower (k, k): lower Cholesky factor of the compliance of the k nodes from `left_end` on.
     - force (n, k); stop (n,): ends of the contacts; motion (n, 2): closing [m] and theta [rad].
@@ -69,7 +69,7 @@ class _LeftEndSolutions(NamedTuple):
 
 
 class Intervals:
-    """Interface whose contact is a single run of consecutive nodes.
+    """Interface on which the nodes in contact are always consecutive.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ class Intervals:
         self.sums = np.zeros((x.size + 1, 3, x.size + 1))
 
     def press(self, gap, load, moment=None, spring=0.0, brackets=None) -> ContactBatch:
-        """Solve the contact problems of q cases.
+        """Solve the contact problems for q cases.
 
         Parameters
         ----------
@@ -153,7 +153,7 @@ class Intervals:
         return contacts
 
     def _bracket_on_coarse_grid(self, gap, loads, *, is_free: bool) -> tuple:
-        """Bracket the contact of q cases by solving them on a coarser grid.
+        """Find brackets of the contact in q cases by solving them on a coarser grid.
 
         The brackets follow from the contacts on a coarse interface.
         """
@@ -167,7 +167,7 @@ class Intervals:
         return first, stop
 
     def fill_sums(self, first: np.ndarray) -> None:
-        """Compute the sums of the runs of nodes that begin at or next to given nodes (q,)."""
+        """Compute the sums for contacts whose first node is one of the given nodes (q,) or next to one."""
         no_nodes = np.zeros(0, int)
         cases = make_cases(no_nodes, no_nodes, np.zeros((0, self.x.size)), np.zeros((0, 3)))
         self._solve_all(cases, int(first.min()) - 1, int(first.max()) + 1, 1, is_free=False)
@@ -209,7 +209,7 @@ class Intervals:
     def _try_left_end(
         self, stretches, cases: Cases, indices, a: int, *, is_free: bool
     ) -> np.ndarray:
-        """Solve cases whose contact may begin at a node; return the node to try next for each."""
+        """Try to solve cases with a given first node in contact; return the node to try next for each."""
         m = self.x.size
         limits = np.minimum(cases.end_limit[indices], m)
         nodes = slice(a, max(int(limits.max()), a + 1))
@@ -236,7 +236,7 @@ class Intervals:
     def _store_solutions(
         self, stretches, cases: Cases, indices, group: _LeftEndSolutions, *, is_free: bool
     ) -> None:
-        """Store the solutions of some cases after a step of iterative refinement."""
+        """Apply one step of iterative refinement to the solutions of some cases, and store them."""
         a = group.left_end
         stop = group.stop
         nodes = slice(a, a + group.force.shape[1])
@@ -268,7 +268,7 @@ class Intervals:
             cases.solutions.gap_rate[indices, 0] = 1 - force_rate @ self.c[nodes, a - 1]
 
     def edge_positions(self, contacts: ContactBatch, softness, row_height: float) -> np.ndarray:
-        """Return the positions (2, q) [m] of both contact edges, between the nodes.
+        """Return the positions (2, q) [m] of both contact edges, which may lie between nodes.
 
         An end of the interface that is in contact is an edge.
 
@@ -328,7 +328,7 @@ class Intervals:
         return gap + motion[:, 1:] * x - motion[:, :1] + displacement
 
     def _edge_fractions(self, cases: Cases, opening) -> np.ndarray:
-        """Return `ContactBatch.fractions`; 1/2 where the set does not change with the approach."""
+        """Return `ContactBatch.fractions`; a fraction is 1/2 where the solution does not determine it."""
         m = self.x.size
         neighbour = np.stack([cases.solutions.first - 1, cases.solutions.stop], axis=1)
         has_neighbour = (neighbour >= 0) & (neighbour < m)

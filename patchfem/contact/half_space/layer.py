@@ -111,7 +111,7 @@ def _layer_states(k, z: float, depth: float, moduli: tuple, scale: float) -> np.
 
 
 def end_compliance(piece: Piece) -> WaveCompliance:
-    """Return the compliances (nx, nx) [m2/N] that free ends add to those of guided ends.
+    """Return the difference (nx, nx) [m2/N] between the compliances with free ends and with guided ends.
 
     The guides are without friction. They prevent displacements across them under a pressure, and along them under a
     shear, so `layer_compliance` is the closed form between them. The error of the cells near a force is the same with
@@ -127,7 +127,7 @@ def end_compliance(piece: Piece) -> WaveCompliance:
 
 
 def guide_ends(stencil: np.ndarray, component: int) -> np.ndarray:
-    """Return the stencil of a grid whose end columns are held in one displacement component.
+    """Return the stencil of a grid in which one displacement component of the end columns is fixed.
 
     The guides prevent motion along x (component 0) or inward (component 1).
     """

@@ -29,7 +29,7 @@ MAX_REFERENCE_POINTS = 64
 
 @dataclass(frozen=True, eq=False, slots=True)
 class PointCompliance:
-    """Compliance of a row of n equal cells, each loaded at its centre.
+    """Compliance of a row of n equal cells, each of which is loaded at its centre.
 
     - x (n,): Centres of the cells [m].
     - area: Area of a cell [m2].
@@ -63,7 +63,7 @@ class PointCompliance:
     def solve_forces(
         self, active: np.ndarray, motion: np.ndarray, max_iterations: int = 400
     ) -> np.ndarray:
-        """Solve for the forces on the active points that produce a prescribed motion.
+        """Solve for the forces at the active points that produce a prescribed motion.
 
         The method is that of conjugate gradients, preconditioned by the stiffness of each wave.
 
@@ -169,7 +169,7 @@ def find_edges(compliance: PointCompliance, force, gap, force_rate) -> list:
 
 
 def set_stiffness(compliance: PointCompliance, active, motion, edges: list) -> float:
-    """Return the stiffness of a contact whose edges lie between equally spaced points.
+    """Return the stiffness of a contact whose edges may lie between equally spaced points.
 
     Each edge adds the change along the parabola through the set with one point less and one more (`contact.edges`). The
     compliances of these points are taken from the edge of the longest contact, because they are the same at all edges

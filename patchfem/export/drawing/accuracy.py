@@ -16,7 +16,7 @@ CAUSES = {
 
 
 def accuracy_charts(curve: AccuracyCurve) -> list:
-    """Return the chart of the worst error against CPU seconds, with the run and its neighbours marked."""
+    """Return the chart of the largest error against CPU seconds, which marks the run and its neighbours."""
     settings = [*curve.coarser[::-1], curve.present]
     marks = [_make_line(settings, "solid")]
     if curve.finer is not None:
@@ -65,19 +65,19 @@ def accuracy_caption(curve: AccuracyCurve) -> str:
 
 
 def _describe(setting: StepSetting) -> str:
-    """Return the error, its measure and the seconds of a setting as text."""
+    """Return a text that states the error of a setting, the measure with this error, and the CPU seconds."""
     error = format_number(setting.error, 2)
     return f"{error} ({setting.measure}) in {format_number(setting.seconds, 2)} s"
 
 
 def _make_line(settings: list, dash: str) -> dict:
-    """Return the line through settings."""
+    """Return the chart line that connects several settings."""
     x, y = _coordinates(settings)
     return charts.make_line(x, y, "accent", dash=dash, width=1.0)
 
 
 def _make_dots(settings: list, colour: str, name: str, shape: str) -> dict:
-    """Return the points of settings."""
+    """Return the chart points of several settings."""
     return charts.make_dots(*_coordinates(settings), colour, name, shape=shape, size=8)
 
 
@@ -89,5 +89,5 @@ def _coordinates(settings: list) -> tuple:
 
 
 def _axis_range(values: list) -> list:
-    """Return the ends of a logarithmic axis around its values."""
+    """Return both ends of a logarithmic axis that contains given values."""
     return [min(values) / AXIS_ROOM, max(values) * AXIS_ROOM]

@@ -153,7 +153,7 @@ def sample_indices(x, y, max_points: int) -> np.ndarray:
 
 
 def limit_characters(all_charts: list, max_characters: int) -> list:
-    """Reduce the points of lines and bands until the charts take a given number of characters.
+    """Remove points from lines and bands until the charts take at most a given number of characters.
 
     A number takes CHARACTERS_PER_NUMBER characters.
     """
@@ -181,7 +181,7 @@ def _reduce_mark(mark: dict, fraction: float) -> dict:
 
 
 def contact_range(x, sigma) -> tuple | None:
-    """Return the ends [m] of the loaded part of a patch; None if the full patch is shown.
+    """Return the ends [m] of the loaded part of a patch, or None if the full patch is shown.
 
     Only this part is shown if less than half of the length is pressed.
     """
@@ -391,7 +391,7 @@ def worn_map_chart(x, width: float, depth) -> list:
 
 
 def reduce_grid(x, depth, cells, max_cells: int) -> tuple:
-    """Average a grid of values over blocks until it has about a given number of cells.
+    """Average a grid of values over blocks of cells until the grid has about a given number of cells.
 
     Parameters
     ----------
@@ -427,7 +427,7 @@ def _frame_size(ratio: float) -> list:
 
 
 def loop_chart(slide, force, title: str, measured: tuple | None = None) -> list:
-    """Return the chart of friction force against slide, with the measured loop if there is one.
+    """Return the chart of friction force against slip displacement, with the measured loop if there is one.
 
     Parameters
     ----------
@@ -468,7 +468,7 @@ def loop_charts(loops: list) -> list:
 
 
 def cycle_envelope(time, value, period: float) -> tuple:
-    """Return middle, minimum and maximum of the samples of each cycle; NaN if it has none.
+    """Return the middle time, minimum and maximum of each cycle; NaN for a cycle without samples.
 
     Cycles are merged if there are more than a picture can show.
 
@@ -674,7 +674,7 @@ def measured_charts(rows: list, frequency: float, level: float, acceleration, di
 
 
 def regime_stretches(curve: dict) -> list:
-    """Split a curve into ranges of neighbouring points with the same regime.
+    """Split a curve into ranges of neighbouring points that have the same regime.
 
     curve: a curve of steady motions.
     """
@@ -691,7 +691,7 @@ def curve_axis(curve: dict) -> tuple:
 
 
 def regime_sentence(steady: dict | None) -> str:
-    """Return a sentence on regime and stability of a steady motion, or ""."""
+    """Return a sentence on the regime and stability of a steady motion, or "" if there is no steady motion."""
     if steady is None:
         return ""
     size = steady["multiplier"]
@@ -841,7 +841,7 @@ def spectra_charts(spectra, frequency: float | None) -> list:
 
 
 def _positive_line(x, y, colour: str, name: str = "") -> dict | None:
-    """Return a chart line through the positive values; None if there are none."""
+    """Return a chart line through the positive values, or None if there are none."""
     is_positive = np.isfinite(y) & (y > 0)
     return make_line(x[is_positive], y[is_positive], colour, name) if is_positive.any() else None
 

@@ -34,7 +34,7 @@ MAX_FRAME_SECONDS = 0.3  # longest duration of a frame [s]
 
 @dataclass(frozen=True, slots=True)
 class Film:
-    """Data and settings that the frames of an animation have in common.
+    """Data and settings that all frames of an animation share.
 
     Attributes
     ----------
@@ -217,7 +217,7 @@ def check_ffmpeg(out: Path) -> None:
 
 
 def _find_ffmpeg(out: Path) -> str:
-    """Return the path of the program ffmpeg, or that of imageio-ffmpeg if there is no other."""
+    """Return the path of the program ffmpeg, or of the one in imageio-ffmpeg if ffmpeg is not installed."""
     program = shutil.which("ffmpeg")
     if program is None and find_spec("imageio_ffmpeg"):
         from imageio_ffmpeg import get_ffmpeg_exe

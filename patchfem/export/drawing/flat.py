@@ -114,7 +114,7 @@ class Picture:
 
 
 class _Bodies:
-    """Drawn cells of both pieces, coloured by their stress, with their borders."""
+    """Drawn cells of both pieces, coloured by their stress, and the outlines of the pieces."""
 
     def __init__(self, axes, frame: Frame, panel: Panel):
         from matplotlib.collections import LineCollection, PolyCollection

@@ -19,7 +19,7 @@ DRAWN_MOTION_FRACTION = 0.05  # largest motion or gap as drawn, relative to the 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Panel:
-    """View of both pieces in a window, with magnified motion and a colour scale.
+    """View of both pieces in a window, with magnified motion and a colour scale for the stress.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class Panel:
     slide_factor: float = 1.0
 
     def title(self, scaled: bool = True) -> str:
-        """Return the title of the panel, with the factors of motion and slide.
+        """Return the title of the panel, which states the magnification of the motion and of the slip.
 
         scaled: whether it contains the stress of the upper end of the colours.
         """
@@ -122,7 +122,7 @@ def make_panels(
 
 
 def _stressed_cells(frame: Frame, window: tuple) -> np.ndarray:
-    """Return a mask of the cells of a window that have a stress."""
+    """Return a mask of the cells in a window for which a stress is defined."""
     left, right, bottom, top = window
     x, y = cell_centres(frame).T
     return (
@@ -135,7 +135,7 @@ def _stressed_cells(frame: Frame, window: tuple) -> np.ndarray:
 
 
 def _colour_limit(mises, area) -> float:
-    """Return the stress [Pa] at the upper end of the colour scale of some cells.
+    """Return the stress [Pa] at the upper end of the colour scale for some cells.
 
     It is the largest stress, unless this is a peak in a corner.
     """
@@ -219,7 +219,7 @@ def upper_points(frame: Frame) -> np.ndarray:
 
 
 def upper_piece_slide(frame: Frame) -> float:
-    """Return the slide [m] of the upper piece as a rigid body.
+    """Return the displacement [m] along x of the upper piece as a rigid body.
 
     It is the motion of its rigid far face, extrapolated to y = 0.
     """
@@ -232,7 +232,7 @@ def upper_piece_slide(frame: Frame) -> float:
 
 
 def upper_piece_slides(points, displacements) -> np.ndarray:
-    """Return the slides (f,) [m] of the upper piece in f frames.
+    """Return the displacements (f,) [m] along x of the upper piece as a rigid body in f frames.
 
     Parameters
     ----------
@@ -251,7 +251,7 @@ def upper_piece_slides(points, displacements) -> np.ndarray:
 
 
 def drawn_displacement(frame: Frame) -> np.ndarray:
-    """Return the magnified displacement (N, 2) [m] with which the points are drawn.
+    """Return the magnified displacement (N, 2) [m] that is added to the points of a drawing.
 
     For the upper piece it includes the shape of its surface, decreasing towards its far face, so
     that the drawn gap is the computed one.
@@ -267,7 +267,7 @@ def drawn_displacement(frame: Frame) -> np.ndarray:
 
 
 def surface_shape_motion(points, normal_motion, x, surface) -> np.ndarray:
-    """Return the motion (f, n) [m] of an upper piece that is due to its surface shape.
+    """Return the displacement (f, n) [m] that moves the face of the upper piece to its surface shape.
 
     Parameters
     ----------

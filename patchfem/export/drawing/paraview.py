@@ -142,7 +142,7 @@ if not films:
 
 
 def write_script(folder: Path, out: Path, component: str = "von_mises") -> str:
-    """Write a ParaView script and the fields of the last cycle; return a line about them.
+    """Write a ParaView script and the fields of the last cycle; return a line of text about them.
 
     Parameters
     ----------
@@ -229,7 +229,7 @@ def script_text(out: Path, film: Film, component: str, ends: tuple, status: bool
 
 
 def add_motion(frame: Frame, component: str = "von_mises") -> Frame:
-    """Return a frame with added point arrays for the motion and the slide.
+    """Return a frame with additional point arrays for the motion and the slip.
 
     Their sum is the displacement as drawn. The stress `component`, a name of STRESSES, and the
     contact pressure are added in MPa as well.

@@ -229,7 +229,7 @@ def _draw_band(axis, mark: dict) -> None:
 
 
 def _draw_span(axis, mark: dict) -> None:
-    """Draw a shaded vertical strip of a chart."""
+    """Draw a shaded vertical strip across a chart."""
     axis.axvspan(
         mark["left"],
         mark["right"],
@@ -241,7 +241,7 @@ def _draw_span(axis, mark: dict) -> None:
 
 
 def _draw_rule(axis, mark: dict) -> None:
-    """Draw a vertical line of a chart."""
+    """Draw a vertical line across a chart."""
     axis.axvline(
         mark["x"],
         color=_mark_colour(mark),

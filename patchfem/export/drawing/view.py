@@ -111,7 +111,7 @@ def _open_window(frame: Frame, head: str, magnify) -> None:
 
 
 def explain_missing_opengl() -> str | None:
-    """Return the reason why OpenGL is not available; None if it is.
+    """Return the reason why OpenGL is not available, or None if it is available.
 
     A child process draws a tiny picture.
     """

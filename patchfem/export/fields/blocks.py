@@ -193,7 +193,7 @@ def merge_blocks(blocks: dict) -> Block:
 
 
 def _concatenate_arrays(parts: list, sizes: list) -> dict:
-    """Concatenate the arrays of several blocks, filled with NaN or -1 where they are missing."""
+    """Concatenate the arrays of several blocks; fill them with NaN or -1 in blocks that lack an array."""
     out = {}
     for name in dict.fromkeys(name for part in parts for name in part):
         like = next(part[name] for part in parts if name in part)

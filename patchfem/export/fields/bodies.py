@@ -132,7 +132,7 @@ def _nodal_loads(patch, fields: dict, side: str) -> tuple:
 
 
 def _piece_displacements(patch, loads: list) -> list:
-    """Compute the displacements (1 + f, nodes, 2) of both pieces in all frames.
+    """Return the displacements (1 + f, nodes, 2) of both pieces in all frames.
 
     Equal pieces share one factorisation.
     """
@@ -196,7 +196,7 @@ def _mesh_and_stress(piece, grid) -> _PieceFields:
 
 
 def _collect_piece_fields(patch, fields: dict, x, side: str, piece_fields: _PieceFields, u) -> dict:
-    """Return the fields of a piece for the file: mesh, displacement and stress in all frames.
+    """Return the fields of a piece that are written to a file: mesh, displacement and stress in all frames.
 
     y points away from the interface.
 

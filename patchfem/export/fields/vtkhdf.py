@@ -105,7 +105,7 @@ def write_series(path: Path, blocks: dict, times, units: dict, steps: dict | Non
 
 
 def _write_frames(file, steps: list, large_arrays: list, count: int) -> None:
-    """Write field arrays frame after frame, each safely on disk before it is counted.
+    """Write field arrays frame by frame; count a frame only after it is safely on disk.
 
     VTK reads beyond its memory unless there are as many times as frames.
 
@@ -155,7 +155,7 @@ def _write_frame(dataset, values, nearest, number: int) -> None:
 
 
 def _set_frame_count(steps: list, times: list, count: int) -> None:
-    """Set the number of frames that readers of the file see."""
+    """Set the number of frames that readers of the file find."""
     for group, all_times in zip(steps, times):
         group.attrs["NSteps"] = np.int64(count)
         group["Values"].resize((count,))

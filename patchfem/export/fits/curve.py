@@ -28,7 +28,7 @@ CSV_HEADERS = (
 
 
 def describe_curve_fit(fit: FittedCurve, folder: Path) -> FitFiles:
-    """Collect the files of a fit to measured frequency and damping against amplitude.
+    """Return the output files of a fit to measured frequency and damping as functions of amplitude.
 
     The paths in the fitted scene are relative to `folder`.
     """
@@ -98,7 +98,7 @@ def _csv_rows(fit: FittedCurve) -> list:
 
 
 def _draw_charts(curve_fit: FittedCurve) -> list:
-    """Chart measured and fitted frequency and damping ratio against amplitude."""
+    """Draw measured and fitted frequency and damping ratio against amplitude."""
     measured = curve_fit.measured
     unit, scale = choose_axis_unit(measured.amplitude, "m")
     x_axis = charts.make_axis("amplitude", unit, True)

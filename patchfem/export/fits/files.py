@@ -87,12 +87,12 @@ def describe_measurement(title: str, measured: str, quantity: str, outcome) -> d
 
 
 def describe_values(keys: FittedKeys) -> dict:
-    """Return all fitted values for fit.json, as a dict of scene keys."""
+    """Return all fitted values as a dict of scene keys, as written in fit.json."""
     return {bound.key: describe_value(bound, keys.fit, k) for k, bound in enumerate(keys.ranges)}
 
 
 def describe_value(bound: Range, fit: Fit, k: int) -> dict:
-    """Return fitted value k with its confidence interval and range for fit.json."""
+    """Return fitted value k with its confidence interval and range, as written in fit.json."""
     ends = fit.intervals.ends[k].tolist()
     low, high = ends if np.isfinite(ends).all() else (None, None)
     return {
@@ -109,7 +109,7 @@ def describe_value(bound: Range, fit: Fit, k: int) -> dict:
 
 
 def describe_unknown(bounds: list, fit: Fit) -> list:
-    """Return for fit.json the changes of fitted values that the data do not determine."""
+    """Return the changes of fitted values that the data do not determine, as written in fit.json."""
     return [
         {bound.key: part for bound, part in zip(bounds, row) if part}
         for row in fit.intervals.unknown.tolist()

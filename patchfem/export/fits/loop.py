@@ -24,7 +24,7 @@ DOT_SIZE = 3.5  # diameter of the dots of measured rows in fit.svg [points]
 
 
 def describe_loop_fit(fit: FittedLoop, folder: Path) -> FitFiles:
-    """Collect the files of a fit to a measured friction loop.
+    """Return the output files of a fit to a measured friction loop.
 
     The paths in the fitted scene are relative to `folder`.
     """
@@ -110,7 +110,7 @@ def _csv_rows(fit: FittedLoop) -> list:
 
 
 def _draw_charts(fit: FittedLoop) -> list:
-    """Chart a measured and fitted friction loop, and the residual of each row."""
+    """Draw a measured and a fitted friction loop, and the residual at each row of the measurement."""
     loop = fit.loop
     name, unit = LABELS[loop.quantity]
     slide_unit, slide_scale = choose_axis_unit(loop.displacement, "m")

@@ -70,7 +70,7 @@ def page_html(
 
 
 def _verdict_html(fit_data: dict, values: dict, summary: Sequence) -> str:
-    """Return the head of the page of a fit as HTML: values, summary and warnings."""
+    """Return the first part of the page of a fit as HTML: values, summary and warnings."""
     values_text = "; ".join(
         f"{escape(key)} = {_value_with_ends(entry)}" for key, entry in values.items()
     )

@@ -27,7 +27,7 @@ Y_MARGIN = 1.05  # upper end of the stiffness axis, relative to the largest stif
 
 
 def describe_patch_fit(fit: FittedPatch, folder: Path) -> FitFiles:
-    """Collect the files of single-point laws that are fitted to a patch.
+    """Return the output files of single-point friction laws that are fitted to a patch.
 
     The paths in the fitted scenes are relative to `folder`.
     """
@@ -48,7 +48,7 @@ def describe_patch_fit(fit: FittedPatch, folder: Path) -> FitFiles:
 
 
 def _collect_fit_data(fit: FittedPatch) -> dict:
-    """Return the contents of fit.json of laws that are fitted to a patch."""
+    """Return the contents of fit.json for friction laws that are fitted to a patch."""
     patch = fit.patch
     laws = {law: _describe_law(law, fitted_law, fit) for law, fitted_law in fit.laws.items()}
     best = laws[fit.best]
@@ -88,7 +88,7 @@ def _describe_law(law: str, fitted_law: FittedLaw, fit: FittedPatch) -> dict:
 
 
 def _difference_sizes(deviations, slides) -> dict:
-    """Return the largest and the rms difference of stiffness and loss between two curves.
+    """Return the largest and the rms difference between two curves, for stiffness and for loss.
 
     `deviations` (2, k) are the relative differences of both at the amplitudes `slides` (k,).
     """
@@ -104,10 +104,10 @@ def _difference_sizes(deviations, slides) -> dict:
 
 
 def _relative_loss(fitted_law: FittedLaw, fit: FittedPatch) -> dict:
-    """Return the largest difference of the loss of a law relative to that of the patch.
+    """Return the largest difference between the losses of a law and of the patch, relative to the latter.
 
-    It is relative to the loss of the patch, also where this loss is tiny. If the patch
-    dissipates nothing, the difference is that of `fitted_law.deviations`.
+    The loss of the patch is the reference also where it is tiny. If the patch dissipates nothing,
+    the difference is that of `fitted_law.deviations`.
     """
     patch_loss = fit.patch.curves.loss
     loss = fitted_law.curves.loss
@@ -124,7 +124,7 @@ def _relative_loss(fitted_law: FittedLaw, fit: FittedPatch) -> dict:
 
 
 def _scene_text(fit: FittedPatch, law: str, fit_data: dict, path: Path) -> str:
-    """Return the text of the scene with a fitted law in place of its patch, in SI units."""
+    """Return the text of the scene in which a fitted law replaces the patch, in SI units."""
     scene = fit.scene
     tables = tomllib.loads(scene.resolved())
     tables.pop("contact")
@@ -153,7 +153,7 @@ def _csv_rows(fit: FittedPatch) -> list:
 
 
 def _draw_charts(fit: FittedPatch) -> list:
-    """Chart the stiffness and the loss per cycle against the slide amplitude."""
+    """Draw the stiffness and the loss per cycle against the slip amplitude."""
     slides = fit.patch.amplitudes
     unit, scale = choose_axis_unit(slides, "m")
     along = charts.make_axis("amplitude of the slide", unit, True)
@@ -220,7 +220,7 @@ def _format_fit_data(fit_data: dict) -> list:
 
 
 def _format_stiffness(fit_data: dict) -> str:
-    """Format the stiffness of the sticking patch, with its error if it is known."""
+    """Format the stiffness of the sticking patch, with its error if the error is known."""
     value = fit_data["stiffness"]
     error = fit_data["stiffness_error"]
     if error is None:
@@ -229,7 +229,7 @@ def _format_stiffness(fit_data: dict) -> str:
 
 
 def _best_law_sentence(fit_data: dict) -> str:
-    """State the law that fits a patch best, with its largest errors."""
+    """State which law fits a patch best, and its largest errors."""
     stiffness, loss = (fit_data["laws"][fit_data["law"]][part] for part in COMPARED_QUANTITIES)
     return (
         f"Law '{fit_data['law']}' fits best; its largest errors over this range are "
@@ -240,7 +240,7 @@ def _best_law_sentence(fit_data: dict) -> str:
 
 
 def _error_sentences(law: str, fit_data: dict) -> list:
-    """Describe the errors of using a fitted law in place of the patch."""
+    """Describe the errors that arise if a fitted law replaces the patch."""
     low, high = (format_quantity(end, "m", 3) for end in fit_data["amplitudes"])
     stiffness, loss = (fit_data["laws"][law][part] for part in COMPARED_QUANTITIES)
     side = "larger" if loss["largest"] > 0 else "smaller"
@@ -260,7 +260,7 @@ def _error_sentences(law: str, fit_data: dict) -> list:
 
 
 def _relative_sentence(loss: dict) -> str:
-    """Describe the largest difference of the loss relative to the loss of the patch.
+    """Describe the largest difference between the losses of a law and of the patch, relative to the latter.
 
     "" if it equals the largest difference that is already stated.
     """

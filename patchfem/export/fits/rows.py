@@ -70,7 +70,7 @@ class SearchCheckpoint:
 
 
 def describe_rows_fit(fit: FittedRows, folder: Path) -> FitFiles:
-    """Collect the files of a fit to a table of measured responses.
+    """Return the output files of a fit to a table of measured responses.
 
     The paths in the fitted scene are relative to `folder`.
     """
@@ -129,7 +129,7 @@ def rows_fit_data(fit: FittedRows) -> dict:
 
 
 def _instrument_settings(fit: FittedRows) -> dict:
-    """Return settings and gains of the instruments of a rig."""
+    """Return the settings and gains of the sensors that measure the motion of a rig."""
     read = fit.models.instrument
     out = {
         "reading": "peak" if read is None else read.reading,
@@ -144,7 +144,7 @@ def _instrument_settings(fit: FittedRows) -> dict:
 
 
 def _search_starts(fit: FittedRows) -> list:
-    """Return for each search its first and last values and its training score."""
+    """Return for each search its initial values, its final values and its score on the training data."""
     names = [bound.key for bound in fit.keys.ranges]
     search = fit.search
     out = []
@@ -237,12 +237,12 @@ def _csv_rows(fit_data: dict) -> list:
 
 
 def _format_cell(value: float | None, unit: float) -> str:
-    """Format a reading [SI] in the unit of its column, or "" if it is missing."""
+    """Format a reading [SI] in the unit of its column, or return "" if the reading is missing."""
     return "" if value is None else f"{value / unit:.6g}"
 
 
 def _draw_charts(fit_data: dict) -> list:
-    """Chart computed against measured accelerations and displacements."""
+    """Draw computed against measured accelerations and displacements."""
     return [
         _draw_chart(fit_data, "acceleration", "g", G_N),
         _draw_chart(fit_data, "displacement", "mil", MIL),
@@ -250,7 +250,7 @@ def _draw_charts(fit_data: dict) -> list:
 
 
 def _draw_chart(fit_data: dict, name: str, unit: str, scale: float) -> dict:
-    """Chart computed against measured readings of one quantity, both fitted and held out."""
+    """Draw computed against measured readings of one quantity, for fitted and for left-out readings."""
     groups: dict = {}
     for row in fit_data["rows"]:
         reading = row[name]

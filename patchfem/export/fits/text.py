@@ -37,7 +37,7 @@ def named_values(fit_data: dict) -> dict:
 
 
 def format_line(name: str, entry: dict) -> str:
-    """Return a line with a fitted value, its interval and the bound that it reached."""
+    """Return a line with a fitted value, its interval, and the bound that it has reached, if any."""
     value, unit, ends = format_fitted(entry)
     interval = "not determined"
     if ends:

@@ -9,7 +9,7 @@ from .files import FITTED_SCENE, FitFiles, describe_measurement
 
 
 def describe_wear_fit(fit: FittedCoefficient, scene: Scene) -> FitFiles:
-    """Describe the files of a fitted wear coefficient.
+    """Return the output files of a fitted wear coefficient.
 
     `scene` is the scene before the fit.
     """

@@ -261,7 +261,7 @@ def _read_shapes(file: Path, requests, settings: EstimateOptions) -> tuple:
 
 
 def _parse_quantity(text: str, kind: str, option: str) -> float | None:
-    """Convert the text of an option to SI; return None for ""."""
+    """Convert the text of an option to SI, or return None if the text is ""."""
     try:
         return quantities.parse_quantity(text, kind) if text else None
     except ValueError as error:

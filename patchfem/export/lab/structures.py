@@ -58,7 +58,7 @@ class Elements(NamedTuple):
 
 
 def export_structure(model: Model, out: Path) -> str:
-    """Write the rig of a Model as .mat or .npz, and return a line about it.
+    """Write the rig of a Model as .mat or .npz, and return a line of text about the file.
 
     Raises
     ------
@@ -100,7 +100,7 @@ def export_structure(model: Model, out: Path) -> str:
 
 
 def _omitted_features(model: Model) -> str:
-    """Return a clause on the features of the scene that the exported file lacks."""
+    """Return a clause that lists the features of the scene that the exported file lacks."""
     rig = model.rig
     out = ["[wear]"] * (model.wear is not None) + ["structure.travel"] * (
         rig.springs.travel < MAX_TRAVEL
@@ -159,7 +159,7 @@ def rig_matrices(model: Model) -> dict:
 
 
 def _coordinate_basis(slides) -> np.ndarray:
-    """Return the modal motions (n, n) of the coordinates in which a rig is exported."""
+    """Return the matrix (n, n) that maps the exported coordinates of a rig to its modal coordinates."""
     i, n = slides.shape
     if not i or i > n:
         return np.eye(n)
@@ -172,12 +172,12 @@ def _coordinate_basis(slides) -> np.ndarray:
 
 
 def _is_speed_only(rig) -> bool:
-    """Return whether the friction force depends on the speed only."""
+    """Return whether the friction force depends only on the sliding speed, at every interface."""
     return all(interface.numbers.law == "tanh" for interface in rig.friction.interfaces)
 
 
 def _refuse_unsupported(model: Model) -> None:
-    """Raise PatchfemError for features that neither matrices nor friction elements have."""
+    """Raise PatchfemError for features that matrices and friction elements cannot represent."""
     rig = model.rig
     motion = engines.collect_motion_features(model, steady=True)
     if _is_speed_only(rig):
@@ -199,7 +199,7 @@ def _refuse_unsupported(model: Model) -> None:
 
 
 def friction_elements(model: Model) -> Elements:
-    """Return the friction elements of a rig; none if it has no friction."""
+    """Return the friction elements of a rig, which are empty arrays if the rig has no friction."""
     rig = model.rig
     n = model.rig.modes.omega.size
     no_values = np.zeros(0)

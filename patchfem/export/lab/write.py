@@ -26,7 +26,7 @@ DECAY = {
 
 
 def export_histories(folder: Path, out: Path) -> str:
-    """Write the histories and loops of a results folder, and return a line about it.
+    """Write the histories and loops of a results folder, and return a line of text about the file.
 
     PatchfemError for another suffix and for a folder without histories; Missing if it does not
     exist or `out` cannot be written.
@@ -53,7 +53,7 @@ def export_histories(folder: Path, out: Path) -> str:
 
 
 def _thinning_note(histories) -> str:
-    """Return the note on early histories of which only the reversals are stored, or ""."""
+    """Return a note that only the reversals of early histories are stored, or "" if all samples are stored."""
     displacement = next(
         (column.values for column in histories.columns if column.name.endswith("displacement")),
         None,

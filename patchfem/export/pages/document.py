@@ -145,12 +145,12 @@ def sentence_html(text: str) -> str:
 
 
 def with_line_breaks(text: str) -> str:
-    """Convert a text to HTML in which long key names may break after a dot."""
+    """Convert a text to HTML in which a long key name may be broken after each of its dots."""
     return re.sub(r"(?<=[A-Za-z])\.(?=[A-Za-z])", ".<wbr>", escape(text))
 
 
 def warning_box(texts: Sequence, heading: str = "") -> str:
-    """Return warnings as an HTML box under a heading; "" if there are none."""
+    """Return warnings as an HTML box under a heading, or "" if there are none."""
     paragraphs = "".join(f"<p>{sentence_html(text)}</p>" for text in texts)
     return (
         paragraphs

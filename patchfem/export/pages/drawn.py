@@ -80,7 +80,7 @@ def _evenly_spaced(number: int, max_number: int) -> np.ndarray:
 
 
 def _extreme_cases(values) -> list:
-    """Return the indices of the smallest and the largest value (n,), if they are finite."""
+    """Return the indices of the smallest and the largest of the finite values (n,)."""
     values = np.asarray(values, float)
     return (
         []

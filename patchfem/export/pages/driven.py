@@ -29,7 +29,7 @@ def format_resolved(text) -> str:
 
 
 def describe_drive(resolved: dict) -> str:
-    """Describe the drive of a run in a phrase; "" if it has no drive.
+    """Describe the drive signal of a run in a phrase, or return "" if it has none.
 
     resolved: the scene with all defaults, as nested tables.
     """
@@ -39,7 +39,7 @@ def describe_drive(resolved: dict) -> str:
 
 
 def _describe_waveform(keys: dict) -> str:
-    """Describe the drive by the phrase of its waveform."""
+    """Describe the drive signal with the phrase for its waveform."""
     if keys["kind"] == "free":
         start = (
             f" released {format_resolved(keys['displacement'])} from rest"
@@ -56,7 +56,7 @@ def _describe_waveform(keys: dict) -> str:
 
 
 def _drive_values(keys: dict) -> dict:
-    """Return the values that the phrase of a waveform contains, as text."""
+    """Return the values that are inserted into the phrase for a waveform, as text."""
     values = {key: _format_drive_value(key, value) for key, value in keys.items()}
     values["seed"] = keys.get("seed", 0)
     sized = next((name for name in ("displacement", "acceleration", "force") if name in keys), None)
@@ -97,14 +97,14 @@ def _format_drive_value(key: str, value) -> str:
 
 
 def _describe_by_level(name: str, values: dict) -> str:
-    """Describe a drive by its size and frequency, if the scene sets them, and by its waveform."""
+    """Describe a drive signal by its waveform, and by its amplitude and frequency if the scene sets them."""
     level = f" of {values['level']}" if "level" in values else ""
     frequency = f" at {values['frequency']}" if "frequency" in values else ""
     return f"{values['what']}{level}{frequency}{values['place']} (waveform '{name}')"
 
 
 def _describe_slide(keys: dict) -> str:
-    """Describe the prescribed slide of a bench in a phrase."""
+    """Describe the displacement that is prescribed on a bench in a phrase."""
     kind = keys["kind"]
     if kind == "file":
         return f"the slide of {Path(keys['file']).name}"
@@ -119,7 +119,7 @@ def _describe_slide(keys: dict) -> str:
 
 
 def list_changed_keys(sets: tuple) -> str:
-    """List the scene keys that command-line options --set changed."""
+    """Return a list of the scene keys that the command-line options --set have changed."""
     return shorten(
         ", ".join(
             f"{key} = {value}"

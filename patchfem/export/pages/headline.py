@@ -103,7 +103,7 @@ class SweepHeadline(NamedTuple):
         They are the answer, whether all cases meet the tolerance, and all others.
         """
         sentences = self.texts
-        # The limits of a grid are more informative than the ranking.
+        # For a grid, the limits or the peak of the swept key replace the ranking of the keys.
         rank = (
             sentences.rank if sentences.scatter or not (sentences.limit or sentences.peak) else ""
         )
@@ -146,7 +146,7 @@ class SweepHeadline(NamedTuple):
         return f"{text.rstrip('.')} ({first}{notes[1:].rstrip('.')})."
 
     def _answer_parts(self) -> list:
-        """Return the sentences of which the main result consists."""
+        """Return the sentences that form the main result."""
         sentences = self.texts
         of_random_cases = [sentence for sentence in (sentences.rank, sentences.scatter) if sentence]
         over_key = sentences.limit or sentences.peak
@@ -233,10 +233,10 @@ def summarise_sweep(table: dict) -> SweepHeadline:
 
 
 def _trusted_cases(name: str, measure: dict, tolerance, settled: np.ndarray) -> np.ndarray:
-    """Return a mask of the cases that meet the tolerance and have settled.
+    """Return a mask of the cases that meet the tolerance and in which the motion has settled.
 
-    It need not have settled if no settled case has the measure, or if the measure is a steady
-    estimate.
+    The motion need not have settled if no settled case has the measure, or if the measure is a
+    steady estimate.
     """
     needs_no_settling = (
         name.endswith("_steady") or not np.isfinite(measure["values"])[settled].any()
@@ -245,7 +245,7 @@ def _trusted_cases(name: str, measure: dict, tolerance, settled: np.ndarray) -> 
 
 
 def _cases_within_floor(measures: dict, tolerance) -> dict:
-    """Return for each measure the cases that meet the tolerance only by the error floor.
+    """Return for each measure the cases that meet the tolerance only because of its absolute error floor.
 
     The floor is given as text.
     """
@@ -261,7 +261,7 @@ def _cases_within_floor(measures: dict, tolerance) -> dict:
 
 
 def _unsettled_sentence(measures: dict, outcome: np.ndarray) -> str:
-    """State how far cases that have not settled move beyond all settled cases, or "".
+    """State the amplitudes of unsettled cases if one exceeds those of all settled cases, otherwise return "".
 
     Parameters
     ----------
@@ -293,7 +293,7 @@ def _unsettled_sentence(measures: dict, outcome: np.ndarray) -> str:
 
 
 def _end_peaks_sentence(table: dict) -> str:
-    """State in how many cases the peak frequency is an end of the frequency range, or ""."""
+    """State in how many cases the peak lies at an end of the frequency range; return "" if in none."""
     measures = measure_columns(table)
     name = "peak_frequency"
     if name not in measures:
@@ -355,7 +355,7 @@ def span_sentence(
     *,
     where: Callable | None = None,
 ) -> str:
-    """State the range of the first measure that any case has, and the errors of its values.
+    """State the range of the first measure that has a value in at least one case, and the errors.
 
     Parameters
     ----------

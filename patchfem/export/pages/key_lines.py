@@ -31,7 +31,7 @@ def key_formatter(key: dict) -> Callable[[int], str]:
 
 
 def group_cases_along_key(key: dict, other_keys: list) -> list:
-    """Group the cases by the values of all other keys, ordered along one key."""
+    """Group the cases in which all other keys have equal values, and order each group along one key."""
     lines = {}
     for case in np.argsort(np.asarray(key["values"], float), kind="stable").tolist():
         lines.setdefault(tuple(other["texts"][case] for other in other_keys), []).append(case)

@@ -56,7 +56,7 @@ ROUND_OFF_CHANGE = 1e-8
 
 
 class KeyLimit(NamedTuple):
-    """Largest value of a swept key up to which a measure stays within its limit.
+    """Largest value of a swept key up to which the change of a measure stays within its limit.
 
     Attributes
     ----------
@@ -121,7 +121,7 @@ class Limits(NamedTuple):
         return np.asarray(self.key["values"], float)
 
     def is_resolved(self, limit: KeyLimit) -> bool:
-        """Return whether a case other than the first lies within a limit."""
+        """Return whether any case besides the first lies within a limit."""
         sizes = self.sizes()
         return sizes[limit.inside] > sizes.min()
 
@@ -250,7 +250,7 @@ def _interpolate(low: float, high: float, part: float, by_factors: bool) -> floa
 
 
 def _sort_key(limit: KeyLimit) -> tuple:
-    """Return the key by which limits are sorted, the smallest first.
+    """Return the value by which limits are sorted in ascending order.
 
     At equal values a limit between two cases comes before an open one.
     """
@@ -279,7 +279,7 @@ def limits_json(limits: Limits) -> list:
 
 
 def limits_sentence(limits: Limits) -> str:
-    """State in one sentence up to which key value measures stay within limits, or ""."""
+    """State in one sentence up to which key value measures stay within limits, or return "" if unknown."""
     if limits.key is None:
         return ""
     motion = _motion_sentence(limits)
@@ -307,7 +307,7 @@ def limits_sentence(limits: Limits) -> str:
 
 
 def _motion_sentence(limits: Limits) -> str:
-    """State how far the key may go before a measure of the motion changes, or "".
+    """State how far the key may go before a measure of the motion changes.
 
     It is "" if the cases do not show it.
     """
@@ -347,7 +347,7 @@ def _motion_sentence(limits: Limits) -> str:
 
 
 def _exceeded_sentence(limits: Limits, ends: list) -> str:
-    """State which measure surely exceeds its limit, and in which case."""
+    """State which measure exceeds its limit by more than its error, and in which case."""
     beyond = [limit for limit in ends if limit.beyond is not None]
     if not beyond:
         return "the cases with larger values do not show where this limit lies"
@@ -359,7 +359,7 @@ def _exceeded_sentence(limits: Limits, ends: list) -> str:
 
 
 def _first_to_change(limits: Limits, ends: list) -> str:
-    """Name the measures that reach their limits first, and the one that does so last.
+    """Name the measures that reach their limits first, and the measure that reaches its limit last.
 
     The last one is left out if it is among the first.
     """
@@ -377,7 +377,7 @@ def _first_to_change(limits: Limits, ends: list) -> str:
 
 
 def _format_limit_and_gap(limits: Limits, limit: KeyLimit, *notes: str) -> str:
-    """Format the limit of a key with notes in brackets."""
+    """Format the limit of a key, followed by notes in brackets."""
     notes = [note for note in (_format_gap(limits, limit), *notes) if note]
     return (
         f"{_format_limit(limits, limit)} ({'; '.join(notes)})"
@@ -387,7 +387,7 @@ def _format_limit_and_gap(limits: Limits, limit: KeyLimit, *notes: str) -> str:
 
 
 def _format_limit(limits: Limits, limit: KeyLimit) -> str:
-    """Format the limit of a key, rounded down."""
+    """Format the limit of a key after rounding it down."""
     return f"{format_number(_round_down(limits, limit), _count_digits(limits, limit))} {limits.unit}".strip()
 
 
@@ -411,7 +411,7 @@ def _count_digits(limits: Limits, limit: KeyLimit) -> int:
 
 
 def _format_gap(limits: Limits, limit: KeyLimit) -> str:
-    """Format the gap that a tilt angle opens over the patch, or "" for other keys."""
+    """Format the gap that a tilt angle opens over the patch, or return "" if the key is not an angle."""
     side = (limits.patch or {}).get(GAP_OF_ANGLE.get(limits.key["name"], ("", ""))[1])
     if not side or not limit.value:
         return ""
@@ -479,7 +479,7 @@ def _convert_to_unit(key: dict, unit: str, scale: float) -> dict:
 
 
 def limits_table(limits: Limits, measures: dict) -> str:
-    """Return the limits of a swept key for all measures as an HTML table, or "".
+    """Return the limits of a swept key for all measures as an HTML table, or "" if there are none.
 
     Parameters
     ----------

@@ -28,7 +28,7 @@ MAX_STEADY_ERROR = 0.01
 
 
 class Estimate(NamedTuple):
-    """Value with its error; NaN if it is unknown."""
+    """Value with its error; the value is NaN if it is unknown."""
 
     value: float
     error: float
@@ -123,7 +123,7 @@ def _case_formatter(key: dict) -> Callable[[int], str]:
 
 
 def _peak_heights(name: str, measures: dict, trusted: dict) -> tuple:
-    """Return the heights (n,) of a measure in the cases and their errors.
+    """Return the values (n,) of a measure in the cases, with their errors, as heights of a peak.
 
     For a case that did not settle it is the steady estimate, if its relative error is at most
     MAX_STEADY_ERROR; else NaN.
@@ -143,7 +143,7 @@ def _peak_heights(name: str, measures: dict, trusted: dict) -> tuple:
 def _find_swept_peak(
     frequency: np.ndarray, height: np.ndarray, error: np.ndarray
 ) -> SweptPeak | None:
-    """Locate the peak of a response curve; None if its largest value is at an end of the range.
+    """Find the peak of a response curve; None if its largest value is at an end of the frequency range.
 
     The peak is that of the parabola of 1/y^2 over f^2, which is exact for a single mode, through
     the largest value and its neighbours. Its error combines those of the cases with the differences
@@ -310,7 +310,7 @@ def _find_crossing(
 
 
 def peaks_sentence(peaks: list) -> str:
-    """State the frequency of the peak, or how it changes over the cases, or ""."""
+    """State the frequency of the peak, or how it changes over the cases; return "" if there are no peaks."""
     known_peaks, unknown_peaks = (
         [peak for peak in peaks if peak.swept.height.is_known() == is_known]
         for is_known in (True, False)
@@ -378,7 +378,7 @@ def _format_width(peak: Peak) -> str:
 
 
 def peaks_table(peaks: list) -> str:
-    """Return the peaks of a sweep as an HTML table, or ""."""
+    """Return the peaks of a sweep as an HTML table, or "" if there are none."""
     if not peaks:
         return ""
     rows = [[escape(peak.fixed_values), *_peak_cells(peak)] for peak in peaks]

@@ -68,7 +68,7 @@ def pack_array(values) -> dict:
 
 
 def player_data(folder: Path) -> dict | None:
-    """Return the data of the animation player for a results folder; None if it has no fields.
+    """Return the data of the animation player for a results folder, or None if it contains no fields.
 
     Returns
     -------
@@ -218,7 +218,7 @@ def _read_piece(
 
 
 def _separate_slide(upper: dict, x, line: dict) -> np.ndarray:
-    """Separate the slide (f,) [m] of the upper piece from its displacements, and add the gap."""
+    """Subtract the rigid displacement (f,) [m] along x from that of the upper piece, and add the gap."""
     points = upper["points"]
     moves = upper["moves"]
     slide = upper_piece_slides(points, moves)

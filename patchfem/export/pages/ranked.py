@@ -110,7 +110,7 @@ def rank_keys(table: dict, trusted: dict, settled: np.ndarray) -> RankedKeys:
 
 
 def too_few_settled_sentence(table: dict, settled: np.ndarray) -> str:
-    """State that too few random cases have settled, and what to do; "" if enough have.
+    """State that the motion has settled in too few random cases; return "" if there are enough such cases.
 
     The consequence is that no ranking is possible, or that the scatter is not known.
     """
@@ -149,7 +149,7 @@ def measure_name(name: str) -> str:
 
 
 def describe_trend(table: dict, ranks: dict, settled: np.ndarray) -> str:
-    """State how the first measure of random cases depends on the strongest key.
+    """State how the first measure of random cases depends on the most influential key.
 
     It states the direction, or where along this key the largest or smallest value lies; "" if the
     cases do not determine it.
@@ -266,7 +266,7 @@ def _trend_sentence(
 
 
 def put_requested_first(names: tuple, table: dict) -> tuple:
-    """Return names of measures, with the one that the user asked for first."""
+    """Return names of measures, beginning with the one that the user requested."""
     first = table.get("first", "")
     return (first, *(name for name in names if name != first)) if first else names
 
@@ -292,7 +292,7 @@ def sobol_indices(table: dict) -> dict:
 def ranking_sentence(
     ranks: dict, n_unsettled: int = 0, moves: bool = True, n_cases: int = 0
 ) -> str:
-    """State how much each key matters for the first measure that is ranked; "" if there is none.
+    """State the influence of each key on the first ranked measure; return "" if there is none.
 
     Keys whose intervals overlap are named together.
 
@@ -376,7 +376,7 @@ def _all_overlap(group: list) -> bool:
 
 
 def _list_keys(group: list) -> str:
-    """List the keys of a group in a sentence; of many only the first."""
+    """List the keys of a group in a sentence, or only the first keys if there are many."""
     names = [index.key for index in group]
     if len(names) > MAX_NAMED_KEYS + 1:
         names[MAX_NAMED_KEYS:] = [f"{len(names) - MAX_NAMED_KEYS} other keys"]
@@ -420,7 +420,7 @@ def _upper_percent(index) -> int:
 
 
 def _format_interval(index) -> str:
-    """Format the interval of a Sobol index in brackets, or ""."""
+    """Format the interval of a Sobol index in brackets, or return "" if it has none."""
     low = round(100 * index.low)
     high = round(100 * index.high)
     return f" ({low} to {high} %)" if low != high and not _may_be_zero(index) else ""
@@ -523,7 +523,7 @@ def describe_scatter(
 
 
 def sobol_bars(ranks: dict) -> str:
-    """Return bars of the Sobol indices of all keys and measures as HTML, or ""."""
+    """Return the Sobol indices of all keys and measures as HTML bars, or "" if there are none."""
     if not ranks:
         return ""
     parts = []
@@ -571,7 +571,7 @@ def _format_range(index) -> str:
 
 
 def quantile_table(quantiles: dict, n_cases: int) -> str:
-    """Return the quantiles over random cases as an HTML table, or "".
+    """Return the quantiles over the random cases as an HTML table, or "" if there are none.
 
     If the cases that are left out may be the extreme ones, no quantiles are given. For a measure
     that only some motions have, the quantiles are those of these motions.

@@ -17,7 +17,7 @@ ZERO_FRACTION = 1e-9
 
 
 def describe_release(result: Result) -> str:
-    """Describe the motion of a released rig in a sentence; "" for any other run.
+    """Describe the motion of a released rig in a sentence, or return "" for any other run.
 
     The text has no full stop at the end.
     """
@@ -33,7 +33,7 @@ def describe_release(result: Result) -> str:
 
 
 def _describe_decay(decay) -> str:
-    """Return a clause on frequency and damping at the start and at the end of a decay."""
+    """Return a clause on frequency and damping ratio at the start and at the end of a decay."""
     known_swings = (
         []
         if decay is None

@@ -149,7 +149,7 @@ def format_value_and_error(name: str, measure: dict, scale: float | None = None)
 
 
 def is_share(name: str) -> bool:
-    """Return whether a measure is a fraction that is shown in percent."""
+    """Return whether a measure is a fraction, which is shown in percent."""
     return re.sub(r"_\d+$", "", name).endswith("fraction")
 
 
@@ -175,7 +175,7 @@ def format_measure(name: str, value: float, unit: str, digits: int) -> str:
 
 
 def format_pair(name: str, low: float, high: float, unit: str, digits: int) -> tuple:
-    """Format two values of a measure in one unit, or in two if they differ greatly.
+    """Format two values of a measure in one unit, or in two units if the values differ greatly.
 
     Parameters
     ----------
@@ -225,7 +225,7 @@ def is_below_minimum(name: str, measure: dict) -> bool:
 
 
 def format_zero(name: str, measure: dict = NONE) -> float:
-    """Return the value [SI] below which a measure is shown as 0.
+    """Return the absolute value [SI] below which a measure is shown as 0.
 
     It is the floor of its definition, or the floor in the run if this is smaller: a floor that the
     run has raised to the tolerance times larger terms is what is required of it, not what is known.
@@ -258,7 +258,7 @@ def format_imperial(name: str, measure: dict) -> str:
 
 
 def _unknown_measures(measures: dict) -> str:
-    """Return the names of the static measures whose error is as large as the value; "" if none."""
+    """Return the names of static measures whose error is as large as their value, or "" if there are none."""
     measure_records = {
         name: Measure(**{key: measure[key] for key in ("value", "unit", "error")})
         for name, measure in measures.items()
@@ -343,7 +343,7 @@ def _no_slip_sentence(patch: bool, cycles: str) -> str:
 
 
 def _bench_slip_sentence(slip: dict | None, first_sentence: str, patch: bool) -> str:
-    """Return the sentence of a bench with its slip, if it exceeds its error.
+    """Return a sentence on the slip of a bench, if the slip exceeds its error.
 
     Parameters
     ----------
@@ -387,7 +387,7 @@ def _bench_loop_sentence(loop: dict, stiffness: dict) -> str:
 
 
 def _error_or_floor(measure: dict) -> float:
-    """Return the error of a measure in its unit, or its floor if no error was estimated."""
+    """Return the error of a measure in its unit, or its absolute error floor if no error was estimated."""
     return measure["floor"] if measure["error"] is None else measure["error"]
 
 
@@ -404,7 +404,7 @@ def headline_sentence(
     number: Callable[[str, str], str] | None = None,
     released: str = "",
 ) -> str:
-    """State the most important measures in one sentence; "" if there are none.
+    """State the most important measures in one sentence, or return "" if there are none.
 
     Parameters
     ----------
@@ -443,7 +443,7 @@ def headline_sentence(
 def _fill_statement(
     statement: Statement, measures: dict, number: Callable[[str, str], str] | None
 ) -> str:
-    """Insert the value of a measure into a statement; "" if it has no value."""
+    """Insert the value of a measure into a statement, or return "" if the measure has no value."""
     name, text = statement
     if not name:
         return text
@@ -457,7 +457,7 @@ def _fill_statement(
 
 
 def _wear_statements(measures: dict) -> list:
-    """Return the statement on the worn depth, or else on the worn volume."""
+    """Return the statement on the worn depth, or on the worn volume if the depth has no value."""
     texts_by_measure = {
         "worn_depth_max": "{} worn off at the deepest place",
         "worn_volume": "{} worn off",
@@ -515,7 +515,7 @@ def _patch_statements(summary: dict) -> list:
 
 
 def _interface_statements(summary: dict, name: str, text: str) -> list:
-    """Return the statement of each interface, or only of the first if there are more than MAX_LISTED.
+    """Return a statement for each interface, or only for the first if there are more than MAX_LISTED.
 
     Strips do not count as interfaces.
     """
@@ -597,7 +597,7 @@ def describe_contact(contact: dict | None, fraction: float | None = None) -> str
 
 
 def tolerance_sentence(result: Result) -> str:
-    """State that all measures meet the tolerance, by which limits, and the largest error.
+    """State that all measures meet the tolerance, which limits apply, and how large the largest error is.
 
     Parameters
     ----------
@@ -652,7 +652,7 @@ def tolerance_sentence(result: Result) -> str:
 
 
 def _absolute_limits(names: list, measures: dict, tolerance: float) -> str:
-    """State the limits of measures whose error exceeds the tolerance times their value."""
+    """State the absolute error limits of measures whose error exceeds the tolerance times their value."""
     parts = []
     for name in names:
         measure = measures[name]
@@ -673,7 +673,7 @@ def _absolute_limits(names: list, measures: dict, tolerance: float) -> str:
 
 
 def _plain_value(name: str, value: float, unit: str) -> str:
-    """Format a value [SI] of a measure with three digits."""
+    """Format a value [SI] of a measure to three digits."""
     display_unit, scale = display_units(name, value, unit)[0]
     return f"{formatting.format_number(value * scale, 3)} {display_unit}".rstrip()
 
@@ -705,7 +705,7 @@ def find_definition(name: str, has_patch: bool = False):
 
 
 def measure_meaning(name: str) -> str:
-    """Return the definition of a measure as a sentence; "" if no table has it."""
+    """Return the definition of a measure as a sentence, or "" if no table contains it."""
     row = find_definition(name)
     return "" if row is None else row.text
 
@@ -751,7 +751,7 @@ def record_interval(name: str, measures: dict) -> tuple:
 
 
 def format_measures(measures: dict, engine: str = "") -> list[str]:
-    """Return the lines of all measures in their groups, each with its error or its reason.
+    """Return a line for each measure, by groups, with its error or the reason why it has no value.
 
     Under a random drive a line also has the interval over other records.
 
@@ -838,7 +838,7 @@ def _format_measure_line(name: str, measure: dict, range_text: str, is_random: b
 
 
 def join_sentences(sentences: Sequence) -> str:
-    """Join sentences with semicolons; "" if there are none."""
+    """Join sentences with semicolons, or return "" if there are none."""
     first, *others = sentences or [""]
     clauses = [
         first,

@@ -67,7 +67,7 @@ class FinishedRun(NamedTuple):
 
 
 def read_run(folder: Path) -> FinishedRun:
-    """Read the run in a results folder; PatchfemError if there is none."""
+    """Read the run in a results folder; raise PatchfemError if there is none."""
     folder = Path(folder)
     if not folder.exists():
         raise Missing(f"{folder}: no such results folder")
@@ -248,7 +248,7 @@ def _axis_unit(arrays: list, unit: str) -> tuple:
 
 
 def drive_period(run: FinishedRun) -> float | None:
-    """Return the period [s] of the sine that drives a run; None if there is none."""
+    """Return the period [s] of the sine that excites a run, or None if there is none."""
     number_with_unit = NUMBER_PATTERN.match(str(run.resolved.get("drive", {}).get("frequency", "")))
     return (
         1 / float(number_with_unit[1])

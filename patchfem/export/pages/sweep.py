@@ -233,7 +233,7 @@ def _explorer_html(drawn_note: str, folders: list | None) -> str:
 
 
 def _change_section(table: dict, key_limits: limits.Limits) -> list:
-    """Return the section about the change of each main measure since the first case.
+    """Return the section that shows how much each main measure changes from the first case.
 
     [] if the sweep has no limits.
     """
@@ -353,7 +353,7 @@ def _keep_unit_together(text: str) -> str:
 
 
 def _is_varied(values) -> bool:
-    """Return whether values (n,) differ by more than round-off."""
+    """Return whether values (n,) differ from each other by more than round-off."""
     finite = np.asarray(values, float)
     finite = finite[np.isfinite(finite)]
     return finite.size > 0 and np.ptp(finite) > 1e-9 * np.abs(finite).max()

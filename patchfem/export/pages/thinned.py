@@ -11,7 +11,7 @@ COLUMNS_PER_ROW = 3.0  # ratio of columns to rows, if the mesh has enough lines 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ReducedMesh:
-    """Coarser mesh for display, with its relation to the finer mesh.
+    """Coarser mesh for display, with the coarser cell to which each cell of the finer mesh belongs.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class ReducedMesh:
     areas: np.ndarray
 
     def means(self, values) -> np.ndarray:
-        """Average values (m, k) on the cells of the finer mesh over coarser cells (c, k)."""
+        """Average values (m, k) on the cells of the finer mesh over each coarser cell; return (c, k)."""
         sums = np.add.reduceat(values[self.order] * self.areas[:, None], self.starts)
         return (sums / np.add.reduceat(self.areas, self.starts)[:, None])[self.groups]
 
@@ -100,7 +100,7 @@ def reduce_mesh(
 
 
 def _line_bins(points, cells, material, max_cells: int, fine_range: tuple | None) -> tuple:
-    """Return for each point the index of the last selected line before it.
+    """Return for each point the index of the last selected grid line at or before it.
 
     The indices count columns along x and rows in depth.
     """
@@ -134,7 +134,7 @@ def _line_bins(points, cells, material, max_cells: int, fine_range: tuple | None
 
 
 def select_lines(lines, count: int, fine_range: tuple | None = None) -> np.ndarray:
-    """Select evenly spaced grid lines, at most a given number.
+    """Select evenly spaced grid lines, but no more than a given number.
 
     The first and the last line are included. fine_range: (left, right) between which half of the lines
     are taken, if there are so many.

@@ -98,7 +98,7 @@ PAGE_NOTE = (
 
 
 def _averaged_part(comparison: Comparison) -> str | None:
-    """Name the part of two traces over which their mean worn depth is taken.
+    """Return the name of the part of two traces over which their mean worn depth is computed.
 
     None for scans, and if there is no mean.
     """
@@ -121,7 +121,7 @@ def _quantities_table(comparison: Comparison) -> QuantityTable:
 
 
 class ComputedParts(NamedTuple):
-    """Results of runs beside a comparison of measured surfaces, None where they were not requested.
+    """Results of runs that are shown beside a comparison, each None if it was not requested.
 
     pressed: a scene with each of the two surfaces; predicted: the wear of a run, fitted to the
     measured one.
@@ -185,7 +185,7 @@ def format_comparison(
 
 
 def sides_lines(rows: list) -> list:
-    """Return measures before and after wear as the lines of a table.
+    """Return the measures before and after wear as lines of a table.
 
     `rows` holds the name, the text before and the text after of each measure.
     """
@@ -196,7 +196,7 @@ def sides_lines(rows: list) -> list:
 
 
 def _format_measure(name: str, measure) -> str:
-    """Format a measure with its error; a dash if it has no value."""
+    """Format a measure with its error, or return a dash if it has no value."""
     if measure is None or measure.value is None:
         return MISSING
     return format_with_error(
@@ -334,7 +334,7 @@ def _scans_data(change: Change) -> dict:
 
 
 def pressed_traces(comparison: Comparison) -> tuple:
-    """Return the traces before and after that a scene presses, cut to their common part.
+    """Return the traces before and after wear that a scene presses, limited to their common part.
 
     Without a common part they are returned completely.
 
@@ -548,7 +548,7 @@ def _aligned_pictures(part: Comparison) -> list:
 
 
 def _scan_pictures(change: Change) -> list:
-    """Draw two aligned scans, their heights and the mean section of a track."""
+    """Draw two aligned scans, their heights and the mean cross-section of a track."""
     x = change.before.x
     y = change.before.y
     first = level_plane(change.before).z
@@ -641,7 +641,7 @@ def _pressed_html(surface_runs: SurfaceRuns) -> str:
 
 
 def _format_ratio(first, second) -> str:
-    """Format the ratio of the second to the first measure; "" if it is unknown."""
+    """Format the ratio of the second to the first measure, or return "" if it is unknown."""
     values = [None if measure is None else measure.value for measure in (first, second)]
     if None in values or values[0] == 0:
         return ""

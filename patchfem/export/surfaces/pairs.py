@@ -36,7 +36,7 @@ MEANS_NOTE = (
 def compare_pairs(
     table_lines: list, direction: str = "", report_fraction: Callable | None = None, **settings
 ) -> list[dict]:
-    """Compare the surfaces of each pair of a table, from files or results folders.
+    """Compare the surfaces of each pair that a table lists, from files or results folders.
 
     Parameters
     ----------

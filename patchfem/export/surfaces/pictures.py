@@ -189,7 +189,7 @@ def draw_statistics(heights: Heights, spectrum: Spectrum, band: tuple, cutoff: f
 
 
 def _full_axis(label: str, unit: str, x) -> dict:
-    """Return a chart axis that extends from the first to the last of given positions."""
+    """Return a chart axis that extends from the first to the last position."""
     return make_axis(label, unit) | {"range": [x[0], x[-1]]}
 
 
@@ -351,7 +351,7 @@ def _abbott_chart(heights: tuple) -> dict:
 
 
 def draw_mean_section(track, start: float, end: float) -> str:
-    """Draw the mean section of a track with its scatter.
+    """Draw the mean cross-section of a track with its scatter.
 
     Parameters
     ----------

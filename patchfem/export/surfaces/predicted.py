@@ -106,7 +106,7 @@ def read_history(folder: Path, piece: str = "") -> WearHistory:
 
 
 def _require_wear(run: PatchRun, folder: Path) -> None:
-    """Raise PatchfemError unless the worn depth is that of one trace since the unworn state."""
+    """Raise PatchfemError unless the run gives the worn depth of a single trace since the unworn state."""
     name = f"compare --predicted {folder}"
     if not run.has_wear:
         raise PatchfemError(

@@ -20,7 +20,7 @@ UNITS = {**UNIT_LADDERS, "m2": (("um^2", 1e12),), "1": (("", 1.0),)}
 
 
 class QuantityText(NamedTuple):
-    """Value, interval and unit of a quantity as strings; "" for a missing interval."""
+    """Value, interval and unit of a quantity as strings; the interval is "" if it is missing."""
 
     value: str
     interval: str
@@ -103,7 +103,7 @@ class CsvColumns(NamedTuple):
 
 
 def csv_columns(tables: list) -> CsvColumns:
-    """Return each quantity with its bounds in SI as columns, "" for a missing number.
+    """Return each quantity with its bounds in SI as columns; a missing number becomes "".
 
     tables: dicts of name -> {value, low, high, unit}.
     """

@@ -122,7 +122,7 @@ def describe_surface(report: RoughnessReport) -> str:
 
 
 def _areal_filters(short_length: float | None, cutoff: float | None, *, has_holes: bool) -> str:
-    """Name the filters of a scan and the surface that they leave."""
+    """Return the names of the filters of a scan and of the surface that results from them."""
     parts = [
         f"{name}-filter at {format_length(length)}"
         for name, length in (("S", short_length), ("L", cutoff))
@@ -157,7 +157,7 @@ def format_roughness(report: RoughnessReport, *, verbose: bool = False) -> list:
 
 
 def _profile_moments(report: RoughnessReport) -> TraceMoments | None:
-    """Return the moments of the primary profile below the cut-off; None if it has none."""
+    """Return the moments of the primary profile below the cut-off, or None if there are none."""
     try:
         return trace_moments(report.surface.primary, report.treatment.cutoff)
     except PatchfemError:
@@ -233,7 +233,7 @@ def means_data(reports: list) -> list:
 
 
 def write_csv(path: Path, reports: list) -> None:
-    """Write a row for each file: its parameters and their bounds in SI, "" if missing."""
+    """Write a row for each file: its parameters and their bounds in SI, with "" for missing numbers."""
     tables = [{value.name: value._asdict() for value in report.values} for report in reports]
     columns = csv_columns(tables)
     lines = [["file", *columns.heads]]

@@ -98,7 +98,7 @@ def wear_verdict(wear: Wear) -> tuple:
 
 
 def describe_hidden_wear(ends: tuple) -> str:
-    """Name the shape of wear from the depths [m] at the ends or corners of a patch."""
+    """Return the name of a shape of wear, given the depths [m] at the ends or corners of a patch."""
     low = min(ends)
     high = max(ends)
     if low < WEDGE_RATIO * high:

@@ -107,11 +107,11 @@ class PatchRun(NamedTuple):
 
     @property
     def has_wear(self) -> bool:
-        """Whether the scene of the run has a table [wear]."""
+        """Return whether the scene of the run has a table [wear]."""
         return "wear" in self.run.resolved
 
     def measure(self, name: str) -> dict | None:
-        """Return a measure of the run; None if it has no value."""
+        """Return a measure of the run, or None if it has no value."""
         measure = self.run.summary["measures"].get(name)
         return measure if measure is not None and measure["value"] is not None else None
 
@@ -176,7 +176,7 @@ def compare_runs(before: Path, after: Path) -> Wear:
 
 
 def read_run(path: Path) -> PatchRun:
-    """Read the run of a patch from a results folder; raises PatchfemError if there is none."""
+    """Read the run of a patch from a results folder; raise PatchfemError if there is none."""
     run = several_runs.read_run(path)
     if "contact" not in run.resolved:
         raise PatchfemError(f"{path}: a run without [contact] has no surfaces to compare")
@@ -198,7 +198,7 @@ def read_run(path: Path) -> PatchRun:
 
 
 def _check_fields(fields: dict) -> PatchSurface:
-    """Return the surface of a patch from the variables of its results.
+    """Return the surface of a patch from the checked variables of its results.
 
     Raises ValueError if they do not match.
     """
@@ -343,7 +343,7 @@ def _mesh_error(surface: PatchSurface, x) -> float:
 
 
 def _measure_change(first: PatchRun, second: PatchRun, name: str) -> tuple[float, float | None]:
-    """Return the change of a measure and the sum of its errors, None if one is unknown."""
+    """Return the change of a measure and the sum of its errors, which is None if one is unknown."""
     later_value = second.measure(name)
     earlier = first.measure(name)
     if earlier is None:
@@ -353,13 +353,13 @@ def _measure_change(first: PatchRun, second: PatchRun, name: str) -> tuple[float
 
 
 def _make_quantity(name: str, value: float, error: float | None) -> Quantity:
-    """Return a quantity of TEXTS with the interval of its numerical error."""
+    """Return one of the quantities in TEXTS, with an interval that covers its numerical error."""
     unit, text = TEXTS[name]
     return _make_nonnegative_quantity(value, error, unit, text)
 
 
 def _make_nonnegative_quantity(value: float, error: float | None, unit: str, text: str) -> Quantity:
-    """Return a non-negative quantity with the interval of its numerical error."""
+    """Return a non-negative quantity with an interval that covers its numerical error."""
     if error is None:
         return Quantity(value, value, None, unit, text, "no error is estimated")
     return Quantity(value, max(value - error, 0.0), value + error, unit, text)
@@ -448,7 +448,7 @@ def _profile_ratios(before: Profile, after: Profile, texts: dict) -> dict:
 
 
 def _measure_track(x, depth, error: float, area: float) -> dict:
-    """Measure the part of a patch that wore by more than the error [m] of the depth.
+    """Measure the part of a patch whose worn depth exceeds the error [m] of this depth.
 
     area: lost area [m2] of the section.
     """

@@ -68,7 +68,7 @@ def write_answer(answer: dict, path: Path) -> None:
 
 
 def read_answer(path: Path) -> dict:
-    """Return the content of sweep.json; {} if it cannot be read."""
+    """Return the contents of sweep.json, or {} if it cannot be read."""
     try:
         answer = json.loads(path.read_bytes())
     except (OSError, ValueError):

@@ -102,7 +102,7 @@ def _hash_bytes(image: bytes) -> str:
 
 
 def _open_results(path: Path) -> h5py.File:
-    """Open a file of results; ValueError if its bytes do not match its name."""
+    """Open a file of results; raise ValueError if the hash of its bytes is not the one in its name."""
     image = path.read_bytes()
     if not path.stem.endswith(f"-{_hash_bytes(image)}"):
         raise ValueError(f"{path.name}: damaged")
@@ -137,7 +137,7 @@ def read_chunk(path: Path) -> tuple[np.ndarray, CaseResults]:
 
 
 def read_names(path: Path) -> np.ndarray:
-    """Return the names (n,) uint64 of the cases of a file; an empty array if it is damaged."""
+    """Return the names (n,) uint64 of the cases in a file, or an empty array if the file is damaged."""
     try:
         with _open_results(path) as file:
             return _read_column(file["case"], np.uint64)
@@ -146,7 +146,7 @@ def read_names(path: Path) -> np.ndarray:
 
 
 def _read_column(dataset, kind, count: int | None = None, rows: int | None = None) -> np.ndarray:
-    """Read a dataset; ValueError if it has another shape or type.
+    """Read a dataset; raise ValueError if its shape or type is not the expected one.
 
     Parameters
     ----------

@@ -109,7 +109,7 @@ def _case_measures(results: CaseResults, case: int) -> dict:
 
 @dataclass(frozen=True, slots=True)
 class ResultsWriter:
-    """Writer of the results folder of each case.
+    """Writer of a separate results folder for each case.
 
     page: whether it contains report.html, which takes more space and time than all other files of a
     short run.
@@ -144,7 +144,7 @@ class Writer:
     token: str = ""
 
     def __call__(self, numbers: Sequence[int], results: CaseResults, texts: Sequence[str]) -> bool:
-        """Write results as `put` does; return False if the folder is not accessible or is full."""
+        """Write results as `put` does; return False if the folder is not accessible or the disk is full."""
         try:
             is_accessible = (self.target / CHUNKS / self.token).is_file()
             if is_accessible:
@@ -154,7 +154,7 @@ class Writer:
             return False
 
     def put(self, numbers: Sequence[int], results: CaseResults, texts: Sequence[str]) -> None:
-        """Write the results of cases, their folders first.
+        """Write the folders of cases, then their results.
 
         Parameters
         ----------
@@ -195,7 +195,7 @@ class Writer:
             raise self._fault(error) from None
 
     def _fault(self, error) -> Missing:
-        """Return the error of a case that cannot be written."""
+        """Return the error that is reported for a case that cannot be written."""
         reason = str(error) if isinstance(error, WriteError) else error.strerror
         return Missing(
             f"{self.shown}: a case cannot be written ({reason}); complete cases are kept"
@@ -203,7 +203,7 @@ class Writer:
 
 
 class Folder:
-    """The folder of a sweep, which is locked while it is open, unless shards share it.
+    """Folder of a sweep, which is locked while it is open, unless shards share it.
 
     Parameters
     ----------
@@ -369,7 +369,7 @@ class Folder:
         return total
 
     def case_folder_names(self) -> list[str]:
-        """Return the folder names of the cases in cases/; [] if no case has a folder."""
+        """Return the folder names of the cases in cases/, or [] if no case has a folder."""
         return (
             list(map(case_folder_name, self.chunks.names)) if (self.target / CASES).is_dir() else []
         )

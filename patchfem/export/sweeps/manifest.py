@@ -21,7 +21,7 @@ TABLES = "sweep.csv", "sweep.nc", "sweep.json", "report.html"
 
 
 def hash_request(path: Path, words: Sequence[str], cases: Path | None = None) -> str:
-    """Return a hash of all data on which a sweep depends; "" if it cannot be computed.
+    """Return a hash of all data on which a sweep depends, or "" if the hash cannot be computed.
 
     It covers the scene, the words of the command, the table of cases, the files that these name,
     and this program.
@@ -61,7 +61,7 @@ def write_manifest(folder: Path, request_hash: str) -> None:
 
 
 def read_manifest(folder: Path, request_hash: str) -> dict:
-    """Return sweep.json of a folder with the complete sweep of this hash; else {}."""
+    """Return the contents of sweep.json if the folder holds the complete sweep of this hash, otherwise {}."""
     try:
         manifest = json.loads((folder / MANIFEST_NAME).read_bytes())
         if not request_hash or manifest != {"sign": request_hash, "files": _sweep_files(folder)}:
@@ -72,7 +72,7 @@ def read_manifest(folder: Path, request_hash: str) -> dict:
 
 
 def _sweep_files(folder: Path) -> list:
-    """Return the files of a sweep with size and time; OSError if there is no folder."""
+    """Return the files of a sweep with their size and time; raise OSError if there is no folder."""
     chunks = [
         Path(entry.path) for entry in os.scandir(folder / "chunks") if entry.name != "whole.json"
     ]

@@ -115,7 +115,7 @@ def key_columns(cases: Cases) -> list:
 
 
 def _shared_facts(facts: dict, columns: list) -> dict:
-    """Return tolerance, patch size [m] and ends [Hz] of the swept frequencies of all cases.
+    """Return tolerance, patch size [m], and the range [Hz] of the swept frequencies of all cases.
 
     They are those of the scene (`facts`), or swept values (`columns`).
     """
@@ -134,7 +134,7 @@ def _shared_facts(facts: dict, columns: list) -> dict:
 
 
 def page_titles(columns: list, scene_title: str) -> dict:
-    """Return the title of the page, made of the swept keys, and the title of the scene.
+    """Return the title of the page, which names the swept keys, and the title of the scene.
 
     The title of the scene refers to the values before the keys were changed.
     """
@@ -150,7 +150,7 @@ def case_link(folder: Path, key: str) -> str:
 
 
 def axis_numbers(values) -> np.ndarray:
-    """Return values along an axis: numbers unchanged, words numbered in order of occurrence."""
+    """Return positions along an axis: numbers unchanged, words numbered in order of occurrence."""
     if isinstance(values, array) or all(isinstance(value, int | float) for value in values):
         return np.asarray(values, float)
     order = {word: number for number, word in enumerate(dict.fromkeys(values))}
@@ -241,7 +241,7 @@ def read_table(folder: Path) -> dict:
 
 
 def _check_table(table: dict) -> dict:
-    """Return the table; ValueError if a column has a wrong length or impossible numbers."""
+    """Return the table; raise ValueError if a column has a wrong length or impossible numbers."""
     count = len(table["outcome"])
     columns = [(column["name"], column["values"]) for column in table["keys"]]
     columns += [

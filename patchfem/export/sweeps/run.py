@@ -54,7 +54,7 @@ class SweepTarget:
     page: bool = True
 
     def kept_files(self, count: int) -> str:
-        """Return what is stored of each case of a sweep with `count` cases."""
+        """Return what is stored for each case of a sweep with `count` cases."""
         return self.keep or ("summaries" if count <= MAX_CASES_WITH_SUMMARY else "none")
 
 
@@ -145,7 +145,7 @@ def sweep_into(
 
 
 def sweep_identity(sweep_scene: SweepScene, cases: Cases) -> dict:
-    """Return the scene hash and the keys of a sweep, by which `--resume` identifies it."""
+    """Return the scene hash and the keys by which `--resume` identifies a sweep."""
     return {"scene": sweep_scene.hash_common_data(), "keys": [axis.key for axis in cases.axes]}
 
 
@@ -316,7 +316,7 @@ def hash_tables(sweep_scene: SweepScene, cases: Cases, folder: Folder, page: boo
 
 
 def _axis_content(axis: Axis) -> tuple:
-    """Return the table contents that depend on an axis: its strings, or a hash of its numbers."""
+    """Return the entries that identify an axis: its strings, or its unit and a hash of its numbers."""
     texts = axis.texts
     return (
         (texts.unit, sha256(texts.numbers).hexdigest())
@@ -385,7 +385,7 @@ def write_tables(
 
 
 def _shard_cases(count: int, shard: tuple | None) -> np.ndarray:
-    """Return the case numbers of a shard (i, n), which are neighbours.
+    """Return the consecutive case numbers that belong to a shard (i, n).
 
     Neighbours share most of the work.
     """

@@ -41,7 +41,7 @@ FACTS = {
 
 
 class Column(NamedTuple):
-    """A column of numbers of a sweep, (n,) [unit], "1" for plain numbers."""
+    """Column of n numbers of a sweep with its unit, which is "1" for dimensionless numbers."""
 
     name: str
     values: np.ndarray
@@ -50,7 +50,7 @@ class Column(NamedTuple):
 
 
 def sort_measures(results: CaseResults) -> list[str]:
-    """Return the measures of the cases in the order of the reference."""
+    """Return the measures of the cases in the order in which the reference lists them."""
     return sorted(
         results.values,
         key=lambda name: (
@@ -94,7 +94,7 @@ def column_names(cases: Cases, results: CaseResults, keys: Sequence[str] = ()) -
 
 
 def csv_lines(cases: Cases, results: CaseResults, keys: Sequence[str] = ()) -> Iterator[list[str]]:
-    """Yield a line of sweep.csv per case; a missing value is "".
+    """Yield a line of sweep.csv for each case; a missing value becomes "".
 
     A line contains the swept keys as written, the outcome, every measure with its error in SI, the
     message of a failed case, and the name of its folder if `keys` are given.
@@ -234,7 +234,7 @@ def _file_attributes(sweep_scene: SweepScene, cases: Cases, answer: str) -> dict
 
 
 def shared_facts(sweep_scene: SweepScene, cases: Cases) -> dict:
-    """Collect the FACTS that all cases share and that are not swept.
+    """Return the FACTS that all cases share and that are not swept.
 
     These are the tolerance, the size of the patch [m] and the ends of the swept frequencies [Hz].
     """
