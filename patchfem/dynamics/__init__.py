@@ -1,4 +1,4 @@
-"""Engines that compute the motion of a modal structure with friction interfaces.
+"""Solvers that compute the motion of a modal structure with friction interfaces.
 
 In: `core.ModalBasis`, a drive, a contact. Out: histories, events, energies. A module imports its own
 entry of this list and the entries before it:

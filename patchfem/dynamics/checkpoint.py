@@ -1,4 +1,4 @@
-"""Checkpoints of a long march on disk, from which it continues with bitwise equal results.
+"""Checkpoint files of a long time integration (march), which resumes with bitwise equal results.
 
 `store_checkpoints` sets the files of all marches in its context, one per march in the order in
 which they begin. A march that ends within MIN_WRITE_INTERVAL writes nothing. A checkpoint holds the
@@ -36,7 +36,7 @@ _FILES = ContextVar("checkpoint_files", default=None)
 
 
 class CheckpointFiles:
-    """Checkpoint files of a run, one for each of its marches.
+    """Checkpoint files of a run, one for each of its marches (time integrations).
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class CheckpointFiles:
 
 @contextmanager
 def store_checkpoints(files: CheckpointFiles | None) -> Iterator[None]:
-    """Set the checkpoint files of the marches in this context; None disables checkpoints."""
+    """Set the checkpoint files for the marches in this context; None switches checkpoints off."""
     token = _FILES.set(files)
     try:
         yield
@@ -66,7 +66,7 @@ def store_checkpoints(files: CheckpointFiles | None) -> Iterator[None]:
 
 
 class MarchedCycle(NamedTuple):
-    """Samples and friction work of a marched cycle, or of a part of a cycle.
+    """Samples and friction work of one marched cycle, or of a fraction of a cycle.
 
     - first_step: number of the first step of the cycle
     - rows: (steps + 1, width) samples
@@ -79,7 +79,7 @@ class MarchedCycle(NamedTuple):
 
 
 class MarchSamples:
-    """Samples that a march has collected so far, which are stored with its checkpoint.
+    """Samples that a march has collected so far; they are stored with its checkpoint.
 
     - last: the last cycles, each of them (number of the first step, rows, work [J])
     - early_rows, early_numbers: blocks of samples from before the last cycles, and the numbers of
@@ -102,16 +102,16 @@ class MarchSamples:
 
     @property
     def capacity(self) -> int:
-        """Number of further samples from before the last cycles that can be kept."""
+        """Number of further samples that can be kept from the time before the last cycles."""
         return MAX_EARLY_SAMPLES - sum(map(len, self.early_numbers))
 
     def keep_early(self, rows, numbers) -> None:
-        """Keep samples from before the last cycles, and the numbers of their steps."""
+        """Keep samples from the time before the last cycles, with the numbers of their steps."""
         self.early_rows.append(rows)
         self.early_numbers.append(numbers)
 
     def to_arrays(self) -> dict:
-        """Return all samples of the march as arrays by name, for storage in a checkpoint."""
+        """Return all samples of the march as named arrays, for storage in a checkpoint."""
         out = _cycles_to_arrays("last", self.last, self.extremes)
         if self.early_rows:
             out |= {
@@ -128,7 +128,7 @@ class MarchSamples:
         }
 
     def restore(self, arrays: dict, start_march) -> None:
-        """Restore the samples of a march from the arrays of a checkpoint (`to_arrays`).
+        """Restore the samples of a march from the arrays that `to_arrays` returned.
 
         start_march: function that returns a new march at its start.
 
@@ -148,7 +148,7 @@ class MarchSamples:
 
 
 def _cycles_to_arrays(name: str, cycles, extremes) -> dict:
-    """Return marched cycles and their extremes as arrays by name."""
+    """Return marched cycles and their extremes as a dictionary of named arrays."""
     return {f"{name}.{k}": cycle.rows for k, cycle in enumerate(cycles)} | {
         f"{name}.first": np.array([cycle.first_step for cycle in cycles], np.int64),
         f"{name}.work": np.array([cycle.work for cycle in cycles], float),
@@ -157,7 +157,7 @@ def _cycles_to_arrays(name: str, cycles, extremes) -> dict:
 
 
 def _cycles_from_arrays(name: str, arrays: dict) -> tuple:
-    """Return marched cycles and their extremes from the arrays of `_cycles_to_arrays`."""
+    """Rebuild marched cycles and their extremes from the arrays that `_cycles_to_arrays` returned."""
     firsts = arrays[f"{name}.first"].tolist()
     works = arrays[f"{name}.work"].tolist()
     cycles = []
@@ -167,7 +167,7 @@ def _cycles_from_arrays(name: str, arrays: dict) -> tuple:
 
 
 class MarchCheckpoint:
-    """Writer of the checkpoint file of one march; it writes nothing if the path is None."""
+    """Writer of the checkpoint file of one march; it writes nothing if its path is None."""
 
     def __init__(self, path: Path | None, key: str):
         self.path = path
@@ -175,7 +175,7 @@ class MarchCheckpoint:
         self.next_write = perf_counter() + MIN_WRITE_INTERVAL
 
     def write_if_due(self, run, samples: MarchSamples) -> None:
-        """Write a checkpoint between two cycles if enough time has passed since the last one.
+        """Write a checkpoint between two cycles if the minimum interval since the last one has passed.
 
         A failure to write, as on a full disk, ends the checkpoints of this march.
 
@@ -194,7 +194,7 @@ class MarchCheckpoint:
 
 
 def open_checkpoint(run, request: tuple, samples: MarchSamples, start_march) -> MarchCheckpoint:
-    """Open the checkpoint file of a new march, and resume the march from an existing file.
+    """Open the checkpoint file of a new march; if the file exists, resume the march from it.
 
     Parameters
     ----------
@@ -227,7 +227,7 @@ def open_checkpoint(run, request: tuple, samples: MarchSamples, start_march) -> 
 
 
 def _make_key(key: str, run, request: tuple) -> str:
-    """Return the hash that identifies the checkpoint of a march: its start, drive and request."""
+    """Return a hash of the start state, drive signal and request, which identifies a march's checkpoint."""
     digest = hashlib.sha256(f"{key} {type(run).__name__} {request}".encode())
     for name, array in _collect_arrays(run, UNFILLED_ATTRIBUTES).items():
         digest.update(f"{name} {array.shape} ".encode() + array.tobytes())
@@ -237,7 +237,7 @@ def _make_key(key: str, run, request: tuple) -> str:
 
 
 def _collect_arrays(run, omitted=()) -> dict:
-    """Return the arrays of a march and of its nested tuples by name.
+    """Collect the arrays of a march, including those in nested tuples, in a dictionary by name.
 
     omitted: names of attributes to leave out.
 
@@ -258,7 +258,7 @@ def _collect_arrays(run, omitted=()) -> dict:
 
 
 def _run_to_arrays(prefix: str, run) -> dict:
-    """Return the arrays and scalar attributes of a march by name, for a checkpoint."""
+    """Return the arrays and scalar attributes of a march as named arrays, for a checkpoint."""
     numbers = {
         name: value for name, value in vars(run).items() if type(value) in (int, float, bool, str)
     }
@@ -267,7 +267,7 @@ def _run_to_arrays(prefix: str, run) -> dict:
 
 
 def _restore_run(run, prefix: str, arrays: dict) -> None:
-    """Restore the state of a march from the arrays of a checkpoint (`_run_to_arrays`)."""
+    """Restore the state of a march from the checkpoint arrays that `_run_to_arrays` returned."""
     numbers = json.loads(str(arrays[f"{prefix}:"]))
     for name, value in list(vars(run).items()):
         if name not in UNSTORED_ATTRIBUTES:
@@ -300,7 +300,7 @@ def save_checkpoint(path: Path, key: str, run, samples: MarchSamples) -> None:
 
 
 def load_checkpoint(path: Path, key: str, run, samples: MarchSamples, start_march) -> None:
-    """Load a checkpoint file into a new march and its samples.
+    """Load a checkpoint file into a new march and its sample collection.
 
     Parameters
     ----------
@@ -333,7 +333,7 @@ def load_checkpoint(path: Path, key: str, run, samples: MarchSamples, start_marc
 
 
 def _restore_value(value, name: str, arrays: dict, number):
-    """Return the stored value of an attribute of a march from the arrays of a checkpoint.
+    """Return the value of a march attribute that is stored in the arrays of a checkpoint.
 
     An array of equal shape is overwritten in place, because other objects may refer to it.
     """

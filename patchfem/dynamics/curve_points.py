@@ -1,4 +1,4 @@
-"""Adaptive sampling of a curve, denser where its curvature is larger.
+"""Adaptive sampling of a curve, with denser points where the curvature is larger.
 
 If the middle point b of three points a, b, c deviates by e from the line from a to c, a parabola
 through them deviates by e h_ab^2/(4 h_ab h_bc) from its chord in the middle of ab. An interval is
@@ -20,7 +20,7 @@ MIN_INTERVAL_RATIO = 1e-6
 
 
 class CurvePoints(NamedTuple):
-    """Abscissas (k,) of a sampled curve in order, and the result of the computation at each."""
+    """Increasing abscissas (k,) of a sampled curve, and the result computed at each of them."""
 
     abscissas: np.ndarray
     results: list
@@ -67,7 +67,7 @@ def sample_adaptively(
 
 
 def find_coarse_intervals(abscissas, values, tolerance: float) -> np.ndarray:
-    """Return the indices k of the intervals (k, k + 1) of a sampled curve that must be halved.
+    """Return the indices k of the intervals (k, k + 1) that must be halved to resolve the curve.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Extremes, phasors and selected samples of the cycles of a march."""
+"""Extremes, phasors and selected samples of the cycles in a march (time integration)."""
 
 from functools import lru_cache
 from typing import NamedTuple
@@ -25,7 +25,7 @@ MIN_SAMPLES = 101
 def choose_sample_times(
     begin: float, end: float, period: float, min_samples: int = MIN_SAMPLES
 ) -> np.ndarray:
-    """Return evenly spaced times at which some cycles of a run are sampled.
+    """Return evenly spaced times at which several cycles of a run are sampled.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def choose_sample_times(
 
 
 def select_cycle_samples(rows, run, n_equidistant: int = 0) -> list:
-    """Return the indices of the samples to keep in each marched cycle.
+    """Return the indices of the samples that are kept in each marched cycle.
 
     These are the first sample, every reversal of the output and of an interface, and every stop and
     release, where the slip speed falls below or exceeds STICK_SPEED_RATIO of its maximum in the
@@ -89,7 +89,7 @@ def select_cycle_samples(rows, run, n_equidistant: int = 0) -> list:
 
 
 def find_cycle_extremes(rows, modes, dt) -> list:
-    """Return the smallest and largest output [m] of each cycle by cubic Hermite interpolation.
+    """Find the smallest and largest output [m] in each cycle by cubic Hermite interpolation.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def find_cycle_extremes(rows, modes, dt) -> list:
 
 
 def find_cycle_phasors(rows, modes, first: int, steps_per_cycle: int) -> list:
-    """Return the phasor [m] of the output at the drive frequency in each cycle.
+    """Compute the phasor [m] of the output at the drive frequency in each cycle.
 
     The phasor is c in the output Re(c exp(i omega t)).
 
@@ -137,19 +137,19 @@ def find_cycle_phasors(rows, modes, first: int, steps_per_cycle: int) -> list:
 
 @lru_cache(maxsize=4)
 def _make_carrier(first: int, n_samples: int, steps_per_cycle: int) -> np.ndarray:
-    """Return exp(-i phase) of the drive at successive samples, from step number `first` on."""
+    """Return exp(-i phase) of the sinusoidal drive at successive samples, beginning with step `first`."""
     return np.exp(-2j * np.pi * (first + np.arange(n_samples)) / steps_per_cycle)
 
 
 class Extremes(NamedTuple):
-    """Minima and maxima (...) of sampled functions."""
+    """Minima and maxima of sampled functions, as arrays of any shape (...)."""
 
     minimum: np.ndarray
     maximum: np.ndarray
 
 
 def find_hermite_extremes(values, rates, dt) -> Extremes:
-    """Return the extremes of the piecewise cubic Hermite interpolant of sampled functions.
+    """Find the minima and maxima of piecewise cubic Hermite interpolants through samples.
 
     Parameters
     ----------

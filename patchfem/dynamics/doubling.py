@@ -1,4 +1,4 @@
-"""Exact time step of modes whose periods are much shorter than the step, by repeated doubling.
+"""Exact time step for modes whose periods are much shorter than the step, by repeated doubling.
 
 Numerical integration over a step does not resolve a motion that decays in a millionth of it. Over a
 short step it is exact to round-off. Two successive steps make a step of twice the length, whose motion
@@ -13,7 +13,7 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False, slots=True)
 class StepMap:
-    """Linear map of a modal time step, and its energies as quadratic forms.
+    """Linear map of the modal state over a time step, and the step's energies as quadratic forms.
 
     Both are functions of y = (z, z', f, a): coordinates, rates and constant accelerations (n,), and the drive (m,) at
     nodes.
@@ -31,7 +31,7 @@ class StepMap:
 
 
 def make_short_step(square, damping, push, parts: dict, quadratic) -> StepMap:
-    """Return the step map of a step that is short compared to the periods of the modes.
+    """Return the step map for a step that is short compared with the periods of the modes.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def make_short_step(square, damping, push, parts: dict, quadratic) -> StepMap:
 
 
 def double_step(step: StepMap, halves) -> StepMap:
-    """Return the step map of two successive equal steps.
+    """Return the step map for two successive equal steps.
 
     halves: two (m, m), interpolation of the drive from the nodes of the double step to those of each half.
     """
@@ -99,7 +99,7 @@ def double_step(step: StepMap, halves) -> StepMap:
 
 
 def split_step(step: StepMap) -> tuple:
-    """Return the drive weights and the loss form of a step map.
+    """Return the weights of the drive signal, and the quadratic form of the loss, from a step map.
 
     They are those of `propagator._compute_drive_weights` for coupled damping.
 

@@ -1,4 +1,4 @@
-"""Result of a time integration: histories from modal coordinates, energies and outcome.
+"""Result of a time integration: time histories from modal coordinates, energies and outcome.
 
 Measures that an engine integrates over the last cycles itself are a `core.IntegratedMeasures`.
 """
@@ -15,7 +15,7 @@ MIN_ALIGNMENT = 0.95
 
 
 def mean_slip_phase(count, cosine, sine):
-    """Return the mean phase [rad] modulo pi of the slip onsets of one run or of (n,) runs.
+    """Return the mean phase [rad], modulo pi, at which slip begins, for one run or for (n,) runs.
 
     It is NaN if there is no onset, and if the onsets differ by more than MIN_ALIGNMENT allows: the
     mean of several slip phases in a half cycle is the phase of none.
@@ -35,7 +35,7 @@ def mean_slip_phase(count, cosine, sine):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class EngineResult:
-    """Result of a simulation run of a time integrator.
+    """Result of a run by one of the time integrators.
 
     - response, window: time histories of the run and of its last cycles
     - amplitudes: (c, 2) smallest and largest output of every cycle [m]
@@ -55,7 +55,7 @@ class EngineResult:
 
 
 def find_accelerations(modes: ModalBasis, drive_acceleration, z, rate, friction) -> np.ndarray:
-    """Return the modal accelerations (k, n) [m s-2] relative to the base from eq. 3.4.
+    """Compute the modal accelerations (k, n) [m s-2] relative to the base from eq. 3.4.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def find_accelerations(modes: ModalBasis, drive_acceleration, z, rate, friction)
 def make_histories(
     modes: ModalBasis, drive, time, motion: tuple, interface: tuple, extra: dict
 ) -> Response:
-    """Return the time histories of output, drive and first interface from a modal motion.
+    """Compute the time histories of output, drive signal and first interface from a modal motion.
 
     Parameters
     ----------

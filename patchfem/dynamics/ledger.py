@@ -1,10 +1,10 @@
-"""Indices into the energy sums and sample rows that the compiled loops of a march write."""
+"""Indices into the energy sums and sample rows that the compiled loops of a march fill."""
 
 from enum import IntEnum
 
 
 class Ledger(IntEnum):
-    """Indices into the ledger of a march: energy sums and counters since its start.
+    """Indices into the ledger of a march: energy sums and counters since the start.
 
     - DRIVE_WORK, VISCOUS_LOSS: energies since the start [J]
     - DRIVE_POWER: sum of the absolute works of the drive in the steps [J]
@@ -27,7 +27,7 @@ class Ledger(IntEnum):
 
 
 class SampleColumn(IntEnum):
-    """Columns of a march sample for the first interface, after the modal coordinates and rates.
+    """Columns of a march sample for the first interface; they follow the modal coordinates and rates.
 
     They belong to the contact, or to the first element if the rig has no contact.
 

@@ -1,4 +1,4 @@
-"""Limit cycles of modes with negative damping and friction, without drive.
+"""Limit cycles of modes with negative damping and friction, in the absence of a drive signal.
 
 Friction of at most F dissipates up to 4 F A in a cycle of amplitude A, and a damping c < 0 supplies pi |c|
 omega A^2. Where both are equal the motion is periodic: one mode under Coulomb friction at A = 4 F/(pi
@@ -72,12 +72,12 @@ class LimitCycle(NamedTuple):
 
 
 def find_unstable_modes(modes: ModalBasis) -> np.ndarray:
-    """Return the indices (k,) of the modal coordinates with negative damping."""
+    """Return the indices (k,) of the modal coordinates that have negative damping."""
     return np.flatnonzero(np.diagonal(modes.damping_matrix) < 0)
 
 
 def estimate_amplitude(modes: ModalBasis, row, limit: float, mode: int) -> float:
-    """Estimate the limit-cycle amplitude [m] of a modal coordinate by den Hartog's balance.
+    """Estimate the limit-cycle amplitude [m] of a modal coordinate by den Hartog's energy balance.
 
     It is 4 F s/(pi |d| omega m).
 
@@ -100,7 +100,7 @@ def estimate_amplitude(modes: ModalBasis, row, limit: float, mode: int) -> float
 
 
 def find_relay_cycles(modes: ModalBasis, row, slip_force: float, stick_force: float) -> list:
-    """Find the limit cycles under rigid friction whose interface never sticks.
+    """Find the limit cycles under rigid friction in which the interface never sticks.
 
     After a reversal the force is constant: y(T/2) = E (y - e) + e = -y has one y for each half
     period T/2. It is a limit cycle if the interface stops at the reversal, slides in one direction in
@@ -127,7 +127,7 @@ def find_relay_cycles(modes: ModalBasis, row, slip_force: float, stick_force: fl
 
 
 def _find_mode_relay_cycles(modes: ModalBasis, row, forces: tuple, mode: int) -> list:
-    """Return the limit cycles under rigid friction with a frequency near that of a mode.
+    """Find the limit cycles under rigid friction whose frequency is close to that of a given mode.
 
     forces: kinetic and static friction [N].
     """
@@ -204,7 +204,7 @@ def trace_relay_backbone(modes: ModalBasis, row, forces: tuple, amplitudes, mode
 def _solve_damping(
     solve_cycle, amplitude: float, modal_rate: float, friction_rate: float
 ) -> tuple | None:
-    """Return the limit cycle and damping ratio of an amplitude [m] by the secant method.
+    """Solve for the limit cycle with an amplitude [m], and its damping ratio, by the secant method.
 
     modal_rate: damping rate of the mode [1/s]; friction_rate: guess of the damping rate of friction [1/s].
     """
@@ -228,7 +228,7 @@ def _solve_damping(
 
 
 def _free_motion_matrices(modes: ModalBasis, t) -> np.ndarray:
-    """Return the transition matrices (k, 2n, 2n) of the modal state (z, z') over times (k,)."""
+    """Return the transition matrices (k, 2n, 2n) of the modal state (z, z') over time spans (k,)."""
     blocks = propagator.free_motion(modes, t)
     if modes.damping is None:
         blocks = [part[..., None] * np.eye(modes.omega.size) for part in blocks]
@@ -236,7 +236,7 @@ def _free_motion_matrices(modes: ModalBasis, t) -> np.ndarray:
 
 
 def _reversal_speed_ratios(modes: ModalBasis, row, force: float, half_periods) -> np.ndarray:
-    """Return the relative slide velocity (k,) at the reversal for assumed half periods.
+    """Return dimensionless interface velocities (k,) at the reversal for assumed half periods.
 
     It is the velocity times the half period, divided by the slide; see `_find_reversal`.
     """
@@ -249,7 +249,7 @@ def _reversal_speed_ratios(modes: ModalBasis, row, force: float, half_periods) -
 
 
 def _find_reversal(modes: ModalBasis, row, force: float, half_period: float) -> tuple:
-    """Return the state of a periodic motion at its reversal, for an assumed half period.
+    """Return the state at the reversal of a periodic motion with an assumed half period.
 
     Also returns the slide velocity there, times the half period and divided by the slide, and the
     equilibrium.
@@ -270,7 +270,7 @@ def _find_reversal(modes: ModalBasis, row, force: float, half_period: float) -> 
 def _make_relay_cycle(
     modes: ModalBasis, row, forces: tuple, half_period: float
 ) -> LimitCycle | None:
-    """Return the limit cycle of a half period [s].
+    """Return the limit cycle that has a given half period [s].
 
     The result is None if the interface reverses or sticks within the half period.
 
@@ -308,13 +308,13 @@ def _make_relay_cycle(
 
 
 def _find_accelerations(modes: ModalBasis, y, row, force: float) -> np.ndarray:
-    """Return the modal accelerations (n,) of a state (2 n,) under a force [N] along a row."""
+    """Return the modal accelerations (n,) in a state (2 n,), with a force [N] applied along a row."""
     n = modes.omega.size
     return row * force / modes.mass - modes.omega**2 * y[:n] - modes.damping_matrix @ y[n:]
 
 
 def _find_maximum(samples) -> float:
-    """Return the maximum of a sampled motion (k,), interpolated by a parabola.
+    """Return the maximum of a sampled motion (k,), interpolated by a parabola through three samples.
 
     The motion changes sign after half a period.
     """
@@ -366,7 +366,7 @@ def find_balance_cycles(modes: ModalBasis, group: LawGroup, row, limit: float) -
 
 
 def _find_mode_cycles(modes: ModalBasis, group: LawGroup, mode: int, size: float) -> tuple:
-    """Return the limit cycles of one mode and the smallest amplitude [m] examined."""
+    """Return the limit cycles of one mode and the smallest amplitude [m] that was examined."""
     shape = np.eye(modes.omega.size)[mode]
     paths = (
         (
@@ -403,7 +403,7 @@ def _find_mode_cycles(modes: ModalBasis, group: LawGroup, mode: int, size: float
 def _find_undamped_motions(
     modes: ModalBasis, group: LawGroup, mode: int, path: tuple, harmonics: int
 ) -> list:
-    """Return the limit cycles of a mode: free motions at which the damping changes sign.
+    """Find the limit cycles of a mode: free motions at amplitudes where the damping changes sign.
 
     path: amplitudes (k,) [m], and frequency [rad/s] and shape (n,) of the first motion.
     """
@@ -429,7 +429,7 @@ def _find_undamped_motions(
 
 
 def _pack_unknowns(equations: FreeBalance, motion: FreeMotion) -> np.ndarray:
-    """Return the unknowns of a free motion for `FreeBalance.solve`."""
+    """Pack a free motion into the vector of unknowns for `FreeBalance.solve`."""
     y = equations.balance.lift.T @ motion.slides[:, : equations.h + 1]
     return np.append(
         pack_harmonics(y) / motion.amplitude, [motion.omega / equations.scale, motion.zeta]
@@ -439,7 +439,7 @@ def _pack_unknowns(equations: FreeBalance, motion: FreeMotion) -> np.ndarray:
 def _solve_undamped_between(
     equations: FreeBalance, low: FreeMotion, high: FreeMotion
 ) -> FreeMotion:
-    """Return the undamped free motion between two of opposite damping by the Illinois method."""
+    """Find the undamped free motion between two with opposite signs of damping (Illinois method)."""
     ends = [(np.log(motion.amplitude), motion.zeta, motion) for motion in (low, high)]
     last = 0
     for _ in range(60):

@@ -1,4 +1,4 @@
-"""Periodic motions by the shooting method: Newton's method on the map over a period.
+"""Periodic motions by the shooting method: Newton's method on the map of a state over one period.
 
 A motion with the numbers x at phase 0 of the drive is periodic where P(x) = x, with the map P over
 a period, or over half a period with the sign changed. Newton's step solves (P' - 1) dx = x - P(x)
@@ -41,7 +41,7 @@ UNIT_CIRCLE_TOL = 1e-5
 
 @dataclass(eq=False, slots=True)
 class MappedPoint:
-    """State of a motion and its image under the map over a period.
+    """State of a motion and the state to which the map over one period takes it.
 
     - point, image: state at the start and at the end of the period, of the class that the engine uses
     - slope: (m, m) derivative of the numbers at the end with respect to those at the start
@@ -70,7 +70,7 @@ class MappedPoint:
         self.max_residual = float(np.abs(self.residual).max())
 
     def is_periodic(self, tolerance: float) -> bool:
-        """Return whether the motion is periodic within a tolerance relative to its size."""
+        """Return whether the motion is periodic within a tolerance, relative to its size."""
         return (
             self.max_residual <= tolerance
             and self.max_residual * self.size <= MAX_FREE_MASS_RESIDUAL
@@ -105,7 +105,7 @@ class MappedPoint:
 
 
 class MotionGrows(NotConverged):
-    """Error: the motion grows by the same amount in every period and never becomes periodic.
+    """Error: the motion grows by the same amount in every period, so it never becomes periodic.
 
     - mapped_point: last MappedPoint of the search
     - n_steps: number of Newton steps
@@ -120,17 +120,17 @@ class MotionGrows(NotConverged):
 
 
 class PeriodicPoint(NamedTuple):
-    """Periodic motion found by shooting, and the number of Newton steps."""
+    """State of a periodic motion found by shooting, and the number of Newton steps."""
 
     mapped_point: MappedPoint
     n_steps: int
 
 
 class Shooting:
-    """Shooting method for the periodic motion of an engine, based on its map over a period."""
+    """Shooting method for periodic motions, based on a solver that maps a state over one period."""
 
     def map_point(self, point) -> MappedPoint:
-        """Integrate a state over a period; return the state with its image and derivative.
+        """Integrate a state over one period; return the state, its image and the derivative of the map.
 
         Raises NotConverged if the engine does not reach the end of the period.
 
@@ -138,11 +138,11 @@ class Shooting:
         raise NotImplementedError
 
     def move_by_newton_step(self, mapped_point: MappedPoint, step):
-        """Return the state that lies a Newton step (m,) away from a mapped point."""
+        """Return the state that is reached from a mapped point by a Newton step (m,)."""
         raise NotImplementedError
 
     def march_periods(self, mapped_point: MappedPoint, n_periods: int):
-        """Return the state after integrating some periods from the image of a mapped point."""
+        """Integrate over several periods, beginning at the image of a mapped point; return the state."""
         raise NotImplementedError
 
     def is_growing(self, mapped_point: MappedPoint) -> bool:
@@ -165,7 +165,7 @@ class Shooting:
     def find_periodic_point(
         self, point, n_periods: tuple = (10, 160), tolerance: float = 1e-12
     ) -> PeriodicPoint:
-        """Find the periodic motion near a state by damped Newton iteration.
+        """Find the periodic motion close to a given state by damped Newton iteration.
 
         Parameters
         ----------
@@ -212,7 +212,7 @@ class Shooting:
         )
 
     def _damped_newton_step(self, mapped_point: MappedPoint, fractions) -> MappedPoint | None:
-        """Return the mapped point after the largest fraction of a Newton step that reduces the residual.
+        """Take the largest of several fractions of a Newton step that reduces the residual.
 
         The result is None if no fraction does.
 
@@ -234,7 +234,7 @@ class Shooting:
 
 
 def solve_linear(matrix):
-    """Return a function that solves a linear system with a matrix (n, n) for right sides b.
+    """Return a function that solves the linear system with a matrix (n, n) for a right-hand side b.
 
     The least-squares solution is returned if the matrix is singular, for example if nothing determines a mean
     displacement or a rest position.
@@ -249,7 +249,7 @@ def solve_linear(matrix):
 
 
 def bound_error(residual: float, multipliers) -> float:
-    """Return a bound of the relative error of a periodic motion from its residual.
+    """Return an upper bound of the relative error of a periodic motion, given its residual.
 
     It grows as one of the Floquet multipliers (m,) approaches 1.
     """
@@ -258,11 +258,11 @@ def bound_error(residual: float, multipliers) -> float:
 
 
 def find_multipliers(matrix) -> np.ndarray:
-    """Return the Floquet multipliers (s,) of a monodromy matrix in decreasing magnitude."""
+    """Return the Floquet multipliers (s,) of a monodromy matrix in order of decreasing magnitude."""
     multipliers = np.linalg.eigvals(matrix)
     return multipliers[np.argsort(-np.abs(multipliers))]
 
 
 def is_stable(multipliers) -> bool:
-    """Return whether a motion is stable: no Floquet multiplier (s,) exceeds 1 in magnitude."""
+    """Return whether a motion is stable, that is, no Floquet multiplier (s,) exceeds 1 in magnitude."""
     return bool(np.abs(multipliers).max(initial=0.0) <= 1 + UNIT_CIRCLE_TOL)

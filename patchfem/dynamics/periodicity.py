@@ -1,4 +1,4 @@
-"""Schedule and error bound of the check whether a motion has become periodic.
+"""Schedule of the checks whether a motion has become periodic, and their error bound.
 
 The remaining cycles of a periodic motion equal the last one and need not be computed.
 
@@ -30,7 +30,7 @@ def cycles_to_next_check(n_cycles: int) -> int:
 def bound_remaining_change(
     change: float, previous_change: float, n_remaining: int, n_checked: int
 ) -> float:
-    """Return a bound of the relative change of a marched motion in its remaining cycles.
+    """Return a bound of the relative change that a marched motion undergoes in its remaining cycles.
 
     Parameters
     ----------

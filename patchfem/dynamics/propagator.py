@@ -1,4 +1,4 @@
-"""Exact time step of damped modes under a drive and constant interface forces.
+"""Exact time step of damped modes under a drive signal and constant interface forces.
 
 The step is computed from the matrix exponential of each mode, or of all modes together where
 damping couples them, so resonance without damping, rigid modes and overdamped modes need no special
@@ -31,7 +31,7 @@ SHORT_STEP_RATE_TIME = 4.0
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Propagator:
-    """Coefficients of the exact time step of n modal coordinates with p interface ports.
+    """Coefficients of the exact time step for n modal coordinates and p interface ports.
 
     free (4, n): z and z' at the end per z and z' at the start (zz, zv, vz, vv); push (2, n): both
     per modal acceleration, constant over the step; dense (2 n, 3 n): the same for (z, z',
@@ -55,7 +55,7 @@ class Propagator:
     parts: dict
 
     def tables(self, drive, first: int, count: int) -> np.ndarray:
-        """Return the coefficients of the drive for successive steps, one row per step.
+        """Return the drive coefficients for successive steps, one row per step.
 
         The columns are the contribution of the drive to z and z' (n, n); linear forms in (z, z',
         acceleration) of the work of the drive (3 n) and of the viscous loss (3 n) [J]; the constant
@@ -101,7 +101,7 @@ class Propagator:
 
 
 def make_propagator(modes: ModalBasis, drive, steps_per_cycle: int, rows=None) -> Propagator:
-    """Return the propagator of the modes for equal steps of a drive period.
+    """Return the propagator of the modes for equal steps that divide a drive period.
 
     Steps of large omega dt use up to MAX_GAUSS_POINTS Gauss points; if these do not suffice, a
     short step is doubled. The last few propagators are cached, because the runs that estimate
@@ -130,7 +130,7 @@ def make_propagator(modes: ModalBasis, drive, steps_per_cycle: int, rows=None) -
 
 
 class _HashableBasis:
-    """Modal basis that is compared and hashed by its numbers, as a key of the cache."""
+    """Modal basis that is compared and hashed by its numerical values, for use as a cache key."""
 
     def __init__(self, modes: ModalBasis):
         self.modes = modes
@@ -232,7 +232,7 @@ def _gauss_rule(dt: float, count: int) -> tuple:
 
 
 def _integrate_by_doubling(modes: ModalBasis, dt: float, fastest: float, slowest: float) -> tuple:
-    """Compute the coefficients of a step much longer than the modal periods, by doubling.
+    """Compute the coefficients for a step much longer than the modal periods, by doubling.
 
     fastest, slowest [1/s]: rates of the modes and of the drive. Returns (free-motion blocks, motion per acceleration,
     drive weights, quadratic form of the loss) and the nodes.
@@ -329,7 +329,7 @@ def _free_motion_uncoupled(omega, zeta, t) -> tuple:
 
 
 def matrix_exponentials(a) -> np.ndarray:
-    """Return the exponentials of matrices (k, m, m) by scaling and squaring.
+    """Compute the exponentials of matrices (k, m, m) by scaling and squaring.
 
     The Taylor series of order 13 of a matrix with a norm below 1/4 has an error of (1/4)^14/14! =
     4e-20.
@@ -347,7 +347,7 @@ def matrix_exponentials(a) -> np.ndarray:
 
 
 def _motion_per_acceleration(modes: ModalBasis, dt: float, nodes, weight) -> tuple:
-    """Return the modal coordinate and rate after dt [s] per constant modal acceleration.
+    """Return the modal coordinate and rate after dt [s], per unit of a constant modal acceleration.
 
     Each has the shape (n,), or (n, n) if damping couples the coordinates. The first one is the
     integral of zv, which avoids cancellation in a short step.
@@ -358,7 +358,7 @@ def _motion_per_acceleration(modes: ModalBasis, dt: float, nodes, weight) -> tup
 
 
 def _compute_drive_weights(modes: ModalBasis, dt, nodes, weight, node_blocks) -> tuple:
-    """Return the weights of the drive at the Gauss points, and the form of the viscous loss.
+    """Return the weights of the drive signal at the Gauss points, and the quadratic form of viscous loss.
 
     `tables` multiplies the weights by the drive.
     """
@@ -411,7 +411,7 @@ def _compute_drive_weights(modes: ModalBasis, dt, nodes, weight, node_blocks) ->
 
 
 def _lagrange_polynomials(nodes, points) -> np.ndarray:
-    """Evaluate the Lagrange polynomials of nodes (m,) at points (k,), as an array (k, m)."""
+    """Evaluate the Lagrange polynomials for nodes (m,) at points (k,), as an array (k, m)."""
     node_distances = nodes[:, None] - nodes
     np.fill_diagonal(node_distances, 1.0)
     scale = 1 / np.prod(node_distances / np.ptp(nodes), axis=1)

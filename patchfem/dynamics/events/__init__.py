@@ -1,4 +1,4 @@
-"""Event engine: exact motion of modes with rigid (Coulomb) and elastic-plastic elements.
+"""Event-driven solver: exact motion of modes with rigid (Coulomb) and elastic-plastic elements.
 
 Equation. Between two events the system is linear. With modal coordinates z, the drive a(t) and the
 friction forces F of the interfaces,

@@ -1,4 +1,4 @@
-"""Estimates of the CPU time of the event engine in interpreted Python.
+"""Estimates of the CPU time that the event-driven solver takes in interpreted Python.
 
 The engine decides by it whether to compile its loop.
 
@@ -15,7 +15,7 @@ from ...structure.drive_sizes import find_max_frequency_ratio
 
 
 def estimate_cycle_time(modes: ModalBasis, drive, stiffness: float, elements: int) -> float:
-    """Estimate the CPU time [s] of one drive cycle of the event engine in interpreted Python.
+    """Estimate the CPU time [s] that one drive cycle takes in interpreted Python.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def estimate_cycle_time(modes: ModalBasis, drive, stiffness: float, elements: in
 
 
 def estimate_sample_time(modes: ModalBasis) -> float:
-    """Estimate the CPU time [s] of one sample of the motion in interpreted Python."""
+    """Estimate the CPU time [s] to evaluate one sample of the motion in interpreted Python."""
     return (
         PYTHON_SAMPLE_TIME_RATIO
         * PYTHON_PIECE_SECONDS

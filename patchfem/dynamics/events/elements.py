@@ -1,4 +1,4 @@
-"""Parallel rigid and elastic-plastic friction elements of interfaces, and their memory.
+"""Parallel rigid and elastic-plastic friction elements of interfaces, and their hysteresis memory.
 
 All elements share the relative displacement of their interface. The elastic-plastic ones are
 sorted by yield slide, the stretch at which they slip.
@@ -21,7 +21,7 @@ YIELD_TOL = 1e-14
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Elements:
-    """Parallel friction elements of one interface, with force F = sum k_j e_j.
+    """Parallel friction elements of one interface, whose total force is F = sum k_j e_j.
 
     The stretches obey |e_j| <= y_j. A rigid element (Coulomb friction) may act in parallel.
 
@@ -42,12 +42,12 @@ class Elements:
 
     @property
     def limit(self) -> float:
-        """Friction limit of the elastic-plastic elements, sum k_j y_j [N]."""
+        """Friction limit [N] of the elastic-plastic elements, sum k_j y_j."""
         return float(self.stiffness @ self.yield_displacement)
 
 
 def make_elements(stiffness, yield_displacement) -> Elements:
-    """Return elastic-plastic elements in increasing order of their yield displacement.
+    """Return elastic-plastic elements, sorted by increasing yield displacement.
 
     Elements with equal yield displacements become one.
 
@@ -88,7 +88,7 @@ def make_elements(stiffness, yield_displacement) -> Elements:
 
 
 def make_coulomb_elements(static: float, kinetic: float | None = None) -> Elements:
-    """Return the rigid element of Coulomb friction with static and kinetic limits.
+    """Return the rigid element for Coulomb friction with static and kinetic limits.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def make_coulomb_elements(static: float, kinetic: float | None = None) -> Elemen
 
 
 def merge_elements(elements: Elements, count: int = 2, first: int = 0) -> Elements:
-    """Merge neighbouring friction elements into fewer ones with the same stiffness and limit.
+    """Merge neighbouring friction elements into fewer ones with equal total stiffness and limit.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ def merge_elements(elements: Elements, count: int = 2, first: int = 0) -> Elemen
 
 
 def join_cells(count: int, first: int, stiffness, yield_displacement) -> tuple:
-    """Return stiffness [N/m] and yield displacement [m] of merged friction elements.
+    """Return the stiffness [N/m] and yield displacement [m] of the merged friction elements.
 
     See `merge_elements`.
 
@@ -273,7 +273,7 @@ def reset_work(memory: Memory) -> Memory:
 
 
 def element_stretches(group: Elements, memory: Memory, interface: int) -> np.ndarray:
-    """Return the stretch (a,) [m] of every friction element of an interface in the given order.
+    """Return the stretch (a,) [m] of each friction element of an interface, in the order given.
 
     The order is that of the arguments of `make_elements`.
 
@@ -296,7 +296,7 @@ def element_stretches(group: Elements, memory: Memory, interface: int) -> np.nda
 
 
 def sorted_stretches(group: Elements, memory: Memory, interface: int) -> np.ndarray:
-    """Return the stretch (t,) [m] of every friction element in order of the yield displacement.
+    """Return the stretch (t,) [m] of each friction element, sorted by yield displacement.
 
     Parameters
     ----------

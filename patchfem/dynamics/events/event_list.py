@@ -1,4 +1,4 @@
-"""Log of the events of a run: kind, interface, time and relative displacement."""
+"""Log of the events in a run: kind, interface, time and relative displacement."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ MAX_EVENTS = 400_000
 
 @dataclass(frozen=True, eq=False, slots=True)
 class EventLog:
-    """Log of the last MAX_EVENTS events of a run in order of time.
+    """Log of the last MAX_EVENTS events in a run, in order of time.
 
     - time, phase: (k,) time [s] and phase of the drive [rad]
     - interface: (k,) number of the interface, -1 for a border between two segments of the drive

@@ -1,4 +1,4 @@
-"""Run of the event engine, with samples, extremes, energies and events."""
+"""Run of the event-driven solver, with samples, extremes, energies and events."""
 
 from dataclasses import dataclass, field, replace
 from math import ceil
@@ -75,7 +75,7 @@ SAME_TIME_TOL = 1e-12
 
 @dataclass(frozen=True, eq=False, slots=True)
 class EventRunResult:
-    """Result of an event-driven run of rigid and elastic-plastic friction elements.
+    """Result of an event-driven run with rigid and elastic-plastic friction elements.
 
     - amplitudes: (c, 2) smallest and largest output of every cycle [m]
     - phasors: (c,) output at the frequency of the drive in the last cycle of every window [m], 0 in
@@ -114,12 +114,12 @@ class EventRunResult:
 
     @property
     def loops(self) -> tuple:
-        """Friction loop in the window, for every interface."""
+        """Friction loop of each interface in the window (the last cycles)."""
         return self.reading.loops
 
     @property
     def output_amplitude(self) -> float:
-        """Output amplitude in the window, half of the peak-to-peak range [m]."""
+        """Output amplitude [m] in the window: half of the peak-to-peak range."""
         return float(self.reading.output_amplitude)
 
     @property
@@ -129,7 +129,7 @@ class EventRunResult:
 
 
 def load_event_kernels(say=None) -> tuple:
-    """Load the compiled functions that march, evaluate samples and measure cycles.
+    """Load the compiled functions that integrate the motion, evaluate samples and measure cycles.
 
     say: is called before they are compiled.
     """
@@ -140,7 +140,7 @@ def load_event_kernels(say=None) -> tuple:
 def announce_runs(
     modes: ModalBasis, drive, groups, cycles: float, window: int, runs: int = 1
 ) -> None:
-    """Report the cost of coming runs to the kernels, which decide from it whether to compile.
+    """Report the expected cost of runs to the kernels, which decide from it whether to compile.
 
     Parameters
     ----------
@@ -170,7 +170,7 @@ def announce_runs(
 
 
 def is_loop_cached(modes: ModalBasis, drive) -> bool:
-    """Return whether machine code of the event loop is cached for the given modes.
+    """Return whether the cache contains machine code of the event loop for the given modes.
 
     The loop for one mode, whose squared frequency is a tuple, and that for several are compiled
     separately.
@@ -201,7 +201,7 @@ def start_event_run(
     start: InitialState | None = None,
     memory=None,
 ) -> "_EventRun":
-    """Set up an event-driven run at its initial state, but compute no motion.
+    """Set up an event-driven run in its initial state; no motion is computed.
 
     The parameters are those of `simulate`.
 
@@ -229,7 +229,7 @@ def simulate(
     *,
     even: bool = False,
 ) -> EventRunResult:
-    """Run the drive from rest or from a given state; keep the last cycles with all samples.
+    """Simulate the motion from rest or from a given state; keep all samples of the last cycles.
 
     Parameters
     ----------
@@ -285,7 +285,7 @@ def simulate(
 
 
 def simulate_batch(cases, cycles: int, window: int) -> list:
-    """Run many cases and omit histories and events, in a tenth of the time of `simulate`.
+    """Simulate many cases without histories and events, in a tenth of the time of `simulate`.
 
     Parameters
     ----------
@@ -440,7 +440,7 @@ class _EventRun:
             self.rows = np.empty((ROWS_PER_CALL, self.n_columns))
 
     def run_to(self, cycles: float, keep=None, progress=None) -> None:
-        """March the run up to a time given in cycles.
+        """March the run to a time that is given in cycles.
 
         If the motion repeats and not every row is needed, the last cycle stands for the
         remaining cycles.
@@ -468,7 +468,7 @@ class _EventRun:
                 break
 
     def _slip_signs(self, speeds, sizes) -> np.ndarray:
-        """Return the signs (i,) of the slip of the rigid elements at given velocities (i,) [m/s].
+        """Return the slip signs (i,) of the rigid elements at given velocities (i,) [m/s].
 
         sizes: (i,) magnitudes that the speeds are added from [m/s].
         """
@@ -479,7 +479,7 @@ class _EventRun:
         )
 
     def _march(self, stop, rows) -> tuple:
-        """Call the compiled march; return its status and the rows (k, w) that it filled.
+        """Call the compiled march; return its status and the rows (k, w) that it has filled.
 
         Its sums are added to those of the run as a whole: added piece by piece, the energies of a
         million cycles of four pieces were wrong by 6e-11.
@@ -506,7 +506,7 @@ class _EventRun:
         return code, rows[: 0 if self.has_passed_travel else used]
 
     def _make_row_collector(self, out: list):
-        """Return a callback that logs the events of rows and appends the rows to a list."""
+        """Return a callback that logs the events in rows and appends the rows to a list."""
 
         def keep(rows) -> None:
             self._log_events(rows)
@@ -515,7 +515,7 @@ class _EventRun:
         return keep
 
     def _keep_reversal_rows(self, rows) -> None:
-        """Keep the rows that begin with a reversal or a slip event, from before the window."""
+        """Keep the rows before the window that begin with a reversal or a slip event."""
         self.is_marked = self._log_events(rows) | (rows[:, Row.BEGIN] == ROW_BEGIN.reversal)
         if not self.n_kept and len(rows):
             self.is_marked[0] = True  # the first row is the start of the run
@@ -524,7 +524,7 @@ class _EventRun:
             self.n_kept += int(self.is_marked.sum())
 
     def _make_equidistant_sampler(self, step: float):
-        """Return a callback that keeps samples at all multiples of a time step [s].
+        """Return a callback that keeps a sample at each multiple of a time step [s].
 
         It also keeps those of `sample_rows`.
         """
@@ -547,13 +547,10 @@ class _EventRun:
         return keep
 
     def _skip_repeating_cycles(self, end: int, rows) -> None:
-        """Compute one cycle of a repeating motion and let it stand for the following cycles.
+        """Compute one cycle of a repeating motion and copy its result to the following cycles.
 
-        The last cycle is number `end`, or the one before the next segment of the drive. The
-        cycles are computed one by one if that cycle needs more than `rows`.
-
-        The border is the cycle number `end`, or the next segment of the drive. The cycles are
-        computed one by one if that cycle needs more than `rows`.
+        The last cycle before number `end`, or before the next segment of the drive signal, is not
+        skipped. The cycles are computed one by one if the first cycle needs more than `rows`.
         """
         run_sums = self.run_sums
         begin = int(self.time_state.now[Time.CYCLE])
@@ -618,7 +615,7 @@ class _EventRun:
         self.n_events += n_cycles * (self.n_events - n_earlier_events)
 
     def _log_events(self, rows) -> np.ndarray:
-        """Append stops, releases, reversals and drive changes to the event log.
+        """Append the stops, releases, reversals and drive changes in rows to the event log.
 
         Return which rows (k,) begin with one of them.
 
@@ -649,7 +646,7 @@ class _EventRun:
         return is_event
 
     def _add_events(self, rows, interface: int, kind, slide) -> None:
-        """Append the events with which rows (k, w) begin to the log."""
+        """Append the events at the beginning of rows (k, w) to the log."""
         if not len(rows):
             return
         events = np.empty((len(rows), 5))
@@ -662,7 +659,7 @@ class _EventRun:
         self.n_events += len(events)
 
     def _column_index(self, interface: int, column: int) -> int:
-        """Return the index in a row of a quantity of an interface.
+        """Return the index, within a row, of a quantity that belongs to an interface.
 
         `column` is a member of `Column`.
         """
@@ -705,7 +702,7 @@ class _EventRun:
         return self._make_result(early_rows, self._append_end_row(window_rows))
 
     def run_without_histories(self) -> EventRunResult:
-        """March the run to its end and return its measures only, no histories or events.
+        """March the run to its end and return only its measures, without histories and events.
 
         If the motion repeats, only a few cycles are measured.
         """
@@ -719,14 +716,14 @@ class _EventRun:
         return self._summarise(self._append_end_row(window_rows))
 
     def _cycle_ends(self, first: float, last: float) -> list:
-        """Return the ends of the cycles in the window, for a run that ends within a cycle."""
+        """Return the ends of the cycles in the window, or [] if the run ends with a whole drive cycle."""
         if abs(self.cycles - round(self.cycles)) < CYCLE_END_TOL:
             return []
         ends = self.cycles - np.arange(self.n_window, 0, -1)
         return [end for end in ends if first < end <= last]
 
     def _append_end_row(self, window_rows) -> np.ndarray:
-        """Return the rows (k + 1, w) of the window, followed by a row for its end."""
+        """Return the rows (k + 1, w) of the window with one more row for the end of the run."""
         n = self.modes.omega.size
         memory = self.memory
         row = np.zeros(self.n_columns)
@@ -773,7 +770,7 @@ class _EventRun:
         }
 
     def _summarise(self, rows) -> EventRunResult:
-        """Return the measures of the run, computed from the rows of the window, without histories."""
+        """Compute the measures of the run from the rows of the window, without histories."""
         start_time = rows[0, Row.TIME]
         end_time = rows[-1, Row.TIME]
         n_interfaces = len(self.groups)
@@ -861,7 +858,7 @@ class _EventRun:
         )
 
     def event_log(self) -> EventLog:
-        """Return the log of the last events of the run."""
+        """Return the log of the last events in the run."""
         rows = np.concatenate([np.empty((0, 5)), *self.events])
         rows = rows[np.argsort(rows[:, Row.TIME], kind="stable")][-MAX_EVENTS:]
         time, phase, interface, kind, slide = rows.T
@@ -922,7 +919,7 @@ class _EventRun:
         return out
 
     def _make_response(self, rows, owner, tau, time) -> Response:
-        """Return histories at times (k,) [s], given the row and the time since its start."""
+        """Return histories at times (k,) [s], given the row of each time and the time since its start."""
         return self._response_from_columns(self.evaluate_rows(rows, owner, tau), time)
 
     def _response_from_columns(self, columns, time) -> Response:
@@ -970,7 +967,7 @@ class _EventRun:
 
 
 def _shift_rows(rows, delays) -> np.ndarray:
-    """Return copies of rows (k, w) shifted by each of several delays (m,) [s]."""
+    """Return copies of rows (k, w), shifted in time by each of several delays (m,) [s]."""
     out = np.tile(rows, (len(delays), 1))
     out[:, 0] += np.repeat(delays, len(rows))
     return out
@@ -993,7 +990,7 @@ _HISTORY_FIELDS = (
 
 
 def _select_samples(response: Response, selection) -> Response:
-    """Return the samples of histories that an index or a mask selects."""
+    """Return the history samples that an index or a mask selects."""
     columns = [getattr(response, name)[selection] for name in _HISTORY_FIELDS]
     extra = {}
     for name, values in response.extra.items():
@@ -1002,7 +999,7 @@ def _select_samples(response: Response, selection) -> Response:
 
 
 def _join_responses(responses) -> Response:
-    """Join histories in order of time to one with strictly increasing times."""
+    """Join histories in order of time into one whose times strictly increase."""
     if len(responses) == 1:
         return responses[0]
     columns = []

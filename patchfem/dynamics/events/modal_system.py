@@ -1,4 +1,4 @@
-"""Arrays of the compiled event engine: modes, time, sums and workspace."""
+"""Arrays of the compiled event-driven solver: modes, time, sums and workspace."""
 
 from typing import NamedTuple
 
@@ -28,7 +28,7 @@ series_kernels = get_kernel_module("dynamics.events.series_kernels")
 
 
 class ModalSystem(NamedTuple):
-    """Modal matrices and participations as arrays for the kernels.
+    """Modal matrices and participation factors as arrays for the kernels.
 
     The kernels take the number of modes from the length of `omega_squared`, and that of interfaces
     from `inverse_mass`. Of one mode with one interface both are tuples: their length is then part
@@ -92,7 +92,7 @@ def make_modal_system(modes: ModalBasis) -> ModalSystem:
 
 
 class TimeState(NamedTuple):
-    """Present time of a run, and the segments of its drive.
+    """Present time of a run, and the segments of its drive signal.
 
     - now: (6,) time and what the march notes of it, see `Time`
     - segments: (p, 12) segments of the drive, see `Segment`
@@ -133,7 +133,7 @@ def make_initial_time_state(drive, n_interfaces: int) -> TimeState:
 
 
 def drive_segments(drive) -> np.ndarray:
-    """Return the segments (p, 12) of a drive: sines, straight lines or a sweep.
+    """Return the segments (p, 12) of a drive signal: sines, straight lines or a sweep.
 
     The drive is one of `core` or `structure.drives`; for the columns see `Segment`.
     """
@@ -143,7 +143,7 @@ def drive_segments(drive) -> np.ndarray:
 
 
 def split_time(time: float, period: float) -> tuple:
-    """Split a time [s] into the number of its cycle and the time [s] since that cycle began.
+    """Split a time [s] into the cycle number and the time [s] since the start of that cycle.
 
     A time within round-off of the end of a cycle counts as that end.
     """
@@ -155,7 +155,7 @@ def split_time(time: float, period: float) -> tuple:
 
 
 def _make_segment(start: float, period: float, kind: float, **columns) -> np.ndarray:
-    """Return one drive segment (12,) that starts at a time [s].
+    """Return one segment (12,) of a drive signal that starts at a given time [s].
 
     `columns` holds values by the names of `Segment` in lower case.
     """
@@ -168,7 +168,7 @@ def _make_segment(start: float, period: float, kind: float, **columns) -> np.nda
 
 
 def _sine_segment(sine, period: float) -> np.ndarray:
-    """Return the drive segment of a sine, or of a constant if amplitude or frequency is 0."""
+    """Return the drive segment for a sine, or for a constant if amplitude or frequency is 0."""
     omega = sine.omega if sine.amplitude else 0.0
     constant = sine.constant + (0.0 if omega else sine.amplitude * np.sin(sine.phase))
     revolutions = omega * period / (2 * np.pi)
@@ -190,7 +190,7 @@ def _sine_segment(sine, period: float) -> np.ndarray:
 
 
 def _sweep_segments(sweep) -> list:
-    """Return the two drive segments of a sweep: the sweep, then a sine at its last frequency."""
+    """Return the two drive segments for a sweep: the sweep, then a sine at its final frequency."""
     first_omega = 2 * np.pi * sweep.low
     last_omega = 2 * np.pi * sweep.high
     duration = sweep.duration
@@ -227,7 +227,7 @@ def _sweep_segments(sweep) -> list:
 
 
 def _record_segments(record) -> np.ndarray:
-    """Return the drive segments (p, 12) of a measured record: straight lines between its samples.
+    """Return the drive segments (p, 12) for a measured signal: straight lines between its samples.
 
     After the last sample the drive is 0.
     """
@@ -240,7 +240,7 @@ def _record_segments(record) -> np.ndarray:
 
 
 def copy_into(old, new):
-    """Copy a nested tuple of arrays into the arrays of another tuple of the same shapes.
+    """Copy the arrays in a nested tuple into the arrays of another tuple with the same shapes.
 
     Compiled code knows where the old arrays are, which takes most of the time of a short call.
 
@@ -265,7 +265,7 @@ def copy_into(old, new):
 
 
 def _has_same_shapes(old, new) -> bool:
-    """Return whether two nested tuples of arrays have the same shapes."""
+    """Return whether the arrays in two nested tuples have the same shapes."""
     for a, b in zip(old, new):
         has_same_shape = _has_same_shapes(a, b) if isinstance(a, tuple) else a.shape == b.shape
         if not has_same_shape:
@@ -287,7 +287,7 @@ class PreviousCycle(NamedTuple):
 
 
 def make_previous_cycle(modal_system: ModalSystem, table: ElementTable) -> PreviousCycle:
-    """Return an empty record of the previous cycle for a run that begins."""
+    """Return an empty record of the previous cycle, for the beginning of a run."""
     status = np.zeros(len(PreviousStatus))
     status[PreviousStatus.SEGMENT] = -1.0
     return PreviousCycle(
@@ -298,7 +298,7 @@ def make_previous_cycle(modal_system: ModalSystem, table: ElementTable) -> Previ
 
 
 class Constraint(NamedTuple):
-    """Constraint on the modes by the interfaces whose rigid elements stick.
+    """Constraint that interfaces with sticking rigid elements impose on the modes.
 
     It is built by `stick_kernels.constrain_slides`.
 
@@ -325,7 +325,7 @@ class Constraint(NamedTuple):
 
 
 class Choice(NamedTuple):
-    """Workspace of the search for the interfaces that stick after an event.
+    """Workspace for the search that determines which interfaces stick after an event.
 
     The search is `stick_kernels.choose_sticks`.
 
@@ -346,7 +346,7 @@ class Choice(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """Workspace of the kernels for one time interval.
+    """Workspace of the kernels for one time interval between events.
 
     - coefficients: (terms, n) series of the modal coordinates [m]
     - drive: (3, terms) series of the drive [m s-2], and workspace for it
@@ -406,7 +406,7 @@ def make_workspace(modal_system: ModalSystem) -> Workspace:
 
 
 def clear_workspace(workspace: Workspace) -> Workspace:
-    """Reset a kernel workspace to its state before a run, and return it."""
+    """Reset a kernel workspace to its state before a run, and return the workspace."""
     for array in (*workspace[:-2], *workspace.constraint, *workspace.choice):
         array.fill(0.0)
     workspace.choice.orders.fill(-1.0)
@@ -414,7 +414,7 @@ def clear_workspace(workspace: Workspace) -> Workspace:
 
 
 class RunSums(NamedTuple):
-    """Energies, extremes and phasors that a run accumulates.
+    """Energies, extremes and phasors accumulated during a run.
 
     - ledger: (8,) energies and counts, see `Ledger`
     - extremes: (c, 2) smallest and largest output [m] of every cycle
@@ -454,7 +454,7 @@ class RunArrays(NamedTuple):
 
 
 def make_run_sums(n_cycles: int, is_phasor_wanted, travel: float = np.inf) -> RunSums:
-    """Return cleared sums for a run of a given number of cycles.
+    """Return zeroed sums for a run over a given number of cycles.
 
     Parameters
     ----------

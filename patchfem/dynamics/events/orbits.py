@@ -1,4 +1,4 @@
-"""Antisymmetric periodic motions under sinusoidal drives, and their measured quantities."""
+"""Antisymmetric periodic motions under a sinusoidal drive signal, and their measured quantities."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -36,7 +36,7 @@ class PeriodicMotion(NamedTuple):
 
 
 class PeriodicMotionFinder:
-    """Finder of periodic motions that change sign after half a period.
+    """Finder of periodic motions that reverse their sign after half a period.
 
     A call with a drive (core.SineDrive) and a PoincarePoint near its motion, or None for rest, returns a
     PeriodicMotion; it raises the errors of `steady.solve_steady`. A PoincarePoint of other elements is
@@ -63,7 +63,7 @@ class PeriodicMotionFinder:
         )
 
     def replace_system(self, modes: ModalBasis, groups) -> bool:
-        """Replace the modes and the friction elements, keeping the workspace.
+        """Replace the modes and the friction elements, but keep the workspace.
 
         Returns False if they do not fit.
         """
@@ -92,7 +92,7 @@ class PeriodicMotionFinder:
         return PeriodicMotion(point, float(peak_acceleration), fundamental, peak_output)
 
     def window(self, drive, point: PoincarePoint) -> Response:
-        """Return the histories of one period of a periodic motion, given its start point."""
+        """Return the histories over one period of a periodic motion, given its start point."""
         n = self.period_map.n
         memory = self.period_map.complete_memory(point)
         start = InitialState(point.motion[:n], point.motion[n:])
@@ -101,7 +101,7 @@ class PeriodicMotionFinder:
         ).window
 
     def _is_compatible(self, near: PoincarePoint | None) -> bool:
-        """Return whether a start point belongs to the present modes and friction elements."""
+        """Return whether a start point fits the present modes and friction elements."""
         rest_memory = self.period_map.rest_memory
         n_elements = self.period_map.table.n_elements
         return (
@@ -112,7 +112,7 @@ class PeriodicMotionFinder:
         )
 
     def _march_half_period(self, drive, point: PoincarePoint, modal_system) -> tuple:
-        """March half a period; return the number of time intervals and the peak output [m].
+        """March over half a period; return the number of time intervals and the peak output [m].
 
         The time intervals are stored in `rows`; the other half of the period changes sign.
         """
@@ -140,7 +140,7 @@ class PeriodicMotionFinder:
             self.argument_cache = {}
 
     def _bound_arguments(self, name: str, modal_system, moving: float = 0.0) -> tuple:
-        """Return the arguments to which a compiled function is bound, from a cache."""
+        """Return the arguments that are bound to a compiled function, from a cache."""
         period_map = self.period_map
         key = (name, id(modal_system), moving)
         if key not in self.argument_cache:
@@ -153,5 +153,5 @@ class PeriodicMotionFinder:
 
 
 def _count_elements(memory: Memory) -> np.ndarray:
-    """Return the number (i,) of friction elements of every interface from its memory."""
+    """Return the number (i,) of friction elements at each interface, given their memory."""
     return np.where(memory.n_groups > 0, memory.group_end[:, 0], memory.n_slipping)

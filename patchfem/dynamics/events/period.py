@@ -1,4 +1,4 @@
-"""Map of a state over one period or half a period of a sine, with its exact derivative.
+"""Map of a state over one period or half a period of a sine, and the exact derivative of the map.
 
 The sign of the motion is changed after half a period.
 """
@@ -33,7 +33,7 @@ ODD_MEMORY_FIELDS = ("slide", "direction", "group_slide", "group_sign", "force",
 
 
 class PoincarePoint(NamedTuple):
-    """State of modes and friction elements at phase 0 of the drive.
+    """State of modes and friction elements at phase 0 of the sinusoidal drive signal.
 
     - motion: (2 n,) modal coordinates [m] and rates [m/s]
     - memory: of the elements
@@ -46,7 +46,7 @@ class PoincarePoint(NamedTuple):
 
     @property
     def stored_reversals(self) -> tuple:
-        """Interfaces (d,) and element groups (d,) of the stored reversals."""
+        """Interface (d,) and element group (d,) of each stored reversal."""
         return self.known or find_stored_reversals(self.memory)
 
     @property
@@ -55,7 +55,7 @@ class PoincarePoint(NamedTuple):
         return np.concatenate([self.motion, self.memory.group_slide[self.stored_reversals]])
 
     def with_unknowns(self, unknowns) -> "PoincarePoint":
-        """Return a state with other unknowns and the same elements in every group."""
+        """Return a copy of the state with other unknowns and the same elements in every group."""
         memory = copy_memory(self.memory)
         count = self.motion.size
         reversals = self.stored_reversals
@@ -64,7 +64,7 @@ class PoincarePoint(NamedTuple):
 
 
 def find_stored_reversals(memory: Memory) -> tuple:
-    """Return interfaces (d,) and element groups (d,) of the reversals stored in a memory."""
+    """Return the interface (d,) and element group (d,) of each reversal stored in a memory."""
     groups = []
     for signs, n_groups in zip(memory.group_sign, memory.n_groups.tolist()):
         groups.append(signs[:n_groups].nonzero()[0])
@@ -102,7 +102,7 @@ class PeriodMapping:
 
 
 class PeriodMap:
-    """Map of the state of modes and friction elements over a period of the drive.
+    """Map of the state of modes and friction elements over one period of the drive signal.
 
     Its arrays are reused for each call.
     """
@@ -157,7 +157,7 @@ class PeriodMap:
         return PoincarePoint(np.zeros(2 * self.n), copy_memory(self.rest_memory))
 
     def complete_memory(self, point: PoincarePoint) -> Memory:
-        """Return the memory of a state, with displacement and slip computed from its motion."""
+        """Return the memory of a state, including displacement and slip computed from its motion."""
         memory = copy_memory(point.memory)
         memory.slide[:] = self.faces @ point.motion[: self.n]
         for f, elements in enumerate(self.groups):
@@ -170,7 +170,7 @@ class PeriodMap:
         return memory
 
     def run_arrays(self, modal_system, sums) -> RunArrays:
-        """Return the arrays of a run that starts from the state of the map.
+        """Return the arrays for a run that starts from the state of the map.
 
         Parameters
         ----------
@@ -216,7 +216,7 @@ class PeriodMap:
         self.workspace.choice.orders[:] = -1.0
 
     def _set_drive(self, drive) -> None:
-        """Set the time to the start of a sinusoidal drive.
+        """Set the time to the start of a sinusoidal drive signal.
 
         Its segments are cached for the next call.
         """
@@ -320,7 +320,7 @@ class PeriodMap:
         )
 
     def _slope_arrays(self, size: int) -> tuple:
-        """Return arrays for the derivatives with respect to a given number of unknowns.
+        """Return arrays for the derivatives by a given number of unknowns.
 
         They are those of the motion (2, n, size) and of reversal displacements (i, t + 2, size), and the
         former at the start.

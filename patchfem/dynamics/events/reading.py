@@ -1,4 +1,4 @@
-"""Amplitudes, energies and slip of the last cycles of event-driven runs."""
+"""Measures (amplitudes, energies and slip) of the last cycles in event-driven runs."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ MIN_VIBRATION_ANGLE = 0.95 * 3 * np.pi
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Reading:
-    """Measures of the last cycles of one run, or of several runs (...).
+    """Measures of the last cycles of one run, or of several runs as arrays of shape (...).
 
     - run: (..., 13) see `positions_kernels.RunMeasure`
     - faces: (..., i, 21) see `positions_kernels.InterfaceMeasure`
@@ -30,7 +30,7 @@ class Reading:
     period: float
 
     def interface_value(self, measure: int, interface: int = 0):
-        """Return a measure of an interface.
+        """Return the value of a measure for one interface.
 
         `measure` is a member of `InterfaceMeasure`.
         """
@@ -38,7 +38,7 @@ class Reading:
 
     @property
     def output_amplitude(self):
-        """Output amplitude, half of the peak-to-peak range [m]."""
+        """Output amplitude [m]: half of the peak-to-peak range."""
         return (self.run[..., RunMeasure.MAX_OUTPUT] - self.run[..., RunMeasure.MIN_OUTPUT]) / 2
 
     @property
@@ -48,7 +48,7 @@ class Reading:
 
     @property
     def acceleration_harmonics(self) -> tuple:
-        """Amplitudes of the first and third harmonic of the absolute output acceleration [m s-2]."""
+        """Amplitudes of the first and third harmonics of the absolute output acceleration [m s-2]."""
         x = self.run
         return (
             2 / self.span * np.hypot(x[..., RunMeasure.COS_1], x[..., RunMeasure.SIN_1]),
@@ -57,7 +57,7 @@ class Reading:
 
     @property
     def slip_start_phase(self):
-        """Mean phase [rad] modulo pi at which the first interface starts to slip.
+        """Mean phase [rad], modulo pi, at which slip begins at the first interface.
 
         See `mean_slip_phase`.
         """
@@ -69,7 +69,7 @@ class Reading:
 
     @property
     def drift(self):
-        """Drift of the relative displacement of the first interface per cycle [m].
+        """Drift [m] of the relative displacement at the first interface per cycle.
 
         It is the difference of the mean relative displacements of the last and the first cycle
         divided by the number of cycles between them; for fewer than 1.5 cycles it is the difference between both ends.
@@ -95,7 +95,7 @@ class Reading:
 
     @property
     def force_increase(self):
-        """Increase of the mean friction force magnitude of the first interface [N].
+        """Increase [N] of the mean friction force magnitude at the first interface.
 
         It is that of the last cycle minus that of the first.
         """
@@ -135,7 +135,7 @@ class Reading:
 
 
 def find_stick_vibration(modal_system, table, reading: Reading) -> tuple | None:
-    """Find the free vibration of a single mode while its only interface sticks.
+    """Compute the free vibration of a single mode while its only interface sticks.
 
     Parameters
     ----------

@@ -50,7 +50,7 @@ class SteadyState:
 
     @property
     def error(self) -> float:
-        """Relative error of the motion due to the residual of Newton's method.
+        """Relative error of the motion that is due to the residual of Newton's method.
 
         See `periodic.bound_error`.
         """
@@ -67,7 +67,7 @@ class SteadyState:
 def solve_steady(
     modes: ModalBasis, drive, groups, near: PoincarePoint | None = None
 ) -> SteadyState:
-    """Find the periodic response to a sine that changes sign after half a period.
+    """Find the periodic response to a sinusoidal drive signal that reverses sign after half a period.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def solve_steady(
 def continue_to_steady_state(
     modes: ModalBasis, drive, groups, start: InitialState, memory: Memory
 ) -> SteadyState:
-    """Find the periodic motion that a run from a given state approaches.
+    """Find the periodic motion that a run approaches from a given state.
 
     The result is valid if the groups of elements no longer change on the way to that motion.
 
@@ -127,7 +127,7 @@ def continue_to_steady_state(
 def find_antisymmetric_motion(
     period_map: PeriodMap, drive, near: PoincarePoint | None = None
 ) -> PeriodicPoint:
-    """Find the periodic motion that changes sign after half a period, by shooting.
+    """Find the periodic motion that reverses its sign after half a period, by shooting.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ def find_antisymmetric_motion(
 
 
 class YieldShooting(Shooting):
-    """Shooting method for periodic motions of elastic-plastic friction elements.
+    """Shooting method for periodic motions with elastic-plastic elements.
 
     If `half` is set, the map covers half a period and changes the sign.
 
@@ -168,7 +168,7 @@ class YieldShooting(Shooting):
         self.rows = np.maximum(np.abs(period_map.faces).sum(axis=1), 1e-300)
 
     def map_point(self, point: PoincarePoint) -> MappedPoint:
-        """Map a state over the period; raise NotConverged if events accumulate."""
+        """Map a state over the period; raise NotConverged if events accumulate in time."""
         mapping = self.period_map(self.drive, point, self.half)
         n = self.period_map.n
         omega = self.drive.segments[0].omega
@@ -197,15 +197,15 @@ class YieldShooting(Shooting):
         )
 
     def move_by_newton_step(self, mapped_point: MappedPoint, step) -> PoincarePoint:
-        """Return the state after a Newton step; the element groups are those at the end of the period."""
+        """Return the state after a Newton step, with the element groups at the end of the period."""
         return mapped_point.image.end.with_unknowns(mapped_point.point.unknowns + step)
 
     def march_periods(self, mapped_point: MappedPoint, n_periods: int) -> PoincarePoint:
-        """Return the state after some periods that follow a mapped period."""
+        """Integrate over several periods after a mapped period; return the state at the end."""
         return self.run(self._make_next_start(mapped_point.image), n_periods)
 
     def run(self, point: PoincarePoint, n_periods: int) -> PoincarePoint:
-        """Return the state after some periods."""
+        """Integrate a state over several periods; return the state at the end."""
         for _ in range(2 * n_periods if self.half else n_periods):
             point = self._make_next_start(self.period_map(self.drive, point, self.half, False))
         return point
@@ -233,7 +233,7 @@ class YieldShooting(Shooting):
 
 
 def _have_same_unknowns(point: PoincarePoint, end: PoincarePoint) -> bool:
-    """Return whether two states have the same unknowns: as many reversals of the same signs."""
+    """Return whether two states have the same unknowns: equally many reversals with equal signs."""
     a = point.memory
     b = end.memory
     return _have_same_groups(a, b, a.group_sign, b.group_sign)
@@ -251,7 +251,7 @@ def _have_same_elements(point: PoincarePoint, end: PoincarePoint) -> bool:
 
 
 def _have_same_groups(a: Memory, b: Memory, values, other_values) -> bool:
-    """Return whether two memories have as many element groups with equal values (i, t)."""
+    """Return whether two memories have equally many element groups with equal values (i, t)."""
     n_groups = a.n_groups.tolist()
     if n_groups != b.n_groups.tolist():
         return False

@@ -1,4 +1,4 @@
-"""Periodic motion of a rig with Coulomb friction or no friction, by shooting.
+"""Periodic motion of a rig with Coulomb friction, or without friction, by shooting.
 
 Newton's method finds the fixed point of the map over a period.
 
@@ -52,7 +52,7 @@ class CoulombSteadyState:
 
 
 class CoulombPeriodMapping(NamedTuple):
-    """Image of a state (2n,) under the map over some periods of the drive.
+    """Image of a state (2n,) under the map over one or more periods of the drive signal.
 
     - end: the state at the end
     - slope: (2n, 2n) derivative of the map
@@ -76,7 +76,7 @@ class CoulombPeriodMapping(NamedTuple):
 
 
 class LinearPhase:
-    """Linear motion from one event to the next, in which the same interfaces stick.
+    """Linear motion between two successive events, during which the same interfaces stick.
 
     run: the run; row: first row of the phase; span: duration [s].
     """
@@ -106,7 +106,7 @@ class LinearPhase:
         self.damping_matrix = np.asarray(modes.damping_matrix, float)
 
     def slope(self) -> np.ndarray:
-        """Return the derivative (2n, 2n) of the end state with respect to the start state."""
+        """Return the derivative (2n, 2n) of the end state by the start state."""
         n = len(self.stiffness_matrix)
         p = self.projector
         system_matrix = np.block(
@@ -115,13 +115,13 @@ class LinearPhase:
         return exponentiate_modal_matrix(system_matrix * self.span) @ self.stick_projection()
 
     def stick_projection(self) -> np.ndarray:
-        """Return the projection (2n, 2n) of a state that removes rates of sticking interfaces."""
+        """Return the matrix (2n, 2n) that projects a state onto zero velocity at sticking interfaces."""
         projection = np.eye(2 * len(self.stiffness_matrix))
         projection[len(self.stiffness_matrix) :, len(self.stiffness_matrix) :] = self.projector
         return projection
 
     def acceleration(self, z, v, drive: float) -> tuple:
-        """Return the modal accelerations, first with and then without the reactions of sticking interfaces.
+        """Return the modal accelerations with and without the reactions of sticking interfaces.
 
         Parameters
         ----------
@@ -146,7 +146,7 @@ class LinearPhase:
         return self.projector @ free_acceleration, free_acceleration
 
     def saltation(self, later: "LinearPhase") -> tuple:
-        """Return the saltation matrix (2n, 2n) of the event at the end of this phase.
+        """Return the saltation matrix (2n, 2n) for the event at the end of this phase.
 
         The second value tells whether only one interface changed.
         """
@@ -192,7 +192,7 @@ class LinearPhase:
 
 
 def exponentiate_modal_matrix(matrix) -> np.ndarray:
-    """Return the exponential of a small matrix (2n, 2n) of modal coordinates and rates.
+    """Return the exponential of a small matrix (2n, 2n) that acts on modal coordinates and rates.
 
     Taylor's series of 2^-s of the matrix, squared s times. SciPy's function starts the threads of
     its linear algebra, which takes up to milliseconds for two rows.
@@ -216,7 +216,7 @@ def exponentiate_modal_matrix(matrix) -> np.ndarray:
 
 
 def _identify_event(phase: LinearPhase, next_phase: LinearPhase, changed, reactions) -> tuple:
-    """Return the interface of the event between two phases and whether its slip stopped.
+    """Identify the event between two phases: return its interface and whether slip stopped there.
 
     reactions: (h,) [N] of the sticking interfaces.
     """
@@ -230,7 +230,7 @@ def _identify_event(phase: LinearPhase, next_phase: LinearPhase, changed, reacti
 
 
 def map_period(modes: ModalBasis, drive, groups, state, periods: int = 1) -> CoulombPeriodMapping:
-    """Map a state over complete periods of the drive, with the derivative.
+    """Map a state over complete periods of the drive signal, and compute the derivative of the map.
 
     Parameters
     ----------
@@ -294,7 +294,7 @@ def solve_steady(
     cycles: int = 30,
     periods: int = 1,
 ) -> CoulombSteadyState:
-    """Find the periodic response to a sine under Coulomb friction.
+    """Find the periodic response to a sinusoidal drive signal under Coulomb friction.
 
     Parameters
     ----------
@@ -339,7 +339,7 @@ def solve_steady(
 
 
 class CoulombShooting(Shooting):
-    """Shooting method for periodic motions under Coulomb friction, see `solve_steady`."""
+    """Shooting method for periodic motions under Coulomb friction (see `solve_steady`)."""
 
     def __init__(self, modes: ModalBasis, drive, groups, periods: int = 1):
         self.modes = modes
@@ -352,7 +352,7 @@ class CoulombShooting(Shooting):
         )
 
     def map_point(self, point) -> MappedPoint:
-        """Map a state (2n,) over the periods."""
+        """Map a state (2n,) over the given number of periods."""
         mapping = map_period(self.modes, self.drive, self.groups, point, self.periods)
         return MappedPoint(
             point,
@@ -364,18 +364,18 @@ class CoulombShooting(Shooting):
         )
 
     def move_by_newton_step(self, mapped_point: MappedPoint, step):
-        """Return the state after a Newton step, in which the sticking interfaces stay at rest."""
+        """Return the state after a Newton step that keeps the sticking interfaces at rest."""
         n = self.modes.omega.size
         state = mapped_point.point + step
         state[n:] = mapped_point.image.first_projector @ state[n:]
         return state
 
     def march_periods(self, mapped_point: MappedPoint, n_periods: int):
-        """Return the state after some periods that begin at a mapped state."""
+        """Integrate over several periods from a mapped state; return the state at the end."""
         return self.run(mapped_point.point, n_periods)
 
     def run(self, state, n_periods: int):
-        """Return the state after some periods."""
+        """Integrate a state over several periods; return the state at the end."""
         n = self.modes.omega.size
         run = histories.start_event_run(
             self.modes, self.drive, self.groups, n_periods, start=InitialState(state[:n], state[n:])

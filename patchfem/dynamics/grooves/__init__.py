@@ -1,4 +1,4 @@
-"""Rigs whose load climbs the flanks of matched grooves as it slides (`friction.grooves`).
+"""Rigs whose load rides up the flanks of matched grooves during slip (`friction.grooves`).
 
 Equation. On a flank of slope t(q) the lifted mass m rises with t q', so with the vertical force V
 = N + m (t q')' the force against the relative displacement is

@@ -1,10 +1,10 @@
-"""Names of the array entries of a contact that climbs flanks (`ClimbingPoints`)."""
+"""Names for the array entries of a contact that rides up groove flanks (`ClimbingPoints`)."""
 
 from enum import IntEnum
 
 
 class FlankIndex(IntEnum):
-    """Indices into `ClimbingPoints.flank`: load, groove geometry and kind of law.
+    """Indices into `ClimbingPoints.flank`: load, groove geometry and type of law.
 
     - LOAD: normal load on the patch [N]
     - WAVE_NUMBER, AMPLITUDE, PHASE: geometry of the grooves [rad/m], [m], [rad]
@@ -21,7 +21,7 @@ class FlankIndex(IntEnum):
 
 
 class ClimbIndex(IntEnum):
-    """Indices into `ClimbingPoints.climb`: state of the lifted mass and trial step.
+    """Indices into `ClimbingPoints.climb`: state of the lifted mass, and the trial step.
 
     State:
 

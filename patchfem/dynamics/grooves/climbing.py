@@ -1,4 +1,4 @@
-"""Contact models of laws with memory along the flanks of grooves."""
+"""Contact models for friction laws with memory that act along the flanks of grooves."""
 
 from dataclasses import dataclass, replace
 
@@ -29,7 +29,7 @@ MIN_LENGTH_RATIO = 1e-3
 
 
 def check_lifted_mass(grooves: Grooves, static: float, modes) -> None:
-    """Raise PatchfemError if friction of a lifted mass exceeds the inertia of the sliding mass.
+    """Raise PatchfemError if friction due to a lifted mass exceeds the inertia of the sliding mass.
 
     That is the case where 1 + m s t (t - mu)/(1 + mu t) <= 0 on some flank, with s [1/kg] the
     acceleration of the relative displacement per newton.
@@ -54,7 +54,7 @@ def check_lifted_mass(grooves: Grooves, static: float, modes) -> None:
 
 
 def lift_message(grooves: Grooves, time: float) -> str:
-    """Return the error message for a lifted mass that leaves its grooves at a given time [s]."""
+    """Return the error message for a lifted mass that leaves its grooves at a time [s]."""
     return (
         f"the lifted mass of {grooves.lifted_mass:.3g} kg leaves the grooves at {time:.6g} s: the inertia of this "
         f"mass takes all of the load; lower {grooves.key}.lifted_mass or the drive, or raise the load"
@@ -62,7 +62,7 @@ def lift_message(grooves: Grooves, time: float) -> str:
 
 
 def make_model(grooves: Grooves, load: float, law: VaryingLoadLaw, modes) -> "ClimbingModel":
-    """Return the contact model of a law with memory along the flanks of grooves.
+    """Return the contact model for a friction law with memory along the flanks of grooves.
 
     Coulomb's law at points of pieces that deform in shear is an elastic-plastic law of length 0;
     `with_shear_modes` sets its length.
@@ -94,7 +94,7 @@ def make_model(grooves: Grooves, load: float, law: VaryingLoadLaw, modes) -> "Cl
 def with_shear_modes(
     model: "ClimbingModel", patch, count: int | None, tolerance: float
 ) -> "ClimbingModel":
-    """Return a copy of the model with the points and shear modes of a solved patch.
+    """Return a copy of the model that has the points and shear modes of a solved patch.
 
     Coulomb points on pieces of the shear stiffness K_t become elastic-plastic ones
     with a bond length COULOMB_LENGTH_RATIO tolerance mu N/K_t: on flat ground the force is then
@@ -151,16 +151,16 @@ class FlankModel:
 
     @property
     def limit(self) -> float:
-        """Largest friction force on the steepest flank [N], the scale of the residuals."""
+        """Largest friction force [N] on the steepest flank, which scales the residuals."""
         return self.grooves.max_force(self.load, self.static)
 
     @property
     def reduction(self):
-        """Shear modes of the pieces in contact; None if they are rigid in shear."""
+        """Shear modes of the pieces in contact, or None if the pieces are rigid in shear."""
 
     @property
     def set_valued(self) -> bool:
-        """Whether the law sticks rigidly (set-valued); always False for a law with memory."""
+        """Return whether the law sticks rigidly (is set-valued); always False for a law with memory."""
         return False
 
     def get_plot_fields(self, contact) -> dict:
@@ -188,7 +188,7 @@ class ClimbingModel(FlankModel):
 
     @property
     def kind(self) -> tuple:
-        """Modules of contact and law, for which `march.instances` compiles the loop."""
+        """Contact module and law module for which `march.instances` compiles the loop."""
         return CONTACT_MODULE, ""
 
     @property
@@ -203,7 +203,7 @@ class ClimbingModel(FlankModel):
 
     @property
     def runner(self):
-        """Class that integrates a motion with this contact in time."""
+        """Class that integrates a motion with this contact over time."""
         return ClimbingRun
 
     def allocate_contact(self) -> ClimbingPoints:
@@ -260,7 +260,7 @@ class GroovesRun(Run):
     """Time integration of a modal basis whose interface slides over grooves."""
 
     def make_response(self, rows, number) -> Response:
-        """Return the time histories of samples, with the vertical force of a lifted mass.
+        """Return the time histories of samples, including the vertical force on a lifted mass.
 
         The vertical force is `extra["normal_load"]` [N].
 
@@ -289,7 +289,7 @@ class GroovesRun(Run):
         )
 
     def _set_grooves_left(self) -> None:
-        """Set the outcome and message of a march whose lifted mass has left the grooves."""
+        """Set the outcome and message for a march in which the lifted mass has left the grooves."""
         self.outcome = Outcome.LEAVES_GROOVES
         self.message = lift_message(self.model.grooves, self.done * self.prop.dt)
 

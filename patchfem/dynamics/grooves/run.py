@@ -58,28 +58,28 @@ class GroovesModel(FlankModel):
 
     @property
     def length(self) -> float:
-        """Bond length [m]; always 0, as the law has no bonds."""
+        """Bond length [m]; always 0 because the law has no bonds."""
         return 0.0
 
     @property
     def set_valued(self) -> bool:
-        """Whether the law sticks rigidly (set-valued Coulomb friction)."""
+        """Return whether the law sticks rigidly (set-valued Coulomb friction)."""
         return self.speed is None
 
     @property
     def runner(self):
-        """Class that integrates a motion with this contact in time."""
+        """Class that integrates a motion with this contact over time."""
         return SampledRun
 
     def allocate_contact(self):
-        """Return a frictionless contact, which serves as a placeholder in the kernel arguments."""
+        """Return a frictionless contact as a placeholder in the kernel arguments."""
         return coulomb_model(0.0, 0.0).allocate_contact()
 
 
 def make_model(
     grooves: Grooves, load: float, static: float, kinetic: float, speed: float | None, modes
 ) -> GroovesModel:
-    """Return the contact model of grooves under a law without memory.
+    """Return the contact model for grooves with a friction law that has no memory.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def make_model(
 
 
 class SampledRun(GroovesRun):
-    """Time integration over grooves by the smooth engine, sampled as a march."""
+    """Time integration over grooves by the Runge-Kutta solver, with the samples of a march."""
 
     def __init__(self, modes, drive, model, steps_per_cycle, travel, loops, start=None):
         super().__init__(modes, drive, model, steps_per_cycle, travel, loops, start)
@@ -115,7 +115,7 @@ class SampledRun(GroovesRun):
         self.ledger[Ledger.DRIVE_WORK] += self.find_interface_energy()
 
     def _start_smooth_motion(self) -> None:
-        """Start the smooth motion from the present modal state, at the start of the drive."""
+        """Start the Runge-Kutta integration from the present modal state, at the start of the drive signal."""
         g = self.model.grooves
         model = self.model
         numbers = [
@@ -145,7 +145,7 @@ class SampledRun(GroovesRun):
         self.counted_sums = self._read_sums()
 
     def _read_sums(self) -> np.ndarray:
-        """Return the energy sums and the step counter of the smooth motion, (6,).
+        """Return the energy sums and the step count of the Runge-Kutta integration, (6,).
 
         They are drive work, viscous loss, sum of absolute drive works, friction loss [J], number of steps, and friction
         work [J].
@@ -158,7 +158,7 @@ class SampledRun(GroovesRun):
         )
 
     def fork(self, drive):
-        """Return an independent copy of the march that continues under another drive."""
+        """Return an independent copy of the march that continues with another drive signal."""
         copied_run = super().fork(drive)
         copied_run.smooth_motion = self.smooth_motion.fork(drive)
         return copied_run
@@ -167,7 +167,7 @@ class SampledRun(GroovesRun):
         """Do nothing, because the contact has no memory."""
 
     def _march_steps(self, count: int, rows) -> tuple:
-        """Fill the sample rows of a march from the smooth motion.
+        """Fill the sample rows of a march from the Runge-Kutta integration.
 
         The rows have the friction loss of each step as an additional column.
         """
@@ -226,7 +226,7 @@ class SampledRun(GroovesRun):
         return sampled_work(rows[:, n], rows[:, n + 2], after)
 
     def _step_energies(self, rows) -> np.ndarray:
-        """Return friction work, dissipated and created energy of each step, (3, steps) [J].
+        """Return the friction work, dissipated energy and created energy in each step, (3, steps) [J].
 
         The dissipated energy is the work of friction along the flank.
         """
@@ -239,7 +239,7 @@ class SampledRun(GroovesRun):
             self._set_grooves_left()
 
     def check_steps(self) -> None:
-        """Set the outcome to not_converged if an integration step did not meet its tolerance."""
+        """Set the outcome to not_converged if any integration step has not met its tolerance."""
         if self.ledger[Ledger.N_UNCONVERGED]:
             self.outcome = Outcome.NOT_CONVERGED
             self.message = (
@@ -248,7 +248,7 @@ class SampledRun(GroovesRun):
             )
 
     def find_interface_energy(self) -> float:
-        """Return the energy [J] of the load height and of the moving lifted mass."""
+        """Return the energy [J] due to the height of the load and the motion of the lifted mass."""
         g = self.model.grooves
         z, v = self.state
         q = float(self.modes.slide @ z)

@@ -1,4 +1,4 @@
-"""Steady motions by harmonic balance, with branches and stability.
+"""Steady motions by harmonic balance, with solution branches and stability.
 
 Equation. With theta = omega t every coordinate is Re sum_k Z_k exp(i k theta), k = 0 to H. The
 modes are condensed to the rows of the interfaces: for every harmonic

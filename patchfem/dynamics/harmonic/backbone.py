@@ -1,4 +1,4 @@
-"""Backbone of a mode with friction: frequency and damping ratio as functions of amplitude.
+"""Backbone curve of a mode with friction: frequency and damping ratio as functions of amplitude.
 
 A negative damping that balances friction sustains the motion.
 
@@ -30,7 +30,7 @@ MAX_HALVINGS = 6
 
 
 class FreeMotion(NamedTuple):
-    """Periodic free motion of one mode at an amplitude, sustained by negative damping.
+    """Periodic free motion of one mode at a given amplitude, sustained by negative damping.
 
     - amplitude: amplitude of the coordinate of the mode [m]
     - omega, zeta: frequency [rad/s] and damping ratio
@@ -47,7 +47,7 @@ class FreeMotion(NamedTuple):
 
 
 class FreeBalance:
-    """Harmonic balance of the free motion of one mode that negative damping sustains.
+    """Harmonic balance for the free motion of one mode that is sustained by negative damping.
 
     - balance: HarmonicBalance of the interface rows
     - mode: index of the modal coordinate whose amplitude is prescribed
@@ -66,7 +66,7 @@ class FreeBalance:
         self.scale = scale
 
     def make_linear_part(self, omega: float, zeta: float) -> LinearPart:
-        """Return the receptances of the modes with the damping -2 zeta omega added.
+        """Return the receptances of the modes, to which the damping -2 zeta omega is added.
 
         The coordinate of prescribed amplitude has no receptance. omega: frequency [rad/s].
         """
@@ -98,7 +98,7 @@ class FreeBalance:
         )
 
     def evaluate(self, x, amplitude: float) -> BalanceEquations:
-        """Evaluate the balance equations of a free motion at given unknowns and amplitude.
+        """Evaluate the balance equations for a free motion at given unknowns and amplitude.
 
         x: unknowns (N,); amplitude [m], by which all lengths of the equations are divided.
 
@@ -188,7 +188,7 @@ class FreeBalance:
 
 
 def _invert_matrices(matrices) -> np.ndarray:
-    """Return the inverses of matrices (k, n, n), or pseudoinverses if one is singular.
+    """Return the inverses of matrices (k, n, n), or their pseudoinverses if one of them is singular.
 
     A matrix is singular if nothing determines the mean of a coordinate.
 
@@ -203,7 +203,7 @@ def _invert_matrices(matrices) -> np.ndarray:
 
 
 def trace_free_motions(equations: FreeBalance, amplitudes, omega: float, shape) -> list:
-    """Compute the free motions of a mode at increasing amplitudes from its linear mode.
+    """Compute the free motions of a mode at increasing amplitudes, starting from its linear mode shape.
 
     Parameters
     ----------

@@ -12,7 +12,7 @@ STUCK_SLIDE_RATIO = 1e-3
 
 
 def find_regime(periodic: SteadyMotion) -> tuple:
-    """Return the friction regime of a steady motion and the fraction of the limit that slips.
+    """Return the friction regime of a steady motion, and the fraction of the friction limit that slips.
 
     The regimes are "stuck", "partial slip", "slides" and "no friction". The fraction is that of the
     friction limits of all laws. An elastic-plastic element
@@ -46,7 +46,7 @@ def find_regime(periodic: SteadyMotion) -> tuple:
 
 
 def find_cycle_energies(periodic: SteadyMotion, modes) -> dict:
-    """Return drive work, viscous loss and friction work of a steady motion per cycle [J].
+    """Return the drive work, viscous loss and friction work per cycle [J] of a steady motion.
 
     They follow from the harmonics by Parseval's theorem. `balance` is the imbalance of these energies
     relative to the work of the drive [1]. A spring among the laws adds
@@ -71,7 +71,7 @@ def find_cycle_energies(periodic: SteadyMotion, modes) -> dict:
 
 
 def make_cycle_response(periodic: SteadyMotion, modes, drive, samples: int = 1000) -> Response:
-    """Return time histories of the modes and the first interface over a steady cycle.
+    """Return the time histories of the modes and the first interface over one steady cycle.
 
     The forces are evaluated from the laws at each instant, so the accelerations do not oscillate like a
     truncated series.
@@ -94,7 +94,7 @@ def make_cycle_response(periodic: SteadyMotion, modes, drive, samples: int = 100
     stride = n_samples // samples
 
     def sample_cycle(values):
-        """Return the samples of one cycle, whose last sample repeats the first one."""
+        """Sample one cycle; the last sample equals the first one."""
         selected = values[..., ::stride]
         return np.concatenate([selected, selected[..., :1]], axis=-1).T
 

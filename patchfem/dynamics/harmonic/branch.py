@@ -1,4 +1,4 @@
-"""Branches of steady motions, all steady motions at one drive, and backbones."""
+"""Solution branches of steady motions, coexisting steady motions at one drive, and backbones."""
 
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -26,7 +26,7 @@ from .starts import find_one_harmonic_roots
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Branch:
-    """Branch of steady motions along frequency or drive level, in order along the curve.
+    """Solution branch of steady motions, in order along the curve.
 
     - points: tuple of SteadyMotion
     - parameter: "frequency" [Hz] or "level" [m s-2]
@@ -42,7 +42,7 @@ class Branch:
 
     @property
     def values(self) -> np.ndarray:
-        """Parameter values (k,) of the branch: drive frequency [Hz] or drive level [m s-2]."""
+        """Values (k,) of the parameter along the branch: drive frequency [Hz] or drive amplitude [m s-2]."""
         if self.parameter == "frequency":
             return np.array([point.omega / (2 * np.pi) for point in self.points])
         return np.array([point.level for point in self.points])
@@ -59,7 +59,7 @@ class Branch:
 def trace_over_frequency(
     modes, drive: SineDrive, group, frequencies, stability: bool = False, **numerics
 ) -> Branch:
-    """Trace the branch of steady motions over drive frequency at constant drive amplitude.
+    """Trace a branch of steady motions over the drive frequency at a constant drive amplitude.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def trace_over_frequency(
 def trace_over_level(
     modes, drive: SineDrive, group, accelerations, stability: bool = False, **numerics
 ) -> Branch:
-    """Trace the branch of steady motions over drive amplitude [m s-2] at constant frequency.
+    """Trace a branch of steady motions over the drive amplitude [m s-2] at a constant frequency.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def trace_over_level(
 
 
 class CurveNumerics(NamedTuple):
-    """Numerical settings for tracing a branch of steady motions.
+    """Numerical settings for tracing a solution branch.
 
     - harmonics: number of harmonics, or None for as many as the tolerance needs
     - tolerance: relative error of each motion
@@ -122,7 +122,7 @@ class CurveNumerics(NamedTuple):
 
 
 def _check_values(parameter_values, subject: str, noun: str) -> np.ndarray:
-    """Return drive levels or frequencies as an array; PatchfemError unless they are positive."""
+    """Return drive amplitudes or frequencies as an array; raise PatchfemError unless all are positive."""
     values = np.asarray(parameter_values, float)
     if values.size < 2 or not (np.isfinite(values).all() and values.min() > 0):
         raise PatchfemError(f"{subject} needs two or more positive {noun}")
@@ -132,7 +132,7 @@ def _check_values(parameter_values, subject: str, noun: str) -> np.ndarray:
 def _trace_branch(
     parameter: str, modes, drives, group, numerics: CurveNumerics, stability: bool
 ) -> Branch:
-    """Trace a branch of steady motions over prescribed drives, with stability on request."""
+    """Trace a branch of steady motions through given drive values, and its stability if requested."""
     solve = _trace_curve if len(drives) == 2 else _solve_points
     branch = solve(modes, drives, make_group(modes, group), parameter, numerics)
     if not stability:
@@ -141,7 +141,7 @@ def _trace_branch(
 
 
 def _solve_points(modes, drives, group, parameter, numerics: CurveNumerics) -> Branch:
-    """Find the motion at each drive, starting from the motion at the previous one."""
+    """Find the motion at each drive value, starting from the motion at the previous value."""
     points = []
     last = numerics.start
     for drive in drives:
@@ -151,7 +151,7 @@ def _solve_points(modes, drives, group, parameter, numerics: CurveNumerics) -> B
 
 
 def _trace_curve(modes, drives, group, parameter, numerics: CurveNumerics) -> Branch:
-    """Trace a branch by arc length with the same number of harmonics at all points.
+    """Trace a branch by arc-length continuation with the same number of harmonics at all points.
 
     The number is raised until the harmonics above it are negligible at all points.
     """
@@ -176,7 +176,7 @@ def _trace_curve(modes, drives, group, parameter, numerics: CurveNumerics) -> Br
 
 
 def _trace_with_harmonics(modes, drives, group, parameter, h, first, max_step) -> tuple:
-    """Trace a branch with h harmonics and enough samples per cycle for the largest slide.
+    """Trace a branch with h harmonics, and with enough samples per cycle for the largest amplitude.
 
     Returns the points, the largest fraction of a motion above h, the CurvePath and the unit of its
     parameter.
@@ -219,7 +219,7 @@ def _trace_with_harmonics(modes, drives, group, parameter, h, first, max_step) -
 
 
 def _find_amplitude(coefficients, min_samples: int):
-    """Return the amplitudes (...) of slides from their harmonics (..., H + 1).
+    """Return the amplitudes (...) of relative displacements from their harmonics (..., H + 1).
 
     The amplitude is half the range of equidistant samples of a cycle.
 
@@ -229,7 +229,7 @@ def _find_amplitude(coefficients, min_samples: int):
 
 
 def measure_distance(first: SteadyMotion, second: SteadyMotion, width: float) -> float:
-    """Return the distance between two points of a branch in scaled unknowns and frequency.
+    """Return the distance between two points on a branch in scaled unknowns and frequency.
 
     Parameters
     ----------
@@ -244,7 +244,7 @@ def measure_distance(first: SteadyMotion, second: SteadyMotion, width: float) ->
 
 
 def _find_scaled_step(first: SteadyMotion, second: SteadyMotion, width: float) -> tuple:
-    """Return the scaled step (N + 1,) between two points of a branch, and the motion size."""
+    """Return the scaled step (N + 1,) between two points on a branch, and the norm of the motion."""
     size = max(float(np.linalg.norm(first.unknowns)), float(np.linalg.norm(second.unknowns))) or 1.0
     return np.append(
         (second.unknowns - first.unknowns) / size, (second.omega - first.omega) / width
@@ -254,7 +254,7 @@ def _find_scaled_step(first: SteadyMotion, second: SteadyMotion, width: float) -
 def find_point_between(
     modes, drive, first: SteadyMotion, second: SteadyMotion, fraction: float, width: float
 ) -> SteadyMotion:
-    """Find the point of a frequency branch at a fraction of the step between two points.
+    """Find the point on a frequency branch at a given fraction of the step between two points.
 
     Newton's method corrects the linear interpolation perpendicular to the step, so folds are no obstacle.
 
@@ -299,7 +299,7 @@ def find_point_between(
 def find_branches(
     modes, drive: SineDrive, group, tolerance: float = 1e-3, stability: bool = True
 ) -> list:
-    """Find coexisting steady motions at a drive from all roots of the one-harmonic balance.
+    """Find coexisting steady motions at one drive, starting from all roots of the one-harmonic balance.
 
     Parameters
     ----------

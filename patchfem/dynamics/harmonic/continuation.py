@@ -1,4 +1,4 @@
-"""Curves of solutions r(x, p) = 0 through folds: pseudo-arc-length continuation.
+"""Pseudo-arc-length continuation of solution curves r(x, p) = 0, which can pass folds.
 
 The arc length is measured in scaled unknowns and a scaled parameter, so that both count. At a fold
 the parameter reverses; at a crossing the determinant of the bordered system changes
@@ -28,7 +28,7 @@ MIN_STEP_COSINE = 0.7
 
 @dataclass(frozen=True, eq=False, slots=True)
 class CurvePath:
-    """Solution curve of r(x, p) = 0 as a sequence of points in order of arc length.
+    """Solution curve of r(x, p) = 0: a sequence of points in order of arc length.
 
     - x, p: (k, N), (k,) solutions and parameters
     - turn, arc: (k,) dp/ds, and arc length s
@@ -65,14 +65,14 @@ class PathSettings(NamedTuple):
 
 
 class Scales(NamedTuple):
-    """Scales of arc-length continuation: norm of the unknowns and width of the parameter range."""
+    """Scales for arc-length continuation: norm of the unknowns, and width of the parameter range."""
 
     size: float
     width: float
 
 
 class CorrectedPoint(NamedTuple):
-    """Converged point of a solution curve, and its number of Newton steps."""
+    """Converged point on a solution curve, and the number of Newton steps it took."""
 
     x: np.ndarray
     p: float
@@ -80,7 +80,7 @@ class CorrectedPoint(NamedTuple):
 
 
 class _PathPoint(NamedTuple):
-    """Point of a solution curve with unit tangent (N + 1,) and arc length.
+    """Point on a solution curve with its unit tangent (N + 1,) and arc length.
 
     sign: sign of the determinant of the bordered Jacobian, which changes at a bifurcation.
 
@@ -181,7 +181,7 @@ def _parameter_direction(x) -> np.ndarray:
 
 
 def _step_factor(n_newton_steps: int) -> float:
-    """Return the factor for the next arc-length step from the number of Newton steps.
+    """Return the factor for the next arc-length step, given the number of Newton steps.
 
     Few Newton steps show that the curve is nearly straight.
 
@@ -192,7 +192,7 @@ def _step_factor(n_newton_steps: int) -> float:
 
 
 def _take_step(evaluate, point: _PathPoint, step, scales, tolerance) -> CorrectedPoint | None:
-    """Take a predictor step along the tangent and correct it.
+    """Take a predictor step along the tangent, and correct the predicted point.
 
     Returns None if the corrector fails or jumps to another part of the curve.
 
@@ -212,7 +212,7 @@ def _take_step(evaluate, point: _PathPoint, step, scales, tolerance) -> Correcte
 
 
 def _make_bordered_matrix(jacobian, by_p, t, scales: Scales) -> np.ndarray:
-    """Return the scaled Jacobian bordered by the tangent, (N + 1, N + 1)."""
+    """Return the scaled Jacobian with the tangent as an additional row, (N + 1, N + 1)."""
     n = by_p.size
     matrix = np.empty((n + 1, n + 1))
     matrix[:n, :n] = jacobian
@@ -224,7 +224,7 @@ def _make_bordered_matrix(jacobian, by_p, t, scales: Scales) -> np.ndarray:
 def correct_point(
     evaluate, guess: tuple, tangent, scales: Scales, tolerance: float, fixed: float | None = None
 ) -> CorrectedPoint | None:
-    """Correct a predicted point by Newton's method perpendicular to the tangent.
+    """Correct a predicted point by Newton's method in the plane perpendicular to the tangent.
 
     Parameters
     ----------
@@ -285,7 +285,7 @@ def _make_path_point(
 
 
 def _find_folds(points: list, width: float) -> tuple:
-    """Return the parameter values at folds by cubic interpolation between points.
+    """Find the parameter values at folds by cubic interpolation between points.
 
     A fold is an extremum of p between two points whose dp/ds differ in sign.
 

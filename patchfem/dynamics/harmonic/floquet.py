@@ -1,4 +1,4 @@
-"""Monodromy matrix of a steady motion: growth of small perturbations over a cycle.
+"""Monodromy matrix of a steady motion, which describes how small perturbations grow over a cycle.
 
 The state is the motion of the modes and the memory of the contacts. A law without memory gives a
 slope over the slide and over its rate. Elastic-plastic elements remember, for each reversal,
@@ -23,7 +23,7 @@ from ..propagator import matrix_exponentials
 
 @dataclass(frozen=True, eq=False, slots=True)
 class TurningPoint:
-    """Perturbed slide at a reversal, on which the force of the sticking elements depends.
+    """Perturbed relative displacement at a reversal, which affects the force of sticking elements.
 
     - row, cell, share: interface row, cell of the cycle, and position [0, 1] in this cell
     - hold: (N,) force in each cell per perturbation of the slide at the reversal [N/m]
@@ -37,7 +37,7 @@ class TurningPoint:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FadingMemory:
-    """Fading memory u of a friction law: u' = gain q' - loss u, with the force limit * u.
+    """Fading memory u of a friction law with u' = gain q' - loss u, whose force is limit * u.
 
     - row
     - gain, loss: (N,) coefficients in each cell, per slide and per angle [1]
@@ -53,7 +53,7 @@ class FadingMemory:
 def find_monodromy(
     modes: ModalBasis, rows, omega: float, slope, by_rate, reversals=(), fading=()
 ) -> np.ndarray:
-    """Return the monodromy matrix of modes and contact memories over one cycle.
+    """Compute the monodromy matrix of modes and contact memories over one cycle.
 
     The state is (z, dz/dtheta, memories) with theta = omega t from 0.
 
@@ -114,7 +114,7 @@ def find_monodromy(
 
 
 def _find_equal_cells(coefficients: list, reversals) -> np.ndarray:
-    """Return the first cell of each run of adjacent cells with equal coefficients (..., N).
+    """Return the first cell of each run of adjacent cells whose coefficients (..., N) are equal.
 
     A cell with a reversal is a run of its own.
     """
@@ -128,7 +128,7 @@ def _find_equal_cells(coefficients: list, reversals) -> np.ndarray:
 
 
 def multiply_pairwise(steps) -> np.ndarray:
-    """Return the ordered product of matrices (N, s, s), the first one rightmost, by pairs."""
+    """Multiply matrices (N, s, s) in order, with the first one rightmost, by pairs."""
     while len(steps) > 1:
         unpaired = steps[-1:] if len(steps) % 2 else steps[:0]
         steps = np.concatenate([steps[1::2] @ steps[0 : len(steps) - len(unpaired) : 2], unpaired])

@@ -1,4 +1,4 @@
-"""Harmonics of friction forces by the alternating frequency/time method."""
+"""Harmonics of friction forces by the alternating frequency-time method."""
 
 from functools import lru_cache
 
@@ -15,7 +15,7 @@ MAX_SAMPLES = 65536
 
 
 class LawGroup:
-    """Friction laws and springs on the interface rows of a modal basis.
+    """Friction laws and springs that act on the interface rows of a modal basis.
 
     `parts` is a law, a pair (row, law) or a list of them. A row is the number of an interface of
     `modes` or participations (n,); a law alone acts on
@@ -46,7 +46,7 @@ class LawGroup:
         self.samples = samples
 
     def with_samples(self, samples: int) -> "LawGroup":
-        """Return a copy with another number of samples per cycle."""
+        """Return a copy with a different number of samples per cycle."""
         copy = object.__new__(LawGroup)
         copy.rows = self.rows
         copy.laws = self.laws
@@ -54,14 +54,14 @@ class LawGroup:
         return copy
 
     def with_elements(self, change) -> "LawGroup":
-        """Return a copy with replaced elastic-plastic elements.
+        """Return a copy in which the elastic-plastic elements are replaced.
 
         change: function of stiffness (t,) [N/m] and yield slide (t,) [m] that returns both of the new elements.
         """
         copy = self.with_samples(self.samples)
 
         def replace_elements(law):
-            """Return a law with changed elements if it has any."""
+            """Return a law with replaced elements, or the law itself if it has none."""
             if isinstance(law, Jenkins):
                 return Jenkins(*change(law.stiffness, law.limit_slide))
             return law
@@ -70,7 +70,7 @@ class LawGroup:
         return copy
 
     def samples_for(self, harmonics: int, amplitudes=None) -> int:
-        """Return the number of samples per cycle that resolves the harmonics and stick phases.
+        """Return the number of samples per cycle needed to resolve the harmonics and stick phases.
 
         The number is a power of two. amplitudes: (i,) amplitudes of the slides [m].
 
@@ -91,11 +91,11 @@ class LawGroup:
         return int(min(2 ** int(np.ceil(np.log2(samples))), MAX_SAMPLES))
 
     def stiffness(self) -> np.ndarray:
-        """Return the tangent stiffness at rest of the laws on each interface row, (i,) [N/m]."""
+        """Return the total tangent stiffness at rest (i,) [N/m] for each interface row."""
         return np.array([sum(law.total for law in laws) for laws in self.laws])
 
     def sample_slides(self, q, omega: float, samples: int = 0) -> list:
-        """Sample the slide of every interface row over a cycle.
+        """Sample the relative displacement of each interface row over a cycle.
 
         Parameters
         ----------
@@ -135,7 +135,7 @@ class LawGroup:
         )
 
     def compute_force_harmonics(self, q, omega: float, harmonics: int, samples: int) -> np.ndarray:
-        """Return the harmonics (i, harmonics + 1) of the friction forces [N] at given slides.
+        """Compute the harmonics (i, harmonics + 1) of the friction forces [N] for given displacements.
 
         Parameters
         ----------
@@ -156,7 +156,7 @@ class LawGroup:
 
 
 def find_response(tracks: list, sampled: list) -> ContactResponse:
-    """Return the harmonics of sampled friction forces and of their derivatives.
+    """Return the harmonics of sampled friction forces, and the harmonics of their derivatives.
 
     tracks: SampledSlide of each row; sampled: SampledForces of the laws of each row. The local slope
     K(theta) enters by its harmonics up to 2 H, as a Toeplitz and a Hankel part; a
@@ -187,7 +187,7 @@ def find_response(tracks: list, sampled: list) -> ContactResponse:
     k = np.arange(1, h + 1)
 
     def derivative_by_omega(jacobians, change):
-        """Return the derivative of the forces with respect to omega for changes of the harmonics."""
+        """Return the derivative of the forces by omega, given the changes of the harmonics."""
         parts = np.concatenate([np.zeros((rows, 1)), change.real, change.imag], axis=1)
         return np.einsum("ikl,il->ik", jacobians, parts)
 
@@ -213,7 +213,7 @@ def find_response(tracks: list, sampled: list) -> ContactResponse:
 
 
 def _sum_laws(laws: list, name: str) -> np.ndarray | None:
-    """Return the sum of a field of SampledForce over all laws of an interface row.
+    """Sum one field of SampledForce over all laws on an interface row.
 
     The result is None if no law has the field. A law with a tangent contributes its force alone.
     """
@@ -228,14 +228,14 @@ def _sum_laws(laws: list, name: str) -> np.ndarray | None:
 
 @lru_cache(maxsize=16)
 def _coefficient_positions(h: int) -> tuple:
-    """Return the positions of the sums and differences of harmonics up to h, (h + 1, h + 1) each."""
+    """Return positions of the sums and differences of harmonic numbers up to h, (h + 1, h + 1) each."""
     row = np.arange(h + 1)[:, None]
     column = np.arange(h + 1)[None, :]
     return row - column + 2 * h, row + column + 2 * h
 
 
 def find_local_jacobians(k) -> np.ndarray:
-    """Return the Jacobians (i, H + 1, 2 H + 1) of the harmonics of a force K(theta) q(theta).
+    """Return the Jacobians (i, H + 1, 2 H + 1) of the harmonics for a force K(theta) q(theta).
 
     k: (i, 2 H + 1) harmonics of the local stiffness K.
     """

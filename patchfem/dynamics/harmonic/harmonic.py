@@ -1,4 +1,4 @@
-"""Harmonic balance under sinusoidal drive, with the interface slides as unknowns.
+"""Harmonic balance under a sinusoidal drive signal; the unknowns are relative displacements.
 
 The linear part of the structure is exact.
 
@@ -30,7 +30,7 @@ SINGULAR_RATIO = 1e-10
 
 
 class ContactResponse(NamedTuple):
-    """Harmonics of the contact forces of a cycle, and their derivatives.
+    """Harmonics of the contact forces over a cycle, and their derivatives.
 
     - force: (i, K + 1) complex [N], K >= H
     - slope: (i, H + 1, 2 H + 1) complex [N/m], derivative with respect to Re q_0..Re q_H, Im
@@ -52,7 +52,7 @@ def pack_harmonics(x) -> np.ndarray:
 
 
 def unpack_harmonics(v, rows: int) -> np.ndarray:
-    """Unpack complex harmonics (rows, H + 1) from the real vector of `pack_harmonics`."""
+    """Unpack complex harmonics (rows, H + 1) from a real vector made by `pack_harmonics`."""
     v = v.reshape(rows, -1)
     h = v.shape[1] // 2
     x = v[:, : h + 1].astype(complex)
@@ -61,13 +61,13 @@ def unpack_harmonics(v, rows: int) -> np.ndarray:
 
 
 def _to_real_equations(c) -> np.ndarray:
-    """Split complex equations (H + 1, ...) into real equations (2 H + 1, ...)."""
+    """Split complex equations (H + 1, ...) into their real and imaginary parts (2 H + 1, ...)."""
     return np.concatenate([c.real, c.imag[1:]], axis=0)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class LinearPart:
-    """Receptances of the modes at the harmonics of one frequency.
+    """Receptances of the modes at the harmonics of one drive frequency.
 
     - inverse, slope: (H + 1, n, n) receptance R_k and d(R_k^-1)/d omega
     - free: (k, right (n,), left (n,), stiffness) of every coordinate without receptance
@@ -79,7 +79,7 @@ class LinearPart:
 
 
 def make_linear_part(modes: ModalBasis, omega: float, harmonics: int) -> LinearPart:
-    """Return the modal receptances at the harmonics of a frequency.
+    """Compute the receptances of the modes at the harmonics of a frequency.
 
     They are (Omega^2 - k^2 omega^2 + i k omega D)^-1 for k = 0 to `harmonics`.
 
@@ -144,7 +144,7 @@ def make_linear_part(modes: ModalBasis, omega: float, harmonics: int) -> LinearP
 
 
 class BalanceEquations(NamedTuple):
-    """Residual and Jacobian of the harmonic balance at given unknowns.
+    """Residual and Jacobian of the harmonic balance for given unknowns.
 
     - residual: (N,), jacobian: (N, N)
     - by_omega, by_level: (N,) derivatives with respect to omega and to the amplitude of the drive
@@ -161,7 +161,7 @@ class BalanceEquations(NamedTuple):
 
 
 class HarmonicBalance:
-    """Harmonic balance of a modal basis with contact forces on interface rows.
+    """Harmonic balance of a modal basis with contact forces on its interface rows.
 
     rows: (i, n); contact: (q (i, H + 1), omega) -> ContactResponse.
 
@@ -189,13 +189,13 @@ class HarmonicBalance:
         self._linear = {}
 
     def with_contact(self, contact) -> "HarmonicBalance":
-        """Return a copy of the harmonic balance with another contact."""
+        """Return a copy of the harmonic balance with a different contact."""
         copy = object.__new__(HarmonicBalance)
         copy.__dict__.update(self.__dict__, contact=contact)
         return copy
 
     def get_linear_part(self, omega: float, harmonics: int) -> LinearPart:
-        """Return the modal receptances at a frequency [rad/s], from a cache of nine frequencies."""
+        """Return the modal receptances at a frequency [rad/s]; nine frequencies are cached."""
         key = (omega, harmonics)
         if key not in self._linear:
             if len(self._linear) > 8:
@@ -209,7 +209,7 @@ class HarmonicBalance:
         return self.lift.shape[1] * (2 * harmonics + 1) + sum(1 if k == 0 else 2 for k, *_ in free)
 
     def unpack_slides(self, x, omega: float, harmonics: int) -> np.ndarray:
-        """Unpack the harmonics of the interface slides (i, H + 1) [m] from the unknowns.
+        """Unpack the harmonics (i, H + 1) [m] of the relative displacements from the unknowns.
 
         Parameters
         ----------
@@ -227,7 +227,7 @@ class HarmonicBalance:
     def compute_modal_motion(
         self, x, omega: float, level: float, harmonics: int, force
     ) -> np.ndarray:
-        """Return the modal harmonics (K + 1, n) [m] under drive and contact forces.
+        """Compute the modal harmonics (K + 1, n) [m] due to the drive signal and contact forces.
 
         Parameters
         ----------
@@ -274,7 +274,7 @@ class HarmonicBalance:
     def evaluate(
         self, x, omega: float, level: float, harmonics: int, linear_part: LinearPart | None = None
     ) -> BalanceEquations:
-        """Evaluate residual and Jacobian of the harmonic balance at given unknowns.
+        """Evaluate the residual and the Jacobian of the harmonic balance for given unknowns.
 
         Parameters
         ----------
@@ -335,7 +335,7 @@ class HarmonicBalance:
         )
 
     def free_residual(self, free, c, omega: float, level: float, force) -> complex:
-        """Return the force residual of a modal coordinate without receptance, divided by omega^2 [m].
+        """Return the force residual of a coordinate that has no receptance, divided by omega^2 [m].
 
         Parameters
         ----------
@@ -363,7 +363,7 @@ class HarmonicBalance:
         ) / omega**2
 
     def combine_slopes(self, slope) -> np.ndarray:
-        """Transform force derivatives of the interface rows to the reduced slides y.
+        """Transform the force derivatives of the interface rows to the reduced displacements y.
 
         Their shapes are (i, H + 1, 2 H + 1) and (H + 1, r, r (2 H + 1)).
         """
@@ -384,7 +384,7 @@ class HarmonicBalance:
         harmonics: int,
         size: float,
     ) -> bool:
-        """Return whether the residual after the last Newton step is due to round-off.
+        """Return whether the residual that remains after the last Newton step is due to round-off.
 
         A least-squares step can vanish at a point that is no solution.
 
@@ -433,7 +433,7 @@ class HarmonicBalance:
         omega,
         size,
     ):
-        """Append the equations of modal coordinates without receptance to the balance.
+        """Append the equations of modal coordinates that have no receptance to the balance.
 
         The equations are divided by omega^2 [m].
         """

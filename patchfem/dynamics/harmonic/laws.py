@@ -1,4 +1,4 @@
-"""Friction laws and springs sampled along one cycle of a periodic slide.
+"""Friction laws and springs sampled over one cycle of a periodic relative displacement.
 
 Forces are taken at instants, not as means over steps: the mean of a trigonometric polynomial over
 equal samples is exact up to their number, so only the corners of the force alias, by (slope
@@ -23,24 +23,24 @@ SAMPLES_PER_STICK = 48
 
 @cache
 def load_cycle_kernels():
-    """Load the compiled kernels for reversals and elastic-plastic elements along a cycle."""
+    """Load the compiled kernels that find reversals and sample elastic-plastic elements over a cycle."""
     return load("dynamics.harmonic.cycle_kernels")
 
 
 @cache
 def load_speed_kernels(law: str):
-    """Load the compiled sampling kernel of a velocity-dependent law without memory."""
+    """Load the compiled kernel that samples a velocity-dependent law without memory."""
     return instantiate("dynamics.harmonic.speed_kernels", {"law": load(law)})
 
 
 @cache
 def load_flow_kernels(law: str):
-    """Load the compiled periodic-state kernel of a law with one memory variable."""
+    """Load the compiled kernel that finds the periodic state of a law with one memory variable."""
     return instantiate("dynamics.harmonic.flow_kernels", {"law": load(law)})
 
 
 class SampledForce(NamedTuple):
-    """Force of a friction law at N samples of a cycle, with its derivatives.
+    """Force of a friction law at N samples of a cycle, and its derivatives.
 
     - force, slope, by_rate: force [N], derivative with respect to slide [N/m] and velocity [N s/m]
     - hold: (R, N) derivatives with respect to the slides at R reversals [N/m]
@@ -60,7 +60,7 @@ class SampledForce(NamedTuple):
 
 
 class TurningPoints(NamedTuple):
-    """Reversals of a periodic slide within a cycle.
+    """Reversals of a periodic relative displacement within a cycle.
 
     - angles, slides: (R,) angle [rad] and slide [m] at each reversal
     - cells: (R,) index of the sample before each reversal
@@ -74,7 +74,7 @@ class TurningPoints(NamedTuple):
 
 
 class JenkinsSums(NamedTuple):
-    """Cumulative sums (t + 1,) over Jenkins elements in order of their yield slide.
+    """Cumulative sums (t + 1,) over Jenkins elements, sorted by yield displacement.
 
     They are sums of the stiffness k [N/m], k limit [N] and k limit^2 [N m].
 
@@ -86,7 +86,7 @@ class JenkinsSums(NamedTuple):
 
 
 class JenkinsGroups(NamedTuple):
-    """Groups of Jenkins elements that last slipped up to the same reversal (workspace).
+    """Groups of Jenkins elements whose last slip ended at the same reversal (workspace).
 
     The innermost group is the last one.
 
@@ -117,7 +117,7 @@ class JenkinsSamples(NamedTuple):
 
 
 class SampledSlide:
-    """Periodic slide sampled at equidistant instants of the cycle.
+    """Periodic relative displacement, sampled at equidistant instants of the cycle.
 
     - x: (H + 1,) harmonics [m]; omega [rad/s]; samples: N
     - q, rate: (N,) slide and dq/d(omega t) [m]
@@ -132,7 +132,7 @@ class SampledSlide:
 
     @cached_property
     def turning_points(self) -> "TurningPoints":
-        """Reversals of the slide within the cycle."""
+        """Reversals of the relative displacement within the cycle."""
         n = self.samples
         angle = np.empty(n)
         slide = np.empty(n)
@@ -146,7 +146,7 @@ class SampledSlide:
 
 
 def evaluate_series(x, samples: int) -> np.ndarray:
-    """Evaluate Fourier series Re sum X_k exp(i k theta) at N samples of a cycle."""
+    """Evaluate the Fourier series Re sum X_k exp(i k theta) at N samples of a cycle."""
     if 2 * x.shape[-1] > samples:
         stride = -(-2 * x.shape[-1] // samples)
         return evaluate_series(x, samples * stride)[..., ::stride]
@@ -157,7 +157,7 @@ def evaluate_series(x, samples: int) -> np.ndarray:
 
 
 def find_harmonics(values, harmonics: int) -> np.ndarray:
-    """Return the complex harmonics (..., H + 1) of samples (..., N) of a cycle.
+    """Compute the complex harmonics (..., H + 1) from samples (..., N) of a cycle.
 
     H must not exceed N/2.
 
@@ -178,7 +178,7 @@ class Law:
     total = 0.0
 
     def count_samples(self, amplitude: float) -> int:
-        """Return the number of samples per cycle that resolves the corners of the force.
+        """Return the number of samples per cycle needed to resolve the kinks of the force.
 
         amplitude: amplitude of the slide [m]. The number is 0 for a smooth force.
 
@@ -186,7 +186,7 @@ class Law:
         return 0
 
     def sample(self, track: "SampledSlide") -> "SampledForce":
-        """Return the steady periodic force along a slide, starting from a virgin contact."""
+        """Sample the steady periodic force for a periodic displacement, from an initially unstretched contact."""
         raise NotImplementedError
 
 
@@ -231,7 +231,7 @@ class Jenkins(Law):
         return float(self.sums.stiffness[-1])
 
     def count_samples(self, amplitude: float) -> int:
-        """Return the number of samples per cycle that resolves the stick phases.
+        """Return the number of samples per cycle needed to resolve the stick phases.
 
         amplitude: amplitude of the slide [m].
 
@@ -240,7 +240,7 @@ class Jenkins(Law):
         return _count_samples(stick_fraction)
 
     def sample(self, track: SampledSlide) -> SampledForce:
-        """Return the steady periodic force along a slide, starting from a virgin contact."""
+        """Sample the steady periodic force for a periodic displacement, from an initially unstretched contact."""
         n = track.samples
         n_turning_points = track.turning_points.slides.size
         max_groups = 2 * n_turning_points + 3
@@ -268,7 +268,7 @@ class Jenkins(Law):
 
 @dataclass(frozen=True, slots=True)
 class Spring(Law):
-    """Bonded spring with linear stiffness [N/m] and cubic stiffness [N/m3]."""
+    """Spring across an interface with a linear stiffness [N/m] and a cubic stiffness [N/m3]."""
 
     stiffness: float = 0.0
     cubic: float = 0.0
@@ -279,7 +279,7 @@ class Spring(Law):
         return self.stiffness
 
     def sample(self, track: SampledSlide) -> SampledForce:
-        """Return the force and its derivative at the samples of a periodic slide."""
+        """Sample the force and its derivative for a periodic relative displacement."""
         q = track.q
         return SampledForce(
             q * (self.stiffness + self.cubic * q * q), self.stiffness + 3 * self.cubic * q * q
@@ -288,7 +288,7 @@ class Spring(Law):
 
 @dataclass(frozen=True, slots=True)
 class Interlock(Law):
-    """Sinusoidal restoring force of interlocking peaks.
+    """Sinusoidal restoring force of interlocking surface peaks.
 
     The force is stiffness wavelength/(2 pi) sin(2 pi q/wavelength), in [N/m] and [m].
 
@@ -303,11 +303,11 @@ class Interlock(Law):
         return self.stiffness
 
     def count_samples(self, amplitude: float) -> int:
-        """Return the number of samples per cycle that resolves the wavelengths passed."""
+        """Return the number of samples per cycle needed to resolve the wavelengths passed."""
         return int(16 * min(2 * np.pi * amplitude / self.wavelength, 1000.0))
 
     def sample(self, track: SampledSlide) -> SampledForce:
-        """Return the force and its derivative at the samples of a periodic slide."""
+        """Sample the force and its derivative for a periodic relative displacement."""
         angle = 2 * np.pi / self.wavelength * track.q
         return SampledForce(
             self.stiffness * self.wavelength / (2 * np.pi) * np.sin(angle),
@@ -317,12 +317,12 @@ class Interlock(Law):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SpeedLaw(Law):
-    """Velocity-dependent friction law without memory, from an Element of form "speed"."""
+    """Velocity-dependent friction law without memory, made from an Element of form "speed"."""
 
     element: Element
 
     def sample(self, track: SampledSlide) -> SampledForce:
-        """Return the force and its derivative at the samples of a periodic slide."""
+        """Sample the force and its derivative for a periodic relative displacement."""
         force = np.empty(track.samples)
         slope = np.empty(track.samples)
         load_speed_kernels(self.element.kernels).sample_forces(
@@ -333,13 +333,13 @@ class SpeedLaw(Law):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class FlowLaw(Law):
-    """Friction law whose only memory is its stretch, such as an Element of form "flow"."""
+    """Friction law whose only memory is its elastic stretch, such as an Element of form "flow"."""
 
     element: Element
 
     @property
     def length(self) -> float:
-        """Stretch at which the law slips [m]."""
+        """Stretch [m] at which the law slips."""
         return self.element.length
 
     @property
@@ -348,7 +348,7 @@ class FlowLaw(Law):
         return self.element.limit / self.element.length
 
     def count_samples(self, amplitude: float) -> int:
-        """Return the number of samples per cycle that resolves the force after a reversal.
+        """Return the number of samples per cycle needed to resolve the force after a reversal.
 
         amplitude: amplitude of the slide [m].
 
@@ -356,7 +356,7 @@ class FlowLaw(Law):
         return _count_samples(self.length / max(amplitude, 1e-300))
 
     def find_periodic_state(self, track: SampledSlide) -> "FlowNodes":
-        """Return the periodic state of the law at the samples and reversals of a cycle."""
+        """Find the periodic state of the law at the samples and reversals of a cycle."""
         angles, slides, cells, _ = track.turning_points
         n = track.samples
         is_sample = np.ones(track.samples + len(cells), bool)
@@ -378,7 +378,7 @@ class FlowLaw(Law):
         return FlowNodes(angle, is_sample, dt, z, steps, force, slopes)
 
     def sample(self, track: SampledSlide) -> SampledForce:
-        """Return the steady periodic force at the samples of a slide.
+        """Sample the steady periodic force for a periodic relative displacement.
 
         For a rate-independent law the derivatives are those with respect to the slide and its
         reversals, otherwise those with respect to the harmonics.
@@ -411,7 +411,7 @@ class FlowLaw(Law):
         )
 
     def _compute_tangent(self, track: SampledSlide, nodes: "FlowNodes") -> tuple:
-        """Return the derivatives of the force with respect to the slide harmonics and the frequency.
+        """Compute the derivatives of the force by the displacement harmonics and by the frequency.
 
         See `SampledForce.tangent`.
 
@@ -451,7 +451,7 @@ class FlowNodes(NamedTuple):
     slopes: np.ndarray
 
     def find_remainders(self, nodes) -> np.ndarray:
-        """Return the remaining fraction (r, M) at all nodes of stretch perturbations at r nodes.
+        """Return the fractions (r, M) of stretch perturbations at r nodes that remain at all M nodes.
 
         It is 0 for a law whose memory does not fade.
         """
@@ -467,7 +467,7 @@ class FlowNodes(NamedTuple):
         return np.exp(log_remainder) / cycle_loss
 
     def find_cell_factors(self) -> tuple:
-        """Return the decay factor (N,) of the stretch per cell, and its slide derivative."""
+        """Return the factor (N,) by which the stretch decays in each cell, and its derivative by displacement."""
         decay, by_slide, _ = self.steps
         first = np.flatnonzero(self.own)
         is_reversal = ~self.own
@@ -480,7 +480,7 @@ class FlowNodes(NamedTuple):
 
 
 def _count_samples(stick_fraction: float) -> int:
-    """Return the number of samples per cycle that resolves a stick phase.
+    """Return the number of samples per cycle needed to resolve a stick phase.
 
     stick_fraction: yield slide relative to the amplitude. The stick phase spans the angle acos(1 - 2 stick_fraction).
     """
@@ -489,7 +489,7 @@ def _count_samples(stick_fraction: float) -> int:
 
 
 def make_law(model):
-    """Return the harmonic-balance law of a contact model (`march.models.ContactModel`).
+    """Return the harmonic-balance law that corresponds to a contact model (`march.models.ContactModel`).
 
     Raises
     ------

@@ -39,7 +39,7 @@ MIN_PERTURBATION_RATIO = 1e-5
 
 
 def march_to_periodic(run) -> float:
-    """Integrate a run until its motion is periodic; return the relative change in the last cycle.
+    """March a run until its motion is periodic; return the relative change over the last cycle.
 
     The change exceeds PERIODIC_TOL if no periodic motion is reached within MAX_CYCLES; `run.outcome` is set
     if the march ended early.
@@ -81,7 +81,7 @@ def march_to_periodic(run) -> float:
 
 
 def march_cycle(run, frames: int = 0) -> tuple:
-    """March a run over one more cycle; return its samples and snapshots of the interface.
+    """March a run over one more cycle; return its samples and the snapshots of the interface.
 
     The samples are a `Mark`, whose energies are those of this cycle.
     """
@@ -93,7 +93,7 @@ def march_cycle(run, frames: int = 0) -> tuple:
 
 
 def estimate_multipliers(run) -> np.ndarray:
-    """Estimate the Floquet multipliers (2 n,) of a periodic march by perturbed marches.
+    """Estimate the Floquet multipliers (2 n,) of a periodic motion by perturbed marches.
 
     They are in decreasing magnitude. Each march perturbs one number of the present state. In the first
     N_SETTLING_CYCLES the memory of the contact adapts; the map of a cycle is a least-squares
@@ -140,7 +140,7 @@ def estimate_multipliers(run) -> np.ndarray:
 
 
 def _scaled_state(run) -> np.ndarray:
-    """Return the state (2 n,) [m] of a run: coordinates, and rates divided by the fastest rate."""
+    """Return the state (2 n,) [m] of a run: coordinates, and rates divided by the fastest modal rate."""
     return np.concatenate([run.state[0], run.state[1] / _fastest_rate(run)])
 
 
@@ -149,7 +149,7 @@ def _fastest_rate(run) -> float:
 
 
 def _split_state(run, state) -> tuple:
-    """Return the modal coordinates and rates (n,) of a state vector."""
+    """Split a state vector into modal coordinates and rates, (n,) each."""
     n = run.state.shape[1]
     return state[:n], state[n:] * _fastest_rate(run)
 
@@ -159,7 +159,7 @@ def _max_magnitude(state) -> float:
 
 
 def _extrapolate(successive_states):
-    """Extrapolate the limit of successive states (k, 2 n) by reduced rank extrapolation.
+    """Extrapolate successive states (k, 2 n) to their limit by reduced rank extrapolation.
 
     The limit is the weighted mean of the states with the smallest change. The result is None if the
     extrapolation is ill-conditioned.

@@ -1,4 +1,4 @@
-"""Steady motion at one drive by harmonic balance, with an error estimate.
+"""Steady motion under one sinusoidal drive signal by harmonic balance, with an error estimate.
 
 The balance is solved for H harmonics. Those above H follow from the harmonics of the force
 (q_k = -G_k F_k, a contraction once the inertia of k > H outweighs the stiffness of the contact),
@@ -46,7 +46,7 @@ class _Unbounded(NotConverged):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SteadyMotion:
-    """Steady periodic motion under sinusoidal drive, from harmonic balance.
+    """Steady periodic motion under a sinusoidal drive signal, from harmonic balance.
 
     - omega, level: frequency [rad/s] and amplitude [m s-2] of the drive
     - coefficients, forces: (i, K + 1) harmonics of the slides [m] and forces [N] of the rows of
@@ -80,13 +80,13 @@ class SteadyMotion:
 
     @property
     def base_samples(self) -> int:
-        """Number of samples per cycle with which the unknowns were solved."""
+        """Number of samples per cycle that was used to solve for the unknowns."""
         return (
             self.samples // 2 if self.coefficients.shape[1] > self.harmonics + 1 else self.samples
         )
 
     def amplitude(self, row, samples: int = 4096) -> float:
-        """Return the displacement amplitude [m], half the range of row @ modal coordinates.
+        """Return the displacement amplitude [m]: half of the range of row @ modal coordinates.
 
         row: (n,); extremes between samples are interpolated by parabolas.
 
@@ -95,7 +95,7 @@ class SteadyMotion:
         return (find_peak(y) + find_peak(-y)) / 2
 
     def find_reversals(self) -> tuple:
-        """Return slide [m], friction force [N] and slip [m] of the first row at both reversals.
+        """Return displacement [m], friction force [N] and slip [m] of the first row at both reversals.
 
         The result is () for an interface at rest.
         """
@@ -123,7 +123,7 @@ class SteadyMotion:
 
 
 def friction_force(laws: tuple, sampled: list) -> np.ndarray:
-    """Return the friction force (N,) [N] of an interface row, without interlocking springs.
+    """Return the friction force (N,) [N] on an interface row, excluding interlocking springs.
 
     The interlock of [structure.bonded] is a spring parallel to the contact, so its force is not
     friction.
@@ -135,7 +135,7 @@ def friction_force(laws: tuple, sampled: list) -> np.ndarray:
 
 
 def find_slip(track: SampledSlide, sampled: list) -> np.ndarray:
-    """Return the slip (N,) [m] of an interface row from its sampled laws.
+    """Compute the slip (N,) [m] of an interface row from its sampled laws.
 
     The slip is the slide minus the mean elastic stretch; it is 0 if there is no friction.
 
@@ -159,7 +159,7 @@ def find_peak(y) -> float:
 
 
 def make_group(modes, group) -> LawGroup:
-    """Return the laws of a rig as a LawGroup.
+    """Combine the friction laws of a rig in a LawGroup.
 
     group: a LawGroup, a law, a contact model or (row, law) pairs.
 
@@ -168,7 +168,7 @@ def make_group(modes, group) -> LawGroup:
 
 
 def make_balance(modes, group: LawGroup, samples: int) -> HarmonicBalance:
-    """Return the harmonic balance of a law group with a number of samples per cycle.
+    """Return the harmonic balance of a law group for a given number of samples per cycle.
 
     Parameters
     ----------
@@ -187,7 +187,7 @@ def make_balance(modes, group: LawGroup, samples: int) -> HarmonicBalance:
 def find_steady_motion(
     modes, drive, group, harmonics: int | None = None, tolerance: float = 1e-3, start=None
 ) -> SteadyMotion:
-    """Find a steady motion under sinusoidal drive by harmonic balance.
+    """Find a steady motion under a sinusoidal drive signal by harmonic balance.
 
     Parameters
     ----------
@@ -251,7 +251,7 @@ def find_steady_motion(
 
 
 def _estimate_min_harmonics(modes, drive, group) -> float:
-    """Return the number of harmonics (<= 63) above which inertia exceeds the contact stiffness."""
+    """Return the number of harmonics (<= 63) above which inertia dominates the contact stiffness."""
     stiff = float(np.sum(group.stiffness() * np.sum(group.rows**2, axis=1))) / modes.mass
     return min(np.sqrt(stiff) / drive.omega, 63)
 
@@ -263,7 +263,7 @@ def _next_harmonic_count(h: int) -> int:
 
 
 def change_harmonic_count(balance, slides, unknowns, h: int, harmonics: int) -> np.ndarray:
-    """Convert the unknowns of a balance with h harmonics to another number of harmonics.
+    """Convert the unknowns of a balance with h harmonics to a different number of harmonics.
 
     Parameters
     ----------
@@ -285,7 +285,7 @@ def change_harmonic_count(balance, slides, unknowns, h: int, harmonics: int) -> 
 
 
 def refine_steady_motion(motion: SteadyMotion, modes, drive) -> SteadyMotion:
-    """Recompute a steady motion with twice as many harmonics and samples.
+    """Recompute a steady motion with twice the number of harmonics and samples.
 
     One harmonic becomes three, because a symmetric law has no even harmonics. NotConverged is raised if
     no solution is found.
@@ -321,7 +321,7 @@ def refine_steady_motion(motion: SteadyMotion, modes, drive) -> SteadyMotion:
 def _solve_harmonics(
     modes, drive, group, h, x, harmonics_ratio, tolerance=DEFAULT_TOLERANCE, near=0
 ) -> SteadyMotion:
-    """Solve the balance with h harmonics, then add harmonics that follow from the force.
+    """Solve the balance with h harmonics, then add higher harmonics that follow from the force.
 
     The harmonics that are added extend up to `harmonics_ratio` times h. The samples resolve the shortest stick phase.
 
@@ -350,7 +350,7 @@ def _solve_harmonics(
 
 
 def _solve_balance(balance, x, drive, h: int):
-    """Solve a harmonic balance from several initial guesses in turn, finally from weaker drives."""
+    """Solve a harmonic balance from several initial guesses in turn, and finally from weaker drives."""
     omega = drive.omega
     level = drive.acceleration
     for start in _generate_guesses(balance, x, omega, level, h):
@@ -383,7 +383,7 @@ def _generate_guesses(balance, x, omega, level, h: int):
 
 
 def _raise_harmonics(balance, omega, level, h: int) -> np.ndarray:
-    """Return an initial guess by raising the number of harmonics step by step.
+    """Compute an initial guess by increasing the number of harmonics step by step.
 
     Few harmonics are inexpensive to follow from weaker drives.
 
@@ -405,7 +405,7 @@ def _raise_harmonics(balance, omega, level, h: int) -> np.ndarray:
 
 
 def _follow_levels(balance, omega, level, h: int) -> np.ndarray:
-    """Return the unknowns at a drive level by continuation from a thousandth of it."""
+    """Compute the unknowns at a drive amplitude by continuation from a thousandth of it."""
     path = follow_curve(
         lambda v, p: differentiate_by_level(balance, v, omega, p, h),
         _solve_stuck(balance, omega, level, h) * 1e-3,
@@ -431,7 +431,7 @@ def _follow_levels(balance, omega, level, h: int) -> np.ndarray:
 
 
 def differentiate_by_level(balance, x, omega, level, h) -> tuple:
-    """Return residual, Jacobian and derivative of a balance by the drive level.
+    """Return residual and Jacobian of a balance, and its derivative by the drive amplitude.
 
     Parameters
     ----------
@@ -447,7 +447,7 @@ def differentiate_by_level(balance, x, omega, level, h) -> tuple:
 
 
 def differentiate_by_frequency(balance, x, omega, level, h) -> tuple:
-    """Return residual, Jacobian and derivative of a balance by the drive frequency.
+    """Return residual and Jacobian of a balance, and its derivative by the drive frequency.
 
     Parameters
     ----------
@@ -463,7 +463,7 @@ def differentiate_by_frequency(balance, x, omega, level, h) -> tuple:
 
 
 def make_motion_from_unknowns(balance, x, drive, h: int) -> tuple:
-    """Return the steady motion for solved unknowns, and the relative size of the truncated harmonics.
+    """Return the steady motion for solved unknowns, and the relative magnitude of the truncated harmonics.
 
     Parameters
     ----------
@@ -488,14 +488,14 @@ def make_motion_from_unknowns(balance, x, drive, h: int) -> tuple:
 
 
 def _solve_stuck(balance, omega, level, h: int) -> np.ndarray:
-    """Return the unknowns of the linear motion with all contacts stuck."""
+    """Solve for the unknowns of the linear motion in which all contacts stick."""
     x = np.zeros(balance.count_unknowns(omega, h))
     equations = balance.evaluate(x, omega, level, h)
     return -solve_linear(equations.jacobian)(equations.residual)
 
 
 class SweepStart(NamedTuple):
-    """Initial values of the sweeps over the higher harmonics.
+    """Initial values of the fixed-point sweeps over the higher harmonics.
 
     - x, equations, count: unknowns (N,), their equations, and iterations so far
     - slides: (i, K + 1) [m] with harmonics above those of the unknowns, or None
@@ -555,7 +555,7 @@ def _add_harmonics(
 
 
 def _make_diverged_motion(balance, start: SweepStart, drive, h, samples) -> SteadyMotion:
-    """Return the steady motion of h harmonics with unknown error, if higher harmonics diverge."""
+    """Return the steady motion with h harmonics and unknown error, if the sweeps have diverged."""
     x, equations, count, _ = start
     q = balance.unpack_slides(x, drive.omega, h)
     z = balance.compute_modal_motion(x, drive.omega, drive.acceleration, h, equations.fold.force)
@@ -576,7 +576,7 @@ def _make_diverged_motion(balance, start: SweepStart, drive, h, samples) -> Stea
 
 
 def _find_residual(balance, x, omega, level, h, force, z) -> np.ndarray:
-    """Return the residual (N,) of a balance under forces with additional harmonics."""
+    """Return the residual (N,) of a balance for forces that contain additional harmonics."""
     n_slide_unknowns = balance.lift.shape[1] * (2 * h + 1)
     position = 0
     y = unpack_harmonics(x[:n_slide_unknowns], balance.lift.shape[1])

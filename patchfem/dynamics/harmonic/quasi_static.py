@@ -1,4 +1,4 @@
-"""Quasi-static backbone of a mode: static force along its own deflection, and friction loops.
+"""Quasi-static backbone of a mode, from a static force along the mode shape and friction loops.
 
 The inertia force m omega^2 z of a deflection z holds it in equilibrium: m omega_i^2 z_i + (rows^T F)_i =
 m omega^2 z_i. The slides reverse together, so each law runs through its own loop, whose tip is F, and
@@ -32,14 +32,14 @@ SPEED_MESSAGE = "a friction force that depends on the sliding speed has no stati
 
 
 class StaticLoops(NamedTuple):
-    """Tip force [N] and area [J] of the friction loop of an interface row."""
+    """Force [N] at the tip, and area [J], of the friction loop on an interface row."""
 
     tip: float
     area: float
 
 
 class StaticMotion(NamedTuple):
-    """Quasi-static motion of a mode with its frequency and damping ratio.
+    """Quasi-static motion of a mode, with its frequency and damping ratio.
 
     - amplitude: amplitude of the motion along the shape of the given mode [m]
     - omega, zeta: frequency [rad/s] and damping ratio
@@ -55,7 +55,7 @@ class StaticMotion(NamedTuple):
 
 
 def find_loops(laws, u: float, samples: int) -> StaticLoops:
-    """Return tip force and area of the friction loop of an interface row.
+    """Compute the tip force and the area of the friction loop on an interface row.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def find_loops(laws, u: float, samples: int) -> StaticLoops:
 
 
 def _sample_loops(law, u: float, samples: int) -> StaticLoops:
-    """Return tip force and area of the loop of a rate-independent law, by sampling a cycle."""
+    """Compute the tip force and area of a rate-independent law's loop by sampling a cycle."""
     if u == 0:
         return StaticLoops(0.0, 0.0)
     track = SampledSlide(np.array([0.0, u], complex), 1.0, samples)
@@ -92,7 +92,7 @@ def _sample_loops(law, u: float, samples: int) -> StaticLoops:
 
 
 def depends_on_speed(group: LawGroup, u: float) -> bool:
-    """Return whether a friction force of the group depends on the sliding speed.
+    """Return whether any friction force in the group depends on the sliding speed.
 
     u: amplitude of the slide [m] at which the laws are sampled.
 
@@ -111,7 +111,7 @@ def depends_on_speed(group: LawGroup, u: float) -> bool:
 def find_static_motions(
     modes: ModalBasis, group: LawGroup, amplitudes, stuck_mode: tuple, samples: int = 4096, row=None
 ) -> list:
-    """Compute the quasi-static motions of a mode at prescribed amplitudes.
+    """Compute the quasi-static motions of a mode at given amplitudes.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ def find_static_motions(
 
 
 def find_static_motions_from_loops(modes: ModalBasis, row, mode: int, slides, loops) -> list:
-    """Compute the quasi-static motions of a mode with one interface of known friction loops.
+    """Compute the quasi-static motions of a mode with one interface whose friction loops are known.
 
     Parameters
     ----------
@@ -198,7 +198,7 @@ def find_static_motions_from_loops(modes: ModalBasis, row, mode: int, slides, lo
 def _solve_equilibrium(
     modes, group, mode: tuple, amplitude: float, guess, samples: int
 ) -> np.ndarray:
-    """Solve for the static equilibrium of a mode at an amplitude [m].
+    """Solve for the static equilibrium of a mode at a given amplitude [m].
 
     Returns z/amplitude, and the squared frequency relative to that of the stuck mode. mode: frequency [rad/s] and
     shape of the stuck mode, and the row of the amplitude.
@@ -236,13 +236,13 @@ def _solve_equilibrium(
 
 
 def _find_tip_slope(laws, u: float, samples: int) -> float:
-    """Return the derivative [N/m] of the tip force of loops with respect to the slide amplitude."""
+    """Return the derivative [N/m] of the force at the loop tip by the displacement amplitude."""
     step = max(RELATIVE_SLIDE_STEP * u, 1e-30)
     return (find_loops(laws, u + step, samples).tip - find_loops(laws, u, samples).tip) / step
 
 
 def _make_static_motion(modes, shape, motion: tuple) -> StaticMotion:
-    """Return the quasi-static motion with the frequency and damping ratio of an equilibrium.
+    """Return the quasi-static motion, with frequency and damping ratio, for an equilibrium.
 
     motion: z (n,) [m], squared frequency [rad2 s-2] and loss [J].
 

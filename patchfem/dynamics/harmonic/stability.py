@@ -1,4 +1,4 @@
-"""Stability of a steady motion: Floquet multipliers from the derivatives of its laws."""
+"""Stability of a steady motion: Floquet multipliers from the derivatives of the friction laws."""
 
 from dataclasses import replace
 
@@ -28,7 +28,7 @@ def add_stability(periodic, modes, cells: int = 0):
 
 
 def find_motion_monodromy(periodic, modes, cells: int = 0) -> np.ndarray:
-    """Return the monodromy matrix of a steady motion over one period of the drive.
+    """Compute the monodromy matrix of a steady motion over one period of the drive signal.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def find_motion_monodromy(periodic, modes, cells: int = 0) -> np.ndarray:
 
 
 def _average_cells(values, weights) -> np.ndarray:
-    """Return the weighted mean of sampled values in each cell, (..., N).
+    """Return the weighted means (..., N) of sampled values in all cells.
 
     weights: weight of the value at the end of a cell.
 
@@ -75,7 +75,7 @@ def _average_cells(values, weights) -> np.ndarray:
 
 
 def _weigh_samples(track, sampled):
-    """Return the weights (N,) of the later sample in the mean stiffness of each cell.
+    """Return the weights (N,) that the later sample of each cell has in the cell's mean stiffness.
 
     The mean is the secant of the force over the cell, or follows the position of a reversal in
     it; the weight is 0.5 if the force does not depend on the slide alone.
@@ -106,23 +106,22 @@ def _weigh_samples(track, sampled):
 
 
 def _set_reversal_weights(track, weights):
-    """Set the weights of the cells with a reversal from its position in the cell."""
+    """Set the weights in cells with a reversal, from the position of the reversal in the cell."""
     cells = track.turning_points.cells
     weights[cells] = 1 - _find_cell_positions(track)
     return weights
 
 
 def _find_cell_positions(track) -> np.ndarray:
-    """Return the relative position [0, 1] of every reversal in its cell."""
+    """Return the relative position [0, 1] of each reversal within its cell."""
     return track.turning_points.angles * (track.samples / (2 * np.pi)) - track.turning_points.cells
 
 
 def _make_turning_points(row: int, track, hold, weights, slope) -> list:
-    """Return the reversals of a slide on which the sticking elements depend.
+    """Return the reversals of the displacement that affect the sticking elements.
 
     The list has no reversal whose elements never slip. In the cell of a reversal its stiffness does not act yet:
-    the slide has not left it by more than the
-    square of the cell.
+    the displacement there departs from the reversal only by a term of second order in the cell length.
     """
     reversals = []
     for cell, position, stiffness in zip(

@@ -1,4 +1,4 @@
-"""Initial guesses for harmonic balance: all solutions of the one-harmonic balance."""
+"""Initial guesses for harmonic balance: all solutions of the balance with one harmonic."""
 
 from itertools import pairwise
 
@@ -10,7 +10,7 @@ N_SAMPLES = 512
 
 
 def find_one_harmonic_roots(balance, omega: float, level: float, count: int = 240) -> list:
-    """Find all solutions of the one-harmonic balance at a drive.
+    """Find all solutions of the one-harmonic balance at one frequency and drive amplitude.
 
     The search covers 1e-7 to 1e4 times the linear motion in the absence of contact.
 
@@ -64,7 +64,7 @@ def find_one_harmonic_roots(balance, omega: float, level: float, count: int = 24
 
 
 def _bracket_roots(function, grid, values) -> list:
-    """Return intervals (a, b) around all sign changes of a function on a grid (k,).
+    """Return intervals (a, b) that enclose the sign changes of a function on a grid (k,).
 
     A sample closer to zero than its neighbours may hide two roots; its minimum is then located.
     """

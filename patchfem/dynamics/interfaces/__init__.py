@@ -1,4 +1,4 @@
-"""Contacts of a march: solution of a step and update of their memory in the compiled loop.
+"""Contacts of a march: solution of a time step and update of contact memory in the compiled loop.
 
 Equation of a step. Over a step of dt the friction force enters as its mean over the path, so its
 work is exact:

@@ -1,4 +1,4 @@
-"""Arrays of the contacts, loads and modes that the compiled loop of a march uses."""
+"""Arrays of the contacts, loads and modes that the compiled loop of a march takes."""
 
 from collections import namedtuple
 from enum import IntEnum
@@ -8,7 +8,7 @@ import numpy as np
 
 
 class Element(NamedTuple):
-    """Numbers and memory of one friction law that acts along one relative displacement.
+    """Parameters and memory of one friction law that acts along one relative displacement.
 
     - num, mem: (1, k), (1, l) numbers and memory of the law
     - last: (2,) increments of the last two steps [m]
@@ -37,7 +37,7 @@ class StepStart(NamedTuple):
 
 
 class SolvedStep(NamedTuple):
-    """Solution of a time step of a contact: increment and mean force.
+    """Solution of a time step for a contact: displacement increment and mean force.
 
     - increment: increment of the relative displacement [m]
     - mean_force: path mean of the friction force [N]
@@ -50,7 +50,7 @@ class SolvedStep(NamedTuple):
 
 
 class StepProblem(NamedTuple):
-    """Equation of a time step of points coupled by shear modes.
+    """Equation of a time step for points that are coupled by shear modes.
 
     It is dq = free - compliance times friction force.
 
@@ -83,7 +83,7 @@ class LawStep(NamedTuple):
 
 
 class BondSums(NamedTuple):
-    """Sums over bond points: force [N], energy [J], stretch times load [N m] and load [N]."""
+    """Sums over bond points: force [N], energy [J], stretch times load [N m], and load [N]."""
 
     force: float
     energy: float
@@ -92,7 +92,7 @@ class BondSums(NamedTuple):
 
 
 class PointRow(IntEnum):
-    """Rows of `ShearedPoints.points`: bonds, load and step solution of each point.
+    """Row indices of `ShearedPoints.points`: bonds, load and step solution of each point.
 
     - DENSITY, STRETCH, SQUARED_STRETCH: moments of the bonds; for an elastic-plastic law DENSITY is the traction over mu and
       STRETCH the density of the springs
@@ -112,7 +112,7 @@ class PointRow(IntEnum):
 
 
 class ListPointRow(IntEnum):
-    """First rows of `ShearedLists.points`, which replace those of `PointRow` for lists of bonds.
+    """First row indices of `ShearedLists.points`, which replace those in `PointRow` for bond lists.
 
     - GROWTH_SPEED: speed at which bonds grow in the step [m/s]
     - LAST_SPEED: mean speed of the last step [m/s]
@@ -126,7 +126,7 @@ class ListPointRow(IntEnum):
 
 
 class FullSlipRow(IntEnum):
-    """Rows of `ShearedPoints.drag`: full-slip forces of the holder and of each shear mode.
+    """Row indices of `ShearedPoints.drag`: full-slip forces on the holder and on each shear mode.
 
     - FORCE: force if all points slip in the positive direction [N]
     - MAX_SLIDE: largest slide of a point per coordinate
@@ -139,7 +139,7 @@ class FullSlipRow(IntEnum):
 
 
 class FlowIndex(IntEnum):
-    """Indices into `ShearedPoints.flow`: state of full slip.
+    """Indices into `ShearedPoints.flow`: state of the contact during full slip.
 
     - FULL_SLIP_DIRECTION: sign of the slide while all points are in steady full slip, otherwise 0
     - TOTAL_SLIDE: slide of the holder [m]
@@ -152,7 +152,7 @@ class FlowIndex(IntEnum):
 
 
 class WorkRow(IntEnum):
-    """Rows of `ShearedPoints.workspace`: gradient, Newton step and trial solution of a step."""
+    """Row indices of `ShearedPoints.workspace`: gradient, Newton step and trial solution of a step."""
 
     GRADIENT = 0
     STEP = 1
@@ -160,7 +160,7 @@ class WorkRow(IntEnum):
 
 
 class PressedIndex(IntEnum):
-    """Indices into `PressedPoints.force`: parameters of the friction law of the points.
+    """Indices into `PressedPoints.force`: parameters of the friction law at the points.
 
     - MU_STATIC, MU_KINETIC: coefficients of friction
     - BOND_LENGTH: bond length [m]
@@ -178,7 +178,7 @@ class PressedIndex(IntEnum):
 
 
 class LoadIndex(IntEnum):
-    """Indices into `VaryingLoad.few`: load and normal contact of the present step.
+    """Indices into `VaryingLoad.few`: load and normal contact in the present step.
 
     - LOAD: present load [N]
     - MEAN_PRESS: mean forces of the step on heave [N] and pitch [N m]
@@ -195,7 +195,7 @@ class LoadIndex(IntEnum):
 
 
 class ShearedPoints(NamedTuple):
-    """Arrays of a contact of m points with memory, coupled by r shear modes of the pieces.
+    """Arrays of a contact whose m points have memory and are coupled by r shear modes of the pieces.
 
     - weight: (m,) force per traction of the law: mu_s area/eps_0 for bonds under a load
       in Pa
@@ -233,7 +233,7 @@ class ShearedPoints(NamedTuple):
 def make_sheared_fields(
     weight, length: float, growth, psi, kappa, lanes: int = 1, load=None
 ) -> dict:
-    """Return the initial fields of `ShearedPoints` for a contact at rest.
+    """Return the initial fields of `ShearedPoints` for a contact that is at rest.
 
     Parameters
     ----------
@@ -292,7 +292,7 @@ class PressedPoints(
         "PressedPoints", ("force", "memory", "pressed", "modes", "under", *ShearedPoints._fields)
     )
 ):
-    """Arrays of a contact of points under a varying load, see `pressed_points_kernels`.
+    """Arrays of a contact whose points are under a varying load (see `pressed_points_kernels`).
 
     - force: (6,) law parameters, see `PressedIndex`
     - memory: (3, m) elastic-plastic traction/mu and springs [N], or moments m, z, s2 of bonds [N, N m, N
@@ -310,7 +310,7 @@ class PressedPoints(
 class ClimbingPoints(
     namedtuple("ClimbingPoints", ("flank", "climb", "share", *PressedPoints._fields))
 ):
-    """Arrays of a contact with memory along the flanks of grooves, see `dynamics.grooves`.
+    """Arrays of a contact with memory on the flanks of grooves (see `dynamics.grooves`).
 
     - flank, climb: (6,), (14,) see `FlankIndex` and `ClimbIndex` of `grooves.arrays`
     - share: (m,) fractions of the normal force that the points carry
@@ -322,7 +322,7 @@ class ClimbingPoints(
 
 
 class BondList(NamedTuple):
-    """Arrays of a contact with one list of bonds on one relative displacement.
+    """Arrays of a contact that has one bond list along one relative displacement.
 
     - force: (1,) friction limit mu_s N [N]
     - bondlist, now, status, law, table: see `friction.bonds.list_rows_kernels`
@@ -361,7 +361,7 @@ class ShearedLists(
         ),
     )
 ):
-    """Arrays of a contact of m points that are coupled by shear modes and each have a bond list.
+    """Arrays of a contact whose m points are coupled by shear modes and each have a bond list.
 
     The functions are those of `shear_list_kernels`.
 
@@ -383,7 +383,7 @@ class ShearedLists(
 
 
 class VaryingLoad(NamedTuple):
-    """Arrays of a varying normal load with heave and pitch, see `march.pressing_kernels`.
+    """Arrays for a varying normal load, with heave and pitch (see `march.pressing_kernels`).
 
     - sets: `contact.set_arrays.SetArrays`
     - rows: (3, n) slide, heave and pitch per coordinate; beta: (3, 3) their reduction in a step
@@ -411,7 +411,7 @@ class VaryingLoad(NamedTuple):
 
 
 class ConstantLoad(NamedTuple):
-    """Empty arrays in place of `VaryingLoad` for a constant normal load.
+    """Empty arrays that replace `VaryingLoad` if the normal load is constant.
 
     - loads: (0,)
 
@@ -421,7 +421,7 @@ class ConstantLoad(NamedTuple):
 
 
 def split_memory(contact, element=None) -> list | None:
-    """Return the memory of a contact as rows of comparable numbers.
+    """Return the memory of a contact as a list of rows, each with numbers of comparable magnitude.
 
     It is None for a list of bonds, whose sums increase without bound. element: law of an `Element`.
     """
@@ -442,7 +442,7 @@ def split_memory(contact, element=None) -> list | None:
 
 
 def split_element_memory(element, memory) -> list:
-    """Return the memory (l,) of a friction element as rows of comparable numbers."""
+    """Return the memory (l,) of a friction element as rows of numbers of comparable magnitude."""
     head = {"parallel": 3, "points": 1, "places": 1}.get(element.form, memory.size)
     kinds = 5 if element.form in ("points", "places") else 1
     return [*memory[:head, None], *memory[head:].reshape(kinds, -1)]

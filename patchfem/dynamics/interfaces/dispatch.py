@@ -1,4 +1,4 @@
-"""Dispatch module that combines several compiled laws, selected by numbers[0].
+"""Dispatch module that combines several compiled laws; numbers[0] selects the law.
 
 It is generated and stored with the compiled code.
 """
@@ -30,7 +30,7 @@ def {name}({signature}):
 
 
 def number_laws(laws: tuple) -> dict:
-    """Return the number that selects each law module: 0 for Coulomb's law, others from 1.
+    """Return the number that selects each law module: 0 for Coulomb's law, 1 and above for the others.
 
     The loops treat Coulomb's law separately, because it has no slope.
     """
@@ -41,7 +41,7 @@ def number_laws(laws: tuple) -> dict:
 
 @cache
 def load_law(laws: tuple):
-    """Load the compiled module of one law, or generate a dispatch module for several laws.
+    """Load the compiled module of one law, or generate a dispatch module if there are several laws.
 
     laws: names of the law modules. The dispatch module is stored with the compiled code.
     """

@@ -1,4 +1,4 @@
-"""Many cases of one mode, one interface and a sine drive, integrated in vector lanes.
+"""Time integration of many cases with one mode, one interface and a sinusoidal drive, in batches.
 
 Equation. With the angle of the drive as time, x the slide and f the friction force per unit mass,
 

@@ -1,4 +1,4 @@
-"""Energies and measures of cases in lanes, in the format of `dynamics.events`.
+"""Energies and measures of cases integrated in batches, in the format of `dynamics.events`.
 
 Sums of a march are those of the trapezoidal rule; the formula of Euler and Maclaurin corrects them at their ends.
 """
@@ -37,14 +37,14 @@ RUN_MEASURES = (
 
 
 class Integrals(NamedTuple):
-    """Integrals (n,) of a quantity times cosine and sine of the drive over the observed cycles."""
+    """Integrals (n,) of a quantity times cosine and sine of the drive phase over the observed cycles."""
 
     cosine: np.ndarray
     sine: np.ndarray
 
 
 class Harmonics(NamedTuple):
-    """Drive-frequency integrals of displacement, output acceleration and friction.
+    """Integrals of displacement, output acceleration and friction at the drive frequency.
 
     The integrals of the output acceleration at three times the drive frequency are included.
     """
@@ -109,14 +109,14 @@ def run_energies(law: str, cases: Cases, marched: LaneResults, energy) -> dict:
 
 
 def _free_acceleration(law: str, cases: Cases, motion) -> np.ndarray:
-    """Return the acceleration (n,) of the relative displacement where the drive passes 0."""
+    """Return the acceleration (n,) of the relative displacement at drive phase 0."""
     x = motion[:, Row.SLIDE]
     v = motion[:, Row.SPEED]
     return -cases.damping * v - cases.stiffness * x - _friction(law, cases, motion)
 
 
 def _friction(law: str, cases: Cases, motion) -> np.ndarray:
-    """Return the friction force per unit mass (n,) [m] where the drive passes 0."""
+    """Return the friction force per unit mass (n,) [m] at drive phase 0."""
     x = motion[:, Row.SLIDE]
     memory = motion[:, Row.MEMORY]
     slip_sign = motion[:, Row.SLIP_SIGN]
@@ -129,7 +129,7 @@ def _friction(law: str, cases: Cases, motion) -> np.ndarray:
 
 
 def _elastic_energy(law: str, cases: Cases, motion) -> np.ndarray:
-    """Return the elastic energy (n,) of the interface per unit mass [m^2]."""
+    """Return the elastic energy (n,) [m^2] of the interface per unit mass."""
     if law in MASING_LAWS:
         return _slider_energy(law, cases, motion)
     if has_one_stretch(law):
@@ -140,7 +140,7 @@ def _elastic_energy(law: str, cases: Cases, motion) -> np.ndarray:
 
 
 def _slider_energy(law: str, cases: Cases, motion) -> np.ndarray:
-    """Return the elastic energy (n,) of the sliders of the Masing (Iwan) model per unit mass [m^2].
+    """Return the elastic energy (n,) [m^2] per unit mass in the sliders of the Masing (Iwan) model.
 
     It is computed as in `masing_kernels.slider_energy`.
     """
@@ -170,7 +170,7 @@ def _slider_energy(law: str, cases: Cases, motion) -> np.ndarray:
 
 
 def measure_runs(law: str, cases: Cases, marched: LaneResults, energy, omega, extremes) -> Reading:
-    """Return the measures of the observed cycles of n runs.
+    """Return the measures of the observed cycles for n runs.
 
     Parameters
     ----------
@@ -229,7 +229,7 @@ def measure_runs(law: str, cases: Cases, marched: LaneResults, energy, omega, ex
 
 
 def integrate_harmonics(law: str, cases: Cases, marched: LaneResults, angle) -> Harmonics:
-    """Integrate displacement, acceleration and friction with cosine and sine of the drive.
+    """Integrate displacement, acceleration and friction times cosine and sine of the drive phase.
 
     The integrals of x'' follow from those of x by parts, and those of the friction from the equation. The sums of x are
     corrected at their ends to the sixth order, or to the fourth for a law of one stretch.
@@ -274,7 +274,7 @@ def integrate_harmonics(law: str, cases: Cases, marched: LaneResults, angle) -> 
 
 
 def _end_differences(law: str, cases: Cases, start, end) -> tuple:
-    """Return differences (n,) of x'' and x''' between two motions where the drive passes 0.
+    """Return the differences (n,) of x'' and x''' between two motions at drive phase 0.
 
     The friction of a law of one stretch is taken as constant, because its steps are finer.
     """
@@ -289,7 +289,7 @@ def _end_differences(law: str, cases: Cases, start, end) -> tuple:
 
 
 def _friction_rate(law: str, cases: Cases, motion) -> np.ndarray:
-    """Return the derivative (n,) of the friction force per unit mass with respect to the drive angle."""
+    """Return the derivative (n,) of the friction force per unit mass by the drive phase."""
     if law in MASING_LAWS:
         tangent = law_state(law, motion, "TANGENT")
     else:

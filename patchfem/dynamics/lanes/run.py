@@ -1,4 +1,4 @@
-"""March in lanes of cases with one mode, one interface and a sinusoidal drive."""
+"""March of cases with one mode, one interface and a sinusoidal drive; each case takes one vector lane."""
 
 from functools import cache
 from typing import NamedTuple
@@ -23,7 +23,7 @@ N_REPEATED_CYCLES_READ = 3  # number of measured cycles of a repeating motion
 
 
 class Cases(NamedTuple):
-    """Cases of one mode and one interface: x'' + D x' + W x = P sin - f.
+    """Parameters and start of n cases with one mode and one interface: x'' + D x' + W x = P sin - f.
 
     Times are angles of the drive, and x is the relative displacement [m].
 
@@ -54,7 +54,7 @@ class Cases(NamedTuple):
 
 
 class LaneResults(NamedTuple):
-    """Results of a march of n cases in lanes.
+    """Results of a march of n cases that are integrated in vector lanes (one case per lane).
 
     - `start`, `observed_start`, `motion` (n, N_STATE and the state of the law): motion at the
       start, at the start of the observed cycles, and at the end.
@@ -74,7 +74,7 @@ class LaneResults(NamedTuple):
     step: float
 
     def get_measure(self, name: str) -> np.ndarray:
-        """Return the values (n,) of a measured quantity of the observed cycles by its row name."""
+        """Return the values (n,) of a measure of the observed cycles, given the name of its row."""
         return self.measures[:, Row[name] - rows.FIRST_MEASURE]
 
 
@@ -88,7 +88,7 @@ def has_one_stretch(law: str) -> bool:
 
 @cache
 def load_loop(law: str):
-    """Load the compiled march for a friction law.
+    """Load the compiled loop that marches cases with a given friction law.
 
     The law is "rigid", "yielding", "masing", "table" or the module of the kernels of a law of
     one stretch.
@@ -113,7 +113,7 @@ def load_loop(law: str):
 
 
 def count_law_rows(law: str) -> int:
-    """Return the number of workspace rows for the additional variables of a friction law."""
+    """Return the number of workspace rows for the additional variables that a friction law needs."""
     if has_one_stretch(law):
         return len(rows.StretchRow)
     if law in MASING_LAWS:
@@ -123,7 +123,7 @@ def count_law_rows(law: str) -> int:
 
 
 def make_curve_tables(groups) -> np.ndarray:
-    """Return the tables (n, m) of the first-loading curves of n sets of Jenkins elements.
+    """Tabulate the first-loading curves of n sets of Jenkins elements, (n, m).
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ def make_curve_tables(groups) -> np.ndarray:
 
 
 def law_number_scales(law: str, force, omega) -> np.ndarray:
-    """Return the factors (n, k) that scale the parameters of a law to those of cases.
+    """Return the factors (n, k) that convert the parameters of a law to the units of the cases.
 
     Parameters
     ----------
@@ -195,7 +195,7 @@ def law_number_scales(law: str, force, omega) -> np.ndarray:
 
 
 def taylor_step(damping, stiffness, angle: float, start: tuple, forces: tuple) -> tuple:
-    """Integrate x'' + D x' + W x = g over an angle by Taylor series.
+    """Integrate x'' + D x' + W x = g over a phase angle by Taylor series.
 
     Parameters
     ----------
@@ -228,7 +228,7 @@ def taylor_step(damping, stiffness, angle: float, start: tuple, forces: tuple) -
 
 
 def make_case_numbers(law: str, cases: Cases, steps: int) -> np.ndarray:
-    """Return the parameters of cases in the order of their workspace rows, and their tables.
+    """Return the parameters of the cases, in the order of their workspace rows, and their tables.
 
     The first number belongs in row `rows_kernels.FIRST_NUMBER`.
 
@@ -263,7 +263,7 @@ def make_case_numbers(law: str, cases: Cases, steps: int) -> np.ndarray:
 
 
 def step_coefficients(cases: Cases, spring, angle: float) -> np.ndarray:
-    """Return the coefficients of an exact step with a spring parallel to the mode.
+    """Return the coefficients of an exact time step with a spring in parallel with the mode.
 
     Parameters
     ----------
@@ -296,7 +296,7 @@ def step_coefficients(cases: Cases, spring, angle: float) -> np.ndarray:
 
 
 def make_drive_table(steps: int) -> np.ndarray:
-    """Return sine and cosine of the drive at the steps of a cycle, and the step angle.
+    """Return sine and cosine of the drive phase at the steps of a cycle, and the phase step.
 
     They are the rows of an array (3, steps + 1).
     """
@@ -308,7 +308,7 @@ def make_drive_table(steps: int) -> np.ndarray:
 
 
 def initial_motion(law: str, cases: Cases) -> np.ndarray:
-    """Return the motion of cases at their start.
+    """Return the initial motion of the cases.
 
     It has the shape (n, N_STATE and the number of law variables).
     """
@@ -342,7 +342,7 @@ def initial_motion(law: str, cases: Cases) -> np.ndarray:
 
 
 def law_state(law: str, motion, name: str) -> np.ndarray:
-    """Return a law variable (n,) of a motion by its row name.
+    """Return a state variable (n,) of the friction law in a motion, given the name of its row.
 
     Parameters
     ----------
@@ -361,7 +361,7 @@ def law_state(law: str, motion, name: str) -> np.ndarray:
 
 
 def continue_march(law: str, cases: Cases, motion, cycles: int, steps: int) -> tuple:
-    """March cases over more cycles, or until their motion repeats.
+    """March cases over further cycles, or until their motion repeats.
 
     The last cycle then stands for those that follow.
 
@@ -394,13 +394,13 @@ def continue_march(law: str, cases: Cases, motion, cycles: int, steps: int) -> t
 
 
 def repeat_last_cycles(history, n_done) -> None:
-    """Fill the history (n, c, 4) of cases whose motion repeats after given cycles (n,)."""
+    """Fill the history (n, c, 4) by repeating the last of the `n_done` (n,) cycles computed per case."""
     for case in np.flatnonzero(n_done < history.shape[1]):
         history[case, n_done[case] :] = history[case, n_done[case] - 1]
 
 
 def output_accelerations(law: str, cases: Cases, motion, cycles: int, steps: int) -> np.ndarray:
-    """Return the absolute output acceleration [m s-2] at the start and after every step.
+    """Return the absolute output acceleration [m s-2] at the start and after each step.
 
     Parameters
     ----------
@@ -431,7 +431,7 @@ def output_accelerations(law: str, cases: Cases, motion, cycles: int, steps: int
 
 
 def make_workspace(numbers, motion) -> tuple:
-    """Return the workspace of the lanes for cases, and an array for lane indices."""
+    """Return the workspace for a batch of cases in vector lanes, and an array for lane indices."""
     n_law_state = motion.shape[1] - rows.N_STATE
     table_size = numbers.shape[1] - rows.N_NUMBERS
     n_rows = rows.LAW_STATE + n_law_state + table_size

@@ -1,4 +1,4 @@
-"""Time integration of modes that move exactly under friction forces constant over a step.
+"""Time integration (march) with exact modal motion under friction forces held constant in a step.
 
 Equation. The modal coordinates z follow z'' + 2 zeta omega z' + omega^2 z = (drive - sum_p row_p F_p)/mass, where F_p is
 the friction force on port p and row_p gives the slide q_p = row_p z of the port.

@@ -1,4 +1,4 @@
-"""Capacity of growing lists of bonds.
+"""Capacity of bond lists that grow during a march.
 
 The arrays that a part of a run may change are copied before it. If the list fills up, the part is repeated with twice
 the capacity. A contact without a list has a fixed size; for it these functions do nothing.
@@ -21,7 +21,7 @@ LONG_LIST_ADVICE = (
 
 
 class SavedState(NamedTuple):
-    """Copies of the arrays of a run, for repeating a part of the march.
+    """Copies of the arrays of a run, from which a section of the march can be repeated.
 
     - `entries`: used entries of every list of bonds.
     - `fields`: other arrays of the contact by name.
@@ -34,7 +34,7 @@ class SavedState(NamedTuple):
 
 
 def copy_state(contact, *others) -> SavedState | None:
-    """Copy the arrays of a contact with a bond list, and other arrays of a run.
+    """Copy the arrays of a contact with a bond list, and further arrays of a run.
 
     The result is None if the contact has no list.
     """
@@ -49,12 +49,12 @@ def copy_state(contact, *others) -> SavedState | None:
 
 
 def _get_statuses(contact) -> np.ndarray:
-    """Return the status rows (m, 16) of the lists of bonds of a contact."""
+    """Return the status rows (m, 16) of the bond lists of a contact."""
     return contact.statuses if hasattr(contact, "statuses") else contact.status[None]
 
 
 def is_full(contact) -> bool:
-    """Return whether a list of bonds of a contact has reached its capacity.
+    """Return whether any bond list of a contact has reached its capacity.
 
     For a contact with a single list a full list is the only cause of a failed step.
     """
@@ -64,7 +64,7 @@ def is_full(contact) -> bool:
 
 
 def enlarge_list(contact, saved_state: SavedState, location: str, *others):
-    """Restore a contact from saved copies with twice the capacity of its list of bonds.
+    """Restore a contact from saved copies and double the capacity of its bond list.
 
     The other arrays are restored in place.
 
@@ -100,5 +100,5 @@ def enlarge_list(contact, saved_state: SavedState, location: str, *others):
 
 
 def list_bytes(n_entries: float) -> float:
-    """Return the memory [bytes] of a list of bonds, including its copy during enlargement."""
+    """Return the memory [bytes] that a bond list takes, including its copy during enlargement."""
     return 3 * ENTRY_BYTES * min(n_entries, MAX_ENTRIES)

@@ -1,4 +1,4 @@
-"""Arrays of a march that stores sums instead of samples, with names for their rows."""
+"""Arrays of a march that stores sums instead of samples, and the names of their rows."""
 
 from enum import IntEnum
 from typing import NamedTuple
@@ -7,7 +7,7 @@ import numpy as np
 
 
 class SumIndex(IntEnum):
-    """Indices into `CycleSums.sums`: energies accumulated over the cycles of a call [J].
+    """Indices into `CycleSums.sums`: energies [J] accumulated over the cycles of one call.
 
     - WORK: friction work
     - LOSS, CREATED: dissipated energy, and energy created by numerical errors
@@ -23,7 +23,7 @@ class SumIndex(IntEnum):
 
 
 class TraceRow(IntEnum):
-    """Rows of `CycleSums.trace`: output [m], output rate [m/s], cosine and sine of the drive."""
+    """Row indices of `CycleSums.trace`: output [m], output rate [m/s], cosine and sine of the drive phase."""
 
     OUTPUT = 0
     RATE = 1
@@ -32,7 +32,7 @@ class TraceRow(IntEnum):
 
 
 class CycleColumn(IntEnum):
-    """Columns of the results of a cycle: extremes and phasor of the output [m]."""
+    """Columns of the results for one cycle: extremes and phasor of the output [m]."""
 
     MIN_OUTPUT = 0
     MAX_OUTPUT = 1
@@ -41,7 +41,7 @@ class CycleColumn(IntEnum):
 
 
 class BlockRow(IntEnum):
-    """Rows of `CycleSums.workspace`: energies and motion in a block of steps.
+    """Row indices of `CycleSums.workspace`: energies and motion during a block of steps.
 
     - DRIVE_WORK, VISCOUS_LOSS: energies of the step [J]
     - SLIDE, SPEED: slide [m] and speed [m/s] at the end of the step; SLIDE later has the increment
@@ -65,7 +65,7 @@ BLOCK = 32  # number of steps in full slip that are computed as a block, mode by
 
 
 class StepBounds(NamedTuple):
-    """Tolerance and limits of a march that stores sums.
+    """Tolerance and limits for a march that stores sums.
 
     - goal: tolerance of the friction force of a step [N]
     - force: friction limit [N]
@@ -78,7 +78,7 @@ class StepBounds(NamedTuple):
 
 
 class LargestSlide(NamedTuple):
-    """March sample at the largest slide so far, for n modes.
+    """March sample with the largest relative displacement so far, for n modes.
 
     - row: (2 n + 7,) present sample
     - kept: (2 n + 10,) sample of the largest slide so far, with the energy sums at that time
@@ -91,7 +91,7 @@ class LargestSlide(NamedTuple):
 
 
 class CycleSums(NamedTuple):
-    """Energy sums and output that `passing_kernels` stores instead of samples.
+    """Energy sums and output values that `passing_kernels` stores instead of samples.
 
     - bounds, largest: tolerance and limits, and the sample of the largest slide
     - ledger: (9,) energy sums, see `dynamics.ledger.Ledger`

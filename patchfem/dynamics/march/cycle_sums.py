@@ -1,4 +1,4 @@
-"""Long marches of coupled bond points that store sums instead of samples (`passing_kernels`)."""
+"""Long marches of coupled bond points that store sums in place of samples (`passing_kernels`)."""
 
 import numpy as np
 
@@ -26,7 +26,7 @@ CYCLE_SUM_KERNELS = "dynamics.march.passing_kernels"
 
 
 def can_sum_cycles(run: Run) -> bool:
-    """Return whether a march can store sums instead of samples (`march_with_sums`).
+    """Return whether a march can store sums in place of samples (see `march_with_sums`).
 
     This requires bond points coupled by shear modes, no other elements, and a constant load.
 
@@ -35,7 +35,7 @@ def can_sum_cycles(run: Run) -> bool:
 
 
 def march_with_sums(run: Run, steps: int, samples: MarchSamples) -> bool:
-    """March to a step and store energy sums, extremes and phasors of all cycles instead of samples.
+    """March to a given step; store the energy sums, extremes and phasors of all cycles, but no samples.
 
     The sample at the largest slide is also stored.
 
@@ -99,7 +99,7 @@ def march_with_sums(run: Run, steps: int, samples: MarchSamples) -> bool:
 
 
 def _make_cycle_sums(run: Run) -> CycleSums:
-    """Return the arrays of the sums that are stored instead of samples."""
+    """Return the arrays for the sums that are stored in place of samples."""
     largest = LargestSlide(
         row=np.zeros(2 * run.modes.omega.size + N_SAMPLE_COLUMNS),
         kept=np.zeros(run.width + N_SUMS),
@@ -122,7 +122,7 @@ def _make_cycle_sums(run: Run) -> CycleSums:
 
 
 def _make_trace(run: Run, size: int) -> np.ndarray:
-    """Return the output record of a cycle with the cosine and sine of the drive at its steps."""
+    """Return the record of the output in a cycle, with cosine and sine of the drive phase at its steps."""
     cycle_steps = run.prop.steps
     phase = 2 * np.pi * (run.done % cycle_steps + np.arange(size + 1)) / cycle_steps
     return np.array([0 * phase, 0 * phase, np.cos(phase), np.sin(phase)])

@@ -1,4 +1,4 @@
-"""Arrays of the friction elements and springs of a march, with names for their rows."""
+"""Arrays of the friction elements and springs in a march, and the names of their rows."""
 
 from enum import IntEnum
 from typing import NamedTuple
@@ -7,7 +7,7 @@ import numpy as np
 
 
 class LinkRow(IntEnum):
-    """Rows of `PortElements.links`: port, kind and plane partner of each element.
+    """Row indices of `PortElements.links`: port, type, and partner in a plane for each element.
 
     - PORT: port on which the element acts
     - IS_FRICTION: 1 for friction, 0 for a spring
@@ -20,7 +20,7 @@ class LinkRow(IntEnum):
 
 
 class ElementRow(IntEnum):
-    """Rows of `PortElements.state`: force, slide and residual of an element in a step.
+    """Row indices of `PortElements.state`: force, relative displacement and residual of each element.
 
     - FORCE: mean force of the step [N]
     - SLIDE, SPEED: slide [m] and its speed [m/s] at the start
@@ -45,7 +45,7 @@ class ElementRow(IntEnum):
 
 
 class ContactIndex(IntEnum):
-    """Indices into `PortElements.contact`: state of the contact on port 0 in a step.
+    """Indices into `PortElements.contact`: state of the contact on port 0 during a step.
 
     - FORCE: mean force [N]
     - INCREMENT: increment of the slide [m]
@@ -62,14 +62,14 @@ class ContactIndex(IntEnum):
 
 
 class PortRow(IntEnum):
-    """Rows of `PortElements.port`: force-free slide increment [m] and end speed [m/s]."""
+    """Row indices of `PortElements.port`: increment [m] and final speed [m/s] if no force acted."""
 
     FREE_SLIDE = 0
     FREE_SPEED = 1
 
 
 class ModalRow(IntEnum):
-    """Rows of `PortElements.modal`: compliances, accelerations and workspace of the modes.
+    """Row indices of `PortElements.modal`: compliances, accelerations and workspace of the modes.
 
     - COMPLIANCE: compliance of the coordinates in a step [m/N]
     - OTHER_ACCELERATION: accelerations due to forces other than those of contact and elements [m s-2]
@@ -82,7 +82,7 @@ class ModalRow(IntEnum):
 
 
 class ComplianceRow(IntEnum):
-    """First index of `compliances`: reduction of a port's motion in a step per constant force.
+    """First index of `compliances`: how much a constant force reduces a port's motion in a step.
 
     - SLIDE: reduction of the slide [m/N]
     - SPEED: reduction of the speed [m/(s N)]
@@ -95,7 +95,7 @@ class ComplianceRow(IntEnum):
 
 
 class LimitRow(IntEnum):
-    """Rows of `SetValuedElements.limit`: friction limits [N] of set-valued elements.
+    """Row indices of `SetValuedElements.limit`: friction limits [N] of set-valued elements.
 
     The limits at the end of the step are AT_END rows further on.
 
@@ -107,7 +107,7 @@ class LimitRow(IntEnum):
 
 
 class FaceRow(IntEnum):
-    """Rows of `SetValuedElements.field`: state of a set-valued element (a face) in a step.
+    """Row indices of `SetValuedElements.field`: state of each set-valued element (face) in a step.
 
     - FREE_SLIDE, FREE_SPEED: increment of the slide [m] and speed at the end [m/s] in the absence of face forces
     - START_SPEED: speed at the start [m/s]
@@ -146,7 +146,7 @@ class FaceRow(IntEnum):
 
 
 class LoadColumn(IntEnum):
-    """Last columns of a march sample under a varying load.
+    """Last columns of a march sample if the load varies.
 
     - LOAD, MOMENT: normal force [N] and its moment [N m]
     - ENERGY: energy of the preloaded contact [J]
@@ -177,7 +177,7 @@ class SingleContact(NamedTuple):
 
 
 class SetValuedElements(NamedTuple):
-    """Arrays of the m set-valued elements of a march, the faces of `stops_kernels`.
+    """Arrays of the m set-valued friction elements in a march, called faces in `stops_kernels`.
 
     - element, names: (m,) numbers of the elements, and workspace for numbers of faces
     - limit: (4, m) friction limits, see `LimitRow`
@@ -196,7 +196,7 @@ class SetValuedElements(NamedTuple):
 
 
 class PortElements(NamedTuple):
-    """Arrays of friction elements and springs (e,) on ports (p,) of a march.
+    """Arrays of the e friction elements and springs on the p ports of a march.
 
     They supplement or replace a contact on port 0.
 

@@ -1,4 +1,4 @@
-"""Initial arrays of the friction elements and springs of a march."""
+"""Initial arrays of the friction elements and springs in a march."""
 
 import numpy as np
 
@@ -89,7 +89,7 @@ def make_element_arrays(model, prop, modal_system, mass: float):
 
 
 def _make_set_valued(elements, ports, num, compliances, rows, mass: float) -> SetValuedElements:
-    """Return the arrays of the set-valued elements of a march at its start.
+    """Return the arrays of the set-valued friction elements at the start of a march.
 
     Parameters
     ----------

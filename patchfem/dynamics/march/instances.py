@@ -1,4 +1,4 @@
-"""Compiled loops of the march: one instance per contact, set of laws and type of load.
+"""Compiled loops of the march: one for each combination of contact, laws and type of load.
 
 `loop_kernels` runs with any contact, `interfaces.element_kernels` and its solver with any law. A law passed to a compiled
 function as an argument cannot be cached on disk, so `compiled.instantiate` writes the loop once per law instead.
@@ -20,7 +20,7 @@ POINT_LOADS = "points"
 
 @cache
 def load_contact(kind: tuple):
-    """Load the compiled functions of a contact of a given kind (contact module, law module)."""
+    """Load the compiled functions for a kind of contact (contact module, law module)."""
     contact, law = kind
     if contact == SHEARED_LISTS_MODULE:
         return compiled.instantiate(
@@ -49,7 +49,7 @@ def load_loop(
     is_coupled: bool = False,
     has_planes: bool = False,
 ):
-    """Load the compiled loop of a march, with its functions `march` and `follow`.
+    """Load the compiled loop of a march, which has the functions `march` and `follow`.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def load_loop(
 
 
 def march(model, *arguments) -> tuple:
-    """March a model by its compiled loop; return the number of completed steps and the status."""
+    """March a model by its compiled loop; return the number of completed steps and a status code."""
     has_contact = not model.joints or getattr(model, "patch", None) is not None
     loop = load_loop(
         model.kind,
@@ -130,7 +130,7 @@ def march(model, *arguments) -> tuple:
 
 
 def follow_path(path, dt, kind, contact, goal, energies, forces) -> int:
-    """Move a contact along a prescribed slide path by its compiled loop.
+    """Move a contact along a prescribed path of relative displacement by its compiled loop.
 
     Parameters
     ----------

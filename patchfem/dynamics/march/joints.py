@@ -10,7 +10,7 @@ from .models import IDLE_KIND, ContactModel, Joint, frictionless_model
 
 
 def make_cubic_spring(port: int, stiffness: float) -> Joint:
-    """Return a cubic spring on a port, with the restoring force k_3 q^3 [N].
+    """Return a cubic spring on a port, whose restoring force is k_3 q^3 [N].
 
     stiffness: k_3 [N/m3].
 
@@ -19,7 +19,7 @@ def make_cubic_spring(port: int, stiffness: float) -> Joint:
 
 
 def make_interlocking_spring(port: int, stiffness: float, wavelength: float) -> Joint:
-    """Return a spring on a port with the sinusoidal restoring force of interlocking peaks.
+    """Return a spring on a port whose restoring force is sinusoidal, as for interlocking peaks.
 
     The force is k lambda/(2 pi) sin(2 pi q/lambda) [N].
 
@@ -49,7 +49,7 @@ def _make_spring(port: int, numbers, potential) -> Joint:
 
 
 def pair_plane_joints(joints, planes) -> list:
-    """Return the joints of interfaces (i,), with a second joint for each that slides in a plane.
+    """Return the joints of interfaces (i,), and a second joint for each interface that slides in a plane.
 
     The first directions act on the ports 0 to i - 1, the second directions on ports from i on; planes (i,) states
     which interfaces slide in a plane.
@@ -98,12 +98,12 @@ class JointsModel:
 
     @property
     def length(self) -> float:
-        """Bond length [m] of the patch or, if there is no patch, of the first interface."""
+        """Bond length [m] of the patch, or of the first interface if there is no patch."""
         return self.patch.length if self.patch is not None else self.joints[0].element.length
 
     @property
     def reduction(self):
-        """Shear modes from which the patch was reduced (`ContactModel.reduction`).
+        """Shear modes to which the patch was reduced (see `ContactModel.reduction`).
 
         The result is None if there is no patch.
         """
@@ -111,21 +111,21 @@ class JointsModel:
 
     @property
     def set_valued(self) -> bool:
-        """Whether the patch or, if there is none, the first interface sticks rigidly (set-valued)."""
+        """Return whether the patch, or the first interface if there is no patch, sticks rigidly."""
         return (
             self.patch.set_valued if self.patch is not None else not self.joints[0].element.kernels
         )
 
     @property
     def laws(self) -> tuple:
-        """Distinct modules of the compiled laws of the joints."""
+        """Distinct compiled law modules of the joints."""
         return tuple(
             sorted({*self.also, *(joint.element.kernels or COULOMB_LAW for joint in self.joints)})
         )
 
     @property
     def kind(self) -> tuple:
-        """Modules of the contact of the patch and of its law (`ContactModel.kind`).
+        """Contact module and law module of the patch (see `ContactModel.kind`).
 
         If there is no patch, they are those of an inactive contact.
 
@@ -133,9 +133,9 @@ class JointsModel:
         return self.patch.kind if self.patch is not None else IDLE_KIND
 
     def get_plot_fields(self, contact) -> dict:
-        """Return the memory of the patch as fields for plotting."""
+        """Return the contact memory of the patch as fields for plotting."""
         return self.patch.get_plot_fields(contact) if self.patch is not None else {}
 
     def allocate_contact(self):
-        """Allocate the contact arrays of the patch or, if there is none, of an inactive point."""
+        """Allocate the contact arrays of the patch, or of an inactive point if there is no patch."""
         return (self.patch or frictionless_model()).allocate_contact()

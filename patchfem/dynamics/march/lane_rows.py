@@ -1,4 +1,4 @@
-"""Sizes and row names of the arrays of `lanes_kernels`."""
+"""Sizes and row names of the arrays in `lanes_kernels`, which integrate one case per vector lane."""
 
 from enum import IntEnum
 
@@ -82,7 +82,7 @@ N_WORKSPACE_ROWS = sum(WORKSPACE_ROWS.values())
 
 
 def _stack_rows(row_counts: dict, row_length: int) -> dict:
-    """Return the position of the first number of each quantity in a stacked array."""
+    """Return the position at which the numbers of each quantity begin in a stacked array."""
     positions = {}
     end = 0
     for name, count in row_counts.items():
@@ -97,7 +97,7 @@ At = IntEnum("At", _stack_rows(WORKSPACE_ROWS, LANES), module=__name__)
 
 
 class RigRow(IntEnum):
-    """Rows of the propagator of a rig mode, relative to the friction force.
+    """Row indices of the propagator of a rig, whose coefficients are per friction force.
 
     They follow from `propagator.Propagator`, whose coefficients are per acceleration.
 
@@ -126,7 +126,7 @@ class RigRow(IntEnum):
 
 
 class StepColumn(IntEnum):
-    """Columns of the drive table of the steps, for a drive amplitude of 1 m s-2.
+    """Columns of the drive table for the steps of a cycle, for a drive amplitude of 1 m s-2.
 
     - BY_DRIVE: contribution of the drive to coordinates and rates
     - WORK_FORMS, LOSS_FORMS: coefficients of the drive work and of the viscous loss
@@ -147,7 +147,7 @@ N_COLUMNS = StepColumn.WAVES + 2
 
 
 def get_rows(workspace, position: At):
-    """Return a view of the rows of one quantity in a workspace of cases.
+    """Return a view of the rows that hold one quantity in a workspace of cases.
 
     Parameters
     ----------

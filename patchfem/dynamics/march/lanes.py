@@ -1,4 +1,4 @@
-"""March of many patches with coupled bond points, one case per lane."""
+"""March of many patches with coupled bond points; each case takes one vector lane of the kernels."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -41,7 +41,7 @@ LEDGER_POSITIONS = {
 
 
 class PointsCase(NamedTuple):
-    """Bond points and drive amplitude of a case.
+    """Bond points and drive amplitude of one case.
 
     - `limit` (p,): friction limits of the points [N].
     - `shape` (p, r), `stiffness` (r,): slides of the points per coordinate of the pieces, and stiffness of
@@ -81,12 +81,12 @@ class MarchedCases(NamedTuple):
 
 
 def can_march(modes: ModalBasis) -> bool:
-    """Return whether a rig has the number of modes that the lanes are compiled for."""
+    """Return whether the compiled batch solver supports the number of modes and the damping of a rig."""
     return modes.omega.size <= N_RIG_MODES and modes.damping is None
 
 
 def _make_rig_rows(modes: ModalBasis, prop) -> np.ndarray:
-    """Return the propagator rows of a rig for the lane kernels (`RigRow`).
+    """Return the propagator of a rig as rows for the batch kernels (see `RigRow`).
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def _make_rig_rows(modes: ModalBasis, prop) -> np.ndarray:
 
 
 def _make_step_table(modes: ModalBasis, drive, steps: int, prop) -> np.ndarray:
-    """Return the drive table of the steps of a cycle for a drive amplitude of 1 m s-2.
+    """Return the drive table for the steps of a cycle, for a drive amplitude of 1 m s-2.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def _make_step_table(modes: ModalBasis, drive, steps: int, prop) -> np.ndarray:
 
 
 def _make_workspace(cases: list) -> np.ndarray:
-    """Return the workspace of cases at rest; surplus lanes repeat the last case."""
+    """Return the workspace for cases at rest; lanes that are not needed repeat the last case."""
     workspace = np.zeros((N_WORKSPACE_ROWS, LANES))
     for i in range(LANES):
         case = cases[min(i, len(cases) - 1)]
@@ -160,7 +160,7 @@ def _make_workspace(cases: list) -> np.ndarray:
 def march(
     modes: ModalBasis, drive: SineDrive, cases: list, cycles: int, steps: int, window: int
 ) -> MarchedCases:
-    """March cases from rest over cycles of a drive, each with its own drive amplitude.
+    """March cases from rest over cycles of a drive signal, each case with its own drive amplitude.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""March of a contact model over cycles of its drive, with selected samples and results."""
+"""March of a contact model over cycles of a drive signal, with selected samples and results."""
 
 from collections import deque
 from dataclasses import dataclass
@@ -45,12 +45,12 @@ class MarchResult:
 
 
 def _get_run_class(model):
-    """Return the class that integrates a model in time: `Run`, or the class set by the model."""
+    """Return the class that integrates a model over time: that set by the model, otherwise `Run`."""
     return getattr(model, "runner", None) or Run
 
 
 def warm_up(modes: ModalBasis, drive: SineDrive, model: ContactModel, say=None) -> None:
-    """Load or compile the loop of a model by a march without steps.
+    """Load or compile the loop for a model by a march of zero steps.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def march(
     keeps_extremes: bool = False,
     even: bool = False,
 ) -> MarchResult:
-    """March a model over cycles of its drive, from rest or from an initial state.
+    """March a model over cycles of its drive signal, from rest or from an initial state.
 
     Parameters
     ----------
@@ -206,7 +206,7 @@ def march(
 
 
 class _MarchPlan(NamedTuple):
-    """Lengths of a march and its records in steps and cycles.
+    """Lengths of a march and of its records, in steps and cycles.
 
     - n_steps: number of steps of the march
     - steps_per_cycle: number of steps of a cycle
@@ -223,12 +223,12 @@ class _MarchPlan(NamedTuple):
     mark_steps: list
 
     def next_mark_step(self, n_completed: int) -> int:
-        """Return the next step after which the state is recorded as a mark, or the last step."""
+        """Return the next step at which the state is recorded as a `Mark`, or the last step if there is none."""
         return min((step for step in self.mark_steps if step > n_completed), default=self.n_steps)
 
 
 def _march_recorded(run, recorder: Recorder, plan: _MarchPlan, checkpoint, progress) -> list:
-    """March to the end of a plan and record the cycles.
+    """March to the end of a plan, and record the cycles.
 
     Returns the snapshots of the last cycle. The remaining cycles of a periodic motion are skipped; see `Run.is_periodic`.
     """
@@ -256,7 +256,7 @@ def _march_recorded(run, recorder: Recorder, plan: _MarchPlan, checkpoint, progr
 
 
 def _make_result(run, recorder: Recorder, plan: _MarchPlan, snapshots: list) -> MarchResult:
-    """Return the result of a finished march from its recorded samples."""
+    """Return the result of a finished march, made from its recorded samples."""
     samples = recorder.samples
     extremes = samples.extremes
     phasors = samples.phasors

@@ -32,7 +32,7 @@ IDLE_KIND = ELEMENT_KERNELS, "friction.laws.elastic_plastic_kernels"
 
 
 def load_instances(say=None):
-    """Load the module of the compiled loops.
+    """Load the module with the compiled loops.
 
     say: callback that reports when loops have to be compiled.
 
@@ -83,22 +83,22 @@ class ContactModel:
 
     @property
     def kind(self) -> tuple:
-        """Modules of contact and law, for which the loop is compiled."""
+        """Contact module and law module for which the loop is compiled."""
         return self.contact, self.law
 
     @property
     def set_valued(self) -> bool:
-        """Whether the contact sticks rigidly (set-valued Coulomb friction)."""
+        """Return whether the contact sticks rigidly (set-valued Coulomb friction)."""
         return self.law == COULOMB_LAW
 
     @property
     def laws(self) -> tuple:
-        """Modules of the compiled laws of the elements (`joints`)."""
+        """Modules with the compiled laws of the elements (`joints`)."""
         return (COULOMB_LAW,) if self.set_valued else ()
 
     @property
     def joints(self) -> tuple:
-        """Set-valued element that replaces the contact, so that all such elements are solved together."""
+        """Set-valued element that replaces the contact, so that it is solved together with other such elements."""
         return (Joint(0, self.element),) if self.set_valued else ()
 
     def get_plot_fields(self, contact) -> dict:
@@ -151,7 +151,7 @@ class ContactModel:
 
 
 def element_model(element: Element, reduction=None) -> ContactModel:
-    """Return the contact model of one law on one slide."""
+    """Return the contact model for one law that acts along one relative displacement."""
     bound = element.limit if element.is_bounded else np.inf
     fields = {
         "num": element.numbers[None],
@@ -173,17 +173,17 @@ def element_model(element: Element, reduction=None) -> ContactModel:
 
 @cache
 def frictionless_model() -> ContactModel:
-    """Return the contact model of a frictionless interface."""
+    """Return the contact model for a frictionless interface."""
     return jenkins_model([0.0], [1.0])
 
 
 def coulomb_model(static: float, kinetic: float) -> ContactModel:
-    """Return the model of a rigid Coulomb contact with static and kinetic friction force [N]."""
+    """Return the model for a rigid Coulomb contact with given static and kinetic friction forces [N]."""
     return element_model(Coulomb(kinetic, static).element(1.0))
 
 
 def jenkins_model(stiffness, yield_displacement, reduction=None) -> ContactModel:
-    """Return the contact model of parallel Jenkins elements.
+    """Return the contact model for parallel Jenkins elements.
 
     Parameters
     ----------
@@ -195,7 +195,7 @@ def jenkins_model(stiffness, yield_displacement, reduction=None) -> ContactModel
 
 
 def points_model(law, area, sigma, shear=None, pattern=None) -> ContactModel:
-    """Return the contact model of bond points of order 1 with friction.reading = "stretch".
+    """Return the contact model for bond points of order 1 with friction.reading = "stretch".
 
     Parameters
     ----------
@@ -248,7 +248,7 @@ def points_model(law, area, sigma, shear=None, pattern=None) -> ContactModel:
 def point_lists_model(
     law, limit, sigma, shear, reach: float, merge: float, pressure_fields: dict | None = None
 ) -> ContactModel:
-    """Return the contact model of points that are coupled by shear modes and each have a bond list.
+    """Return the contact model for points that are coupled by shear modes and each have a bond list.
 
     The bonds have any order and either value of `friction.reading`.
 
@@ -315,7 +315,7 @@ def point_lists_model(
 
 
 def lower_pressure_fields(x, sigma, measure: float) -> dict:
-    """Return fields of `point_lists_model` for a pressure fixed to the lower piece.
+    """Return fields of `point_lists_model` for a pressure distribution that is fixed to the lower piece.
 
     Parameters
     ----------
@@ -346,7 +346,7 @@ def nodal_load_fields(force, measure) -> dict:
 
 
 def point_pressures(contact) -> np.ndarray:
-    """Return the present pressures (m,) of points with bond lists, relative to those of their limits."""
+    """Return the present pressures (m,) at points with bond lists, divided by those of the friction limits."""
     if contact.pattern.size:
         x, pressure = contact.pattern
         return np.interp(
@@ -358,7 +358,7 @@ def point_pressures(contact) -> np.ndarray:
 
 
 def bond_list_model(law, limit: float, reach: float, merge: float) -> ContactModel:
-    """Return the contact model of one list of bonds under a uniform slide.
+    """Return the contact model for one bond list along a uniform relative displacement.
 
     The bonds have any order and either value of `friction.reading`.
 

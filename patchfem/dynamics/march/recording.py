@@ -1,4 +1,4 @@
-"""Recording of a march: all samples of the last cycles, and selected earlier samples."""
+"""Recording of a march: all samples of the last cycles, and selected samples of earlier ones."""
 
 from dataclasses import dataclass
 
@@ -17,7 +17,7 @@ N_SUMS = 3
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Mark:
-    """Recorded state of a march at a requested number of cycles, with the last samples before it.
+    """State of a march recorded after a requested number of cycles, with the last samples before it.
 
     - `window`, `step_force`, `work`, `amplitudes`, `ledger`: as in `march.MarchResult`.
     - `after`: the `Run` from which to continue.
@@ -32,7 +32,7 @@ class Mark:
 
 
 class Recorder:
-    """Recorder of march samples: all of the last cycles, and selected earlier ones.
+    """Recorder of march samples: all samples of the last cycles, and selected earlier ones.
 
     - `samples`: the recorded `checkpoint.MarchSamples`.
     - `keeps_samples`, `keeps_extremes`: whether samples from before the last cycles are kept, and extremes and phasors
@@ -79,7 +79,7 @@ class Recorder:
         self.capacity -= len(indices)
 
     def repeat_last(self, run, count: int) -> None:
-        """Skip cycles of a periodic motion by repeating the samples of the last cycle.
+        """Skip cycles of a periodic motion: repeat the samples of the last cycle in their place.
 
         The running energy sums of the repeated samples increase from cycle to cycle.
         """
@@ -106,7 +106,7 @@ class Recorder:
 
 
 def read_output_extremes(cycles, run) -> list:
-    """Return the smallest and largest output [m] of each recorded cycle."""
+    """Return the smallest and largest output [m] in each recorded cycle."""
     extremes = []
     for cycle in cycles:
         extremes += find_cycle_extremes(cycle.rows[None], run.modes, run.prop.dt)
@@ -141,7 +141,7 @@ def make_mark(run, cycles, extremes, after=None) -> Mark:
 
 
 def join_cycles(cycles) -> tuple:
-    """Join the samples of successive cycles; return the rows and the number of the first step.
+    """Join the samples of successive cycles; return the rows and the step number of the first row.
 
     The sample that two cycles share is kept once.
 

@@ -1,4 +1,4 @@
-"""State of a march in time, and its integration by one or several drive cycles at once."""
+"""State of a march, and its integration over one or several drive cycles at a time."""
 
 from collections import deque
 from copy import copy
@@ -54,7 +54,7 @@ SUM_POSITIONS = [
 
 
 class MarchStatus(IntEnum):
-    """Status of a march, as its compiled loop returns it.
+    """Status code of a march that its compiled loop returns.
 
     - FINISHED: all steps are done, or the motion ended otherwise
     - EXCEEDS_TRAVEL: the output exceeds the travel
@@ -102,7 +102,7 @@ def _make_response(rows, number, dt, modes, drive) -> Response:
 
 
 def make_modal_arrays(modes: ModalBasis, prop) -> ModalArrays:
-    """Return the arrays of the modes for the compiled loops (`ModalArrays`)."""
+    """Return the modal arrays for the compiled loops (`ModalArrays`)."""
     damping = np.zeros((0, 0)) if modes.damping is None else modes.damping
     arrays_of_modes = (
         modes.omega,
@@ -128,7 +128,7 @@ def make_modal_arrays(modes: ModalBasis, prop) -> ModalArrays:
 
 
 class Run:
-    """Time integration of a modal basis with a contact model: its state and arrays.
+    """Time integration of a modal basis with a contact model.
 
     - `state` (2, n): modal coordinates and rates.
     - `contact`, `faces`, `load`: arrays of the contact, the elements and the load, in `interfaces.arrays`.
@@ -179,7 +179,7 @@ class Run:
         self.change = np.inf
 
     def fork(self, drive):
-        """Return an independent copy of the march that continues under another drive."""
+        """Return an independent copy of the march that continues with another drive signal."""
         copied_run = copy(self)
         copied_run.drive = drive
         copied_run.periodic = None
@@ -192,7 +192,7 @@ class Run:
         return copied_run
 
     def _carried_state(self) -> list:
-        """Return the state at the end of a step as rows of comparable numbers.
+        """Return the state at the end of a step as rows, each with numbers of comparable magnitude.
 
         The first row has the coordinates and the rates divided by the drive frequency, the others the
         memories of the laws. The list is empty if the state cannot become periodic.
@@ -249,7 +249,7 @@ class Run:
         )
 
     def skip_cycles(self, count: int) -> None:
-        """Skip cycles that are equal to the last one, directly after `is_periodic`."""
+        """Skip cycles that equal the last one; to be called directly after `is_periodic`."""
         increase = count * (self._collect_sums() - self.last_sums)
         self.ledger[SUM_POSITIONS] += increase[SUM_POSITIONS]
         self.totals += increase[9:12]
@@ -268,7 +268,7 @@ class Run:
         self.done = 0
 
     def _slide_contact(self, path) -> None:
-        """Update the memory of the contact for a slide along a path (2,) [m] in one second."""
+        """Update the contact memory for a motion along a displacement path (2,) [m] within one second."""
         self.loops.follow_path(
             path,
             1.0,
@@ -280,7 +280,7 @@ class Run:
         )
 
     def reset_balance(self) -> None:
-        """Restart the energy balance with the present energies at the start of a cycle."""
+        """Restart the energy balance from the present energies at the start of a cycle."""
         self.ledger[:] = 0.0
         self.totals[:] = 0.0
         self.work_sums[:] = 0.0
@@ -288,7 +288,7 @@ class Run:
         self.ledger[Ledger.DRIVE_WORK] = self.find_modal_energy() + self.find_interface_energy()
 
     def march_to_mark(self, cycles: int, window: int) -> Mark:
-        """March further cycles, and return the `Mark` of the last `window` of them."""
+        """March over further cycles; return a `Mark` with the last `window` of them."""
         marched_cycles = deque(maxlen=window)
         for _ in range(cycles):
             marched_cycles.append(self.march_cycle(self.prop.steps, 0, []))
@@ -297,18 +297,18 @@ class Run:
         return make_mark(self, list(marched_cycles), read_output_extremes(marched_cycles, self))
 
     def get_step_table(self, count: int) -> tuple:
-        """Return the drive table for the next steps, and its row for the first of them."""
+        """Return the drive table for the next steps, and the index of its row for the first step."""
         if self.periodic is not None:
             return self.periodic, self.done % len(self.periodic)
         return self.prop.tables(self.drive, self.done, max(count, 1)), 0
 
     def make_response(self, rows, number) -> Response:
-        """Return the time histories of samples with given step numbers (k,)."""
+        """Return the time histories for samples with given step numbers (k,)."""
         response = _make_response(rows, number, self.prop.dt, self.modes, self.drive)
         return self._add_elements(response, rows) if hasattr(self.model, "patch") else response
 
     def _add_elements(self, response, rows) -> Response:
-        """Add slides, forces and slips of the elements to the time histories.
+        """Add the relative displacements, forces and slips of the elements to the time histories.
 
         `extra` gets slides, slide_rates, forces and slips (k, i) of the interfaces, spring_forces (k, s), and
         for elements in a plane lateral_slides and so on (k, i), which are 0 for the other elements.
@@ -339,14 +339,14 @@ class Run:
         )
 
     def _element_columns(self, rows) -> np.ndarray:
-        """Return the sample columns of the elements (k, e, 5)."""
+        """Return the sample columns that belong to the elements, (k, e, 5)."""
         count = len(self.model.joints)
         first_column = 2 * self.modes.omega.size + N_SAMPLE_COLUMNS + rows.shape[1] - self.width
         columns = rows[:, first_column : first_column + N_ELEMENT_COLUMNS * count]
         return columns.reshape(len(rows), count, N_ELEMENT_COLUMNS)
 
     def march_without_samples(self, steps: int, after_piece=None) -> bool:
-        """March to a step without keeping samples.
+        """March to a given step, but keep no samples.
 
         Returns whether the march reached the step. after_piece: callback after each part of the march.
         """
@@ -425,7 +425,7 @@ class Run:
         return cycle_lists
 
     def march_cycle(self, size: int, frames: int, snapshots: list) -> MarchedCycle:
-        """March a number of steps and return them as one cycle.
+        """March over a number of steps and return them as one cycle.
 
         Parameters
         ----------
@@ -444,7 +444,7 @@ class Run:
         return cycle
 
     def _march_rows(self, size: int, frames: int, snapshots: list) -> np.ndarray:
-        """March a number of steps and return their sample rows (steps + 1, width).
+        """March over a number of steps and return their sample rows (steps + 1, width).
 
         The arguments are those of `march_cycles`.
 
@@ -497,13 +497,13 @@ class Run:
         return rows
 
     def _copy_for_softening_springs(self) -> tuple:
-        """Return copies of all arrays that steps change if a spring is nonlinear, otherwise ()."""
+        """Copy all arrays that steps change if any spring is nonlinear; otherwise return ()."""
         if all(joint.potential is None for joint in self.model.joints):
             return ()
         return tuple(array.copy() for array in (*self.contact, *self._changing_arrays()))
 
     def _has_diverged(self, rows) -> bool:
-        """Return whether the last step ends far beyond the travel or is not finite."""
+        """Return whether the last sample is far beyond the travel or is not finite."""
         return len(rows) > 1 and not (
             self._find_output_distance(rows[-1]) <= DIVERGENCE_RATIO * self.travel
             and np.isfinite(rows[-1]).all()
@@ -545,7 +545,7 @@ class Run:
         return self.load
 
     def _accumulate_energies(self, rows) -> np.ndarray:
-        """Return the energies (3, steps + 1) [J] accumulated since the start at each sample.
+        """Return the energies (3, steps + 1) [J] accumulated from the start up to each sample.
 
         They are friction work, dissipated and created energy; `march_cycles` inserts them into the rows as columns.
         """
@@ -558,7 +558,7 @@ class Run:
         return sums
 
     def _step_energies(self, rows) -> np.ndarray:
-        """Return friction work, dissipated and created energy of each step, (3, steps) [J].
+        """Return the friction work, dissipated energy and created energy in each step, (3, steps) [J].
 
         The dissipated energy is the work minus the increase of the stored energy of the interface.
         """
@@ -579,11 +579,11 @@ class Run:
         return energies
 
     def _step_works(self, rows) -> np.ndarray:
-        """Return the friction work of each step between samples [J]."""
+        """Return the friction work [J] in each step between samples."""
         return rows[:-1, 2 * self.modes.omega.size + SampleColumn.STEP_WORK]
 
     def _sampled_works(self, rows) -> np.ndarray:
-        """Return the friction work of each step [J] from the sampled slides and forces alone.
+        """Return the friction work [J] in each step, from sampled displacements and forces alone.
 
         Impulses at the end of a step, when a slide stops, have no slide from which their work could be computed;
         their work is added if all friction is set-valued.
@@ -609,14 +609,14 @@ class Run:
         return works if has_smooth_friction else works + impulse_works
 
     def _changing_arrays(self) -> list:
-        """Return the arrays that a step changes, apart from those of the contact."""
+        """Return the arrays that a step changes, except for those of the contact."""
         arrays_of_elements = [*self.faces[:-1]]
         if self.model.joints:
             arrays_of_elements += self.faces.stops
         return [self.state, self.ledger, *arrays_of_elements]
 
     def set_outcome(self, status: int) -> None:
-        """Set the outcome and message of the march from the status of the compiled loop."""
+        """Set the outcome and message of the march, given the status from the compiled loop."""
         if status == MarchStatus.EXCEEDS_TRAVEL:
             self.outcome = Outcome.EXCEEDS_TRAVEL
         if status == MarchStatus.NOT_FINITE:
@@ -643,7 +643,7 @@ class Run:
         } | self.model.get_plot_fields(self.contact)
 
     def check_steps(self) -> None:
-        """Set the outcome to not_converged if a step did not meet its tolerance."""
+        """Set the outcome to not_converged if any step has not met its tolerance."""
         if self.ledger[Ledger.N_UNCONVERGED]:
             self.outcome = Outcome.NOT_CONVERGED
             self.message = (
@@ -652,7 +652,7 @@ class Run:
             )
 
     def read_rates_and_slips(self, rows) -> tuple:
-        """Return the slide rates (k, i) [m/s] and slips (k, i) [m] of the interfaces in samples.
+        """Return the sliding rates (k, i) [m/s] and the slips (k, i) [m] of the interfaces in samples.
 
         rows: sample rows of `march_cycles`.
 
@@ -664,7 +664,7 @@ class Run:
         return np.column_stack(rates), np.column_stack(slips)
 
     def find_modal_energy(self) -> float:
-        """Return the sum of kinetic and elastic energy of the modes [J]."""
+        """Return the sum of the kinetic and elastic energies of the modes [J]."""
         return (
             0.5
             * self.modes.mass
@@ -689,7 +689,7 @@ class Run:
         return float(energy)
 
     def energy_balance(self) -> dict:
-        """Return the energies [J] and iteration counters of the march by name."""
+        """Return the energies [J] and iteration counters of the march as a dictionary by name."""
         names = (
             "work_in",
             "viscous",

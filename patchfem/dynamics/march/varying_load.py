@@ -1,4 +1,4 @@
-"""Time integration of modes under the force, moment and friction of a varying contact load.
+"""Time integration of modes under the force, moment and friction due to a varying contact load.
 
 The upper holder moves from its solved preload by the heave h = normal . z and the pitch th = pitch . z. The nodal forces are
 those of the unilateral contact at approach delta0 - h and rotation theta0 + th (`contact.contact_sets`). The modes are
@@ -80,14 +80,14 @@ class VaryingLoadLaw:
 
 
 def make_coulomb_law(static: float, kinetic: float | None = None) -> VaryingLoadLaw:
-    """Return the set-valued Coulomb law under the resultant load."""
+    """Return the set-valued Coulomb law that acts under the resultant load."""
     return VaryingLoadLaw(
         LawKind.COULOMB, static, (static, static if kinetic is None else kinetic, 0.0, 1.0)
     )
 
 
 def make_tanh_law(static: float, speed: float) -> VaryingLoadLaw:
-    """Return the regularised law mu N tanh(v/v_0) of eq. 2.4 under the resultant load.
+    """Return the regularised law mu N tanh(v/v_0) of eq. 2.4 that acts under the resultant load.
 
     speed: v_0 [m/s].
 
@@ -96,12 +96,12 @@ def make_tanh_law(static: float, speed: float) -> VaryingLoadLaw:
 
 
 def make_elastic_plastic_law(static: float, length: float) -> VaryingLoadLaw:
-    """Return the elastic-plastic law of eq. 3.12 at each point under its own load."""
+    """Return the elastic-plastic law of eq. 3.12 that acts at each point under the point's load."""
     return VaryingLoadLaw(LawKind.PLASTIC, static, (static, static, length, 1.0), length=length)
 
 
 def make_bonds_law(law) -> VaryingLoadLaw:
-    """Return the law of bonds of order 1 with friction.reading = "stretch" at each point.
+    """Return the law of bonds of order 1 with friction.reading = "stretch" that acts at each point.
 
     Raises PatchfemError for other bonds.
     """
@@ -124,7 +124,7 @@ def make_bonds_law(law) -> VaryingLoadLaw:
 
 
 def make_bond_lists_law(law, reach: float, merge: float) -> VaryingLoadLaw:
-    """Return the law of bonds with friction.reading = "report", as a bond list at each point.
+    """Return the law of bonds with friction.reading = "report", with a bond list at each point.
 
     Raises PatchfemError for friction.reading = "stretch".
 
@@ -158,7 +158,7 @@ def make_bond_lists_law(law, reach: float, merge: float) -> VaryingLoadLaw:
 
 
 def make_contact_sets(patch, spring: float = 0.0) -> ContactSets:
-    """Return the contact sets of a patch near its solved contact state.
+    """Return the contact sets of a patch in the vicinity of its solved contact state.
 
     `spring` is the rotational stiffness of the holder [N m/rad], 0 for a rigid one. PatchfemError for a nonlinear asperity
     layer, for strips and for a patch that carries no load.
@@ -182,7 +182,7 @@ def make_contact_sets(patch, spring: float = 0.0) -> ContactSets:
 
 
 def port_rows(modes: ModalBasis) -> np.ndarray:
-    """Return slide, heave and pitch per modal coordinate, (3, n)."""
+    """Return relative displacement, heave and pitch per unit of each modal coordinate, (3, n)."""
     no_motion = np.zeros(modes.omega.size)
     return np.stack(
         [
@@ -193,7 +193,7 @@ def port_rows(modes: ModalBasis) -> np.ndarray:
 
 
 def make_pressed_fields(law: VaryingLoadLaw, normal, shear, limit: float) -> tuple:
-    """Return the initial fields of `interfaces.arrays.PressedPoints` under nodal forces.
+    """Return the initial fields of `interfaces.arrays.PressedPoints` for given nodal forces.
 
     Parameters
     ----------
@@ -246,52 +246,52 @@ class VaryingLoadModel:
 
     @property
     def preload(self) -> float:
-        """Normal load at the start [N]."""
+        """Normal load [N] at the start."""
         return self.sets.load if self.load is None else float(self.load(np.zeros(1))[0])
 
     @property
     def limit(self) -> float:
-        """Force scale of the residuals [N]: static friction limit, or the load if there is no friction."""
+        """Force scale [N] of the residuals: the static friction limit, or the load if there is no friction."""
         return (self.law.static or 1.0) * max(self.preload, 1e-9)
 
     @property
     def length(self) -> float:
-        """Bond length of the law [m]; 0 if it has no bonds."""
+        """Bond length [m] of the law, or 0 if the law has no bonds."""
         return self.law.length
 
     @property
     def reduction(self):
-        """Shear modes of the pieces; None if they are rigid in shear."""
+        """Shear modes of the pieces, or None if the pieces are rigid in shear."""
         return self.shear
 
     @property
     def set_valued(self) -> bool:
-        """Whether the law sticks rigidly (set-valued Coulomb friction)."""
+        """Return whether the law sticks rigidly (set-valued Coulomb friction)."""
         return self.law.kind == LawKind.COULOMB
 
     @property
     def runner(self):
-        """Class that integrates the model in time."""
+        """Class that integrates the model over time."""
         return VaryingLoadRun
 
     @property
     def has_point_loads(self) -> bool:
-        """Whether each point carries its own fraction of the load."""
+        """Return whether each point carries its own fraction of the load."""
         return self.law.kind in POINT_LAWS
 
     @property
     def loading(self) -> str:
-        """Kind of the load (`instances`): resultant on the interface, or load on each point."""
+        """Type of load for `instances`: resultant on the interface, or load on each point."""
         return POINT_LOADS if self.has_point_loads else COMMON_LOAD
 
     @property
     def laws(self) -> tuple:
-        """Modules of the compiled laws of the elements (`joints`)."""
+        """Modules with the compiled laws of the elements (`joints`)."""
         return (COULOMB_LAW,) if self.set_valued else ()
 
     @property
     def joints(self) -> tuple:
-        """Set-valued friction element under the preload."""
+        """Set-valued friction element at the preload."""
         if not self.set_valued:
             return ()
         law = Coulomb(self.law.force[PressedIndex.MU_KINETIC], self.law.static)
@@ -299,7 +299,7 @@ class VaryingLoadModel:
 
     @property
     def kind(self) -> tuple:
-        """Modules of contact and law, except the elements, for which the loop is compiled."""
+        """Contact module and law module for which the loop is compiled; elements are not included."""
         if self.law.kind == LawKind.LISTS:
             return SHEARED_LISTS_MODULE, ""
         if self.has_point_loads:
@@ -307,7 +307,7 @@ class VaryingLoadModel:
         return IDLE_KIND if self.set_valued else (IDLE_KIND[0], "friction.laws.tanh_kernels")
 
     def allocate_contact(self):
-        """Allocate the contact arrays under the preload."""
+        """Allocate the contact arrays at the preload."""
         law = self.law
         if self.has_point_loads:
             return self.points(
@@ -320,7 +320,7 @@ class VaryingLoadModel:
         ).allocate_contact()
 
     def points(self, force):
-        """Allocate the contact points under the nodal forces (m,) [N] of the preload."""
+        """Allocate the contact points at the nodal forces (m,) [N] due to the preload."""
         law = self.law
         if law.kind != LawKind.LISTS:
             return arrays.PressedPoints(*make_pressed_fields(law, force, self.shear, self.limit))
@@ -347,7 +347,7 @@ def choose_shear_modes(
     count: int | None = None,
     tolerance: float = 1e-3,
 ):
-    """Choose the shear modes of pieces whose contact set changes.
+    """Choose the shear modes for pieces whose contact set changes during the motion.
 
     Modes are weighted with mu_s times the preload plus MIN_PRESSURE_FRACTION of its mean pressure, so nodes
     that are open at first also count; with m modes they are exact for any weights.
@@ -388,7 +388,7 @@ def choose_shear_modes(
 def make_model(
     modes: ModalBasis, law: VaryingLoadLaw, sets: ContactSets | None, load=None, shear=None
 ) -> VaryingLoadModel:
-    """Return the model of a contact under a varying load.
+    """Return the model for a contact under a varying load.
 
     Parameters
     ----------
@@ -433,7 +433,7 @@ class VaryingLoadRun(Run):
     """Time integration of a modal basis under a varying load."""
 
     def _make_initial_load(self) -> arrays.VaryingLoad:
-        """Return the arrays of the initial load, and load the points of the contact.
+        """Return the arrays for the initial load, and apply this load to the contact points.
 
         The contact sets are copied, because other runs may use them.
         """
@@ -539,7 +539,7 @@ class VaryingLoadRun(Run):
         )
 
     def make_response(self, rows, number) -> Response:
-        """Return the time histories of samples, with load, heave and pitch.
+        """Return the time histories for samples, including load, heave and pitch.
 
         `extra` has normal_load [N], normal_moment [N m], normal_energy [J], heave [m] and turn [rad].
         """
@@ -561,7 +561,7 @@ class VaryingLoadRun(Run):
 
 
 def _make_point_sets(load: float) -> SetArrays:
-    """Return the arrays of contact sets for a prescribed load on one point."""
+    """Return the contact-set arrays for a prescribed load on one point."""
     point = np.zeros(1)
     reference = (load, 0.0, 0.0, 1.0, 1.0)
     return make_set_arrays(np.ones((1, 1)), point, point, reference, np.zeros(1, bool), n_slots=1)

@@ -1,4 +1,4 @@
-"""Smooth engine: a Runge-Kutta method of order 8 from reversal to reversal.
+"""Solver for smooth friction laws: Runge-Kutta steps of order 8 between successive reversals.
 
 Equation. With modal coordinates z, relative displacement q = slide . z and states s of the
 friction law,

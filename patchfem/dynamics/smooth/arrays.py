@@ -1,4 +1,4 @@
-"""Arrays of the compiled steps of the smooth engine, with names for their indices."""
+"""Arrays for the compiled Runge-Kutta steps, and the names of their indices."""
 
 from enum import IntEnum
 from typing import NamedTuple
@@ -17,7 +17,7 @@ class Mode(IntEnum):
 
 
 class Work(IntEnum):
-    """Row indices of `MotionArrays.work` after the slopes of the 16 Runge-Kutta stages.
+    """Row indices of `MotionArrays.work`; they follow the slopes at the 16 Runge-Kutta stages.
 
     - EXTENSION: first of 8 rows, the extension of the step
     - SIZES: sizes of the states of the law, and smallest sizes of the others
@@ -30,7 +30,7 @@ class Work(IntEnum):
 
 
 class Scalar(IntEnum):
-    """Indices of the entries of `MotionArrays.scalars`, the scalar state of a motion.
+    """Indices into `MotionArrays.scalars`, the scalar state of a motion.
 
     - TIME, STEP, FIRST_STEP: time, length of the next step and of the first one after a reversal
       [s]
@@ -64,7 +64,7 @@ class Scalar(IntEnum):
 
 
 class Counter(IntEnum):
-    """Indices of the entries of `MotionRecord.counters`: energies, counts and next rows.
+    """Indices into `MotionRecord.counters`: energies, counts and numbers of the next rows.
 
     - DRIVE_POWER: integral of the magnitude of the power of the drive [J]
     - MAX_STORED: largest stored energy [J]
@@ -89,7 +89,7 @@ class Counter(IntEnum):
 
 
 class Turn(IntEnum):
-    """Indices of the entries of `MotionArrays.turn`, which integrator and friction law share.
+    """Indices into `MotionArrays.turn`, which the integrator and the friction law share.
 
     - DIRECTION: of the motion, 0 in stick
     - KINK_PATH: path to the next kink of the law [m], infinite if there is none
@@ -115,7 +115,7 @@ class Turn(IntEnum):
 
 
 class StepEvents(NamedTuple):
-    """Codes of the events that end a step of the smooth engine.
+    """Codes of the events that end a Runge-Kutta step.
 
     - stop: the velocity vanishes
     - kink, knee: the law has a kink along its path, or at a speed
@@ -133,7 +133,7 @@ class StepEvents(NamedTuple):
 
 
 class CallStatus(NamedTuple):
-    """Codes that state why a call of the step loop ends.
+    """Codes that state why a call of the step loop has ended.
 
     - finished: the time is reached
     - travel: the output has reached its travel
@@ -162,7 +162,7 @@ NODE_FRACTIONS = (1 - np.cos(np.pi * np.arange(N_NODES) / (N_NODES - 1))) / 2
 
 
 class MotionArrays(NamedTuple):
-    """Modes, drive, friction law and state of a motion as arrays.
+    """Modes, drive signal, friction law and state of a motion as arrays.
 
     The state has N = 2 n + l + 3 entries for n modes and l states of the law.
 

@@ -1,4 +1,4 @@
-"""Measures of the last cycles of a motion, from its steps as polynomials.
+"""Measures of the last cycles of a motion, computed from polynomials that represent its steps.
 
 Each part of a step is the polynomial through its samples at Chebyshev points
 (`arrays.NODE_FRACTIONS`), so a number that is smooth inside the part is known to as many digits as
@@ -43,7 +43,7 @@ REST_SPEED_RATIO = 1e-7
 
 
 def make_interpolation_matrix(fractions) -> np.ndarray:
-    """Return the interpolation matrix (p, N_NODES) from NODE_FRACTIONS to other fractions.
+    """Return the matrix (p, N_NODES) that interpolates from NODE_FRACTIONS to other fractions.
 
     fractions: (p,) of a step.
     """
@@ -51,7 +51,7 @@ def make_interpolation_matrix(fractions) -> np.ndarray:
 
 
 def evaluate_power_series(terms, fraction):
-    """Evaluate k polynomials in powers of (2 fraction - 1) at fractions (k,).
+    """Evaluate k polynomials in (2 fraction - 1) at fractions (k,).
 
     terms: (k, N_NODES) coefficients.
     """
@@ -63,7 +63,7 @@ def evaluate_power_series(terms, fraction):
 
 
 def transform_parts(values, matrix) -> np.ndarray:
-    """Apply a matrix (p, N_NODES) to the nodal values of k polynomials.
+    """Multiply the nodal values of k polynomials by a matrix (p, N_NODES).
 
     For so many rows a matrix product would be slower, because it starts threads.
     """
@@ -84,7 +84,7 @@ TO_GAUSS = make_interpolation_matrix(GAUSS_POINTS)
 
 
 class StepParts:
-    """Last cycles of a motion as polynomial parts of steps.
+    """Last cycles of a motion, divided into parts of steps that are represented by polynomials.
 
     response: a Response at the nodes of all parts in order of time.
     """
@@ -97,11 +97,11 @@ class StepParts:
         self.length = np.diff(self.time[:, [0, -1]])[:, 0]
 
     def values(self, name: str) -> np.ndarray:
-        """Return the values of a history at the nodes of all parts of steps (k, N_NODES)."""
+        """Return the values (k, N_NODES) of a history at the nodes of all parts of steps."""
         return getattr(self.response, name).reshape(-1, N_NODES)
 
     def find_maximum(self, values) -> tuple:
-        """Return the maximum of a polynomial history with nodal values (k, N_NODES), and its error.
+        """Find the maximum of a polynomial history with nodal values (k, N_NODES), and its error.
 
         The error is the size of the last two Chebyshev coefficients.
         """
@@ -127,7 +127,7 @@ class StepParts:
         return float(peaks[best]), float(np.abs(TO_CHEBYSHEV[-2:] @ values[steps[best]]).sum())
 
     def find_magnitude(self, name: str) -> tuple:
-        """Return the largest magnitude of a history, and its error."""
+        """Find the largest magnitude of a history, and its error."""
         values = self.values(name)
         return max(self.find_maximum(values), self.find_maximum(-values))
 
@@ -198,7 +198,7 @@ class StepParts:
         return total / (end - begin)
 
     def drift(self) -> float | None:
-        """Return the drift of the relative displacement per cycle [m].
+        """Return the drift [m] of the relative displacement per cycle.
 
         It is the difference of the mean relative displacements of the last and the first cycle, divided
         by the cycles between them; None for fewer than 1.5 cycles.
@@ -213,7 +213,7 @@ class StepParts:
         return (last - first) / (cycles - 1)
 
     def find_sticks(self) -> tuple:
-        """Return the time in stick [s] and the times [s] at which slip begins.
+        """Return the total time [s] in stick, and the times [s] at which slip begins.
 
         The interface sticks where less than SLIP_FRACTION of its velocity is irreversible. At a
         reversal both velocities vanish and their computed values are round-off, so the nearest
@@ -265,7 +265,7 @@ class StepParts:
 
 
 def measure_parts(response, drive, ends) -> tuple:
-    """Measure the last cycles of a motion from the parts of its steps.
+    """Compute the measures of a motion's last cycles from the polynomial parts of its steps.
 
     Parameters
     ----------
@@ -315,7 +315,7 @@ def measure_parts(response, drive, ends) -> tuple:
 
 
 def _acceleration_harmonics(parts: StepParts, drive, ends) -> tuple | None:
-    """Return the first and third harmonic [m s-2] of the output acceleration.
+    """Return the first and third harmonics [m s-2] of the output acceleration.
 
     That of the output relative to the base is that of the displacement, integrated by parts. None
     if the drive is no sine.

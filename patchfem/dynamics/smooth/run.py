@@ -1,4 +1,4 @@
-"""Run of modes under a smooth friction law, from its start to its result."""
+"""Simulation of modes under a smooth friction law, from the initial state to the result."""
 
 from copy import copy
 from dataclasses import dataclass, field, replace
@@ -46,7 +46,7 @@ PACKAGE = "dynamics.smooth"
 
 @cache
 def load_loop(law: str, say=None):
-    """Return the compiled step loop for the friction law of a kernel module.
+    """Load the compiled step loop for the friction law in a kernel module.
 
     say: is called before it is compiled.
     """
@@ -60,7 +60,7 @@ def load_loop(law: str, say=None):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SmoothResult(MarchResult):
-    """Result of a run of the smooth engine, with statistics of the integrator.
+    """Result of a simulation with a smooth friction law, with statistics of the integrator.
 
     - integrated: measures of the last cycles, integrated over their steps
     - peak_errors: errors of peaks [unit of the measure] by measure
@@ -143,7 +143,7 @@ def start_arrays(modes: ModalBasis, drive, element, cycles: float, start=None) -
 
 
 def make_response(modes, drive, rows, stored: float) -> Response:
-    """Return histories from the sample rows of a motion.
+    """Compute histories from the sample rows of a motion.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ def make_response(modes, drive, rows, stored: float) -> Response:
 
 
 def select_phasor_cycles(count: int, window: int) -> np.ndarray:
-    """Return a mask of the cycles whose phasor is needed: the ends of the last windows."""
+    """Return a mask of the cycles whose phasor is needed: the final cycles of the last windows."""
     cycles_to_end = np.arange(count)[::-1]
     return (cycles_to_end % window == 0) & (cycles_to_end < N_PHASOR_WINDOWS * window)
 
@@ -199,7 +199,7 @@ class MotionState(NamedTuple):
 
 
 class Motion:
-    """Motion in progress: its arrays, its record and the collected results.
+    """Motion in progress: its arrays, its record and the results collected so far.
 
     repeat_change: remaining change, relative to its size, if cycles were skipped because it
     repeats.
@@ -235,7 +235,7 @@ class Motion:
         self.begun = float(self.record.counters[Counter.MAX_STORED])
 
     def fork(self, drive):
-        """Return an independent copy of the motion under another drive."""
+        """Return an independent copy of the motion that continues with another drive signal."""
         twin = copy(self)
         twin.progress = None
         twin.arrays = type(self.arrays)(*(array.copy() for array in self.arrays))
@@ -250,11 +250,11 @@ class Motion:
         return twin
 
     def request_last_phasors(self, window: int) -> None:
-        """Request phasors only for the last cycle and for the ends of the windows before it."""
+        """Request phasors only for the final cycles of the last window and of the windows before it."""
         self.record.cycles[2:, ~select_phasor_cycles(self.record.cycles.shape[1], window)] = np.nan
 
     def extremes(self, count: int) -> np.ndarray:
-        """Return the smallest and largest output (count, 2) [m] of the first cycles."""
+        """Return the smallest and largest output (count, 2) [m] in each of the first `count` cycles."""
         return self.record.cycles[:2, :count].T.copy()
 
     @property
@@ -263,14 +263,14 @@ class Motion:
         return float(self.arrays.scalars[Scalar.TIME])
 
     def _segment_starts(self) -> np.ndarray:
-        """Return the times (p,) [s] at which the segments of the drive begin."""
+        """Return the times (p,) [s] at which the segments of the drive signal begin."""
         return self.arrays.segments[:, [Segment.CYCLE, Segment.OFFSET]] @ [self.drive.period, 1.0]
 
     def _enter_segment(self, piece: int) -> None:
         self.arrays.scalars[Scalar.SEGMENT] = piece
 
     def run_to(self, time: float, times=(), records_parts: bool = False) -> np.ndarray:
-        """March the motion to a time, with samples at given times.
+        """March the motion to a given time, with samples at given times.
 
         Parameters
         ----------
@@ -312,7 +312,7 @@ class Motion:
         return self.record.samples[: int(self.record.counters[Counter.NEXT_SAMPLE])]
 
     def run_ahead_to(self, time: float) -> None:
-        """March the motion to a time [s], skipping cycles if the motion repeats.
+        """March the motion to a time [s]; skip cycles once the motion repeats.
 
         `periodicity` determines when the motion is checked, and bounds its remaining change. The
         energies are continued as in the last quarter of the cycles between two checks, so their
@@ -354,7 +354,7 @@ class Motion:
         self.run_to(time)
 
     def _has_final_sine(self) -> bool:
-        """Return whether the drive ends in a sine whose period is that of the drive."""
+        """Return whether the drive signal ends in a sine whose period is that of the signal."""
         last = self.arrays.segments[-1]
         has_period = abs(last[Segment.OMEGA] * self.drive.period / (2 * np.pi) - 1) < 1e-12
         return (
@@ -362,7 +362,7 @@ class Motion:
         )
 
     def _measure_change(self, last) -> float:
-        """Return the largest relative change since an earlier state, at least the tolerance.
+        """Return the largest relative change since an earlier state, or the tolerance if that is larger.
 
         Coordinates and rates count relative to their recent maximum, states of the law relative to
         their sizes.
@@ -379,7 +379,7 @@ class Motion:
         )
 
     def _has_equal_cycles(self, count: int) -> bool:
-        """Return whether the last two cycles have equal extremes within the error of their steps.
+        """Return whether the extremes of the last two cycles are equal within the error of their steps.
 
         The error of the steps bounds the difference.
         """
@@ -389,7 +389,7 @@ class Motion:
         ).max() <= MAX_CYCLE_RATIO * MAX_REPEAT_CHANGE * self.tolerance * np.ptp(last)
 
     def _read_sums(self) -> np.ndarray:
-        """Return the energies (5,) [J] that grow from cycle to cycle.
+        """Return the energies (5,) [J] that accumulate from cycle to cycle.
 
         They are the work of the drive minus the stored energy, viscous loss, friction work, the
         magnitude of the work of the drive, and friction loss.
@@ -400,7 +400,7 @@ class Motion:
         )
 
     def _skip_cycles(self, count: int, sums) -> None:
-        """Skip a number of cycles that equal the last cycle.
+        """Skip a number of cycles, each of which equals the last cycle.
 
         sums: (5,) growth of `_read_sums` per cycle [J].
         """
@@ -422,7 +422,7 @@ class Motion:
         self.arrays.scalars[Scalar.TIME] = (at + count) * period
 
     def _collect(self, status: int) -> None:
-        """Collect the records of a call of the step loop, and set the outcome from its status."""
+        """Collect the records from a call of the step loop, and set the outcome according to its status."""
         count = int(self.record.counters[Counter.N_TURNS])
         if count and sum(map(len, self.turns)) < MAX_KEPT_REVERSALS:
             self.turns.append(self.record.turns[:count].copy())
@@ -443,7 +443,7 @@ class Motion:
             )
 
     def energy_ledger(self) -> dict:
-        """Return the energies [J] up to the present time, and the number of steps."""
+        """Return the energies [J] up to the present time, and the number of steps taken."""
         state = self.read_state()
         counters = state.counters
         energies = self.arrays.state[-3:]
@@ -470,7 +470,7 @@ class Motion:
         return MotionState(sample, record.counters, twin.memory[0], stored)
 
     def response(self, rows) -> Response:
-        """Return histories from sample rows (k, 2 n + 7), with forces clipped to their limit.
+        """Compute histories from sample rows (k, 2 n + 7), with forces clipped to the friction limit.
 
         The dense output of a step may exceed that limit.
         """
@@ -483,7 +483,7 @@ class Motion:
         )
 
     def end_state(self) -> np.ndarray:
-        """Return the present time [s], output [m], its rate [m/s] and friction work [J]."""
+        """Return the present time [s], output [m], output rate [m/s] and friction work [J]."""
         n = self.modes.omega.size
         y = self.arrays.state
         output = self.modes.output
@@ -492,7 +492,7 @@ class Motion:
     def run_last_cycles(
         self, end: float, window: float, shots=(), snapshots: list | None = None
     ) -> tuple:
-        """March to the end of the run and keep the samples of its last window.
+        """March to the end of the run, and keep the samples of the last window.
 
         Parameters
         ----------
@@ -560,7 +560,7 @@ def simulate(
     *,
     even: bool = False,
 ) -> SmoothResult:
-    """Run the drive from rest or from a given state with a relative error tolerance.
+    """Simulate the motion from rest or from a given state with a relative error tolerance.
 
     Parameters
     ----------
@@ -648,7 +648,7 @@ def simulate(
 
 
 def _run_to_window(run: Motion, window: float, n_equidistant: int) -> list:
-    """March to the start of the last window; return the sample rows from before it.
+    """March to the start of the last window; return the sample rows of the time before it.
 
     They are `n_equidistant` samples of every cycle unless that is 0, and those of the last two
     cycles before the window.
@@ -668,7 +668,7 @@ def _run_to_window(run: Motion, window: float, n_equidistant: int) -> list:
 
 
 def _compute_work_check(response) -> dict:
-    """Return the friction work [J] from samples and from the energy ledger, and its magnitude."""
+    """Return the friction work [J] from the samples and from the energy ledger, and its magnitude."""
     parts = np.diff(response.extra["ledger"][0])
     return {
         "sampled": float(sampled_work(response.slide, response.force).sum()),
@@ -678,7 +678,7 @@ def _compute_work_check(response) -> dict:
 
 
 def _merge_reversals(rows, run, begin: float) -> np.ndarray:
-    """Return the sample rows merged with those at reversals after a given time, in order."""
+    """Merge the sample rows with those at reversals after a given time, in order of time."""
     turns = np.concatenate(run.turns) if run.turns else rows[:0]
     every = np.concatenate([rows, turns[(turns[:, 0] > begin) & (turns[:, 0] < rows[-1, 0])]])
     every = every[np.argsort(every[:, 0], kind="stable")]
@@ -686,7 +686,7 @@ def _merge_reversals(rows, run, begin: float) -> np.ndarray:
 
 
 def _select_reversal_rows(run, begin: float) -> list:
-    """Return the sample rows at the start and at the reversals before a given time [s]."""
+    """Return the sample rows at the start, and at the reversals before a given time [s]."""
     if run.first[0] >= begin:
         return []
     turns = np.concatenate(run.turns) if run.turns else np.zeros((0, run.first.size))
