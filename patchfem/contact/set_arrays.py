@@ -44,7 +44,7 @@ class Tableau(NamedTuple):
 
 
 class StoredSets(NamedTuple):
-    """Contact sets in k slots, which are looked up by 64-bit hashes.
+    """Contact sets in k slots, which are looked up by 64-bit names (hashes of their nodes).
 
     The name of a set is the exclusive or of the names of its nodes.
 

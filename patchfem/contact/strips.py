@@ -380,7 +380,7 @@ def _holder_problem(layout: StripLayout, gap, loads: HolderLoads) -> ContactProb
 
 
 def _holder_position(motion, loads: HolderLoads) -> HolderPosition:
-    """Convert approach and free rotations (r,) to the position of the holder."""
+    """Convert the approach and the released rotations (r,) to the position of the holder."""
     theta = -float(motion[1]) if loads.moment is not None else 0.0
     roll = -float(motion[-1]) if loads.roll_moment is not None else 0.0
     return HolderPosition(float(motion[0]), theta, roll)

@@ -114,7 +114,7 @@ class CondensedGrid:
         return (out + out.T) / 2
 
     def displacement(self, load) -> np.ndarray:
-        """Solve for the displacements of all free nodes under forces on the interface.
+        """Solve for the displacements of all unfixed nodes under forces on the interface.
 
         Parameters
         ----------

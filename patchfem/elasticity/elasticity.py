@@ -228,7 +228,7 @@ def compute_displacement(piece, shear: np.ndarray, normal: np.ndarray) -> np.nda
 
 
 def hooke(strain, is_coating, layers: Layers) -> np.ndarray:
-    """Compute the stresses of plane strains by Hooke's law.
+    """Compute the stresses for given plane strains by Hooke's law.
 
     Parameters
     ----------

@@ -273,7 +273,7 @@ def write_picture(folder: Path, knob: str, runs: list, tolerance: float) -> Path
 
 
 def cost_data(knob: str, runs: list, tolerance: float) -> dict:
-    """Return the results of the runs of a curve as plain lists and dicts, in SI.
+    """Return the results of the runs of a cost curve as lists and dicts, in SI units.
 
     `runs`: label, value of the setting, tolerance, CPU seconds, elapsed seconds, and values, errors
     and distances by measure of each run, with `worst` {`measure`, `error` as in the picture} and

@@ -165,7 +165,7 @@ def _coordinate_description(rig) -> str:
 
 
 def _level_columns(levels) -> dict:
-    """Return the results of a run over its drive levels as columns."""
+    """Return the results of a run at each of its drive levels as columns."""
     out = {
         "level_drive": (levels[0].unit, np.array([level.drive for level in levels])),
         "level_stuck": ("1", np.array([level.stuck for level in levels], np.int8)),

@@ -1,4 +1,4 @@
-"""Data of the page and the pictures of a run, as plain arrays and strings in SI units."""
+"""Data for the page and the pictures of a run, as arrays and strings in SI units."""
 
 import tomllib
 from dataclasses import dataclass, field, replace

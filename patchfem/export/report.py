@@ -148,7 +148,7 @@ def _curve_picture(data: RunData) -> Picture | None:
 
 
 def _spectra_picture(data: RunData) -> Picture | None:
-    """Return the picture of the spectra of a random drive."""
+    """Return the picture of the spectra under random excitation."""
     if data.evaluations.spectra is None:
         return None
     measures = data.verdict.summary["measures"]
@@ -300,7 +300,7 @@ def _faces_picture(data: RunData) -> Picture | None:
 
 
 def _omitted_charts_sentence(drawn_interfaces: list) -> str:
-    """Return the sentence, for the end of a caption, on charts that are left out."""
+    """Return a sentence about omitted charts for the end of a caption, or "" if none are omitted."""
     return (
         f" Only the first {MAX_INTERFACES} of {len(drawn_interfaces)} interfaces are shown."
         if len(drawn_interfaces) > MAX_INTERFACES
@@ -444,7 +444,7 @@ def _histories_picture(data: RunData) -> Picture | None:
 
 
 def _drive_sentence(data: RunData) -> str:
-    """Describe the drive of a run in a sentence for the end of a caption.
+    """Describe the drive signal of a run in a sentence for the end of a caption.
 
     With a curve, it gives the frequency of the motion that is shown.
     """

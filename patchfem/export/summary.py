@@ -185,7 +185,7 @@ def runaway_data(result: Result) -> dict:
 
 
 def loop_entry(result: Result) -> dict:
-    """Return the slide amplitude [m] and the loss factor of a periodic bench as a dict.
+    """Return the displacement amplitude [m] and the loss factor of a bench in periodic motion as a dict.
 
     It is {"loop": {"slide_amplitude", "loss_factor", "error"}}. The loss factor is the work of a
     cycle over 2 pi times the largest elastic energy, W/(pi k A^2) with the equivalent stiffness k.

@@ -1,4 +1,4 @@
-"""Amplitude, speed, frequency and cycle of a drive, for defaults and measures."""
+"""Amplitude, speed, frequency and cycle of a drive signal, for defaults and measures."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -145,7 +145,7 @@ def count_repeat_cycles(drive) -> float | None:
 
 
 def has_full_cycle(span: float, drive) -> bool:
-    """Return whether a time span [s] contains a full drive cycle, as a friction loop needs."""
+    """Return whether a time span [s] contains a full drive cycle, which a friction loop requires."""
     return span > drive.period * (1 - TIME_TOL)
 
 

@@ -1,4 +1,4 @@
-"""Drives except the plain sine: steps, levels, releases, sweeps and recorded signals.
+"""Drive signals other than a single sine: steps, levels, releases, sweeps and recorded signals.
 
 Every drive has these attributes:
 

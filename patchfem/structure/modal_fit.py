@@ -247,7 +247,7 @@ def _stack_real(values):
 
 
 def _join_complex(stacked):
-    """Join real and imaginary parts that were stacked."""
+    """Combine the real and imaginary parts that `_stack_real` has stacked into complex numbers."""
     half = len(stacked) // 2
     return stacked[:half] + 1j * stacked[half:]
 

@@ -1,4 +1,4 @@
-"""A stationary random drive: a record with a given one-sided spectral density G(f).
+"""Stationary random drive signal: a record with a given one-sided spectral density G(f).
 
 a(t) = sum_k A_k cos 2 pi f_k t + B_k sin 2 pi f_k t, with f_k = k/T and with A_k and B_k normally
 distributed of variance G(f_k)/T. The record is Gaussian, has the length T, and has no power outside the

@@ -1,4 +1,4 @@
-"""Drive of several sines, such as two tones or a modulated tone, interpolated linearly.
+"""Drive signal with several sines, such as two tones or a modulated tone, interpolated linearly.
 
 a(t) = sum_k a_k sin(2 pi f_k t + phi_k). Linear interpolation between rows h apart multiplies a tone by
 sinc^2(f h), which is compensated. It adds images at n/h +- f of the relative size (f h)^2; a mode of a

@@ -781,7 +781,7 @@ def curve_charts(curve: dict) -> list:
 
 
 def spectra_charts(spectra, frequency: float | None) -> list:
-    """Return charts of spectral densities of output and drive, and of the magnitude of H1.
+    """Return charts of the spectral densities of output and drive signal, and of the magnitude of H1.
 
     Parameters
     ----------

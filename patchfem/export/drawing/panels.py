@@ -327,12 +327,12 @@ def cell_centres(frame: Frame) -> np.ndarray:
 
 
 def cell_areas(frame: Frame) -> np.ndarray:
-    """Return the areas (cells,) [m2] of the cells of a frame; 0 for interface segments."""
+    """Return the areas (cells,) [m2] of the cells in a frame, which are 0 for interface segments."""
     return quadrilateral_areas(frame.points[:, :2], cell_corners(frame.connectivity, frame.offsets))
 
 
 def cell_corners(connectivity, offsets) -> np.ndarray:
-    """Return the corners (m, 4) of cells in VTK form; smaller cells repeat their last corner."""
+    """Return the corners (m, 4) of cells in VTK form; a cell with fewer corners repeats its last one."""
     last = np.diff(offsets)[:, None] - 1
     return connectivity[offsets[:-1, None] + np.minimum(np.arange(4), last)]
 

@@ -156,7 +156,7 @@ def draw_charts(chart_list: list, axes_to_use=None, height: float = HEIGHT):
 
 
 def _write_plain_numbers(axis) -> None:
-    """Label a logarithmic axis with plain numbers or powers of ten."""
+    """Label a logarithmic axis with decimal numbers or powers of ten."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     low, high = sorted(axis.get_view_interval())

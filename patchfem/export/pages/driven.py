@@ -1,4 +1,4 @@
-"""Description of the drive of a run, and the command that repeats the run."""
+"""Description of the drive signal of a run, and the command that repeats the run."""
 
 import shlex
 from pathlib import Path

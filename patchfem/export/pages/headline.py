@@ -315,7 +315,7 @@ def _end_peaks_sentence(table: dict) -> str:
 
 
 def _qualification_sentence(table: dict, outcome: np.ndarray, is_stated: bool) -> str:
-    """State limitations that apply to the whole summary of a sweep; "" if there are none.
+    """State limitations of the whole summary of a sweep, or return "" if there are none.
 
     This is how many cases of an interrupted sweep have no result, that no case has settled, and
     that no case has a value of the requested measure.

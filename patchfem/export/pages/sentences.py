@@ -731,7 +731,7 @@ def order_measures(measures: dict) -> dict:
 
 
 def record_interval(name: str, measures: dict) -> tuple:
-    """Format a measure under random drive with its 95 % interval over records.
+    """Format a measure under random excitation with its 95 % interval over records.
 
     They have the digits that the scatter of records allows; ("", "") for any other measure.
     """

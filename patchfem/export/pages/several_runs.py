@@ -258,7 +258,7 @@ def drive_period(run: FinishedRun) -> float | None:
 
 
 def _select_last_cycles(run: FinishedRun) -> np.ndarray:
-    """Return a mask of the samples in the last cycles of a sinusoidal drive.
+    """Return a mask of the samples in the last cycles of a sinusoidal drive signal.
 
     Without a sine it is the last tenth of the run; on a bench all samples.
     """

@@ -1,4 +1,4 @@
-"""Comparison of two surfaces, before and after wear, as text, plain data and a page."""
+"""Comparison of two surfaces, before and after wear, as text, as a dict and as a page."""
 
 from dataclasses import replace
 from html import escape
@@ -135,7 +135,7 @@ NOTHING_COMPUTED = ComputedParts()
 
 
 def add_predicted_sentence(verdict: tuple, predicted: PredictedWear | None) -> tuple:
-    """Return headline and sentences, with a sentence on the computed wear at the end."""
+    """Return headline and sentences, to which a sentence on the computed wear is appended."""
     if predicted is None:
         return verdict
     headline, sentences = verdict
@@ -306,7 +306,7 @@ def _roughness_data(roughness: TrackRoughness) -> dict:
 
 
 def _values_data(values: dict) -> dict:
-    """Return quantities by name as a dict of plain data."""
+    """Convert quantities to a dict of their names and values."""
     return {name: quantity_data(quantity) for name, quantity in values.items()}
 
 

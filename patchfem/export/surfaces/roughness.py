@@ -1,4 +1,4 @@
-"""Roughness of one or several surfaces as lines of text, as plain data and as a page."""
+"""Roughness of one or several surfaces as lines of text, as a dict and as a page."""
 
 from html import escape
 from pathlib import Path
@@ -206,7 +206,7 @@ def _means_table(means: Means) -> QuantityTable:
 
 
 def means_data(reports: list) -> list:
-    """Return the means of the parameters over several files as plain data in SI units."""
+    """Return the means of the parameters over several files as a list of dicts in SI units."""
     out = []
     for means in average_reports(reports):
         measures = {}

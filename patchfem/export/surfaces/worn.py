@@ -1,4 +1,4 @@
-"""Wear between two runs as lines of text, plain data and a page."""
+"""Wear between two runs as lines of text, as a dict and as a page."""
 
 from html import escape
 from pathlib import Path
