@@ -241,8 +241,10 @@ def choose_law(known: str, wanted: str) -> Choice:
     wanted_words = parse_choice(wanted, WISHES, "--want")
 
     def count_costs(row: JointLaw) -> tuple[int, int, int]:
-        """Return minus the number of answered wishes, and the numbers of missing inputs and of
-        assumed keys; the law with the smallest tuple is chosen."""
+        """Return the costs by which laws are ranked; the law with the smallest tuple is chosen.
+
+        They are minus the number of answered wishes, the number of missing inputs and that of assumed keys.
+        """
         # A friction coefficient can be taken from tables; the other inputs must be measured.
         missing = set(row.known).difference(known_words, {"coefficient"})
         n_answered = len(set(row.wanted).intersection(wanted_words))
