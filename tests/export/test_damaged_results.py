@@ -23,6 +23,8 @@ REPLACEMENTS = {
 }
 SLIDE = '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "143 Hz"\ncycles = 2\n'
 SAMPLE_INTERVAL = 571  # Interval of the damages that are tested in a quick run.
+# A complex error of a sweep is always tested: NumPy would drop its imaginary part with a Python warning.
+ALWAYS_TESTED = ("s", "sweep.nc", "slip_amplitude_error", "complex")
 
 
 @pytest.fixture(scope="module")
@@ -130,9 +132,10 @@ def test_always_damaged_arrays_are_refused_with_message(results_folders, tmp_pat
     faults = []
     entries = list_damages(results_folders)
     shutil.copytree(results_folders / "b", tmp_path / "b")
-    for number, (folder, file, name, damage) in enumerate(entries):
-        if is_sample and number % SAMPLE_INTERVAL:
+    for number, entry in enumerate(entries):
+        if is_sample and number % SAMPLE_INTERVAL and entry != ALWAYS_TESTED:
             continue
+        folder, file, name, damage = entry
         shutil.rmtree(tmp_path / folder, ignore_errors=True)
         shutil.copytree(results_folders / folder, tmp_path / folder)
         damage_dataset(tmp_path / folder / file, name, damage)

@@ -260,6 +260,13 @@ def _check_table(table: dict) -> dict:
     return table
 
 
+def _read_floats(file, name: str):
+    """Return a variable of sweep.nc as a flat array of floats; raise ValueError for other numbers."""
+    values = np.asarray(file[name][...])
+    require_valid(values.dtype.kind in "biuf", f"{name} contains values of type {values.dtype}")
+    return values.astype(float).ravel()
+
+
 def _read_sweep_table(folder: Path, rows: list, keys: list, file) -> dict:
     """Return the table for `pages.sweep.page_html` from rows of sweep.csv and from sweep.nc."""
     columns = []
@@ -287,9 +294,9 @@ def _read_sweep_table(folder: Path, rows: list, keys: list, file) -> dict:
         name: {
             "unit": str(file[name].attrs["units"]),
             "means": str(file[name].attrs["long_name"]),
-            "values": np.asarray(file[name][...], float).ravel(),
-            "errors": np.asarray(file[f"{name}_error"][...], float).ravel(),
-            "floors": np.asarray(file[f"{name}_floor"][...], float).ravel()
+            "values": _read_floats(file, name),
+            "errors": _read_floats(file, f"{name}_error"),
+            "floors": _read_floats(file, f"{name}_floor")
             if f"{name}_floor" in file.variables
             else np.zeros(len(rows)),
         }
