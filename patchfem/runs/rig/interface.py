@@ -4,8 +4,6 @@ In: a Model, its Numerics and its Patch. Out: a contact model of `dynamics` (sin
 several joints, grooves, varying load), or the Elements of every interface.
 """
 
-from weakref import WeakKeyDictionary
-
 import numpy as np
 
 from ...dynamics.grooves import run
@@ -20,7 +18,7 @@ from ...model.model import Model
 from ...slip import fields, shear_modes
 from ...structure.drive_sizes import find_drive_omega
 from ..bench import averaged_law, rigid, shear
-from ..patch import faces, jenkins_elements
+from ..patch import faces, jenkins_elements, store
 from . import strips, varying_load
 from .bond_lists import choose_bond_summation
 from .numerics import Numerics
@@ -215,22 +213,22 @@ def _compute_shear_modes(patch, law, n_modes: int | None, model) -> tuple:
     The forces (k,) [N] are normal forces; they are None if all nodes are points. Both are cached
     for all runs with the same Patch.
     """
-    cache = _SHEAR_MODE_CACHE.setdefault(patch, {})
     tolerance = model.accuracy.tolerance
     has_few_points = model.patch.mesh.can_gather_points
-    if (law, n_modes, tolerance, has_few_points) not in cache:
-        mode_tolerance = (REDUCTION_TOL_FRACTION if has_few_points else 0.1) * tolerance
-        reduced = fields.bond_shear_modes(
-            patch, law, n_modes, mode_tolerance, fewest=has_few_points
+
+    def make() -> tuple:
+        """Compute the shear modes, and the normal forces of the few points."""
+        if not has_few_points:
+            return fields.bond_shear_modes(patch, law, n_modes, 0.1 * tolerance, fewest=False), None
+        mode_tolerance = REDUCTION_TOL_FRACTION * tolerance
+        reduced = fields.bond_shear_modes(patch, law, n_modes, mode_tolerance, fewest=True)
+        reduced, limit, _ = shear_modes.find_fewest_gauss_points(
+            reduced, patch.x[reduced.points], mode_tolerance
         )
-        force = None
-        if has_few_points:
-            reduced, force, _ = shear_modes.find_fewest_gauss_points(
-                reduced, patch.x[reduced.points], REDUCTION_TOL_FRACTION * tolerance
-            )
-            force = force / law.static
-        cache[law, n_modes, tolerance, has_few_points] = reduced, force
-    return cache[law, n_modes, tolerance, has_few_points]
+        return reduced, limit / law.static
+
+    key = ("shear modes", patch, law, n_modes, tolerance, has_few_points)
+    return store.get_or_compute(key, make)
 
 
 def reduce_to_few_points(
@@ -245,7 +243,7 @@ def reduce_to_few_points(
         Bond parameters.
     tolerance : float
         Largest error of the backbone curve of the patch, relative to the friction limit.
-    n_points, modes : int
+    n_points, max_modes : int
         Number of points, and largest number of modes.
 
     Returns
@@ -254,22 +252,20 @@ def reduce_to_few_points(
         ShearModes of the points, their friction limits [N], and the error of the backbone curve
         relative to the friction limit; None if more modes are needed.
     """
-    cache = _SHEAR_MODE_CACHE.setdefault(patch, {})
-    key = (law.static, law.length, law.ratio, tolerance, n_points, max_modes)
-    if key not in cache:
+
+    def make() -> tuple | None:
+        """Compute the shear modes of the few points; None if they are too inaccurate."""
         all_modes = fields.bond_shear_modes(patch, law, None, tolerance, fewest=True)
-        cache[key] = None
-        if all_modes.stiffness.size <= max_modes:
-            reduced, limit, error = shear_modes.modes_at_gauss_points(
-                all_modes, patch.x[all_modes.points], n_points
-            )
-            whole = all_modes.spectrum.backbone(max(shear_modes.N_REFERENCE_MODES, 4 * max_modes))
-            error += all_modes.spectrum.relative_difference(
-                whole, all_modes.spectrum.backbone(all_modes.stiffness.size)
-            )
-            cache[key] = (reduced, limit, error) if error <= 2 * tolerance else None
-    return cache[key]
+        if all_modes.stiffness.size > max_modes:
+            return None
+        reduced, limit, error = shear_modes.modes_at_gauss_points(
+            all_modes, patch.x[all_modes.points], n_points
+        )
+        whole = all_modes.spectrum.backbone(max(shear_modes.N_REFERENCE_MODES, 4 * max_modes))
+        error += all_modes.spectrum.relative_difference(
+            whole, all_modes.spectrum.backbone(all_modes.stiffness.size)
+        )
+        return (reduced, limit, error) if error <= 2 * tolerance else None
 
-
-# Cache of shear modes by their parameters; it lives as long as the Patch.
-_SHEAR_MODE_CACHE = WeakKeyDictionary()
+    key = ("few points", patch, law.static, law.length, law.ratio, tolerance, n_points, max_modes)
+    return store.get_or_compute(key, make)
