@@ -11,7 +11,7 @@ from functools import partial
 from time import perf_counter
 from typing import NamedTuple
 
-from .errors import coarser_errors
+from .errors import convergence_errors
 
 
 class CoarserRuns(NamedTuple):
@@ -94,4 +94,4 @@ def make_spatial_coarsening(settings, reference=None, source: str = "mesh") -> C
     -------
     CoarserRuns
     """
-    return CoarserRuns((settings,), partial(coarser_errors, order=2.0), reference, source)
+    return CoarserRuns((settings,), partial(convergence_errors, order=2.0), reference, source)

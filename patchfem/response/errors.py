@@ -3,9 +3,9 @@
 In a run that is coarser by a factor `ratio` (in steps, elements, cells of a density, harmonics, modes
 or the tolerance of a step), a measure changes by ratio**p - 1 times its error, where p is the order of
 convergence. The error estimate is therefore SAFETY_FACTOR times the change divided by ratio**p - 1
-(Roache, J. Fluids Eng. 116, 405, 1994; ASME V&V 20). Three runs with successive factors of 2 show p if
-the measure changes monotonically. For two runs, the assumed order depends on the kind of coarsening. No
-factor depends on a measure, law or scene. tests/README.md gives the fraction of the error estimates of
+(Roache, J. Fluids Eng. 116, 405, 1994; ASME V&V 20); `convergence_error` is the only formula. Three runs
+with successive factors of 2 show p if the measure changes monotonically. For two runs, the assumed order
+depends on the kind of coarsening. No factor depends on a measure, law or scene. tests/README.md gives the fraction of the error estimates of
 random scenes that contain the true error.
 """
 
@@ -37,7 +37,7 @@ ERROR_MEASURES = ("energy_balance", "work_check")
 
 def signed_change(fine: dict, coarse: dict) -> dict:
     """Return the difference of each measure, fine minus coarse; phases differ by at most pi/2."""
-    changes = {name: fine[name] - coarse[name] for name in fine.keys() & coarse.keys()}
+    changes = {name: fine[name] - coarse[name] for name in fine if name in coarse}
     if "slip_start_phase" in changes:
         changes["slip_start_phase"] = (changes["slip_start_phase"] + np.pi / 2) % np.pi - np.pi / 2
     return changes
@@ -48,116 +48,89 @@ def absolute_change(fine: dict, coarse: dict) -> dict:
     return {name: abs(difference) for name, difference in signed_change(fine, coarse).items()}
 
 
-def error_of_change(difference, ratio: float = 2.0, order: float = MIN_ORDER):
-    """Estimate the error of a value from its change in a coarser or finer run.
+def convergence_error(change, *coarser_changes, ratio: float = 2.0, order: float = MIN_ORDER):
+    """Estimate the error of a value from its changes between successive runs.
+
+    The estimate is SAFETY_FACTOR |change| / (growth - 1), where `growth` is the factor between the
+    errors of a run and of the next coarser one.
+
+    - Two runs (one change): growth = ratio**order.
+    - Three runs: growth is the ratio of the two changes, at most 2**MAX_ORDER, if it lies between
+      ratio**order and MAX_CHANGE_RATIO. The change counts as at least 2**-MAX_ORDER of the previous
+      one, so that a change that is small by accident does not give a small error.
+    - More runs: the estimate without the finest run is an upper limit if its interval contains the
+      value; the error is assumed to decrease by at most 2**MAX_ORDER from run to run.
 
     Parameters
     ----------
-    difference : float or (n,)
+    change : float or (n,)
+        Change from the second finest to the finest run.
+    coarser_changes : float or (n,)
+        Changes between the runs before, from fine to coarse; nan if unknown. Arrays only for up to
+        three runs.
     ratio : float
-        Ratio of the step or cell sizes of the two runs; below 1 for a finer run.
+        Ratio of the step or cell sizes of two successive runs; below 1 if the only change is that to
+        a finer run.
     order : float
-        Order of convergence.
+        Order of convergence that is assumed if the changes do not show it.
 
     Returns
     -------
     float or (n,)
+        Error in the unit of the value.
     """
-    return SAFETY_FACTOR * np.abs(difference) / abs(ratio**order - 1)
-
-
-def convergence_error(last_change, previous_change=None):
-    """Estimate the error of a value from its changes at successive refinements by a factor of 2.
-
-    Parameters
-    ----------
-    last_change : float or (n,)
-        Change from the second finest to the finest run.
-    previous_change : float or (n,) or None
-        Change from the third finest to the second finest run; None or nan if unknown.
-    """
-    change = np.abs(last_change)
-    growth = 2.0**MIN_ORDER
-    if previous_change is not None:
+    growth = ratio**order
+    largest = np.abs(change)
+    if coarser_changes:
+        previous = coarser_changes[0]
         with np.errstate(divide="ignore", invalid="ignore"):
-            ratio = np.divide(previous_change, last_change)
-        shows_order = (ratio > growth) & (ratio <= MAX_CHANGE_RATIO)
-        growth = np.where(shows_order, np.minimum(ratio, 2.0**MAX_ORDER), growth)
-        change = np.fmax(change, np.abs(previous_change) / 2.0**MAX_ORDER)
-    return (SAFETY_FACTOR * change / (growth - 1))[()]
+            observed = np.divide(previous, change)
+        shows_order = (observed > growth) & (observed <= MAX_CHANGE_RATIO)
+        growth = np.where(shows_order, np.minimum(observed, 2.0**MAX_ORDER), growth)
+        largest = np.fmax(largest, np.abs(previous) / 2.0**MAX_ORDER)
+    error = (SAFETY_FACTOR * largest / np.abs(growth - 1))[()]
+    if len(coarser_changes) > 1:
+        coarser_error = convergence_error(*coarser_changes, ratio=ratio, order=order)
+        if abs(change) <= coarser_error:  # the value lies in the error interval of the coarser run
+            error = min(error, coarser_error)
+        error = max(error, coarser_error / 2**MAX_ORDER)
+    return error
 
 
-def convergence_errors(*values: dict) -> dict:
-    """Estimate the error of each measure from runs with successive refinements by a factor of 2.
-
-    With more than three runs, the estimate from the coarser runs is an upper limit for that from
-    the finer ones if its interval contains the value. From run to run, the error is assumed to
-    decrease by at most the factor of the highest order.
+def convergence_errors(
+    *values: dict, ratio: float = 2.0, order: float = MIN_ORDER, steps: int | None = None
+) -> dict:
+    """Estimate the error of each measure from two or more successive runs (`convergence_error`).
 
     Parameters
     ----------
     values : dict
-        Measures by name of two or more runs, from fine to coarse.
+        Measures by name of the runs, from fine to coarse; floats or arrays (n,) of many runs.
+    ratio, order : float
+        Ratio of the step or cell sizes of successive runs, and order of convergence.
+    steps : int, optional
+        Steps per cycle of the finest run, if the others have fewer steps. The error of a measure that
+        is resolved only to a sample is then increased by this resolution.
+
+    Returns
+    -------
+    dict
+        Errors by name, for the measures of the two finest runs.
     """
     changes = [signed_change(fine, coarse) for fine, coarse in pairwise(values)]
     errors = {}
     for name in changes[0]:
-        errors[name] = _finest_error([change[name] for change in changes if name in change])
-    return errors
-
-
-def _finest_error(changes: list) -> float:
-    """Estimate the error of a value from its changes between successive runs, finest first."""
-    if len(changes) == 1:
-        return convergence_error(changes[0])
-    error = convergence_error(*changes[-2:])
-    for last, before in reversed(list(pairwise(changes[:-1]))):
-        next_error = convergence_error(last, before)
-        if abs(last) <= error:  # the value lies in the error interval of the coarser run
-            next_error = min(next_error, error)
-        error = max(next_error, error / 2**MAX_ORDER)
-    return error
-
-
-def step_errors(*values: dict, steps: int) -> dict:
-    """Estimate the time-step error of each measure from runs with fewer steps.
-
-    The error of a measure that is resolved only to a sample is at least this resolution.
-
-    Parameters
-    ----------
-    values : dict
-        Measures by name of the runs with `steps`, a half and a quarter of them per cycle.
-    steps : int
-        Steps per cycle of the finest run.
-    """
-    errors = convergence_errors(*values)
-    for name in errors:
-        errors[name] += find_definition(name).sample_error / steps
+        known = [change[name] for change in changes if name in change]
+        errors[name] = convergence_error(*known, ratio=ratio, order=order)
+        if steps is not None:
+            errors[name] += find_definition(name).sample_error / steps
     min_load = values[0].get("normal_load_least", 0.0)
-    if values[0].get("open_fraction") == 0 and min_load > errors.get("normal_load_least", np.inf):
+    if (
+        steps is not None
+        and values[0].get("open_fraction") == 0
+        and min_load > errors.get("normal_load_least", np.inf)
+    ):
         errors["open_fraction"] = 0.0  # The normal load remains positive between the samples.
-    return errors
-
-
-def coarser_errors(fine: dict, *coarse: dict, ratio: float = 2.0, order: float = MIN_ORDER) -> dict:
-    """Estimate the error of each measure from runs with larger steps or cells.
-
-    Parameters
-    ----------
-    fine : dict
-        Measures by name; floats or arrays (n,) of many runs.
-    coarse : dict
-        Measures of each coarser run; the largest change is used.
-    ratio, order : float
-        Ratio of the step or cell sizes, and order of convergence.
-    """
-    changes = [absolute_change(fine, values) for values in coarse]
-    errors = {}
-    for name in fine:
-        if all(name in change for change in changes):
-            largest = np.maximum.reduce([change[name] for change in changes])
-            errors[name] = error_of_change(largest, ratio, order)
     return errors
 
 
@@ -172,7 +145,7 @@ def finer_errors(values: dict, finer: dict) -> dict:
     values, finer : dict
         Measures by name of the run and of the finer run.
     """
-    return coarser_errors(values, finer, ratio=0.5, order=2.0)
+    return convergence_errors(values, finer, ratio=0.5, order=2.0)
 
 
 def merged_cell_errors(fine: dict, *coarse: dict) -> dict:
@@ -190,11 +163,14 @@ def merged_cell_errors(fine: dict, *coarse: dict) -> dict:
     coarse : dict
         Measures of each coarse run.
     """
-    errors = coarser_errors(fine, *coarse, ratio=4.0, order=2.0)
-    first_order_errors = coarser_errors(fine, *coarse, ratio=4.0, order=1.0)
-    for name in errors:
-        if find_definition(name).sample_error:
-            errors[name] = first_order_errors[name]
+    changes = [signed_change(fine, values) for values in coarse]
+    errors = {}
+    for name in fine:
+        if all(name in change for change in changes):
+            order = 1.0 if find_definition(name).sample_error else 2.0
+            errors[name] = np.max(
+                [convergence_error(change[name], ratio=4.0, order=order) for change in changes]
+            )
     return errors
 
 

@@ -9,7 +9,7 @@ import patchfem as pf
 from patchfem.campaigns import compute_backbone
 from patchfem.campaigns.backbone.bench_loops import compute_steady_loop, run_friction_loop
 from patchfem.campaigns.backbone.joint import build_joint
-from patchfem.response import error_of_change
+from patchfem.response import convergence_error
 
 PLASTIC = 'law = "elastic-plastic"\nbond_length = "1 mm"'
 OMEGA = 200 * np.pi
@@ -663,4 +663,4 @@ def test_exact_error_of_cells_follows_largest_change():
     values = iter([1.0, 1.01, 0.98, 1.005, 1.0])
     joint = build_joint(build_block(IWAN), "")
     error = joint.spatial_discretization_errors(lambda group: next(values))
-    assert error == pytest.approx(error_of_change(0.02, ratio=4.0, order=2.0), rel=1e-9)
+    assert error == pytest.approx(convergence_error(0.02, ratio=4.0, order=2.0), rel=1e-9)

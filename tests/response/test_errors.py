@@ -9,12 +9,10 @@ from patchfem import build, run
 from patchfem.response import (
     absolute_change,
     add_errors,
-    coarser_errors,
     convergence_error,
     convergence_errors,
     error_floor,
     merged_cell_errors,
-    step_errors,
 )
 from patchfem.response.errors import SAFETY_FACTOR, observed_orders
 from patchfem.runs import choose_numerics
@@ -82,7 +80,7 @@ def coverage_of_errors(count, seed, finest=12800):
             n: rig_march.march_in_time(model, replace(numerics, steps=n), None).values
             for n in (400, 200, 100, finest)
         }
-        errors = step_errors(runs[400], runs[200], runs[100], steps=400)
+        errors = convergence_errors(runs[400], runs[200], runs[100], steps=400)
         truth = absolute_change(runs[400], runs[finest])
         for name, measure in add_errors(runs[400], [("steps", errors)]).items():
             if name in truth and name != "energy_balance":
@@ -132,7 +130,7 @@ def test_always_errors_cover_irregular_sequences(seed):
 def test_exact_two_runs_use_given_order(ratio, order):
     """For two runs the given order determines the error; a measure absent from the coarser run gets none."""
     fine, coarse = make_sequence(1.0, ratio, order=order)
-    found = coarser_errors(fine | {"loop_area": 1.0}, coarse, fine, ratio=ratio, order=order)
+    found = convergence_errors(fine | {"loop_area": 1.0}, coarse, ratio=ratio, order=order)
     assert found == {NAME: pytest.approx(SAFETY_FACTOR * 1e-3)}
 
 
@@ -153,7 +151,7 @@ def test_exact_phase_difference_is_modulo_pi():
 def test_exact_time_fractions_have_sampling_error():
     """Fractions of time and phases have an error of the sampling interval, even if all runs agree."""
     same = {"open_fraction": 0.25, "slip_start_phase": 0.6, "stick_fraction": 0.2, NAME: 1.0}
-    assert step_errors(same, same, same, steps=128) == pytest.approx(
+    assert convergence_errors(same, same, same, steps=128) == pytest.approx(
         {
             "open_fraction": 4 / 128,
             "slip_start_phase": 1 / 128,

@@ -15,7 +15,7 @@ from ...dynamics.harmonic.harmonic import pack_harmonics
 from ...dynamics.harmonic.laws import evaluate_series
 from ...dynamics.harmonic.point import find_peak, make_balance
 from ...formatting import format_length
-from ...response.errors import error_of_change
+from ...response.errors import convergence_error
 from .joint import MIN_AMPLITUDE_FACTOR, JointMode
 from .records import AMPLITUDE_TOL, ROUND_OFF_ERROR, Curve, make_curve
 
@@ -55,7 +55,7 @@ def compute_balance_curve(joint: JointMode, amplitudes) -> Curve:
         if not count:
             raise NotConverged("no free motion of these amplitudes was found")
         better = _tabulate_free_motions(laws, joint, amplitudes, harmonics, count)
-        error = error_of_change(better - values) + ROUND_OFF_ERROR * np.abs(better)
+        error = convergence_error(better - values) + ROUND_OFF_ERROR * np.abs(better)
         values = better
         known = np.isfinite(error[0])
         if (error[:2] <= tolerance * np.abs(values[:2]))[:, known].all():

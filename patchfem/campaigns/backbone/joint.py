@@ -11,7 +11,7 @@ from ...dynamics.events.elements import CELL_MERGES, join_cells
 from ...dynamics.harmonic.forces import LawGroup
 from ...effects import describe_unsupported, law_has_trait
 from ...model.model import Model
-from ...response.errors import error_of_change
+from ...response.errors import convergence_error
 from ...runs.patch import result as patch_result
 from ...runs.plan import plan
 from ...runs.rig import decays
@@ -269,7 +269,7 @@ class JointMode(NamedTuple):
             for cells in CELL_MERGES:
                 merged = group.with_elements(partial(join_cells, *cells))
                 changes.append(np.abs(compute(merged) - best))
-            error = error + error_of_change(np.max(changes, axis=0), ratio=4.0, order=2.0)
+            error = error + convergence_error(np.max(changes, axis=0), ratio=4.0, order=2.0)
         return error
 
 

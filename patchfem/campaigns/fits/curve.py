@@ -24,7 +24,7 @@ from ...identify.two_models import TwoModels
 from ...inputs.cells import TableFormat, read_text
 from ...inputs.columns import read_columns
 from ...model.source import locate_errors
-from ...response.errors import error_of_change
+from ...response.errors import convergence_error
 from ...scene.overrides import BaseScene
 from ...scene.scene import Scene
 from ..backbone.curves import compute_backbone
@@ -429,7 +429,7 @@ def _widen_by_missing_modes(
         return WidenedFit(fit, (f"{NO_MODE_ERROR}: {reason}",))
     reference = curves.compute_reference_curve(fit.values)
     change = np.nan_to_num(richer_curve - reference)
-    error = error_of_change(change, ratio=0.5, order=2.0)
+    error = convergence_error(change, ratio=0.5, order=2.0)
     shifted = replace(
         problem,
         residual=lambda values: measured.normalized_residual(model(values) + error),

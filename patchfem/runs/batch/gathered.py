@@ -27,10 +27,9 @@ from ...model.model import Model
 from ...response import run_events
 from ...response.errors import (
     FrictionScale,
-    coarser_errors,
+    convergence_errors,
     friction_errors,
     split_errors,
-    step_errors,
 )
 from ...response.measures import energy_balance
 from ...response.reasons import MAX_OTHER_MODES_FRACTION
@@ -411,8 +410,8 @@ def _estimate_run_errors(
     for case, (model, solved_case) in enumerate(zip(models, cases)):
         values, half, quarter, coarse = (select_known_values(run, case) for run in columns)
         kinds = (
-            step_errors(values, half, quarter, steps=steps),
-            coarser_errors(quarter, coarse, order=2.0),
+            convergence_errors(values, half, quarter, steps=steps),
+            convergence_errors(quarter, coarse, order=2.0),
             _reduction_errors(values, solved_case.fine, model, fine.energies["passed"][case]),
             dict.fromkeys(values, 0.0) | fine.error_estimates[case],
         )

@@ -24,7 +24,6 @@ from ...response.errors import (
     convergence_errors,
     finer_errors,
     friction_errors,
-    step_errors,
 )
 from ...slip import shear_modes
 from . import bench, rigid, shear
@@ -126,9 +125,8 @@ def list_coarser_runs(model, patches: list, fine_run, steps: int) -> list:
     halved = CoarseRun(max(4, steps // 8 * 4), 0, choice)
     quarter = CoarseRun(max(4, steps // 16 * 4), 0, choice)
     # Parallel elements follow any path exactly, so that the steps affect only the harmonics.
-    rule = (
-        convergence_errors if uses_parallel_elements(model) else partial(step_errors, steps=steps)
-    )
+    sampled_steps = None if uses_parallel_elements(model) else steps
+    rule = partial(convergence_errors, steps=sampled_steps)
     out = [CoarserRuns((halved, quarter), rule, source="steps")]
     has_coarser_mesh = len(patches) > 1
     patch = patches[0]

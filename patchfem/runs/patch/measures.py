@@ -655,7 +655,9 @@ def add_strip_count_errors(patch_model, patch: Patch, measures_by_name: dict) ->
         measure = measures_by_name[name]
         if measure.value is not None:
             change = value - other_values[name]
-            error = measure.error + errors.error_of_change(change, ratio, errors.MAX_ORDER)
+            error = measure.error + errors.convergence_error(
+                change, ratio=ratio, order=errors.MAX_ORDER
+            )
             out[name] = replace(measure, error=float(error))
     return out
 

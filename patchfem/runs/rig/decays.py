@@ -23,7 +23,7 @@ from ...response.decay_curve import (
     locate_reversals,
     make_half_cycles,
 )
-from ...response.errors import MAX_ORDER, error_of_change
+from ...response.errors import MAX_ORDER, convergence_error
 from ...slip.mesh_correction import SPREAD_FACTOR, spread_elements
 from ..patch import faces
 from . import interface, numerics
@@ -203,7 +203,7 @@ def estimate_mesh_error(fine, coarse, compute) -> np.ndarray:
     """
     best = compute(fine)
     changes = (compute(other) - best for other in coarse)
-    by_meshes = sum(error_of_change(change, order=MAX_ORDER) for change in changes)
+    by_meshes = sum(convergence_error(change, order=MAX_ORDER) for change in changes)
     return np.fmax(
         SPREAD_FACTOR * np.abs(compute(fine.with_elements(_spread_elements)) - best), by_meshes
     )

@@ -18,11 +18,10 @@ from ...model.model import Model
 from ...response.coarser import CoarserRuns, make_spatial_coarsening
 from ...response.errors import (
     FrictionScale,
-    coarser_errors,
+    convergence_errors,
     finer_errors,
     friction_errors,
     merged_cell_errors,
-    step_errors,
 )
 from ...scene.rules import methods
 from ...scene.rules.accuracy import has_effect, list_fixed_settings
@@ -240,7 +239,7 @@ def _list_element_space_runs(model: Model, numerics, patch, coarse, solution) ->
     meshes = _list_coarse_mesh_numerics(model, numerics)
     if coarse is not None and model.partial_slip:
         meshes = [replace(numerics, coarse_patch=True), *meshes]
-    coarser_runs = [CoarserRuns((mesh,), coarser_errors, source="mesh") for mesh in meshes]
+    coarser_runs = [CoarserRuns((mesh,), convergence_errors, source="mesh") for mesh in meshes]
     laws = [interface.numbers.law for interface in model.rig.friction.interfaces]
     if any(law_has_trait(law, "cells") for law in laws):
         merged = tuple(replace(numerics, joined=cells) for cells in CELL_MERGES)
@@ -264,7 +263,7 @@ def _divide_steps(numerics, divisor: int):
 def _list_march_time_runs(model: Model, numerics) -> list:
     """List the comparison runs of a time integration with half and with a quarter of its steps."""
     runs = (_divide_steps(numerics, 2), _divide_steps(numerics, 4))
-    return [CoarserRuns(runs, partial(step_errors, steps=numerics.steps), source="steps")]
+    return [CoarserRuns(runs, partial(convergence_errors, steps=numerics.steps), source="steps")]
 
 
 def _list_march_space_runs(model: Model, numerics, patch, coarse, solution) -> list:
@@ -362,7 +361,7 @@ def _list_steady_space_runs(model: Model, numerics, patch, coarse, solution) -> 
 
 # Tolerance factor for the time steps of the coarse run of the smooth engine.
 STEP_TOLERANCE_FACTOR = 30.0
-estimate_smooth_errors = partial(coarser_errors, ratio=STEP_TOLERANCE_FACTOR)
+estimate_smooth_errors = partial(convergence_errors, ratio=STEP_TOLERANCE_FACTOR)
 
 
 def _list_smooth_time_runs(model: Model, numerics) -> list:

@@ -12,7 +12,7 @@ from ...core import IntegratedMeasures, Outcome
 from ...effects import law_has_trait
 from ...friction import path_work
 from ...response import run_events
-from ...response.errors import ERROR_MEASURES, absolute_change, error_of_change
+from ...response.errors import ERROR_MEASURES, absolute_change, convergence_error
 from ...response.levels import LEVEL_MEASURES, Level
 from ...response.loops import reversal_force_rule
 from ...response.measures import (
@@ -192,7 +192,7 @@ class RunEvaluator:
         for name, change in absolute_change(values, coarse_values).items():
             if change > 0 and name not in ERROR_MEASURES:
                 row = find_definition(name)
-                error = error_of_change(change, order=row.order)
+                error = convergence_error(change, order=row.order)
                 errors[name] = error + row.sample_error / self.steps
         return errors
 
@@ -230,7 +230,7 @@ class RunEvaluator:
             coarse_values = self.evaluate_measures(thinned, drive)
             for row in rows:
                 change = values[row.name] - coarse_values[row.name]
-                errors[row.name] += error_of_change(change, order=row.order)
+                errors[row.name] += convergence_error(change, order=row.order)
         return errors
 
     def collect_solution_fields(self, run, drive) -> dict:

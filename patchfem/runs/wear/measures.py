@@ -11,7 +11,7 @@ import numpy as np
 
 from ...core import Measure, Outcome, frozen_array
 from ...formatting import format_length, format_number
-from ...response.errors import convergence_errors, error_of_change
+from ...response.errors import convergence_error, convergence_errors
 from ..patch.measures import with_other_strip_count
 from ..patch.press import nodal_areas, solve_patch_contact
 from ..patch.values import compute_static_values
@@ -151,8 +151,8 @@ def _widen_errors_by_jumps(result, evolved):
     for name, value in fine_values.items():
         measure = measures.get(name)
         if measure is not None and measure.error is not None:
-            error = error_of_change(value - coarse[name])
-            error = error + error_of_change(value - other_values[name], ratio)
+            error = convergence_error(value - coarse[name])
+            error = error + convergence_error(value - other_values[name], ratio=ratio)
             measures[name] = replace(measure, error=float(measure.error + error))
     return replace(result, measures=measures)
 
@@ -242,7 +242,7 @@ def _measure_patch_wear(model, evolved, motion: dict, *, estimate: bool = True) 
                 + float(mesh_errors[name])
                 + ROUND_OFF * value
                 + start_error
-                + float(error_of_change(strips[name] - value, ratio))
+                + float(convergence_error(strips[name] - value, ratio=ratio))
             )
         measures[name] = _make_wear_measure(name, value, error, WORN_SOURCE)
     amplitude = evolved.moments[-1].values.get("groove_amplitude")

@@ -11,7 +11,7 @@ import numpy as np
 from ....dynamics.lanes import run as march
 from ....model.model import Model
 from ....model.similar_models import collect_columns, select_models
-from ....response.errors import coarser_errors
+from ....response.errors import convergence_errors
 from ....response.rows import larger_term
 from ..case_results import CaseResults
 from . import lane_runs
@@ -139,7 +139,7 @@ class _Refinement:
         cases = select_rows(self.cases.coarse, indices)
         coarse = march_and_measure(self.law, *cases, self.cycles, steps).values
         with np.errstate(all="ignore"):
-            errors = coarser_errors(values, coarse)
+            errors = convergence_errors(values, coarse)
         for name, error in errors.items():
             column = self.mesh_errors.setdefault(name, np.zeros(len(self.models)))
             column[indices] = np.where(np.isnan(error), np.abs(values[name]), error)

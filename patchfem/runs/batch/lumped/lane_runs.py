@@ -5,7 +5,6 @@ from marches with half and, if available, a quarter of the steps (`response.erro
 """
 
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +14,7 @@ from ....dynamics.lanes import run as march
 from ....dynamics.lanes.rows_kernels import Row
 from ....model.model import Model
 from ....model.similar_models import collect_columns
-from ....response.errors import SUM_ROUND_OFF, convergence_error, signed_change
+from ....response.errors import SUM_ROUND_OFF, convergence_errors
 from ....response.measures import energy_balance
 from ....response.settling import window_amplitude_means
 from ...rig.event_driven import compute_event_measures
@@ -107,25 +106,6 @@ def march_and_measure(law: str, cases, scales: Scales, cycles: int, steps: int) 
     )
 
 
-def step_errors(values: dict, coarser: list) -> dict:
-    """Estimate the error (n,) of each measure from marches with fewer steps.
-
-    Parameters
-    ----------
-    values : dict
-        Measures by name, (n,) each.
-    coarser : list of dict
-        Measures with half and, if available, a quarter of the steps.
-    """
-    errors = {}
-    with np.errstate(over="ignore", invalid="ignore"):  # a march with half the steps may diverge
-        changes = [signed_change(fine, coarse) for fine, coarse in pairwise([values, *coarser])]
-        for name in values:
-            error = convergence_error(*(change[name] for change in changes))
-            errors[name] = np.nan_to_num(error, posinf=np.inf)
-    return errors
-
-
 def collect_runs(
     models: Sequence[Model],
     cases: tuple[march.Cases, Scales],
@@ -150,7 +130,9 @@ def collect_runs(
     cases, scales = cases
     values = measured.values
     marched = measured.marched
-    errors = step_errors(values, coarser)
+    with np.errstate(over="ignore", invalid="ignore"):  # a march with half the steps may diverge
+        errors = convergence_errors(values, *coarser)
+    errors = {name: np.nan_to_num(error, posinf=np.inf) for name, error in errors.items()}
     for name in errors.keys() & mesh_errors.keys():
         errors[name] = errors[name] + mesh_errors[name]
     slip_ranges = marched.get_measure("MAX_SLIP") - marched.get_measure("MIN_SLIP")

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from ....model.model import Model
-from ....response.errors import coarser_errors
+from ....response.errors import convergence_errors
 from ...rig.engines import PIECES, choose_engine
 from ...rig.event_driven import YieldingElements
 from .. import solved_patches
@@ -88,7 +88,7 @@ def compute_motions(
     coarse = pieces.simulate_cases(
         coarse_cases, cycles, window, report, MIN_CASES_PER_THREAD, steady=False
     )
-    runs = pieces.add_coarser_errors(fine, [coarse], coarser_errors)
+    runs = pieces.add_coarser_errors(fine, [coarse], convergence_errors)
     runs = replace(runs, case_settings=tuple(numerics), refines_steps=False)
     results, needs_single_run, _ = assemble_results(
         models, runs, {"engine": PIECES.name, "window_cycles": window}
