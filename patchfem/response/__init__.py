@@ -12,7 +12,7 @@ PUBLIC = {
     "coarser": (
         "CoarserRuns",
         "estimate_errors",
-        "make_spatial_coarsening",
+        "second_order_errors",
     ),
     "decay_curve": (
         "DecayCurve",

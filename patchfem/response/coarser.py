@@ -11,7 +11,10 @@ from functools import partial
 from time import perf_counter
 from typing import NamedTuple
 
-from .errors import convergence_errors
+from .errors import MAX_ORDER, convergence_errors
+
+# Rule of CoarserRuns for a coarser mesh or fewer shear modes.
+second_order_errors = partial(convergence_errors, order=MAX_ORDER)
 
 
 class CoarserRuns(NamedTuple):
@@ -78,20 +81,3 @@ def estimate_errors(solve: Callable, fine: dict, coarse_runs, solved_runs: dict)
             (coarser.source, coarser.rule(reference_values, *map(solve_values, coarser.runs)))
         )
     return errors, perf_counter() - begin
-
-
-def make_spatial_coarsening(settings, reference=None, source: str = "mesh") -> CoarserRuns:
-    """Return the coarser run on a coarser mesh, with second-order convergence.
-
-    Parameters
-    ----------
-    settings : hashable
-        Settings of the run on the coarser mesh.
-    reference, source
-        Fields of `CoarserRuns`.
-
-    Returns
-    -------
-    CoarserRuns
-    """
-    return CoarserRuns((settings,), partial(convergence_errors, order=2.0), reference, source)

@@ -3,10 +3,10 @@
 In a run that is coarser by a factor `ratio` (in steps, elements, cells of a density, harmonics, modes
 or the tolerance of a step), a measure changes by ratio**p - 1 times its error, where p is the order of
 convergence. The error estimate is therefore SAFETY_FACTOR times the change divided by ratio**p - 1
-(Roache, J. Fluids Eng. 116, 405, 1994; ASME V&V 20); `convergence_error` is the only formula. Three runs
-with successive factors of 2 show p if the measure changes monotonically. For two runs, the assumed order
-depends on the kind of coarsening. No factor depends on a measure, law or scene. tests/README.md gives the fraction of the error estimates of
-random scenes that contain the true error.
+(Roache, J. Fluids Eng. 116, 405, 1994; ASME V&V 20); `convergence_error` is the only formula. Three
+runs with successive factors of 2 show p if the measure changes monotonically. For two runs, the assumed
+order depends on the kind of coarsening. No factor depends on a measure, law or scene. tests/README.md
+gives the fraction of the error estimates of random scenes that contain the true error.
 """
 
 from dataclasses import replace

@@ -13,12 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...effects import law_has_trait, needs_bond_list
-from ...response.coarser import (
-    CoarserRuns,
-    StepRun,
-    estimate_errors,
-    make_spatial_coarsening,
-)
+from ...response.coarser import CoarserRuns, StepRun, estimate_errors, second_order_errors
 from ...response.errors import (
     FrictionScale,
     convergence_errors,
@@ -141,15 +136,11 @@ def list_coarser_runs(model, patches: list, fine_run, steps: int) -> list:
     elif has_coarser_mesh:
         # Both runs have the same number of modes, so that only the mesh changes.
         count = shear.count_shear_modes(model, patch) if model.partial_slip else None
-        out.append(make_spatial_coarsening(quarter._replace(level=1, modes=count), quarter))
+        coarser = quarter._replace(level=1, modes=count)
+        out.append(CoarserRuns((coarser,), second_order_errors, quarter, "mesh"))
         if count:
-            out.append(
-                make_spatial_coarsening(
-                    quarter._replace(modes=shear_modes.comparison_mode_count(count)),
-                    quarter,
-                    "modes",
-                )
-            )
+            coarser = quarter._replace(modes=shear_modes.comparison_mode_count(count))
+            out.append(CoarserRuns((coarser,), second_order_errors, quarter, "modes"))
     if law_has_trait(model.friction.law, "cells") and fine_run.engine.method is Method.ELEMENTS:
         out.append(rigid.list_merged_cell_runs(quarter))
     if fine_run.engine.method in LIST_METHODS and choice.merge > 0:

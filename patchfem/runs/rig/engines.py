@@ -15,7 +15,7 @@ import numpy as np
 from ...dynamics.events.elements import CELL_MERGES
 from ...effects import NO_WAVEFORM, law_has_trait
 from ...model.model import Model
-from ...response.coarser import CoarserRuns, make_spatial_coarsening
+from ...response.coarser import CoarserRuns, second_order_errors
 from ...response.errors import (
     FrictionScale,
     convergence_errors,
@@ -231,7 +231,8 @@ def _list_exact_space_runs(model: Model, numerics, patch, coarse, solution) -> l
     )
     if not has_coarser_mesh:
         return samples
-    return [*samples, make_spatial_coarsening(replace(numerics, coarse_patch=True))]
+    coarser = replace(numerics, coarse_patch=True)
+    return [*samples, CoarserRuns((coarser,), second_order_errors, source="mesh")]
 
 
 def _list_element_space_runs(model: Model, numerics, patch, coarse, solution) -> list:
@@ -274,16 +275,15 @@ def _list_march_space_runs(model: Model, numerics, patch, coarse, solution) -> l
     """
     quarter = _divide_steps(numerics, 4)
     varies = model.rig.friction.load_varies
-    coarser_runs = []
+    meshes = _list_coarse_mesh_numerics(model, quarter)
     shape = getattr(getattr(solution.contact, "reduction", None), "stiffness", None)
     if coarse is not None and (varies or model.partial_slip):
         # Both runs have the same number of shear modes, so that only the mesh changes.
         coarser = replace(quarter, coarse_patch=True)
         if shape is not None:
             coarser = replace(coarser, shear_modes=shape.size)
-        coarser_runs.append(make_spatial_coarsening(coarser, quarter))
-    for coarser in _list_coarse_mesh_numerics(model, quarter):
-        coarser_runs.append(make_spatial_coarsening(coarser, quarter))
+        meshes = [coarser, *meshes]
+    coarser_runs = [CoarserRuns((mesh,), second_order_errors, quarter, "mesh") for mesh in meshes]
     climbs = model.grooves is not None
     gathers = model.patch is not None and model.patch.mesh.can_gather_points
     # A patch that is reduced to a few points has its own error estimate for shear modes.
@@ -291,10 +291,8 @@ def _list_march_space_runs(model: Model, numerics, patch, coarse, solution) -> l
     if shape is not None and (
         varies or climbs or (has_points and law_has_trait(model.friction.law, "bonds"))
     ):
-        n_modes = shear_modes.comparison_mode_count(shape.size)
-        coarser_runs.append(
-            make_spatial_coarsening(replace(quarter, shear_modes=n_modes), quarter, "modes")
-        )
+        coarser = replace(quarter, shear_modes=shear_modes.comparison_mode_count(shape.size))
+        coarser_runs.append(CoarserRuns((coarser,), second_order_errors, quarter, "modes"))
     return [*coarser_runs, *_list_bond_sum_runs(model, quarter, patch, solution)]
 
 
