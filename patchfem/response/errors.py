@@ -314,16 +314,22 @@ def split_errors(values: dict, errors, step_values=()) -> dict:
 
 
 def add_run_error_estimates(measures: dict, error_estimates: dict, end_errors: dict) -> dict:
-    """Add the error estimates of a run to those of its measures.
+    """Add the error estimates of a run itself to the errors of its measures.
 
     Parameters
     ----------
     measures : dict
-        Measure by name.
+        Measure by name; a measure without an error is not changed.
     error_estimates : dict
-        Errors by name.
+        Errors by name, in the unit of each measure.
     end_errors : dict
-        Part of these errors that is caused by a last sample before or after the requested end time.
+        Further errors by name, because the last sample does not lie at the requested end time. They
+        are stated as the cause "end".
+
+    Returns
+    -------
+    dict
+        Measure by name.
     """
     updated = dict(measures)
     for name, measure in measures.items():
@@ -331,7 +337,7 @@ def add_run_error_estimates(measures: dict, error_estimates: dict, end_errors: d
         if causes is not None and end_errors:
             causes = causes._replace(parts=causes.parts | {"end": end_errors.get(name, 0.0)})
         if measure.error is not None:
-            error = measure.error + error_estimates.get(name, 0.0)
+            error = measure.error + error_estimates.get(name, 0.0) + end_errors.get(name, 0.0)
             updated[name] = replace(measure, error=error, causes=causes)
     return updated
 

@@ -126,37 +126,27 @@ class MarchEvaluator(RunEvaluator):
         super().__init__(model, numerics, patch, contact, stick_tolerance)
 
     def collect_solution_fields(self, run, drive) -> dict:
-        """Return drive levels, bond summation and errors due to the end of the run."""
-        fields = {
-            "bond_summation": self.choose_bond_summation(),
-            "extra": {"late": self.estimate_end_errors(run.window)},
-        }
+        """Return drive levels, bond summation and errors due to an end between two steps."""
+        late = {}
+        n_steps = self.numerics.cycles * self.numerics.steps
+        if n_steps != round(n_steps):
+            period = self.model.rig.drive.signal.period
+            changes = estimate_window_error(run.window, period, n_steps - round(n_steps))
+            late = {name: END_ERROR_FACTOR * change for name, change in changes.items()}
+        fields = {"bond_summation": self.choose_bond_summation(), "extra": {"late": late}}
         if self.model.rig.drive.levels.amplitudes:
             fields["levels"], fields["run_level"] = self._evaluate_levels(run)
         return fields
 
     def estimate_run_errors(self, run, drive, values: dict) -> dict:
-        """Return the error estimates for peak sampling and for the end of the run.
+        """Estimate how far the peaks of a motion exceed its samples.
 
         Parameters
         ----------
         run, drive, values
             See `RunEvaluator.estimate_run_errors`.
         """
-        late = self.estimate_end_errors(run.window)
-        between = self.estimate_peak_excesses(run.window)
-        return {name: late.get(name, 0.0) + between.get(name, 0.0) for name in late | between}
-
-    def estimate_peak_excesses(self, window) -> dict:
-        """Estimate how far the peaks of a motion exceed its samples; return a dict by measure."""
-        return peak_sampling_errors(window, self.model.grooves is not None)
-
-    def estimate_end_errors(self, window) -> dict:
-        """Estimate the errors due to a last sample that is not at the requested end time."""
-        steps = self.numerics.cycles * self.numerics.steps
-        period = self.model.rig.drive.signal.period
-        changes = estimate_window_error(window, period, steps - round(steps))
-        return {name: END_ERROR_FACTOR * change for name, change in changes.items()}
+        return peak_sampling_errors(run.window, self.model.grooves is not None)
 
     def choose_bond_summation(self):
         """Return the bond summation of the run; None for a law without bonds."""
