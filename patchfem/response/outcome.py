@@ -45,12 +45,12 @@ def judge_outcome(
     level_cycles: float = 0.0,
     min_decay_rate: float = 0.0,
 ) -> tuple:
-    """Classify the motion of a run, and add the steady amplitude to its measures.
+    """Classify the motion of a run, and estimate the amplitude at which it becomes steady.
 
     - Periodic drive, or last level of a drive in levels: the outcome follows from the amplitudes of
       successive windows (`classify_periodic`) and the remaining free motion (`remaining_free_motion`). If a
       steady motion will still change by more than ESTIMATE_TOL times the tolerance, the steady estimate is
-      added. If a bounded motion is known to exist (`solution.bounded`), an increasing amplitude is
+      returned. If a bounded motion is known to exist (`solution.bounded`), an increasing amplitude is
       TRANSIENT, not GROWS.
     - Release or step: STEADY if the amplitude is below its floor, i.e. at rest; otherwise as above,
       but a release grows only if a mode gains energy.
@@ -64,7 +64,7 @@ def judge_outcome(
     ----------
     solution : Solution
     measures : dict
-        Measures by name.
+        Measures by name; they are not changed.
     tolerance : float
         Relative tolerance of the scene.
     drive
@@ -72,20 +72,26 @@ def judge_outcome(
         Number of cycles per level; 0 without levels.
     min_decay_rate : float
         Smallest decay rate of a mode [1/s]; negative if a mode gains energy.
+
+    Returns
+    -------
+    outcome : Outcome
+    steady : dict
+        The measure relative_displacement_amplitude_steady [m] by its name; {} if it is not reported.
     """
     if (
         solution.outcome is Outcome.STUCK
         and not hasattr(drive, "band")
         and is_still_loading(solution.window, drive.period, tolerance)
     ):
-        return Outcome.TRANSIENT, measures
+        return Outcome.TRANSIENT, {}
     if solution.outcome is not None:
-        return solution.outcome, measures
+        return solution.outcome, {}
     if hasattr(drive, "band"):
         is_stationary = stationary.is_stationary(solution.window, drive)
-        return Outcome.DONE if is_stationary else Outcome.TRANSIENT, measures
+        return Outcome.DONE if is_stationary else Outcome.TRANSIENT, {}
     if not drive.segments and drive_sizes.count_repeat_cycles(drive) is None:
-        return Outcome.TRANSIENT, measures
+        return Outcome.TRANSIENT, {}
     # for several tones, each window contains whole beats
     floor = (
         AMPLITUDE_ROUND_OFF
@@ -93,8 +99,7 @@ def judge_outcome(
         / drive_sizes.find_drive_omega(drive) ** 2
     )
     if not drive.segments and not drive_sizes.is_periodic(drive):
-        outcome = classify(solution.amplitudes, tolerance, floor)
-        return outcome, remove_errors(measures) if outcome is Outcome.GROWS else measures
+        return classify(solution.amplitudes, tolerance, floor), {}
     amplitudes = solution.amplitudes
     extremes = solution.extremes
     window = max(1, round((solution.window.time[-1] - solution.window.time[0]) / drive.period))
@@ -109,7 +114,7 @@ def judge_outcome(
             outcome = _reject_drifting(outcome, measures, tolerance, drift)
         if outcome is Outcome.GROWS and not drive.segments[-1].constant and min_decay_rate >= 0:
             outcome = Outcome.TRANSIENT
-        return outcome, remove_errors(measures) if outcome is Outcome.GROWS else measures
+        return outcome, {}
     number, steady, error = (
         one[0]
         for one in classify_periodic(
@@ -122,19 +127,16 @@ def judge_outcome(
         )
     )
     outcome = _reject_drifting(CLASSES[number], measures, tolerance)
-    if outcome is Outcome.GROWS:
-        return outcome, remove_errors(measures)
+    if outcome is Outcome.GROWS or np.isnan(steady):
+        return outcome, {}
     base = measures["relative_displacement_amplitude"]
-    if not np.isnan(steady) and (
-        outcome is Outcome.TRANSIENT or is_still_changing(steady, error, base.value, tolerance)
+    if outcome is not Outcome.TRANSIENT and not is_still_changing(
+        steady, error, base.value, tolerance
     ):
-        total = steady_estimate_error(steady, error, base.value, base.error or 0.0)
-        measures = measures | {
-            "relative_displacement_amplitude_steady": Measure(
-                float(steady), "m", float(total), base.floor
-            )
-        }
-    return outcome, measures
+        return outcome, {}
+    total = steady_estimate_error(steady, error, base.value, base.error or 0.0)
+    measure = Measure(float(steady), "m", float(total), base.floor)
+    return outcome, {"relative_displacement_amplitude_steady": measure}
 
 
 def is_drifting(drift, error, amplitude, tolerance, floor) -> np.ndarray:

@@ -107,7 +107,7 @@ def add_outcome_and_errors(run: CoupledRun) -> CoupledRun:
     measures = add_run_error_estimates(run.measures, solution.run_errors, end_errors)
     if not run.has_errors:
         measures = remove_errors(measures)
-    outcome, measures = judge_outcome(
+    outcome, steady = judge_outcome(
         solution,
         measures,
         run.model.accuracy.tolerance,
@@ -119,8 +119,9 @@ def add_outcome_and_errors(run: CoupledRun) -> CoupledRun:
     # program.
     if outcome is Outcome.EXCEEDS_TRAVEL and rig.springs.travel == MAX_TRAVEL:
         outcome = Outcome.GROWS
+    if outcome is Outcome.GROWS and solution.outcome is not Outcome.GROWS:
         measures = remove_errors(measures)
-    return replace(run, outcome=outcome, measures=measures)
+    return replace(run, outcome=outcome, measures=measures | steady)
 
 
 def add_missing_value_reasons(run: CoupledRun) -> CoupledRun:
