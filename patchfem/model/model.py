@@ -173,7 +173,7 @@ def build(scene: Scene) -> Model:
         grooves = load.build_grooves(scene)
     path = slide.build_slide(scene) if scene.slide is not None else None
     rig_model = rig.build_rig(scene) if scene.structure is not None else None
-    law = _build_law(scene)
+    law = _build_law(scene, rig_model)
     if patch_model is not None:
         edge_motion = _find_edge_motion(scene, rig_model)
         patch_model = patch_model.with_mesh(edge_motion=edge_motion)
@@ -242,17 +242,17 @@ def _request_slip_mesh(model: PatchModel, path: SlidePath, law: Friction | None)
     return model.with_mesh(slip=slip)
 
 
-def _build_law(scene: Scene) -> _SceneLaw:
-    """Build the law of the first interface."""
-    law = scene.friction
-    normal_load = find_normal_load(scene)
-    if scene.structure is not None and scene.structure.interface:
-        law = scene.structure.interface[0]
-        normal_load = law.normal_load
+def _build_law(scene: Scene, rig_model: Rig | None) -> _SceneLaw:
+    """Build the law of the first interface: that of the rig, or of [friction] without a rig."""
+    interfaces = scene.structure.interface if scene.structure is not None else ()
+    law = interfaces[0] if interfaces else scene.friction
     if law is None:
         return _SceneLaw()
     pad = find_pad_width(scene)
-    friction = make_effective_law(law, pad, scene.where, normal_load)
+    if rig_model is not None:
+        friction = rig_model.friction.interfaces[0].numbers
+    else:
+        friction = make_effective_law(law, pad, scene.where, find_normal_load(scene))
     return _SceneLaw(friction, law.temperature, law.spread, pad)
 
 
