@@ -76,10 +76,10 @@ PUBLIC = {
     ),
     "rules.limits": ("find_lateral_slide_obstacle",),
     "rules.methods": (
+        "ENGINE_SUPPORT",
         "EngineSupport",
         "Joint",
         "MotionFeatures",
-        "find_first_unsupported",
         "find_unsupported_feature",
     ),
     "scene": (

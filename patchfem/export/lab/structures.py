@@ -181,7 +181,7 @@ def _refuse_unsupported(model: Model) -> None:
     rig = model.rig
     motion = engines.collect_motion_features(model, steady=True)
     if _is_speed_only(rig):
-        reason = methods.find_first_unsupported(SPEED_LAW_SUPPORT, motion)
+        reason = methods.find_unsupported_feature(SPEED_LAW_SUPPORT, motion)
     else:
         reason = engines.PIECES.find_unsupported_feature(model, steady=True)
     if reason.startswith("for law"):

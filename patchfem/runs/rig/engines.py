@@ -101,7 +101,7 @@ class Engine(NamedTuple):
         model.
         """
         return methods.find_unsupported_feature(
-            self.name, collect_motion_features(model, steady=steady)
+            methods.ENGINE_SUPPORT[self.name], collect_motion_features(model, steady=steady)
         )
 
 

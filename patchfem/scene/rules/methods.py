@@ -103,17 +103,25 @@ ENGINE_SUPPORT = {
     "march": EngineSupport("", " ".join(FEATURE_FINDERS)),
     "harmonic": EngineSupport("", "no-law parts grooves spring faces levels"),
 }
-EXACT_ENGINES = ("exact", "piecewise")  # engines of accuracy.method = "exact"
+# Support of the engines of accuracy.method = "exact".
+EXACT_SUPPORTS = (ENGINE_SUPPORT["exact"], ENGINE_SUPPORT["piecewise"])
 METHOD_KEY = "accuracy.method"
 
 
-def find_unsupported_feature(engine: str, motion: MotionFeatures) -> str:
-    """Return the first feature of a motion that a solver does not support, or "" if it supports all."""
-    return find_first_unsupported(ENGINE_SUPPORT[engine], motion)
+def find_unsupported_feature(support: EngineSupport, motion: MotionFeatures) -> str:
+    """Return the first feature of a motion that a solver does not support, or "" if it supports all.
 
+    Parameters
+    ----------
+    support : EngineSupport
+        Features of the solver, such as ENGINE_SUPPORT["march"].
+    motion : MotionFeatures
 
-def find_first_unsupported(support: EngineSupport, motion: MotionFeatures) -> str:
-    """Return the first unsupported feature of a motion as text, or "" if all are supported."""
+    Returns
+    -------
+    str
+        End of a message, such as "for law 'dahl'" or "with several interfaces".
+    """
     joint = _find_unsupported_joint(support, motion)
     if joint is not None:
         compliance = f" with {joint.compliance}" if joint.compliance else ""
@@ -126,23 +134,20 @@ def find_first_unsupported(support: EngineSupport, motion: MotionFeatures) -> st
 
 
 def _find_unsupported_joint(support: EngineSupport, motion: MotionFeatures) -> Joint | None:
-    """Return the first interface whose friction law is not supported, or None if all are supported."""
-    if not support.law:
-        return None
-    return next((joint for joint in motion.joints if not _is_supported(support.law, joint)), None)
+    """Return the first interface whose friction law is not supported, or None if all are supported.
 
-
-def _is_supported(word: str, joint: Joint) -> bool:
-    """Return whether a solver supports the friction law of an interface."""
-    if not law_supports(joint.law, word):
-        return False
-    if word == "exact":  # the event-driven solution supports only patches that slip as a whole
-        return not joint.compliance
-    if word == "pieces":
-        # A law that sticks without displacement becomes spring-slider elements
-        # only with a compliance in series.
-        return bool(joint.compliance) or not law_has_trait(joint.law.law, "set-valued")
-    return True
+    The event-driven solution ("exact") needs patches that slip as a whole. A law that sticks without
+    displacement becomes spring-slider elements ("pieces") only with a compliance in series.
+    """
+    for joint in motion.joints:
+        is_supported = not support.law or law_supports(joint.law, support.law)
+        if support.law == "exact":
+            is_supported &= not joint.compliance
+        elif support.law == "pieces" and not joint.compliance:
+            is_supported &= not law_has_trait(joint.law.law, "set-valued")
+        if not is_supported:
+            return joint
+    return None
 
 
 def check_method(draft: SceneDraft, kind: str) -> None:
@@ -242,15 +247,15 @@ def describe_load_change(key: str) -> str:
 
 def _find_exact_obstacle(motion: MotionFeatures) -> str:
     """Return why no exact solution of a motion exists, or "" if there is one."""
-    reasons = {engine: find_unsupported_feature(engine, motion) for engine in EXACT_ENGINES}
-    if not all(reasons.values()):
+    reasons = [find_unsupported_feature(support, motion) for support in EXACT_SUPPORTS]
+    if not all(reasons):
         return ""
     carried = [
-        name
-        for name in EXACT_ENGINES
-        if _find_unsupported_joint(ENGINE_SUPPORT[name], motion) is None
+        reason
+        for support, reason in zip(EXACT_SUPPORTS, reasons)
+        if _find_unsupported_joint(support, motion) is None
     ]
-    why = reasons[carried[0] if carried else "exact"]
+    why = (carried or reasons)[0]
     return f"no exact solution exists {why}; use 'march' or leave `method` out"
 
 
@@ -269,9 +274,9 @@ def _find_harmonic_obstacle(motion: MotionFeatures) -> str:
             "'harmonic' needs a constant acceleration over a sweep; give drive.acceleration in place of "
             "drive.displacement"
         )
-    if feature := find_unsupported_feature("harmonic", motion):
+    if feature := find_unsupported_feature(ENGINE_SUPPORT["harmonic"], motion):
         return describe_unsupported(f"'harmonic' {feature}", "march")
-    is_exact = not all(find_unsupported_feature(engine, motion) for engine in EXACT_ENGINES)
+    is_exact = not all(find_unsupported_feature(support, motion) for support in EXACT_SUPPORTS)
     if not motion.joints or is_exact or motion.has_grooves:
         return ""  # with grooves, the method integrates in time until the motion repeats
     return _find_harmonic_law_obstacle(motion)
