@@ -9,6 +9,7 @@ the step (`protocol`). `laws/` has one law per file, `bonds/` the sum over bonds
 # Names that other folders use, by module
 PUBLIC = {
     "bonds.engines": (
+        "RECURSION",
         "RequestedEngine",
         "choose_engine",
         "unsupported_reason",

@@ -84,6 +84,10 @@ class EngineChoice:
         return ", ".join([*parts, f"error of the sum {self.error:.1g} of the friction limit"])
 
 
+# The recursion is exact and keeps no strips.
+RECURSION = EngineChoice("recursion", 0.0, 0.0, 0.0, 0.0, cost_model.RECURSION_STEP_SECONDS)
+
+
 def unsupported_reason(engine: str, reading: str, order: float) -> str:
     """Return a sentence that states why an engine cannot sum a law, and which engine can.
 
@@ -150,7 +154,7 @@ def choose_engine(
     if reason:
         raise ValueError(f"{engine} {reason}")
     if engine == "recursion" or (engine == "auto" and sum_form(law) == FORM_MOMENTS):
-        return EngineChoice("recursion", 0.0, 0.0, 0.0, 0.0, cost_model.RECURSION_STEP_SECONDS)
+        return RECURSION
     if tail is None:
         tail = min(1e-3 * tolerance, MAX_TAIL)
     width = merge

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import Missing
-from ...effects import law_has_trait
+from ...effects import law_has_trait, needs_bond_list
 from ...friction.bonds import engines
 from ...friction.bonds.list_forms_kernels import FORM_REPORT_GROWING
 from ...friction.bonds.list_numbers import sum_form
@@ -59,18 +59,19 @@ MAX_BOND_PHASE = 2.0  # Largest phase [rad] per step of the vibration of the blo
 def choose_bond_summation(model: Model, numerics: Numerics):
     """Choose the method of bond summation of a nonlocal law in a rig.
 
-    The method depends on the stroke, which is four times the amplitude that follows from the speed
-    scale and the frequency of the drive, or from the stiffness of the bonds if they hold the block.
-    If the motion decays (release, step), the stroke is reduced to DECAYED_FRACTION, because a list
-    of all bonds would need too much memory. For a block held by the printed law it is reduced to
-    STICKING_STROKE_RATIO.
+    A law that needs no bond list has the recursion, which is exact. Otherwise the method depends on
+    the stroke, which is four times the amplitude that follows from the speed scale and the frequency
+    of the drive, or from the stiffness of the bonds if they hold the block. If the motion decays
+    (release, step), the stroke is reduced to DECAYED_FRACTION, because a list of all bonds would need
+    too much memory. For a block held by the printed law it is reduced to STICKING_STROKE_RATIO.
     """
-    return numerics.choice or _choose_summation_for_engine(
-        model,
-        numerics,
-        _estimate_held_displacement(model),
-        bench_engine.find_requested_engine(model),
-    )
+    if numerics.choice is not None:
+        return numerics.choice
+    requested = bench_engine.find_requested_engine(model)
+    if requested in ("auto", "recursion") and not needs_bond_list(model.friction):
+        return engines.RECURSION
+    stretch = _estimate_held_displacement(model)
+    return _choose_summation_for_engine(model, numerics, stretch, requested)
 
 
 def has_bond_list(model: Model, numerics: Numerics) -> bool:
