@@ -11,7 +11,7 @@ from ...structure.drive_sizes import choose_samples_per_cycle
 from ..checkpoint import MarchSamples, open_checkpoint
 from .cycle_sums import can_sum_cycles, march_with_sums
 from .models import ContactModel, load_instances
-from .recording import Recorder, join_cycles, make_mark, read_output_extremes
+from .recording import Recorder, join_cycles, make_mark
 from .run import Run
 
 
@@ -259,10 +259,8 @@ def _make_result(run, recorder: Recorder, plan: _MarchPlan, snapshots: list) -> 
     """Return the result of a finished march, made from its recorded samples."""
     samples = recorder.samples
     extremes = samples.extremes
-    phasors = samples.phasors
     if not recorder.keeps_extremes:
-        extremes = read_output_extremes(samples.last, run)
-        phasors = []
+        extremes = extremes[-len(samples.last) :]
     last_mark = make_mark(run, list(samples.last)[-plan.window :], extremes)
     rows, first_step = join_cycles(samples.last)
     number = np.concatenate([*samples.early_numbers, first_step + np.arange(len(rows))])
@@ -271,7 +269,7 @@ def _make_result(run, recorder: Recorder, plan: _MarchPlan, snapshots: list) -> 
         window=last_mark.window,
         step_force=last_mark.step_force,
         amplitudes=last_mark.amplitudes,
-        phasors=np.array(phasors),
+        phasors=np.array(samples.phasors),
         ledger=last_mark.ledger,
         outcome=run.outcome,
         snapshots=snapshots,

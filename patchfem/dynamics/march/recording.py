@@ -35,8 +35,9 @@ class Recorder:
     """Recorder of march samples: all samples of the last cycles, and selected earlier ones.
 
     - `samples`: the recorded `checkpoint.MarchSamples`.
-    - `keeps_samples`, `keeps_extremes`: whether samples from before the last cycles are kept, and extremes and phasors
-      of all cycles.
+    - `keeps_samples`: whether samples from before the last cycles are kept.
+    - `keeps_extremes`: whether the phasors of all cycles are kept, and the result contains the extremes of all cycles
+      instead of those of the last cycles.
     - `capacity`: remaining number of samples from before the last cycles that may be kept.
     """
 
@@ -62,9 +63,9 @@ class Recorder:
                 self._keep_samples(run, last[0], self._picks.pop(last[0].first_step, None))
             last.append(cycle)
             self._picks[cycle.first_step] = indices
+        self.samples.extremes += find_cycle_extremes(rows, run.modes, run.prop.dt)
         if self.keeps_extremes:
             first_step = cycles[0].first_step
-            self.samples.extremes += find_cycle_extremes(rows, run.modes, run.prop.dt)
             self.samples.phasors += find_cycle_phasors(rows, run.modes, first_step, run.prop.steps)
 
     def _keep_samples(self, run, cycle: MarchedCycle, indices=None) -> None:
