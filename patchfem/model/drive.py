@@ -1,4 +1,4 @@
-"""The drive signal of a rig from [drive], and the length of the run in drive cycles."""
+"""The drive signal of a rig from [drive]."""
 
 from pathlib import Path
 
@@ -6,11 +6,8 @@ from ..core import ModalBasis, PatchfemError
 from ..effects import find_waveform, import_effect
 from ..inputs import signals
 from ..structure import drives
-from ..structure.drive_sizes import DriveKeys, count_cycles_per_level, find_first_period
+from ..structure.drive_sizes import DriveKeys, find_first_period
 from .file_cache import cache_by_file
-
-# Smallest number of drive cycles in a run whose length is given as a duration.
-MIN_RUN_CYCLES = 0.25
 
 
 def build_signal(scene, modes: ModalBasis):
@@ -27,24 +24,6 @@ def build_signal(scene, modes: ModalBasis):
     )
     waveform = scene.drive.waveform
     return import_effect(f"drive.waveform={waveform}").DRIVE_BUILDERS[waveform](keys)
-
-
-def has_levels(keys) -> bool:
-    """Return whether the amplitude of the drive signal is raised in levels."""
-    return find_waveform(keys).has_levels
-
-
-def count_run_cycles(keys, signal) -> float:
-    """Return the length of a run in drive cycles, including all levels of a stepped amplitude.
-
-    `keys` are those of [drive], `signal` is the drive that follows from them.
-    """
-    if has_levels(keys):
-        return count_cycles_per_level(keys) * len(keys.levels)
-    if keys.cycles is not None:
-        return keys.cycles
-    duration = signal.duration if keys.duration is None else keys.duration
-    return max(duration / signal.period, MIN_RUN_CYCLES)
 
 
 def _read_recorded_drive(scene) -> tuple:

@@ -15,7 +15,7 @@ from ..structure.drive_sizes import (
     find_drive_omega,
 )
 from . import structure_reduced
-from .drive import build_signal, count_run_cycles, has_levels
+from .drive import build_signal
 from .law import build_interface_laws, make_interface_names
 from .structure import (
     build_modes,
@@ -31,6 +31,8 @@ from .structure import (
 
 # Largest displacement [m] up to which a motion that grows without bound is computed.
 MAX_TRAVEL = 1e3
+# Smallest number of drive cycles in a run whose length is given as a duration.
+MIN_RUN_CYCLES = 0.25
 # Slide of the first mode per modal coordinate, relative to the largest one of all
 # modes, below which it is round-off.
 MIN_SLIDE_FRACTION = 1e-9
@@ -270,21 +272,28 @@ def _build(scene, own_modes: ModalBasis, interfaces: tuple, joint: float | None 
 
 
 def _build_drive(scene, modes: ModalBasis) -> RigDrive:
-    """Build the drive signal of a rig from [drive]."""
+    """Build the drive signal of a rig from [drive], and the number of drive cycles of the run."""
     keys = scene.drive
     signal = build_signal(scene, modes)
+    waveform = find_waveform(keys)
     levels = DriveLevels()
-    if has_levels(keys):
+    if waveform.has_levels:
         amplitudes = tuple(segment.amplitude for segment in signal.segments)
         levels = DriveLevels(
             amplitudes, count_cycles_per_level(keys), (keys.onset, keys.onset_length)
         )
+        cycles = levels.cycles * len(keys.levels)
+    elif keys.cycles is not None:
+        cycles = keys.cycles
+    else:
+        duration = signal.duration if keys.duration is None else keys.duration
+        cycles = max(duration / signal.period, MIN_RUN_CYCLES)
     return RigDrive(
         signal=signal,
         kind=keys.kind,
-        waveform=find_waveform(keys),
+        waveform=waveform,
         frequency=keys.frequency,
-        cycles=float(count_run_cycles(keys, signal)),
+        cycles=float(cycles),
         force=keys.force if keys.kind == "force" else None,
         levels=levels,
     )

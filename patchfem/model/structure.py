@@ -21,6 +21,7 @@ from .law import InterfaceLaw, build_interface_laws, find_normal_load
 # Fraction of the squared motion of the output below which a mode
 # moves the output by round-off only.
 MIN_MODE_FRACTION = 1e-12
+_build_listed_modes = memoize(listed_modes.build_basis)
 
 
 def build_modes(scene, own_modes: ModalBasis | None = None) -> ModalBasis:
@@ -150,9 +151,8 @@ def compute_sticking_stiffness(interface: InterfaceLaw, load: float) -> float:
 def _build_given_modes(scene) -> ModalBasis:
     """Build the modes that [structure] describes, excluding the spring of the bonded joint."""
     structure = scene.structure
-    is_forced = scene.drive.kind == "force"
     if structure.mode:
-        return _build_listed_modes(structure, is_forced)
+        return _build_listed_modes(structure, scene.drive.kind)
     if structure.reduced is not None:
         return structure_reduced.build_reduced_modes(scene).modes
     if not structure.masses:
@@ -164,21 +164,9 @@ def _build_given_modes(scene) -> ModalBasis:
         [(damper.between, damper.coefficient) for damper in structure.damper],
         pairs,
         structure.output_mass or 1,
-        _find_driven_mass(scene) if is_forced else None,
+        _find_driven_mass(scene) if scene.drive.kind == "force" else None,
     )
     return masses.set_lateral_displacements(modes, laterals)
-
-
-@memoize
-def _build_listed_modes(structure, is_forced: bool) -> ModalBasis:
-    """Build the modes that the tables [[structure.mode]] describe."""
-    basis = listed_modes.build_basis(structure.mode, structure.moving_mass)
-    accelerometer = np.array([mode.accelerometer for mode in structure.mode], float)
-    gauge = np.array([mode.gauge for mode in structure.mode], float)
-    # A force acts at the output, wherever the sensors are.
-    base = frozen_array(-basis.output) if is_forced else basis.base
-    gauge_field = None if np.array_equal(accelerometer, gauge) else frozen_array(gauge)
-    return replace(basis, base=base, output=frozen_array(accelerometer), gauge=gauge_field)
 
 
 def _split_into_strips(scene, modes: ModalBasis) -> ModalBasis:

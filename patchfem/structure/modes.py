@@ -12,34 +12,41 @@ from ..core import ModalBasis, frozen_array
 PATCH_MOTIONS = ("normal", "pitch", "lateral", "yaw")
 
 
-def build_basis(modes, mass: float) -> ModalBasis:
+def build_basis(structure, drive_kind: str) -> ModalBasis:
     """Build the modal basis from the modes that a scene lists.
+
+    The output is the motion of the accelerometer. A force acts at the output of the scene, wherever
+    the sensors are.
 
     Parameters
     ----------
-    modes : sequence
-        Objects with the attributes name, frequency [Hz], damping, slide, base and output, and with
-        the motions normal, pitch, lateral and yaw of the patch.
-    mass : float
-        Modal mass [kg] of each mode.
+    structure : Structure
+        Table with the modal mass `moving_mass` [kg] and with the sequence `mode` of objects with the
+        attributes name, frequency [Hz], damping, slide, base, output, accelerometer and gauge, and
+        with the motions normal, pitch, lateral and yaw of the patch.
+    drive_kind : str
+        Kind of the drive; "force" if it is a force, otherwise the base moves.
 
     Returns
     -------
     ModalBasis
-        A motion of the patch is None if no mode has it.
+        A motion of the patch is None if no mode has it, and `gauge` is None if the gauge and the
+        accelerometer measure the same point.
     """
 
     def column(key: str) -> np.ndarray:
-        return frozen_array([getattr(mode, key) for mode in modes])
+        return frozen_array([getattr(mode, key) for mode in structure.mode])
 
-    patch_motions = {key: column(key) for key in PATCH_MOTIONS}
+    output = column("accelerometer")
+    gauge = column("gauge")
     return ModalBasis(
-        names=tuple(mode.name for mode in modes),
+        names=tuple(mode.name for mode in structure.mode),
         omega=frozen_array(2 * np.pi * column("frequency")),
         zeta=column("damping"),
         slide=column("slide"),
-        base=column("base"),
-        output=column("output"),
-        mass=float(mass),
-        **{key: values for key, values in patch_motions.items() if values.any()},
+        base=frozen_array(-column("output")) if drive_kind == "force" else column("base"),
+        output=output,
+        mass=float(structure.moving_mass),
+        gauge=None if np.array_equal(output, gauge) else gauge,
+        **{key: column(key) for key in PATCH_MOTIONS if column(key).any()},
     )

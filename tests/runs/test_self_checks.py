@@ -8,10 +8,10 @@ import pytest
 import patchfem as pf
 from patchfem.core import Outcome
 from patchfem.dynamics.march import march
+from patchfem.model import structure
 from patchfem.response import rows
 from patchfem.runs.self_checks import checks
 from patchfem.runs.self_checks.evidence import Evidence
-from patchfem.structure import modes
 
 PATCH = """
 [contact]
@@ -115,8 +115,8 @@ def test_always_correct_runs_pass_all_self_checks():
     ("owner", "name", "fault", "scene", "warnings"),
     [
         (  # the warning states the wrong and the right value
-            modes,
-            "build_basis",
+            structure,
+            "_build_listed_modes",
             lambda basis: replace(basis, slide=2 * basis.slide),
             SCENES["exact"].replace("8 g", "8.1 g"),
             ["self-check.*slide of mode 1.* 2,.*it is 1;"],
