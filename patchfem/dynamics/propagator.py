@@ -103,14 +103,17 @@ class Propagator:
 def make_propagator(modes: ModalBasis, drive, steps_per_cycle: int, rows=None) -> Propagator:
     """Return the propagator of the modes for equal steps that divide a drive period.
 
-    Steps of large omega dt use up to MAX_GAUSS_POINTS Gauss points; if these do not suffice, a
-    short step is doubled. The last few propagators are cached, because the runs that estimate
-    errors use the same ones again.
+    The step is exact for a constant friction force and for the drive up to round-off, whatever its
+    length. The energy balance of a run contains the work and the loss of each step, so that it would
+    show a wrong propagator. Steps of large omega dt use up to MAX_GAUSS_POINTS Gauss points; if these
+    do not suffice, a short step is doubled. The last few propagators are cached, because the runs
+    that estimate errors use the same ones again.
 
     Parameters
     ----------
     modes : ModalBasis
     drive
+        Drive signal, of which only the period [s] is used.
     steps_per_cycle : int
     rows : array_like, optional
         (p, n) slide of each port per coordinate; the interfaces by default.
@@ -118,6 +121,7 @@ def make_propagator(modes: ModalBasis, drive, steps_per_cycle: int, rows=None) -
     Returns
     -------
     Propagator
+        For steps of period / steps_per_cycle [s].
     """
     if rows is None and modes.omega.size <= MAX_CACHED_COORDINATES:
         return _make_interface_propagator(_HashableBasis(modes), drive.period, steps_per_cycle)

@@ -144,6 +144,11 @@ def finer_errors(values: dict, finer: dict) -> dict:
     ----------
     values, finer : dict
         Measures by name of the run and of the finer run.
+
+    Returns
+    -------
+    dict
+        Errors by name.
     """
     return convergence_errors(values, finer, ratio=0.5, order=2.0)
 
@@ -161,7 +166,12 @@ def merged_cell_errors(fine: dict, *coarse: dict) -> dict:
     fine : dict
         Measures by name.
     coarse : dict
-        Measures of each coarse run.
+        Measures of each coarse run; the largest change is used.
+
+    Returns
+    -------
+    dict
+        Errors by name, for the measures of all runs.
     """
     changes = [signed_change(fine, values) for values in coarse]
     errors = {}

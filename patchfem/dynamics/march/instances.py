@@ -115,7 +115,23 @@ def load_loop(
 
 
 def march(model, *arguments) -> tuple:
-    """March a model by its compiled loop; return the number of completed steps and a status code."""
+    """March a model by its compiled loop; return the number of completed steps and a status code.
+
+    The loop is `march` of `loop_kernels`, compiled for the contact and the laws of the model. With the environment variable
+    NUMBA_DISABLE_JIT=1 the same source runs in Python.
+
+    Parameters
+    ----------
+    model : ContactModel, joints.JointsModel or varying_load.VaryingLoadModel
+    *arguments
+        Those of the loop.
+
+    Returns
+    -------
+    n_steps : int
+    status : int
+        Value of `MarchStatus`.
+    """
     has_contact = not model.joints or getattr(model, "patch", None) is not None
     loop = load_loop(
         model.kind,

@@ -447,7 +447,14 @@ def choose_engine(model: Model) -> Engine:
 
     The method of the scene selects its engine; if several have this method, the first one that can
     compute the model. For method = "auto" it is the first of AUTOMATIC_ENGINES that can compute the
-    model and is not more expensive than the next one.
+    model and is not more expensive than the next one. All engines solve the same equations, so the
+    choice affects the time and the errors of a run, but not its meaning; the summary of a run names
+    its engine.
+
+    Returns
+    -------
+    Engine
+        Record with the comparison runs from which the errors of its measures are estimated.
     """
     named = [engine for engine in ENGINES.values() if engine.method == model.accuracy.method]
     for engine in named[:-1]:
