@@ -198,7 +198,7 @@ def _reject_drifting(
 
 
 def remove_errors(measures: dict) -> dict:
-    """Return the measures of a growing motion without errors, because it has no final values."""
+    """Return the measures by name with their values, but without errors, because these are unknown."""
     return {name: replace(measure, error=None) for name, measure in measures.items()}
 
 

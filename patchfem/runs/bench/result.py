@@ -11,7 +11,7 @@ from ...core import Outcome
 from ...effects import law_has_trait
 from ...formatting import format_quantity
 from ...response.errors import add_errors
-from ...response.outcome import OPEN_LOOP
+from ...response.outcome import OPEN_LOOP, remove_errors
 from ...response.rows import set_final_floors
 from ..results.notes import (
     note_on_groove_slope,
@@ -28,7 +28,6 @@ from ..results.result import (
     SlipRule,
     can_estimate_mesh_error,
     make_interface_frames,
-    remove_unknown_errors,
 )
 from ..results.travel import (
     MAX_SLIDE_FRACTION,
@@ -83,9 +82,8 @@ def run_prescribed(inputs: RunInputs) -> Result:
             fine.slide[fine.frames],
             SlipRule(nodal_element_limit(model, patch), starts_at_rest=True),
         )
-    measures = remove_unknown_errors(
-        measures, inputs.estimate and can_estimate_mesh_error(model, patch, inputs.coarse)
-    )
+    if not (inputs.estimate and can_estimate_mesh_error(model, patch, inputs.coarse)):
+        measures = remove_errors(measures)
     extra = {
         "engine": fine.engine.name,
         "steps": steps,

@@ -6,7 +6,7 @@ the numerical settings of the run.
 
 import re
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
@@ -229,11 +229,6 @@ def can_estimate_mesh_error(model, patch, coarse) -> bool:
         or model.load_varies
         or (model.rig is not None and model.rig.friction.strips_slide_apart)
     )
-
-
-def remove_unknown_errors(measures: dict, estimate: bool) -> dict:
-    """Return the measures, without errors if the run did not estimate them."""
-    return measures if estimate else {k: replace(m, error=None) for k, m in measures.items()}
 
 
 def collect_used_settings(result) -> dict:

@@ -119,6 +119,7 @@ def add_outcome_and_errors(run: CoupledRun) -> CoupledRun:
     # program.
     if outcome is Outcome.EXCEEDS_TRAVEL and rig.springs.travel == MAX_TRAVEL:
         outcome = Outcome.GROWS
+    # A growing motion has no final values, so the errors of its measures are unknown.
     if outcome is Outcome.GROWS and solution.outcome is not Outcome.GROWS:
         measures = remove_errors(measures)
     return replace(run, outcome=outcome, measures=measures | steady)

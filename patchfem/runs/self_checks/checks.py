@@ -8,7 +8,8 @@ from dataclasses import replace
 from itertools import chain
 
 from ...core import Outcome
-from ..results.result import Result, remove_unknown_errors
+from ...response import outcome
+from ..results.result import Result
 from . import motion, patch, structure
 from .evidence import Evidence
 from .finding import Finding
@@ -27,28 +28,31 @@ CHECKS: tuple[Callable[[Evidence], Iterator[Finding]], ...] = (
 )
 
 
-def run_failed_checks(result: Result) -> list:
-    """Return the findings of all self-checks that fail for a Result."""
-    run = Evidence(result)
-    findings = chain.from_iterable(check(run) for check in CHECKS)
-    return [finding for finding in findings if finding.has_failed]
-
-
 def mark_failed_checks(result: Result) -> Result:
     """Return the Result, marked as `not_converged` with a warning for each failed self-check.
 
-    If no check fails it is returned unchanged. A model that was changed after it was built is not
-    compared with its scene.
+    If no check fails, it is returned unchanged; otherwise its measures lose their errors and keep
+    their values. A model that was changed after it was built is not compared with its scene.
+
+    Parameters
+    ----------
+    result : Result
+
+    Returns
+    -------
+    Result
     """
     model = result.plan.model
     if result.outcome is Outcome.NOT_CONVERGED or not model.source.describes(model):
         return result
-    failed = run_failed_checks(result)
+    run = Evidence(result)
+    findings = chain.from_iterable(check(run) for check in CHECKS)
+    failed = [finding for finding in findings if finding.has_failed]
     if not failed:
         return result
     return replace(
         result,
         outcome=Outcome.NOT_CONVERGED,
-        measures=remove_unknown_errors(result.measures, False),
+        measures=outcome.remove_errors(result.measures),
         warnings=[*(finding.sentence for finding in failed), *result.warnings],
     )
