@@ -24,7 +24,6 @@ from ..core import NotConverged, PatchfemError, compute_allowed_error
 from ..formatting import format_number
 from ..model.model import Model
 from ..model.source import locate_errors
-from ..runs.patch.measures import estimate_static_measures
 from ..runs.patch.mesh_levels import solve_on_split_mesh
 from ..runs.plan import plan
 from ..runs.run import run as run_plan
@@ -435,8 +434,8 @@ def _run_setting(
     """
     try:
         if setting.level:
-            fine, *coarser = solve_on_split_mesh(setting.model.patch, setting.level, can_split)
-            return _FinishedRun(estimate_static_measures(fine, *coarser), (), None)
+            fine, *_ = solve_on_split_mesh(setting.model.patch, setting.level, can_split)
+            return _FinishedRun(fine.measures, (), None)
         result = run_plan(plan(setting.model), fresh=True)
         steps = result.extra.get("steps_per_cycle") or result.extra.get("steps")
         return _FinishedRun(result.measures, result.warnings, steps)

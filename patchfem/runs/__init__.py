@@ -61,7 +61,6 @@ PUBLIC = {
         "solve_with_coarser",
         "solve_on_split_mesh",
     ),
-    "patch.measures": ("estimate_static_measures",),
     "patch.sweep_meshes": ("geometry_key",),
     "patch.press": ("nodal_areas",),
     "patch.result": ("make_piece_meshes_of_run",),

@@ -22,7 +22,6 @@ sys.path.insert(0, str(Path(__file__).parent))
 import tilted
 from scipy.optimize import brentq
 
-from patchfem.runs import estimate_static_measures
 from patchfem.runs.patch.press import solve_patch_contact
 from patchfem.runs.patch.values import compute_static_values
 
@@ -39,7 +38,9 @@ def rolled_pieces(roll: float, count: int, skin: str):
 def case(roll: float, count: int, skin: str = "bare") -> dict:
     """Return {name: Measure} of pieces in strips under a roll [rad], with `yaw` [N m], the moment of sliding friction."""
     three = [solve_patch_contact(rolled_pieces(roll, count, skin), tilted.pair(k)) for k in (1, 0)]
-    return estimate_static_measures(*three) | {"yaw": abs(three[0].strips.yaw_moment(FRICTION))}
+    return tilted.estimate_static_measures(*three) | {
+        "yaw": abs(three[0].strips.yaw_moment(FRICTION))
+    }
 
 
 def roll_for(centre: float, skin: str, count: int = 16) -> float:

@@ -14,8 +14,8 @@ from patchfem.mesh import Layout, TensorGrid, divide_into_columns
 from patchfem.mesh.tensor import graded_depth
 from patchfem.model import build
 from patchfem.model.patch import PatchModel
-from patchfem.runs import estimate_static_measures
 from patchfem.runs.patch.condensed import CondensedPair, condense
+from patchfem.runs.patch.measures import estimate_static_measures
 from patchfem.runs.patch.press import Patch, solve_patch_contact
 from patchfem.scene import scene
 

@@ -17,7 +17,7 @@ from synthetic import self_affine
 
 import patchfem as pf
 from patchfem.model import build
-from patchfem.runs import estimate_static_measures, solve_with_coarser
+from patchfem.runs import solve_with_coarser
 from patchfem.runs.patch import profile_points
 from patchfem.scene import loads
 
@@ -127,15 +127,11 @@ def compare_trace(seed: int, folder: Path, earlier: dict | None = None) -> dict:
 def _solve_on_cells(kind: str, patch_model, tolerance: float) -> dict:
     """Return the measures of a patch on cells alone, uniform ones for kinds in FINE, else graded ones."""
     if kind in FINE:
-        return estimate_static_measures(
-            *solve_with_coarser(patch_model.with_mesh(element_size=LENGTH / CELLS), tolerance)
-        )
+        even = patch_model.with_mesh(element_size=LENGTH / CELLS)
+        return solve_with_coarser(even, tolerance)[0].measures
     can_use_points = profile_points.can_use_points
     profile_points.can_use_points = lambda patch_model: False
     try:
-        patches = [
-            patch for patch in solve_with_coarser(patch_model, tolerance) if patch is not None
-        ]
-        return estimate_static_measures(*patches, tolerance=tolerance)
+        return solve_with_coarser(patch_model, tolerance)[0].measures
     finally:
         profile_points.can_use_points = can_use_points

@@ -135,6 +135,33 @@ def estimate_static_measures(
     return out
 
 
+def with_static_measures(patches, tolerance: float | None, points=None) -> tuple:
+    """Return solved patches of which the finest one has its static measures with their errors.
+
+    Parameters
+    ----------
+    patches : sequence of Patch or None
+        One patch on meshes from fine to coarse; None where there is no such mesh.
+    tolerance : float or None
+        Measures that miss it are extrapolated if the mesh is automatic (`PatchMesh`); a tolerance
+        of the mesh itself takes its place.
+    points : PointSolution, optional
+        Solution on the points of a profile, added to the finest patch.
+
+    Returns
+    -------
+    tuple
+        The patches; the first one is a copy with `Patch.measures` and the points.
+    """
+    fine, *coarse = patches
+    if points is not None:
+        fine = replace(fine, points=points, averaging=points.spacing)
+    mesh = fine.model.mesh
+    used_tolerance = (mesh.tolerance or tolerance) if mesh.is_automatic else None
+    measures = estimate_static_measures(fine, *coarse, tolerance=used_tolerance)
+    return replace(fine, measures=measures), *coarse
+
+
 def _select_more_accurate_point_measures(measures_by_name: dict, estimates: dict) -> dict:
     """Return the measures that profile points determine more accurately than the mesh.
 
@@ -297,12 +324,6 @@ def max_mesh_error_ratio(measures_by_name: dict, tolerance: float) -> float:
     ignored.
     """
     return max(measures_by_name[name].error_ratio(tolerance) for name in MESH_MEASURES)
-
-
-def estimate_mesh_error_ratio(patches, tolerance: float) -> float:
-    """Return `max_mesh_error_ratio` of a patch that is solved on meshes from fine to coarse."""
-    measures = estimate_static_measures(*patches, tolerance=tolerance)
-    return max_mesh_error_ratio(measures, tolerance)
 
 
 def _reason_for_unbounded_pressure(patch: Patch) -> str:

@@ -5,7 +5,6 @@ does not prescribe is refined until the static measures meet the tolerance or th
 expensive (`solve_on_refined_meshes`).
 """
 
-from dataclasses import replace
 from functools import partial
 
 from ...core import NotConverged, Outcome
@@ -13,7 +12,7 @@ from ...model.pieces import make_piece_meshes
 from . import profile_points, slip_zones, store
 from .condensed import condense, condense_on_shared_meshes
 from .grids import MAX_CONDENSING_SECONDS, MIN_LEVELS, make_base_grids, predict_condensing_seconds
-from .measures import estimate_mesh_error_ratio
+from .measures import estimate_static_measures, max_mesh_error_ratio, with_static_measures
 from .press import solve, solve_patch_contact
 
 # Tolerance at which a patch with prescribed partial slip may take as much CPU time as a patch in a
@@ -45,7 +44,7 @@ def solve_on_split_mesh(patch_model, level: int, estimate: bool) -> tuple:
     bodies = make_piece_meshes(patch_model)
     for _ in range(level):
         bodies = tuple(None if body is None else body.refine() for body in bodies)
-    return _solve_with_coarser(patch_model, bodies, estimate, True)
+    return _solve_on_given_meshes(patch_model, bodies, None, estimate, ignore_cache=True)
 
 
 def solve_with_coarser(
@@ -70,7 +69,8 @@ def solve_with_coarser(
     Returns
     -------
     tuple
-        Patches from fine to coarse, at least two; None for each mesh that is not solved.
+        Patches from fine to coarse, at least two; None for each mesh that is not solved. The first
+        has the static measures with the errors that follow from all of them (`Patch.measures`).
     """
     if patch_model.solved is not None and not ignore_cache:
         return patch_model.solved.patches
@@ -79,38 +79,34 @@ def solve_with_coarser(
     if mesh.shared is None:
         if mesh.is_automatic:
             return solve_on_refined_meshes(patch_model, tolerance, estimate, ignore_cache)
-        return _solve_with_coarser(
-            patch_model, make_piece_meshes(patch_model), estimate, ignore_cache
-        )
+        bodies = make_piece_meshes(patch_model)
+        return _solve_on_given_meshes(patch_model, bodies, tolerance, estimate, ignore_cache)
     if ignore_cache:
         pairs = [condense(patch_model, *level, ignore_cache=True) for level in mesh.shared.levels]
-        return solve_on_pairs(patch_model, pairs, estimate)
+        return solve_on_pairs(patch_model, pairs, tolerance, estimate)
     patches = store.get_or_compute_in_sweep(
         patch_model,
-        ("patches", store.content_key(patch_model), estimate),
-        lambda: solve_on_pairs(patch_model, condense_on_shared_meshes(patch_model), estimate),
+        ("patches", store.content_key(patch_model), tolerance, estimate),
+        lambda: solve_on_pairs(
+            patch_model, condense_on_shared_meshes(patch_model), tolerance, estimate
+        ),
     )
-    if estimate and _misses_tolerance_with_profile(patch_model, patches, tolerance):
+    has_profile = mesh.is_automatic and patch_model.gap.profile is not None
+    if has_profile and max_mesh_error_ratio(patches[0].measures, tolerance) > 1:
         return solve_on_refined_meshes(patch_model.with_mesh(shared=None), tolerance)
     return patches
 
 
-def _misses_tolerance_with_profile(patch_model, patches: tuple, tolerance: float) -> bool:
-    """Return whether a patch with a profile misses its tolerance on shared meshes."""
-    has_trace = patch_model.mesh.is_automatic and patch_model.gap.profile is not None
-    if not has_trace or patches[1] is None:
-        return False
-    return estimate_mesh_error_ratio(patches, tolerance) > 1
-
-
-def solve_on_pairs(patch_model, pairs, estimate: bool = True) -> tuple:
+def solve_on_pairs(patch_model, pairs, tolerance: float, estimate: bool = True) -> tuple:
     """Solve a patch on given condensed pieces.
 
     Parameters
     ----------
     patch_model : PatchModel
-    sequence of CondensedPair
+    pairs : sequence of CondensedPair
         From fine to coarse.
+    tolerance : float
+        See `with_static_measures`.
     estimate : bool
         Whether to use the coarser pieces as well.
 
@@ -120,19 +116,17 @@ def solve_on_pairs(patch_model, pairs, estimate: bool = True) -> tuple:
         Patches as in `solve_with_coarser`.
     """
     needed_pairs = pairs if estimate else pairs[:1]
-    return _pad_with_none(solve_patch_contact(patch_model, pair) for pair in needed_pairs)
+    patches = [solve_patch_contact(patch_model, pair) for pair in needed_pairs]
+    return with_static_measures((*patches, *(3 - len(patches)) * [None]), tolerance)
 
 
-def _pad_with_none(patches) -> tuple:
-    """Append None to a sequence of patches until it has at least three entries."""
-    out = tuple(patches)
-    return out + (None,) * (3 - len(out))
-
-
-def _solve_with_coarser(patch_model, bodies: tuple, estimate: bool, ignore_cache: bool) -> tuple:
+def _solve_on_given_meshes(
+    patch_model, bodies: tuple, tolerance: float | None, estimate: bool, ignore_cache: bool
+) -> tuple:
     """Solve a patch on given meshes and on the meshes of its error estimate."""
     levels = [bodies, *(make_comparison_meshes(*bodies) if estimate else ())]
-    return _pad_with_none(solve(patch_model, *level, ignore_cache) for level in levels)
+    pairs = [condense(patch_model, *level, ignore_cache=ignore_cache) for level in levels]
+    return solve_on_pairs(patch_model, pairs, tolerance)
 
 
 def make_file_meshes(patch_model) -> list:
@@ -184,39 +178,36 @@ def solve_on_refined_meshes(
     Returns
     -------
     tuple
-        Patches on all meshes, from fine to coarse.
+        Patches on all meshes, from fine to coarse. The first has the static measures of the last
+        turn of the refinement (`Patch.measures`), by which the refinement ended.
     """
     grids = make_base_grids(patch_model).bodies
-    patches = []
+    patches = ()
     points = None
     has_failed_on_points = False
     while True:
         patch = None
         if estimate or len(patches) == MIN_LEVELS - 1:
             try:
-                patch = solve_patch_contact(
-                    patch_model, condense(patch_model, *grids, ignore_cache=ignore_cache)
-                )
+                patch = solve(patch_model, *grids, ignore_cache=ignore_cache)
             # The cells are too short for double precision, so that the finest mesh is left out.
             except NotConverged:
                 if not patches or patches[0] is None:
                     raise
-                return tuple(patches) if len(patches) > 1 else (*patches, None)
-        patches.insert(0, patch)
+                return with_static_measures((*patches, *(2 - len(patches)) * [None]), tolerance)
+        patches = (patch, *patches)
         grids = [grid.refine() for grid in grids]
         if len(patches) < MIN_LEVELS:
             continue
-        if not estimate or patch.pressure.outcome is Outcome.NO_CONTACT:
-            return tuple(patches)
-        seconds = predict_condensing_seconds(grids)
         # The solution on the points of the profile is used with all finer meshes.
-        if points is not None:
-            patches[0] = _attach_point_solution(patch, points)
-        is_within = estimate_mesh_error_ratio(patches, tolerance) <= 1
-        resolves_slip = _resolves_slip_work(patch_model, patches, tolerance)
+        patches = with_static_measures(patches, tolerance, points)
+        if not estimate or patch.pressure.outcome is Outcome.NO_CONTACT:
+            return patches
+        seconds = predict_condensing_seconds(grids)
+        is_within = max_mesh_error_ratio(patches[0].measures, tolerance) <= 1
         if (
-            seconds > MAX_CONDENSING_SECONDS[False]
-            and not is_within
+            not is_within
+            and seconds > MAX_CONDENSING_SECONDS[False]
             and not has_failed_on_points
             and profile_points.can_use_points(patch_model)
         ):
@@ -224,24 +215,18 @@ def solve_on_refined_meshes(
             points = profile_points.solve_on_points(patch_model, meets_tolerance)
             # points that do not converge do not do so on the next mesh either
             has_failed_on_points = points is None
-            patches[0] = _attach_point_solution(patch, points)
-            is_within = estimate_mesh_error_ratio(patches, tolerance) <= 1
-        is_done = resolves_slip and (patches[0].points is not None or is_within)
-        if is_done or seconds > max_condensing_seconds(patch_model, tolerance):
-            return tuple(patches)
+            patches = with_static_measures(patches, tolerance, points)
+        is_done = is_within or patches[0].points is not None
+        if is_done and _resolves_slip_work(patch_model, patches, tolerance):
+            return patches
+        if seconds > max_condensing_seconds(patch_model, tolerance):
+            return patches
 
 
-def _attach_point_solution(patch, points):
-    """Add a solution on the points of a profile, if any, to a patch."""
-    if points is None:
-        return patch
-    return replace(patch, points=points, averaging=points.spacing)
-
-
-def _meets_tolerance(patches: list, tolerance: float, points) -> bool:
-    """Return whether all measures that control the mesh meet the tolerance."""
-    fine = _attach_point_solution(patches[0], points)
-    return estimate_mesh_error_ratio((fine, *patches[1:]), tolerance) <= 1
+def _meets_tolerance(patches: tuple, tolerance: float, points) -> bool:
+    """Return whether the measures that control the mesh meet the tolerance with given points."""
+    fine = with_static_measures(patches, tolerance, points)[0]
+    return max_mesh_error_ratio(fine.measures, tolerance) <= 1
 
 
 def max_condensing_seconds(patch_model, tolerance: float | None = None) -> float:
@@ -290,7 +275,7 @@ def solve_on_static_meshes(
     )
 
 
-def _resolves_slip_work(patch_model, patches: list, tolerance: float) -> bool:
+def _resolves_slip_work(patch_model, patches, tolerance: float) -> bool:
     """Return whether the meshes of a patch resolve the friction work of a prescribed displacement."""
     if patch_model.mesh.slip is None:
         return True
@@ -317,10 +302,12 @@ def tolerance_for_finer_mesh(patch_model, patches, tolerance: float) -> float | 
         return None
     solved = [patch for patch in patches if patch is not None]
     if patches[0].points is not None:
-        return tolerance / 10 if estimate_mesh_error_ratio(solved, tolerance) <= 1 else None
+        is_within = max_mesh_error_ratio(patches[0].measures, tolerance) <= 1
+        return tolerance / 10 if is_within else None
     for decade in range(1, MAX_DECADES + 1):
         tighter = tolerance * 10.0**-decade
-        is_within = estimate_mesh_error_ratio(solved, tighter) <= 1
+        measures = estimate_static_measures(*solved, tolerance=tighter)
+        is_within = max_mesh_error_ratio(measures, tighter) <= 1
         is_done = is_within and _resolves_slip_work(patch_model, solved, tighter)
         if not is_done and seconds <= max_condensing_seconds(patch_model, tighter):
             return tighter

@@ -96,6 +96,8 @@ class Patch:
     - step_variants: for a gap with a step at a node: (weight, Patch) with this node on the higher
       side of the step, and the same on the lower side; else ().
     - points: PointSolution of a patch with a profile; None if the mesh has the finest solution.
+    - measures: static measures by name with their errors, of the finest of several meshes
+      (`measures.with_static_measures`); None for a patch that was solved on a single mesh.
     - frames: frames of the interface (`Result.fields`); {} before the end of the run.
     """
 
@@ -112,6 +114,7 @@ class Patch:
     averaging: float | None = None
     step_variants: tuple = ()
     points: PointSolution | None = None
+    measures: dict | None = None
     frames: dict = field(default_factory=dict)
 
     @property

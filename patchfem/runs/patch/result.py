@@ -19,7 +19,7 @@ from ...surface import nodes
 from ..results.patch_rows import TABLE
 from ..results.result import Result, RunInputs, collect_rest_frame
 from . import skin, store
-from .measures import add_strip_count_errors, estimate_static_measures, note_on_plane_state
+from .measures import add_strip_count_errors, note_on_plane_state
 from .mesh_levels import solve_on_static_meshes, solve_with_coarser
 from .values import compute_static_values, contact_reaches_steep_end
 
@@ -67,14 +67,15 @@ def make_piece_meshes_of_run(model) -> tuple:
 
 
 def static_measures(model, patch, coarse) -> dict:
-    """Return the static measures of the patch of a model, with error estimates.
+    """Return the measures of a solved patch with the floors of their errors.
 
-    If the mesh was chosen from the tolerance, measures that miss the tolerance are extrapolated.
+    Values and errors are those of `Patch.measures`; only strips add the error due to their number.
 
     Parameters
     ----------
     model : Model
     patch : Patch
+        With measures, as from `solve_with_coarser`.
     coarse : sequence of Patch or None
         The patch on coarser meshes, from fine to coarse; None for a missing one.
 
@@ -84,22 +85,10 @@ def static_measures(model, patch, coarse) -> dict:
         Measure by name, with the floors of `measure_floors`.
     """
     patch_model = model.patch
-    tolerance = None
-    if patch_model.mesh.is_automatic:
-        tolerance = patch_model.mesh.tolerance or model.accuracy.tolerance
-    if patch_model.solved is not None:
-        measures_by_name = patch_model.solved.measures
-    else:
-        patches = (patch, *coarse)
-        measures_by_name = store.get_or_compute_in_sweep(
-            patch_model,
-            ("measures", patches, tolerance),
-            lambda: estimate_static_measures(*patches, tolerance=tolerance),
-        )
-    values_by_name = {name: measure.value for name, measure in measures_by_name.items()}
+    values_by_name = {name: measure.value for name, measure in patch.measures.items()}
     min_floors = measure_floors(patch_model, model.accuracy.tolerance, values_by_name)
     measures = {}
-    for name, measure in measures_by_name.items():
+    for name, measure in patch.measures.items():
         measures[name] = replace(measure, floor=max(measure.floor, min_floors[name]))
     # For worn strips, `wear.measures` adds the error due to their number.
     if patch.strips is None or coarse[0] is None or model.wear is not None:

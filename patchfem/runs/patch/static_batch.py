@@ -7,6 +7,7 @@ one.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import chain, pairwise
 from types import MappingProxyType
 from typing import NamedTuple
@@ -41,12 +42,10 @@ MAX_END_CELLS = 2
 class SolvedPatch(NamedTuple):
     """Solution of a patch that was computed in a batch with other patches.
 
-    - measures: static measures by name.
     - plane_sentences: notes on the plane state (`measures.note_on_plane_state`).
-    - patches: the solved Patch on all meshes, from fine to coarse.
+    - patches: the solved Patch on all meshes, from fine to coarse; the first has its measures.
     """
 
-    measures: dict
     plane_sentences: list
     patches: tuple
 
@@ -269,11 +268,10 @@ def solve_similar_patches(patch_models, tolerance: float) -> list:
     out = [None] * len(patch_models)
     for case in np.flatnonzero(solution.is_solved).tolist():
         patch_model = patch_models[case]
-        out[case] = SolvedPatch(
-            solution.measures(case),
-            solution.plane_sentences(patch_model, case),
-            tuple(_extract_patch(patch_model, pair, level, case) for pair, level in levels),
-        )
+        fine, *coarse = (_extract_patch(patch_model, *level, case) for level in levels)
+        fine = replace(fine, measures=solution.measures(case))
+        sentences = solution.plane_sentences(patch_model, case)
+        out[case] = SolvedPatch(sentences, (fine, *coarse))
     return out
 
 

@@ -18,7 +18,7 @@ from ...mesh.tensor import TensorGrid
 from ...model.patch import SharedMeshes
 from . import grids, mesh_levels
 from .condensed import cache_condensed_pairs, condense
-from .measures import estimate_mesh_error_ratio
+from .measures import max_mesh_error_ratio
 from .press import solve_patch_contact
 from .static_batch import max_mesh_error_ratios, solve_patches_on_pair
 
@@ -364,7 +364,7 @@ def _refine_until_tolerance_is_met(
 def _max_mesh_error_ratio(patch_model, pairs: list, tolerance: float) -> float:
     """Return the largest ratio of error to allowed error of a patch; 0 if it is not solved."""
     try:
-        patches = mesh_levels.solve_on_pairs(patch_model, pairs)
-        return estimate_mesh_error_ratio(patches, tolerance)
+        fine, *_ = mesh_levels.solve_on_pairs(patch_model, pairs, tolerance)
+        return max_mesh_error_ratio(fine.measures, tolerance)
     except PatchfemError:
         return 0.0

@@ -22,7 +22,7 @@ from ...disk.atomic_write import write_atomically
 from ...effects import describe_unsupported
 from ...wear.depth import wear_rates
 from ...wear.jumps import WearProblem, WearState, make_initial_wear_state, replay_jumps, take_jump
-from ..patch.measures import with_other_strip_count
+from ..patch.measures import with_other_strip_count, with_static_measures
 from ..patch.press import make_contact_force_function, nodal_areas, solve_patch_contact
 from ..patch.values import compute_static_values
 from ..rig import numerics
@@ -229,10 +229,11 @@ def compute_wear(
             state, moments = initial
             patch = solve_patch_contact(patch_model, patch.pair, frozen_array(state.depth))
     except _UnboundedMotion as reason:
-        worn = tuple(mesh and _add_earlier_wear(model, mesh) for mesh in coarse)
+        worn = [mesh and _add_earlier_wear(model, mesh) for mesh in coarse]
+        patch, *worn = with_static_measures((patch, *worn), model.accuracy.tolerance)
         stop_reason = f"nothing was worn: {reason}"
         seconds = perf_counter() - clock
-        return WornPatch(patch, worn, None, (), (), None, 0.0, seconds, stop_reason)
+        return WornPatch(patch, tuple(worn), None, (), (), None, 0.0, seconds, stop_reason)
     while state.cycle < n_cycles and find_worn_through_coating(model, state.depth) is None:
         try:
             state = _take_next_jump(model, problem, state)
@@ -255,9 +256,11 @@ def compute_wear(
     stripped = None
     if replayed and strips_model is not patch_model:
         stripped = _replay_wear(strips_model, model, patch, patch, moments)
+    worn = (*(worn for worn, _ in replayed), *(None for mesh in coarse if mesh is None))
+    patch, *worn = with_static_measures((patch, *worn), model.accuracy.tolerance)
     return WornPatch(
         patch,
-        (*(worn for worn, _ in replayed), *(None for mesh in coarse if mesh is None)),
+        tuple(worn),
         state,
         moments,
         tuple(depth for _, depth in replayed),
