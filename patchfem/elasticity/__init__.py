@@ -40,7 +40,6 @@ PUBLIC = {
         "compute_displacement",
         "interface_compliance",
         "lame",
-        "make_piece",
         "von_mises",
     ),
     "fronts": (

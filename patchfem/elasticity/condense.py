@@ -43,10 +43,6 @@ class KeptNodeFactor:
     lower_factor: np.ndarray
     n_interface: int
 
-    def compliance(self) -> np.ndarray:
-        """Return the last diagonal block (n_interface, n_interface) of the inverse."""
-        return cho_inverse(self.lower_factor[-self.n_interface :, -self.n_interface :])
-
     def solve(self, load) -> np.ndarray:
         """Return the displacements (n, 2, r) of the retained nodes under loads of the same shape."""
         out = np.zeros_like(load).reshape(-1, load.shape[-1])
@@ -82,7 +78,12 @@ class CondensedGrid:
             Symmetric; node by node along x and inward.
         """
         with use_one_blas_thread():
-            parts = [factor.compliance() for factor in self.kept_factors]
+            parts = []
+            for factor in self.kept_factors:
+                # The unknowns of the interface come last, so that this block of the Cholesky factor
+                # is that of their Schur complement.
+                interface = slice(-factor.n_interface, None)
+                parts.append(cho_inverse(factor.lower_factor[interface, interface]))
         return self._join_halves(*parts) if self.is_mirrored else parts[0]
 
     def _join_halves(self, even, odd) -> np.ndarray:

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..core import NotConverged, frozen_array
 from ..formatting import format_length
+from ..mesh.tensor import TensorGrid
 from .condense import CondensedGrid, condense
 from .lapack import use_one_blas_thread
 from .tensor_stiffness import tensor_stencil
@@ -61,40 +62,25 @@ def lame(young: float, poisson: float, plane: str) -> tuple[float, float]:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Piece:
-    """Piece on a tensor grid with a fixed far face, whose stiffness is assembled on first use.
+    """Piece on a tensor grid of bilinear quadrilaterals, whose far face is fixed.
 
-    A piece whose compliance is in the disk cache is often never assembled.
+    The stiffness is assembled and factorised on first use: a piece whose compliance is in the disk
+    cache is often never assembled.
 
-    - ``x``: (nx,) [m] of the interface nodes
-    - ``depth``: (ny,) [m] of the rows of nodes
-    - ``nodes``: (nx * ny, 2) x and depth [m]; node column * ny + row
-    - ``cells``: (t, 4) nodes, column by column
-    - ``is_coating``: (t,) bool
+    - ``grid``: columns and rows of nodes
     - ``layers``: the materials
-    - ``computed``: cached results by name: stencil and factor
+    - ``computed``: cached results by name: factor
     """
 
-    x: np.ndarray
-    depth: np.ndarray
-    nodes: np.ndarray
-    cells: np.ndarray
-    is_coating: np.ndarray
+    grid: TensorGrid
     layers: Layers
     computed: dict = field(default_factory=dict)
 
     @property
-    def is_mirrored(self) -> bool:
-        """Return whether the piece is mirror-symmetric in x, to round-off of the coordinates."""
-        grid = self.nodes.reshape(self.x.size, -1, 2)
-        return bool(np.abs(grid * [-1, 1] - grid[::-1]).max() <= 1e-13 * np.ptp(self.x))
-
-    @property
     def stencil(self) -> np.ndarray:
         """Stiffness per unit width (nx, ny - 1, 3, 3, 2, 2) [N/m per m] (`tensor_stiffness`)."""
-        if "stencil" not in self.computed:
-            lam, mu = self.layers.lame(self.is_coating[: self.depth.size - 1])
-            self.computed["stencil"] = tensor_stencil(self.x, self.depth, lam, mu)
-        return self.computed["stencil"]
+        lam, mu = self.layers.lame(self.grid.is_coating_cell()[0])
+        return tensor_stencil(self.grid.x, self.grid.depth, lam, mu)
 
     @property
     def round_off_error(self) -> float:
@@ -108,22 +94,23 @@ class Piece:
         NotConverged, with a remedy, if the stiffness cannot be factorised.
         """
         if "factor" not in self.computed:
+            x = self.grid.x
+            is_mirrored = np.abs(x + x[::-1]).max() <= 1e-13 * self.grid.length
             try:
-                self.computed["factor"] = condense(self.stencil, self.is_mirrored)
+                self.computed["factor"] = condense(self.stencil, bool(is_mirrored))
             except NotConverged as error:
-                min_length = min(np.diff(self.x).min(), np.diff(self.depth).min())
-                size = (np.ptp(self.x), self.depth[-1])
+                min_length = min(np.diff(x).min(), np.diff(self.grid.depth).min())
+                size = (self.grid.length, self.grid.height)
                 remedy = describe_remedy(
-                    self.layers, min_length, size, has_coating=self.is_coating.any()
+                    self.layers, min_length, size, has_coating=self.grid.coating_rows > 0
                 )
                 raise NotConverged(f"{error}; {remedy}") from None
         return self.computed["factor"]
 
     def solve(self, load) -> np.ndarray:
         """Return displacements (frames, nx * ny, 2) [m] under loads (nx, 2, frames) [N/m]."""
-        nx = self.x.size
-        frames = load.shape[-1]
-        out = np.zeros((frames, nx, self.depth.size, 2))
+        nx, _, frames = load.shape
+        out = np.zeros((frames, nx, self.grid.depth.size, 2))
         out[:, :, :-1] = np.moveaxis(self.factor.displacement(load), 3, 0)
         return out.reshape(frames, -1, 2)
 
@@ -156,50 +143,6 @@ def describe_remedy(layers: Layers, min_length: float, size, *, has_coating: boo
         f"{format_length(size[0], 3)} x {format_length(size[1], 3)}: use longer "
         "cells (contact.element_size, or the cells of contact.mesh)"
     )
-
-
-def make_piece(x, depth, coating_rows: int, layers: Layers) -> Piece:
-    """Create a piece on a tensor grid of bilinear quadrilaterals; its stiffness is not yet assembled.
-
-    Parameters
-    ----------
-    x : (nx,) ndarray [m]
-    depth : (ny,) ndarray [m]
-    coating_rows : int
-        Number of rows of cells in the coating.
-    layers : Layers
-
-    Returns
-    -------
-    Piece
-    """
-    nodes = np.stack(np.broadcast_arrays(np.asarray(x)[:, None], depth), axis=-1).reshape(-1, 2)
-    cells, is_coating = grid_cells(x.size, depth.size, coating_rows)
-    return Piece(x, depth, nodes, cells, is_coating, layers)
-
-
-def grid_cells(columns: int, rows: int, coating_rows: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the corner nodes of the cells of a tensor grid, column by column.
-
-    The corners of a cell are (column, row), (column + 1, row), (column + 1, row + 1) and
-    (column, row + 1).
-
-    Parameters
-    ----------
-    columns, rows : int
-        Numbers of nodes.
-    coating_rows : int
-        Number of rows of cells in the coating.
-
-    Returns
-    -------
-    cells : (t, 4) ndarray of int
-        Nodes column * rows + row.
-    is_coating : (t,) ndarray of bool
-    """
-    first = (np.arange(columns - 1)[:, None] * rows + np.arange(rows - 1)).ravel()
-    cells = np.stack([first, first + rows, first + rows + 1, first + 1], axis=1)
-    return cells, first % rows < coating_rows
 
 
 def compute_displacement(piece, shear: np.ndarray, normal: np.ndarray) -> np.ndarray:

@@ -53,7 +53,14 @@ class Cells:
 def get_cells(piece) -> Cells:
     """Return the cells of an elasticity.Piece or a substructure.Substructure."""
     if isinstance(piece, Piece):
-        return Cells(piece.nodes, (piece.cells,), piece.is_coating, piece.layers)
+        x = piece.grid.x
+        depth = piece.grid.depth
+        points = np.stack(np.broadcast_arrays(x[:, None], depth), axis=-1).reshape(-1, 2)
+        # A cell has the nodes (column, row), (column + 1, row), (column + 1, row + 1) and
+        # (column, row + 1); cells and nodes are numbered column by column.
+        first = (np.arange(x.size - 1)[:, None] * depth.size + np.arange(depth.size - 1)).ravel()
+        corners = np.stack([first, first + depth.size, first + depth.size + 1, first + 1], axis=1)
+        return Cells(points, (corners,), piece.grid.is_coating_cell().ravel(), piece.layers)
     mesh = piece.mesh
     blocks = tuple(block for block in (mesh.triangles, mesh.quads) if len(block))
     return Cells(mesh.points, blocks, mesh.is_coating, piece.layers)

@@ -13,7 +13,7 @@ from patchfem.closed_forms import contact as exact
 from patchfem.contact import press
 from patchfem.contact.gaps import crown, tilt
 from patchfem.core import Compliance, Interface, frozen_array
-from patchfem.elasticity import Layers, interface_compliance, make_piece
+from patchfem.elasticity import Layers, Piece, interface_compliance
 from patchfem.mesh import TensorGrid
 from patchfem.mesh.tensor import graded_rows
 
@@ -90,7 +90,7 @@ def compute_errors(x, p) -> tuple:
 def condense_pair(grid: TensorGrid, bodies: int) -> Compliance:
     """Condense the pair from its meshes: one piece counted twice, or both pieces assembled and condensed."""
     layers = Layers(MATERIAL, MATERIAL, "strain")
-    parts = [interface_compliance(make_piece(grid.x, grid.depth, 0, layers)) for _ in range(bodies)]
+    parts = [interface_compliance(Piece(grid, layers)) for _ in range(bodies)]
     low = parts[0]
     high = parts[-1]
     return Compliance(

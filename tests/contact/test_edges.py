@@ -9,7 +9,7 @@ from pieces import TITANIUM, make_bare_layers, make_refined_grid
 from patchfem.closed_forms.contact import hertz_half_width
 from patchfem.contact import edges, press
 from patchfem.core import Compliance, Interface, frozen_array
-from patchfem.elasticity import interface_compliance, make_piece
+from patchfem.elasticity import Piece, interface_compliance
 
 WIDTH = 12.7e-3
 HALF_WIDTH = 0.1e-3
@@ -54,7 +54,7 @@ def hertz_block():
 
 def compute_block(grid) -> tuple:
     """Return the compliance of two titanium pieces on a grid and the height [m] of its first row."""
-    nn, tt, _ = interface_compliance(make_piece(grid.x, grid.depth, 0, make_bare_layers(TITANIUM)))
+    nn, tt, _ = interface_compliance(Piece(grid, make_bare_layers(TITANIUM)))
     interface = Interface(grid.x, frozen_array(grid.tributary_lengths() * WIDTH), WIDTH)
     return Compliance(interface, frozen_array(2 * nn / WIDTH), frozen_array(2 * tt / WIDTH)), float(
         grid.depth[1]

@@ -15,8 +15,9 @@ from patchfem.contact import (
     solve_by_gradients,
 )
 from patchfem.contact.half_space.point_compliance import find_edges, set_stiffness
-from patchfem.elasticity import Layers, make_piece
+from patchfem.elasticity import Layers, Piece
 from patchfem.elasticity.condense import condense
+from patchfem.mesh import TensorGrid
 
 LENGTH, HEIGHT, THICKNESS = 12.7e-3, 6.35e-3, 0.1524e-3
 COATED = Layers((250e9, 0.24), (120e9, 0.32), "strain")
@@ -59,9 +60,10 @@ def test_order_of_strip_compliance_on_finite_elements(component, plane):
                 THICKNESS + (HEIGHT - THICKNESS) * np.linspace(0, 1, cells // 2) ** 1.8,
             ]
         )
-        piece = make_piece(x, depth, cells // 10, layers)
-        stencil = fix_ends(piece.stencil, component)
-        face = condense(stencil, False).compliance()[1 - component :: 2, 1 - component :: 2]
+        piece = Piece(TensorGrid(x, depth, cells // 10), layers)
+        face = condense(fix_ends(piece.stencil, component), False).compliance()[
+            1 - component :: 2, 1 - component :: 2
+        ]
         weight = np.full(x.size, x[1])
         weight[[0, -1]] /= 2
         k = np.array([0.0, 2.0, 5.0]) * np.pi / LENGTH
@@ -136,8 +138,7 @@ def test_always_mirrored_contact_has_same_stiffness():
 def test_exact_smooth_modes_reproduce_end_compliance():
     """The smooth modes reproduce the change of compliance by the free ends within 1e-7."""
     x = np.linspace(-LENGTH / 2, LENGTH / 2, 41)
-    depth = HEIGHT * np.linspace(0, 1, 21) ** 1.5
-    piece = make_piece(x, depth, 0, COATED)
+    piece = Piece(TensorGrid(x, HEIGHT * np.linspace(0, 1, 21) ** 1.5, 0), COATED)
     end_change = end_compliance(piece)[0]
     modes, weights = smooth_modes(x, end_change, x)
     assert modes * weights @ modes.T == pytest.approx(

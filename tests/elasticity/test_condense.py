@@ -12,14 +12,14 @@ from pieces import CARBIDE, COATED, TITANIUM
 from stiffness import free_stiffness
 
 from patchfem.core import NotConverged
-from patchfem.elasticity import Layers, interface_compliance, make_piece
+from patchfem.elasticity import Layers, Piece, interface_compliance
 from patchfem.elasticity.condense import MAX_REFINEMENT_CHANGE, condense
 from patchfem.mesh import TensorGrid, graded_grid
 
 
 def make_grid_piece(grid, layers=COATED):
     """Return the piece of a tensor grid."""
-    return make_piece(grid.x, grid.depth, grid.coating_rows, layers)
+    return Piece(grid, layers)
 
 
 def make_random_piece(columns, rows, seed=None):
@@ -65,7 +65,7 @@ def test_exact_grid_compliance_equals_dense_inverse(columns, rows, seed):
 def test_exact_symmetric_halves_equal_whole_piece(columns):
     """Condensing the two halves of a symmetric piece gives the compliance of the whole piece, with fewer entries."""
     piece = make_random_piece(columns, 17)
-    assert piece.is_mirrored
+    assert piece.factor.is_mirrored
     whole, halves = (condense(piece.stencil, mirrored) for mirrored in (False, True))
     whole_compliance = whole.compliance()
     half_compliance = halves.compliance()

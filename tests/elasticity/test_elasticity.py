@@ -13,10 +13,10 @@ from stiffness import free_stiffness
 from patchfem.closed_forms.contact import layered_compliance
 from patchfem.elasticity import (
     Layers,
+    Piece,
     centre_stress,
     compute_displacement,
     get_cells,
-    make_piece,
     von_mises,
 )
 from patchfem.mesh import TensorGrid, graded_grid
@@ -32,7 +32,7 @@ NONUNIFORM_GRID = TensorGrid(
 
 def make_grid_piece(grid, layers):
     """Return the piece of a tensor grid."""
-    return make_piece(grid.x, grid.depth, grid.coating_rows, layers)
+    return Piece(grid, layers)
 
 
 @pytest.mark.parametrize("plane", ["strain", "stress"])
@@ -41,9 +41,10 @@ def test_exact_each_element_row_carries_load(plane):
     grid = graded_grid(4e-3, 2e-3, 2e-4, COATING)
     piece = make_grid_piece(grid, Layers(CARBIDE, TITANIUM, plane))
     shear, normal = np.random.default_rng(2).normal(size=(2, 4, grid.x.size))
-    stress = centre_stress(get_cells(piece), compute_displacement(piece, shear, normal))
+    cells = get_cells(piece)
+    stress = centre_stress(cells, compute_displacement(piece, shear, normal))
     mises = von_mises(stress)
-    corner = piece.cells
+    corner = cells.blocks[0]
     ny = grid.depth.size
     widths = grid.x[corner[:, 1] // ny] - grid.x[corner[:, 0] // ny]
     row = corner[:, 0] % ny
@@ -73,9 +74,10 @@ def test_exact_linear_field_satisfies_hooke_law(coating, substrate, plane, slope
     (ux, uy), (vx, vy) = np.reshape(slopes, (2, 2)) * 1e-3
     x, y = np.meshgrid(NONUNIFORM_GRID.x, NONUNIFORM_GRID.depth, indexing="ij")
     field = np.stack([ux * x + uy * y, vx * x + vy * y], axis=-1).reshape(1, -1, 2)
-    stress = centre_stress(get_cells(piece), field)
+    cells = get_cells(piece)
+    stress = centre_stress(cells, field)
     for is_coating, (young, nu) in ((True, coating), (False, substrate)):
-        sxx, syy, szz, sxy = stress[0, piece.is_coating == is_coating].T
+        sxx, syy, szz, sxy = stress[0, cells.is_coating == is_coating].T
         scale = 1e-11 * (np.abs(slopes).max() * 1e-3 + 1e-300) / (1 - 2 * nu)
         assert np.abs((sxx - nu * (syy + szz)) / young - ux).max() <= scale
         assert np.abs((syy - nu * (sxx + szz)) / young - vy).max() <= scale
@@ -95,7 +97,7 @@ def half_wave_compliance(n_elements, wavelength):
         depth = np.sort(np.concatenate([depth, (depth[1:] + depth[:-1]) / 2]))
         rows *= 2
     x = np.linspace(0, wavelength / 2, n_elements + 1)
-    piece = make_piece(x, depth, rows, COATED)
+    piece = Piece(TensorGrid(x, depth, rows), COATED)
     k = 2 * np.pi / wavelength
     # consistent nodal forces of cos(kx) on straight shape functions
     h = x[1]

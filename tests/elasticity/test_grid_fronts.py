@@ -4,16 +4,17 @@ import numpy as np
 import pytest
 from pieces import COATED
 
-from patchfem.elasticity import make_piece, predict_bytes, predict_seconds
+from patchfem.elasticity import Piece, predict_bytes, predict_seconds
 from patchfem.elasticity.condense import condense
 from patchfem.elasticity.grid_fronts import predict_work
+from patchfem.mesh import TensorGrid
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
 @pytest.mark.parametrize("nx, ny", [(2, 2), (5, 3), (16, 70), (41, 20), (90, 33)])
 def test_exact_predicted_work_equals_factor_sizes(nx, ny, mirrored):
     """The predicted number of fronts and entries agrees with the computed factors."""
-    piece = make_piece(np.linspace(-1, 1, nx), np.linspace(0, 1, ny), 1, COATED)
+    piece = Piece(TensorGrid(np.linspace(-1, 1, nx), np.linspace(0, 1, ny), 1), COATED)
     condensed = condense(piece.stencil, mirrored)
     stacks = condensed.inner_factor.stacks
     work = predict_work(nx, ny, mirrored)

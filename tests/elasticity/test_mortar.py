@@ -70,7 +70,7 @@ def block_compliance(x, height, young, poisson=TITANIUM[1], plane="strain", grow
     """Return (nn, tt, nt) of a block of uniform material on these columns, with rows that grow downwards."""
     depth = np.concatenate([[0.0], np.cumsum(graded_rows(np.diff(x).min(), height, growth))])
     return elasticity.interface_compliance(
-        elasticity.make_piece(x, depth, 0, make_bare_layers((young, poisson), plane))
+        elasticity.Piece(TensorGrid(x, depth, 0), make_bare_layers((young, poisson), plane))
     )
 
 
@@ -237,7 +237,7 @@ def _compute_hertz_block(per_half_width):
     """Return (x, compliance) of a Hertz block of titanium."""
     grid = make_refined_grid(1.5 * HALF_WIDTH, HALF_WIDTH / per_half_width, LENGTH, 6e-3, 1.1)
     return grid.x, elasticity.interface_compliance(
-        elasticity.make_piece(grid.x, grid.depth, 0, make_bare_layers(TITANIUM))
+        elasticity.Piece(grid, make_bare_layers(TITANIUM))
     )
 
 

@@ -51,7 +51,7 @@ def test_exact_stiff_coating_compliance_within_round_off_bound():
     """For a very stiff coating the grid and mesh compliances differ by no more than their stated round-off errors."""
     layers = Layers((TITANIUM[0] * 1e5, CARBIDE[1]), TITANIUM, "strain")
     grid = graded_grid(LENGTH, HEIGHT, LENGTH / 40, 1e-6)
-    grid_piece = elasticity.make_piece(grid.x, grid.depth, grid.coating_rows, layers)
+    grid_piece = elasticity.Piece(grid, layers)
     mesh_piece = Substructure(mesh_of_grid(grid, seed=1), layers)
     expected = condense(grid_piece)[0]
     computed = condense(mesh_piece)[0]
@@ -111,7 +111,7 @@ def test_exact_mesh_fields_agree_with_compliance_and_grid(split):
         )
     assert relative_height[mesh.interface] == pytest.approx(1)
     if split == 0:
-        grid_piece = elasticity.make_piece(grid.x, grid.depth, grid.coating_rows, COATED)
+        grid_piece = elasticity.Piece(grid, COATED)
         expected = elasticity.von_mises(
             centre_stress(get_cells(grid_piece), compute_displacement(grid_piece, shear, normal))
         )

@@ -16,17 +16,11 @@ from skfem import Basis, ElementQuad1, ElementTriP1, ElementVector, MeshQuad, Me
 from skfem.models.elasticity import linear_elasticity
 from stiffness import free_stiffness, make_matrix, make_stencil
 
-from patchfem.elasticity import Layers, Piece, Substructure, lame, make_piece
-from patchfem.elasticity.elasticity import grid_cells
+from patchfem.elasticity import Layers, Piece, Substructure, get_cells, lame
 from patchfem.elasticity.tensor_stiffness import apply_stencil
-from patchfem.mesh import graded_grid
+from patchfem.mesh import TensorGrid, graded_grid
 
 SPACINGS = st.lists(st.floats(0.01, 10.0), min_size=2, max_size=9)
-
-
-def grid_nodes(x, depth):
-    """Return the nodes (nx, ny, 2) of a tensor grid."""
-    return np.stack(np.meshgrid(x, depth, indexing="ij"), axis=-1)
 
 
 def assemble_with_skfem(shape, element, points, cells, coated, layers, degree=2):
@@ -40,24 +34,16 @@ def assemble_with_skfem(shape, element, points, cells, coated, layers, degree=2)
     return linear_elasticity(lam, mu).assemble(basis)[order][:, order]
 
 
-def assemble_quad_piece(nodes, coating_rows, layers):
-    """Return a piece of quadrilaterals with arbitrary nodes (nx, ny, 2), assembled by scikit-fem."""
-    columns, rows = nodes.shape[:2]
-    cells, is_coating = grid_cells(columns, rows, coating_rows)
-    flat = nodes.reshape(-1, 2)
-    free = (2 * np.flatnonzero(np.arange(len(flat)) % rows < rows - 1)[:, None] + [0, 1]).ravel()
-    matrix = assemble_with_skfem(MeshQuad, ElementQuad1, flat, cells, is_coating, layers)[free][
-        :, free
-    ]
-    return Piece(
-        nodes[:, 0, 0].copy(),
-        nodes[columns // 2, :, 1].copy(),
-        flat,
-        cells,
-        is_coating,
-        layers,
-        computed={"stencil": make_stencil(matrix, columns)},
+def assemble_quad_stencil(piece):
+    """Return the stencil of a piece of quadrilaterals, assembled by scikit-fem."""
+    cells = get_cells(piece)
+    columns, rows = piece.grid.x.size, piece.grid.depth.size
+    is_free = np.arange(columns * rows) % rows < rows - 1
+    free = (2 * np.flatnonzero(is_free)[:, None] + [0, 1]).ravel()
+    matrix = assemble_with_skfem(
+        MeshQuad, ElementQuad1, cells.points, cells.blocks[0], cells.is_coating, piece.layers
     )
+    return make_stencil(matrix[free][:, free], columns)
 
 
 @given(
@@ -73,20 +59,16 @@ def test_exact_grid_stiffness_equals_scikit_fem(column_widths, row_heights, coat
     )
     layers = Layers(CARBIDE, TITANIUM, plane)
     coating = min(coating, len(row_heights))
-    computed = make_piece(x, depth, coating, layers)
-    expected = assemble_quad_piece(grid_nodes(x, depth), coating, layers)
-    scale = np.abs(expected.stencil).max()
+    computed = Piece(TensorGrid(x, depth, coating), layers)
+    stencil = computed.stencil
+    expected = assemble_quad_stencil(computed)
+    scale = np.abs(expected).max()
     # scikit-fem computes element lengths from its mapping, with the round-off of the coordinates
     aspect = max(np.ptp(points) / np.diff(points).min() for points in (x, depth))
-    assert np.abs(computed.stencil - expected.stencil).max() <= 2e-15 * aspect * scale
-    assert np.array_equal(computed.cells, expected.cells) and np.array_equal(
-        computed.is_coating, expected.is_coating
-    )
+    assert np.abs(stencil - expected).max() <= 2e-15 * aspect * scale
     u = np.random.default_rng(0).normal(size=(x.size, depth.size - 1, 2, 2))
     product = free_stiffness(computed) @ u.reshape(-1, 2)
-    assert (
-        np.abs(apply_stencil(computed.stencil, u).reshape(-1, 2) - product).max() <= 1e-13 * scale
-    )
+    assert np.abs(apply_stencil(stencil, u).reshape(-1, 2) - product).max() <= 1e-13 * scale
     assert np.array_equal(
         make_matrix(make_stencil(free_stiffness(computed), x.size)).toarray(),
         free_stiffness(computed).toarray(),

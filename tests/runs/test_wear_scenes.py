@@ -29,7 +29,7 @@ from patchfem import build
 from patchfem.closed_forms.contact import hertz_half_width, hertz_peak
 from patchfem.contact.unilateral import solve_forces
 from patchfem.core import Compliance, Interface
-from patchfem.elasticity import interface_compliance, make_piece
+from patchfem.elasticity import Piece, interface_compliance
 from patchfem.runs.patch.result import solve_with_coarser
 from patchfem.runs.wear import evolve
 from patchfem.scene import loads
@@ -231,9 +231,7 @@ def test_exact_wear_shakedown_of_crown_agrees_with_closed_form():
     peak = hertz_peak(line, radius, young / (1 - 0.32**2) / 2)
     stick = half * np.sqrt(0.4)
     grid = make_refined_grid(1.5 * half, half / cells, 40 * half, 20 * half, 1.15)
-    nn, _, _ = interface_compliance(
-        make_piece(grid.x, grid.depth, grid.coating_rows, make_bare_layers((young, 0.32)))
-    )
+    nn, _, _ = interface_compliance(Piece(grid, make_bare_layers((young, 0.32))))
     x = grid.x
     area = grid.tributary_lengths() * width
     gap = grid.x**2 / 2 / radius

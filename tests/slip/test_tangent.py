@@ -8,7 +8,7 @@ from pieces import COATED, COATING, HEIGHT, LENGTH, WIDTH, make_bare_layers, mak
 
 from patchfem.contact import coupled_stiffness, tangential_stiffness
 from patchfem.core import Compliance, Interface
-from patchfem.elasticity import interface_compliance, make_piece
+from patchfem.elasticity import Piece, interface_compliance
 from patchfem.mesh import graded_grid
 
 
@@ -20,7 +20,7 @@ def dissimilar_bodies() -> tuple:
         graded_grid(LENGTH, 4e-3, LENGTH / 60),
     )
     low, high = (
-        interface_compliance(make_piece(grid.x, grid.depth, grid.coating_rows, layers))
+        interface_compliance(Piece(grid, layers))
         for grid, layers in zip(grids, (COATED, make_bare_layers((70e9, 0.3))))
     )
     x = grids[0].x

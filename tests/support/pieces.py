@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 
 from patchfem.core import Compliance, Interface
-from patchfem.elasticity import Layers, interface_compliance, make_piece
+from patchfem.elasticity import Layers, Piece, interface_compliance
 from patchfem.mesh import TensorGrid, graded_grid
 from patchfem.mesh.tensor import graded_rows
 
@@ -28,7 +28,7 @@ def make_bare_layers(material, plane="strain") -> Layers:
 
 def make_compliance(grid: TensorGrid, layers: Layers, width: float = WIDTH) -> Compliance:
     """Return the compliance of two mirrored bodies: normal and tangential parts double, the coupling cancels."""
-    piece = make_piece(grid.x, grid.depth, grid.coating_rows, layers)
+    piece = Piece(grid, layers)
     nn, tt, _ = interface_compliance(piece)
     return Compliance(
         Interface(grid.x, grid.tributary_lengths() * width, width), 2 * nn / width, 2 * tt / width

@@ -8,11 +8,11 @@ with the depth z, and
     2 mu u_x = k (a - 2 b (1 - nu) + b k z) e^(-k z) sin(k x).
 """
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
+from ...elasticity.condense import condense
 from ...elasticity.elasticity import Layers, Piece, lame
 
 # Largest product of wavenumber and thickness for which a wave reaches the other side of a layer;
@@ -117,11 +117,11 @@ def end_compliance(piece: Piece) -> WaveCompliance:
     shear, so `layer_compliance` is the closed form between them. The error of the cells near a force is the same with
     and without guides and cancels, which leaves a function as smooth as the distance to the end is long.
     """
-    free = piece.factor.compliance()
+    grid = piece.factor
+    free = grid.compliance()
     parts = []
     for component in (0, 1):
-        guided_piece = replace(piece, computed={"stencil": guide_ends(piece.stencil, component)})
-        guided = guided_piece.factor.compliance()
+        guided = condense(guide_ends(grid.stencil, component), grid.is_mirrored).compliance()
         parts.append((free - guided)[1 - component :: 2, 1 - component :: 2])
     return WaveCompliance(*parts)
 

@@ -152,10 +152,6 @@ class _PieceFields:
 
     Attributes
     ----------
-    points : (n, 2) array
-        x and depth [m].
-    blocks : list
-        Cells.
     interface : (m,) array
         Node numbers.
     stress : callable
@@ -164,8 +160,6 @@ class _PieceFields:
         Cells, Gauss points and stress recovery, for the error estimate of the stress.
     """
 
-    points: np.ndarray
-    blocks: list
     interface: np.ndarray
     stress: Callable
     cells: Cells
@@ -177,16 +171,10 @@ def _mesh_and_stress(piece, grid) -> _PieceFields:
     """Return the mesh, the stress and the stress recovery of a piece."""
     cells = get_cells(piece)
     if isinstance(piece, Piece):
-        points = cells.points
-        blocks = [piece.cells]
         interface = np.arange(0, len(cells.points), grid.depth.size)
     else:
-        points = grid.points
-        blocks = list(cells.blocks)
         interface = grid.interface
     return _PieceFields(
-        points,
-        blocks,
         interface,
         partial(centre_stress, cells),
         cells,
@@ -218,7 +206,7 @@ def _collect_piece_fields(patch, fields: dict, x, side: str, piece_fields: _Piec
     out = {
         name: np.empty((frames, *shape), np.float32)
         for name, shape in {
-            "displacement": piece_fields.points.shape,
+            "displacement": cells.points.shape,
             "stress": (cells.is_coating.size, 4),
             "mises": cells.is_coating.shape,
         }.items()
@@ -236,7 +224,7 @@ def _collect_piece_fields(patch, fields: dict, x, side: str, piece_fields: _Piec
         out["displacement"][frame_slice] = (
             motion * [1.0, sign]
             if lower
-            else motion + _holder_motion(patch, fields, piece_fields.points, frame_slice)
+            else motion + _holder_motion(patch, fields, cells.points, frame_slice)
         )
     error = StressError(
         *(
@@ -251,13 +239,13 @@ def _collect_piece_fields(patch, fields: dict, x, side: str, piece_fields: _Piec
     if bond:
         # Like the shear stress of the interface, it is positive along +x on the lower piece.
         bond["shear_bond"] *= -sign
-    blocks = [block if not lower else block[:, ::-1] for block in piece_fields.blocks]
+    blocks = [block if not lower else block[:, ::-1] for block in cells.blocks]
     finest = min(
         choose_rounding_step(piece_fields.recovery, error, piece_fields.rules, ROUNDING_FRACTION),
         MIN_STEP_FRACTION * float(out["mises"].max(initial=0.0)),
     )
     return out | {
-        "points": piece_fields.points * [1.0, sign],
+        "points": cells.points * [1.0, sign],
         "blocks": blocks,
         "interface": piece_fields.interface,
         "material": cells.is_coating,

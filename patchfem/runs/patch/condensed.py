@@ -17,7 +17,6 @@ from ...elasticity.elasticity import (
     Layers,
     Piece,
     interface_compliance,
-    make_piece,
 )
 from ...mesh.tensor import TensorGrid
 from ...model.pieces import make_elastic_layers
@@ -82,40 +81,38 @@ class CondensedPair:
         return self.joint.distribute_forces(nodal)
 
 
-def assemble_piece(body, layers: Layers):
-    """Assemble a piece: a Piece from a tensor grid, a Substructure from any other mesh."""
-    if isinstance(body, TensorGrid):
-        return make_piece(body.x, body.depth, body.coating_rows, layers)
-    return substructure.Substructure(body, layers)
-
-
-def condense_piece(body, piece, ignore_cache: bool) -> InterfaceCompliance:
-    """Compute the interface compliance of a piece, or read it from the disk cache.
-
-    It has the normal, tangential and coupling parts nn, tt and nt.
+def condense_piece(body, layers: Layers, ignore_cache: bool) -> tuple:
+    """Condense a piece to its interface, or read its compliance from the disk cache.
 
     Parameters
     ----------
     body : TensorGrid or PieceMesh
-    piece : Piece or Substructure
+    layers : Layers
     ignore_cache : bool
         Whether to ignore the disk cache.
+
+    Returns
+    -------
+    piece : Piece or Substructure
+        Not yet factorised if its compliance was in the cache.
+    compliance : InterfaceCompliance
     """
     is_grid = isinstance(body, TensorGrid)
+    piece = Piece(body, layers) if is_grid else substructure.Substructure(body, layers)
     if (body.x.size if is_grid else len(body.points) ** 0.5) < MIN_CACHED_NODES:
-        return interface_compliance(piece)
+        return piece, interface_compliance(piece)
     if is_grid:
-        key = cache.grid_key(body.x, body.depth, body.coating_rows, piece.layers)
+        key = cache.grid_key(body.x, body.depth, body.coating_rows, layers)
     else:
-        key = cache.mesh_key(body, piece.layers)
+        key = cache.mesh_key(body, layers)
     shapes = dict.fromkeys(InterfaceCompliance._fields, 2 * (body.x.size,))
     cached_arrays = None if ignore_cache else cache.load_arrays(key, shapes)
     if cached_arrays is not None:
-        return InterfaceCompliance(**cached_arrays)
+        return piece, InterfaceCompliance(**cached_arrays)
     compliance = interface_compliance(piece)
     if not piece.round_off_error:
         cache.store_arrays(key, compliance._asdict())
-    return compliance
+    return piece, compliance
 
 
 def condense(patch_model, grid, upper_grid=None, ignore_cache: bool = False) -> CondensedPair:
@@ -135,16 +132,13 @@ def condense(patch_model, grid, upper_grid=None, ignore_cache: bool = False) -> 
     """
     width = patch_model.pieces.width * patch_model.pieces.pairs
     start = perf_counter()
-    piece = assemble_piece(grid, make_elastic_layers(patch_model, patch_model.pieces.lower))
+    layers = make_elastic_layers(patch_model, patch_model.pieces.lower)
+    piece, lower_compliance = condense_piece(grid, layers, ignore_cache)
     upper = piece
+    upper_compliance = lower_compliance
     if upper_grid is not None:
-        upper = assemble_piece(
-            upper_grid, make_elastic_layers(patch_model, patch_model.pieces.upper)
-        )
-    lower_compliance = condense_piece(grid, piece, ignore_cache)
-    upper_compliance = (
-        lower_compliance if upper is piece else condense_piece(upper_grid, upper, ignore_cache)
-    )
+        layers = make_elastic_layers(patch_model, patch_model.pieces.upper)
+        upper, upper_compliance = condense_piece(upper_grid, layers, ignore_cache)
     joint = None
     x = grid.x
     tributary_lengths = grid.tributary_lengths()

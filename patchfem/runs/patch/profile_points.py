@@ -22,9 +22,10 @@ from ...contact.half_space.point_compliance import (
     smooth_modes,
 )
 from ...core import NotConverged
-from ...elasticity.elasticity import make_piece
+from ...elasticity.elasticity import Piece
 from ...elasticity.lapack import use_one_blas_thread
 from ...mesh.grading import Layout, divide_into_columns, divide_into_rows
+from ...mesh.tensor import TensorGrid
 from ...model import profile
 from ...model.pieces import make_elastic_layers
 from .edge_values import EdgeValues
@@ -240,8 +241,8 @@ def _compute_free_end_compliance(patch_model, level: int) -> FreeEnds:
     x = divide_into_columns(layout)
     changes = 0.0
     for piece, multiplicity in _distinct_pieces(patch_model):
-        depth, coated = _row_depths(piece, layout)
-        body = make_piece(x, depth, coated, make_elastic_layers(patch_model, piece))
+        grid = TensorGrid(x, *_row_depths(piece, layout))
+        body = Piece(grid, make_elastic_layers(patch_model, piece))
         changes = changes + multiplicity * np.array(end_compliance(body))
     return FreeEnds(x, *changes)
 
