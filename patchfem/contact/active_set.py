@@ -90,98 +90,13 @@ class SetSolution(NamedTuple):
     stiffness: float
 
 
-class _SetEquations:
-    """Equations for a given active set, with the rigid motions orthogonalized.
-
-    The motions R T are orthogonal in the norm of C^-1 on the set plus the springs (modified Gram-Schmidt), so each
-    motion is found from a single division. Two neighbouring nodes at the far end of the interface then lose no digits.
-    """
-
-    def __init__(self, compliance, problem: ContactProblem, active: np.ndarray):
-        self.compliance = compliance
-        self.problem = problem
-        self.index = active.nonzero()[0]
-        n_nodes = self.index.size
-        n_motions = problem.target.size
-        gap = problem.gap[self.index]
-        # The smallest gap is subtracted first, because the approach may be far smaller than the
-        # gaps.
-        self.offset = gap.min() if n_motions else 0.0
-        # There is one right-hand side for the gap and one for each motion. The first columns are
-        # the gap or the displacement of the nodes; the last columns of the motions begin as the
-        # identity and become T, transposed.
-        right_sides = np.zeros((1 + n_motions, n_nodes + n_motions))
-        right_sides[0, :n_nodes] = gap - self.offset
-        rows = right_sides[1:]
-        rows[:, :n_nodes] = problem.motions.T[:, self.index]
-        for k in range(n_motions):
-            rows[k, n_nodes + k] = 1.0
-        for k in range(1, n_motions):
-            rows[k] -= (rows[k, 0] + rows[k, n_nodes - 1]) / 2 * rows[0]
-        self.solve_block = compliance.solver(active)
-        # The solution holds the forces that these motions cause in the nodes, then in the springs.
-        solution = right_sides.copy()
-        solution[:, :n_nodes] = self.solve_block(right_sides[:, :n_nodes].T).T
-        solution[:, n_nodes:] *= problem.springs
-        forces = solution[1:]
-        self.stiffness = np.empty(n_motions)
-        for k in range(n_motions):
-            for j in range(k):
-                shift = (rows[j] @ forces[k]) / self.stiffness[j]
-                rows[k] -= shift * rows[j]
-                forces[k] -= shift * forces[j]
-            self.stiffness[k] = rows[k] @ forces[k]
-            if not self.stiffness[k] > 0:
-                raise np.linalg.LinAlgError("the nodes in contact do not determine the motion")
-        self.gap_force = solution[0, :n_nodes]
-        self.rows = rows[:, :n_nodes]
-        self.nodal_forces = forces[:, :n_nodes]
-        self.spring_loads = forces[:, n_nodes:]
-        self.transform = rows[:, n_nodes:].T
-        self.motions = self.transform.T @ problem.motions.T
-        self.target = self.transform.T @ problem.target
-
-    def solve(self, n_refinements: int) -> SetSolution:
-        """Solve the equations, with a given number of steps of iterative refinement."""
-        problem = self.problem
-        nodal_force, motion = self._close_gap(self.gap_force, self.target)
-        motion[:1] += self.offset
-        force = np.zeros(problem.gap.size)
-        for step in range(n_refinements + 1):
-            force[self.index] = nodal_force
-            displacement = self.compliance.product(force)
-            opening = problem.gap - motion @ self.motions + displacement
-            if step == n_refinements:
-                break
-            spring_load = self.transform.T @ (motion @ self.spring_loads)
-            force_change, motion_change = self._close_gap(
-                gap_force=self.solve_block(opening[self.index, None])[:, 0],
-                loads=self.target - self.rows @ nodal_force - spring_load,
-            )
-            nodal_force = nodal_force + force_change
-            motion = motion + motion_change
-        closing_scale = np.abs(motion) @ np.abs(self.motions)
-        return SetSolution(
-            force=force,
-            opening=opening,
-            scale=np.abs(problem.gap) + closing_scale + np.abs(displacement).max(),
-            motion=self.transform @ motion,
-            stiffness=float(self.stiffness[0]) if motion.size else 0.0,
-        )
-
-    def _close_gap(self, gap_force: np.ndarray, loads: np.ndarray) -> tuple:
-        """Return the nodal forces (k,) [N] and orthogonalized motions (r,) that close a gap.
-
-        gap_force: (k,) forces [N] that close the gap without any motion; loads: (r,) of these motions.
-        """
-        motion = (loads + self.rows @ gap_force) / self.stiffness
-        return motion @ self.nodal_forces - gap_force, motion
-
-
 def solve_on_set(
     compliance, problem: ContactProblem, active: np.ndarray, n_refinements: int = 0
 ) -> SetSolution:
     """Solve for the forces and the holder motion for given nodes in contact; forces may have either sign.
+
+    The motions R T are orthogonal in the norm of C^-1 on the set plus the springs (modified Gram-Schmidt), so each
+    motion is found from a single division. Two neighbouring nodes at the far end of the interface then lose no digits.
 
     Parameters
     ----------
@@ -201,7 +116,70 @@ def solve_on_set(
     LinAlgError
         If the set does not determine the motion, or the compliance is not positive definite on it.
     """
-    return _SetEquations(compliance, problem, active).solve(n_refinements)
+    index = active.nonzero()[0]
+    nodes = slice(index.size)
+    n_motions = problem.target.size
+    gap = problem.gap[index]
+    # The smallest gap is subtracted first, because the approach may be far smaller than the gaps.
+    offset = gap.min() if n_motions else 0.0
+    # There is one right-hand side for the gap and one for each motion. The first columns are the gap
+    # or the displacement of the nodes; the last columns of the motions begin as the identity and
+    # become T, transposed.
+    right_sides = np.zeros((1 + n_motions, index.size + n_motions))
+    right_sides[0, nodes] = gap - offset
+    rows = right_sides[1:]
+    rows[:, nodes] = problem.motions.T[:, index]
+    rows[:, index.size :] = np.eye(n_motions)
+    rows[1:] -= (rows[1:, :1] + rows[1:, index.size - 1 : index.size]) / 2 * rows[:1]
+    solve_block = compliance.solver(active)
+    # The solution holds the forces that these motions cause in the nodes, then in the springs.
+    solution = right_sides.copy()
+    solution[:, nodes] = solve_block(right_sides[:, nodes].T).T
+    solution[:, index.size :] *= problem.springs
+    forces = solution[1:]
+    stiffness = np.empty(n_motions)
+    for k in range(n_motions):
+        for j in range(k):
+            shift = (rows[j] @ forces[k]) / stiffness[j]
+            rows[k] -= shift * rows[j]
+            forces[k] -= shift * forces[j]
+        stiffness[k] = rows[k] @ forces[k]
+        if not stiffness[k] > 0:
+            raise np.linalg.LinAlgError("the nodes in contact do not determine the motion")
+    transform = rows[:, index.size :].T
+    motions = transform.T @ problem.motions.T
+    target = transform.T @ problem.target
+
+    def close_gap(gap_force: np.ndarray, loads: np.ndarray) -> tuple:
+        """Return the nodal forces (k,) [N] and orthogonalized motions (r,) that close a gap.
+
+        gap_force: (k,) forces [N] that close the gap without any motion; loads: (r,) of these motions.
+        """
+        motion = (loads + rows[:, nodes] @ gap_force) / stiffness
+        return motion @ forces[:, nodes] - gap_force, motion
+
+    nodal_force, motion = close_gap(solution[0, nodes], target)
+    motion[:1] += offset
+    force = np.zeros(problem.gap.size)
+    for step in range(n_refinements + 1):
+        force[index] = nodal_force
+        displacement = compliance.product(force)
+        opening = problem.gap - motion @ motions + displacement
+        if step < n_refinements:
+            spring_load = transform.T @ (motion @ forces[:, index.size :])
+            force_change, motion_change = close_gap(
+                gap_force=solve_block(opening[index, None])[:, 0],
+                loads=target - rows[:, nodes] @ nodal_force - spring_load,
+            )
+            nodal_force = nodal_force + force_change
+            motion = motion + motion_change
+    return SetSolution(
+        force=force,
+        opening=opening,
+        scale=np.abs(problem.gap) + np.abs(motion) @ np.abs(motions) + np.abs(displacement).max(),
+        motion=transform @ motion,
+        stiffness=float(stiffness[0]) if n_motions else 0.0,
+    )
 
 
 def refine_solution(compliance, problem, solution: SetSolution, active) -> SetSolution:

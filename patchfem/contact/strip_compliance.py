@@ -6,6 +6,7 @@ the nodes of all strips are flat, strip after strip.
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -123,7 +124,13 @@ class StripCompliance:
             nodes = is_active.nonzero()[0]
             if not nodes.size:
                 continue
-            blocks.append((slice(start, start + nodes.size), self._factor(strip, is_active, nodes)))
+            if self.warm_start is None:
+                factor = factorise(self.block(strip, nodes))
+            else:
+                diagonal = b"" if self.added is None else self.added[strip].tobytes()
+                key = (is_active.tobytes(), diagonal)
+                factor = self.warm_start.factor(key, partial(self.block, strip, nodes))
+            blocks.append((slice(start, start + nodes.size), factor))
             start += nodes.size
 
         def solve(right_sides: np.ndarray) -> np.ndarray:
@@ -132,14 +139,6 @@ class StripCompliance:
             return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
         return solve
-
-    def _factor(self, strip: int, is_active: np.ndarray, nodes: np.ndarray) -> np.ndarray:
-        """Return the Cholesky factor for the active nodes of a strip, from the cache if possible."""
-        if self.warm_start is None:
-            return factorise(self.block(strip, nodes))
-        diagonal = b"" if self.added is None else self.added[strip].tobytes()
-        key = (is_active.tobytes(), diagonal)
-        return self.warm_start.factor(key, lambda: self.block(strip, nodes))
 
     def add_to_diagonal(self, diagonal: np.ndarray) -> "StripCompliance":
         """Return the compliance after addition of diagonal terms (m,) [m/N] in every strip."""
