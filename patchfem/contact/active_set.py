@@ -216,11 +216,11 @@ def relative_violation(solution: SetSolution) -> float:
 def complete_set(problem: ContactProblem, active: np.ndarray) -> np.ndarray:
     """Add nodes to an active set until it can carry the load.
 
-    Where it does not reach to both sides of the load line of a free rotation, the node of the smallest gap on each side
-    is added.
+    An empty set gets the nodes of the smallest gap. Where a set does not reach to both sides of the load line of a free
+    rotation, the node of the smallest gap on each side is added.
     """
     if not problem.free_rotations:
-        return active if active.any() else problem.gap <= problem.gap.min()
+        return problem.gap <= problem.gap.min()
     for k in problem.free_rotations:
         position = problem.motions[:, k]
         load_line = problem.target[k] / problem.target[0]
@@ -261,7 +261,8 @@ def solve_primal_dual(
     """
     visited = set()
     for iteration in range(1, max_iterations + 1):
-        active = complete_set(problem, active)
+        if problem.free_rotations or not active.any():
+            active = complete_set(problem, active)
         key = active.tobytes()
         if key in visited:
             return None, iteration
@@ -318,7 +319,8 @@ def solve_primal(
     active = force > 0
     max_iterations = max_iterations or 20 * force.size
     for iteration in range(1, max_iterations + 1):
-        active = complete_set(problem, active)
+        if problem.free_rotations or not active.any():
+            active = complete_set(problem, active)
         solution = solve_on_set(compliance, problem, active)
         is_tensile = active & (solution.force < 0)
         if is_tensile.any():

@@ -162,11 +162,13 @@ def solve(
     LinAlgError
         If the compliance is not positive definite.
     """
-    rest_motion = find_rest_motion(problem)
-    problem = problem._replace(
-        gap=problem.gap - problem.motions @ rest_motion,
-        target=problem.target - problem.springs * rest_motion,
-    )
+    rest_motion = np.zeros(problem.target.size)
+    if rest_motion.size > 1:
+        rest_motion = find_rest_motion(problem)
+        problem = problem._replace(
+            gap=problem.gap - problem.motions @ rest_motion,
+            target=problem.target - problem.springs * rest_motion,
+        )
     solution = None
     n_iterations = 0
     is_patch = problem.gap.size == len(compliance.common)
