@@ -32,7 +32,7 @@ PUBLIC = {
     "edges": (
         "MIN_RELATIVE_PRESSURE",
         "contact_intervals",
-        "edge_offset_fraction",
+        "edge_offset",
         "find_pressure_edges",
         "parabola_change",
         "snap_to_steps",

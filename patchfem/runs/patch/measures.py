@@ -527,7 +527,7 @@ def _contact_edge_position_error(pair, cell):
             ratio = piece.layers.coating[0] / piece.layers.substrate[0]
             contrast = 1 - min(ratio, 1 / ratio)
             cells = np.minimum(1.0, cell / grid.coating_thickness)
-            out = np.maximum(out, edges.edge_offset_fraction(1.0) * cells * contrast)
+            out = np.maximum(out, edges.edge_offset(cells, cells, 0.0) * contrast)
     return out
 
 
