@@ -420,8 +420,14 @@ def compute_contact_resolution(pair, pieces, force, gap_range, can_rotate: bool)
     longest = cells.max(axis=1)
     corner_pressure = 0.0
     if pieces is pair.compliance:  # An asperity layer (skin) bounds the pressure.
+        # The free end of a coating raises the pressure in a layer as long as the coating is thick.
+        # Cells longer than this layer do not resolve it; for shorter cells the missed pressure falls
+        # with the square of their length.
+        thicknesses = [grid.coating_thickness for grid in (pair.grid, pair.upper_grid)]
+        thinnest = min((thickness for thickness in thicknesses if thickness > 0), default=np.inf)
+        fraction = np.minimum(1.0, (np.diff(interface.x)[[0, -1]] / thinnest) ** 2)
         ends = (force / interface.weight)[:, [0, -1]]
-        corner_pressure = _unresolved_corner_pressure(pair, ends, np.diff(interface.x)[[0, -1]])
+        corner_pressure = (CORNER_LAYER_FRACTION * ends * fraction).max(axis=1)
     return Resolution(
         length=interface.length,
         n_nodes=np.maximum(active.sum(axis=1), 1),
@@ -529,27 +535,6 @@ def _contact_edge_position_error(pair, cell):
             cells = np.minimum(1.0, cell / grid.coating_thickness)
             out = np.maximum(out, edges.edge_offset(cells, cells, 0.0) * contrast)
     return out
-
-
-def _unresolved_corner_pressure(pair, sigma, cells):
-    """Return the pressures (...) [Pa] at loaded corners of a coating that the mesh misses.
-
-    The free end of a coating raises the pressure in a layer as long as the coating is thick. Cells
-    longer than this layer do not resolve it; for shorter cells the missed pressure falls with the
-    square of their length.
-
-    Parameters
-    ----------
-    pair : CondensedPair
-    sigma : (..., 2)
-        Pressures at both ends [Pa].
-    cells : (2,)
-        Cells at both ends [m].
-    """
-    thicknesses = [grid.coating_thickness for grid in (pair.grid, pair.upper_grid)]
-    thinnest = min((thickness for thickness in thicknesses if thickness > 0), default=np.inf)
-    fraction = np.minimum(1.0, (cells / thinnest) ** 2)
-    return (CORNER_LAYER_FRACTION * sigma * fraction).max(axis=-1)
 
 
 def _wedge_indentation_pressure(patch: Patch) -> float:
