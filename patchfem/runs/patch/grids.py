@@ -13,13 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import frozen_array
 from ...elasticity.grid_fronts import predict_seconds
 from ...mesh.grading import Layout, divide_into_columns, divide_into_rows
 from ...mesh.tensor import TensorGrid
 from ...model.pieces import extend_grid, find_rounded_edges
 from . import slip_zones, store
-from .condensed import CondensedPair, condense, delete_matrix_factors
+from .condensed import condense
 from .press import Patch, solve_patch_contact
 from .values import contact_ends
 
@@ -101,27 +100,6 @@ class ContactExtent:
         return self.span[1] - self.span[0]
 
 
-def condense_on_search_grid(patch_model) -> CondensedPair:
-    """Condense the pieces on equal columns, on which the search for the contact starts.
-
-    The result is cached for all patches of equal geometry.
-    """
-    layout = make_search_layout(patch_model)
-    key = (
-        "search",
-        layout,
-        patch_model.pieces.lower,
-        patch_model.pieces.upper,
-        patch_model.pieces.plane,
-        patch_model.pieces.width * patch_model.pieces.pairs,
-        patch_model.mesh.is_static,
-        patch_model.gap.jumps,
-    )
-    return store.get_or_compute(
-        key, lambda: delete_matrix_factors(condense(patch_model, *make_grids(patch_model, layout)))
-    )
-
-
 class BaseGrids(NamedTuple):
     """Coarsest grids of the pieces of a patch, graded towards the contact region.
 
@@ -137,7 +115,19 @@ class BaseGrids(NamedTuple):
 def make_base_grids(patch_model) -> BaseGrids:
     """Return the coarsest grids of a `PatchModel`, graded towards its contact region.
 
-    The result is cached, because the plan of a run and the run itself use the same grids.
+    Every grid of a run halves the cells of these ones, so that the choice of the columns and rows
+    changes the error of a measure, but not the value to which it converges; the printed error is
+    estimated from the halved cells. The result is cached, because the plan of a run and the run
+    itself use the same grids.
+
+    Parameters
+    ----------
+    patch_model : PatchModel
+        Its load may be 0; the columns are even then.
+
+    Returns
+    -------
+    BaseGrids
     """
     has_files = patch_model.mesh.file is not None or patch_model.gap.profile is not None
     key = ("base grids", patch_model if has_files else store.content_key(patch_model))
@@ -155,11 +145,8 @@ def _search_contact_region(patch_model) -> BaseGrids:
     layout = make_search_layout(patch_model)
     contact = None
     # Without a load there is no contact to search for.
-    for search in range(MAX_SEARCHES if patch_model.nominal_load > 0 else 0):
-        if search == 0:
-            pair = condense_on_search_grid(patch_model)
-        else:
-            pair = condense(patch_model, *make_grids(patch_model, layout))
+    for _ in range(MAX_SEARCHES if patch_model.nominal_load > 0 else 0):
+        pair = condense(patch_model, *make_grids(patch_model, layout))
         x = pair.grid.x
         extents = []
         for loaded_model in loaded_models:
@@ -389,60 +376,44 @@ def _find_pressure_maxima(x, sigma) -> tuple:
 
 
 def make_grids(patch_model, layout: Layout) -> list:
-    """Return the grids of both pieces with the columns of a layout; one grid for identical pieces."""
-    pieces = patch_model.pieces.both
-    if patch_model.pieces.are_alike:
-        pieces = pieces[:1]
-    x = make_columns(patch_model, layout)
-    growth = 1 + CELL_GROWTH[patch_model.mesh.is_static]
-    grids = []
-    for piece in pieces:
-        grids.append(extend_grid(patch_model, piece, make_grid(patch_model, x, piece), growth))
-    return grids
+    """Return the grids of both pieces with the columns of a layout; one grid for identical pieces.
 
-
-def make_columns(patch_model, layout: Layout) -> np.ndarray:
-    """Return the node positions (k,) [m] of a column layout, coarsened to MAX_COLUMNS if needed."""
-    x = divide_into_columns(layout, patch_model.gap.jumps)
-    while x.size > MAX_COLUMNS + 1 and layout.bands:
-        layout = layout.scale_cells(x.size / MAX_COLUMNS)
-        x = divide_into_columns(layout, patch_model.gap.jumps)
-    return x
-
-
-def make_grid(patch_model, x, piece) -> TensorGrid:
-    """Return the tensor grid of a piece with given columns.
-
-    Its rows are as short as the columns at the interface, and also short at the inner face of the
-    coating and at the holder.
+    The columns are coarsened to MAX_COLUMNS if needed. The rows are as short as the columns at the
+    interface, and also short at the inner face of the coating and at the holder.
 
     Parameters
     ----------
     patch_model : PatchModel
-    x : (k,)
-        Positions of the nodes along the interface [m].
-    piece : PatchPiece
+    layout : Layout
+        Column layout, from `make_column_layout`.
+
+    Returns
+    -------
+    list of TensorGrid or ShapedGrid
+        ShapedGrid for pieces that reach beyond the interface.
     """
-    coating_thickness = piece.thickness
-    height = piece.height
+    x = divide_into_columns(layout, patch_model.gap.jumps)
+    while x.size > MAX_COLUMNS + 1 and layout.bands:
+        layout = layout.scale_cells(x.size / MAX_COLUMNS)
+        x = divide_into_columns(layout, patch_model.gap.jumps)
     first_row = float(np.diff(x).min())
-    # The height of a row is at most a tenth of the length, or 1/24 of the height of a tall piece,
-    # and never more than 1/6 of the height.
-    max_row_height = min(max(patch_model.pieces.length / 10, height / 24), height / 6)
-    bands = [(0.0, 0.0, first_row), (height, height, min(height, patch_model.pieces.length) / 60)]
-    if coating_thickness:
-        bands.append((coating_thickness, coating_thickness, max(coating_thickness / 4, first_row)))
-    layout = Layout(
-        0.0,
-        height,
-        tuple(bands),
-        (0.0, height),
-        max_row_height,
-        max_row_height,
-        CELL_GROWTH[patch_model.mesh.is_static],
-    )
-    depth, n_coating_rows = divide_into_rows(layout, coating_thickness)
-    return TensorGrid(frozen_array(x), depth, n_coating_rows)
+    length = patch_model.pieces.length
+    growth = CELL_GROWTH[patch_model.mesh.is_static]
+    pieces = patch_model.pieces.both
+    grids = []
+    for piece in pieces[:1] if patch_model.pieces.are_alike else pieces:
+        height = piece.height
+        coating = piece.thickness
+        # The height of a row is at most a tenth of the length, or 1/24 of the height of a tall
+        # piece, and never more than 1/6 of the height.
+        max_row = min(max(length / 10, height / 24), height / 6)
+        bands = [(0.0, 0.0, first_row), (height, height, min(height, length) / 60)]
+        if coating:
+            bands.append((coating, coating, max(coating / 4, first_row)))
+        rows = Layout(0.0, height, tuple(bands), (0.0, height), max_row, max_row, growth)
+        grid = TensorGrid(x, *divide_into_rows(rows, coating))
+        grids.append(extend_grid(patch_model, piece, grid, 1 + growth))
+    return grids
 
 
 def count_nodes(body) -> tuple:

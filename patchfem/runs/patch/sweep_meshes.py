@@ -228,12 +228,9 @@ def _make_common_layout(
     """
     first = cases[0]
     max_cell_ratio = 1 / (grids.EDGE_CELLS[first.mesh.is_static] - 1)
-    layout = None
+    layout = grids.make_search_layout(first)
     for _ in range(MAX_SEARCHES):
-        if layout is None:
-            pair = grids.condense_on_search_grid(first)
-        else:
-            pair = condense(first, *grids.make_grids(first, layout))
+        pair = condense(first, *grids.make_grids(first, layout))
         layouts = []
         largest_ratio = 0.0
         for case, patch in zip(cases, solve_patches_on_pair(cases, pair)):
