@@ -419,9 +419,9 @@ def _open_interface(gap: np.ndarray, approach: float, rotation: float) -> Contac
 def _solve_and_check(
     pieces: Compliance, problem: ContactProblem, start, approach: float, rotation: float
 ) -> ContactState:
-    """Solve and check a contact problem whose gap is measured from `approach` [m].
+    """Solve a contact problem whose gap is measured from `approach` [m], and refuse it unless it is solved.
 
-    A large offset of the gap then costs no digits.
+    A large offset of the gap then costs no digits. NotConverged if a residual exceeds 1e-12.
     """
     x = pieces.interface.x
     weight = pieces.interface.weight
@@ -430,11 +430,13 @@ def _solve_and_check(
             solution = solve(StripCompliance(pieces.normal), problem, start)
         except np.linalg.LinAlgError:
             raise NotConverged(explain_singular_set(pieces.normal, problem)) from None
-        opening, residuals = check_solution(pieces.normal, x, problem, solution)
-    force = solution.force
+        residuals = compute_residuals(pieces.normal, x, problem, solution)
+        refuse_residuals(residuals, RESIDUAL_TOL)
+        force = solution.force
+        opening = problem.gap + solution.theta * x - solution.closing + pieces.normal @ force
     return ContactState(
         frozen_array(force / weight),
-        frozen_array(opening),
+        frozen_array(np.where(force > 0, 0.0, np.maximum(opening, 0.0))),
         float(approach + solution.closing),
         float(rotation + solution.theta),
         float(force.sum()),
@@ -470,30 +472,6 @@ def explain_singular_set(c: np.ndarray, problem: ContactProblem) -> str:
         "contact: the nodes that touch do not determine the rotation; lower contact.load_line.offset (with "
         f"contact.load_line.moment: raise contact.load) or {holder} contact.holder.rotational_stiffness"
     )
-
-
-def check_solution(c, x, problem: ContactProblem, solution: ContactSolution) -> tuple:
-    """Return the gaps under load (m,) [m] and the relative residuals of a patch.
-
-    Parameters
-    ----------
-    c : (m, m) ndarray
-        Compliance [m/N].
-    x : (m,) ndarray
-        Positions [m].
-    problem : ContactProblem
-    solution : ContactSolution
-
-    Raises
-    ------
-    NotConverged
-        If a residual exceeds 1e-12.
-    """
-    force = solution.force
-    residuals = compute_residuals(c, x, problem, solution)
-    refuse_residuals(residuals, RESIDUAL_TOL)
-    opening = problem.gap + solution.theta * x - solution.closing + c @ force
-    return np.where(force > 0, 0.0, np.maximum(opening, 0.0)), residuals
 
 
 def refuse_residuals(residuals, tolerance: float, place: str = "contact", remedy: str = "") -> None:
