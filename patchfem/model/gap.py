@@ -4,7 +4,6 @@ A shape is a table of [contact] and the function of the same name in `contact.ga
 the coordinate x and the keys of the table; `effects.GAP_SHAPES` lists them.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
@@ -165,34 +164,6 @@ def longest_loaded_cell(x, loaded_nodes) -> float:
     """
     beside = loaded_nodes[1:] | loaded_nodes[:-1]
     return float(np.diff(x)[beside].max(initial=0.0) or np.diff(x).max())
-
-
-def build_gap(contact: Contact, lengths: ProfileLengths, resolve_path: Callable) -> Gap:
-    """Build the gap that a table [contact] describes.
-
-    Parameters
-    ----------
-    contact : Contact
-    lengths : ProfileLengths
-        Lengths over which a profile is averaged.
-    resolve_path : callable
-        Function of a file name in the scene that returns its path.
-
-    Returns
-    -------
-    Gap
-    """
-    profile = contact.profile
-    return Gap(
-        shapes=list_gap_shapes(contact),
-        profile=resolve_path(profile.file) if profile is not None else None,
-        average=lengths.average,
-        limit=lengths.limit,
-        is_rough=contact.asperities is not None,
-        side=find_shape_side(contact),
-        material=profile is not None and profile.heights == "surface",
-        file=profile.file if profile is not None else "",
-    )
 
 
 def list_gap_shapes(contact: Contact) -> tuple:

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..mesh.ends import SHARP_END, End
-from ..scene.keys.contact import Asperities, Coating, Contact, Material
+from ..scene.keys.contact import Asperities, Coating, Contact, Material, OnePiece
 from . import peaks, profile
-from .gap import DEFAULT_CELLS, Gap, ProfileLengths, build_gap, list_gap_shapes
+from .gap import DEFAULT_CELLS, Gap, ProfileLengths, find_shape_side, list_gap_shapes
 
 TYPICAL_N_NODES = 160  # number of interface nodes that a patch takes at the default tolerance
 LENGTH_TOL = 1e-9  # largest relative difference of equal lengths
@@ -322,11 +322,30 @@ def build_patch(contact: Contact, kind: str, resolve_path: Callable) -> PatchMod
     PatchModel
     """
     pieces = build_pieces(contact)
+    trace = contact.profile
+    lengths = find_profile_lengths(contact, pieces)
+    gap = Gap(
+        shapes=list_gap_shapes(contact),
+        profile=resolve_path(trace.file) if trace is not None else None,
+        average=lengths.average,
+        limit=lengths.limit,
+        is_rough=contact.asperities is not None,
+        side=find_shape_side(contact),
+        material=trace is not None and trace.heights == "surface",
+        file=trace.file if trace is not None else "",
+    )
+    skin = contact.asperities
+    if skin is not None and skin.law == "hertz":
+        cutoff = find_shortest_wavelength(contact, pieces.length)
+        skin = peaks.complete_asperities(skin, resolve_path, cutoff)
+    strips = contact.strips
+    if strips is not None:
+        strips = PatchStrips(strips.count, strips.roll, strips.offset)
     return PatchModel(
         pieces=pieces,
-        gap=build_gap(contact, find_profile_lengths(contact, pieces), resolve_path),
+        gap=gap,
         loading=_build_loading(contact),
-        interface=_build_interface(contact, pieces.length, resolve_path),
+        interface=PatchInterface(skin, strips, contact.shear is not None, contact.compliance_key),
         mesh=PatchMesh(
             element_size=contact.element_size,
             file=resolve_path(contact.mesh) if contact.mesh is not None else None,
@@ -342,9 +361,27 @@ def replace_loading_and_shapes(patch: PatchModel, contact: Contact) -> PatchMode
 
 
 def build_pieces(contact: Contact) -> PatchPieces:
-    """Build the two pieces that a table [contact] describes."""
-    lower = _build_piece(contact, contact.lower)
-    upper = _build_piece(contact, contact.upper)
+    """Build the two pieces that a table [contact] describes.
+
+    Keys in the table of a piece take precedence over those in [contact]. The interface is as long
+    as the shorter face.
+    """
+    pieces = []
+    for own in (contact.lower or OnePiece(), contact.upper or OnePiece()):
+        end = SHARP_END
+        if own.chamfer:
+            end = End("chamfer", own.chamfer)
+        elif own.end_radius:
+            end = End("radius", own.end_radius)
+        piece = PatchPiece(
+            height=own.height or contact.height,
+            substrate=own.substrate or contact.substrate,
+            coating=None if own.coating == "none" else own.coating or contact.coating,
+            length=own.length or contact.length,
+            end=end,
+        )
+        pieces.append(piece)
+    lower, upper = pieces
     return PatchPieces(
         lower=lower,
         upper=upper,
@@ -354,29 +391,6 @@ def build_pieces(contact: Contact) -> PatchPieces:
         substrate=contact.substrate,
         pairs=contact.pairs,
         plane=contact.plane,
-    )
-
-
-def _build_piece(contact: Contact, own) -> PatchPiece:
-    """Build one piece; keys in the table of this piece take precedence over those in [contact]."""
-    if own is None:
-        return PatchPiece(
-            contact.height, contact.substrate, contact.coating, contact.length, SHARP_END
-        )
-    coating = None
-    if own.coating != "none":
-        coating = own.coating or contact.coating
-    end = SHARP_END
-    if own.chamfer:
-        end = End("chamfer", own.chamfer)
-    elif own.end_radius:
-        end = End("radius", own.end_radius)
-    return PatchPiece(
-        height=own.height or contact.height,
-        substrate=own.substrate or contact.substrate,
-        coating=coating,
-        length=own.length or contact.length,
-        end=end,
     )
 
 
@@ -393,19 +407,6 @@ def _build_loading(contact: Contact) -> PatchLoading:
         rotational_stiffness=(holder.rotational_stiffness or 0.0) if holder is not None else 0.0,
         tangential_stiffness=(holder.tangential_stiffness or None) if holder is not None else None,
     )
-
-
-def _build_interface(contact: Contact, length: float, resolve_path: Callable) -> PatchInterface:
-    """Build the interface of length [m] that a table [contact] describes."""
-    skin = contact.asperities
-    if skin is not None and skin.law == "hertz":
-        skin = peaks.complete_asperities(
-            skin, resolve_path, find_shortest_wavelength(contact, length)
-        )
-    strips = contact.strips
-    if strips is not None:
-        strips = PatchStrips(strips.count, strips.roll, strips.offset)
-    return PatchInterface(skin, strips, contact.shear is not None, contact.compliance_key)
 
 
 def find_profile_lengths(contact: Contact, pieces: PatchPieces) -> ProfileLengths:
