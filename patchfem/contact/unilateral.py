@@ -142,12 +142,17 @@ def solve(
 ) -> ContactSolution:
     """Solve a contact problem of a patch or of several strips.
 
+    The forces are those of a strictly convex quadratic program, so that neither the set from which the search starts
+    nor the method that finds them changes them. The residuals of every pressed patch are computed anew
+    (`compute_residuals`, `strips.compute_strip_residuals`).
+
     Parameters
     ----------
     compliance : StripCompliance
     problem : ContactProblem
+        Without a free rotation, its gap [m] is measured from a point near the contact: an offset costs digits.
     start : (n,) bool ndarray, optional
-        Contact set of a similar problem.
+        Contact set of a similar problem, which saves iterations.
     max_iterations : int
         Number of sets that the primal-dual method may try each time.
 
@@ -319,6 +324,10 @@ def press(
 ) -> ContactState:
     """Compute the static pressure between two pieces under a load.
 
+    The nodal forces f >= 0 and the openings w = g + theta x - delta + C f >= 0 satisfy f . w = 0, sum f = load and, with
+    a moment, sum f x = moment + spring * theta. `compute_residuals` checks this in every call, without any
+    intermediate result of the solver.
+
     Parameters
     ----------
     pieces : Compliance
@@ -339,6 +348,7 @@ def press(
     Returns
     -------
     ContactState
+        Its normal stress is the nodal force over the nodal area.
 
     Raises
     ------

@@ -219,13 +219,21 @@ class InterfaceCompliance(NamedTuple):
 def interface_compliance(piece) -> InterfaceCompliance:
     """Compute the compliances of a piece at its interface, per unit width.
 
+    They are the inverse of the Schur complement of the stiffness at the nodes of the interface, with
+    bilinear quadrilaterals (and linear triangles), a fixed far face and free ends. The order in which
+    the inner nodes are eliminated does not enter. Every factorisation is checked with an irregular
+    load: `round_off_error` of the piece is the change of its solution by one step of iterative
+    refinement.
+
     Parameters
     ----------
     piece : Piece or substructure.Substructure
+        It is factorised if it is not yet.
 
     Returns
     -------
     InterfaceCompliance
+        Symmetric nn and tt, positive definite [m2/N].
 
     Raises
     ------

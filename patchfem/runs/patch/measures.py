@@ -94,6 +94,11 @@ def estimate_static_measures(
 ) -> dict:
     """Return the static measures of a patch with their error estimates.
 
+    A value is that of the finest mesh, or its limit for vanishing cells if the value misses the
+    tolerance and the limit is more accurate (`limits`). The error is the larger one of the change
+    that further refinement would cause and of the errors that no refinement shows
+    (`estimate_hidden_errors`).
+
     Parameters
     ----------
     fine : Patch
