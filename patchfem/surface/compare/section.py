@@ -23,6 +23,7 @@ FLANK_HEIGHT = 25.0
 # Smallest height of a cliff, and smallest depth to which any flank is
 # fitted, in standard deviations.
 MIN_CLIFF = 10.0
+MIN_FITTED_DEPTHS = 2  # smallest number of depths to which a flank of two parameters can be fitted
 MIN_FLANK_SAMPLES = 12  # smallest number of samples of a flank, and of the unworn heights beside it
 # Largest number of samples that are tried as the first worn one, which limits the time.
 MAX_CANDIDATES = 160
@@ -220,6 +221,8 @@ def find_end(depth, noise, correlation: float, worn: int) -> FlankEnd:
         first_deep = last_uncertain + 1
         if relative[last_uncertain] <= MAX_UNWORN and relative[first_deep] > MIN_CLIFF:
             return FlankEnd(first_deep, last_uncertain, min(first_deep + 1, depth.size - 1), 0.5)
+    if depth.size < MIN_FITTED_DEPTHS:  # the worn height is the last one of the section
+        return FlankEnd(worn, worn, worn, 0.5)
     low = max(worn - 2 * reach, 0)
     part = depth[low:high]
     sigma = noise[low:high]

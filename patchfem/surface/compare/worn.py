@@ -39,8 +39,6 @@ WITHIN_TEXT = (
 )
 END_TEXTS = ("x of the first worn place", "x of the last worn place")
 
-# Smallest fraction of the total lost area in a worn run whose ends count as ends of the wear.
-MIN_AREA_FRACTION = 0.01
 # Cut-off relative to the longest wave of the band; longer waves of the
 # depth are the form of a track.
 FORM_WAVES = 2.5
@@ -212,7 +210,7 @@ def find_extent(alignment: Alignment, section: Section, tracks: Tracks) -> Exten
         limits = [Quantity(edge, edge, edge, "m", "") for edge in edges]
         ends = [edge if cut else end for end, edge, cut in zip(ends, limits, is_cut)]
     else:
-        runs = _find_main_runs(section)
+        runs = find_runs(find_worn_heights(section))
         if not runs:
             return None
         whole = (0, section.x.size)
@@ -234,15 +232,6 @@ def find_extent(alignment: Alignment, section: Section, tracks: Tracks) -> Exten
         )
         after.append(end._replace(text=f"{text} in the second trace (after wear)"))
     return Extent(tuple(before), tuple(after), is_cut)
-
-
-def _find_main_runs(section: Section) -> list:
-    """Find the runs of worn heights that each have at least 1 % of the lost area."""
-    runs = find_runs(find_worn_heights(section))
-    lost = section.widths * section.depth
-    areas = [float(lost[first : last + 1].sum()) for first, last in runs]
-    total = sum(area for area in areas if area > 0)
-    return [run for run, area in zip(runs, areas) if area >= MIN_AREA_FRACTION * total]
 
 
 def measure_tracks(alignment: Alignment, section: Section, longest: float) -> Tracks:

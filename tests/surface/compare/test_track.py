@@ -39,6 +39,40 @@ def score_tracks(kind: str, count: int) -> tuple:
     return np.array(errors), np.mean(covers), np.mean(ends)
 
 
+def compare_worn_tops(*tops) -> tuple:
+    """Return both ends of the wear of 15 worn tops between 1.0 and 2.88 mm of 4 mm, and of further ones.
+
+    Further tops are (first sample, number of samples, depth [um]); samples are 1 um apart.
+    """
+    random = np.random.default_rng(1)
+    rough = np.convolve(
+        random.standard_normal(4120), np.exp(-0.5 * (np.arange(-60, 61) / 10) ** 2), "valid"
+    )
+    before = 0.3 * UM * rough / rough.std()
+    after = before.copy()
+    for first, count, depth in (*((1000 + 130 * k, 60, 1.0) for k in range(15)), *tops):
+        after[first : first + count] -= depth * UM
+    x = frozen_array(np.arange(4000.0) * UM)
+    jitter = 0.01 * UM * random.standard_normal((2, 4000))
+    traces = (before + jitter[0], after + jitter[1])
+    values = compare_traces(*(Profile(x, frozen_array(z), "trace") for z in traces)).values
+    return values["worn_from_after"], values["worn_to_after"]
+
+
+def test_small_worn_top_far_from_others_is_first_worn_place():
+    """The wear begins at a narrow worn top with 0.5 % of the lost area, 0.9 mm before the others."""
+    start, end = compare_worn_tops((100, 16, 0.3))
+    assert start.low <= 100 * UM <= start.high < 102 * UM
+    assert end.low <= 2879 * UM <= end.high
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 12])
+def test_wear_of_last_samples_has_no_known_end(count):
+    """If the last samples are worn, even a single one, the end is unknown, because the wear may go on."""
+    end = compare_worn_tops((4000 - count, count, 0.5))[1]
+    assert end.value is None and "may go on" in end.reason
+
+
 @pytest.mark.share(1)
 @pytest.mark.parametrize("kind", KINDS)
 def test_always_largest_depth_and_ends_are_covered(kind):
