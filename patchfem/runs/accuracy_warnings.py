@@ -97,6 +97,8 @@ def tolerance_warnings(context: AccuracyContext, coarse=(), static_patches=()) -
     tolerance = model.accuracy.tolerance
     excess = {}
     for name, measure in context.measures.items():
+        if name == "work_check" and notes.warn_of_work_check(context.measures, None):
+            continue  # that warning has a remedy of its own
         ratio = min(measure.error_ratio(tolerance), MAX_EXCESS)
         if ratio > 1:
             excess[name] = ratio
@@ -194,7 +196,9 @@ def _advise_on_statics(context: AccuracyContext, excess: dict, coarse) -> str:
         and peak is not None
         and peak.value is None
     )
-    if is_wear_unbounded or max(excess.values()) >= MAX_EXCESS:
+    # On a prescribed mesh, a value of zero may only show that the mesh is too coarse.
+    is_zero = max(excess.values()) >= MAX_EXCESS and patch_model.mesh.is_automatic
+    if is_wear_unbounded or is_zero:
         return NO_ADVICE
     if (
         patch_model.mesh.file is None
