@@ -19,6 +19,7 @@ from .model import (
     TraceModel,
 )
 from .robust import MAX_NOISE, MAX_UNWORN, MIN_UNWORN, find_floors, fit_biweight, solve_weighted
+from .search import MIN_OVERLAP
 from .section import find_flank_ends, noise_threshold
 
 # Largest scale of a floor relative to that of the quietest floor; rougher floors are dropped.
@@ -180,7 +181,7 @@ def align(before: Profile, after: Profile, shift: float, is_straight: bool = Fal
     Raises
     ------
     PatchfemError
-        If too few heights lie on the first trace.
+        If too few heights lie on the first trace, or if the fit moves most of them off it.
     """
     model = TraceModel(before, after, shift)
     thin = model.thin(N_THINNED)
@@ -192,6 +193,8 @@ def align(before: Profile, after: Profile, shift: float, is_straight: bool = Fal
     model.smooth_slope(floor.scale)
     thin.slope = model.slope
     best = _fit_all_heights(model, floor.state, STRAIGHT_PARAMETERS)
+    if model.overlap(model.places(best.state)).sum() < MIN_OVERLAP * best.x.size:
+        raise PatchfemError(f"{after.source}: the best fit leaves {before.source}")
     if is_straight:
         return replace(_align_straight_datum(model, best), is_straight=True)
     bent = _choose_floor(

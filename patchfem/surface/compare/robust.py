@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..profile import robust_deviation
+from .model import MIN_HEIGHTS
 
 # Fraction of the heights that least trimmed squares fits; it is small because
 # only few heights may be unworn.
@@ -81,6 +82,8 @@ def concentrate(model, state, free, rounds: int = 12) -> np.ndarray:
     """Improve a starting point by C-steps of least trimmed squares."""
     for _ in range(rounds):
         depth, jacobian = model.linearize(state)
+        if depth.size < MIN_HEIGHTS:
+            break
         distance = np.abs(depth)
         keep = distance <= np.quantile(distance, TRIMMED_FRACTION)
         step = solve_weighted(jacobian[keep][:, free], depth[keep], np.ones(keep.sum()))
@@ -111,7 +114,7 @@ def fit_biweight(model, state, free, worn=None, rounds: int = 60, max_scale: flo
         kept = np.ones(depth.size, bool) if worn is None else ~worn
         scale = max(min(estimate_scale(depth[kept]), max_scale), model.min_scale)
         weight = np.clip(1 - (depth / (BIWEIGHT * scale)) ** 2, 0, None) ** 2 * kept
-        if (weight > 0).sum() < 12:
+        if (weight > 0).sum() < MIN_HEIGHTS:
             break
         step = model.limit_step(solve_weighted(jacobian[:, free], depth, weight), free)
         state = state.copy()
@@ -144,13 +147,16 @@ def find_floors(model, state, free, form) -> list:
     """
     floors = []
     depth, _ = model.linearize(state)
-    remaining_blocks = model.blocks(depth.size)
+    remaining_blocks = [block for block in model.blocks(depth.size) if _has_mode(block)]
     rigid = [k for k in free if k in form or k in model.shifts]
     for _ in range(MAX_FLOORS):
         if len(remaining_blocks) < len(form) + 1:
             break
         for start in _find_starts(model, state, form, remaining_blocks):
-            fit = fit_biweight(model, concentrate(model, start, rigid), free, rounds=20)
+            trimmed = concentrate(model, start, rigid)
+            if model.linearize(trimmed)[0].size < MIN_HEIGHTS:
+                continue
+            fit = fit_biweight(model, trimmed, free, rounds=20)
             floors.append(_make_floor(model, fit))
             remaining_blocks = _drop_blocks(model, floors[-1], remaining_blocks)
     return floors
@@ -169,7 +175,7 @@ def _drop_blocks(model, floor: Floor, blocks: list) -> list:
     kept = []
     for block in blocks:
         part = depth[block[block < depth.size]]
-        if part.size >= 3 and abs(estimate_mode(part)) > MAX_UNWORN * floor.scale:
+        if _has_mode(part) and abs(estimate_mode(part)) > MAX_UNWORN * floor.scale:
             kept.append(block)
     return kept
 
@@ -208,6 +214,11 @@ def _choose_subsets(count: int, size: int) -> list:
         return list(combinations(range(count), size))
     draw = np.random.default_rng(SEED)
     return [draw.choice(count, size, replace=False) for _ in range(MAX_SUBSETS // 2)]
+
+
+def _has_mode(values) -> bool:
+    """Return whether values are enough for a mode: the shortest interval that holds two of three."""
+    return values.size >= 3
 
 
 def estimate_mode(values) -> float:

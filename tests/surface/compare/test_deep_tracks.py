@@ -136,6 +136,24 @@ def test_refuses_traces_of_different_places(count):
         )
 
 
+@pytest.mark.parametrize("seed", [97047, 97051])
+def test_refuses_fit_that_leaves_first_trace(seed):
+    """Traces whose best fit moves most heights off the first trace are refused. Earlier this led to an internal fault."""
+    before = make_milled_pair(seed)[0]
+    after = make_milled_pair(seed + 1000)[1]
+    place = find_place_as_given(before, after, 0.0)
+    assert place.alignment is None and "hardly any heights" in place.reason
+
+
+@pytest.mark.parametrize("count", [12, 20, 35])
+def test_refuses_shift_with_few_common_heights(count):
+    """A shift at which too few heights lie on the first trace for the modes of blocks is refused with a reason."""
+    before, after, *_ = make_milled_pair(HELD_OUT)
+    shift = float(before.x[count - 1] - before.x[-1])
+    place = find_place_as_given(before, after, shift)
+    assert place.alignment is None and "hardly any heights" in place.reason
+
+
 def make_turned_surface() -> tuple:
     """Return the traces of a turned surface with waves of 80 um before and after its tops wore off, and the worn depth."""
     x = frozen_array(np.arange(1001) * UM)
