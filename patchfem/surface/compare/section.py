@@ -213,7 +213,8 @@ def find_end(depth, noise, correlation: float, worn: int) -> FlankEnd:
     reach = max(int(deep[0]) if deep.size else depth.size - worn, MIN_FLANK_SAMPLES)
     high = min(worn + reach, depth.size)
     is_certain = relative > noise_threshold(depth.size)
-    inside = is_certain[worn:high]
+    # The first deep height counts too: at a cliff, no height before it is certainly worn.
+    inside = is_certain[worn : high + 1]
     first_certain = worn + (int(np.argmax(inside)) if inside.any() else reach // 2)
     uncertain = np.flatnonzero(~is_certain[:first_certain])
     if inside.any() and uncertain.size:

@@ -169,6 +169,18 @@ def test_always_steep_flank_ends_between_samples(step, rise, scatter):
     assert np.median(value) == 0 and np.median(high - low) == 2
 
 
+@pytest.mark.parametrize("count", [4, 12, 30])
+def test_exact_cliff_is_found_from_outside(count):
+    """The cliff of a track is found if the samples taken as worn begin up to 30 samples before it.
+
+    Earlier only the samples before the first deep one were searched for a cliff.
+    """
+    depth = np.append(np.zeros(200), np.full(100, 33.0))
+    depth += np.random.default_rng(1).normal(size=300)
+    found = find_end(depth, np.ones(300), 1.0, 200 - count)
+    assert (found.low, found.first, found.high, found.offset) == (199, 200, 201, 0.5)
+
+
 @pytest.mark.share(0)
 @pytest.mark.parametrize(("power", "count"), [(2, 20), (1, 40), (2, 40)])
 def test_always_end_of_flat_flank_covers_datum_drift(power, count):
