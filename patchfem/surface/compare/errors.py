@@ -2,8 +2,9 @@
 
 The depths of the unworn heights without the drift of the datum (`drift`), divided by their noise, are
 drawn in blocks (Kuensch, Annals of Statistics 17 (1989) 1217) whose length follows their correlation.
-Drawn drifts are added. The influence function of the biweight gives the change of the fitted parameters
-in each draw, and the drift that a draw shows is subtracted, as it is from the traces. One set of draws
+Single heights far above unworn neighbours are drawn too, because they are the tail of the noise. Drawn
+drifts are added. The influence function of the biweight gives the change of the fitted parameters in
+each draw, and the drift that a draw shows is subtracted, as it is from the traces. One set of draws
 gives the intervals of all means, areas, floors and largest depths.
 """
 
@@ -11,13 +12,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..profile import robust_deviation
 from ..quantity import LEVEL, SIDE
 from .drift import model_drift
-from .robust import BIWEIGHT, MAX_UNWORN
+from .robust import BIWEIGHT, MAX_OUTLIER, MAX_UNWORN
 
 N_DRAWS = 200  # number of bootstrap draws, which determine a standard deviation to 5 %
 # Variance of normal noise of unit variance that is truncated at MAX_UNWORN.
 TRUNCATED_VARIANCE = 0.911
+MAX_NOISE_ROUNDS = 30  # largest number of fits of the noise; most traces need fewer than ten
+MIN_NOISE_HEIGHTS = 30  # smallest number of heights that show how the noise varies along a trace
 SEED = 1989
 
 
@@ -41,7 +45,10 @@ def estimate_noise(depth, unworn, slope, curvature, min_noise: float) -> np.ndar
 
     The variance is that of flat heights, plus terms that grow with the square of the slope (jitter
     of x) and of the curvature (interpolation between samples); all terms are >= 0 (non-negative
-    least squares).
+    least squares). Only depths of the sign with less scatter count, because wear has one sign, and of
+    these only depths within 2.5 standard deviations of their own, which the fit repeats until they no
+    longer change: a common limit would cut off the noise of steep places. Of fewer than 30 heights,
+    the noise is the same everywhere.
 
     Parameters
     ----------
@@ -55,19 +62,31 @@ def estimate_noise(depth, unworn, slope, curvature, min_noise: float) -> np.ndar
     columns = np.column_stack([np.ones(depth.size), slope**2, curvature**2])
     scale = columns[unworn].mean(axis=0)
     columns = columns / np.where(scale > 0, scale, 1.0)
-    used = unworn
-    start = max(float(np.mean(depth[used] ** 2)) / TRUNCATED_VARIANCE, min_noise**2)
+    side = _find_quiet_side(depth)
+    used = unworn & side
+    start = max(float(np.mean(depth[unworn] ** 2)) / TRUNCATED_VARIANCE, min_noise**2)
     variance = np.full(depth.size, start)
-    for _ in range(3):
-        weight = 1 / variance[used]
+    for _ in range(MAX_NOISE_ROUNDS):
+        if used.sum() < MIN_NOISE_HEIGHTS:
+            break
+        # A depth that is rounded to zero belongs to both signs, so it counts half.
+        weight = np.where(depth[used] == 0, np.sqrt(0.5), 1.0) / variance[used]
         coefficients = nnls(
             columns[used] * weight[:, None], depth[used] ** 2 * weight / TRUNCATED_VARIANCE
         )[0]
         variance = np.maximum(columns @ coefficients, min_noise**2)
-        used = unworn & (depth**2 <= (MAX_UNWORN + 0.5) ** 2 * variance)
-        if used.sum() < 30:
+        new = side & (depth**2 <= MAX_UNWORN**2 * variance)
+        if (new == used).all():
             break
+        used = new
     return np.sqrt(variance)
+
+
+def _find_quiet_side(depth) -> np.ndarray:
+    """Find the depths (n,) bool of the sign with less scatter, which shows neither wear nor growth."""
+    sides = (depth <= 0, depth >= 0)
+    scatters = [robust_deviation(depth[side]) if side.any() else np.inf for side in sides]
+    return sides[int(np.argmin(scatters))]
 
 
 def correlation_length(values, present, longest: int | None = None) -> float:
@@ -149,9 +168,10 @@ def draw_errors(depth, noise, unworn, clear, jacobian, degree: int) -> DrawnErro
     model = model_drift(depth, clear, degree, N_DRAWS, random)
     corrected = depth if model is None else model.remove(depth)
     relative = corrected / noise
-    values = relative[unworn]
-    values = values - values.mean()
-    values = values / max(float(values.std()), 1e-300)
+    core = relative[unworn]
+    values = relative[unworn | _find_high_outliers(relative, unworn)]
+    values = np.clip(values - core.mean(), -MAX_OUTLIER, MAX_OUTLIER)
+    values = values / max(float(core.std()), 1e-300)
     correlation = correlation_length(np.where(unworn, relative, 0.0), unworn)
     length = block_length(correlation, values.size)
     errors = draw_blocks(values, length, depth.size) * noise * student_factor(values.size / length)
@@ -162,6 +182,12 @@ def draw_errors(depth, noise, unworn, clear, jacobian, degree: int) -> DrawnErro
     if model is not None:
         errors = model.remove(errors)
     return DrawnErrors(depth - corrected, errors, steps, correlation)
+
+
+def _find_high_outliers(relative, unworn) -> np.ndarray:
+    """Find single heights (n,) bool far above unworn neighbours: the tail of the noise, which wear cannot make."""
+    n_unworn = np.convolve(unworn.astype(float), np.ones(5), "same")
+    return ~unworn & (relative < 0) & (n_unworn > 2.5)
 
 
 def _propagate_to_parameters(errors, noise, unworn, jacobian) -> np.ndarray:

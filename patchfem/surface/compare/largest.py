@@ -8,7 +8,7 @@ import numpy as np
 
 from ..quantity import Quantity, make_quantity
 from .boxes import part_edges
-from .robust import MAX_OUTLIER
+from .robust import MAX_NOISE, MAX_OUTLIER
 from .section import Section
 
 MIN_WINDOW = 5  # number of samples in the shortest window
@@ -199,7 +199,8 @@ def _fits_parabola(windows, noise, correlation: float) -> np.ndarray:
     residual = windows - (windows @ base) @ base.T
     freedom = length - 3
     relative = np.abs(residual) / noise
-    chi_squared = (relative**2).sum(axis=1)
+    # An error of interpolation at a kink is larger than normal noise; it does not end a window.
+    chi_squared = (np.minimum(relative, MAX_NOISE) ** 2).sum(axis=1)
     fits = chi_squared <= freedom + MAX_MISFIT * np.sqrt(2 * freedom * correlation)
     fits &= relative.max(axis=1) < MAX_OUTLIER
     if length >= 2 * N_PARTS:
