@@ -179,7 +179,12 @@ def _describe_removed_option(arguments: list) -> str:
 
 
 def register_verbs(arguments: list) -> None:
-    """Register the requested verb with the command-line parser, or all verbs if there is none."""
+    """Register the requested verb with the command-line parser, or all verbs if there is none.
+
+    `--version` needs no verb, whose modules would be imported.
+    """
+    if arguments == ["--version"]:
+        return
     names_verb = bool(arguments) and arguments[0] in VERBS
     for verb in arguments[:1] if names_verb else VERBS:
         if verb not in app:

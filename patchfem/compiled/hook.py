@@ -115,9 +115,12 @@ def build_machine_code(target: Path, commands=list_usual_commands) -> None:
                 cwd=work,
                 check=True,
             )
-        [compiled_folder] = (cache / "patchfem").iterdir()
+        # The cache also has a folder of compliance matrices.
+        [code_folder] = (cache / "patchfem").glob("*/code")
         for name in ("code", "kinds"):
-            copytree(compiled_folder / name, target / key / name, ignore=ignore_patterns("*.lock"))
+            copytree(
+                code_folder.with_name(name), target / key / name, ignore=ignore_patterns("*.lock")
+            )
 
 
 def get_build_hook():

@@ -219,6 +219,11 @@ class Rig:
 def build_rig(scene, joint: float | None = None) -> Rig:
     """Build the rig of a scene with [structure] and [drive].
 
+    The modes have natural frequencies omega [rad/s] and damping ratios, and per unit modal coordinate
+    the displacement at each interface (`slide`), that at the output and the excitation by the base. They
+    are those of [[structure.mode]], or of its masses, springs, beams or matrices. A drive by the base
+    is its acceleration a(t) [m s-2], such as a sin(omega t) with the amplitude `acceleration`.
+
     Parameters
     ----------
     scene : Scene

@@ -108,6 +108,9 @@ def apply_increment(dq, start, contact, goal):
 def commit_step(dq, force, start, end_velocity, contact):
     """Update the points and pieces after a converged step.
 
+    The bonds of each point advance by its slide xi (eq. 2.17 for p = 1, in the form of the moments m, z
+    and s2 of `friction.bonds.point_kernels`), and the mode coordinates b of the pieces by db.
+
     Parameters
     ----------
     dq : float

@@ -4,7 +4,7 @@ The slide of point j in a step is xi_j = dq - sum_k psi_kj db_k, and the coordin
 (b + db/2) = psi^T f with the path-mean forces f, so the work of the holder equals the energy of points and
 pieces. A force that jumps would leave b oscillating about equilibrium; for such laws kappa
 STEP_DAMPING (db - db of the step before) is added, which removes two thirds of the oscillation in a step and
-changes a smooth motion to second order. With `ending` the pieces relax while the holder
+changes a smooth motion to second order. With `problem.relaxes` the pieces relax while the holder
 is at rest: kappa (b + db) = psi^T f with the forces after the slide, which dissipates energy as long
 as the force increases with the slide.
 
@@ -151,7 +151,7 @@ def write_gradient(y, problem, contact, out):
     Returns
     -------
     float
-        Friction force Friction force [N].
+        Friction force [N].
     """
     end_fraction = 1.0 if problem.relaxes else 0.5
     damping = 0.0 if problem.relaxes else STEP_DAMPING
@@ -257,6 +257,11 @@ def is_last_step(p, contact):
 def minimise(problem, contact, goal):
     """Minimise the potential of a step by Newton's method with a line search.
 
+    The potential is the work of the points over their slides xi_j, plus the energy of the pieces,
+    sum_k kappa_k (b_k db_k + db_k^2/4), plus (free - dq)^2/(2 compliance) of the holder. Its gradient
+    (`write_gradient`) is the equilibrium of holder and pieces in the docstring of the module. It is
+    convex if no force of a point decreases with its slide; the minimum is then the only solution.
+
     The unknowns contact.y = (dq, db) hold the initial guess and the solution. A factorised Hessian
     is reused within a step of the march, until an iteration with it reduces the residual by less
     than a factor of ten. No residual is computed after a Newton step that is short enough.
@@ -267,7 +272,7 @@ def minimise(problem, contact, goal):
         Row 1 of contact.y has the solution of a relaxation, row 0 that of a step.
     contact : arrays.ShearedPoints
     goal : float
-        Tolerance of the residual Friction force [N].
+        Tolerance of the residual [N].
 
     Returns
     -------

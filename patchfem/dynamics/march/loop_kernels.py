@@ -97,6 +97,11 @@ def sample_interface(i, is_last, drive, system, row):
 def march(first, steps, system, rows):
     """March modes and interface over a number of time steps, and record a sample per step.
 
+    A step solves dq = free - beta F(dq) for the increment dq [m] of the relative displacement: `free`
+    [m] is the increment without friction, beta [m/N] the increment per interface force, and F(dq) [N]
+    the mean of the friction force over the path dq (`solve_contact_step`). The modes then move exactly
+    under this constant force, and the memories of the contact are updated (`commit_step` of its kernels).
+
     Parameters
     ----------
     first : int

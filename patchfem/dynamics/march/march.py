@@ -120,6 +120,14 @@ def march(
 ) -> MarchResult:
     """March a model over cycles of its drive signal, from rest or from an initial state.
 
+    The equation of motion is (3.4) of the report: z'' + 2 zeta omega z' + omega^2 z equals the modal
+    acceleration of the drive minus phi^T F/mass, with the friction force F on the interface. In a
+    time step the modes move exactly (`propagator`) under the drive and the mean of F over the path of
+    the step. The increment of the relative displacement follows from this mean by Newton's method, so
+    that friction work and energy balance to round-off. The amplitude is of second order in the step.
+    The extremes of a cycle are those of the cubic Hermite polynomials through the samples of the
+    output and its rate.
+
     Parameters
     ----------
     modes : ModalBasis

@@ -84,8 +84,8 @@ def _make_response(rows, number, dt, modes, drive) -> Response:
     dt : float
         Length of the step [s].
     modes : ModalBasis
-    drive : float
-        Acceleration of the base [m s-2].
+    drive
+        Drive signal, which gives the acceleration of the base [m s-2] at any time.
     """
     n = modes.omega.size
     first_sum = 2 * n + FIRST_SUM

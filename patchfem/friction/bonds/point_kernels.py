@@ -1,7 +1,12 @@
 """Bonds of one point on a line for friction.reading = "stretch" and p = 1, compiled (see `recursion`).
 
 m [Pa], z [Pa m] and s2 [Pa m2] are the sums over the bonds of a point: density, stretch and stretch squared. sigma [Pa]
-is the pressure under which new bonds form, eps [m] the bond length of the step. The traction is mu_s/eps_0 z.
+is the pressure under which new bonds form, eps [m] the bond length of the step. The traction is mu_s/eps_0 z. Per unit
+of path in the direction e = 1 or -1 (eq. 2.17 with p = 1)
+
+    m' = (sigma - m)/eps,   z' = m e - z/eps,   s2' = 2 z e - s2/eps,
+
+which the functions solve exactly over an increment, with x = |increment|/eps.
 Functions named short_* hold for increments up to MAX_SHORT_PATH bond lengths and have no branch, so that loops over
 points vectorise. All arrays are C-ordered float64.
 """
@@ -51,6 +56,7 @@ class BondStep(NamedTuple):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def _sum_series(coefficients, n_terms, x):
+    """Return the sum of coefficients[k] (-x)^k over the first n_terms, by Horner's rule."""
     total = 0.0
     for k in range(n_terms - 1, -1, -1):
         total = coefficients[k] - x * total
@@ -71,6 +77,7 @@ def shape_functions(x):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def _short_shape_functions(x):
+    """Return the shape functions of a path x up to MAX_SHORT_PATH by power series."""
     f2 = _sum_series(SHAPE_SERIES, SHAPE_SERIES.size, x)
     f1 = 1 - x * f2
     return ShapeFunctions(f1, f2, 1 - x * f1)
@@ -86,6 +93,7 @@ def _integrate_powers(x, decay):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def _integrate_short_powers(x, decay):
+    """Return the integrals of `_integrate_powers` for x up to MAX_SHORT_PATH by a power series."""
     series = _sum_series(MOMENT_SERIES, MOMENT_SERIES.size, x)
     return _powers_from_cubic(x, decay, x**4 * series)
 
@@ -135,6 +143,7 @@ def short_bond_mean(m, z, increment, sigma, eps):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def _mean_stretch(m, z, increment, sigma, eps, shapes):
+    """Return the mean of z over the path of an increment, and its derivative over the increment."""
     f1, f2 = shapes
     direction = 1.0 if increment > 0 else -1.0
     x = abs(increment) / eps
@@ -186,6 +195,7 @@ def short_bond_step(m, z, s2, increment, sigma, eps):
 
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def _step_bonds(bonds, increment, sigma, eps, shapes, powers):
+    """Return the sums over the bonds after an increment, from shape functions and integrals of its path."""
     m, z, s2 = bonds
     f1, decay = shapes
     first, second, second_integral = powers

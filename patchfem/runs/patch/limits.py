@@ -46,7 +46,7 @@ def extrapolate_to_zero_cell_length(values, nested: bool = True) -> Limit:
     """Extrapolate values on successively refined meshes to vanishing cell length.
 
     Three values give a ratio of successive changes. If it is regular, the error of the value on the
-    finest mesh is the remainder of the geometric series. With two values the error is twice their
+    finest mesh is REGULAR_ERROR_FACTOR times the remainder of the geometric series. With two values the error is twice their
     change. For meshes that are not nested the order is limited to log2(2.5), and no value is
     extrapolated.
 

@@ -99,6 +99,11 @@ def estimate_static_measures(
     that further refinement would cause and of the errors that no refinement shows
     (`estimate_hidden_errors`).
 
+    The pressure peak on a mesh is the vertex of the parabola through the largest nodal pressure and its
+    neighbours, or at an end of the interface the end value of the curve whose cell means are the nodal
+    pressures (`values.estimate_peak_pressures`). Lengths and stiffnesses include the part of a cell
+    beyond the last loaded node (`contact.edges`).
+
     Parameters
     ----------
     fine : Patch

@@ -52,6 +52,11 @@ def solve_with_coarser(
 ) -> tuple:
     """Solve a patch on its mesh and on the coarser meshes of its error estimate.
 
+    On each mesh the pieces are condensed to the nodes of the interface, so that a compliance [m/N]
+    relates nodal forces and displacements. The pressure sigma_n [Pa] and the gap under load [m] satisfy
+    sigma_n >= 0, gap >= 0 and sigma_n gap = 0 at every node, and the pressure balances the load [N] or
+    gives the prescribed approach [m].
+
     If the element size is not prescribed, nested meshes are refined until the patch meets the
     tolerance. An unstructured mesh has no coarser one; its second solution is on the mesh with all
     edges halved. Shared meshes are used as they are, unless they do not resolve a profile to the
@@ -253,7 +258,7 @@ def solve_on_static_meshes(
 
     Parameters
     ----------
-    patch_model, tolerance, estimate, fresh
+    patch_model, tolerance, estimate, ignore_cache
         See `solve_on_refined_meshes`.
 
     Returns

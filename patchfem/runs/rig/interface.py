@@ -32,7 +32,10 @@ def make_contact(model: Model, numerics: Numerics, patch):
     """Return the contact model of a time integration, with all interfaces and nonlinear springs.
 
     It is a ContactModel for a single interface, a JointsModel for several interfaces or nonlinear
-    springs, or a model of grooves.
+    springs, or a model of grooves. Under a nonlocal law with [contact.shear], the nodes of the patch
+    with pressure become points of bonds with the friction limits mu sigma_n area [N]. They are coupled
+    by shear modes of the pieces, as many as keep the error of the backbone curve below a tenth of the
+    tolerance (`slip.shear_modes`).
 
     Parameters
     ----------
