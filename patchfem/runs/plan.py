@@ -233,7 +233,9 @@ def _make_plan(model: Model) -> Plan:
         and rig.drive.cycles >= MIN_SKIPPED_CYCLES
     ):
         law_sentences.append(UPPER_LIMIT_NOTE)
-    forecast = forecast_tolerance(model)
+    # The forecast solves a contact, which a run with too little memory could not afford.
+    is_refused = memory.reason_for_refusal(cost.parts)
+    forecast = EMPTY_FORECAST if is_refused else forecast_tolerance(model)
     motion_sentences = [*([forecast.sentence()] if forecast.causes else []), *motion_sentences]
     is_compiled = cost.compile_seconds == 0 or compiled.has_run(
         compiled_code_key(model, cost.engine, cost.sizes)
