@@ -7,7 +7,7 @@ the file from the made mesh | the error stated for the file, in per cent:
     tilt        approach       peak           share of contact   normal stiffness   between the pressures
     0.01 mrad   -0.13 | 0.33   -0.30 | 3.4    -0.13 | 0.40        0.07 | 0.25       0.08
     0.1 mrad     0.15 | 0.43   -0.34 | 3.0    -0.07 | 0.26        0.07 | 0.28       0.21
-    1 mrad       0.01 | 0.11   -1.15 | 3.6     0.22 | 2.1         0.11 | 0.99       1.81
+    1 mrad       0.00 | 0.11   -1.15 | 3.6     0.17 | 2.0         0.13 | 0.99       1.81
 
 The last column is half the integral of the absolute difference of both pressures, over that of one.
 

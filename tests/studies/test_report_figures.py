@@ -214,7 +214,7 @@ def test_figures_30_and_31_few_sets_of_traces(tmp_path):
     ]
     for direction, part in zip("xy", figure.middle(sets).parts):
         assert ratios[direction]["amplitude_ratio"]["value"] == pytest.approx(
-            part.amplitude_ratio.value, rel=1e-5
+            part.ratios.amplitude.value, rel=1e-5
         )
 
 
