@@ -1,8 +1,8 @@
 """What does "nearly critically damped in the vicinity of 148 Hz" (Figure 27) say about the rig?
 
 The block slid during the whole modal test. A block that does not slip moves with the base, and its response has no
-peak. With a random base motion of 4.2 to 5.1 g rms the block slides by 0.5 to 1.9 mil rms, and one fitted mode is
-critically damped: at 101 Hz for a rigid Coulomb block, at 128 to 134 Hz for a block that climbs its grooves, and at 295
+peak. With a random base motion of 4.2 to 5.1 g rms the block slides by 0.5 to 1.8 mil rms, and one fitted mode is
+critically damped: at 101 Hz for a rigid Coulomb block, at 128 to 135 Hz for a block that climbs its grooves, and at 295
 Hz with the second load path fitted to Table 1.
 
 Only the grooves pass 148 Hz, at 4.5 g rms: 144 to 160 Hz with a damping ratio of 1.3, in four records of 20 s. A rigid

@@ -5,7 +5,7 @@ The shipped rig (143 Hz, 5 g, one piece tilted by 0.1 mrad, bonds of 1 um, shear
 
 Wear heals the tilt. New, 22 % of the length touches under a peak of 8.3 MPa. With 1e-14 m2/N 0.31 um wear off at the
 loaded end, 38 % touches and the peak is 2.7 MPa; normal and tangential stiffness rise from 535 to 845 and from 229 to
-303 N/um. With 1e-13 it is 97 % of the length and 1.20 um; the peak there, 0.78 +- 0.33 MPa, is hardly known, since
+303 N/um. With 1e-13 it is 97 % of the length and 1.20 um; the peak there, 0.78 +- 0.50 MPa, is hardly known, since
 jumps leave the freshly worn edge too high.
 
 The motion hardly sees it: amplitude 14.80, 15.04 and 15.31 um, loop 1.96, 2.00 and 2.04 mJ, since the same load slides

@@ -121,9 +121,8 @@ def test_figure_14_curve_has_stated_values(tmp_path):
 def test_exact_cost_table_in_the_readme_is_reproduced(words, tmp_path, monkeypatch):
     """`patchfem cost` prints the errors of the table in the README, and CPU times in similar ratios.
 
-    Round-off moves these errors by less than 1e-4 of themselves, except with cells of order 4 (tolerances of 1e-4 and
-    1e-5): there a node at the edge of the contact bears or not by round-off, and with three sets of BLAS kernels the
-    error of the contact fraction is 1.8e-6, 2.2e-6 and 2.3e-6, and no other differs by more than 4 %.
+    Round-off may move the errors at the smallest tolerance, which are compared within 5 %, and within 30 % for the
+    contact fraction: there a node at the edge of the contact bears or not by round-off.
     """
     monkeypatch.setattr("patchfem.campaigns.cost.N_TIMINGS", 1)
     said = run_cli(
@@ -147,7 +146,7 @@ def test_exact_cost_table_in_the_readme_is_reproduced(words, tmp_path, monkeypat
     assert names == printed and re.sub(r"[\d.]+ CPU s", "", said) == re.sub(
         r"[\d.]+ CPU s", "", sentence
     )
-    assert [label for label, *_ in ours] == [label for label, *_ in theirs] and len(ours) in (3, 6)
+    assert [label for label, *_ in ours] == [label for label, *_ in theirs] and len(ours) in (4, 6)
     errors, known = ([cells for *_, cells in rows] for rows in (ours, theirs))
     if not words:
         last, printed = (
