@@ -31,7 +31,7 @@ MIN_ENTRY_BYTES = {b"$Nodes": 6, b"$Elements": 4}
 
 
 def write_mesh(lower, path: Path, upper=None) -> None:
-    """Write a pair as a tagged mesh from which `read_pieces` builds the same pieces.
+    """Write the lower and the upper piece to a mesh file that `read_pieces` reads back unchanged.
 
     Parameters
     ----------

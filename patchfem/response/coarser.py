@@ -65,6 +65,7 @@ def estimate_errors(solve: Callable, fine: dict, coarse_runs, solved_runs: dict)
     errors : list of (str, dict)
         Source of the error and errors by measure name, for each of the CoarserRuns.
     seconds : float
+        Elapsed time of the new runs [s].
     """
     begin = perf_counter()
 

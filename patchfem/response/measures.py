@@ -48,7 +48,7 @@ def relative_gap(sampled_work, balance_work, exchanged_work, energy=0.0):
 
     Parameters
     ----------
-    sampled_work, balanced : float or (n,) array
+    sampled_work, balance_work : float or (n,) array
         Friction work [J] from samples and from the energy balance.
     exchanged_work : float or (n,) array
         Sum of the absolute values of the friction work of all steps [J].

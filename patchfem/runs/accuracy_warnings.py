@@ -97,8 +97,8 @@ def tolerance_warnings(context: AccuracyContext, coarse=(), static_patches=()) -
     tolerance = model.accuracy.tolerance
     excess = {}
     for name, measure in context.measures.items():
-        if name == "work_check" and notes.warn_of_work_check(context.measures, None):
-            continue  # that warning has a remedy of its own
+        if name == "work_check" and (measure.value or 0.0) > notes.MAX_WORK_CHECK:
+            continue  # `notes.warn_of_work_check` warns of it, with its remedy
         ratio = min(measure.error_ratio(tolerance), MAX_EXCESS)
         if ratio > 1:
             excess[name] = ratio

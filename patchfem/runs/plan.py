@@ -234,8 +234,9 @@ def _make_plan(model: Model) -> Plan:
     ):
         law_sentences.append(UPPER_LIMIT_NOTE)
     # The forecast solves a contact, which a run with too little memory could not afford.
-    is_refused = memory.reason_for_refusal(cost.parts)
-    forecast = EMPTY_FORECAST if is_refused else forecast_tolerance(model)
+    forecast = Forecast(model.accuracy.tolerance, ())
+    if not memory.reason_for_refusal(cost.parts):
+        forecast = forecast_tolerance(model)
     motion_sentences = [*([forecast.sentence()] if forecast.causes else []), *motion_sentences]
     is_compiled = cost.compile_seconds == 0 or compiled.has_run(
         compiled_code_key(model, cost.engine, cost.sizes)

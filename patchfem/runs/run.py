@@ -107,7 +107,12 @@ def run(
 def _run_plan(
     run_plan: Plan, say, progress, state_file: StateFile | None, *, estimate: bool, fresh: bool
 ) -> Result:
-    """Run a plan whose memory and CPU time are accepted."""
+    """Run a plan whose memory and CPU time are accepted.
+
+    The order is: patch of [contact] on its meshes, patches of the interfaces, wear, then the motion or
+    the static result, and finally static measures, self-checks and warnings. A patch without contact
+    and a rig without load have a result at once.
+    """
     start = perf_counter()
     model = run_plan.model
     seconds = {}

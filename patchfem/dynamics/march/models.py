@@ -200,10 +200,8 @@ def points_model(law, area, sigma, shear=None, pattern=None) -> ContactModel:
     Parameters
     ----------
     law : friction.bonds.parameters.Bonds
-    area : (m,) array
-        Nodal areas [m2].
-    sigma : (m,) array
-        Pressures [Pa].
+    area, sigma : (m,) array
+        Nodal areas [m2] and pressures [Pa]; only their products, the normal forces [N], matter.
     shear : ShearModes or None
         Shear of the pieces; None for pieces that are rigid in shear.
     pattern : tuple or None

@@ -178,7 +178,10 @@ def make_response(modes, drive, rows, stored: float) -> Response:
 
 
 def select_phasor_cycles(count: int, window: int) -> np.ndarray:
-    """Return a mask of the cycles whose phasor is needed: the final cycles of the last windows."""
+    """Return a mask (count,) of the last cycle of each of the last N_PHASOR_WINDOWS windows.
+
+    Only the phasors of these cycles are computed. `window` is the number of cycles of a window.
+    """
     cycles_to_end = np.arange(count)[::-1]
     return (cycles_to_end % window == 0) & (cycles_to_end < N_PHASOR_WINDOWS * window)
 

@@ -377,7 +377,7 @@ def _first_to_change(limits: Limits, ends: list) -> str:
 
 
 def _format_limit_and_gap(limits: Limits, limit: KeyLimit, *notes: str) -> str:
-    """Format the limit of a key, followed by notes in brackets."""
+    """Format the limit of a scene key, followed in brackets by the gap of a tilt angle and by notes."""
     notes = [note for note in (_format_gap(limits, limit), *notes) if note]
     return (
         f"{_format_limit(limits, limit)} ({'; '.join(notes)})"

@@ -261,6 +261,9 @@ def extrapolate_static_measures(
 ) -> dict:
     """Extrapolate static measures over a sequence of refined meshes, with error estimates.
 
+    The error of a value is the larger one of `error_factor` times the error of the series (`limits`) and
+    the hidden error. For an extrapolated value the hidden error counts with EXTRAPOLATED_ERROR_RATIO.
+
     Parameters
     ----------
     values_by_mesh : list of dict
@@ -477,7 +480,9 @@ def estimate_hidden_errors(resolution: Resolution, finest: dict) -> dict:
     """Estimate the errors of the static measures that mesh refinement does not reveal.
 
     They are due to a contact of few nodes, to a coating thinner than the cells at a loaded corner,
-    to a rounded end shorter than the cells, and to round-off.
+    to a rounded end shorter than the cells, and to round-off. The error of the pressure peak p is
+    p/(4 n^2) for a contact of few nodes n, plus the unresolved pressure of a corner, and at least that
+    of a wedge or what a rounded end would add to p.
 
     Parameters
     ----------

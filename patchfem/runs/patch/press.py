@@ -415,6 +415,11 @@ def solve_contact(
 ) -> SolvedContact:
     """Solve the contact of condensed pieces with the asperity layer, load and holder of a model.
 
+    The conditions are pressure >= 0, gap >= 0 and pressure times gap = 0 at every node. They are solved
+    by an active set (`contact.unilateral`). A patch in strips and one with a nonlinear asperity layer
+    have solvers of their own; a prescribed approach of pieces that rotate is found by a search over the
+    load.
+
     Parameters
     ----------
     patch_model : PatchModel

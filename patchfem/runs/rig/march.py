@@ -63,6 +63,11 @@ def march_in_time(model, numerics, patch, frames: int = 0, say=None, progress=No
         Number of snapshots of the interface in the last cycle.
     say, progress : callable, optional
         Callbacks for a line of text and for the completed fraction.
+
+    Returns
+    -------
+    Solution
+        Without errors from coarse runs.
     """
     march = integrate_without_postprocessing(model, numerics, patch, frames, say, progress)
     evaluator = MarchEvaluator(model, numerics, patch, march.contact)

@@ -93,9 +93,11 @@ def add_level_measures(run: CoupledRun) -> CoupledRun:
 
 
 def add_outcome_and_errors(run: CoupledRun) -> CoupledRun:
-    """Return the run with its outcome, and with the engine's error estimates of its measures.
+    """Return the run with its outcome, and with all error estimates of its measures.
 
-    The outcome is NOT_CONVERGED if the error of the energy balance is too large.
+    The errors that the run itself shows (`Solution.run_errors`) and those of an end between two samples
+    are added to the errors from coarse runs. A motion that grows has no errors. The outcome is
+    NOT_CONVERGED if the error of the energy balance is too large.
     """
     solution = run.solution
     if text := describe_balance_error(ENGINES[run.numerics.engine], run.measures):

@@ -107,7 +107,11 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> RefinedRun:
 
     Only settings that the scene does not fix are refined. All coarse runs are stored in
     `Runner.solutions` by their settings. Runs that are coarser in space are compared with a run
-    that is coarse in time, so that they need not be repeated.
+    that is coarse in time, so that they need not be repeated: their errors are estimated once.
+
+    The error of a measure is the sum of the errors by source (steps, mesh, modes, bonds), each from
+    `response.errors.convergence_error`, plus `Engine.min_relative_error` of the value (`add_errors`).
+    Afterwards `postprocessing.add_outcome_and_errors` adds the errors that the run itself shows.
 
     Parameters
     ----------

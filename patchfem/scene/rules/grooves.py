@@ -70,7 +70,7 @@ class GrooveFacts(TableFacts):
 
     @property
     def lower_shape(self) -> str:
-        """Key of the first shape on the lower piece, or "" if there is none."""
+        """Scene key of the first gap shape on the lower piece, or "" if it has none."""
         return next(iter(list_lower_shapes(self.draft.tables.contact)), "")
 
 
