@@ -38,15 +38,15 @@ class EngineResult:
     """Result of a run by one of the time integrators.
 
     - response, window: time histories of the run and of its last cycles
-    - amplitudes: (c, 2) smallest and largest output of every cycle [m]
+    - extremes: (c, 2) smallest and largest output of every cycle [m]
     - phasors: (c,) phasor of the output at the drive frequency in every cycle [m]
     - ledger: energies [J] by name
-    - outcome: how the run ended; None if it follows from the amplitudes
+    - outcome: how the run ended; None if it follows from the extremes
     """
 
     response: Response
     window: Response
-    amplitudes: np.ndarray
+    extremes: np.ndarray
     phasors: np.ndarray
     ledger: dict
     outcome: Outcome | None = None

@@ -62,7 +62,7 @@ def march_last_cycle(text, cycles=40, steps=400):
     run = march(model.rig.modes, model.rig.drive.signal, contact, cycles, steps, window=1)
     assert run.outcome is None
     return (
-        float(np.ptp(run.amplitudes[-1])) / 2,
+        float(np.ptp(run.extremes[-1])) / 2,
         run.window_work,
         float(np.abs(run.window.force).max()),
     )

@@ -185,7 +185,7 @@ def test_exact_short_history_has_measures_of_full_history(text):
     assert short_run.values | sums == full_run.values and short_run.outcome == full_run.outcome
     for name in ("time", "output", "force", "slip"):
         assert np.array_equal(getattr(short_run.window, name), getattr(full_run.window, name)), name
-    assert np.array_equal(short_run.amplitudes[-1:], full_run.amplitudes[-1:])
+    assert np.array_equal(short_run.extremes[-1:], full_run.extremes[-1:])
     count = short_run.response.time.size
     assert count < full_run.response.time.size and np.array_equal(
         short_run.response.output, full_run.response.output[-count:]

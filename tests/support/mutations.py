@@ -802,7 +802,7 @@ class MutationRun:
 
     def __init__(self, faults: list[Fault], results: Path, options: argparse.Namespace):
         self.faults = faults
-        self.results = results.resolve()  # The tests run in another folder.
+        self.results = results.resolve()
         self.options = options
         self.root = options.root.resolve()
         self.copies = SimpleQueue()

@@ -77,7 +77,7 @@ SAME_TIME_TOL = 1e-12
 class EventRunResult:
     """Result of an event-driven run with rigid and elastic-plastic friction elements.
 
-    - amplitudes: (c, 2) smallest and largest output of every cycle [m]
+    - extremes: (c, 2) smallest and largest output of every cycle [m]
     - phasors: (c,) output at the frequency of the drive in the last cycle of every window [m], 0 in
       the other cycles
     - ledger: energies [J] by name
@@ -96,7 +96,7 @@ class EventRunResult:
     - snapshots: of the elements in the last cycle
     """
 
-    amplitudes: np.ndarray
+    extremes: np.ndarray
     phasors: np.ndarray
     ledger: dict
     outcome: Outcome | None

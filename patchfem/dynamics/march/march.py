@@ -22,7 +22,7 @@ class MarchResult:
     - `response`: histories of the samples that were kept.
     - `window`, `step_force`, `window_work`: samples of the last cycles, mean forces of their steps [N] and
       friction work [J].
-    - `amplitudes` (c, 2), `phasors` (c,): extremes and phasor of the output in each cycle [m].
+    - `extremes` (c, 2), `phasors` (c,): extremes and phasor of the output in each cycle [m].
     - `ledger`: energies [J] by name, as `Run.energy_balance` returns them.
     - `outcome`, `message`: how the march ended, None and "" if it reached its last step.
     - `snapshots`: states of the interface in the last cycle.
@@ -33,7 +33,7 @@ class MarchResult:
     response: Response
     window: Response
     step_force: np.ndarray
-    amplitudes: np.ndarray
+    extremes: np.ndarray
     phasors: np.ndarray
     ledger: dict
     outcome: Outcome | None
@@ -276,7 +276,7 @@ def _make_result(run, recorder: Recorder, plan: _MarchPlan, snapshots: list) -> 
         response=run.make_response(np.concatenate([*samples.early_rows, rows]), number),
         window=last_mark.window,
         step_force=last_mark.step_force,
-        amplitudes=last_mark.amplitudes,
+        extremes=last_mark.extremes,
         phasors=np.array(samples.phasors),
         ledger=last_mark.ledger,
         outcome=run.outcome,

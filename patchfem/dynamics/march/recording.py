@@ -19,14 +19,14 @@ N_SUMS = 3
 class Mark:
     """State of a march recorded after a requested number of cycles, with the last samples before it.
 
-    - `window`, `step_force`, `work`, `amplitudes`, `ledger`: as in `march.MarchResult`.
+    - `window`, `step_force`, `work`, `extremes`, `ledger`: as in `march.MarchResult`.
     - `after`: the `Run` from which to continue.
     """
 
     window: Response
     step_force: np.ndarray
     work: float
-    amplitudes: np.ndarray
+    extremes: np.ndarray
     ledger: dict
     after: object = None
 
@@ -135,7 +135,7 @@ def make_mark(run, cycles, extremes, after=None) -> Mark:
         window=run.make_response(rows, first_step + np.arange(len(rows))),
         step_force=rows[:-1, 2 * run.modes.omega.size + SampleColumn.MEAN_FORCE].copy(),
         work=sum(cycle.work for cycle in cycles),
-        amplitudes=np.array(extremes),
+        extremes=np.array(extremes),
         ledger=run.energy_balance(),
         after=after,
     )

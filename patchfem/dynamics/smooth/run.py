@@ -634,7 +634,7 @@ def simulate(
         response=run.response(all_rows),
         window=run.response(rows),
         step_force=np.zeros(0),
-        amplitudes=run.extremes(n_cycles),
+        extremes=run.extremes(n_cycles),
         phasors=np.array([1, 1j]) @ run.record.cycles[2:, :n_cycles],
         ledger=run.energy_ledger() | _compute_work_check(with_reversals),
         outcome=run.outcome,

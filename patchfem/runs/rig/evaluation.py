@@ -119,10 +119,10 @@ class RunEvaluator:
             fields |= {"reversal_rule": reversal_force_rule(model), "ledger": ledger}
         fields |= self.collect_cycle_data(run, drive, stuck=stuck)
         window = fields["window"]
-        n_cycles = min(self.numerics.window, len(run.amplitudes))
+        n_cycles = min(self.numerics.window, len(run.extremes))
         last_cycles = LastCycles(
             drive=drive,
-            extremes=run.amplitudes[-n_cycles:],
+            extremes=run.extremes[-n_cycles:],
             load=first_interface_load(model, self.patch),
             stiffness=first_mode_stiffness(model, window),
             is_sine=is_sinusoidal(drive),
@@ -264,7 +264,7 @@ class RunEvaluator:
             self.evaluate_measures(run, drive, run.response.extra.get("ledger"), stuck=stuck)
             | rings
         )
-        ends = window_end_values(run.amplitudes, run.phasors, n_cycles)
+        ends = window_end_values(run.extremes, run.phasors, n_cycles)
         fields = {
             "message": getattr(run, "message", ""),
             "log": getattr(run, "log", None),
@@ -276,7 +276,7 @@ class RunEvaluator:
             values=values,
             response=run.response,
             window=run.window,
-            amplitudes=window_amplitudes(run.amplitudes, n_cycles),
+            amplitudes=window_amplitudes(run.extremes, n_cycles),
             outcome=run.outcome or (Outcome.STUCK if stuck else None),
             book=run.ledger,
             seconds=seconds,
@@ -285,7 +285,7 @@ class RunEvaluator:
             run_errors=ring_errors
             | self.estimate_run_errors(run, drive, values)
             | self.estimate_history_sampling_errors(run, drive, values),
-            extremes=run.amplitudes,
+            extremes=run.extremes,
             **(fields | other_fields),
         )
 

@@ -305,7 +305,7 @@ class EventEvaluator(RunEvaluator):
         numerics = self.numerics
         modes = self.model.rig.modes
         unsettled = may_still_change(
-            run.amplitudes,
+            run.extremes,
             numerics.window,
             self.model.accuracy.tolerance,
             find_min_decay_rate(modes) * drive.period,

@@ -265,9 +265,9 @@ def _report_fraction(progress, level: int, n_levels: int, fraction: float) -> No
 def remove_incomplete_cycle(run):
     """Remove the extremes and the Fourier coefficient of an incomplete last cycle."""
     count = int(run.cycles_done + 1e-9)
-    if not count or count >= len(run.amplitudes):
+    if not count or count >= len(run.extremes):
         return run
-    return replace(run, amplitudes=run.amplitudes[:count], phasors=run.phasors[:count])
+    return replace(run, extremes=run.extremes[:count], phasors=run.phasors[:count])
 
 
 def join_runs(runs: list, duration: float):
@@ -286,7 +286,7 @@ def join_runs(runs: list, duration: float):
         window=window,
         ledger=ledger,
         log=run_events.join_logs([run.log for run in runs], shifts),
-        amplitudes=np.concatenate([run.amplitudes for run in runs]),
+        extremes=np.concatenate([run.extremes for run in runs]),
         phasors=np.concatenate([run.phasors for run in runs]),
         events=sum(run.events for run in runs),
     )

@@ -43,7 +43,7 @@ def run_case(
 
 def half_range(result, last=10):
     """Return half of the range of the displacement over the last cycles."""
-    tail = result.amplitudes[-last:]
+    tail = result.extremes[-last:]
     return (tail[:, 1].max() - tail[:, 0].min()) / 2
 
 
@@ -78,7 +78,7 @@ def test_exact_no_motion_below_onset_of_slip(static):
     """If the friction limit exceeds the drive, all motions are exactly zero and the friction
     balances the base acceleration."""
     result = run_case(static, cycles=30)
-    assert result.log.count == 0 and not result.amplitudes.any()
+    assert result.log.count == 0 and not result.extremes.any()
     for name in ("modal", "modal_rate", "slide", "slip", "output", "output_rate"):
         assert not getattr(result.response, name).any()
     np.testing.assert_allclose(
@@ -98,13 +98,13 @@ def test_exact_undamped_resonance_agrees_with_closed_form():
     np.testing.assert_allclose(
         result.response.slide, exact, rtol=0, atol=1e-12 * np.abs(exact).max()
     )
-    assert np.abs(result.amplitudes).max() == pytest.approx(100 * pi, rel=1e-12)
+    assert np.abs(result.extremes).max() == pytest.approx(100 * pi, rel=1e-12)
     assert energy_balance(result.ledger) < 1e-12
 
 
 def test_exact_run_ends_at_travel_limit():
     """A run ends where the output reaches the travel limit, within 1e-11."""
-    travel = 0.6 * np.abs(run_case(0.5, cycles=40).amplitudes).max()
+    travel = 0.6 * np.abs(run_case(0.5, cycles=40).extremes).max()
     result = simulate(make_mode(), SineDrive(1.0, 1.0), 0.5, 0.5, 40, 10, travel)
     assert result.outcome is Outcome.EXCEEDS_TRAVEL
     assert abs(result.response.output[-1]) == pytest.approx(travel, rel=1e-11)
@@ -177,7 +177,7 @@ def test_exact_stroke_of_rigid_block_agrees_with_closed_form(friction):
     """A rigid block without a spring, v' = a sin - f sgn(v), has half the stroke sqrt(1 - (pi
     f/2)^2) a/omega^2 for f < a/sqrt(1 + pi^2/4), within 1e-12."""
     result = run_case(friction, 0.0, 1.3, 80, omega=0.0)
-    low, high = result.amplitudes[-1]
+    low, high = result.extremes[-1]
     assert (high - low) / 2 * 1.3**2 == pytest.approx(sqrt(1 - (pi * friction / 2) ** 2), rel=1e-12)
 
 
@@ -189,7 +189,7 @@ def test_exact_million_cycles_do_not_drift(cycles, monkeypatch):
         histories._EventRun, "_skip_repeating_cycles", lambda self, *arguments: None
     )
     result = run_case(0.8, cycles=cycles)
-    np.testing.assert_allclose(np.abs(result.amplitudes[100:]), 0.28704671337871602595, rtol=1e-12)
+    np.testing.assert_allclose(np.abs(result.extremes[100:]), 0.28704671337871602595, rtol=1e-12)
     assert result.log.count == 4 * cycles
     assert energy_balance(result.ledger) < 1e-11
 
@@ -199,7 +199,7 @@ def test_exact_energy_balance_of_growing_motion(cycles):
     """The motion of an undamped mode with a friction limit below pi/4 grows in every cycle as in
     the closed form, and its energy is balanced within 1e-11."""
     result = run_case(0.5, 0.0, cycles=cycles)
-    peaks = np.abs(result.amplitudes).max(axis=1)
+    peaks = np.abs(result.extremes).max(axis=1)
     assert not result.repeats and energy_balance(result.ledger) < 1e-11
     assert (peaks[-1] - peaks[cycles // 2]) / (cycles - 1 - cycles // 2) == pytest.approx(
         pi - 4 * 0.5, rel=2e-3
@@ -345,8 +345,8 @@ def test_exact_long_periods_with_kinetic_below_static_friction(friction, kinetic
     """With kinetic below static friction some motions have a period of many drive cycles, and no
     shorter period."""
     result = run_case(friction, 0.05 if friction > 0.7 else 0.003, ratio, 4000, kinetic=kinetic)
-    last = result.amplitudes[-2 * periods - 2 :]
-    amplitude = np.abs(result.amplitudes[-periods:]).max()
+    last = result.extremes[-2 * periods - 2 :]
+    amplitude = np.abs(result.extremes[-periods:]).max()
     np.testing.assert_allclose(last[periods:], last[:-periods], rtol=0, atol=1e-10 * amplitude)
     for fewer in (k for k in range(1, periods) if periods % k == 0):
         assert np.abs(last[fewer:] - last[:-fewer]).max() > 1e-3 * amplitude
@@ -374,6 +374,6 @@ def test_exact_slow_drive_agrees_with_statics(zeta):
     """
     result = run_case(0.3, zeta, 1e-4, 3, window=1)
     (loop,) = result.loops
-    assert result.amplitudes[-1] == pytest.approx([-0.7, 0.7], abs=1e-6)
+    assert result.extremes[-1] == pytest.approx([-0.7, 0.7], abs=1e-6)
     assert loop.work == pytest.approx(4 * 0.3 * 0.7, rel=1e-6)
     assert energy_balance(result.ledger) < 1e-9

@@ -15,7 +15,7 @@ from patchfem.structure import drives
 
 def run_amplitude(modes, drive, static, kinetic, cycles, start=None):
     """Return half the peak-to-peak displacement in the last cycle of a run."""
-    low, high = simulate(modes, drive, static, kinetic, cycles, 1, start=start).amplitudes[-1]
+    low, high = simulate(modes, drive, static, kinetic, cycles, 1, start=start).extremes[-1]
     return (high - low) / 2
 
 
@@ -115,7 +115,7 @@ def test_exact_number_of_stops_below_resonance(level, ratio, n_stops):
     result = simulate(modes, drive, 1.0, 1.0, 80, 10)
     stops = np.count_nonzero((result.log.kind == 0) & (result.log.time > 70 * drive.period)) / 10
     assert motion.stops == (stops,) == (n_stops,) and motion.regime == f"{n_stops} stops"
-    low, high = result.amplitudes[-1]
+    low, high = result.extremes[-1]
     assert motion.amplitude == pytest.approx((high - low) / 2, rel=1e-10)
 
 

@@ -203,7 +203,7 @@ def test_exact_two_interfaces_stop_simultaneously(joined):
     single_mode = make_modal_basis(1.0, 0.01)
     result = simulate(modes, drive, 0.6, 0.6, 20, 20)
     expected = simulate(single_mode, drive, 0.6, 0.6, 20, 20)
-    np.testing.assert_allclose(result.amplitudes, expected.amplitudes, atol=1e-13)
+    np.testing.assert_allclose(result.extremes, expected.extremes, atol=1e-13)
     np.testing.assert_allclose(
         result.window.extra["slides"][:, 1], result.window.extra["slides"][:, 0], atol=1e-13
     )
@@ -230,7 +230,7 @@ def test_exact_three_dependent_interfaces_with_weak_or_strong_friction(middle):
             or np.abs(extra["slides"][:, 0] - extra["slides"][:, 1]).max() < 1e-14
         )
         expected = simulate(make_modal_basis(1.0, 0.0, ((1.0,),), (0.7,)), drive, 0.5, 0.5, 30, 30)
-        np.testing.assert_allclose(result.amplitudes, expected.amplitudes, atol=1e-12)
+        np.testing.assert_allclose(result.extremes, expected.extremes, atol=1e-12)
         np.testing.assert_allclose(
             result.ledger["friction"], 2 * expected.ledger["friction"], rtol=1e-11
         )
@@ -246,7 +246,7 @@ def test_exact_dependent_interfaces_slip_at_sum_of_limits():
     assert not simulate(modes, SineDrive(5.999999, 0.7), limit, limit, 3).response.slide.any()
     result = simulate(modes, SineDrive(6.5, 0.7), limit, limit, 8, 8)
     expected = simulate(make_modal_basis(1.0), SineDrive(6.5, 0.7), 6.0, 6.0, 8, 8)
-    np.testing.assert_allclose(result.amplitudes, expected.amplitudes, atol=1e-13)
+    np.testing.assert_allclose(result.extremes, expected.extremes, atol=1e-13)
     np.testing.assert_allclose(
         result.window.extra["forces"].sum(axis=1)[::50],
         result.window.extra["forces"].sum(axis=1)[::50].clip(-6, 6),
@@ -264,7 +264,7 @@ def test_exact_many_interfaces_stop_and_slip_simultaneously(count):
     drive = SineDrive(1.0, 1.1)
     result = simulate(modes, drive, 0.5, 0.5, 6, 6)
     expected = simulate(make_modal_basis(1.0, 0.02), drive, 0.5, 0.5, 6, 6)
-    np.testing.assert_allclose(result.amplitudes, expected.amplitudes, atol=1e-13)
+    np.testing.assert_allclose(result.extremes, expected.extremes, atol=1e-13)
     assert np.ptp(result.window.extra["slides"], axis=1).max() < 1e-13
     assert energy_balance(result.ledger) < 1e-10
 
@@ -338,8 +338,8 @@ def test_exact_mass_on_belt_agrees_with_closed_form():
     releases = result.log.time[np.abs(result.log.kind) == RELEASE]
     np.testing.assert_allclose(np.diff(releases)[2:], 8 + 2 * (pi - atan(4)), atol=1e-9)
     assert 8 + 2 * (pi - atan(4)) == pytest.approx(11.6315499798, abs=1e-10)
-    assert result.amplitudes[-5:, 1].max() == pytest.approx(0.6 + sqrt(0.17), abs=1e-10)
-    assert result.amplitudes[-5:, 0].min() == pytest.approx(0.6 - sqrt(0.17), abs=1e-10)
+    assert result.extremes[-5:, 1].max() == pytest.approx(0.6 + sqrt(0.17), abs=1e-10)
+    assert result.extremes[-5:, 0].min() == pytest.approx(0.6 - sqrt(0.17), abs=1e-10)
 
 
 @pytest.mark.parametrize(
@@ -348,7 +348,7 @@ def test_exact_mass_on_belt_agrees_with_closed_form():
 def test_exact_amplitude_near_onset_of_slip(friction, peak):
     """Amplitudes near the onset of slip agree with known values within 1e-11."""
     result = simulate(make_modal_basis(1.0, 0.003), SineDrive(1.0, 1.0), friction, friction, 30, 30)
-    assert np.abs(result.amplitudes[-1]).max() == pytest.approx(peak, rel=1e-11)
+    assert np.abs(result.extremes[-1]).max() == pytest.approx(peak, rel=1e-11)
 
 
 @pytest.mark.parametrize("distance", [1e-4, 1e-6, 1e-8, 1e-10])
@@ -480,7 +480,7 @@ def test_exact_frictionless_interface_has_no_effect():
     drive = SineDrive(1.0, 1.2)
     result = simulate(modes, drive, [0.0, 0.4], [0.0, 0.4], 20, 5)
     expected = simulate(single_interface, drive, 0.4, 0.4, 20, 5)
-    np.testing.assert_allclose(result.amplitudes, expected.amplitudes, rtol=1e-13)
+    np.testing.assert_allclose(result.extremes, expected.extremes, rtol=1e-13)
     np.testing.assert_allclose(result.log.time, expected.log.time, rtol=1e-14)
     assert (
         set(result.log.interface) == {1}

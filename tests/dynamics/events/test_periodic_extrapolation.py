@@ -56,19 +56,17 @@ def test_exact_extrapolated_run_agrees_with_runs_in_parts(shape):
     # a run without extrapolation would report its progress at least six times
     assert not [fraction for fraction in progress if 0.1 < fraction < 0.99]
     # all cycles of the window are computed
-    marched = histories.simulate(modes, drive, groups, 480, 80).amplitudes[-80:]
+    marched = histories.simulate(modes, drive, groups, 480, 80).extremes[-80:]
     np.testing.assert_array_equal(marched, np.repeat(marched[:1], 80, axis=0))
     parts = run_in_parts(modes, drive, groups, 400, 4)
-    amplitude = np.abs(run.amplitudes).max()
+    amplitude = np.abs(run.extremes).max()
     np.testing.assert_allclose(
-        run.amplitudes[:400],
-        np.concatenate([part.amplitudes for part in parts]),
+        run.extremes[:400],
+        np.concatenate([part.extremes for part in parts]),
         rtol=0,
         atol=2e-13 * amplitude,
     )
-    np.testing.assert_array_equal(
-        run.amplitudes[400:], np.repeat(run.amplitudes[-1:], 3600, axis=0)
-    )
+    np.testing.assert_array_equal(run.extremes[400:], np.repeat(run.extremes[-1:], 3600, axis=0))
     assert (run.phasors != 0).sum() == 1000 and np.all(run.phasors[403::4] == run.phasors[-1])
     assert run.phasors[399] == pytest.approx(parts[-1].phasors[-1], rel=1e-12)
     for name in ("work_in", "viscous", "friction", "power"):
@@ -105,7 +103,7 @@ def test_exact_next_drive_level_ends_extrapolation():
     )
     assert first.repeats and second.repeats
     np.testing.assert_allclose(
-        whole.amplitudes, np.concatenate([first.amplitudes, second.amplitudes]), rtol=1e-13
+        whole.extremes, np.concatenate([first.extremes, second.extremes]), rtol=1e-13
     )
     assert whole.ledger["friction"] == pytest.approx(
         first.ledger["friction"] + second.ledger["friction"], rel=1e-12
@@ -119,8 +117,8 @@ def test_exact_tiny_level_change_ends_extrapolation():
     result = histories.simulate(
         modes, make_levels([1.5, 1.5 * (1 + 1e-9)], 1.3, 300), groups, 600, 5
     )
-    assert np.all(np.ptp(result.amplitudes[290:300], axis=0) == 0)
-    assert 1e-10 < np.ptp(result.amplitudes[[299, -1], 1]) / result.amplitudes[-1, 1] < 1e-8
+    assert np.all(np.ptp(result.extremes[290:300], axis=0) == 0)
+    assert 1e-10 < np.ptp(result.extremes[[299, -1], 1]) / result.extremes[-1, 1] < 1e-8
 
 
 def test_exact_full_event_arrays_do_not_change_run(monkeypatch):
@@ -132,6 +130,6 @@ def test_exact_full_event_arrays_do_not_change_run(monkeypatch):
         for rows in (3, 7, 64):
             monkeypatch.setattr(histories, "ROWS_PER_CALL", rows)
             parts = histories.simulate(modes, drive, groups, 13, window=4)
-            np.testing.assert_array_equal(parts.amplitudes, whole.amplitudes)
+            np.testing.assert_array_equal(parts.extremes, whole.extremes)
             np.testing.assert_array_equal(parts.phasors, whole.phasors)
         monkeypatch.undo()

@@ -37,7 +37,7 @@ def march_amplitude(law, grooves, steps, cycles=6):
     checked."""
     result = march(BASIS, DRIVE, ClimbingModel(grooves, LOAD, law), cycles, steps, window=3)
     assert result.outcome is None and energy_balance(result.ledger) < 1e-11
-    return float(result.amplitudes[-1, 1])
+    return float(result.extremes[-1, 1])
 
 
 def solve_with_numpy_law(law, grooves, slide):
@@ -108,7 +108,7 @@ def test_always_short_bonds_converge_to_coulomb_friction(law):
     grooves = Grooves(80e-6, 7.5e-6, 0.3)
     limit = march(
         BASIS, DRIVE, make_model(grooves, LOAD, MU, MU, None, BASIS), 6, 100, window=3
-    ).amplitudes[-1, 1]
+    ).extremes[-1, 1]
     long, medium, short = (
         abs(march_amplitude(LAWS[law][0](length), grooves, steps) - limit)
         for length, steps in ((4e-7, 1000), (1e-7, 2000), (2.5e-8, 4000))
@@ -125,7 +125,7 @@ def test_exact_flat_grooves_equal_law_without_grooves(law):
         if law == "elastic-plastic"
         else points_model(Bonds(MU, 1e-6), [1.0], [LOAD])
     )
-    expected = march(BASIS, DRIVE, model, 6, 200, window=3).amplitudes[-1, 1]
+    expected = march(BASIS, DRIVE, model, 6, 200, window=3).extremes[-1, 1]
     assert march_amplitude(LAWS[law][0](1e-6), Grooves(80e-6, 1e-17), 200) == pytest.approx(
         expected, rel=1e-9
     )

@@ -29,7 +29,7 @@ def test_exact_orbit_of_linear_oscillator_agrees_with_closed_form():
     expected = 10.0 / abs(omega_squared - drive.omega**2 + 2j * ZETA * OMEGA * drive.omega)
     cycle, _ = orbits.march_cycle(run)
     # the march has second-order errors
-    assert float(np.ptp(cycle.amplitudes)) / 2 == pytest.approx(expected, rel=1e-4)
+    assert float(np.ptp(cycle.extremes)) / 2 == pytest.approx(expected, rel=1e-4)
     assert energy_balance(cycle.ledger) < 1e-11
     multipliers = orbits.estimate_multipliers(run)
     damped_omega = np.sqrt(omega_squared - (ZETA * OMEGA) ** 2)
@@ -54,7 +54,7 @@ def test_exact_orbit_with_coulomb_friction_agrees_with_event_map(level):
     )
     assert orbits.march_to_periodic(run) < orbits.PERIODIC_TOL
     cycle, _ = orbits.march_cycle(run)
-    amplitude = float(np.ptp(cycle.amplitudes)) / 2
+    amplitude = float(np.ptp(cycle.extremes)) / 2
     assert run.state[0, 0] == pytest.approx(expected.start.z[0], abs=1e-7 * amplitude)
     assert run.state[1, 0] == pytest.approx(expected.start.v[0], abs=1e-7 * amplitude * drive.omega)
     largest = np.abs(expected.multipliers).max(initial=0.0)

@@ -236,7 +236,7 @@ def test_order_two_for_steady_amplitude_of_jenkins_oscillator(stiffness, expecte
             steps,
             window=2,
         )
-        low, high = result.amplitudes[-1]
+        low, high = result.extremes[-1]
         amplitudes.append((high - low) / 2)
     errors = np.abs(np.array(amplitudes) - expected)
     assert np.log2(errors[0] / errors[2]) / 4 == pytest.approx(2, abs=0.2) and errors[2] < 3e-6
@@ -314,7 +314,7 @@ def test_exact_last_cycles_are_the_same_without_histories(cycles, travel):
     if np.isfinite(travel):  # the travel is given as a fraction of the amplitude
         travel *= march(
             make_one_mode(OMEGA, 0.003, 1.0), drive, model, cycles, 40, 2
-        ).amplitudes.max()
+        ).extremes.max()
     complete, condensed = (
         march(
             make_one_mode(OMEGA, 0.003, 1.0),
@@ -338,7 +338,7 @@ def test_exact_last_cycles_are_the_same_without_histories(cycles, travel):
     for name in ("time", "slide", "force", "output", "acceleration"):
         assert np.array_equal(getattr(complete.window, name), getattr(condensed.window, name))
     assert np.array_equal(complete.step_force, condensed.step_force)
-    assert np.array_equal(complete.amplitudes[-2:], condensed.amplitudes[-2:])
+    assert np.array_equal(complete.extremes[-2:], condensed.extremes[-2:])
     assert condensed.window_work == pytest.approx(complete.window_work, rel=1e-12)
     assert condensed.ledger == pytest.approx(complete.ledger, rel=1e-12)
     assert condensed.response.extra["ledger"][:, -1] == pytest.approx(

@@ -116,7 +116,7 @@ def test_exact_extrapolated_cycles_agree_with_complete_march(case, keeps_samples
         extrapolated.response.extra["ledger"], complete.response.extra["ledger"]
     ):
         assert_close(found, expected, 1e-10)
-    assert_close(extrapolated.amplitudes, complete.amplitudes, 1e-10)
+    assert_close(extrapolated.extremes, complete.extremes, 1e-10)
     assert_close(extrapolated.phasors, complete.phasors, 1e-10)
     assert_close(extrapolated.step_force, complete.step_force, 1e-10)
     assert extrapolated.window_work == pytest.approx(complete.window_work, rel=1e-10)

@@ -44,8 +44,7 @@ def errors_by_steps(modes, drive, static, kinetic, cycles, steps):
             reference.ledger["friction"], rel=20 * cycles / count
         )
         errors.append(
-            np.abs(result.amplitudes - reference.amplitudes).max()
-            / np.abs(reference.amplitudes).max()
+            np.abs(result.extremes - reference.extremes).max() / np.abs(reference.extremes).max()
         )
     return np.array(errors)
 

@@ -198,7 +198,7 @@ def _evaluate_runs(cases: list, finished: list, cycles: int, window: int, steady
             steady
             and not is_rigid
             and not is_stuck[k]
-            and may_still_change(run.amplitudes, window, tolerance[k], decay)
+            and may_still_change(run.extremes, window, tolerance[k], decay)
         ):
             motion = find_steady_motion(rig.modes, rig.drive.signal, case.groups, run)
             needs_single_run[k] |= motion is None
@@ -239,7 +239,7 @@ def _evaluate_runs(cases: list, finished: list, cycles: int, window: int, steady
         window,
         values,
         energies,
-        np.array([run.amplitudes for run in finished]),
+        np.array([run.extremes for run in finished]),
         np.array([run.phasors[ends] for run in finished]),
         is_stuck,
         needs_single_run,

@@ -116,7 +116,7 @@ class MapFinder(TracedCurve):
         outcome = solution.outcome or Outcome.STEADY
         if not motion.bounded:
             outcome = Outcome.GROWS
-        elif float(np.abs(run.amplitudes).max()) > self.model.rig.springs.travel:
+        elif float(np.abs(run.extremes).max()) > self.model.rig.springs.travel:
             outcome = Outcome.EXCEEDS_TRAVEL
         message = solution.message
         if not motion.stable:
@@ -154,7 +154,7 @@ class MapFinder(TracedCurve):
         )
         window = run.window
         gauge = self.modes.gauge
-        amplitude = float(run.amplitudes[:, 1].max() - run.amplitudes[:, 0].min()) / 2
+        amplitude = float(run.extremes[:, 1].max() - run.extremes[:, 0].min()) / 2
         if gauge is not None:
             amplitude = measure_half_range(
                 window.time, window.modal @ gauge, window.modal_rate @ gauge
