@@ -10,10 +10,11 @@ explains both series with the same parameters.
 
 Everything else has the wrong order or too flat a one. Grooves leave at 8.25, 8.0, 7.75, 7.75 g. With nothing lifted,
 with kinetic friction 10 % lower, a damping of -0.02, bonds that grow, or the 0.09 of yaw that suits Table 1, they leave
-0.25 g later at 135 Hz than at 143 Hz, worn to 10 um 0.25 g earlier. An interlocking and a softening spring leave 0.5
-and 0.25 g later at 135 Hz, a second interface that slips at the same level; a linear spring never lets go. Friction
-alone has the right order, but all four within 0.5 g and, at 5.25 g, without the small motions that were read at 6 and
-7 g. Yaw does it because 135 Hz is near its 129 Hz: at 150 Hz it would
+0.25 g later at 135 Hz than at 143 Hz. Worn to 10 um they leave at the same level within one step of 0.25 g: from 6.6 g
+on the motion at 143 Hz is chaotic, and its largest slip of 1.9 to 2.9 mil changes with the step of time. An
+interlocking and a softening spring leave 0.5 and 0.25 g later at 135 Hz, a second interface that slips at the same
+level; a linear spring never lets go. Friction alone has the right order, but all four within 0.5 g and, at 5.25 g,
+without the small motions that were read at 6 and 7 g. Yaw does it because 135 Hz is near its 129 Hz: at 150 Hz it would
 make 150 Hz leave first, from 4 g on. And the repeat fits it: with its friction back near the axis the same block holds
 8 g at 135 Hz, as the rig did in its fifth series, on pieces worn in. The report's authors feared this mode "if there
 had been any significant asymmetry in the friction forces", and saw none. But 0.25 of an assumed 40 mm is 10 mm, more
