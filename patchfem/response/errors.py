@@ -117,7 +117,7 @@ def convergence_errors(
     dict
         Errors by name, for the measures of the two finest runs.
     """
-    changes = [signed_change(fine, coarse) for fine, coarse in pairwise(values)]
+    changes = [signed_change(*pair) for pair in pairwise(values)]
     errors = {}
     for name in changes[0]:
         known = [change[name] for change in changes if name in change]
@@ -164,7 +164,7 @@ def merged_cell_errors(fine: dict, *coarse: dict) -> dict:
     Parameters
     ----------
     fine : dict
-        Measures by name.
+        Measures by name; floats or arrays (n,) of many runs.
     coarse : dict
         Measures of each coarse run; the largest change is used.
 
@@ -179,7 +179,8 @@ def merged_cell_errors(fine: dict, *coarse: dict) -> dict:
         if all(name in change for change in changes):
             order = 1.0 if find_definition(name).sample_error else 2.0
             errors[name] = np.max(
-                [convergence_error(change[name], ratio=4.0, order=order) for change in changes]
+                [convergence_error(change[name], ratio=4.0, order=order) for change in changes],
+                axis=0,
             )
     return errors
 
@@ -316,7 +317,7 @@ def split_errors(values: dict, errors, step_values=()) -> dict:
     orders = observed_orders(*step_values)
     causes = {}
     for name, value in values.items():
-        parts: dict = {}
+        parts = {}
         for cause, errors_by_name in errors:
             parts[cause] = parts.get(cause, 0.0) + errors_by_name.get(name, abs(value))
         causes[name] = ErrorCauses(parts, orders.get(name))

@@ -35,19 +35,17 @@ from ...response.measures import energy_balance
 from ...response.reasons import MAX_OTHER_MODES_FRACTION
 from ...response.ringing import MIN_PERIODS, MIN_REFINED_FRACTION
 from ..rig.bond_lists import choose_bond_summation
-from ..rig.costs import MAX_MARCH_STEPS
+from ..rig.costs import MAX_MARCH_STEPS, MAX_RUN_STEPS
 from ..rig.engines import MARCH, choose_engine
 from ..rig.interface import reduce_to_few_points
 from . import solved_patches
 from .case_results import CaseResults, has_unreadable_measurements
 from .lumped.columns import MAIN_MEASURE, Runs, assemble_results
-from .lumped.pieces import select_known_values
 from .samples import Samples, find_interpolated_peaks
 
 MAX_CASES_PER_CALL = 256  # largest number of patches in one call
 # Largest number of stored samples of all cases in one call; their evaluation needs 200 MB.
 MAX_SAMPLES = 1_200_000
-MAX_TOTAL_STEPS = 1e7  # largest number of time steps of a run after a refinement
 # Largest ratio of the error of the backbone curve to the tolerance, for the reduction to few modes and for
 # the reduction to few points.
 REDUCTION_TOL_FRACTION = 3e-2
@@ -276,7 +274,7 @@ def _march_cases(models: list, cases: list, steps: int) -> _MarchedCases:
     needs_more_steps = ~needs_single_run & (results.errors[MAIN_MEASURE] > allowed_error)
     if (
         2 * steps > MAX_MARCH_STEPS
-        or 2 * steps * cycles > MAX_TOTAL_STEPS
+        or 2 * steps * cycles > MAX_RUN_STEPS
         or "steps_per_cycle" in numerics.pinned
     ):
         needs_more_steps[:] = False
@@ -359,6 +357,9 @@ def _evaluate_march(
             may_ring &= searches_ringing
         accelerations = samples.acceleration()
         peak_errors = find_interpolated_peaks(np.abs(accelerations))[1]
+    last = marched.extremes[:, -samples.window :]
+    values[MAIN_MEASURE] = (last[:, :, 1].max(axis=1) - last[:, :, 0].min(axis=1)) / 2
+    values["energy_balance"] = energy_balance(energies)
     for name in RING_MEASURES:
         values[name] = np.full(len(models), np.nan)
     error_estimates = [{"absolute_acceleration_peak": float(error)} for error in peak_errors]
@@ -399,16 +400,11 @@ def _estimate_run_errors(
     fine = evaluated[0]
     cycles = int(models[0].rig.drive.cycles)
     window = cases[0].numerics.window
-    columns = []
-    for run in evaluated:
-        last = run.marched.extremes[:, -window:]
-        amplitude = (last[:, :, 1].max(axis=1) - last[:, :, 0].min(axis=1)) / 2
-        others = {MAIN_MEASURE: amplitude, "energy_balance": energy_balance(run.energies)}
-        columns.append(run.values | others)
-    errors = {name: np.zeros(len(models)) for name in columns[0]}
+    errors = {name: np.zeros(len(models)) for name in fine.values}
     causes = []
     for case, (model, solved_case) in enumerate(zip(models, cases)):
-        values, half, quarter, coarse = (select_known_values(run, case) for run in columns)
+        known_values = [_select_known_values(run.values, case) for run in evaluated]
+        values, half, quarter, coarse = known_values
         kinds = (
             convergence_errors(values, half, quarter, steps=steps),
             convergence_errors(quarter, coarse, order=2.0),
@@ -425,7 +421,6 @@ def _estimate_run_errors(
         cycles,
         window,
         fine.values,
-        fine.energies,
         fine.marched.extremes,
         fine.marched.phasors[:, ends],
         fine.values["slip_amplitude"] <= max_slip,
@@ -436,6 +431,12 @@ def _estimate_run_errors(
         refines_steps=False,
     )
     return runs, causes
+
+
+def _select_known_values(measures: dict, case: int) -> dict:
+    """Return the finite values of one case from a dict of columns."""
+    values = {name: float(column[case]) for name, column in measures.items()}
+    return {name: value for name, value in values.items() if not np.isnan(value)}
 
 
 def _reduction_errors(

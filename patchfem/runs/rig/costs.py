@@ -47,6 +47,7 @@ MAX_EXACT_SECONDS_OVER_MARCH = 5.0
 MAX_EXACT_SECONDS_UNRESOLVED = 60.0
 MAX_EXACT_SECONDS = 600.0  # Largest CPU time [s] of an exact solution; a longer one is refused.
 MAX_MARCH_STEPS = 6400  # Largest automatically chosen number of time steps per cycle.
+MAX_RUN_STEPS = 1e7  # Largest number of time steps of a run after its steps were doubled.
 # Exponent of the ratio of friction limit to drive force, which estimates the fraction of time in
 # stick. At a ratio of 1/2, a fraction of 0.01 was measured.
 STICKING_EXPONENT = 6

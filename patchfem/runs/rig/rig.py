@@ -19,7 +19,7 @@ from ...response.settling import slip_period
 from ...structure.drive_sizes import find_decay_rate, is_periodic
 from ..results.result import Result, RunInputs
 from . import bond_lists, levels, postprocessing
-from .costs import MAX_MARCH_STEPS
+from .costs import MAX_MARCH_STEPS, MAX_RUN_STEPS
 from .engines import ENGINES
 from .fields import collect_interface_fields
 from .motion_warnings import collect_notes
@@ -31,7 +31,6 @@ from .solve import refuse_long_run
 
 # Outcomes of runs that ended early; more steps do not change them.
 EARLY_OUTCOMES = (Outcome.EXCEEDS_TRAVEL, Outcome.LEAVES_GROOVES)
-MAX_RUN_STEPS = 1e7  # Largest number of time steps of a run after its steps were doubled.
 MIN_STEP_ERROR = 1e-12  # Smallest relative error per step; below it round-off dominates.
 
 

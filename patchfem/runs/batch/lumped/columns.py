@@ -15,7 +15,6 @@ from ....core import Outcome
 from ....effects import law_has_trait
 from ....model.similar_models import SimilarModels, collect_columns
 from ....response.errors import total_error
-from ....response.measures import energy_balance
 from ....response.outcome import (
     AMPLITUDE_ROUND_OFF,
     classify_periodic,
@@ -92,7 +91,6 @@ class Runs:
 
     - cycles, window: number of cycles of the run, and number of evaluated last cycles.
     - values: measures (n,) by name; NaN if a run does not have the measure.
-    - energies: energies (n,) of the runs by name [J].
     - extremes (n, c, 2): smallest and largest output in each cycle [m].
     - phasors (n, w): phasors of the output [m] in the last cycle of each of the last N_FINAL_WINDOWS
       windows, or of all windows.
@@ -113,7 +111,6 @@ class Runs:
     cycles: int
     window: int
     values: dict
-    energies: dict
     extremes: np.ndarray
     phasors: np.ndarray
     is_stuck: np.ndarray
@@ -125,12 +122,6 @@ class Runs:
     steady: tuple | None = None
     case_settings: tuple = ()
     refines_steps: bool = True
-
-    @property
-    def amplitudes(self) -> np.ndarray:
-        """Amplitude of the output in the evaluated cycles (n,) [m], half peak-to-peak."""
-        last = self.extremes[:, -self.window :]
-        return (last[:, :, 1].max(axis=1) - last[:, :, 0].min(axis=1)) / 2
 
 
 class AssembledRuns(NamedTuple):
@@ -227,8 +218,6 @@ def assemble_results(
 def _compute_values_and_errors(runs: Runs) -> tuple[dict, dict]:
     """Return the measures of n runs and their total errors, as dicts of columns (n,)."""
     values = dict(runs.values)
-    values.setdefault(MAIN_MEASURE, runs.amplitudes)
-    values["energy_balance"] = energy_balance(runs.energies)
     errors = {}
     for name, value in values.items():
         parts = [runs.errors.get(name, np.zeros(len(runs.is_stuck)))]

@@ -1,7 +1,8 @@
 """Ringing of cases in lanes during permanent stick.
 
 In: a march in lanes. Out: `LaneRinging`. The ringing is computed in closed form for a linear spring,
-else by the same fit as in a single run.
+else by the same fit as in a single run. The error of a fit is its own error plus that of the time
+steps, as in a single run.
 """
 
 from typing import NamedTuple
@@ -10,6 +11,7 @@ import numpy as np
 
 from ....dynamics.lanes import run as march
 from ....dynamics.lanes.rows_kernels import Row
+from ....response.errors import convergence_error
 from ....response.ringing import (
     MAX_DAMPING_RATIO,
     MIN_SINUSOID,
@@ -21,8 +23,6 @@ from .lane_numbers import Scales, select_rows
 RINGING_MEASURES = ("ring_frequency", "ring_damping")
 # Smallest number of steps per cycle of a stretch law at which all ringing is detected.
 MIN_RINGING_STEPS = 512
-# Factor on the error of a ringing fit, because the errors of the samples of a march are correlated.
-FIT_ERROR_FACTOR = 5.0
 # Smallest phase of the free vibration in a stick interval [rad] for a search for ringing.
 MIN_STICK_PHASE = 0.9 * 3 * np.pi
 # Smallest phase of a vibration that counts as ringing in closed form [rad]: three half periods.
@@ -112,30 +112,64 @@ def may_contain_transient(cases, marched) -> np.ndarray:
 def _fit_ringing(
     law: str, cases, scales: Scales, measured, case_indices, ringing: LaneRinging
 ) -> None:
-    """Fit the ringing of selected cases to samples of their acceleration."""
-    if not case_indices.size:
-        return
+    """Fit the ringing of selected cases, with all and with half of the steps for its error."""
     steps = measured.steps
-    omega = np.sqrt(np.maximum(cases.stiffness + cases.spring, 1.0))
-    strides = np.maximum(steps / (SAMPLES_PER_PERIOD * omega), 1.0)
-    # the stride is a power of 2 and does not depend on other cases
-    strides = 2 ** np.log2(strides).astype(int)
-    start = measured.marched.observed_start[case_indices]
-    signals = march.output_accelerations(
-        law, select_rows(cases, case_indices), start, measured.window, steps
-    )
-    for case, signal in zip(case_indices.tolist(), signals):
-        omega = float(scales.omega[case])
-        samples = signal[:: strides[case]]
-        time = np.linspace(0, 2 * np.pi * measured.window / omega, len(samples))
-        values, errors = measure_ringing(time, samples, [(0.0, time[-1])], omega)
+    fits = _fit_window(law, cases, scales, measured, case_indices, steps)
+    for case, (values, errors) in fits.items():
         # with few steps, ringing may have been missed
         ringing.needs_more_steps[case] = (
             not values and march.has_one_stretch(law) and steps < MIN_RINGING_STEPS
         )
         for name, value in values.items():
             ringing.values[name][case] = value
-            ringing.errors[name][case] = FIT_ERROR_FACTOR * errors[name]
+            ringing.errors[name][case] = errors[name]
+    ringing_cases = np.array([case for case, (values, _) in fits.items() if values], int)
+    coarse_fits = _fit_window(law, cases, scales, measured, ringing_cases, steps // 2)
+    for case, (coarse_values, _) in coarse_fits.items():
+        for name in RINGING_MEASURES:
+            value = ringing.values[name][case]
+            if name in coarse_values:
+                ringing.errors[name][case] += convergence_error(value - coarse_values[name])
+            else:  # as for every measure that a coarser run lacks
+                ringing.errors[name][case] = abs(value)
+
+
+def _fit_window(law: str, cases, scales: Scales, measured, case_indices, steps: int) -> dict:
+    """Fit the ringing of selected cases in their evaluated cycles.
+
+    Parameters
+    ----------
+    law : str
+        Name of the law in `dynamics.lanes`.
+    cases : Cases
+    scales : Scales
+    measured : lane_runs.MeasuredMarch
+    case_indices : (k,) of int
+    steps : int
+        Steps per cycle with which the evaluated cycles are integrated again.
+
+    Returns
+    -------
+    dict
+        Values and errors as in `measure_ringing`, by case index.
+    """
+    if not case_indices.size:
+        return {}
+    stick_omega = np.sqrt(np.maximum(cases.stiffness + cases.spring, 1.0))
+    strides = np.maximum(steps / (SAMPLES_PER_PERIOD * stick_omega), 1.0)
+    # the stride is a power of 2 and does not depend on other cases
+    strides = 2 ** np.log2(strides).astype(int)
+    start = measured.marched.observed_start[case_indices]
+    signals = march.output_accelerations(
+        law, select_rows(cases, case_indices), start, measured.window, steps
+    )
+    fits = {}
+    for case, signal in zip(case_indices.tolist(), signals):
+        omega = float(scales.omega[case])
+        samples = signal[:: strides[case]]
+        time = np.linspace(0, 2 * np.pi * measured.window / omega, len(samples))
+        fits[case] = measure_ringing(time, samples, [(0.0, time[-1])], omega)
+    return fits
 
 
 def _compute_spring_ringing(

@@ -35,7 +35,6 @@ class MeasuredMarch(NamedTuple):
 
     - steps, cycles, window: steps per cycle, number of cycles, and number of evaluated last cycles.
     - values: measures (n,) by name.
-    - energies: energies of the run (n,) by name [J].
     - marched: result of `dynamics.lanes`.
     - extremes: smallest and largest output of each cycle (n, c, 2) [m].
     - force_rise: increase of the friction force in the evaluated cycles (n,) [N].
@@ -45,7 +44,6 @@ class MeasuredMarch(NamedTuple):
     cycles: int
     window: int
     values: dict
-    energies: dict
     marched: march.LaneResults
     extremes: np.ndarray
     force_rise: np.ndarray
@@ -102,7 +100,7 @@ def march_and_measure(law: str, cases, scales: Scales, cycles: int, steps: int) 
         "energy_balance": energy_balance(energies),
     }
     return MeasuredMarch(
-        steps, cycles, window, values, energies, marched, extremes, run_reading.force_increase
+        steps, cycles, window, values, marched, extremes, run_reading.force_increase
     )
 
 
@@ -160,7 +158,6 @@ def collect_runs(
         measured.cycles,
         measured.window,
         values | ringing.values,
-        measured.energies,
         measured.extremes,
         phasors[:, ends],
         is_stuck,

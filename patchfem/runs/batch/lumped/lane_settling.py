@@ -25,10 +25,6 @@ MAX_EXTENSION = 10
 EXTENSION_FRACTIONS = (0.25, 0.25, 0.5, *(MAX_EXTENSION - 1) * (1.0,))
 SETTLED_TOL = 1e-5  # largest relative change of a steady amplitude over the cycles of the case
 LATE_TOL_FACTOR = 100  # factor on SETTLED_TOL after the longest continuation
-# Factor on the error estimate of an extrapolated amplitude, and its smallest relative error: exceeded in 1 of
-# 571 random cases.
-EXTRAPOLATION_ERROR_FACTOR = 2.5
-MIN_EXTRAPOLATION_ERROR = 7e-6
 
 
 class SteadyRanges(NamedTuple):
@@ -138,7 +134,7 @@ def _estimate_steady_amplitude(history, cycles: int, free_motion, tolerance: flo
 
     The result is the last amplitude if it and the remaining free motion change by less than `tolerance`,
     relative to the amplitude, and not more than in the preceding `cycles` cycles. Otherwise it is
-    extrapolated from window to window; NaN if that fails.
+    extrapolated from window to window as in a single run, with the same error; NaN if that fails.
 
     Parameters
     ----------
@@ -166,5 +162,4 @@ def _estimate_steady_amplitude(history, cycles: int, free_motion, tolerance: flo
         value, error = extrapolate_steady_amplitudes(
             amplitudes[:, ends], history[:, ends, 2:] @ [1, 1j]
         )
-    error = np.maximum(EXTRAPOLATION_ERROR_FACTOR * error, MIN_EXTRAPOLATION_ERROR * value)
     return np.where(is_settled, last, value), np.where(is_settled, remainder + 1e-9 * last, error)

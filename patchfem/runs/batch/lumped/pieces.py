@@ -29,7 +29,7 @@ from ...rig.event_driven import (
     find_steady_motion,
     may_still_change,
 )
-from .columns import MAIN_MEASURE, N_FINAL_WINDOWS, Runs
+from .columns import N_FINAL_WINDOWS, Runs
 from .threads import apply_in_threads
 
 # Number of computed cycles of a periodic motion, such that they contain each of its stick intervals
@@ -225,6 +225,7 @@ def _evaluate_runs(cases: list, finished: list, cycles: int, window: int, steady
         "energy_created": np.zeros(len(finished)),
         "friction_work": work,
         "energy_dissipated": loss,
+        "energy_balance": energy_balance(energies),
     }
     errors = {name: np.zeros(len(finished)) for name in values}
     if is_rigid:
@@ -238,7 +239,6 @@ def _evaluate_runs(cases: list, finished: list, cycles: int, window: int, steady
         cycles,
         window,
         values,
-        energies,
         np.array([run.extremes for run in finished]),
         np.array([run.phasors[ends] for run in finished]),
         is_stuck,
@@ -287,23 +287,11 @@ def add_coarser_errors(fine: Runs, coarse_runs: list, estimate: Callable) -> Run
         Runs whose errors are changed in place.
     coarse_runs : list of Runs
     estimate : callable
-        Function (fine, *coarse) of dicts of values that returns a dict of errors.
+        Function (fine, *coarse) of dicts of columns that returns a dict of errors. The error of a measure
+        that a coarser run does not have is its absolute value.
     """
-    columns = []
-    for runs in (fine, *coarse_runs):
-        others = {MAIN_MEASURE: runs.amplitudes, "energy_balance": energy_balance(runs.energies)}
-        columns.append(runs.values | others)
-    n = len(fine.is_stuck)
-    for case in range(n):
-        values, *coarse = (select_known_values(measures, case) for measures in columns)
-        errors = estimate(values, *coarse)
-        for name, value in values.items():
-            column = fine.errors.setdefault(name, np.zeros(n))
-            column[case] = errors.get(name, abs(value))
+    errors = estimate(fine.values, *(runs.values for runs in coarse_runs))
+    for name, value in fine.values.items():
+        error = errors.get(name, np.nan)
+        fine.errors[name] = np.where(np.isnan(error), np.abs(value), error)
     return fine
-
-
-def select_known_values(measures: dict, case: int) -> dict:
-    """Return the finite values of one case from a dict of columns."""
-    values = {name: float(column[case]) for name, column in measures.items()}
-    return {name: value for name, value in values.items() if not np.isnan(value)}
