@@ -17,7 +17,8 @@ class SyntheticPair(NamedTuple):
     """Two traces and their true difference.
 
     before, after: Profile; shift [m]: a point at x in `before` lies at x + shift in `after`; worn
-    (n,) [m] at the samples of `after`; slope [rad] and offset [m] of `after` relative to `before`.
+    (n,) [m] at the samples of `after`; slope [rad] and offset [m] of `after` relative to `before`;
+    ends [m]: both ends of a track in `after`, between two samples.
     """
 
     before: Profile
@@ -26,6 +27,7 @@ class SyntheticPair(NamedTuple):
     worn: np.ndarray
     slope: float
     offset: float
+    ends: tuple = ()
 
 
 def make_surface(seed: int, sigma: float = 6 * UM):
@@ -123,4 +125,5 @@ def make_track_pair(
         worn,
         0.0,
         0.0,
+        tuple((middle + true_shift + side * width / 2) * UM for side in (-1, 1)),
     )

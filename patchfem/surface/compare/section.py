@@ -28,10 +28,11 @@ MIN_FLANK_SAMPLES = 12  # smallest number of samples of a flank, and of the unwo
 # Largest number of samples that are tried as the first worn one, which limits the time.
 MAX_CANDIDATES = 160
 MIN_PILE_UP = 3.0  # smallest height of a pile-up above the first trace, in standard deviations
-# Distances, in samples, from the point where a smooth flank leaves zero to its first worn sample.
+# Distances, in samples, from the point where a straight or round flank leaves zero to its first worn
+# sample.
 OFFSETS = (1 / 3, 2 / 3, 1.0)
-# Smallest decrease of the deviance for which a flank is modelled with a step.
-MIN_STEP_DEVIANCE = 12.0
+# Smallest decrease of the deviance for which one kind of flank fits clearly better than another.
+MIN_CLEAR_DEVIANCE = 12.0
 # Largest number of bootstrap blocks of a mean section; more would not show its long-wave errors.
 MAX_BLOCKS = 8
 N_FIFTHS = 5  # number of parts of a track; the deepest part is the floor
@@ -147,15 +148,29 @@ def section_from_depths(x, depth, outside) -> Section:
 class FlankEnd(NamedTuple):
     """Beginning of a flank, in depths that are ordered from outside to inside of the track.
 
-    - first, low, high: first worn sample, and the bounds of its 95 % interval.
-    - offset: samples between the place where the flank leaves zero and the first worn sample;
-      half a sample if the flank begins with a step.
+    - first: first worn sample.
+    - place, low, high: place where the flank leaves zero, and the bounds of its 95 % interval, in
+      samples; 2.5 is half-way between the samples 2 and 3.
     """
 
     first: int
-    low: int
-    high: int
+    place: float
+    low: float
+    high: float
+
+
+class FlankShape(NamedTuple):
+    """Smooth flank b t^power + c t^(power + 1); t is zero `offset` samples before the first worn sample."""
+
+    power: float
     offset: float
+
+
+STRAIGHT_FLANKS = tuple(FlankShape(1.0, offset) for offset in OFFSETS)
+FLAT_FLANKS = (FlankShape(2.0, 1.0),)
+ROUND_FLANKS = tuple(FlankShape(0.5, offset) for offset in OFFSETS)
+SMOOTH_FLANKS = (*STRAIGHT_FLANKS, *FLAT_FLANKS, *ROUND_FLANKS)
+STEP_OFFSET = 0.5  # same distance for a flank that begins with a step between two samples
 
 
 def sample_lengths(x) -> np.ndarray:
@@ -190,12 +205,13 @@ def find_worn_heights(section: Section) -> np.ndarray:
 def find_end(depth, noise, correlation: float, worn: int) -> FlankEnd:
     """Find where a flank begins, in depths that are ordered from outside to inside of a track.
 
-    Outside, depths are noise about zero, or pile-up. Inside they follow b t + c t^2, or a + b t + c t^2
-    with a step a if that fits clearly better, with a scatter of their own. The interval holds all ends
-    whose likelihood is high enough, with the best of these flanks or of one that runs out flat as
-    b t^2 + c t^3 (profile likelihood). It has no part for an error of the level outside. At a cliff,
-    where the depth falls between two samples from a value that noise explains to more than ten standard
-    deviations, the end is half-way between them, with an interval of one sample to each side.
+    Outside, depths are noise about zero, or pile-up. Inside they follow a flank with a scatter of its
+    own: straight (b t + c t^2), round with a vertical tangent at its end (b t^(1/2) + c t^(3/2)), or
+    with a step (a + b t + c t^2). The interval holds all ends whose likelihood is high enough, with the
+    best of these flanks or of one that runs out flat as b t^2 + c t^3 (profile likelihood). It has no
+    part for an error of the level outside. At a cliff, where the depth falls between two samples from a
+    value that noise explains to more than ten standard deviations, the end is half-way between them,
+    with an interval of one sample to each side.
 
     Parameters
     ----------
@@ -221,9 +237,11 @@ def find_end(depth, noise, correlation: float, worn: int) -> FlankEnd:
         last_uncertain = int(uncertain[-1])
         first_deep = last_uncertain + 1
         if relative[last_uncertain] <= MAX_UNWORN and relative[first_deep] > MIN_CLIFF:
-            return FlankEnd(first_deep, last_uncertain, min(first_deep + 1, depth.size - 1), 0.5)
+            middle = first_deep - STEP_OFFSET
+            return FlankEnd(first_deep, middle, middle - 1, middle + 1)
     if depth.size < MIN_FITTED_DEPTHS:  # the worn height is the last one of the section
-        return FlankEnd(worn, worn, worn, 0.5)
+        middle = worn - STEP_OFFSET
+        return FlankEnd(worn, middle, middle, middle)
     low = max(worn - 2 * reach, 0)
     part = depth[low:high]
     sigma = noise[low:high]
@@ -232,34 +250,56 @@ def find_end(depth, noise, correlation: float, worn: int) -> FlankEnd:
     outside = _outside_deviances(part, sigma)[candidates]
     flanks = np.array([_flank_deviances(part[k:], sigma[k:]) for k in candidates]).T
     deviances = (outside + flanks) / max(correlation, 1.0)
-    return _select_end(deviances, candidates, low, depth.size)
+    return _select_end(deviances, low + candidates)
 
 
-def _select_end(deviances, candidates, low: int, count: int) -> FlankEnd:
+def _select_end(deviances, candidates) -> FlankEnd:
     """Select the most likely beginning of a flank and its interval.
+
+    A step is taken if it fits clearly better than all smooth flanks. Otherwise the interval holds the
+    likely ends of straight and flat flanks and those of round ones, unless one of these two kinds
+    fits clearly better. The end is that of a straight flank if its likelihood is in the interval of
+    all smooth flanks, else that of a round one.
 
     Parameters
     ----------
     deviances : (flanks, m) array
         Of the flanks of `_flank_deviances` from each candidate on.
     candidates : (m,) int array
-        First worn samples, as indices from `low`.
-    low, count : int
-        First sample of the flank, and number of samples.
+        First worn samples.
     """
-    smooth = deviances[:-1]
-    step = deviances[-1]
-    shape = int(np.argmin(smooth[: len(OFFSETS)].min(axis=1)))
-    is_step = bool(step.min() < smooth.min() - MIN_STEP_DEVIANCE)
-    best = int(candidates[int(np.argmin(step if is_step else smooth[shape]))])
-    profile = step if is_step else smooth.min(axis=0)
-    likely = np.append(candidates[profile <= profile.min() + SIDE**2], best)
-    gap = int(candidates[1] - candidates[0]) if candidates.size > 1 else 1
+    offsets = np.array([*(shape.offset for shape in SMOOTH_FLANKS), STEP_OFFSET])
+    places = candidates - offsets[:, None]
+    n_straight = len(STRAIGHT_FLANKS)
+    straight = slice(0, n_straight)
+    straight_or_flat = slice(0, n_straight + len(FLAT_FLANKS))
+    rounded = slice(straight_or_flat.stop, -1)
+    step = slice(-1, None)
+    best = float(deviances[:-1].min())
+    if deviances[step].min() < best - MIN_CLEAR_DEVIANCE:
+        chosen = step
+        kinds = [step]
+    else:
+        is_straight = deviances[straight_or_flat].min() <= best + SIDE**2
+        chosen = straight if is_straight else rounded
+        kinds = [straight_or_flat, rounded]
+        kinds = [kind for kind in kinds if deviances[kind].min() <= best + MIN_CLEAR_DEVIANCE]
+    row, column = np.unravel_index(np.argmin(deviances[chosen]), deviances[chosen].shape)
+    place = float(places[chosen][row, column])
+    tried = [candidates[0] - 1.0, candidates[-1] + 1.0]
+    likely = [place]
+    for kind in kinds:
+        is_likely = deviances[kind] <= deviances[kind].min() + SIDE**2
+        likely.extend(places[kind][is_likely])
+        tried.extend(places[kind].ravel())
+    # The likelihood falls below the bound between a likely place and the next one that was tried.
+    tried = np.unique(tried)
+    outer, inner = np.searchsorted(tried, (min(likely), max(likely)))
     return FlankEnd(
-        first=low + best,
-        low=max(low + int(likely.min()) - gap, 0),
-        high=min(low + int(likely.max()) + gap, count - 1),
-        offset=0.5 if is_step else OFFSETS[shape],
+        first=int(candidates[column]),
+        place=place,
+        low=float(tried[max(outer - 1, 0)]),
+        high=float(tried[min(inner + 1, tried.size - 1)]),
     )
 
 
@@ -284,19 +324,17 @@ def _widen_by_level_error(flank: FlankEnd, depth, noise, draws, correlation, wor
     worn : int
         First sample that is known as worn.
     """
-    near = slice(max(min(flank.low, worn - MIN_FLANK_SAMPLES), 0), max(worn, 1))
+    outermost = min(int(flank.low), worn - MIN_FLANK_SAMPLES)
+    near = slice(max(outermost, 0), max(worn, 1))
     noise_variance = float(np.mean(noise[near] ** 2)) * correlation / noise[near].size
     level_variance = float(np.var(draws[:, near].mean(axis=1))) - noise_variance
     level_error = SIDE * np.sqrt(max(level_variance, 0.0))
-    first = flank.first
-    raised = find_end(depth + level_error, noise, correlation, worn).first
-    lowered = find_end(depth - level_error, noise, correlation, worn).first
-    outward = np.hypot(first - flank.low, first - min(first, raised, lowered))
-    inward = np.hypot(flank.high - first, max(first, raised, lowered) - first)
-    return flank._replace(
-        low=max(first - int(np.ceil(outward)), 0),
-        high=min(first + int(np.ceil(inward)), depth.size - 1),
-    )
+    place = flank.place
+    raised = find_end(depth + level_error, noise, correlation, worn).place
+    lowered = find_end(depth - level_error, noise, correlation, worn).place
+    outward = float(np.hypot(place - flank.low, place - min(place, raised, lowered)))
+    inward = float(np.hypot(flank.high - place, max(place, raised, lowered) - place))
+    return flank._replace(low=place - outward, high=place + inward)
 
 
 def _outside_deviances(depth, noise) -> np.ndarray:
@@ -310,31 +348,49 @@ def _outside_deviances(depth, noise) -> np.ndarray:
 
 
 def _flank_deviances(depth, noise) -> np.ndarray:
-    """Return the deviances of fits to depths (n,): smooth flanks, a flat flank and one with a step.
+    """Return the deviances of fits to depths (n,): SMOOTH_FLANKS, and a flank with a step.
 
-    There is a smooth flank b t + c t^2 for each of OFFSETS. The flat one is b t^2 + c t^3. The scatter
-    of a flank is at least that of the noise.
+    The scatter of a flank is at least that of the noise.
     """
     weighted = depth / noise
     samples = np.arange(depth.size)
-    residuals = []
-    for power, offset in (*((1, offset) for offset in OFFSETS), (2, OFFSETS[-1])):
-        t = (samples + offset) / depth.size
-        base = np.column_stack([t**power, t ** (power + 1)]) / noise[:, None]
-        shape = np.linalg.solve(base.T @ base, base.T @ weighted)
-        if shape[0] < 0:  # the flank would rise above the surface at first
-            curved = base[:, 1]
-            shape = np.array([0.0, max(float(curved @ weighted) / float(curved @ curved), 0.0)])
-        residuals.append(float(((weighted - base @ shape) ** 2).sum()))
+    squares = [_fit_smooth_flank(weighted, noise, samples, shape) for shape in SMOOTH_FLANKS]
+    t = samples / depth.size
     base = np.column_stack([np.ones(depth.size), t, t * t]) / noise[:, None]
-    shape = np.linalg.lstsq(base, weighted, rcond=None)[0]
-    is_down = shape[0] >= 0  # an upward step is pile-up, where no track begins
-    residuals.append(float(((weighted - base @ shape) ** 2).sum()) if is_down else np.inf)
-    squares = np.array(residuals)
+    coefficients = np.linalg.lstsq(base, weighted, rcond=None)[0]
+    is_down = coefficients[0] >= 0  # an upward step is pile-up, where no track begins
+    squares.append(float(((weighted - base @ coefficients) ** 2).sum()) if is_down else np.inf)
+    squares = np.array(squares)
     mean_square = squares / depth.size
     scattered = depth.size * (1 + np.log(np.maximum(mean_square, 1.0)))
     deviances = np.where(mean_square <= 1, squares, scattered)
     return deviances + 2 * float(np.log(noise).sum())
+
+
+def _fit_smooth_flank(weighted, noise, samples, shape: FlankShape) -> float:
+    """Fit b t^p + c t^(p + 1) to depths; return the sum of the squared residuals / noise.
+
+    Parameters
+    ----------
+    weighted, noise : (n,) array
+        Depth / noise, and the noise [m].
+    samples : (n,) int array
+        Sample numbers from the first worn one on.
+    shape : FlankShape
+    """
+    t = (samples + shape.offset) / samples.size
+    first = t**shape.power / noise
+    second = first * t
+    products = first @ first, first @ second, second @ second
+    determinant = products[0] * products[2] - products[1] ** 2
+    sides = first @ weighted, second @ weighted
+    slope = (products[2] * sides[0] - products[1] * sides[1]) / determinant
+    curvature = (products[0] * sides[1] - products[1] * sides[0]) / determinant
+    if slope < 0:  # the flank would rise above the surface at first
+        slope = 0.0
+        curvature = max(sides[1] / products[2], 0.0)
+    residual = weighted - slope * first - curvature * second
+    return float(residual @ residual)
 
 
 def find_tracks(section: Section, worn, longest: float) -> list:
@@ -455,8 +511,11 @@ def find_flank_ends(depth, noise, correlation: float, first: int, last: int, dra
 
 def _locate_end(x, flank: FlankEnd, name: str) -> Quantity:
     """Return the position where a flank begins; x (n,) [m] is ordered from outside to inside."""
-    offset = (x[0] - x[1]) * flank.offset
-    value, *bounds = (float(x[sample] + offset) for sample in (flank.first, flank.low, flank.high))
+    # An end may be up to a sample outside of the section.
+    samples = np.arange(-1, x.size + 1)
+    positions = np.concatenate([[2 * x[0] - x[1]], x, [2 * x[-1] - x[-2]]])
+    places = np.interp((flank.place, flank.low, flank.high), samples, positions)
+    value, *bounds = places.tolist()
     return Quantity(value, min(bounds), max(bounds), "m", TEXTS[name])
 
 
