@@ -162,7 +162,7 @@ def modules_of_run(text: str) -> set:
         return modules_after(FROM_PYTHON, path)
 
 
-@pytest.mark.share(0, 1, 3, 6, 7)
+@pytest.mark.share(0, 3, 6)
 @pytest.mark.parametrize("name", MODULES_OF_SCENES)
 def test_exact_run_loads_modules_of_its_keys(name):
     """A run from Python loads the modules of the keys in its scene, and not those of absent keys."""
@@ -257,7 +257,7 @@ def test_exact_few_modules_load_before_signal_handling():
     assert roots <= {"patchfem", "importlib", "types", "warnings"}
 
 
-@pytest.mark.share(1, 3)
+@pytest.mark.share(3)
 @pytest.mark.parametrize(
     "text",
     [STRUCTURE, COULOMB_RIG, PLASTIC_RIG, RINGING],

@@ -311,7 +311,7 @@ static = 0.3
 load = "100 N"
 """
     rig = make_shaken_block(PLASTIC)
-    amplitudes = np.array([2e-6, 9e-6, 12e-6, 30e-6])
+    amplitudes = np.array([2e-6, 9e-6, 30e-6])
     backbone = compute_backbone(
         pf.build("[structure]\n" + structure + rig[rig.index("[drive]") :]),
         "",

@@ -64,9 +64,9 @@ def test_exact_modes_as_argument_and_in_scene_give_same_curves(three_curves):
 
     Notes state which tables of the scene are ignored and that a modal mass is assumed.
     """
-    backbone = pf.backbone(LAW + STRUCTURE, amplitudes=AMPLITUDES)
+    backbone = pf.backbone(LAW + STRUCTURE, amplitudes=AMPLITUDES[::6])
     assert backbone.balance_frequency.values == pytest.approx(
-        three_curves.balance_frequency, rel=1e-9
+        three_curves.balance_frequency.values[::6], rel=1e-9
     )
     assert backbone.attrs["stuck_frequency"] == pytest.approx(100)
     assert "[slide] is ignored" in three_curves.attrs["notes"]
@@ -150,6 +150,7 @@ def test_advice_for_single_method_omits_other_methods():
     assert "methods and" not in advice and "other kinds of test" not in advice
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize(("cubic", "start"), [(4e10, 6.5e-3), (-2e10, 2.75e-3)])
 def test_exact_predicted_ring_down_agrees_with_duffing_oscillator(cubic, start):
     """The predicted damping of a ring-down with a cubic spring agrees with an integration within 5e-3."""
@@ -195,6 +196,7 @@ def march_decay(start: float) -> tuple:
     return np.sqrt(peaks[:-2] * peaks[2:]), decrement / np.hypot(1, decrement)
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("ratio", [1.01, 1.06, 1.2])
 def test_band_beside_onset_of_slip_does_not_depend_on_other_amplitudes(ratio):
     """The band at an amplitude contains the decrement of a decay, whichever other amplitudes are given.
@@ -241,7 +243,7 @@ def test_new_joint_scene_has_a_backbone(tmp_path, monkeypatch, capsys):
                     "--json",
                     "--no-page",
                     "--amplitudes",
-                    "9 um..1 mm:5",
+                    "9 um..1 mm:3",
                     *options,
                 ]
             )

@@ -58,6 +58,7 @@ def compute_balance(law: str, damping: float):
     return compute_backbone(make_rig(law, damping), "", AMPLITUDES, ("balance",))
 
 
+@pytest.mark.share(0, 1, 2, 3)
 @pytest.mark.parametrize("damping", DAMPING)
 @pytest.mark.parametrize("law", LAWS)
 def test_balance_gives_curve_or_reason_for_each_sign_of_damping(law, damping):
@@ -86,6 +87,7 @@ def test_exact_viscous_damping_adds_to_friction_damping(law):
     assert negative.damping == pytest.approx(expected, abs=1e-7)
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("law", LAWS)
 def test_damping_is_zero_at_limit_cycle_of_a_run(law):
     """The amplitude of zero damping agrees with the unstable limit cycle of a run within 1e-4.

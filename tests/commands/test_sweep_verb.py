@@ -189,30 +189,25 @@ def test_exact_resumed_sweep_computes_missing_cases(whole_sweep, rig_scene, tmp_
     assert sweep_into(out, rig_scene, *OVER).code == 3 and count_runs() == 10
 
 
-@pytest.mark.parametrize(
-    "change, why",
-    [
-        (
-            ("--set", "friction.static=0.31"),
-            "a sweep of another scene or of another version of patchfem",
-        ),
-        (("--over", "drive.cycles=3,4"), "a sweep of other keys (normal.load)"),
-    ],
-)
-def test_refuses_to_resume_different_sweep(rig_scene, tmp_path, change, why):
+def test_refuses_to_resume_different_sweep(rig_scene, tmp_path):
     """A folder with a finished sweep of another scene or other keys is refused by --resume and stays unchanged."""
     out = tmp_path / "out"
     over = ("--over", "normal.load=10 N,20 N")
     assert sweep_into(out, rig_scene, *over).code == 0
     before = {one.relative_to(out): one.read_bytes() for one in out.rglob("*") if one.is_file()}
-    answer = sweep_into(
-        out, rig_scene, *(() if change[0] == "--over" else over), *change, "--resume"
-    )
-    assert answer.code == 2
-    assert f"out: this folder contains {why}; name another folder with -o" in answer.err
-    assert {
-        one.relative_to(out): one.read_bytes() for one in out.rglob("*") if one.is_file()
-    } == before
+    for words, why in (
+        (
+            (*over, "--set", "friction.static=0.31"),
+            "a sweep of another scene or of another version of patchfem",
+        ),
+        (("--over", "drive.cycles=3,4"), "a sweep of other keys (normal.load)"),
+    ):
+        answer = sweep_into(out, rig_scene, *words, "--resume")
+        assert answer.code == 2
+        assert f"out: this folder contains {why}; name another folder with -o" in answer.err
+        assert {
+            one.relative_to(out): one.read_bytes() for one in out.rglob("*") if one.is_file()
+        } == before
     # sweeps over the same keys share a folder
     answer = sweep_into(out, rig_scene, "--over", "normal.load=20 N,30 N", "--resume")
     assert answer.code == 0
@@ -447,6 +442,7 @@ cycles = 2
 """
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("words", [("--random", "5", "--seed", "3"), ("--sobol", "8")])
 def test_exact_printed_command_repeats_random_cases(tmp_path, monkeypatch, words):
     """The command printed in the report of random cases computes the same table again."""

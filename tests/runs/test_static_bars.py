@@ -121,7 +121,7 @@ def test_always_errors_at_step_cover_reference_and_decrease(text, name, referenc
         previous_error = measure.error
 
 
-@pytest.mark.share(0, 2, 4)
+@pytest.mark.share(0, 4)
 @pytest.mark.parametrize(
     "seed, name, reference, reference_error",
     [

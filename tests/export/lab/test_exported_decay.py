@@ -95,9 +95,7 @@ def read_decay_curve(folder) -> DecayCurve:
         return DecayCurve(**{name: data[f"decay_{name}"].values for name in names})
 
 
-@pytest.mark.parametrize(
-    "name, ending", [("exact", "csv"), ("march", "csv"), ("masses", "csv"), ("masses", "uff")]
-)
+@pytest.mark.parametrize("name, ending", [("exact", "csv"), ("march", "csv"), ("masses", "uff")])
 def test_exact_imported_decay_agrees_with_run(decay_folders, tmp_path, name, ending):
     """The decay imported from exported histories agrees with that of the run in frequency and damping.
 

@@ -146,10 +146,9 @@ def test_exact_history_chart_shows_all_reversals():
     assert np.allclose(drawn_line[:6], 1e6 * swing)
 
 
-@pytest.mark.parametrize("cycles", [60, 200])
-def test_always_swinging_joint_is_not_at_rest(cycles):
+def test_always_swinging_joint_is_not_at_rest():
     """The sliders of the law 'iwan' always slip a little, so the amplitude decreases but the headline states no rest."""
-    result = pf.run(re.sub(r"cycles = \d+", f"cycles = {cycles}", IWAN))
+    result = pf.run(IWAN)
     description = describe_release(result)
     last_amplitude = result.measures["relative_displacement_amplitude"].value
     assert last_amplitude > 50e-9 and "comes to rest" not in description

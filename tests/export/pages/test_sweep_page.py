@@ -134,11 +134,11 @@ def test_always_sweep_without_values_has_no_charts(sweep_table):
 
 
 def test_always_page_of_many_cases_keeps_extremes():
-    """The page of 200 000 random cases stays below 3 MB and shows a subset of the cases.
+    """The page of 60 000 random cases stays below 3 MB and shows a subset of the cases.
 
     It contains the extremes of every key and measure, with unchanged values.
     """
-    n_cases = 200_000
+    n_cases = 60_000
     random = np.random.default_rng(3)
     keys = [
         make_sweep_key(name, random.uniform(1, 2, n_cases), "N")
