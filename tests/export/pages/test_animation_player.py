@@ -169,11 +169,6 @@ def test_always_player_limits_frames_and_cells(player_data):
     assert "frames from" in text and "Motion and gap are magnified by one factor" in text
 
 
-def test_exact_results_without_fields_have_no_player(tmp_path):
-    """Results without a fields file have no player."""
-    assert player.player_data(tmp_path) is None
-
-
 @pytest.fixture(scope="module")
 def player_page(bench_folder, player_data, chromium):
     """Return the page of the bench in a browser, with HTML markup in its title and its scene."""

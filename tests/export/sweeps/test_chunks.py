@@ -70,17 +70,6 @@ def assert_results_equal(results: CaseResults, expected: CaseResults) -> None:
     np.testing.assert_array_equal(results.seconds, expected.seconds)
 
 
-@pytest.mark.parametrize("count", [1, 7, 4096])
-def test_exact_chunk_file_is_read_as_written(tmp_path, count):
-    """Results are read from a chunk file as they were written, with the names of the cases."""
-    names = np.random.default_rng(count).integers(0, 2**64 - 1, count, np.uint64)
-    written = chunks.write_chunk(tmp_path, range(count), names, random_results(count, count))
-    read_names, results = chunks.read_chunk(tmp_path / written)
-    np.testing.assert_array_equal(read_names, names)
-    assert_results_equal(results, random_results(count, count))
-    assert [path.name for path in tmp_path.iterdir()] == [written]
-
-
 def test_exact_cases_are_read_by_name(tmp_path):
     """Cases are read by name in any order, also if requested twice; of two files with one case the later counts."""
     names = np.arange(1, 12, dtype=np.uint64) ** 5
