@@ -32,6 +32,8 @@ MIN_UNWORN_FRACTION = 0.7
 # Length of a flank relative to the trace, from which on a scar is distinguished from a bent datum.
 LONG_FLANK = 0.05
 SHORT_FLANK = 0.02  # length of a flank relative to the trace, below which a scar is excluded
+# Length of the outermost ends relative to the trace, which show whether the trace ends on the floor.
+OUTERMOST_FLANK = 0.005
 MAX_CHI2 = 30.0  # largest chi-squared of the bow of a flank, with two or three degrees of freedom
 # Number of parts of the trace, out of N_PARTS, that remain on either side of a shallow track.
 FLANK_PARTS = 6
@@ -282,7 +284,8 @@ def find_worn_samples(depth, scale: float) -> np.ndarray:
     correlation = correlation_length(depth, quiet, depth.size // N_PARTS)
     threshold = noise_threshold(depth.size)
     worn = depth > threshold * scale
-    clipped = np.clip(depth, -MAX_NOISE * scale, MAX_NOISE * scale)
+    # Deep heights would raise the means of unworn heights next to them.
+    clipped = np.clip(np.where(worn, 0.0, depth), -MAX_NOISE * scale, MAX_NOISE * scale)
     for window in MEAN_WINDOWS:
         if window > depth.size // 10:
             break
@@ -327,7 +330,10 @@ def find_shallow_track(depth, scale: float) -> tuple:
     if depth.size < 8 * N_PARTS:
         return None, np.inf
     edges = part_edges(depth.size, N_PARTS)
-    means = average_parts(np.clip(depth, -MAX_NOISE * scale, MAX_NOISE * scale), edges)
+    # Heights clearly above the floor, such as unworn flanks of a floor in a scar, are not unworn
+    # surroundings of a track in this floor.
+    is_above = depth < -MAX_NOISE * scale
+    means = average_parts(np.where(is_above, 0.0, np.minimum(depth, MAX_NOISE * scale)), edges)
     boxes = make_boxes(N_PARTS, FLANK_PARTS, MIN_PARTS, DATUM_DEGREE)
     means = means - boxes.datum @ (boxes.datum.T @ means)
     heights = boxes.shapes @ means
@@ -346,7 +352,7 @@ def find_shallow_track(depth, scale: float) -> tuple:
 
 
 def _fit_line_through_ends(
-    model, best: Alignment, state, free: tuple, flank: float
+    model, best: Alignment, state, free: tuple, flank: float, min_samples: int = 40
 ) -> Alignment | None:
     """Fit a line through the ends of a trace, or return None unless all worn heights lie between them.
 
@@ -361,10 +367,12 @@ def _fit_line_through_ends(
         Parameters that are fitted.
     flank : float
         Length of each end / length of the trace.
+    min_samples : int
+        Smallest number of samples of each end, in a trace of four times as many or more.
     """
     model = model.cut(state)
     count = model.x.size
-    n_end = max(int(flank * count), min(40, count // 4))
+    n_end = max(int(flank * count), min(min_samples, count // 4))
     ends = np.minimum(np.arange(count), np.arange(count)[::-1]) < n_end
     for _ in range(8):
         depth, jacobian = model.linearize(state)
@@ -401,8 +409,13 @@ def _are_straight(depth, ends) -> bool:
 
 
 def _check_for_wide_scar(model, best: Alignment) -> Alignment:
-    """Return the alignment on a line through both ends if a wide scar is also possible."""
-    count = max(int(0.005 * best.depth.size), 12)
+    """Return the alignment on a line through both ends if a wide scar is also possible.
+
+    The line is the floor if both ends are long flanks, and the rival if they are shorter. Where an end
+    stands above the floor, even the outermost heights are such a flank: the floor of a wedge-shaped scar
+    and the flank behind its deep end look like a tilt and growth.
+    """
+    count = max(int(OUTERMOST_FLANK * best.depth.size), MIN_HEIGHTS)
     ends = [
         float(np.median(best.depth[part])) / best.noise
         for part in (slice(count), slice(-count, None))
@@ -416,6 +429,8 @@ def _check_for_wide_scar(model, best: Alignment) -> Alignment:
     if line is not None:
         return replace(line, rival=best)
     line = _fit_line_through_ends(model, best, state, DATUM, SHORT_FLANK)
+    if line is None and not has_bow:
+        line = _fit_line_through_ends(model, best, state, DATUM, OUTERMOST_FLANK, MIN_HEIGHTS)
     return best if line is None else replace(best, rival=line)
 
 

@@ -131,7 +131,8 @@ def test_always_unworn_traces_show_no_wear(count):
 def test_always_mutually_worn_surfaces_have_depth_or_none(n_rows, n_traces):
     """Surfaces that wear each other by 3 um are aligned on common valleys, with a depth error below 20 nm.
 
-    With 6 um hardly any valley remains, and no depth is given.
+    The true mean is that over the common length: two samples of 512 that are outside of it change the
+    mean by up to 21 nm. With 6 um hardly any valley remains, and no depth is given.
     """
     step = 2 * UM
     count = 512
@@ -148,7 +149,8 @@ def test_always_mutually_worn_surfaces_have_depth_or_none(n_rows, n_traces):
                 Profile(x, frozen_array(lower[k] + noise[1] + 0.004 * x), "after"),
             )
             if found.basis == "place":
-                errors.append(found.worn.mean.value - float((pieces[0][k] - lower[k]).mean()))
+                truth = np.interp(found.alignment.x, x, pieces[0][k] - lower[k]).mean()
+                errors.append(found.worn.mean.value - float(truth))
         assert (
             (len(errors) >= 0.75 * n_traces and max(map(abs, errors)) < 0.02 * UM)
             if is_aligned

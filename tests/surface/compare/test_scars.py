@@ -56,6 +56,17 @@ def test_always_wide_scar_has_both_readings_or_covers_truth(count):
     )
 
 
+@pytest.mark.parametrize("seed", [HELD_OUT + 5, HELD_OUT + 11])
+def test_always_scar_between_flanks_of_1_to_4_percent_has_both_readings(seed):
+    """A trapezoid between flanks of 3.7 % of the length, and a wedge between flanks of 1.3 %, may be growth of the ends.
+
+    Earlier the floor of the trapezoid was taken for a shallow track, and the flanks of the wedge for
+    material that grew.
+    """
+    headlines, intervals, _ = score_comparisons("wide", [seed])
+    assert not intervals and "a scar or material that grew at the ends" in "".join(headlines)
+
+
 def test_always_largest_depth_exceeds_mean_depth():
     """The largest depth is never below the mean depth, for all kinds of pairs."""
     for kind in KINDS:
