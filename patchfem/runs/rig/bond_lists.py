@@ -336,10 +336,10 @@ def estimate_bond_list_cost(model: Model, numerics: Numerics) -> ListCost:
 
     A list that grows in every step contains all strips. Its CPU time is known within a factor of
     about 12, because the number of iterations per step depends on the motion. `BondListGuard` stops a
-    run that takes too long.
+    run that takes too long. After a release the list grows only until the oldest bonds are dropped.
     """
     steps = numerics.cycles * numerics.steps
-    if is_bond_list_growing(model):
+    if is_bond_list_growing(model) and model.rig.drive.kind != "free":
         return ListCost(steps, GROWING_STEP_SECONDS * steps**2 / 2)
     choice = choose_bond_summation(model, numerics)
     if choice.engine != "recursion" and numerics.choice is None:
