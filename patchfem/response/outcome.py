@@ -397,7 +397,7 @@ def warn_of_ringing(free_vibration: float, sizes: tuple, limits: tuple, cycles: 
     Parameters
     ----------
     free_vibration : float
-        Part of the amplitude that is free vibration [m], see `remaining_ringing`.
+        Visible part of the amplitude that is free vibration [m], see `remaining_ringing`.
     sizes : tuple
         Amplitude and its floor [m].
     limits : tuple
@@ -409,14 +409,16 @@ def warn_of_ringing(free_vibration: float, sizes: tuple, limits: tuple, cycles: 
     tolerance, decay = limits
     if not free_vibration > tolerance * amplitude + floor:
         return []
-    ratio = free_vibration / amplitude
+    # The free vibration of a run from rest begins as large as the steady motion and decays at least as fast as
+    # the slowest mode. A beat that is longer than the run hides part of it in the amplitudes of the cycles.
+    ratio = max(free_vibration / amplitude, np.exp(-max(decay, 0.0) * cycles))
     more_cycles = np.log(ratio / tolerance) / decay if decay > 0 else np.inf
     advice = 'set accuracy.method = "harmonic" for the steady motion'
     if more_cycles < MAX_PROPOSED_CYCLES:
         proposed = float(f"{cycles + CYCLES_SAFETY_FACTOR * more_cycles:.2g}")
         advice = f"set drive.cycles = {proposed:g}"
     return [
-        f"{NOT_SETTLED_WARNING}: by up to {100 * free_vibration / amplitude:.2g} % (limit "
+        f"{NOT_SETTLED_WARNING}: by up to {100 * ratio:.2g} % (limit "
         f"{100 * tolerance:g} %) it is free vibration that will decay, so "
         f"relative_displacement_amplitude is that of a transient; {advice}"
     ]
