@@ -366,7 +366,7 @@ def warn_if_ringing(solution, measures: dict, limits: tuple, drive, cycles: floa
     window = max(1, round((solution.window.time[-1] - solution.window.time[0]) / drive.period))
     decay = min_decay_rate * drive.period
     free_vibration = float(remaining_ringing(np.asarray(solution.extremes), window, decay))
-    sizes = (amplitude.value, amplitude.floor)
+    sizes = (amplitude.value, amplitude.floor + (amplitude.error or 0.0))
     return warn_of_ringing(free_vibration, sizes, (tolerance, decay), cycles)
 
 
@@ -394,12 +394,14 @@ def remaining_ringing(extremes, window: int, decay):
 def warn_of_ringing(free_vibration: float, sizes: tuple, limits: tuple, cycles: float) -> list:
     """Return a list with a warning if the free vibration during stick is large.
 
+    A change of the amplitude below its numerical error does not show a free vibration.
+
     Parameters
     ----------
     free_vibration : float
         Visible part of the amplitude that is free vibration [m], see `remaining_ringing`.
     sizes : tuple
-        Amplitude and its floor [m].
+        Amplitude, and its floor plus its numerical error [m].
     limits : tuple
         Tolerance, and logarithmic decay of the slowest mode over a cycle [1].
     cycles : float
@@ -420,7 +422,7 @@ def warn_of_ringing(free_vibration: float, sizes: tuple, limits: tuple, cycles: 
     return [
         f"{NOT_SETTLED_WARNING}: by up to {100 * ratio:.2g} % (limit "
         f"{100 * tolerance:g} %) it is free vibration that will decay, so "
-        f"relative_displacement_amplitude is that of a transient; {advice}"
+        f"relative_displacement_amplitude and loop_area are those of a transient; {advice}"
     ]
 
 

@@ -210,7 +210,9 @@ def assemble_results(
         )
     if is_repeated is not None:
         is_wide &= ~is_repeated(results)
-    ringing_warnings = _ringing_warnings(scales, runs, outcomes, values[MAIN_MEASURE])
+    ringing_warnings = _ringing_warnings(
+        scales, runs, outcomes, (values[MAIN_MEASURE], errors[MAIN_MEASURE])
+    )
     _insert_warnings(models, results, outcomes, is_wide, ringing_warnings)
     return AssembledRuns(results, needs_single_run, is_resolved)
 
@@ -345,19 +347,24 @@ def _judge_outcomes(scales: CaseScales, runs: Runs, is_drifting_motion) -> _Stea
     return _SteadyOutcomes(outcomes, *steady)
 
 
-def _ringing_warnings(scales: CaseScales, runs: Runs, outcomes: list, amplitude) -> dict:
-    """Return warnings by case for stuck interfaces whose structure still vibrates."""
-    n = len(amplitude)
-    floor = np.broadcast_to(error_floor(MAIN_MEASURE, scales.displacement), n)
-    decay = np.broadcast_to(scales.decay * scales.period, n)
+def _ringing_warnings(
+    scales: CaseScales, runs: Runs, outcomes: list, amplitude_and_error: tuple
+) -> dict:
+    """Return warnings by case for stuck interfaces whose structure still vibrates.
+
+    `amplitude_and_error` contains the amplitudes (n,) [m] and their numerical errors (n,) [m].
+    """
+    amplitude, error = amplitude_and_error
+    floor = error_floor(MAIN_MEASURE, scales.displacement) + np.nan_to_num(error)
+    decay = np.broadcast_to(scales.decay * scales.period, len(amplitude))
     is_stuck = np.array([outcome is Outcome.STUCK for outcome in outcomes], bool)
     cases = np.flatnonzero(is_stuck & (amplitude != 0))
     ringing = remaining_ringing(runs.extremes[cases], runs.window, decay[cases])
     warnings = {}
     for case, amplitude_left in zip(cases.tolist(), ringing.tolist()):
-        amplitude_and_floor = float(amplitude[case]), float(floor[case])
+        sizes = float(amplitude[case]), float(floor[case])
         limits = [float(scales.tolerance[case]), float(decay[case])]
-        warning = warn_of_ringing(amplitude_left, amplitude_and_floor, limits, runs.cycles)
+        warning = warn_of_ringing(amplitude_left, sizes, limits, runs.cycles)
         if warning:
             warnings[case] = warning
     return warnings
