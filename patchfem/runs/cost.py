@@ -101,8 +101,6 @@ class EngineCode(NamedTuple):
 
 
 NO_CODE = EngineCode(0.0, 0.0)
-# A linear motion in closed form loads the LLVM library, but no kernels.
-LINEAR_CODE = EngineCode(58e6, 0.0)
 # For the prescribed displacement of a bench, which has few kernels.
 SHORT_CODE = EngineCode(58e6, 0.15, 2.0)
 MARCH_CODE = EngineCode(58e6, 0.15, 3.5)

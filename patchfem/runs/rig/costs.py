@@ -35,7 +35,7 @@ from ...structure.drive_sizes import (
     find_min_decay_rate,
     is_sinusoidal,
 )
-from ..cost import EVENT_CODE, LINEAR_CODE, SMOOTH_CODE, Cost, MemoryPart
+from ..cost import EVENT_CODE, SMOOTH_CODE, Cost, MemoryPart
 
 if TYPE_CHECKING:
     from ...friction.protocol import Element
@@ -149,7 +149,8 @@ def count_cell_merges(model: Model) -> int:
     """
     laws = [interface.numbers.law for interface in model.rig.friction.interfaces]
     if (
-        model.partial_slip
+        not laws
+        or model.partial_slip
         or model.rig.friction.has_partial_slip
         or not all(law_has_trait(law, "cells") for law in laws)
     ):
@@ -331,7 +332,7 @@ def predict_event_driven_cost(model: Model, numerics, n_points: int) -> Cost:
         "motion": estimate_event_driven_seconds(model),
         "histories": cost_model.KEPT_EVENT_SAMPLE_SECONDS * count_stored_samples(numerics),
     }
-    code = EVENT_CODE if model.rig.friction.interfaces else LINEAR_CODE
+    code = EVENT_CODE
     if _estimate_python_loop_seconds(model) <= compiled.MAX_PYTHON_SECONDS:
         # A run in interpreted Python takes 86 MB without compiled code, and 152 MB with it, because
         # compiled code loads the LLVM library.
