@@ -69,7 +69,7 @@ def test_small_worn_top_far_from_others_is_first_worn_place():
     assert end.low <= 2879 * UM <= end.high
 
 
-@pytest.mark.parametrize("count", [1, 2, 3, 12])
+@pytest.mark.parametrize("count", [1, 12])
 def test_wear_of_last_samples_has_no_known_end(count):
     """If the last samples are worn, even a single one, the end is unknown, because the wear may go on."""
     end = compare_worn_tops((4000 - count, count, 0.5))[1]
