@@ -64,7 +64,6 @@ PUBLIC = {
     ),
     "measures": (
         "COORDINATE_ROUND_OFF",
-        "MAX_SMOOTH_RATIO",
         "MIN_SLIDE_RANGE",
         "SLIP_FRACTION",
         "compute_acceleration_peak",
@@ -72,6 +71,7 @@ PUBLIC = {
         "compute_ledger_measures",
         "compute_step_harmonic",
         "energy_balance",
+        "interpolate_peaks",
         "measure_half_range",
         "peak_sampling_errors",
         "relative_gap",
@@ -150,10 +150,9 @@ PUBLIC = {
         "window_amplitude_means",
     ),
     "spectrum": (
-        "GAUSS_POINTS",
-        "GAUSS_WEIGHTS",
         "distortion_ratio",
         "friction_harmonic",
+        "harmonic_weights",
         "motion_harmonic",
         "odd_harmonics",
         "read_instrument",

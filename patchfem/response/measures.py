@@ -290,34 +290,51 @@ def work_difference(work, loops, jumps: bool = False) -> float:
 def compute_acceleration_peak(window: Response) -> float:
     """Return the peak absolute acceleration [m s-2] at the accelerometer in a window.
 
-    The samples must be equally spaced. If the curve is smooth, the peak is the vertex of the parabola
-    through the largest sample and its neighbours.
+    The samples must be equally spaced (`interpolate_peaks`).
     """
-    magnitude = np.abs(window.acceleration)
-    peak = int(np.argmax(magnitude))
-    if not 0 < peak < len(magnitude) - 1 or not _is_smooth(magnitude, peak):
-        return float(magnitude[peak])
-    left, centre, right = magnitude[peak - 1 : peak + 2]
-    curvature = left - 2 * centre + right
-    rise = -((right - left) ** 2) / (8 * curvature) if curvature < 0 else 0.0
+    return float(interpolate_peaks(np.abs(window.acceleration)[:, None])[0][0])
+
+
+def interpolate_peaks(magnitude) -> tuple:
+    """Return the largest values of n curves, and bounds on the errors due to sampling.
+
+    If a curve is smooth, its peak is the vertex of the parabola through the largest sample and its
+    neighbours. A curve is smooth if neighbouring second differences around its largest sample differ by
+    at most a factor of MAX_SMOOTH_RATIO; next to a jump, their signs differ. With a jump at the largest
+    sample, the error is the change over one step on the smooth side.
+
+    Parameters
+    ----------
+    magnitude : (k, n)
+        Equally spaced samples.
+
+    Returns
+    -------
+    tuple
+        Peaks and errors, (n,) each.
+    """
+    columns = np.arange(magnitude.shape[1])
+    last = len(magnitude) - 1
+    peak = magnitude.argmax(axis=0)
+    is_inside = (peak > 0) & (peak < last)
+    samples = magnitude[np.clip(peak + np.arange(-2, 3)[:, None], 0, last), columns]
+    curvatures = samples[:-2] - 2 * samples[1:-1] + samples[2:]
+    # only second differences of samples inside the window are compared
+    curvatures[0] = np.where(peak >= 2, curvatures[0], curvatures[1])
+    curvatures[2] = np.where(peak <= last - 2, curvatures[2], curvatures[1])
+    is_smooth = curvatures.max(axis=0) * MAX_SMOOTH_RATIO <= curvatures.min(axis=0)
+    left, centre, right = samples[1:4]
+    is_peak = is_inside & is_smooth & (curvatures[1] < 0)
+    rise = -((right - left) ** 2) / (8 * np.where(is_peak, curvatures[1], -1.0)) * is_peak
     # a larger increase indicates a jump, not a smooth peak
-    return float(centre + (rise if rise < 0.01 * centre else 0.0))
-
-
-def _is_smooth(magnitude, peak: int) -> bool:
-    """Return whether samples (k,) are smooth around their largest value.
-
-    The samples are smooth if neighbouring second differences differ by at most a factor of
-    MAX_SMOOTH_RATIO. Next to a jump, their signs differ.
-    """
-    curvatures = -np.diff(magnitude[max(peak - 2, 0) : peak + 3], 2)
-    return bool(curvatures.min() * MAX_SMOOTH_RATIO >= curvatures.max())
+    value = np.where(rise < 0.01 * centre, centre + rise, centre)
+    return value, np.where(is_inside & ~is_smooth, centre - np.maximum(left, right), 0.0)
 
 
 def peak_sampling_errors(window: Response, has_grooves: bool = False) -> dict:
     """Return bounds on the errors of the peaks due to sampling, by measure.
 
-    - Acceleration with a jump at its largest sample: change over one step on the smooth side.
+    - Acceleration: see `interpolate_peaks`.
     - Variable normal load: an eighth of the second difference at the smallest and the largest sample.
     - Friction force over grooves: change to the neighbouring sample. Runs with fewer steps may not show
       this error, because they contain some of the same instants.
@@ -328,14 +345,10 @@ def peak_sampling_errors(window: Response, has_grooves: bool = False) -> dict:
     has_grooves : bool
         Whether the surfaces have grooves, which cause sharp peaks of the force.
     """
-    magnitude = np.abs(window.acceleration)
     errors = {}
-    peak = int(np.argmax(magnitude))
-    if 0 < peak < len(magnitude) - 1:
-        if not _is_smooth(magnitude, peak):
-            errors["absolute_acceleration_peak"] = float(
-                magnitude[peak] - max(magnitude[peak - 1], magnitude[peak + 1])
-            )
+    acceleration_error = float(interpolate_peaks(np.abs(window.acceleration)[:, None])[1][0])
+    if acceleration_error > 0:
+        errors["absolute_acceleration_peak"] = acceleration_error
     if has_grooves and len(window.force) > 2:
         force = np.abs(window.force)
         peak = min(max(int(np.argmax(force)), 1), len(force) - 2)

@@ -18,36 +18,42 @@ GAUSS_POINTS = (1 + _GAUSS_RULE[0]) / 2  # Positions of the Gauss points in a st
 GAUSS_WEIGHTS = _GAUSS_RULE[1] / 2  # Weights of the Gauss points in a step of length 1.
 
 
-def harmonic_weights(time, omega: float) -> list:
-    """Return the quadrature weights and phase factors for a Fourier coefficient.
+def harmonic_weights(time, omega: float) -> tuple:
+    """Return the weights of values and rates in a Fourier coefficient of a piecewise cubic motion.
 
-    Several motions use the same weights, whose computation takes most of the time of `motion_harmonic`.
+    With four Gauss points per step, the only error of the coefficient is that of the cubic: h^4/384 times
+    the fourth derivative. Several motions use the same weights, whose computation takes most of the time.
 
     Parameters
     ----------
     time : (k,)
-        Times of the samples [s].
+        Times of the samples [s], at any spacing.
     omega : float
         Angular frequency [rad/s].
 
     Returns
     -------
-    list
-        Weights (k - 1,) [s] and phase factors exp(-i omega t) (k - 1,) for each of the four Gauss points.
+    tuple
+        Weights of the values [1] and of the rates [s], (k,) each.
     """
     step = np.diff(time)
-    phases = np.exp(-1j * omega * time[:-1])
-    # for equal steps, the phase factors of the Gauss points differ by constant factors
     uniform = step.size and np.ptp(step) <= 1e-15 * abs(time[-1])
-    factors = [np.exp(-1j * omega * s * (step.mean() if uniform else step)) for s in GAUSS_POINTS]
-    return [(weight * step, phases * factor) for factor, weight in zip(factors, GAUSS_WEIGHTS)]
+    # for equal steps, the phase factors of the Gauss points are the same in each step
+    length = step.mean(keepdims=True) if uniform else step
+    s = GAUSS_POINTS[:, None]
+    gauss = GAUSS_WEIGHTS[:, None] * np.exp(-1j * omega * s * length)
+    phases = 2 / (time[-1] - time[0]) * step * np.exp(-1j * omega * time[:-1])
+    value_weights = np.zeros(len(time), complex)
+    value_weights[:-1] = (gauss * (1 - 3 * s**2 + 2 * s**3)).sum(axis=0) * phases
+    value_weights[1:] += (gauss * (3 * s**2 - 2 * s**3)).sum(axis=0) * phases
+    rate_weights = np.zeros(len(time), complex)
+    rate_weights[:-1] = (gauss * (s - 2 * s**2 + s**3)).sum(axis=0) * step * phases
+    rate_weights[1:] += (gauss * (s**3 - s**2)).sum(axis=0) * step * phases
+    return value_weights, rate_weights
 
 
-def motion_harmonic(time, value, rate, omega: float, weights: list | None = None) -> complex:
+def motion_harmonic(time, value, rate, omega: float, weights: tuple | None = None) -> complex:
     """Return a Fourier coefficient of the piecewise cubic motion through samples.
-
-    With four Gauss points per step, the only error is that of the cubic: h^4/384 times the fourth
-    derivative.
 
     Parameters
     ----------
@@ -57,22 +63,11 @@ def motion_harmonic(time, value, rate, omega: float, weights: list | None = None
         Samples of the motion and its rate.
     omega : float
         Angular frequency [rad/s].
-    weights : list, optional
+    weights : tuple, optional
         `harmonic_weights` of the same times and frequency.
     """
-    step = np.diff(time)
-    increment = np.diff(value)
-    p = rate[:-1] * step
-    q = rate[1:] * step
-    quadratic = 3 * increment - 2 * p - q
-    cubic = p + q - 2 * increment
-    total = 0j
-    for s, (weight, phase_factor) in zip(
-        GAUSS_POINTS, harmonic_weights(time, omega) if weights is None else weights
-    ):
-        y = value[:-1] + s * (p + s * (quadratic + s * cubic))
-        total += np.sum(weight * y * phase_factor)
-    return complex(2 / (time[-1] - time[0]) * total)
+    value_weights, rate_weights = weights or harmonic_weights(time, omega)
+    return complex(value_weights @ value + rate_weights @ rate)
 
 
 def acceleration_harmonic(time, value, rate, omega: float) -> complex:

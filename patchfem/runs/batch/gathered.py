@@ -31,7 +31,7 @@ from ...response.errors import (
     friction_errors,
     split_errors,
 )
-from ...response.measures import energy_balance
+from ...response.measures import energy_balance, interpolate_peaks
 from ...response.reasons import MAX_OTHER_MODES_FRACTION
 from ...response.ringing import MIN_PERIODS, MIN_REFINED_FRACTION
 from ..rig.bond_lists import choose_bond_summation
@@ -41,7 +41,7 @@ from ..rig.interface import reduce_to_few_points
 from . import solved_patches
 from .case_results import CaseResults, has_unreadable_measurements
 from .lumped.columns import MAIN_MEASURE, Runs, assemble_results
-from .samples import Samples, find_interpolated_peaks
+from .samples import Samples
 
 MAX_CASES_PER_CALL = 256  # largest number of patches in one call
 # Largest number of stored samples of all cases in one call; their evaluation needs 200 MB.
@@ -356,7 +356,7 @@ def _evaluate_march(
         if searches_ringing is not None:
             may_ring &= searches_ringing
         accelerations = samples.acceleration()
-        peak_errors = find_interpolated_peaks(np.abs(accelerations))[1]
+        peak_errors = interpolate_peaks(np.abs(accelerations))[1]
     last = marched.extremes[:, -samples.window :]
     values[MAIN_MEASURE] = (last[:, :, 1].max(axis=1) - last[:, :, 0].min(axis=1)) / 2
     values["energy_balance"] = energy_balance(energies)

@@ -13,13 +13,13 @@ from ...dynamics.integrated import mean_slip_phase
 from ...response.loops import find_reversals, interface_loops, mean_half_range, secant_stiffness
 from ...response.measures import (
     COORDINATE_ROUND_OFF,
-    MAX_SMOOTH_RATIO,
     MIN_SLIDE_RANGE,
     compute_negative_fraction,
     compute_slip_excess,
+    interpolate_peaks,
     relative_gap,
 )
-from ...response.spectrum import GAUSS_POINTS, GAUSS_WEIGHTS, distortion_ratio
+from ...response.spectrum import distortion_ratio, harmonic_weights
 
 
 class Samples:
@@ -84,7 +84,7 @@ class Samples:
         """
         fundamental = self.modal_harmonic(1)
         measures = {
-            "absolute_acceleration_peak": find_interpolated_peaks(np.abs(self.acceleration()))[0],
+            "absolute_acceleration_peak": interpolate_peaks(np.abs(self.acceleration()))[0],
             "friction_force_peak": np.abs(self.motion.force).max(axis=0),
             "normal_load": load,
             "drift_per_cycle": self.drift_per_cycle(),
@@ -113,25 +113,13 @@ class Samples:
 
         The motion is interpolated by cubics as in `spectrum.motion_harmonic`.
         """
-        h = self.dt
-        n = number
-        s = GAUSS_POINTS
         motion = self.motion
-        phase_factor = np.exp(-1j * n * self.angle[:-1])
-        weights = GAUSS_WEIGHTS * h * np.exp(-1j * n * self.omega * h * s)
-        left = weights @ (1 - 3 * s**2 + 2 * s**3)
-        right = weights @ (3 * s**2 - 2 * s**3)
-        left_slope = h * (weights @ (s - 2 * s**2 + s**3))
-        right_slope = h * (weights @ (s**3 - s**2))
-        value_weights = np.append(left * phase_factor, 0.0) + np.append(0.0, right * phase_factor)
-        rate_weights = np.append(left_slope * phase_factor, 0.0) + np.append(
-            0.0, right_slope * phase_factor
-        )
-        integral = 0
-        for weight, part in ((value_weights, motion.z), (rate_weights, motion.rate)):
+        weights = harmonic_weights(self.angle / self.omega, number * self.omega)
+        coefficients = 0
+        for weight, part in zip(weights, (motion.z, motion.rate)):
             samples = part.reshape(len(weight), -1)
-            integral = integral + (weight.real @ samples + 1j * (weight.imag @ samples))
-        return 2 / self.span * integral.reshape(motion.z.shape[1:])
+            coefficients = coefficients + (weight.real @ samples + 1j * (weight.imag @ samples))
+        return coefficients.reshape(motion.z.shape[1:])
 
     def net_changes(self) -> tuple:
         """Return the changes of modal coordinates and rates (m, n) over the window."""
@@ -346,25 +334,3 @@ def _find_largest_slide(slide, speed, force, rows, h: float) -> np.ndarray:
     largest_force = largest_force + slope * (largest_slide - slide[last, rows])
     ends = (best_fraction == 0.0) & ((best_step == 0) | (best_step == len(slide) - 1))
     return np.array([largest_slide, np.where(ends, np.nan, largest_force)])
-
-
-def find_interpolated_peaks(magnitude) -> tuple:
-    """Return the interpolated peaks (n,) of samples (s, n), and bounds on their sampling errors.
-
-    The methods are those of `measures.compute_acceleration_peak` and `measures.peak_sampling_errors`.
-    """
-    rows = np.arange(magnitude.shape[1])
-    peak_index = magnitude.argmax(axis=0)
-    inside = (peak_index > 0) & (peak_index < len(magnitude) - 1)
-    neighbours = np.clip(peak_index + np.arange(-2, 3)[:, None], 0, len(magnitude) - 1)
-    neighbourhood = magnitude[neighbours, rows]
-    curvatures = -(neighbourhood[2:] - 2 * neighbourhood[1:-1] + neighbourhood[:-2])
-    curvatures[0] = np.where(peak_index >= 2, curvatures[0], curvatures[1])
-    curvatures[2] = np.where(peak_index <= len(magnitude) - 3, curvatures[2], curvatures[1])
-    smooth = curvatures.min(axis=0) * MAX_SMOOTH_RATIO >= curvatures.max(axis=0)
-    left, mid, right = neighbourhood[1:4]
-    curvature = -curvatures[1]
-    with np.errstate(all="ignore"):
-        rise = np.where(curvature < 0, -((right - left) ** 2) / (8 * curvature), 0.0)
-    value = np.where(inside & smooth & (rise < 0.01 * mid), mid + rise, mid)
-    return value, np.where(inside & ~smooth, mid - np.maximum(left, right), 0.0)
