@@ -21,10 +21,14 @@ HELD_OUT = 80000
 
 
 def score_pair(seed: int) -> tuple:
-    """Return errors of shift, mean and largest depth [m], whether their intervals cover the truth, and the basis."""
+    """Return errors of shift, mean and largest depth [m], whether their intervals cover the truth, and the basis.
+
+    The true mean is that over the common length, with the heights that were left out as a spike.
+    """
     p = make_worn_pair(seed)
     found = compare_traces(p.before, p.after)
-    worn = np.interp(found.alignment.x, p.after.x, p.worn)
+    ends = found.alignment.x[[0, -1]]
+    worn = p.worn[(p.after.x >= ends[0]) & (p.after.x <= ends[1])]
     quantities = (
         (found.motion.shift, p.shift),
         (found.worn.mean, worn.mean()),
