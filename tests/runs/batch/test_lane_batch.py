@@ -5,6 +5,8 @@ Cases whose errors are too large are solved by the exact engine. The long campai
 runs is `lanes` of tests/support/campaigns.py.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from lane_cases import LAWS, SCENE, compare_answers, draw_points
@@ -20,6 +22,7 @@ from patchfem.runs.batch.lumped import (
     lane_runs,
     lumped,
 )
+from patchfem.runs.batch.lumped.lane_ringing import RINGING_MEASURES
 from patchfem.scene import format_assignments
 
 # Laws with an exact batch; other laws are compared with single runs.
@@ -213,6 +216,23 @@ def test_exact_steady_amplitude_after_last_slip_is_within_error():
         <= results.errors[name + "_steady"][0]
         < 1e-3 * final_amplitude
     )
+
+
+def test_always_errors_of_ringing_hold_beside_more_steps():
+    """Frequency and damping of the ringing agree within the sum of both errors with those of the same cases at a
+    tenth of the tolerance, where some cases take more steps."""
+    cases = draw_models("bouc-wen", 15, 128)
+    finer_cases = [
+        replace(case, accuracy=case.accuracy.model_copy(update={"tolerance": 1e-4}))
+        for case in cases
+    ]
+    answers, finer = batches.solve_models(cases), batches.solve_models(finer_cases)
+    for name in RINGING_MEASURES:
+        difference = np.abs(answers.values[name] - finer.values[name])
+        is_known = ~np.isnan(difference)
+        assert is_known.sum() >= 5 and (difference[is_known] > 0).any()
+        errors = answers.errors[name] + finer.errors[name]
+        assert np.mean(difference[is_known] <= errors[is_known]) >= 0.95
 
 
 def test_always_unbounded_motions_need_no_loop_area():
