@@ -27,6 +27,9 @@ from .harmonic import (
 
 # Largest number of times that the step between two amplitudes is halved if no solution is found.
 MAX_HALVINGS = 6
+# Largest number of Newton steps to the next amplitude of a continuation; where more are needed, the
+# step between the amplitudes is too long, and halving it takes fewer evaluations.
+MAX_CONTINUATION_STEPS = 10
 
 
 class FreeMotion(NamedTuple):
@@ -126,10 +129,10 @@ class FreeBalance:
         )
         return equations._replace(residual=equations.residual / amplitude, jacobian=jacobian)
 
-    def solve(self, x, amplitude: float) -> tuple:
+    def solve(self, x, amplitude: float, max_steps: int = 40) -> tuple:
         """Solve for the free motion at an amplitude by Newton's method.
 
-        x: unknowns (N,) of the initial guess; amplitude [m].
+        x: unknowns (N,) of the initial guess; amplitude [m]; max_steps: of Newton's method.
 
         Returns
         -------
@@ -145,6 +148,7 @@ class FreeBalance:
             lambda v: self.evaluate(v, amplitude),
             x,
             lambda _, left, size: np.linalg.norm(left) < 1e-7,
+            max_steps=max_steps,
         )
         if solution is None:
             raise NotConverged(
@@ -178,7 +182,7 @@ class FreeBalance:
         targets = [float(target)]
         while targets:
             try:
-                x = self.solve(x, targets[-1])[0]
+                x = self.solve(x, targets[-1], MAX_CONTINUATION_STEPS)[0]
                 start = targets.pop()
             except NotConverged:
                 if len(targets) > MAX_HALVINGS:
