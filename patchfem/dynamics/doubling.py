@@ -19,25 +19,25 @@ class StepMap:
     nodes.
 
     - change: (2 n, 2 n) change of (z, z') per (z, z') at the start
-    - push, drive: (2 n, n), (2 n, m) change of (z, z') per acceleration f and per drive a
+    - force_response, drive: (2 n, n), (2 n, m) change of (z, z') per acceleration f and per drive a
     - work, lost: (3 n + m, 3 n + m) work of the drive and viscous loss [J] as quadratic forms of y
     """
 
     change: np.ndarray
-    push: np.ndarray
+    force_response: np.ndarray
     drive: np.ndarray
     work: np.ndarray
     lost: np.ndarray
 
 
-def make_short_step(square, damping, push, parts: dict, quadratic) -> StepMap:
+def make_short_step(square, damping, force_response, parts: dict, quadratic) -> StepMap:
     """Return the step map for a step that is short compared with the periods of the modes.
 
     Parameters
     ----------
     square, damping : ndarray
         (n, n) omega^2 and D.
-    push : tuple
+    force_response : tuple
         Two (n, n): z and z' at the end of the step per constant acceleration.
     parts, quadratic
         Results of `propagator._compute_drive_weights` for coupled damping.
@@ -46,13 +46,16 @@ def make_short_step(square, damping, push, parts: dict, quadratic) -> StepMap:
     -------
     Step
     """
-    position_push, rate_push = push
+    position_response, rate_response = force_response
     # The deviation of the free motion of z from the identity is computed without cancellation.
-    position_change = -position_push @ square
+    position_change = -position_response @ square
     change = np.block(
-        [[position_change, rate_push], [-rate_push @ square, position_change - rate_push @ damping]]
+        [
+            [position_change, rate_response],
+            [-rate_response @ square, position_change - rate_response @ damping],
+        ]
     )
-    n = len(position_push)
+    n = len(position_response)
     m = len(parts["z"])
     work, loss = np.zeros((2, 3 * n + m, 3 * n + m))
     for form, names, drive_part in (
@@ -64,7 +67,11 @@ def make_short_step(square, damping, push, parts: dict, quadratic) -> StepMap:
         form[3 * n :, 3 * n :] = (parts[drive_part] + parts[drive_part].T) / 2
     loss[: 3 * n, : 3 * n] = (quadratic + quadratic.T) / 2
     return StepMap(
-        change, np.concatenate(push), np.concatenate([parts["z"].T, parts["v"].T]), work, loss
+        change,
+        np.concatenate(force_response),
+        np.concatenate([parts["z"].T, parts["v"].T]),
+        work,
+        loss,
     )
 
 
@@ -75,7 +82,7 @@ def double_step(step: StepMap, halves) -> StepMap:
     """
     first, second = halves
     size = len(step.change)
-    n = step.push.shape[1]
+    n = step.force_response.shape[1]
     m = len(first)
     first_state = np.eye(size + n + m)
     second_state = np.eye(size + n + m)
@@ -83,7 +90,7 @@ def double_step(step: StepMap, halves) -> StepMap:
     second_state[size + n :, size + n :] = second
     first_drive = step.drive @ first
     second_state[:size, :size] += step.change
-    second_state[:size, size : size + n] = step.push
+    second_state[:size, size : size + n] = step.force_response
     second_state[:size, size + n :] = first_drive
     work, lost = (
         first_state.T @ form @ first_state + second_state.T @ form @ second_state
@@ -91,7 +98,7 @@ def double_step(step: StepMap, halves) -> StepMap:
     )
     return StepMap(
         2 * step.change + step.change @ step.change,
-        2 * step.push + step.change @ step.push,
+        2 * step.force_response + step.change @ step.force_response,
         first_drive + step.change @ first_drive + step.drive @ second,
         work,
         lost,
@@ -104,7 +111,7 @@ def split_step(step: StepMap) -> tuple:
     They are those of `propagator._compute_drive_weights` for coupled damping.
 
     """
-    n = step.push.shape[1]
+    n = step.force_response.shape[1]
     n_states = 3 * n
     parts = {
         "z": step.drive[:n].T,

@@ -79,10 +79,12 @@ def free_increment(motion, modal_system, port, table, i):
     float
     """
     n = motion.shape[1]
-    reach = modal_system.reach
+    slide_response = modal_system.slide_response
     increment = table[i, 8 * n + 3 + port]
     for k in range(n):
-        increment += reach[port, k] * motion[0, k] + reach[port, n + k] * motion[1, k]
+        increment += (
+            slide_response[port, k] * motion[0, k] + slide_response[port, n + k] * motion[1, k]
+        )
     return increment
 
 
@@ -146,7 +148,7 @@ def move_modes(motion, modal_system, table, i, accel, ledger):
     """
     n = motion.shape[1]
     free = modal_system.free
-    push = modal_system.push
+    force_response = modal_system.force_response
     loss = modal_system.loss
     work = table[i, 8 * n]
     lost = table[i, 8 * n + 1]
@@ -166,8 +168,10 @@ def move_modes(motion, modal_system, table, i, accel, ledger):
                 + (loss[2, k] * v + loss[4, k] * f) * v
                 + loss[5, k] * f * f
             )
-            motion[0, k] = free[0, k] * z + free[1, k] * v + push[0, k] * f + table[i, k]
-            motion[1, k] = free[2, k] * z + free[3, k] * v + push[1, k] * f + table[i, n + k]
+            motion[0, k] = free[0, k] * z + free[1, k] * v + force_response[0, k] * f + table[i, k]
+            motion[1, k] = (
+                free[2, k] * z + free[3, k] * v + force_response[1, k] * f + table[i, n + k]
+            )
     else:
         lost += _move_coupled_modes(motion, modal_system, table, i, accel)
     ledger[Ledger.DRIVE_WORK] += work
@@ -393,14 +397,22 @@ def write_end_state(motion, modal_system, table, row_index, accel, end):
     """
     n = motion.shape[1]
     free = modal_system.free
-    push = modal_system.push
+    force_response = modal_system.force_response
     dense = modal_system.dense
     for i in range(n):
         z = table[row_index, i]
         v = table[row_index, n + i]
         if dense.size == 0:
-            z += free[0, i] * motion[0, i] + free[1, i] * motion[1, i] + push[0, i] * accel[i]
-            v += free[2, i] * motion[0, i] + free[3, i] * motion[1, i] + push[1, i] * accel[i]
+            z += (
+                free[0, i] * motion[0, i]
+                + free[1, i] * motion[1, i]
+                + force_response[0, i] * accel[i]
+            )
+            v += (
+                free[2, i] * motion[0, i]
+                + free[3, i] * motion[1, i]
+                + force_response[1, i] * accel[i]
+            )
         else:
             for k in range(n):
                 z += (

@@ -33,9 +33,9 @@ SHORT_STEP_RATE_TIME = 4.0
 class Propagator:
     """Coefficients of the exact time step for n modal coordinates and p interface ports.
 
-    free (4, n): z and z' at the end per z and z' at the start (zz, zv, vz, vv); push (2, n): both
+    free (4, n): z and z' at the end per z and z' at the start (zz, zv, vz, vv); force_response (2, n): both
     per modal acceleration, constant over the step; dense (2 n, 3 n): the same for (z, z',
-    acceleration) if damping couples the coordinates, else (0, 0). reach (p, 2 n): displacement
+    acceleration) if damping couples the coordinates, else (0, 0). slide_response (p, 2 n): displacement
     of every port in a free motion; beta (p, p) [m/N]: displacement of the ports against unit port
     forces; rows (p, n): the ports. loss (6, n) or dense_loss (3 n, 3 n): viscous loss of a step as
     a quadratic form of (z, z', acceleration). drive: see `tables`; steps: number per period.
@@ -45,9 +45,9 @@ class Propagator:
     steps: int
     rows: np.ndarray
     free: np.ndarray
-    push: np.ndarray
+    force_response: np.ndarray
     dense: np.ndarray
-    reach: np.ndarray
+    slide_response: np.ndarray
     beta: np.ndarray
     loss: np.ndarray
     dense_loss: np.ndarray
@@ -194,26 +194,26 @@ def _make_propagator(modes: ModalBasis, period: float, steps_per_cycle: int, row
     if is_coupled:
         block = np.block([[end_blocks[0], end_blocks[1]], [end_blocks[2], end_blocks[3]]])
         dense = np.concatenate([block, np.concatenate(motion_per_acceleration)], axis=1)
-        reach = rows @ (block - np.eye(2 * n))[:n]
+        slide_response = rows @ (block - np.eye(2 * n))[:n]
         beta = rows @ motion_per_acceleration[0] @ rows.T / modes.mass
         free = np.zeros((4, n))
         loss = np.zeros((6, n))
-        uncoupled_push = np.zeros((2, n))
+        uncoupled_response = np.zeros((2, n))
     else:
         dense = np.zeros((0, 0))
-        uncoupled_push = np.array(motion_per_acceleration)
+        uncoupled_response = np.array(motion_per_acceleration)
         free = np.array(end_blocks)
         loss = loss_form
-        reach = np.concatenate([rows * (end_blocks[0] - 1), rows * end_blocks[1]], axis=1)
+        slide_response = np.concatenate([rows * (end_blocks[0] - 1), rows * end_blocks[1]], axis=1)
         beta = (rows * motion_per_acceleration[0]) @ rows.T / modes.mass
     return Propagator(
         dt,
         steps_per_cycle,
         rows,
         free,
-        uncoupled_push,
+        uncoupled_response,
         np.ascontiguousarray(dense),
-        np.ascontiguousarray(reach),
+        np.ascontiguousarray(slide_response),
         np.ascontiguousarray(beta),
         loss,
         loss_form if is_coupled else np.zeros((0, 0)),
@@ -270,7 +270,7 @@ def _integrate_by_doubling(modes: ModalBasis, dt: float, fastest: float, slowest
     parts, quadratic = doubling.split_step(step)
     transition = step.change + np.eye(2 * n)
     blocks = [transition[:n, :n], transition[:n, n:], transition[n:, :n], transition[n:, n:]]
-    motion_per_acceleration = (step.push[:n], step.push[n:])
+    motion_per_acceleration = (step.force_response[:n], step.force_response[n:])
     if modes.damping is None:
         blocks = [np.diag(part) for part in blocks]
         motion_per_acceleration = tuple(np.diag(part) for part in motion_per_acceleration)

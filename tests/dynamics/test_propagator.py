@@ -81,8 +81,8 @@ def propagate_step(modes, propagator, drive, number, state, force):
         zz, zv, vz, vv = propagator.free
         new = np.concatenate(
             [
-                zz * z + zv * v + propagator.push[0] * acceleration,
-                vz * z + vv * v + propagator.push[1] * acceleration,
+                zz * z + zv * v + propagator.force_response[0] * acceleration,
+                vz * z + vv * v + propagator.force_response[1] * acceleration,
             ]
         )
         new += coefficients[: 2 * n]
@@ -97,7 +97,9 @@ def propagate_step(modes, propagator, drive, number, state, force):
     work = coefficients[2 * n : 5 * n] @ x + coefficients[8 * n]
     loss = coefficients[5 * n : 8 * n] @ x + coefficients[8 * n + 1] + quadratic
     slide_increment = (
-        propagator.reach[0] @ state + coefficients[8 * n + 3] - propagator.beta[0, 0] * force
+        propagator.slide_response[0] @ state
+        + coefficients[8 * n + 3]
+        - propagator.beta[0, 0] * force
     )
     return new, work, loss, slide_increment
 
@@ -156,7 +158,10 @@ def dense_step_matrices(propagator):
     zz, zv, vz, vv = (np.diag(part) for part in propagator.free)
     a, b, c, d, e, f = (np.diag(part) for part in propagator.loss)
     return np.block(
-        [[zz, zv, np.diag(propagator.push[0])], [vz, vv, np.diag(propagator.push[1])]]
+        [
+            [zz, zv, np.diag(propagator.force_response[0])],
+            [vz, vv, np.diag(propagator.force_response[1])],
+        ]
     ), np.block([[a, b / 2, d / 2], [b / 2, c, e / 2], [d / 2, e / 2, f]])
 
 
@@ -202,7 +207,15 @@ def test_exact_step_by_doubling_equals_direct_step(monkeypatch):
         # with explicit interfaces the cache is not used
         doubled = make_propagator(modes, drive, 300, modes.interfaces)
         monkeypatch.undo()
-        for name in ("free", "push", "dense", "reach", "beta", "loss", "dense_loss"):
+        for name in (
+            "free",
+            "force_response",
+            "dense",
+            "slide_response",
+            "beta",
+            "loss",
+            "dense_loss",
+        ):
             expected = getattr(direct, name)
             found = getattr(doubled, name)
             assert (

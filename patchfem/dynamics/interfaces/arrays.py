@@ -126,7 +126,7 @@ class ListPointRow(IntEnum):
 
 
 class FullSlipRow(IntEnum):
-    """Row indices of `ShearedPoints.drag`: full-slip forces on the holder and on each shear mode.
+    """Row indices of `ShearedPoints.full_slip`: full-slip forces on the holder and on each shear mode.
 
     - FORCE: force if all points slip in the positive direction [N]
     - MAX_SLIDE: largest slide of a point per coordinate
@@ -138,8 +138,8 @@ class FullSlipRow(IntEnum):
     MEAN_SLIDE = 2
 
 
-class FlowIndex(IntEnum):
-    """Indices into `ShearedPoints.flow`: state of the contact during full slip.
+class SlipStateIndex(IntEnum):
+    """Indices into `ShearedPoints.slip_state`: state of the contact during full slip.
 
     - FULL_SLIP_DIRECTION: sign of the slide while all points are in steady full slip, otherwise 0
     - TOTAL_SLIDE: slide of the holder [m]
@@ -204,8 +204,8 @@ class ShearedPoints(NamedTuple):
     - psi, kappa, b: shear modes (r, m), their stiffness [N/m] and coordinates [m] (r,)
     - points: (8, m), see `PointRow`
     - count: (1,) number of columns of points and psi that are under load
-    - drag, flow: (3, 1 + r), (2,) full slip under a constant load, see `FullSlipRow` and
-      `FlowIndex`
+    - full_slip, slip_state: (3, 1 + r), (2,) full slip under a constant load, see `FullSlipRow` and
+      `SlipStateIndex`
     - y: (2, 1 + r) solution (dq, db) of the step, and of the relaxation of the pieces
     - last: (2, 1 + r) solutions of the two steps before
     - scale, workspace: (1 + r,), (3, 1 + r), see `WorkRow`
@@ -220,8 +220,8 @@ class ShearedPoints(NamedTuple):
     b: np.ndarray
     points: np.ndarray
     count: np.ndarray
-    drag: np.ndarray
-    flow: np.ndarray
+    full_slip: np.ndarray
+    slip_state: np.ndarray
     y: np.ndarray
     last: np.ndarray
     scale: np.ndarray
@@ -258,11 +258,11 @@ def make_sheared_fields(
     size = 1 + len(kappa)
     n_padding = -m % lanes
     points = np.zeros((len(PointRow), m + -m % lanes))
-    drag = np.zeros((len(FullSlipRow), size))
+    full_slip = np.zeros((len(FullSlipRow), size))
     if load is not None:
         points[PointRow.LOAD, :m] = load
         full_slip_force = length * weight * load
-        drag[:] = (
+        full_slip[:] = (
             np.append(full_slip_force.sum(), psi.T @ full_slip_force),
             np.append(0.0, np.abs(psi).max(axis=0)),
             np.append(1.0, psi.T @ full_slip_force / full_slip_force.sum()),
@@ -276,8 +276,8 @@ def make_sheared_fields(
         "b": np.zeros(r),
         "points": points,
         "count": np.full(1, m + n_padding),
-        "drag": drag,
-        "flow": np.zeros(2),
+        "full_slip": full_slip,
+        "slip_state": np.zeros(2),
         "y": np.zeros((2, size)),
         "last": np.zeros((2, size)),
         "scale": np.append(1.0, 1 / np.sqrt((psi**2).mean(axis=0))),
@@ -431,7 +431,7 @@ def split_memory(contact, element=None) -> list | None:
         return [
             contact.eps,
             contact.b,
-            contact.flow[FlowIndex.TOTAL_SLIDE :],
+            contact.slip_state[SlipStateIndex.TOTAL_SLIDE :],
             *contact.points[: PointRow.SLIDE],
         ]
     return (
@@ -460,7 +460,7 @@ class ModalArrays(NamedTuple):
 
     - omega, damp, slide, base, output: (n,); damp is 2 zeta omega
     - damping: (n, n) if it couples the modes, otherwise (0, 0)
-    - free, push, dense, reach, loss, dense_loss: step coefficients of `propagator.Propagator`
+    - free, force_response, dense, slide_response, loss, dense_loss: step coefficients of `propagator.Propagator`
     - dt, beta: step length [s], and compliance of the first interface in a step [m/N]
     - mass: modal mass [kg]; workspace: (3, n)
     """
@@ -472,9 +472,9 @@ class ModalArrays(NamedTuple):
     output: np.ndarray
     damping: np.ndarray
     free: np.ndarray
-    push: np.ndarray
+    force_response: np.ndarray
     dense: np.ndarray
-    reach: np.ndarray
+    slide_response: np.ndarray
     loss: np.ndarray
     dense_loss: np.ndarray
     dt: float

@@ -13,7 +13,7 @@ from ...compiled.jit import njit
 from ...friction.bonds.point_kernels import bond_step, elastic_bond_step, grow, short_bond_step
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ...friction.protocol_kernels import Reading
-from .arrays import BondSums, FlowIndex, FullSlipRow, PointRow, SolvedStep, StepProblem
+from .arrays import BondSums, FullSlipRow, PointRow, SlipStateIndex, SolvedStep, StepProblem
 from .shear_points_kernels import POINTS, are_slides_short
 from .shear_solve_kernels import accept_step, minimise, set_middle_length
 
@@ -26,19 +26,34 @@ FULL_SLIP_TOL = 2e-15
 def solve_step(free, beta, start, contact, goal):
     """Solve the slide increment and mean friction force of a step.
 
-    Parameters are those of `element_kernels.solve_step`.
+    Parameters
+    ----------
+    free : float
+        Increment of the relative displacement in the absence of friction [m].
+    beta : float
+        Compliance of the modes in the step [m/N].
+    start : arrays.StepStart
+        State at the start of the step.
+    contact : arrays.ShearedPoints
+        Its row y[0] gets the increments of the holder and of the shear modes.
+    goal : float
+        Tolerance of the residual [N].
 
     Returns
     -------
     arrays.SolvedStep
-        Without iterations if all points are in steady full slip.
+        Increment [m], mean friction force [N] and number of iterations: zero if all points are in
+        steady full slip, negative if the solution did not converge.
     """
-    if contact.flow[FlowIndex.FULL_SLIP_DIRECTION] != 0.0 and solve_full_slip_step(
+    if contact.slip_state[SlipStateIndex.FULL_SLIP_DIRECTION] != 0.0 and solve_full_slip_step(
         free, beta, contact
     ):
-        force = contact.flow[FlowIndex.FULL_SLIP_DIRECTION] * contact.drag[FullSlipRow.FORCE, 0]
+        force = (
+            contact.slip_state[SlipStateIndex.FULL_SLIP_DIRECTION]
+            * contact.full_slip[FullSlipRow.FORCE, 0]
+        )
         return SolvedStep(contact.y[0, 0], force, 0)
-    contact.flow[FlowIndex.FULL_SLIP_DIRECTION] = 0.0
+    contact.slip_state[SlipStateIndex.FULL_SLIP_DIRECTION] = 0.0
     set_middle_length(start.velocity, start.dt, contact)
     force, count = minimise(StepProblem(free, beta, POINTS, False), contact, goal)
     return SolvedStep(contact.y[0, 0], force, count)
@@ -63,15 +78,16 @@ def solve_full_slip_step(free, beta, contact):
     bool
         Whether all points remain in full slip in this step; contact.y[0] is then its solution.
     """
-    direction = contact.flow[FlowIndex.FULL_SLIP_DIRECTION]
+    direction = contact.slip_state[SlipStateIndex.FULL_SLIP_DIRECTION]
     y = contact.y[0]
     min_increment = 0.0
-    dq = free - beta * direction * contact.drag[FullSlipRow.FORCE, 0]
+    dq = free - beta * direction * contact.full_slip[FullSlipRow.FORCE, 0]
     for k in range(contact.b.size):
         y[k + 1] = 2 * (
-            direction * contact.drag[FullSlipRow.FORCE, k + 1] / contact.kappa[k] - contact.b[k]
+            direction * contact.full_slip[FullSlipRow.FORCE, k + 1] / contact.kappa[k]
+            - contact.b[k]
         )
-        min_increment += contact.drag[FullSlipRow.MAX_SLIDE, k + 1] * abs(y[k + 1])
+        min_increment += contact.full_slip[FullSlipRow.MAX_SLIDE, k + 1] * abs(y[k + 1])
     if direction * dq <= min_increment:
         return False
     y[0] = dq
@@ -98,7 +114,7 @@ def apply_increment(dq, start, contact, goal):
     is_solved : bool
         Whether the solution converged.
     """
-    contact.flow[FlowIndex.FULL_SLIP_DIRECTION] = 0.0
+    contact.slip_state[SlipStateIndex.FULL_SLIP_DIRECTION] = 0.0
     contact.y[0, 0] = dq
     solution = solve_step(dq, 0.0, start, contact, goal)
     return solution.mean_force, solution.iterations >= 0
@@ -129,15 +145,15 @@ def commit_step(dq, force, start, end_velocity, contact):
     is_solved : bool
         Always true.
     """
-    direction = contact.flow[FlowIndex.FULL_SLIP_DIRECTION]
+    direction = contact.slip_state[SlipStateIndex.FULL_SLIP_DIRECTION]
     length = contact.eps[1]
     dissipated = 0.0
-    contact.flow[FlowIndex.TOTAL_SLIDE] += dq
+    contact.slip_state[SlipStateIndex.TOTAL_SLIDE] += dq
     if direction != 0.0:
         for k in range(contact.y.shape[1]):
             dissipated += (
                 direction
-                * contact.drag[FullSlipRow.FORCE, k]
+                * contact.full_slip[FullSlipRow.FORCE, k]
                 * contact.y[0, k]
                 * (1.0 if k == 0 else -1.0)
             )
@@ -153,7 +169,7 @@ def commit_step(dq, force, start, end_velocity, contact):
         contact.eps[0], start.velocity, end_velocity, abs(dq), start.dt, contact.growth
     )[0]
     if contact.growth[0] < 0.0 and loose == 0.0:
-        contact.flow[FlowIndex.FULL_SLIP_DIRECTION] = find_full_slip_direction(
+        contact.slip_state[SlipStateIndex.FULL_SLIP_DIRECTION] = find_full_slip_direction(
             1.0 if dq > 0.0 else -1.0, contact
         )
     return dissipated / 2, True
@@ -257,14 +273,14 @@ def read_state(contact, rel_disp, velocity):
     -------
     friction.protocol_kernels.Reading
     """
-    direction = contact.flow[FlowIndex.FULL_SLIP_DIRECTION]
+    direction = contact.slip_state[SlipStateIndex.FULL_SLIP_DIRECTION]
     energy = 0.0
-    slip = contact.flow[FlowIndex.TOTAL_SLIDE]
+    slip = contact.slip_state[SlipStateIndex.TOTAL_SLIDE]
     for k in range(contact.b.size):
         energy += 0.5 * contact.kappa[k] * contact.b[k] ** 2
-        slip -= contact.drag[FullSlipRow.MEAN_SLIDE, k + 1] * contact.b[k]
+        slip -= contact.full_slip[FullSlipRow.MEAN_SLIDE, k + 1] * contact.b[k]
     if direction != 0.0:
-        limit = contact.drag[FullSlipRow.FORCE, 0]
+        limit = contact.full_slip[FullSlipRow.FORCE, 0]
         energy += contact.eps[0] * limit
         return Reading(direction * limit, energy, slip - direction * contact.eps[0])
     sums = sum_bonds(contact)

@@ -12,7 +12,7 @@ from ...friction.bonds.list_rows_kernels import LAW, PATH, STATUS
 from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ...friction.protocol_kernels import Reading
 from . import shear_solve_kernels as solver
-from .arrays import FlowIndex, FullSlipRow, ListPointRow, PointRow, SolvedStep, StepProblem
+from .arrays import FullSlipRow, ListPointRow, PointRow, SlipStateIndex, SolvedStep, StepProblem
 from .list_kernels import add_list_energies
 from .shear_lists_kernels import (
     find_pressure,
@@ -83,7 +83,7 @@ def commit_step(dq, force, start, end_velocity, contact):
     before = stored_energy(contact)
     has_room = True
     changes = has_changing_pressure(contact)
-    contact.flow[FlowIndex.TOTAL_SLIDE] += dq
+    contact.slip_state[SlipStateIndex.TOTAL_SLIDE] += dq
     for j in range(int(contact.count[0])):
         load_list(j, contact)
         xi = points[PointRow.SLIDE, j]
@@ -101,7 +101,7 @@ def commit_step(dq, force, start, end_velocity, contact):
         )
         points[ListPointRow.LAST_SPEED, j] = speed
     solver.accept_step(contact)
-    contact.flow[FlowIndex.IS_FULL] = 0.0 if has_room else 1.0
+    contact.slip_state[SlipStateIndex.IS_FULL] = 0.0 if has_room else 1.0
     return force * dq - (stored_energy(contact) - before), has_room
 
 
@@ -153,9 +153,9 @@ def read_state(contact, rel_disp, velocity):
             total += load
         slip = (slip - contact.law[LAW.length] * force) / total if total > 0 else rel_disp
         return Reading(force, stored_energy(contact), slip)
-    slip = contact.flow[FlowIndex.TOTAL_SLIDE]
+    slip = contact.slip_state[SlipStateIndex.TOTAL_SLIDE]
     for k in range(contact.b.size):
-        slip -= contact.drag[FullSlipRow.MEAN_SLIDE, k + 1] * contact.b[k]
+        slip -= contact.full_slip[FullSlipRow.MEAN_SLIDE, k + 1] * contact.b[k]
     for j in range(int(contact.count[0])):
         force += contact.weight[j] * contact.statuses[j, STATUS.force]
         total += contact.weight[j]

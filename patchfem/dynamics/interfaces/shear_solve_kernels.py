@@ -247,9 +247,10 @@ def is_last_step(p, contact):
     """
     max_slide = abs(p[0])
     for k in range(1, p.size):
-        max_slide += contact.drag[FullSlipRow.MAX_SLIDE, k] * abs(p[k])
+        max_slide += contact.full_slip[FullSlipRow.MAX_SLIDE, k] * abs(p[k])
     return (
-        max_slide <= LAST_STEP_RATIO * contact.eps[1] and contact.drag[FullSlipRow.FORCE, 0] > 0.0
+        max_slide <= LAST_STEP_RATIO * contact.eps[1]
+        and contact.full_slip[FullSlipRow.FORCE, 0] > 0.0
     )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...core import Missing
 from ...friction.bonds.list_rows_kernels import N_ROWS, STATUS
-from ..interfaces.arrays import FlowIndex
+from ..interfaces.arrays import SlipStateIndex
 
 # Largest number of entries of a bond list, which limits the memory of a run.
 MAX_ENTRIES = 2_000_000
@@ -59,7 +59,7 @@ def is_full(contact) -> bool:
     For a contact with a single list a full list is the only cause of a failed step.
     """
     return hasattr(contact, "bondlist") and (
-        not hasattr(contact, "flow") or contact.flow[FlowIndex.IS_FULL] == 1.0
+        not hasattr(contact, "slip_state") or contact.slip_state[SlipStateIndex.IS_FULL] == 1.0
     )
 
 

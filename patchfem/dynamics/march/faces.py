@@ -63,9 +63,9 @@ def make_element_arrays(model, prop, modal_system, mass: float):
     has_contact = getattr(model, "patch", None) is not None
     contact[ContactIndex.FORCE_TOL] = STEP_TOL * (model.patch.limit if has_contact else model.limit)
     modal = np.zeros((ModalRow.SCRATCH + 3, n))
-    modal[ModalRow.COMPLIANCE] = modal_system.push[0] / mass
+    modal[ModalRow.COMPLIANCE] = modal_system.force_response[0] / mass
     # These are the rates of the modes per constant force.
-    rate_rows = prop.rows * prop.push[1]
+    rate_rows = prop.rows * prop.force_response[1]
     if prop.dense.size:
         rate_rows = prop.rows @ prop.dense[n:, 2 * n :]
     gamma = rate_rows @ prop.rows.T / mass

@@ -97,8 +97,8 @@ def _make_rig_rows(modes: ModalBasis, prop) -> np.ndarray:
     out = np.zeros((len(RigRow) + N_LOSS_COEFFICIENTS - 1, 3))
     for first, rows in (
         (RigRow.ZZ, prop.free),
-        (RigRow.BY_Z, prop.push),
-        (RigRow.REACH_Z, prop.reach[0].reshape(2, n)),
+        (RigRow.BY_Z, prop.force_response),
+        (RigRow.REACH_Z, prop.slide_response[0].reshape(2, n)),
         (RigRow.LOSS, prop.loss),
         (RigRow.SLIDE_SHAPE, [modes.slide, modes.output, modes.omega**2]),
     ):

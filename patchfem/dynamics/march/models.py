@@ -14,7 +14,7 @@ from ...friction.laws.elastic_plastic import parallel_element
 from ...friction.laws.stretch import growth_numbers, points_element, unpack_bonds
 from ...friction.protocol import Element
 from ..interfaces import arrays
-from ..interfaces.arrays import FlowIndex, FullSlipRow, PointRow
+from ..interfaces.arrays import FullSlipRow, PointRow, SlipStateIndex
 from ..interfaces.dispatch import COULOMB_LAW
 
 INTERFACES_FOLDER = "dynamics.interfaces"
@@ -137,7 +137,8 @@ class ContactModel:
                     m,
                     z,
                     s2,
-                    contact.flow[FlowIndex.TOTAL_SLIDE] - self.reduction.shape @ contact.b,
+                    contact.slip_state[SlipStateIndex.TOTAL_SLIDE]
+                    - self.reduction.shape @ contact.b,
                     play,
                 ]
             ),
@@ -280,7 +281,7 @@ def point_lists_model(
     )
     fields = arrays.make_sheared_fields(limit, law.length, growth_numbers(law), shape, stiffness)
     fields["points"][PointRow.LOAD] = sigma
-    fields["drag"][FullSlipRow.MEAN_SLIDE, 1:] = shape.T @ limit / limit.sum()
+    fields["full_slip"][FullSlipRow.MEAN_SLIDE, 1:] = shape.T @ limit / limit.sum()
     fields |= {
         "bondlist": np.zeros((N_ROWS, limit.size * capacity)),
         "status": numbers.make_status(capacity),

@@ -14,7 +14,7 @@ import numpy as np
 from ...compiled.jit import njit
 from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ..interfaces import shear_kernels as contact
-from ..interfaces.arrays import FlowIndex, FullSlipRow, StepStart
+from ..interfaces.arrays import FullSlipRow, SlipStateIndex, StepStart
 from ..ledger import N_SAMPLE_COLUMNS, Ledger, SampleColumn
 from ..modal_kernels import (
     count_iterations,
@@ -117,12 +117,14 @@ def advance_piece_modes(interface, n_steps, slides):
     slides : (n_steps,) array
         Increments of the slide [m].
     """
-    direction = interface.flow[FlowIndex.FULL_SLIP_DIRECTION]
+    direction = interface.slip_state[SlipStateIndex.FULL_SLIP_DIRECTION]
     last = interface.last
     for k in range(interface.y.shape[1]):
         mode_increment = 0.0
         if k > 0:
-            equilibrium = direction * interface.drag[FullSlipRow.FORCE, k] / interface.kappa[k - 1]
+            equilibrium = (
+                direction * interface.full_slip[FullSlipRow.FORCE, k] / interface.kappa[k - 1]
+            )
             mode_increment = 2 * (equilibrium - interface.b[k - 1])
         for m in range(max(0, n_steps - 3), n_steps):
             if k == 0:
@@ -167,8 +169,8 @@ def move_mode(k, count, table_row, accel, system, workspace):
     zv = modal_system.free[1, k]
     vz = modal_system.free[2, k]
     vv = modal_system.free[3, k]
-    by_z = modal_system.push[0, k] * accel
-    by_v = modal_system.push[1, k] * accel
+    by_z = modal_system.force_response[0, k] * accel
+    by_v = modal_system.force_response[1, k] * accel
     slide = modal_system.slide[k]
     output = modal_system.output[k]
     square = modal_system.omega[k] * modal_system.omega[k]
@@ -204,18 +206,18 @@ def move_mode(k, count, table_row, accel, system, workspace):
 @njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def find_piece_step(interface):
     """Return the change of the shear modes of the pieces in the next step of full slip."""
-    direction = interface.flow[FlowIndex.FULL_SLIP_DIRECTION]
+    direction = interface.slip_state[SlipStateIndex.FULL_SLIP_DIRECTION]
     min_increment = 0.0
     work = 0.0
-    energy = interface.eps[0] * interface.drag[FullSlipRow.FORCE, 0]
+    energy = interface.eps[0] * interface.full_slip[FullSlipRow.FORCE, 0]
     energy_increase = 0.0
     for k in range(interface.b.size):
         y = 2 * (
-            direction * interface.drag[FullSlipRow.FORCE, k + 1] / interface.kappa[k]
+            direction * interface.full_slip[FullSlipRow.FORCE, k + 1] / interface.kappa[k]
             - interface.b[k]
         )
-        min_increment += interface.drag[FullSlipRow.MAX_SLIDE, k + 1] * abs(y)
-        work += direction * interface.drag[FullSlipRow.FORCE, k + 1] * y
+        min_increment += interface.full_slip[FullSlipRow.MAX_SLIDE, k + 1] * abs(y)
+        work += direction * interface.full_slip[FullSlipRow.FORCE, k + 1] * y
         energy += 0.5 * interface.kappa[k] * interface.b[k] * interface.b[k]
         energy_increase += interface.kappa[k] * y * (interface.b[k] + 0.5 * y)
     return PieceStep(min_increment, work, energy, energy_increase)
@@ -249,7 +251,7 @@ def record_full_slip_steps(n_block, first_sample, slide, table_row, force, syste
     interface = system.interface
     table = system.table
     record = system.record
-    direction = interface.flow[FlowIndex.FULL_SLIP_DIRECTION]
+    direction = interface.slip_state[SlipStateIndex.FULL_SLIP_DIRECTION]
     size = 2 * system.motion.shape[1]
     ledger = record.ledger
     workspace = record.workspace
@@ -281,7 +283,7 @@ def record_full_slip_steps(n_block, first_sample, slide, table_row, force, syste
         record.trace[TraceRow.RATE, first_sample + n_steps] = workspace[BlockRow.RATE, s]
         slide = end_slide
         workspace[BlockRow.SLIDE, s] = increment
-        interface.flow[FlowIndex.TOTAL_SLIDE] += increment
+        interface.slip_state[SlipStateIndex.TOTAL_SLIDE] += increment
         is_finite = np.isfinite(slide + workspace[BlockRow.SPEED, s])
         if not (abs(workspace[BlockRow.OUTPUT, s]) <= record.bounds.travel and is_finite):
             break
@@ -319,7 +321,10 @@ def march_full_slip(first, count, first_sample, slide, system):
     workspace = system.record.workspace
     n = motion.shape[1]
     at = first % system.table.shape[0]
-    force = interface.flow[FlowIndex.FULL_SLIP_DIRECTION] * interface.drag[FullSlipRow.FORCE, 0]
+    force = (
+        interface.slip_state[SlipStateIndex.FULL_SLIP_DIRECTION]
+        * interface.full_slip[FullSlipRow.FORCE, 0]
+    )
     accel = modal_system.workspace[0]
     start = modal_system.workspace[1:]
     write_friction_accelerations(force, modal_system.slide, modal_system.mass, accel)
@@ -426,7 +431,10 @@ def march_cycle_with_sums(first, system):
         store_largest_slide(first + i, record)
         if status or i == count:
             return i, status
-        if interface.flow[FlowIndex.FULL_SLIP_DIRECTION] != 0.0 and modal_system.dense.size == 0:
+        if (
+            interface.slip_state[SlipStateIndex.FULL_SLIP_DIRECTION] != 0.0
+            and modal_system.dense.size == 0
+        ):
             n_steps = march_full_slip(first + i, count - i, i, modal.slide, system)
             if n_steps:
                 i = i + n_steps

@@ -112,9 +112,9 @@ def make_modal_arrays(modes: ModalBasis, prop) -> ModalArrays:
         modes.output,
         damping,
         prop.free,
-        prop.push,
+        prop.force_response,
         prop.dense,
-        prop.reach,
+        prop.slide_response,
         prop.loss,
         prop.dense_loss,
     )

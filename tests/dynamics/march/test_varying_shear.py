@@ -113,8 +113,8 @@ def march_all_nodes(basis, drive, law, sets, response, steps: int) -> tuple:
         state = slide_nodes(state, -y_back, loads[i + 1])[1]
         u = u + y_back
         accel = -(free_motion[0] - z - y[0]) / beta / MASS
-        z = free_motion[0] + propagator.push[0, 0] * accel
-        v = free_motion[1] + propagator.push[1, 0] * accel
+        z = free_motion[0] + propagator.force_response[0, 0] * accel
+        v = free_motion[1] + propagator.force_response[1, 0] * accel
         slides.append(z)
         forces.append(law.traction(state).sum())
     return np.array(slides), np.array(forces), loads
