@@ -459,7 +459,7 @@ def find_affected_measures(runs: list) -> list:
 
 
 def find_fastest_settings(runs: list, tolerance: float) -> dict:
-    """Return the label of the fastest run within the tolerance for each measure; None if none is.
+    """Return, for each measure, the label of the fastest run whose error is within the tolerance, or None.
 
     A coarse run that is accurate by chance is excluded: all finer runs must meet the tolerance as well.
     """

@@ -261,7 +261,7 @@ def assemble_fit(
 def choose_starting_points(
     model: UnitCubeResidual, given_start, max_points: int, n_trials: int = 0
 ) -> list:
-    """Return the points of the unit cube from which the descents start.
+    """Return the points of the unit cube from which the local minimisations start.
 
     Parameters
     ----------

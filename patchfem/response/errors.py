@@ -36,7 +36,7 @@ ERROR_MEASURES = ("energy_balance", "work_check")
 
 
 def signed_change(fine: dict, coarse: dict) -> dict:
-    """Return the difference of each measure, fine minus coarse; phases differ by at most pi/2."""
+    """Return the difference of each measure, fine minus coarse; that of phases is reduced modulo pi."""
     changes = {name: fine[name] - coarse[name] for name in fine if name in coarse}
     if "slip_start_phase" in changes:
         changes["slip_start_phase"] = (changes["slip_start_phase"] + np.pi / 2) % np.pi - np.pi / 2

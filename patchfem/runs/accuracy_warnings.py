@@ -26,7 +26,7 @@ MAX_EXCESS = 1e9
 PROPOSED_TOLERANCE_RATIO = 0.1
 # Largest number of halvings of the time step to which the observed order is extrapolated.
 MAX_HALVINGS = 4
-# Fraction of the allowed error that is left to the steps if other causes use all of it.
+# Fraction of the allowed error that the time steps may have if the other causes alone exceed it.
 MIN_STEP_ERROR_FRACTION = 0.2
 # Largest number of strips that is proposed; four times as many strips take about twenty times as
 # long.

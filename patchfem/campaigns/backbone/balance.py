@@ -142,7 +142,7 @@ def find_free_motions(
 
 
 class _FreeMotionSearch:
-    """Solver for the free motions of a mode, with a neighbour or the stuck mode as initial guess.
+    """Solver for the free motions of a mode; the initial guess is the motion at the next amplitude, or the stuck mode.
 
     Parameters
     ----------

@@ -8,7 +8,7 @@ METHODS = ("balance", "decay", "quasi-static")
 # Methods that are computed by default: the recommended one, and another that costs little beside it.
 DEFAULT_METHODS = ("balance", "quasi-static")
 ROUND_OFF_ERROR = 1e-9  # Relative round-off error of a computed value.
-AMPLITUDE_TOL = 1e-7  # Largest relative difference of equal amplitudes.
+AMPLITUDE_TOL = 1e-7  # Amplitudes with a smaller relative difference count as equal.
 COLUMNS = ("amplitude", "frequency", "frequency_error", "damping", "damping_error", "loss")
 
 

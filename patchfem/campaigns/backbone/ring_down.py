@@ -178,7 +178,7 @@ def _interpolation_error(rows: _MotionRows) -> np.ndarray:
     single point, linear interpolation is wrong by up to s w/4. A motion that is not known gives inf.
     """
     steps = np.diff(rows.x, axis=1)
-    # Steps are 0 where a motion is not known, or where the damping is below round-off.
+    # The differences are 0 where a motion was not found, or where its damping is below round-off.
     with np.errstate(invalid="ignore", divide="ignore"):
         energy_slope = np.diff(rows.energy, axis=1) / steps
         loss_slope = np.diff(rows.loss, axis=1) / steps

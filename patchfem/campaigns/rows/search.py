@@ -101,7 +101,7 @@ def make_residual(
 
 
 class _StoredDescents(DescentStorage):
-    """Descents of a search, stored as lists of numbers in a checkpoint of the caller.
+    """Local minimisations of a search, stored as lists of numbers in a checkpoint of the caller.
 
     Parameters
     ----------

@@ -132,7 +132,7 @@ class Cases:
         return self.spread_case_numbers(max_cases)
 
     def sort_by_pieces(self, numbers: Sequence[int]) -> list[int]:
-        """Sort case numbers so that cases with equal pieces are consecutive.
+        """Sort case numbers so that cases whose pieces have the same shape and material are consecutive.
 
         Such cases have most computations in common. Cases with equal patches are consecutive, too.
         """

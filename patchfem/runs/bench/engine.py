@@ -29,7 +29,7 @@ LIST_PASS_RATIO = 1 / 3
 
 
 class Method(Enum):
-    """Method that computes the friction force of a bench run.
+    """How the friction force of a bench run is computed: in closed form, or by one of the numerical engines.
 
     The value of a member is its name in summaries and plans.
     """

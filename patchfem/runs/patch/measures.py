@@ -500,7 +500,7 @@ def estimate_hidden_errors(resolution: Resolution, finest: dict) -> dict:
     n_nodes = resolution.n_nodes
     load = finest["normal_load"]
     peak = finest["pressure_peak"]
-    # Half the sum of the edge cells exceeds the longest one only if the contact has many edges.
+    # Errors add up over the edges of the contact: half of all their cells, but at least the longest one.
     cell = np.maximum(resolution.longest_cell, resolution.edge_cells / 2)
     is_unresolved = n_nodes <= MAX_UNRESOLVED_NODES
     centre_error = np.where(is_unresolved, cell / (2 * n_nodes**2), 1e-3 * cell)

@@ -99,7 +99,7 @@ def strips_rotational_stiffness(state, strip_compliance, x, weight) -> float:
 
 
 def compute_strip_edge_values(patch) -> EdgeValues:
-    """Return the contact length and the contact stiffnesses of a patch in strips."""
+    """Return the contact length and the contact stiffnesses of a patch that is divided into strips."""
     weight = patch.pair.compliance.interface.weight / len(patch.strips.offsets)
     if isinstance(patch.skin, SmoothAsperities):
         return _edge_values_with_skin(patch, weight)

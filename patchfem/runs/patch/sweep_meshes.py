@@ -208,7 +208,7 @@ def _count_extra_halvings(cases: list, tolerance: float) -> dict:
                 len(mesh_levels.solve_on_refined_meshes(case, case.mesh.tolerance or tolerance))
                 - grids.MIN_LEVELS
             )
-        except PatchfemError:  # The single run of this case reports the error.
+        except PatchfemError:  # The error is reported when this case is run alone.
             continue
     return halvings
 

@@ -61,7 +61,7 @@ class RunEvaluator:
         self.contact = contact
         self.steps = steps or numerics.steps
         self.has_friction = model.friction is not None
-        # A law that creeps never sticks.
+        # With a law that creeps, the interface slips under every force, however small.
         self.creeps = self.has_friction and law_has_trait(model.friction.law, "creeps")
         self.stick_tolerance = 0.0 if self.creeps else stick_tolerance
 

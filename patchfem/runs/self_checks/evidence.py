@@ -174,7 +174,7 @@ class Evidence:
 
 
 class LastCycle(NamedTuple):
-    """Time [s], displacement [m] and friction force [N] (k,) in the last cycle of a bench."""
+    """Time [s], displacement [m] and friction force [N] (k,) in the last cycle of the slide of a bench."""
 
     time: np.ndarray
     slide: np.ndarray

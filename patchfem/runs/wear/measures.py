@@ -90,7 +90,7 @@ def _make_wear_measure(name: str, value: float, error: float | None, engine: str
 
 
 def _measure_worn_through_cycle(model, evolved, error: float | None) -> dict:
-    """Return a dict with the measure worn_through_cycle if a coating is worn through.
+    """Return a dict with the cycle in which the wear first reaches the substrate, if it does.
 
     error: error of the largest worn depth [m].
     """

@@ -292,7 +292,7 @@ class EventFinder(MapFinder):
 
     @cached_property
     def max_growth_rate(self) -> float:
-        """Growth rate [1/s] of the slowest free motion without friction; negative if it decays."""
+        """Largest growth rate [1/s] of the free motions without friction; negative if all of them decay."""
         n = self.modes.omega.size
         state = np.block(
             [

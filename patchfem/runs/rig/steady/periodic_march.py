@@ -236,7 +236,7 @@ class MarchFinder(TracedCurve):
         ), run
 
     def _has_step_error(self, value: float, half: float) -> bool:
-        """Return whether half the steps change the amplitude by more than the tolerance."""
+        """Return whether the amplitudes with all and with half of the steps differ by more than the tolerance."""
         return abs(value - half) > self.model.accuracy.tolerance * abs(value)
 
     def compute_curve_point(self, drive, guess=None) -> CurvePoint:
