@@ -53,7 +53,7 @@ class Gap:
     - shapes: pairs of the name of a shape and the keys of its table.
     - profile: file of measured heights.
     - average, limit: lengths [m] of `ProfileLengths`.
-    - rough: whether asperities represent the waves that are finer than `average`.
+    - is_rough: whether asperities represent the waves that are finer than `average`.
     - side: piece that carries the shapes, ``"upper"`` or ``"lower"``.
     - material: whether the heights of the profile are those of a surface, so that a peak closes the
       gap.

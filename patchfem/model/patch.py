@@ -313,7 +313,8 @@ def build_patch(contact: Contact, kind: str, resolve_path: Callable) -> PatchMod
     ----------
     contact : Contact
     kind : str
-        Kind of the run.
+        Kind of the run. A patch of kind "patch" is static: its mesh is finer than that of the same patch
+        in a rig or a bench, and may take more CPU time (`PatchModel.mesh.is_static`).
     resolve_path : callable
         Function of a file name in the scene that returns its path.
 

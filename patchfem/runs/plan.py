@@ -180,7 +180,7 @@ def plan(source) -> Plan:
 
 
 def _make_plan(model: Model) -> Plan:
-    """Choose engine and settings for a Model, and predict the cost of its run."""
+    """Collect what `plan` states of a Model: its effects, stiffnesses, groups of numbers, cost and verdict."""
     if model.measured is not None:
         try:
             # An invalid table of measured responses is reported before anything runs.

@@ -369,7 +369,7 @@ class Run:
     def march_cycles(self, size: int, last_step: int, frames: int, snapshots: list) -> list:
         """March one cycle, or several complete cycles at once.
 
-        No cycle goes beyond the step `stop` or the next check of `is_periodic`. With frames the last cycle is
+        No cycle goes beyond the step `last_step` or the next check of `is_periodic`. With frames the last cycle is
         marched separately, in as many parts, with a snapshot after each.
 
         Parameters

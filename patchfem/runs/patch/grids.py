@@ -137,6 +137,10 @@ def make_base_grids(patch_model) -> BaseGrids:
 def _search_contact_region(patch_model) -> BaseGrids:
     """Search for the contact region on grids that are graded towards the previous result.
 
+    The contact is solved on a coarse grid, and the columns of the next grid are short at the edges of this
+    contact. The search ends when the cells at all edges are short compared to the contact, or when the
+    bands of short cells no longer change, after MAX_SEARCHES solutions at most.
+
     If a varying load moves the contact edges, the columns are short wherever the edges lie between
     LOAD_RANGE_FACTORS times the load. If wear moves them, no column is longer than
     MAX_WEAR_CELL_RATIO times the interface.

@@ -45,8 +45,14 @@ class Limit(NamedTuple):
 def extrapolate_to_zero_cell_length(values, nested: bool = True) -> Limit:
     """Extrapolate values on successively refined meshes to vanishing cell length.
 
-    Three values give a ratio of successive changes. If it is regular, the error of the value on the
-    finest mesh is REGULAR_ERROR_FACTOR times the remainder of the geometric series. With two values the error is twice their
+    Three values give a ratio of successive changes. It is regular between MIN_CONVERGING_RATIO and
+    MAX_REGULAR_RATIO. The value is then extrapolated by the remainder of the geometric series, and the error
+    of the value on the finest mesh is REGULAR_ERROR_FACTOR times this remainder. The error of the
+    extrapolated value is a quarter of the remainder, half of it if the ratio is below MIN_REGULAR_RATIO; it
+    is at least the change of the extrapolated value by the last refinement, and doubled if this is unknown.
+
+    If the ratio is irregular, nothing is extrapolated, and the error is IRREGULAR_ERROR_FACTOR times the last
+    change, or a fraction of the change before if that is larger. With two values the error is twice their
     change. For meshes that are not nested the order is limited to log2(2.5), and no value is
     extrapolated.
 

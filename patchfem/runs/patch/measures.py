@@ -409,7 +409,7 @@ class Resolution(NamedTuple):
 
 
 def compute_contact_resolution(pair, pieces, force, gap_range, can_rotate: bool) -> Resolution:
-    """Return how well a mesh resolves the contacts of q patches.
+    """Return what the hidden errors of q patches follow from: cells at contact edges, and missed pressures.
 
     Parameters
     ----------
@@ -481,8 +481,8 @@ def estimate_hidden_errors(resolution: Resolution, finest: dict) -> dict:
 
     They are due to a contact of few nodes, to a coating thinner than the cells at a loaded corner,
     to a rounded end shorter than the cells, and to round-off. The error of the pressure peak p is
-    p/(4 n^2) for a contact of few nodes n, plus the unresolved pressure of a corner, and at least that
-    of a wedge or what a rounded end would add to p.
+    p/(4 n^2) for a contact of n <= MIN_RESOLVED_NODES nodes that ends inside the interface, plus the
+    unresolved pressure of a corner, and at least that of a wedge or what a rounded end would add to p.
 
     Parameters
     ----------

@@ -166,10 +166,11 @@ def solve_on_refined_meshes(
 ) -> tuple:
     """Solve a patch on successively finer meshes until it meets the tolerance.
 
-    The refinement ends if the next mesh would exceed the CPU time that is allowed for a patch. If
-    the next mesh of a patch with a profile is expensive, the measures are computed on points as
-    dense as the profile, and the mesh only serves fields and motion. Under a prescribed
-    displacement, the meshes must resolve the friction work as well.
+    At least MIN_LEVELS meshes are solved, because the error follows from the changes between them. Each
+    mesh halves the cells of the previous one. The refinement ends if the next mesh would exceed the CPU
+    time that is allowed for a patch. If the next mesh of a patch with a profile is expensive, the
+    measures are computed on points as dense as the profile, and the mesh only serves fields and motion.
+    Under a prescribed displacement, the meshes must resolve the friction work as well.
 
     Parameters
     ----------

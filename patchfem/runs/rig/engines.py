@@ -270,8 +270,12 @@ def _list_march_time_runs(model: Model, numerics) -> list:
 def _list_march_space_runs(model: Model, numerics, patch, coarse, solution) -> list:
     """List the comparison runs of a time integration with another spatial discretization.
 
-    They have a coarser mesh, another number of shear modes or another bond summation, and a quarter
-    of the steps.
+    Each has a quarter of the steps of the run and is compared with a run that has as many:
+
+    - a coarser mesh, if the run has a coarser patch and its load varies or it slips in part;
+    - another number of shear modes, if the load varies, the slide goes over grooves, or a law with bonds
+      acts at the nodes of a patch that is not reduced to a few points;
+    - other settings of a bond summation, see `_list_bond_sum_runs`.
     """
     quarter = _divide_steps(numerics, 4)
     varies = model.rig.friction.load_varies

@@ -75,6 +75,10 @@ class Numerics:
 def choose_numerics(model: Model) -> Numerics:
     """Choose the engine and the numerical settings of a run of a rig.
 
+    The measures are evaluated over a window of the last cycles: a tenth of all cycles, at least 1 and at
+    most 10. Under a drive with a beat the window contains whole beats, and under a random drive it is the
+    record without its initial transient.
+
     Parameters
     ----------
     model : Model
