@@ -32,7 +32,7 @@ MIN_UNWORN_FRACTION = 0.7
 # Length of a flank relative to the trace, from which on a scar is distinguished from a bent datum.
 LONG_FLANK = 0.05
 SHORT_FLANK = 0.02  # length of a flank relative to the trace, below which a scar is excluded
-# Length of the outermost ends relative to the trace, which show whether the trace ends on the floor.
+# Length of the two ends of a trace, relative to the trace, whose median depths are compared with the noise.
 OUTERMOST_FLANK = 0.005
 MAX_CHI2 = 30.0  # largest chi-squared of the bow of a flank, with two or three degrees of freedom
 # Number of parts of the trace, out of N_PARTS, that remain on either side of a shallow track.
@@ -330,10 +330,13 @@ def find_shallow_track(depth, scale: float) -> tuple:
     if depth.size < 8 * N_PARTS:
         return None, np.inf
     edges = part_edges(depth.size, N_PARTS)
-    # Heights clearly above the floor, such as unworn flanks of a floor in a scar, are not unworn
-    # surroundings of a track in this floor.
+    clipped = np.clip(depth, -MAX_NOISE * scale, MAX_NOISE * scale)
+    # Zero depth may be the floor of a wide scar. Its flanks, which stand clearly above it, must not make the
+    # floor look like a shallow track. If most heights stand above it, they are the surface, and it is a track.
     is_above = depth < -MAX_NOISE * scale
-    means = average_parts(np.where(is_above, 0.0, np.minimum(depth, MAX_NOISE * scale)), edges)
+    if 2 * np.count_nonzero(is_above) < depth.size:
+        clipped[is_above] = 0.0
+    means = average_parts(clipped, edges)
     boxes = make_boxes(N_PARTS, FLANK_PARTS, MIN_PARTS, DATUM_DEGREE)
     means = means - boxes.datum @ (boxes.datum.T @ means)
     heights = boxes.shapes @ means
@@ -409,11 +412,12 @@ def _are_straight(depth, ends) -> bool:
 
 
 def _check_for_wide_scar(model, best: Alignment) -> Alignment:
-    """Return the alignment on a line through both ends if a wide scar is also possible.
+    """Return the alignment with a second reading, by which the trace is worn everywhere except at its ends.
 
-    The line is the floor if both ends are long flanks, and the rival if they are shorter. Where an end
-    stands above the floor, even the outermost heights are such a flank: the floor of a wedge-shaped scar
-    and the flank behind its deep end look like a tilt and growth.
+    In the second reading, the unworn surface is a line through both ends. It replaces the given alignment if
+    the ends are long, and is stored as its rival if they are short. If an end stands above the given
+    surface, the outermost heights alone are tried as ends as well, because a wedge-shaped scar with a short
+    flank at its deep end looks like a tilted surface with material that grew at this end.
     """
     count = max(int(OUTERMOST_FLANK * best.depth.size), MIN_HEIGHTS)
     ends = [

@@ -31,7 +31,7 @@ MIN_PILE_UP = 3.0  # smallest height of a pile-up above the first trace, in stan
 # Distances, in samples, from the point where a straight or round flank leaves zero to its first worn
 # sample.
 OFFSETS = (1 / 3, 2 / 3, 1.0)
-# Smallest decrease of the deviance for which one kind of flank fits clearly better than another.
+# Smallest decrease of the deviance (-2 log likelihood) by which one kind of flank excludes another.
 MIN_CLEAR_DEVIANCE = 12.0
 # Largest number of bootstrap blocks of a mean section; more would not show its long-wave errors.
 MAX_BLOCKS = 8
@@ -368,7 +368,7 @@ def _flank_deviances(depth, noise) -> np.ndarray:
 
 
 def _fit_smooth_flank(weighted, noise, samples, shape: FlankShape) -> float:
-    """Fit b t^p + c t^(p + 1) to depths; return the sum of the squared residuals / noise.
+    """Fit b t^p + c t^(p + 1) to depths by least squares; return the sum of (residual / noise)^2.
 
     Parameters
     ----------

@@ -106,6 +106,14 @@ def test_always_deep_track_is_aligned(count, parameters):
     )
 
 
+def test_deep_track_is_no_scar_below_grown_ends():
+    """In this pair the floor of the track also fits the first trace, but two thirds of the heights stand above it."""
+    before, after, worn, _ = make_milled_pair(97048, waves=0.0)
+    found = compare_traces(before, after)
+    truth = np.interp(found.alignment.x, after.x, worn).mean()
+    assert found.worn.mean.low <= truth <= found.worn.mean.high
+
+
 def test_always_unworn_noisy_traces_are_aligned():
     """Unworn traces with a correlation of 0.97 are aligned.
 
