@@ -198,7 +198,7 @@ def solve_by_gradients(
 
 
 def _guess_forces(program: _QuadraticProgram, start, n_nodes: int, eigenvalue_bound: float):
-    """Return initial nodal forces [N], which do not yet balance the prescribed load and moment.
+    """Return nodal forces [N] as an initial guess; they need not balance the prescribed load and moment.
 
     start: (n_nodes,) forces [N] of the nodes, or None. The springs of the holder begin without force.
     """

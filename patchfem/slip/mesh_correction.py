@@ -1,4 +1,4 @@
-"""Correction of partial slip for the finite mesh: each friction element is spread over a range of yield displacements.
+"""Correction of partial slip for the finite mesh: a friction element gets a range of yield displacements.
 
 Slip starts where a contact carries least and proceeds from node to node. At a relative displacement below the first yield
 displacement, a mesh shows no slip, and neither does a mesh of half as many nodes. The joint, however, dissipates energy

@@ -112,13 +112,13 @@ tolerance = 0.003
     ids=["mode", "masses", "released", "released for longer"],
 )
 def test_always_plan_estimates_strips_of_stuck_block(text):
-    """The plan estimates the strips of bonds of a stuck block within a factor of 1.5: one per step, or
+    """The plan estimates at least the strips of bonds of a stuck block, and at most 1.5 times as many: one per step, or
     after a release those that are younger than the oldest bond that still carries."""
     scene = load(text)
     run_plan = plan(scene)
     result = run(scene)
     strips = result.extra["book"]["strips"]
-    assert strips / 1.5 <= run_plan.unknowns["bond_list_about"] <= 1.5 * strips
+    assert strips <= run_plan.unknowns["bond_list_about"] <= 1.5 * strips
     # A warning states the missing error.
     assert any("accuracy.steps_per_cycle" in text for text in result.warnings)
 

@@ -27,9 +27,9 @@ from .harmonic import (
 
 # Largest number of times that the step between two amplitudes is halved if no solution is found.
 MAX_HALVINGS = 6
-# Largest number of Newton steps to the next amplitude of a continuation; where more are needed, the
-# step between the amplitudes is too long, and halving it takes fewer evaluations.
-MAX_CONTINUATION_STEPS = 10
+# Largest number of Newton iterations at one amplitude of a continuation. If more were needed, the next
+# amplitude is too far away, and it is cheaper to halve the ratio of the amplitudes than to iterate on.
+MAX_CONTINUATION_ITERATIONS = 10
 
 
 class FreeMotion(NamedTuple):
@@ -132,7 +132,7 @@ class FreeBalance:
     def solve(self, x, amplitude: float, max_steps: int = 40) -> tuple:
         """Solve for the free motion at an amplitude by Newton's method.
 
-        x: unknowns (N,) of the initial guess; amplitude [m]; max_steps: of Newton's method.
+        x: unknowns (N,) of the initial guess; amplitude [m]; max_steps: number of Newton iterations.
 
         Returns
         -------
@@ -182,7 +182,7 @@ class FreeBalance:
         targets = [float(target)]
         while targets:
             try:
-                x = self.solve(x, targets[-1], MAX_CONTINUATION_STEPS)[0]
+                x = self.solve(x, targets[-1], MAX_CONTINUATION_ITERATIONS)[0]
                 start = targets.pop()
             except NotConverged:
                 if len(targets) > MAX_HALVINGS:

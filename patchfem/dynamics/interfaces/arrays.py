@@ -126,7 +126,7 @@ class ListPointRow(IntEnum):
 
 
 class FullSlipRow(IntEnum):
-    """Row indices of `ShearedPoints.full_slip`: full-slip forces on the holder and on each shear mode.
+    """Row indices of `ShearedPoints.full_slip`. Its columns are the holder and the shear modes.
 
     - FORCE: force if all points slip in the positive direction [N]
     - MAX_SLIDE: largest slide of a point per coordinate

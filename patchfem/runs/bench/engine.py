@@ -29,7 +29,7 @@ LIST_PASS_RATIO = 1 / 3
 
 
 class Method(Enum):
-    """How the friction force of a bench run is computed: in closed form, or by one of the numerical engines.
+    """Methods of computing the friction force of a bench run.
 
     The value of a member is its name in summaries and plans.
     """

@@ -210,8 +210,8 @@ def assemble_results(
         )
     if is_repeated is not None:
         is_wide &= ~is_repeated(results)
-    ringing_warnings = _ringing_warnings(
-        scales, runs, outcomes, (values[MAIN_MEASURE], errors[MAIN_MEASURE])
+    ringing_warnings = _list_ringing_warnings(
+        scales, runs, outcomes, values[MAIN_MEASURE], errors[MAIN_MEASURE]
     )
     _insert_warnings(models, results, outcomes, is_wide, ringing_warnings)
     return AssembledRuns(results, needs_single_run, is_resolved)
@@ -347,14 +347,13 @@ def _judge_outcomes(scales: CaseScales, runs: Runs, is_drifting_motion) -> _Stea
     return _SteadyOutcomes(outcomes, *steady)
 
 
-def _ringing_warnings(
-    scales: CaseScales, runs: Runs, outcomes: list, amplitude_and_error: tuple
+def _list_ringing_warnings(
+    scales: CaseScales, runs: Runs, outcomes: list, amplitude, error
 ) -> dict:
     """Return warnings by case for stuck interfaces whose structure still vibrates.
 
-    `amplitude_and_error` contains the amplitudes (n,) [m] and their numerical errors (n,) [m].
+    amplitude, error: amplitudes (n,) [m] and their numerical errors (n,) [m].
     """
-    amplitude, error = amplitude_and_error
     floor = error_floor(MAIN_MEASURE, scales.displacement) + np.nan_to_num(error)
     decay = np.broadcast_to(scales.decay * scales.period, len(amplitude))
     is_stuck = np.array([outcome is Outcome.STUCK for outcome in outcomes], bool)

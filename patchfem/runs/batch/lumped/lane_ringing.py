@@ -135,23 +135,10 @@ def _fit_ringing(
 
 
 def _fit_window(law: str, cases, scales: Scales, measured, case_indices, steps: int) -> dict:
-    """Fit the ringing of selected cases in their evaluated cycles.
+    """Integrate the evaluated cycles of selected cases (k,) again, with `steps` per cycle, and fit their ringing.
 
-    Parameters
-    ----------
-    law : str
-        Name of the law in `dynamics.lanes`.
-    cases : Cases
-    scales : Scales
-    measured : lane_runs.MeasuredMarch
-    case_indices : (k,) of int
-    steps : int
-        Steps per cycle with which the evaluated cycles are integrated again.
-
-    Returns
-    -------
-    dict
-        Values and errors as in `measure_ringing`, by case index.
+    Returns a dict by case index of the values and errors of `measure_ringing`. The other parameters are
+    those of `find_ringing`.
     """
     if not case_indices.size:
         return {}
