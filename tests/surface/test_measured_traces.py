@@ -10,19 +10,13 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
-from patchfem.core import PatchfemError
 from patchfem.surface import (
     Profile,
-    average_at_nodes,
-    clean,
     describe_lost_waves,
-    level,
     level_plane,
-    place_over_patch,
     read_surface,
 )
 from patchfem.surface.fine import wave_spectrum
-from patchfem.surface.profile import find_spikes
 
 pytestmark = pytest.mark.skipif(
     "PATCHFEM_DATA" not in os.environ, reason="PATCHFEM_DATA names no folder of scans"
@@ -98,19 +92,6 @@ def test_exact_gap_map_of_bolted_beam(data_folder, reference_values):
     assert np.array_equal(scan.z[row, column], points[:, 2], equal_nan=True)
 
 
-def test_exact_measured_traces_have_few_spikes(data_folder):
-    """Measured traces have no spikes, and scans at most 10 of 10201 heights; pits do not count as spikes."""
-    assert (
-        not find_spikes(read_mitutoyo_trace(data_folder)).any()
-        and not find_spikes(read_dektak_trace(data_folder)).any()
-    )
-    for name in ("nanovea-test1.txt.gz", "nanovea-test2.txt.gz"):
-        z = np.loadtxt(data_folder / name, delimiter=",")[:, 2].reshape(101, 101) * 1e-6
-        found = sum(int(find_spikes(Profile(np.arange(101) * 5e-6, row, name)).sum()) for row in z)
-        # 379 of the 10201 heights lie beyond 8 deviations of the whole scan, but they are pits
-        assert found <= 10
-
-
 def test_exact_spectrum_agrees_with_filtered_rms(data_folder, reference_values):
     """Rq after a Gaussian filter, from the spectrum, agrees with another code within 1 to 5 %.
 
@@ -131,33 +112,6 @@ def test_exact_spectrum_agrees_with_filtered_rms(data_folder, reference_values):
         "% of its rms height in waves shorter than 2 elements (200 um), which the mesh cannot resolve: add "
         '[contact.asperities], or set element_size = "20 um"'
     ) in str(describe_lost_waves(profile, 100e-6))
-
-
-def test_exact_measured_trace_is_averaged_at_nodes(data_folder):
-    """The heights at coarse nodes agree within 20 nm with means of the trace over the length of an element."""
-    nodes = np.linspace(-4.9e-3, 4.9e-3, 197)
-    trace = level(clean(place_over_patch(read_mitutoyo_trace(data_folder), nodes), 1e-4))
-    assert "the trace is centred on the patch, which adds -4.997 mm to x" in trace.notes[0]
-    gap = average_at_nodes(trace, nodes)
-    fine = np.interp(np.linspace(nodes[0], nodes[-1], 196 * 50 + 1), trace.x, trace.z)
-    box = np.convolve(fine, np.r_[0.5, np.ones(49), 0.5] / 50, "valid")[25::50]
-    assert gap[1:-1] == pytest.approx(box[:195], abs=2e-8)
-
-
-@pytest.mark.parametrize(
-    "name",
-    [
-        "xy-1.txt",
-        "nanovea-test1.txt.gz",
-        "brb_surface_data.mat",
-        "truth.json",
-        "friction-damper-1hz.csv",
-    ],
-)
-def test_refuses_files_without_units_or_surface(data_folder, name):
-    """Files without units, or without a surface, are refused with the header that is needed."""
-    with pytest.raises(PatchfemError, match=r"header (as )?`x \[um\],z \[um\]`"):
-        read_surface(data_folder / name)
 
 
 def test_exact_trace_without_header_is_read_with_given_units(data_folder):

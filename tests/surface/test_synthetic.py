@@ -10,11 +10,8 @@ from synthetic import (
     SIGMA,
     report_area,
     report_density,
-    report_sigma,
     report_trace,
     self_affine,
-    sine,
-    waves,
 )
 
 LENGTH = 12.7e-3
@@ -38,19 +35,6 @@ def test_exact_rms_and_spectrum_of_self_affine_trace(seed, hurst, count):
         (np.arange(8, 65) / 8.0) ** (-1 - 2 * hurst), rel=1e-9
     )
     assert power[65:].max() < 1e-20 * power[1]
-
-
-@given(st.floats(1e-6, 1e-2), st.floats(0, 6), st.floats(-5e-6, 5e-6))
-def test_exact_waves_are_superposed(wave, phase, height):
-    """A trace of several waves is the sum of the single sines."""
-    x = np.linspace(-LENGTH / 2, LENGTH / 2, 301)
-    sum_of_waves = waves(x, [height, 1e-6], [wave, LENGTH], [phase, 0.2])
-    assert sum_of_waves.z == pytest.approx(
-        sine(x, height, wave, phase).z + sine(x, 1e-6, LENGTH, 0.2).z, abs=1e-20
-    )
-    assert sine(x, height, wave, phase).z == pytest.approx(
-        height * np.sin(2 * np.pi * x / wave + phase), abs=1e-20
-    )
 
 
 def make_areas(count):
@@ -90,32 +74,3 @@ def test_exact_spectrum_of_report_surface():
     )
     # wavelength with the largest power per octave
     assert 2e-3 / (np.arange(351) * trace_power).argmax() == pytest.approx(85e-6, abs=2e-6)
-
-
-def test_always_dominant_wavelength_is_80_um():
-    """The ring of the measured spectrum with the largest power is at 80 um within 4 um; rings are 6 % wide."""
-    k = np.hypot(np.fft.fftfreq(POINTS, STEP)[:, None], np.fft.fftfreq(POINTS, STEP))
-    edges = np.geomspace(1 / 200e-6, 1 / 30e-6, 33)
-    ring = np.digitize(k, edges).ravel()
-    found = []
-    for z in make_areas(20):
-        power = np.bincount(ring, (np.abs(np.fft.fft2(z)) ** 2).ravel()) / np.bincount(ring)
-        strongest = 1 + power[1:-1].argmax()
-        found.append(1 / k.ravel()[ring == strongest].mean())
-    assert np.abs(np.array(found) - 80e-6).max() < 4e-6
-
-
-def test_exact_factors_of_amplitude_kinds():
-    """The upper quartile of the heights from a peak to the next valley, without waves below 40 um, is 2.5 sigma.
-
-    The kinds of amplitude follow from this factor.
-    """
-    f = np.fft.rfftfreq(POINTS, STEP)
-    swings = []
-    for row in np.concatenate([z[::8] for z in make_areas(10)]):
-        z = np.fft.irfft(np.where(f <= 1 / 40e-6, np.fft.rfft(row), 0), POINTS)
-        up = np.diff(z) > 0
-        swings.append(np.abs(np.diff(z[1:-1][up[1:] != up[:-1]])))
-    assert np.quantile(np.concatenate(swings), 0.75) / SIGMA == pytest.approx(2.5, abs=0.05)
-    for kind, factor in (("peak-to-valley", 2.5), ("zero-to-peak", 1.25), ("rms", 1)):
-        assert report_sigma(15e-6, kind) == pytest.approx(15e-6 / factor, rel=1e-15)

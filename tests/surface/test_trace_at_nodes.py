@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from synthetic import sine
 
 from patchfem.core import PatchfemError
 from patchfem.surface import Profile, average_at_nodes, place_over_patch
@@ -36,15 +35,6 @@ def node_grids(draw):
     return nodes, np.unique(np.concatenate([inner, ends]))
 
 
-@given(node_grids(), st.floats(-1, 1), st.floats(-1e-3, 1e-3))
-def test_exact_linear_profile_at_any_nodes(grid, slope, offset):
-    """A linear profile is averaged exactly at any nodes."""
-    nodes, x = grid
-    assert average_at_nodes(make_trace(x, slope * x + offset), nodes) == pytest.approx(
-        slope * nodes + offset, abs=1e-15
-    )
-
-
 @given(node_grids(), st.integers(0, 10**6))
 def test_exact_node_averages_agree_with_quadrature(grid, seed):
     """Averages at nodes agree with a quadrature over each tributary length and the slope of the means."""
@@ -69,17 +59,6 @@ def test_exact_node_averages_agree_with_quadrature(grid, seed):
     assert average_at_nodes(make_trace(x, z), nodes) == pytest.approx(expected, abs=1e-10)
 
 
-@pytest.mark.parametrize("elements", [0.5, 1.0, 1.3, 2.0, 4.0, 11.0])
-def test_exact_reduction_of_waves_by_averaging(elements):
-    """Averaging reduces a wave by sin(pi h / wave)/(pi h / wave): to 0 at one element, 64 % at two, 90 % at four."""
-    wave = elements * H
-    x = np.linspace(-HALF_LENGTH, HALF_LENGTH, 200 * 400 + 1)
-    averaged = average_at_nodes(sine(x, 1.0, wave, 0.7), NODES)
-    assert averaged[2:-2] == pytest.approx(
-        np.sinc(1 / elements) * sine(NODES, 1.0, wave, 0.7).z[2:-2], abs=1e-4
-    )
-
-
 def test_exact_covering_trace_keeps_its_coordinate():
     """A trace that covers the patch keeps its own coordinate, or is centred on request."""
     x = np.linspace(-8e-3, 20e-3, 5000)
@@ -95,17 +74,6 @@ def test_exact_covering_trace_keeps_its_coordinate():
     assert average_at_nodes(centred, NODES) == pytest.approx(NODES + 6e-3, abs=2e-15)
     assert centred.notes == ()
     assert np.array_equal(place_over_patch(profile, NODES).x, profile.x)
-
-
-def test_exact_non_covering_trace_is_centred_with_note():
-    """A trace that does not cover the patch with its own coordinate is centred, with a note."""
-    x = np.linspace(0, 15e-3, 5000)
-    profile = place_over_patch(make_trace(x, x), NODES)
-    assert average_at_nodes(profile, NODES) == pytest.approx(NODES + 7.5e-3, abs=2e-15)
-    assert profile.notes == (
-        "before.csv: x runs from 0 um to 15 mm in the file and does not cover the patch, "
-        "from -6.35 mm to 6.35 mm; the trace is centred on the patch, which adds -7.5 mm to x",
-    )
 
 
 def test_exact_trace_of_patch_length_is_centred_with_note():

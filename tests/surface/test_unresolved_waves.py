@@ -60,17 +60,6 @@ def test_always_element_length_keeps_requested_fraction(seed, fraction):
     )
 
 
-def test_exact_uneven_samples_give_same_fine_fraction():
-    """Unevenly spaced samples give the same fine fraction within 0.1 %."""
-    rng = np.random.default_rng(5)
-    x = np.unique(np.concatenate([[0, LENGTH], rng.uniform(0, LENGTH, 20000)]))
-    parts = [(np.pi / 2, 3.0, 6), (np.pi / 2, 1.0, 80)]
-    profile = waves(
-        x, [h for _, h, _ in parts], [2 * LENGTH / k for _, _, k in parts], [p for p, _, _ in parts]
-    )
-    assert fine_fraction(profile, 2 * LENGTH / 40) == pytest.approx(1 / np.sqrt(10), rel=1e-3)
-
-
 def test_exact_lost_waves_are_reported_with_remedy():
     """The message about waves that the mesh does not resolve states their fraction and suitable element sizes.
 

@@ -26,15 +26,12 @@ def gap_errors(gap, walk: float, seeds: range) -> np.ndarray:
     return np.array(errors)
 
 
-@pytest.mark.share(1, 2)
+@pytest.mark.share(0)
 @pytest.mark.parametrize(
     ("gap", "walk", "count", "min_count"),
     [
-        pytest.param(MIDDLE, 0.0, 40, 35, id="between"),
-        pytest.param(END, 0.0, 20, 17, id="beyond"),
         pytest.param(MIDDLE, 3.0, 20, 17, id="between, with a random walk"),
-        pytest.param(END, 0.0, 40, 35, id="beyond, 40 times"),
-        pytest.param(MIDDLE, 3.0, 40, 35, id="between, with a random walk, 40 times"),
+        pytest.param(END, 0.0, 40, 35, id="beyond"),
         # in 53 of 60 other random walks the error lies within two deviations
         pytest.param(END, 3.0, 40, 32, id="beyond, with a random walk"),
     ],
@@ -47,20 +44,3 @@ def test_always_gap_errors_follow_normal_law(gap, walk, count, min_count):
     errors = gap_errors(gap, walk, range(count))
     assert (np.abs(errors) <= 1.96).sum() >= min_count
     assert np.abs(errors).mean() > 0.2  # overestimated errors would make this mean small
-
-
-@pytest.mark.parametrize("degree", [1, 2])
-def test_exact_polynomial_datum_is_removed_with_drift(degree):
-    """A datum that is a polynomial of the given degree is removed within 2e-3."""
-    random = np.random.default_rng(1)
-    model = model_drift(random.standard_normal(COUNT), ~MIDDLE, degree, 10, random)
-    datum = 5.0 - 3.0 * POSITION + (4.0 * POSITION**2 if degree == 2 else 0.0)
-    inner = slice(30, -30)  # beyond the centres of the outermost parts the drift is constant
-    assert np.abs(model.remove(datum)[inner]).max() < 2e-3
-
-
-def test_exact_few_unworn_samples_give_no_drift_model():
-    """With four unworn samples there is no model of the drift."""
-    unworn = np.zeros(60, bool)
-    unworn[:4] = True
-    assert model_drift(np.ones(60), unworn, 1, 10, np.random.default_rng(1)) is None

@@ -19,15 +19,11 @@ from patchfem.surface.compare.ratios import Size
 from patchfem.surface.compare.sentences import compute_confidence, describe_ratio_change
 from patchfem.surface.compare.verdict import compose_verdict
 
-MANY = pytest.param(40, marks=pytest.mark.slow)
 
-
-@pytest.mark.parametrize("count", [4, MANY])
-def test_always_unchanged_surfaces_rarely_count_as_reduced(count):
-    """Unchanged surfaces at two places are called reduced in at most 2.5 % of the cases, and increased in as many.
-
-    Two or more of 8 ratios have a chance of 1.6 %.
-    """
+@pytest.mark.slow
+def test_always_unchanged_surfaces_rarely_count_as_reduced():
+    """Unchanged surfaces at two places are called reduced in at most 2.5 % of the cases, and increased in as many."""
+    count = 40
     seeds = range(70000, 70000 + count)
     sizes = [
         [
@@ -42,15 +38,11 @@ def test_always_unchanged_surfaces_rarely_count_as_reduced(count):
         for ordered_sizes in (pair_of_sizes, pair_of_sizes[::-1])
     ]
     words = [describe_ratio_change(pair_of_sizes) for pair_of_sizes in ratios]
-    max_count = max(count // 10, 1)
-    assert words.count("reduced") <= max_count and words.count("increased") <= max_count
+    assert words.count("reduced") <= 4 and words.count("increased") <= 4
     values = np.quantile([pair_of_sizes.value for pair_of_sizes in ratios], (0.05, 0.95))
     assert [a.value * b.value for a, b in zip(ratios[::2], ratios[1::2])] == pytest.approx(
         [1.0] * count, rel=1e-12
     )
-    if count < 40:  # the number of seeds is too small for the tails of the distribution
-        assert 0.64 * 0.85 < values[0] < 1 < values[1] < 1.57 * 1.15
-        return
     # quantiles measured on traces of 1 mm of the surface of the report
     assert values == pytest.approx((0.64, 1.57), rel=0.15)
 

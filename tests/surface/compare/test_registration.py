@@ -6,8 +6,6 @@ The method was tuned on seeds 0 to 150; the seeds of these tests are others.
 import numpy as np
 import pytest
 from pairs import UM, make_surface, make_worn_pair
-from rubbing import rub
-from synthetic import report_area
 
 from patchfem.core import PatchfemError, frozen_array
 from patchfem.surface import Profile
@@ -114,64 +112,6 @@ def test_always_traces_of_different_places_have_no_depth(count):
         assert "unworn flanks" in found.worn.mean.reason
         worn = found.worn
         assert [part.unit for part in (worn.largest, worn.mean, worn.area)] == ["m", "m", "m2"]
-
-
-@pytest.mark.parametrize("count", [2, pytest.param(8, marks=pytest.mark.slow)])
-def test_always_unworn_traces_show_no_wear(count):
-    """Unworn traces of one place are aligned with a mean difference below 4 nm, and no wear or range is reported."""
-    for seed in range(30050, 30050 + count):
-        p = make_worn_pair(seed, worn_fraction=0.0)
-        found = compare_traces(p.before, p.after)
-        assert found.basis == "place"
-        assert found.worn.mean.value is None and abs(found.alignment.depth.mean()) < 0.004 * UM
-        assert found.worn.extent is None
-        assert "no wear detected" in compose_verdict([found])[1][0]
-        assert "at most" not in compose_verdict([found])[1][0]
-
-
-@pytest.mark.parametrize(
-    "n_rows, n_traces", [(128, 2), pytest.param(512, 8, marks=pytest.mark.slow)]
-)
-def test_always_mutually_worn_surfaces_have_depth_or_none(n_rows, n_traces):
-    """Surfaces that wear each other by 3 um are aligned on common valleys, with a depth error below 20 nm.
-
-    The true mean is that over the common length: two samples of 512 that are outside of it change the
-    mean by up to 21 nm. With 6 um hardly any valley remains, and no depth is given.
-    """
-    step = 2 * UM
-    count = 512
-    pieces = [report_area((n_rows, count), step, seed)[2] for seed in (0, 1)]
-    x = np.arange(count) * step
-    random = np.random.default_rng(1)
-    for wear_depth, is_aligned in ((3 * UM, True), (6 * UM, False)):
-        lower = rub(*pieces, step, 3 * step, 2 * wear_depth, bite=0.05 * UM).lower
-        errors = []
-        for k in range(0, n_rows, n_rows // n_traces):
-            noise = 0.02 * UM * random.standard_normal((2, count))
-            found = compare_traces(
-                Profile(x, frozen_array(pieces[0][k] + noise[0] - 0.003 * x), "before"),
-                Profile(x, frozen_array(lower[k] + noise[1] + 0.004 * x), "after"),
-            )
-            if found.basis == "place":
-                truth = np.interp(found.alignment.x, x, pieces[0][k] - lower[k]).mean()
-                errors.append(found.worn.mean.value - float(truth))
-        assert (
-            (len(errors) >= 0.75 * n_traces and max(map(abs, errors)) < 0.02 * UM)
-            if is_aligned
-            else not errors
-        )
-
-
-def test_always_periodic_surface_is_not_aligned():
-    """A turned surface is not aligned, because it is periodic, and the reason states this."""
-    x = np.arange(1001) * UM
-    noise = 0.02 * UM * np.random.default_rng(0).standard_normal((2, x.size))
-    z = 5 * UM * np.sin(2 * np.pi * x / (80 * UM))
-    found = compare_traces(
-        Profile(x, frozen_array(z + noise[0]), "turned"),
-        Profile(x, frozen_array(np.minimum(z, UM) + noise[1]), "worn"),
-    )
-    assert found.basis != "place" and "surface is periodic" in found.motion.shift.reason
 
 
 @pytest.fixture(scope="module")

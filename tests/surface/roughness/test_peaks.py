@@ -18,7 +18,6 @@ from patchfem.surface import (
     Moments,
     Profile,
     gaussian_peaks,
-    level,
     persson_stiffness,
     trace_moments,
 )
@@ -85,39 +84,6 @@ def test_exact_peaks_agree_with_quadrature(alpha):
     assert 1 / peaks_found.radius == pytest.approx(curvature, rel=1e-10)
     # the coefficients of the source have four digits
     assert peaks_found.deviation**2 / alpha == pytest.approx(variance, abs=1e-4 / alpha)
-
-
-def test_exact_peaks_scale_with_units():
-    """Radius, density and deviation of peaks scale with the units of heights and lengths."""
-    reference = gaussian_peaks(Moments(2.0, 0.3, 0.2))
-    scaled = gaussian_peaks(Moments(2.0 * 3, 0.3 * 3 / 7, 0.2 * 3 / 49))
-    assert scaled == pytest.approx(
-        (reference.radius * 49 / 3, reference.density / 49, reference.deviation * 3), rel=1e-12
-    )
-
-
-def test_exact_moments_of_two_sines():
-    """Moments of a sum of two sines agree with the closed forms within 0.2 %.
-
-    A difference over h reduces a wave k by sin(k h/2)/(k h/2).
-
-    A difference over h reduces a wave k by sin(k h/2)/(k h/2).
-    """
-    n = 4096
-    step = 0.5e-6
-    x = step * np.arange(n + 1)
-    waves = [(64, 0.3e-6, 0.4), (410, 0.05e-6, 1.1)]
-    z = sum(a * np.cos(2 * np.pi * k * x / (n * step) + p) for k, a, p in waves)
-    for stride in (1, 2):
-        found = rms_moments(level(make_trace(z, step)), stride)
-        h = stride * step
-        k = np.array([2 * np.pi * k / (n * step) for k, _, _ in waves])
-        a = np.array([a for _, a, _ in waves])
-        for order, value in enumerate(found):
-            # both ends of the trace count, and levelling removes a part of the longest wave
-            assert value == pytest.approx(
-                np.sqrt(np.sum((a * (2 * np.sin(k * h / 2) / h) ** order) ** 2) / 2), rel=2e-3
-            )
 
 
 def test_exact_dust_in_moments_is_reported():
@@ -242,20 +208,6 @@ def test_refuses_incomplete_peak_definition(keys, message, tmp_path):
     with pytest.raises(PatchfemError) as caught:
         pf.plan(tmp_path / "scene.toml")
     assert message in str(caught.value) and "asperities" in str(caught.value)
-
-
-def test_exact_short_trace_has_peaks(tmp_path):
-    """A short trace has peaks; the verdict states that every second of its samples would give none."""
-    x = np.arange(24)
-    z = 2 * np.sin(0.5 * x) + 0.3 * np.random.default_rng(3).normal(size=24)
-    (tmp_path / "short.csv").write_text(
-        "x [um],z [um]\n" + "".join(f"{a},{b!r}\n" for a, b in zip(x, z.tolist()))
-    )
-    (tmp_path / "scene.toml").write_text(PATCH + 'from = "short.csv"\n')
-    assert any(
-        "from every second sample: no surface of such peaks" in text
-        for text in pf.plan(tmp_path / "scene.toml").verdict
-    )
 
 
 def test_exact_profile_combines_two_faces(tmp_path):

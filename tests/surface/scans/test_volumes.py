@@ -33,7 +33,7 @@ def test_always_volume_interval_covers_missing_wall(from_depth):
     assert found.high - found.value > 0.1 * truth  # noise alone would give 1 %
 
 
-@pytest.mark.parametrize("count", [12, pytest.param(40, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [8, pytest.param(40, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("sigma", [0.0, 4.0])
 def test_always_volume_interval_accounts_for_correlation(sigma, count):
     """Of 40 grooves under white or correlated noise, at least 90 % of the intervals cover the volume."""
@@ -62,13 +62,12 @@ def test_exact_worn_fraction_of_groove():
     assert found.low <= 61 / 240 and found.high >= 59 / 240
 
 
-@pytest.mark.parametrize("sign, name", [(1.0, "worn_volume"), (-1.0, "grown_volume")])
-def test_exact_growth_is_measured_like_wear(sign, name):
+def test_exact_growth_is_measured_like_wear():
     """A map with the opposite sign has the same volume as growth."""
-    found = measure_volumes(make_alignment(sign * add_noise(GROOVE), NOISE), AXIS, AXIS).values
+    found = measure_volumes(make_alignment(-add_noise(GROOVE), NOISE), AXIS, AXIS).values
     reference = measure_volumes(make_alignment(add_noise(GROOVE), NOISE), AXIS, AXIS).values
-    assert found[name].value == pytest.approx(reference["worn_volume"].value, rel=1e-9)
-    assert found[name].low > 0.95 * float(GROOVE.sum()) * STEP**2
+    assert found["grown_volume"].value == pytest.approx(reference["worn_volume"].value, rel=1e-9)
+    assert found["grown_volume"].low > 0.95 * float(GROOVE.sum()) * STEP**2
 
 
 def test_always_noise_alone_gives_no_volume():
