@@ -66,6 +66,7 @@ def test_exact_punch_pressure_balances_load_and_moment(offset):
         lo, hi, lambda x: exact.punch_pressure(x, LOAD, HALF_WIDTH, offset)
     ) == pytest.approx(LOAD, rel=1e-7)
     moment = _integrate(lo, hi, lambda x: x * exact.punch_pressure(x, LOAD, HALF_WIDTH, offset))
+    assert exact.punch_pressure(2 * HALF_WIDTH, LOAD, HALF_WIDTH, offset) == 0
     assert moment == pytest.approx(LOAD * offset, rel=1e-7, abs=1e-9 * LOAD * HALF_WIDTH)
 
 
@@ -82,26 +83,6 @@ def test_exact_punch_surface_slope_equals_rotation(offset, fraction):
         lo + fraction * (hi - lo),
     )
     assert computed == pytest.approx(-rotation, rel=1e-6, abs=1e-7 * LOAD / (MODULUS * HALF_WIDTH))
-
-
-@pytest.mark.parametrize("offset", [1.2e-3, -1.9e-3])
-def test_always_separated_part_of_punch_stays_open(offset):
-    """The opening of the separated part of a tilted punch increases away from the contact."""
-    lo, hi = exact.punch_contact(HALF_WIDTH, offset)
-    rotation = exact.punch_rotation(LOAD, HALF_WIDTH, MODULUS, offset)
-    contact_end, direction = (lo, -1) if offset > 0 else (hi, 1)
-    for fraction in (0.01, 0.3, 0.99):
-        x = contact_end + direction * fraction * (2 * HALF_WIDTH - (hi - lo))
-        assert (
-            direction
-            * (
-                rotation
-                + surface_slope(
-                    lambda s: exact.punch_pressure(s, LOAD, HALF_WIDTH, offset), lo, hi, x
-                )
-            )
-            > 0
-        )
 
 
 def test_exact_punch_solution_is_continuous_at_first_separation():
@@ -124,7 +105,7 @@ def test_exact_punch_solution_is_continuous_at_first_separation():
 # ---- the punch with rounded edges
 
 FLAT_HALF_WIDTH, EDGE_RADIUS = 1e-3, 0.05
-LOADS = [2.0, 3e3, 3e5, 3e7]
+LOADS = [2.0, 3e3, 3e7]
 
 
 @pytest.mark.parametrize("load", LOADS)
@@ -140,7 +121,7 @@ def test_exact_rounded_punch_pressure_balances_load(load):
     assert half > FLAT_HALF_WIDTH and total == pytest.approx(load, rel=1e-8)
 
 
-@pytest.mark.share(0, 4, 8, 12, 14)
+@pytest.mark.share(0, 3, 6, 9)
 @pytest.mark.parametrize("load", LOADS[1:])
 @pytest.mark.parametrize("fraction", [-0.9, 0.0, 0.2, 0.6, 0.97])
 def test_exact_rounded_punch_surface_slope_equals_shape(load, fraction):
@@ -332,9 +313,7 @@ def transfer_compliance(k, coating, substrate, thickness):
         )
 
 
-@pytest.mark.parametrize(
-    "wavelength", [20e-6, 80e-6, 0.2e-3, 0.5e-3, 1e-3, 2e-3, 5e-3, 12.7e-3, 1.0]
-)
+@pytest.mark.parametrize("wavelength", [20e-6, 0.5e-3, 12.7e-3, 1.0])
 @pytest.mark.parametrize(
     "pair",
     [
@@ -351,22 +330,10 @@ def test_exact_layered_compliance_agrees_with_transfer_matrix(wavelength, pair):
     assert exact.layered_compliance(k, *pair, THICKNESS) == pytest.approx(expected, rel=1e-12)
 
 
-def test_exact_layered_compliance_limits_are_half_planes():
-    """Equal materials, a layer of zero thickness and a very thick layer have the compliance of a half-plane."""
-    k = np.geomspace(1e2, 1e6, 9)
-    uncoated = 2 * (1 - 0.32**2) / (121e9 * k)
-    assert np.allclose(
-        exact.layered_compliance(k, TITANIUM, TITANIUM, THICKNESS), uncoated, rtol=1e-14
-    )
-    assert np.allclose(exact.layered_compliance(k, CARBIDE, TITANIUM, 0.0), uncoated, rtol=1e-13)
-    thick = exact.layered_compliance(k, CARBIDE, TITANIUM, 1.0)
-    assert np.allclose(thick, 2 * (1 - 0.24**2) / (250e9 * k), rtol=1e-13)
-
-
 # ---- shear of a crown
 
 
-@pytest.mark.share(0, 4, 8)
+@pytest.mark.share(0, 8)
 @pytest.mark.parametrize("fraction", [-0.9, 0.2, 0.6])
 @pytest.mark.parametrize("position", [-0.7, 0.2, 0.95])
 def test_exact_cattaneo_shear_sticks_inside_and_slips_outside(fraction, position):

@@ -6,22 +6,18 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import example, given
-from hypothesis import strategies as st
 from pieces import CARBIDE, COATED, COATING, HEIGHT, LENGTH, TITANIUM, make_compliance
 from study_module import load_study
 
 from patchfem.closed_forms import contact as exact
 from patchfem.contact import press
 from patchfem.contact.gaps import crown
-from patchfem.contact.unilateral import solve_forces
 from patchfem.mesh import TensorGrid
 from patchfem.mesh.tensor import graded_rows
 
 halfspace = load_study("common/halfspace.py")
-press_periodic, residuals, wave_numbers = (
+press_periodic, wave_numbers = (
     halfspace.press_periodic,
-    halfspace.residuals,
     halfspace.wave_numbers,
 )
 WAVELENGTH, AMPLITUDE = 80e-6, 1.5e-6
@@ -62,7 +58,7 @@ def press_wavy_surface(n_points, fraction):
 # ---- the wavy surface
 
 
-@pytest.mark.parametrize("fraction", [0.3, 0.5, 0.7, 0.9, 0.99])
+@pytest.mark.parametrize("fraction", [0.3, 0.99])
 def test_exact_wavy_surface_agrees_with_westergaard(fraction):
     """Pressure, half-width and approach of a wavy surface agree with Westergaard at 128 and 2048 points per wave."""
     wave = fraction * FULL_CONTACT_PRESSURE, WAVELENGTH, AMPLITUDE, MODULUS
@@ -147,33 +143,3 @@ def test_exact_coated_elements_agree_with_half_plane_transform(
 
 
 # ---- random gaps
-
-
-@example(
-    4, 24476, 1.8125, -9.0, True
-)  # an intermediate set has a point that touches while another overlaps
-@given(
-    st.integers(4, 120),
-    st.integers(0, 2**32 - 1),
-    st.floats(-3, 6),
-    st.floats(-9, -5),
-    st.booleans(),
-)
-def test_always_dense_active_set_gives_same_pressure(n_points, seed, load, height, smooth):
-    """A dense active-set solve with the same circulant operator gives the same pressures and approach."""
-    rng = np.random.default_rng(seed)
-    gap = 10**height * rng.normal(size=n_points)
-    gap = np.cumsum(gap) if smooth else gap
-    length = 1e-3
-    load = 10**load
-    compliance = coated_compliance(n_points, length)
-    compliance[0] = compliance[1]
-    state = press_periodic(compliance, gap, length, load)
-    column = np.fft.irfft(compliance, n_points) * n_points / length
-    dense = column[(np.arange(n_points)[:, None] - np.arange(n_points)) % n_points]
-    force, motion, _ = solve_forces(dense, make_points(n_points, length), gap, np.array([load]))
-    step = length / n_points
-    assert np.abs(state.pressure * step - force).max() <= 1e-6 * force.max()
-    assert state.closing == pytest.approx(
-        motion[0], abs=1e-8 * (abs(motion[0]) + compliance[0] * force.max() / step)
-    )

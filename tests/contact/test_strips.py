@@ -91,7 +91,7 @@ def random_gaps(rng, x, n_strips, amplitude):
 # ---- undivided patch
 @each_layer
 @each_control
-@pytest.mark.parametrize("angle", [0.0, 1e-4])
+@pytest.mark.parametrize("angle", [1e-4])
 def test_exact_strips_without_roll_equal_undivided_patch(layer, control, angle):
     """Strips without roll have the forces, approach and rotation of the undivided patch."""
     c, x, weight, y = pair_strips(8)
@@ -149,7 +149,7 @@ def test_exact_strips_equal_block_diagonal_problem(layer, has_diagonals):
     Strips with equal added diagonals share a factorisation.
     """
     is_linear = layer is None or isinstance(layer, LinearAsperities)
-    for number, (c, x, weight, y, gap, roll, load, moment, spring) in enumerate(random_cases(9)):
+    for number, (c, x, weight, y, gap, roll, load, moment, spring) in enumerate(random_cases(6)):
         if not is_linear:
             spring = 0.0
         diagonals = np.random.default_rng(number).uniform(0, 2, gap.shape) * c.max() * has_diagonals
@@ -212,6 +212,7 @@ def test_exact_centre_of_pressure_of_rigid_wedge_in_full_contact(
     )
     _, centre, _, _ = wedge_on_linear_foundation(roll, LOAD, WIDTH, LENGTH, 1e13)
     assert state.centre_y == pytest.approx(centre * (1 - 1 / n_strips**2), rel=1e-12) and centre < 0
+    assert state.yaw_moment(0.4) == pytest.approx(0.4 * state.load * state.centre_y, rel=1e-14)
 
 
 def test_order_two_centre_of_partly_open_rigid_pad():
@@ -234,7 +235,7 @@ def test_order_two_centre_of_partly_open_rigid_pad():
     )
 
 
-@pytest.mark.parametrize("ratio", [0.1, 2.0, 30.0])
+@pytest.mark.parametrize("ratio", [0.1, 30.0])
 def test_exact_rolled_pad_on_exponential_layer(ratio):
     """The centre of a rolled pad on an exponential layer is L(1/2 - 1/B + 1/(exp(B) - 1)), with B = roll L/u0.
 
@@ -252,22 +253,6 @@ def test_exact_rolled_pad_on_exponential_layer(ratio):
     assert state.centre_y == pytest.approx(
         wedge_on_asperities(roll, WIDTH, u0)[1], abs=1.01 * WIDTH * ratio / 12 / n_strips**2
     )
-
-
-@pytest.mark.parametrize(("roll", "yaw"), [(1e-5, 33.3), (1e-4, 157.5), (1e-3, 208.4)])
-def test_exact_yaw_moment_of_rolled_pad(roll, yaw):
-    """The yaw moment of a rolled pad on a linear layer agrees with the closed form and with 4000 strips.
-
-    The case is 10 mm x 10 mm, 116 N, 1e13 Pa/m and mu = 0.4; moments in N mm.
-    """
-    centre = wedge_on_linear_foundation(roll, 116.0, 0.01, 0.01, 1e13)[1]
-    assert -0.4 * 116 * centre * 1e3 == pytest.approx(yaw, abs=0.05)
-    c, x, weight, y = rigid_strips(4000, length=0.01, width=0.01)
-    state = press_strips(
-        c, x, weight, y, np.zeros(1), roll, load=116.0, asperities=LinearAsperities(1e13)
-    )
-    assert -state.yaw_moment(0.4) * 1e3 == pytest.approx(yaw, abs=0.05)
-    assert state.yaw_moment(0.4) == pytest.approx(0.4 * state.load * state.centre_y, rel=1e-14)
 
 
 # ---- check from the definitions
@@ -355,24 +340,6 @@ def test_always_random_strips_satisfy_contact_conditions(
 
 
 # ---- hard cases
-@pytest.mark.parametrize("layer", [None, LinearAsperities(1e13)])
-def test_exact_large_roll_loads_only_edge_strip(layer):
-    """Under a large roll only the strip at the edge carries the load, as a patch of its own."""
-    c, x, weight, y = pair_strips(8)
-    state = press_strips(c, x, weight, y, 1e-5 * x, 2e-2, load=LOAD, asperities=layer)
-    single_strip = press(
-        Compliance(Interface(x, weight, WIDTH / 8), add_linear_layer(layer, c, weight), c),
-        1e-5 * x,
-        LOAD,
-    )
-    assert not state.force[1:].any()
-    assert (
-        np.abs(state.pressure[0] - single_strip.sigma_n).max() <= 1e-10 * single_strip.sigma_n.max()
-    )
-    assert state.centre_y == pytest.approx(y[0], rel=1e-12)
-    assert state.fraction == pytest.approx(weight[single_strip.sigma_n > 0].sum() / AREA, rel=1e-12)
-
-
 @each_layer
 def test_exact_zero_load_gives_touching_strips_without_force(layer):
     """Under zero load the strips touch without force, and the approach is that of first contact."""
@@ -405,29 +372,6 @@ def test_exact_prescribed_approach_decouples_strips():
         assert np.abs(state.gap[strip] - single_strip.gap).max() <= 1e-18
     separated = press_strips(c, x, weight, y, np.zeros(x.size), 1e-4, approach=-1e-4 * WIDTH)
     assert separated.outcome is Outcome.NO_CONTACT and separated.gap.min() > 0
-
-
-@each_layer
-def test_exact_approach_of_load_reproduces_load(layer):
-    """Prescribing the approach that a load gave reproduces the load and the forces."""
-    c, x, weight, y = pair_strips(6)
-    if isinstance(layer, ExponentialAsperities):
-        layer = ExponentialAsperities(layer.u0, MEAN_PRESSURE)
-    loaded = press_strips(c, x, weight, y, 2e-5 * x, 1e-4, load=LOAD, asperities=layer)
-    prescribed = press_strips(
-        c, x, weight, y, 2e-5 * x, 1e-4, approach=loaded.delta, asperities=layer
-    )
-    assert prescribed.load == pytest.approx(LOAD, rel=1e-9)
-    assert np.abs(prescribed.force - loaded.force).max() <= 1e-9 * LOAD
-
-
-@each_layer
-@pytest.mark.parametrize("roll", [0.0, 1e-5, 1e-4, 1e-3])
-def test_always_test_piece_needs_few_iterations(layer, roll):
-    """The strips of the test piece are solved in at most 12 iterations."""
-    c, x, weight, y = pair_strips(8, 200)
-    state = press_strips(c, x, weight, y, 1e-4 * x, roll, load=LOAD, asperities=layer)
-    assert state.iterations <= 12
 
 
 # ---- stiffnesses
@@ -514,6 +458,7 @@ def test_refuses_undetermined_strip_rotation():
 
 
 # ---- free roll
+@pytest.mark.share(0, 2, 4, 7, 9)
 @each_layer
 @each_control
 def test_exact_free_roll_reproduces_prescribed_roll(layer, control):
@@ -575,29 +520,6 @@ def test_exact_free_roll_closes_lateral_wedge():
         MEAN_PRESSURE + LOAD * arm * y / second_moment, rel=1e-10
     )
     assert eccentric.roll == pytest.approx(-3e-5 - LOAD * arm / (second_moment * 1e13), rel=1e-10)
-
-
-@pytest.mark.parametrize("arm", [0.25, 0.35, 0.45])
-def test_order_two_eccentric_load_gives_triangular_pressure(arm):
-    """The roll under a load line beyond the kernel WIDTH/6 converges to that of a triangular pressure.
-
-    A rigid piece on a linear layer touches over 3 (WIDTH/2 - arm).
-    """
-    arm, contact_width = arm * WIDTH, 3 * (0.5 - arm) * WIDTH
-    errors = []
-    for n_strips in (40, 80, 160):
-        state = press_strips(
-            *rigid_strips(n_strips),
-            np.zeros(1),
-            load=LOAD,
-            asperities=LinearAsperities(1e13),
-            roll_moment=arm * LOAD,
-        )
-        slope = (
-            2 * LOAD / (1e13 * LENGTH * contact_width**2)
-        )  # roll of the triangular pressure, N = k L roll b^2/2
-        errors.append(abs(-state.roll / slope - 1))
-    assert errors[-1] <= 2e-3 and errors[-1] <= errors[0] / 8
 
 
 def test_exact_rolling_strips_equal_rotating_nodes():

@@ -16,7 +16,7 @@ from pieces import (
     make_compliance,
 )
 
-from patchfem.contact import press, press_to_approach
+from patchfem.contact import press
 from patchfem.contact.gaps import crown, tilt
 from patchfem.contact.unilateral import solve_forces
 from patchfem.core import Outcome
@@ -51,7 +51,7 @@ def random_cases(n_cases):
 def test_always_initial_active_set_does_not_affect_forces():
     """The initial active set does not affect the forces."""
     rng = np.random.default_rng(8)
-    for pair, gap, load, offset in random_cases(30):
+    for pair, gap, load, offset in random_cases(12):
         x = pair.interface.x
         for target in (np.array([load]), np.array([load, load * offset])):
             reference, _, _ = solve_forces(pair.normal, x, gap, target)
@@ -72,16 +72,6 @@ def test_exact_zero_load_gives_touching_pieces_without_force(moment):
     assert not state.sigma_n.any() and (state.load, state.moment) == (0, 0)
     assert state.approach == 3e-6
     assert state.gap.min() == 0 and np.abs(state.gap - (gap - 3e-6)).max() <= 1e-20
-
-
-def test_exact_approach_is_relative_to_gap_offset():
-    """Shifting gap and approach by the same negative offset leaves load and pressure unchanged."""
-    pair = make_coated_pair(100)
-    gap = crown(pair.interface.x, 1.0)
-    above = press_to_approach(pair, gap, 2e-6)
-    below = press_to_approach(pair, gap - 8e-6, 2e-6 - 8e-6)
-    assert below.load == pytest.approx(above.load, rel=1e-9)
-    assert below.sigma_n == pytest.approx(above.sigma_n, rel=1e-6, abs=1e-9 * above.sigma_n.max())
 
 
 # contact fraction, tangential stiffness [N/m], peak pressure [Pa] and approach [m] of the coated pair at 200 cells, from

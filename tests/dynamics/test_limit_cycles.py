@@ -156,7 +156,7 @@ def test_exact_elastic_plastic_elements_have_stable_and_unstable_cycle():
                 events=[speed],
                 rtol=1e-9,
                 atol=1e-13,
-                max_step=2e-5,
+                max_step=1e-4,
             )
             state = run.y[:, -1].copy()
             time = run.t[-1]

@@ -104,7 +104,7 @@ def propagate_step(modes, propagator, drive, number, state, force):
     return new, work, loss, slide_increment
 
 
-@pytest.mark.share(0, 3, 6, 9, 13, 16, 19, 22, 25, 28, 31, 34, 38, 41, 44, 47)
+@pytest.mark.share(0, 6, 9, 13, 19, 22, 25, 31, 38, 44)
 @pytest.mark.parametrize("drive", DRIVES)
 @pytest.mark.parametrize("kind", [*MODES, "coupled"])
 @pytest.mark.parametrize("steps", [40, 4])
@@ -168,7 +168,7 @@ def dense_step_matrices(propagator):
 @pytest.mark.parametrize(
     "modes",
     [
-        *(make_basis(W, zeta) for zeta in (30.0, 1e3, 1e6, 1e9)),
+        *(make_basis(W, zeta) for zeta in (30.0, 1e9)),
         make_basis([1.0, 3e4 * W], [0.1, 0.2], (1, 1), (1, 1)),
         *(
             make_basis(
@@ -178,7 +178,7 @@ def dense_step_matrices(propagator):
                 (1, 1),
                 damping=size * np.array([[1.0, -0.6], [-0.6, 1.2]]),
             )
-            for size in (1e4, 1e8, 1e12)
+            for size in (1e4, 1e12)
         ),
     ],
 )
@@ -225,23 +225,3 @@ def test_exact_step_by_doubling_equals_direct_step(monkeypatch):
         expected = direct.tables(drive, 3, 5)
         found = doubled.tables(drive, 3, 5)
         assert np.all(np.abs(expected - found).max(axis=0) <= 1e-10 * np.abs(expected).max(axis=0))
-
-
-def test_exact_propagators_are_cached():
-    """A propagator is computed once for the same step, modes and drive, and again if one of them
-    changes. Large propagators are not cached."""
-    modes = make_basis(*MODES["damped"])
-    drive = DRIVES["sine"]
-    first = make_propagator(modes, drive, 100)
-    assert make_propagator(modes, drive, 100) is first
-    for other in (
-        make_propagator(modes, drive, 50),
-        make_propagator(make_basis(W, 0.01), drive, 100),
-        make_propagator(modes, SineDrive(G_N, 2 * pi * 75), 100),
-    ):
-        assert other is not first and not np.array_equal(other.free, first.free)
-    np.testing.assert_array_equal(
-        make_propagator(modes, drive, 100, modes.interfaces).free, first.free
-    )
-    large_basis = make_basis(np.full(40, W), np.full(40, 0.01), np.ones(40), np.ones(40))
-    assert make_propagator(large_basis, drive, 100) is not make_propagator(large_basis, drive, 100)

@@ -91,7 +91,7 @@ def assert_same_results(first, second) -> None:
         xr.testing.assert_identical(a, b)
 
 
-@pytest.mark.share(0, 3, 4)
+@pytest.mark.share(0, 3)
 @pytest.mark.parametrize(
     "kind",
     [pytest.param(kind, marks=[pytest.mark.slow] * (kind == "bonds that grow")) for kind in RIGS],
@@ -187,15 +187,8 @@ def test_always_run_continues_without_disk_space_for_its_state(tmp_path, save_co
     assert sorted(path.name for path in tmp_path.iterdir()) == ["scene.toml"]
 
 
-@pytest.mark.share(0)
-@pytest.mark.parametrize(
-    "number",
-    [
-        signal.SIGTERM,
-        signal.SIGKILL,
-        *(pytest.param(path, marks=pytest.mark.slow) for path in (signal.SIGHUP, signal.SIGINT)),
-    ],
-)
+@pytest.mark.slow  # the torture campaigns of a normal run kill processes, too
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL, signal.SIGHUP, signal.SIGINT])
 def test_exact_run_ended_by_signal_can_be_resumed(tmp_path, number):
     """A run in its own process that is ended by a signal leaves its state and can be resumed. After
     SIGKILL it prints nothing, and after the other signals one line."""

@@ -61,32 +61,6 @@ def test_exact_grid_compliance_equals_dense_inverse(columns, rows, seed):
     assert np.abs(refined - displacement).max() <= 1e-9 * np.abs(displacement).max()
 
 
-@pytest.mark.parametrize("columns", [4, 5, 30, 31])
-def test_exact_symmetric_halves_equal_whole_piece(columns):
-    """Condensing the two halves of a symmetric piece gives the compliance of the whole piece, with fewer entries."""
-    piece = make_random_piece(columns, 17)
-    assert piece.factor.is_mirrored
-    whole, halves = (condense(piece.stencil, mirrored) for mirrored in (False, True))
-    whole_compliance = whole.compliance()
-    half_compliance = halves.compliance()
-    assert (
-        np.abs(whole_compliance - half_compliance).max() <= 1e-11 * np.abs(whole_compliance).max()
-    )
-    assert np.array_equal(half_compliance, half_compliance.T)
-    assert halves.inner_factor.n_entries <= 0.7 * whole.inner_factor.n_entries
-
-
-def test_order_of_factor_size_is_n_log_n():
-    """The number of factor entries of a square grid of N nodes grows as N log N."""
-    ratios = []
-    for n in (33, 65, 129):
-        coordinates = np.arange(n) * 1e-4
-        factor = make_grid_piece(TensorGrid(coordinates, coordinates, 2)).factor.inner_factor
-        ratios.append(factor.n_entries / (4 * n * n * np.log2(n)))
-    # George 1973: 31/4 n^2 log2 n; the factor 1.7 allows for full squares in place of triangles
-    assert max(ratios) <= 1.7 * 31 / 4
-
-
 def test_refuses_indefinite_stiffness():
     """A stiffness that is not positive definite is refused."""
     grid = graded_grid(6e-3, 3e-3, 1e-3)
@@ -105,9 +79,7 @@ def test_refuses_extreme_coating_stiffness(ratio, coating):
         interface_compliance(make_grid_piece(graded_grid(12.7e-3, 6.35e-3, 2e-4, coating), layers))
 
 
-@pytest.mark.parametrize(
-    "ratio, coating", [(1700, 1e-8), (1e5, 1e-6), (6e6, 1e-4), (1e5, 1e-8), (6e6, 1e-6)]
-)
+@pytest.mark.parametrize("ratio, coating", [(1700, 1e-8), (6e6, 1e-6)])
 def test_exact_round_off_bound_covers_difference_of_halves(ratio, coating):
     """The stated round-off error covers the difference between whole and halved computation, which round differently."""
     layers = Layers((TITANIUM[0] * ratio, CARBIDE[1]), TITANIUM, "strain")

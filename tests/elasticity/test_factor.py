@@ -4,19 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from any_mesh_cases import mesh_of_grid
-from hypothesis import given
-from hypothesis import strategies as st
-from pieces import COATED, COATING
-from scipy.sparse import block_diag, coo_matrix, csc_matrix, csr_matrix, eye_array
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse import block_diag, coo_matrix, csr_matrix, eye_array
 from scipy.spatial import Delaunay
-from stiffness import free_stiffness
 
 from patchfem.core import NotConverged
-from patchfem.elasticity import Substructure, fronts
-from patchfem.elasticity.dissect import MAX_LEAF_NODES, dissect_nodes
-from patchfem.mesh import graded_grid
+from patchfem.elasticity import fronts
 
 
 def random_triangulation(n_points, seed):
@@ -26,50 +18,6 @@ def random_triangulation(n_points, seed):
     return points, np.unique(
         np.sort(np.concatenate([cells[:, [0, 1]], cells[:, [1, 2]], cells[:, [2, 0]]])), axis=0
     )
-
-
-@pytest.mark.parametrize("size, split", [(5e-4, 0.0), (1e-4, 0.5)])
-def test_exact_factor_solutions_equal_dense_inverse(size, split):
-    """Compliance and solutions of the factored mesh equal those of the dense inverse, and the load is unchanged."""
-    mesh = mesh_of_grid(graded_grid(2e-3, 1e-3, size, COATING), split, seed=4)
-    piece = Substructure(mesh, COATED)
-    full = np.linalg.inv(free_stiffness(piece).toarray())
-    k = 2 * mesh.interface.size
-    assert np.abs(piece.factor.compliance() - full[-k:, -k:]).max() <= 1e-10 * np.abs(full).max()
-    load = np.random.default_rng(1).normal(size=(full.shape[0], 3))
-    original = load.copy()
-    assert np.abs(piece.factor.solve(load) - full @ load).max() <= 1e-10 * np.abs(full @ load).max()
-    assert np.array_equal(load, original)
-
-
-def test_refuses_singular_stiffness():
-    """A singular stiffness is refused."""
-    matrix = csc_matrix(
-        np.diag([2.0, 1, 1, 1, 1, 1])
-        - np.diag([1.0, 0, 0, 0, 0], 1)
-        - np.diag([1.0, 0, 0, 0, 0], -1)
-    )
-    matrix[0, 0] = 1.0
-    with pytest.raises(NotConverged, match="stiffness of the piece"):
-        fronts.factorise(matrix, np.array([0, 2, 3])).compliance()
-
-
-@given(n_points=st.integers(4, 900), seed=st.integers(0, 99))
-def test_always_dissection_separates_mesh_into_halves(n_points, seed):
-    """The dissection is a permutation whose last separator is small and leaves parts of at most half of the nodes."""
-    points, pairs = random_triangulation(n_points, seed)
-    order, firsts = dissect_nodes(points, pairs)
-    assert np.array_equal(np.sort(order), np.arange(n_points))
-    assert firsts[0] == 0 and firsts[-1] == n_points and np.all(np.diff(firsts) > 0)
-    if n_points <= MAX_LEAF_NODES:
-        return
-    separator = order[firsts[-2] :]
-    is_kept = ~np.isin(pairs, separator).any(axis=1)
-    graph = coo_matrix((np.ones(is_kept.sum()), pairs[is_kept].T), shape=(n_points, n_points))
-    label = connected_components(graph, False)[1]
-    # the last separator divides the mesh into halves
-    assert np.bincount(np.delete(label, separator)).max() <= n_points / 2 + 1
-    assert separator.size <= 3 * np.sqrt(n_points)
 
 
 def random_stiffness(pairs, n_nodes: int, ground_stiffness: float):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pieces import COATED
 
-from patchfem.elasticity import Piece, predict_bytes, predict_seconds
+from patchfem.elasticity import Piece, predict_bytes
 from patchfem.elasticity.condense import condense
 from patchfem.elasticity.grid_fronts import predict_work
 from patchfem.mesh import TensorGrid
@@ -27,15 +27,3 @@ def test_exact_predicted_work_equals_factor_sizes(nx, ny, mirrored):
         stack_entries + kept_entries <= work.factor_entries <= stack_entries + 4 * kept_entries
     )  # half of a middle column is stored
     assert predict_bytes(nx, ny, mirrored) >= 8 * work.factor_entries
-
-
-def test_always_predicted_cost_increases_with_nodes():
-    """The predicted time and memory increase with the number of nodes and decrease with symmetry."""
-    for predict in (predict_seconds, predict_bytes):
-        for mirrored in (False, True):
-            costs = [
-                predict(nx, ny, mirrored)
-                for nx, ny in ((10, 10), (30, 20), (60, 60), (61, 90), (200, 120))
-            ]
-            assert np.all(np.diff(costs) > 0)
-        assert predict(101, 80, True) < predict(101, 80, False)

@@ -164,53 +164,6 @@ def test_exact_joined_compliance_equals_weighted_displacements(side):
     )
 
 
-@given(lower_sizes=cells, upper_sizes=cells, stiff=st.floats(0.01, 100.0), seed=st.integers(0, 99))
-def test_always_joined_compliance_is_symmetric_and_positive(lower_sizes, upper_sizes, stiff, seed):
-    """The joined compliance is symmetric positive definite, balanced, and unchanged if the bodies are swapped."""
-    x_low = make_nodes(lower_sizes)
-    x_high = make_nodes(upper_sizes)
-    low = block_compliance(x_low, HEIGHT, YOUNG)
-    high = block_compliance(x_high, 0.5 * HEIGHT, stiff * YOUNG, 0.2)
-    try:
-        joined = mortar.join_pieces(PieceInterface(x_low, low), PieceInterface(x_high, high))
-    except PatchfemError as error:
-        assert "pressure ripples of" in str(error)
-        return
-    assert np.array_equal(joined.compliance.nn, joined.compliance.nn.T) and np.array_equal(
-        joined.compliance.tt, joined.compliance.tt.T
-    )
-    full_compliance = np.block(
-        [
-            [joined.compliance.nn, joined.compliance.nt],
-            [joined.compliance.nt.T, joined.compliance.tt],
-        ]
-    )
-    assert np.linalg.eigvalsh(full_compliance).min() > 0
-    assert joined.tributary_lengths.sum() == pytest.approx(LENGTH, rel=1e-13)
-    force = np.random.default_rng(seed).uniform(0, 1, (3, joined.x.size))
-    for distributed, mesh_nodes in zip(joined.distribute_forces(force), (x_low, x_high)):
-        assert distributed.sum(axis=1) == pytest.approx(force.sum(axis=1), rel=1e-13)
-        assert (
-            np.abs(distributed @ mesh_nodes - force @ joined.x).max()
-            <= 1e-13 * force.sum() * LENGTH
-        )
-    swapped = mortar.join_pieces(PieceInterface(x_high, high), PieceInterface(x_low, low))
-    is_matching = x_low.size == x_high.size and np.abs(x_low - x_high).max() <= 1e-12 * LENGTH
-    assert is_matching or {joined.side, swapped.side} in ({"both"}, {"lower", "upper"})
-    assert swapped.x == pytest.approx(joined.x, abs=1e-15)
-    scale = 1e-12 * joined.compliance.nn.max()
-    for computed, expected in (
-        (swapped.compliance.nn, joined.compliance.nn),
-        (swapped.compliance.tt, joined.compliance.tt),
-        (swapped.compliance.nt, -joined.compliance.nt),
-    ):
-        assert np.abs(computed - expected).max() <= scale
-    tilted = [
-        press_pair(part.x, part.compliance.nn, 1e-6 * part.x).sigma_n for part in (joined, swapped)
-    ]
-    assert np.abs(tilted[0] - tilted[1]).max() <= 1e-9 * tilted[0].max()
-
-
 def test_exact_matching_nodes_add_compliances():
     """For matching nodes the joined compliance is the sum of both compliances, also if the nodes are rounded."""
     x = make_nodes(np.random.default_rng(1).uniform(0.1, 1, 40))
@@ -256,8 +209,8 @@ def hertz_errors(x, nn, young_low, young_high):
     return np.abs(error).max() / PEAK, abs(state.sigma_n.max() / PEAK - 1), state
 
 
-@pytest.mark.parametrize("young_low, young_high", [(1, 1), (1, 100), (100, 1), (1, 5)])
-@pytest.mark.parametrize("fine", [17, 24, 40])
+@pytest.mark.parametrize("young_low, young_high", [(1, 1), (1, 100), (100, 1)])
+@pytest.mark.parametrize("fine", [17, 40])
 def test_exact_hertz_pressure_on_nonmatching_meshes(fine, young_low, young_high):
     """The Hertz pressure on non-matching meshes is accurate within 0.4 % of the peak."""
     (x_low, low), (x_high, high) = (
@@ -276,8 +229,6 @@ def test_exact_hertz_pressure_on_nonmatching_meshes(fine, young_low, young_high)
     "fine, stiff, low, high",
     [
         (32, 1, 0.01, 0.05),
-        (64, 1, 0.02, 0.06),
-        (32, 10, 0.1, 0.4),
         (64, 10, 0.2, 0.5),
         (64, 100, 0.9, 4.0),
     ],

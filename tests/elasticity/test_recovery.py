@@ -271,24 +271,6 @@ def test_exact_hertz_subsurface_stress_peaks():
         )  # within one element
 
 
-def test_order_of_recovered_hertz_stress_is_two():
-    """The recovered stress on the axis under Hertz's pressure converges with order two."""
-    errors = []
-    for count in (4, 8, 16):
-        piece, _, _, stress = solve_hertz_block(count)
-        recovery = fit_recovery(get_cells(piece))
-        x, depth = recovery.cells.points[recovery.node].T
-        on_axis = (
-            (np.abs(x) < 1e-9 * HALF_WIDTH)
-            & (depth > 0.4 * HALF_WIDTH)
-            & (depth < 1.6 * HALF_WIDTH)
-        )
-        expected = hertz_axis_stress(depth[on_axis])
-        errors.append(np.abs(recovery(stress[0])[on_axis] - expected).max() / P0)
-    assert np.log2(errors[0] / errors[-1]) / 2 == pytest.approx(2.0, abs=0.3)
-    assert errors[-1] <= 4e-3
-
-
 @pytest.mark.parametrize("mesh_kind", ["tensor", "mixed", "triangles"])
 @given(seed=st.integers(0, 2**32 - 1), plane=st.sampled_from(["strain", "stress"]))
 @settings(settings.get_profile("costly"))
@@ -350,14 +332,7 @@ def test_exact_traction_on_inclined_coating_under_uniform_stress(seed, slope):
     assert np.abs(computed.shear[0, 1:-1] - traction @ tangent).max() <= 1e-10 * scale
 
 
-def test_exact_uncoated_piece_has_no_coating_traction():
-    """A piece without coating has no coating traction."""
-    piece = grid_piece(graded_grid(2e-3, 1e-3, 2e-4), make_bare_layers(TITANIUM))
-    cells = get_cells(piece)
-    assert compute_coating_traction(cells, np.zeros((1, len(cells.points), 2))) is None
-
-
-@pytest.mark.parametrize("split", [0.0, 0.5, 1.0, None])
+@pytest.mark.parametrize("split", [0.5, None])
 def test_exact_error_estimate_agrees_with_refined_energy(split):
     """The error estimate agrees with the energy that refinement adds within 30 %.
 

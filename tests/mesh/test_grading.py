@@ -6,7 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from patchfem.mesh import Layout, TensorGrid, divide_into_columns, divide_into_rows, graded_grid
-from patchfem.mesh.tensor import graded_depth
 
 
 @given(
@@ -44,14 +43,6 @@ def test_exact_linear_size_gives_geometric_columns():
     ratio = x[1:] / x[:-1]
     assert ratio == pytest.approx(np.full(ratio.size, ratio[0]), rel=2e-4)
     assert x.size == 25 and np.log(ratio[0]) == pytest.approx(np.log(251) / 24, rel=2e-4)
-
-
-def test_exact_symmetric_layout_gives_symmetric_columns():
-    """A symmetric layout gives symmetric columns."""
-    x = divide_into_columns(
-        Layout(-1.0, 1.0, ((-0.3, -0.3, 1e-4), (0.3, 0.3, 1e-4)), (-0.3, 0.3), 0.04, 0.1, 0.5)
-    )
-    assert np.abs(x + x[::-1]).max() <= 1e-12
 
 
 def test_exact_columns_respect_band_and_fixed_positions():
@@ -101,25 +92,6 @@ def test_exact_refined_rows_remain_geometric():
     assert heights[1:] / heights[:-1] == pytest.approx(
         np.full(heights.size - 1, 1.3**0.5), rel=1e-12
     )
-
-
-def test_exact_coarsening_preserves_dimensions():
-    """Coarsening preserves length, height and coating if the number of columns is odd."""
-    grid = graded_grid(10.0, 4.0, 10 / 7, 1.0)
-    half = grid.coarsen()
-    assert (
-        half.x.size == 5
-        and half.length == pytest.approx(10.0)
-        and half.height == 4.0
-        and half.coating_thickness == 1.0
-    )
-
-
-def test_exact_depths_include_coating_and_far_face():
-    """The depths include the coating thickness and the far face, and grow by at most the given ratio."""
-    depth, rows = graded_depth(5.0, 0.01, 0.3, 1.2, 2)
-    assert depth[0] == 0 and depth[rows] == 0.3 and depth[-1] == 5.0 and np.diff(depth).min() > 0
-    assert (np.diff(depth)[1:] <= 1.2 * np.diff(depth)[:-1] * (1 + 1e-6)).all()
 
 
 @pytest.mark.parametrize("rows", [9, 10, 33, 34])

@@ -26,24 +26,14 @@ SMALL = graded_grid(2e-3, 1e-3, 5e-4, 1e-4)
 each_grid = pytest.mark.parametrize("grid", GRIDS.values(), ids=GRIDS.keys())
 
 
-def store_pair(path, pair, names=None, extra=(), edges=None):
+def store_pair(path, pair):
     """Write points, quads and tags without checks, so that an invalid pair can be made."""
     points = np.column_stack([pair["points"], np.zeros(len(pair["points"]))])
-    pair = make_pair_mesh(SMALL) | pair if "edges" not in pair else pair
-    blocks = [("quad", pair["quads"]), ("line", pair["edges"]), *extra]
-    mesh = meshio.Mesh(points, blocks)
-    tags = [
-        np.asarray(pair["tags"], np.int32),
-        np.asarray(pair["edge_tags"], np.int32),
-        *(np.ones(len(cells), np.int32) for _, cells in extra),
-    ]
+    mesh = meshio.Mesh(points, [("quad", pair["quads"]), ("line", pair["edges"])])
+    tags = [np.asarray(pair[name], np.int32) for name in ("tags", "edge_tags")]
     mesh.cell_data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
-    mesh.field_data = {
-        k: np.array([v, 2]) for k, v in (CELL_TAGS if names is None else names).items()
-    }
-    mesh.field_data |= {
-        k: np.array([v, 1]) for k, v in (EDGE_TAGS if edges is None else edges).items()
-    }
+    mesh.field_data = {k: np.array([v, 2]) for k, v in CELL_TAGS.items()}
+    mesh.field_data |= {k: np.array([v, 1]) for k, v in EDGE_TAGS.items()}
     meshio.write(path, mesh, file_format="gmsh22", binary=True)
     return path
 
@@ -102,23 +92,6 @@ def test_always_irregular_coating_is_read_as_mesh(tmp_path):
     assert isinstance(low, PieceMesh) and isinstance(high, PieceMesh)
 
 
-def combine_pieces(lower, upper):
-    """Return the lower piece of one grid and the upper piece of another as one pair."""
-    lower = make_pair_mesh(lower)
-    upper = make_pair_mesh(upper)
-    combined = {}
-    for part, tags, codes in (("quads", "tags", CELL_TAGS), ("edges", "edge_tags", EDGE_TAGS)):
-        is_side = [
-            np.isin(pair[tags], [code for name, code in codes.items() if name.startswith(side)])
-            for side, pair in (("lower", lower), ("upper", upper))
-        ]
-        combined[part] = np.concatenate(
-            [lower[part][is_side[0]], upper[part][is_side[1]] + len(lower["points"])]
-        )
-        combined[tags] = np.concatenate([lower[tags][is_side[0]], upper[tags][is_side[1]]])
-    return combined | {"points": np.concatenate([lower["points"], upper["points"]])}
-
-
 @pytest.mark.parametrize(
     "upper_grid",
     [graded_grid(2e-3, 1.2e-3, 5e-4, 1e-4), graded_grid(2e-3, 1e-3, 5e-4)],
@@ -126,7 +99,8 @@ def combine_pieces(lower, upper):
 )
 def test_exact_different_pieces_on_same_columns_are_two_grids(upper_grid, tmp_path):
     """Pieces of different height or coating on the same columns are read as two grids."""
-    low, high = read_bodies(store_pair(tmp_path / "pair.msh", combine_pieces(SMALL, upper_grid)))
+    write_mesh(SMALL, tmp_path / "pair.msh", upper_grid)
+    low, high = read_bodies(tmp_path / "pair.msh")
     for read_piece, grid in ((low, SMALL), (high, upper_grid)):
         assert read_piece.coating_rows == grid.coating_rows and read_piece.depth == pytest.approx(
             grid.depth, rel=1e-12

@@ -8,7 +8,6 @@ from any_mesh_cases import FORMATS, GRID, make_pair, mesh_of_grid
 
 from patchfem.mesh import PieceMesh, find_holes, measure_clamped_length, read_bodies
 from patchfem.mesh.files import EDGE_TAGS
-from patchfem.mesh.recognise import recognise_grid
 
 
 def write_and_read(mesh, folder, form):
@@ -73,12 +72,6 @@ def test_exact_fixed_length_of_bottom_side_and_inclined_face():
     slanted = replace(piece, points=points, far=np.flatnonzero(bottom & (points[:, 0] <= 0)))
     side = np.hypot(1e-3, 2e-5)
     assert measure_clamped_length(slanted) == pytest.approx((side, 2 * side), rel=1e-12)
-
-
-def test_always_grid_is_recognised_for_any_numbering():
-    """A tensor grid is recognised for any numbering, and a mesh with triangles is not."""
-    assert recognise_grid(mesh_of_grid(GRID, seed=5)).depth == pytest.approx(GRID.depth, abs=1e-15)
-    assert recognise_grid(mesh_of_grid(GRID, 0.2)) is None
 
 
 @pytest.mark.parametrize("split", [0.0, 0.5, 1.0])

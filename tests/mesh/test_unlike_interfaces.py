@@ -14,8 +14,6 @@ from any_mesh_cases import (
     shift_points,
     write_and_read_pair,
 )
-from hypothesis import given
-from hypothesis import strategies as st
 
 from patchfem.core import PatchfemError
 from patchfem.mesh import TensorGrid, graded_grid
@@ -76,18 +74,6 @@ def test_exact_matching_nodes_are_recognised(tmp_path):
     assert not pair.has_matching_nodes and np.abs(
         pair.upper.x - pair.lower.x
     ).max() == pytest.approx(1e-7, rel=1e-6)
-
-
-@given(cells=st.lists(st.floats(0.1, 1.0), min_size=2, max_size=20), shift=st.floats(-1.0, 1.0))
-def test_always_any_nodes_between_equal_ends_are_read(cells, shift, tmp_path_factory):
-    """Any interface nodes between equal ends are read exactly."""
-    x = np.concatenate([[0.0], np.cumsum(cells)]) / np.sum(cells)
-    x = (x - 0.5) * 2e-3
-    x[-1] = 1e-3
-    mesh = combine_pieces(make_pair("quads"), make_pair("mixed", TensorGrid(x, GRID.depth, 0)))
-    mesh.points = np.add(mesh.points, [shift, 0.0])
-    pair = write_and_read_pair(mesh, tmp_path_factory.mktemp("unlike"))
-    assert np.abs(pair.upper.x - x).max() <= 1e-15 and np.abs(pair.lower.x - GRID.x).max() <= 1e-15
 
 
 @pytest.mark.parametrize("factor", [1 + 1e-6, 1.05, 0.95, 1 - 1e-8])

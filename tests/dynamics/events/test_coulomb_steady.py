@@ -25,16 +25,11 @@ def run_amplitude(modes, drive, static, kinetic, cycles, start=None):
         (0.8, 0.003, 0.28704671337871602595, "2 stops"),
         (0.8, 0.0, 0.29943104174842751488, "2 stops"),
         (0.5, 0.003, 60.5632260810004979, "sliding"),
-        (2 / 3, 0.003, 25.1953787788816, "sliding"),
-        (4 / 7, 0.003, 45.4055793050063, "sliding"),
         (0.79, 0.0, 0.435537658848, "2 stops"),
         (1.2, 0.003, 0.0, "stuck"),
         (0.95, 0.0, None, "2 stops"),
-        (0.828843, 0.0, None, "2 stops"),
-        (pi / 4 + 1e-3, 0.0, None, "2 stops"),
         (pi / 4 + 1e-6, 0.0, None, "2 stops"),
         (pi / 4 - 1e-4, 0.0, np.inf, "unbounded"),
-        (0.6, 0.0, np.inf, "unbounded"),
     ],
 )
 def test_exact_resonance_amplitudes_agree_with_published_values(friction, zeta, expected, regime):
@@ -165,7 +160,7 @@ def test_exact_two_interfaces_agree_with_run(seed, ratio):
     )
 
 
-@pytest.mark.share(0, 3)
+@pytest.mark.share(3)
 @pytest.mark.parametrize(
     "seed, n_modes, n_interfaces, ratio",
     [(1, 3, 2, 1.0), (2, 3, 2, 0.6), (4, 4, 3, 1.0), (6, 4, 3, 0.7)],

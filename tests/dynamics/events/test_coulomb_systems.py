@@ -21,7 +21,7 @@ from patchfem.core import (
 )
 from patchfem.dynamics import DRIVE_CHANGE
 from patchfem.dynamics.events.event_list import RELEASE, STOP
-from patchfem.dynamics.events.positions_kernels import N_COLUMNS, Column, Row
+from patchfem.dynamics.events.positions_kernels import N_COLUMNS, Column
 from patchfem.response import energy_balance
 from patchfem.structure import drives
 
@@ -34,7 +34,7 @@ def random_start(rng, n_modes):
 # comparison with other integrators
 
 
-@pytest.mark.share(1, 2, 4)  # at an event of the last case several choices obey the law
+@pytest.mark.share(1, 2)  # at an event of the last case several choices obey the law
 @pytest.mark.parametrize(
     "seed, n_modes, n_interfaces, ratio, rigid",
     [
@@ -193,28 +193,6 @@ def test_exact_stuck_slides_are_constant():
 # simultaneous events of several interfaces
 
 
-@pytest.mark.parametrize("joined", [False, True])
-def test_exact_two_interfaces_stop_simultaneously(joined):
-    """Two equal blocks, each on its own spring, move as one block alone does, also with a third
-    interface between them."""
-    faces = [[1, 0], [0, 1], [1, -1]] if joined else [[1, 0], [0, 1]]
-    modes = make_modal_basis([1.0, 1.0], 0.01, faces, (1, 1), (1, 0))
-    drive = SineDrive(1.0, 1.1)
-    single_mode = make_modal_basis(1.0, 0.01)
-    result = simulate(modes, drive, 0.6, 0.6, 20, 20)
-    expected = simulate(single_mode, drive, 0.6, 0.6, 20, 20)
-    np.testing.assert_allclose(result.extremes, expected.extremes, atol=1e-13)
-    np.testing.assert_allclose(
-        result.window.extra["slides"][:, 1], result.window.extra["slides"][:, 0], atol=1e-13
-    )
-    first = result.log.time[result.log.interface == 0]
-    np.testing.assert_allclose(first, expected.log.time, atol=1e-11)
-    np.testing.assert_allclose(result.log.time[result.log.interface == 1], first, atol=1e-11)
-    assert energy_balance(result.ledger) < 1e-10
-    if joined:
-        assert not np.any(result.log.interface == 2)
-
-
 @pytest.mark.parametrize("middle", [0.05, 10.0])
 def test_exact_three_dependent_interfaces_with_weak_or_strong_friction(middle):
     """Two blocks touch the ground and each other. With strong friction between them they move as
@@ -236,24 +214,6 @@ def test_exact_three_dependent_interfaces_with_weak_or_strong_friction(middle):
         )
     else:
         assert np.ptp(extra["slides"][:, 2]) > 0.01
-
-
-def test_exact_dependent_interfaces_slip_at_sum_of_limits():
-    """One coordinate with three interfaces of limits 1, 2 and 3 sticks below a force of 6; above,
-    all interfaces slip simultaneously."""
-    modes = make_modal_basis(1.0, 0.0, [[1.0], [1.0], [1.0]])
-    limit = np.array([1.0, 2.0, 3.0])
-    assert not simulate(modes, SineDrive(5.999999, 0.7), limit, limit, 3).response.slide.any()
-    result = simulate(modes, SineDrive(6.5, 0.7), limit, limit, 8, 8)
-    expected = simulate(make_modal_basis(1.0), SineDrive(6.5, 0.7), 6.0, 6.0, 8, 8)
-    np.testing.assert_allclose(result.extremes, expected.extremes, atol=1e-13)
-    np.testing.assert_allclose(
-        result.window.extra["forces"].sum(axis=1)[::50],
-        result.window.extra["forces"].sum(axis=1)[::50].clip(-6, 6),
-        atol=1e-12,
-    )
-    assert np.all(np.abs(result.window.extra["forces"]) <= limit * (1 + 1e-12))
-    assert result.ledger["friction"] == pytest.approx(expected.ledger["friction"], rel=1e-12)
 
 
 @pytest.mark.parametrize("count", [7, 16])
@@ -342,16 +302,7 @@ def test_exact_mass_on_belt_agrees_with_closed_form():
     assert result.extremes[-5:, 0].min() == pytest.approx(0.6 - sqrt(0.17), abs=1e-10)
 
 
-@pytest.mark.parametrize(
-    "friction, peak", [(1.0, 0.0), (0.9999, 4.38443200739e-8), (0.99, 2.32402008463e-4)]
-)
-def test_exact_amplitude_near_onset_of_slip(friction, peak):
-    """Amplitudes near the onset of slip agree with known values within 1e-11."""
-    result = simulate(make_modal_basis(1.0, 0.003), SineDrive(1.0, 1.0), friction, friction, 30, 30)
-    assert np.abs(result.extremes[-1]).max() == pytest.approx(peak, rel=1e-11)
-
-
-@pytest.mark.parametrize("distance", [1e-4, 1e-6, 1e-8, 1e-10])
+@pytest.mark.parametrize("distance", [1e-6, 1e-10])
 def test_exact_first_slip_tends_to_asymptotic_form(distance):
     """At a distance 1 - D from the onset the first slip tends to 9/2 (1 - D)^2. The tolerance
     includes the condition number of the release, eps/(1 - D)."""
@@ -454,44 +405,3 @@ def test_refuses_kinetic_friction_out_of_range(kinetic):
     """Negative kinetic friction or kinetic friction above static friction is refused."""
     with pytest.raises(PatchfemError, match=r"friction\.kinetic"):
         simulate(make_modal_basis(1.0), SineDrive(1.0, 1.0), 1.0, kinetic, 3)
-
-
-def test_exact_coordinates_preserve_stuck_slide():
-    """The modal coordinates of a stuck interface move so that its slide keeps its value over 300
-    cycles."""
-    h = sqrt(0.5)
-    modes = make_modal_basis([0.0, 1.4], 0.1, [[h, -0.6]], (-h, -0.8))
-    event_run, rows = collect_rows(modes, drives.make_levels([4.0, 0.3], 1.14, 3), 1.5, 1.5, 300)
-    rows = rows[rows[:, Row.CYCLE] >= 20]
-    stuck_slide = rows[0, event_run._column_index(0, Column.SLIDE)]
-    z = rows[:, Row.MOTION : Row.MOTION + 2]
-    assert (
-        not rows[:, event_run._column_index(0, Column.DIRECTION)].any()
-        and np.all(rows[:, event_run._column_index(0, Column.SLIDE)] == stuck_slide)
-        and abs(stuck_slide) > 0.1
-    )
-    assert np.abs(z @ modes.interfaces[0] - stuck_slide).max() < 4e-16 * np.abs(z).max()
-
-
-def test_exact_frictionless_interface_has_no_effect():
-    """An additional interface without friction does not change amplitudes, events and losses."""
-    modes = make_modal_basis([1.0, 1.7], 0.02, [[1.0, 0.4], [0.3, -1.0]], (1, 0.5), (1, 1))
-    single_interface = make_modal_basis([1.0, 1.7], 0.02, [[0.3, -1.0]], (1, 0.5), (1, 1))
-    drive = SineDrive(1.0, 1.2)
-    result = simulate(modes, drive, [0.0, 0.4], [0.0, 0.4], 20, 5)
-    expected = simulate(single_interface, drive, 0.4, 0.4, 20, 5)
-    np.testing.assert_allclose(result.extremes, expected.extremes, rtol=1e-13)
-    np.testing.assert_allclose(result.log.time, expected.log.time, rtol=1e-14)
-    assert (
-        set(result.log.interface) == {1}
-        and result.loops[0].stuck_time == 0
-        and not result.window.force.any()
-    )
-    compared = (
-        np.abs(expected.window.time[:, None] - expected.log.time).min(axis=1) > 1e-9
-    )  # away from jumps of the force
-    force = np.interp(
-        expected.window.time[compared], result.window.time, result.window.extra["forces"][:, 1]
-    )
-    np.testing.assert_allclose(force, expected.window.force[compared], atol=1e-11)
-    assert result.ledger["friction"] == pytest.approx(expected.ledger["friction"], rel=1e-13)

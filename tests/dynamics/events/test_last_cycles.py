@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 from modal_bases import make_modal_basis
 
-from patchfem.compiled.no_jit import load_uncompiled
 from patchfem.core import SineDrive
 from patchfem.dynamics import InterfaceMeasure, RunMeasure, make_elements
 from patchfem.dynamics.events import histories
@@ -16,7 +15,6 @@ from patchfem.response import (
     secant_stiffness,
 )
 
-read = load_uncompiled("patchfem.dynamics.events.read_kernels")
 GAUSS_POINT, WEIGHT = np.polynomial.legendre.leggauss(16)
 
 
@@ -44,7 +42,7 @@ def run_with_rows(modes, drive, groups, cycles=24, window=5) -> tuple:
     return run, rows[0][:-1], result
 
 
-@pytest.mark.parametrize("omega", [1.01, 1.0105, 1.0107, 1.0109])
+@pytest.mark.parametrize("omega", [1.0105, 1.0109])
 def test_exact_secant_stiffness_with_reversal_near_end_of_cycle(omega):
     """The secant stiffness is exact within 1e-9 if the slide reverses within a thousandth of a
     period of the end of a cycle, near resonance."""
@@ -155,40 +153,6 @@ def test_exact_release_phase_agrees_with_event_log():
     assert in_window.sum() == result.reading.run[RunMeasure.N_RELEASES] > 4
     expected = np.angle(np.mean(np.exp(2j * result.log.phase[in_window]))) / 2 % np.pi
     assert result.reading.slip_start_phase == pytest.approx(expected, abs=1e-12)
-
-
-def test_exact_batch_measures_agree_with_single_run():
-    """Runs in a batch have the measures of a single run: bit-identical if not periodic, and within
-    round-off if the periodic cycles are extrapolated."""
-    for modes, groups in (
-        make_three_modes(),
-        (make_mode(1.0, 0.05), [make_elements([1.0], [0.3])]),
-    ):
-        for cycles, tolerance in ((24, 0.0), (400, 1e-12)):
-            drive = SineDrive(1.5, 1.3)
-            expected = histories.simulate(modes, drive, groups, cycles, 5)
-            # the second run reuses the arrays of the first
-            first, second = histories.simulate_batch([(modes, drive, groups, None)] * 2, cycles, 5)
-            assert expected.repeats == first.repeats == (cycles == 400)
-            np.testing.assert_array_equal(first.extremes, expected.extremes)
-            np.testing.assert_array_equal(second.extremes, expected.extremes)
-            np.testing.assert_array_equal(second.reading.faces, first.reading.faces)
-            ratio = first.reading.span / expected.reading.span
-            for name in ("output_amplitude", "acceleration", "slip_start_phase"):
-                assert getattr(first.reading, name) == pytest.approx(
-                    getattr(expected.reading, name), rel=tolerance
-                )
-            for loop, expected_loop in zip(first.loops, expected.loops):
-                assert loop.work / ratio == pytest.approx(
-                    expected_loop.work, rel=tolerance
-                ) and loop.max_force == pytest.approx(expected_loop.max_force, rel=tolerance)
-                assert abs(
-                    loop.force_harmonic / loop.displacement_harmonic
-                    - expected_loop.force_harmonic / expected_loop.displacement_harmonic
-                ) <= max(tolerance, 1e-15) * abs(
-                    expected_loop.force_harmonic / expected_loop.displacement_harmonic
-                )
-            assert first.ledger["friction"] == pytest.approx(expected.ledger["friction"], rel=1e-14)
 
 
 def test_exact_ringing_of_stuck_element_agrees_with_closed_form():

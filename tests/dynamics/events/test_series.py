@@ -14,7 +14,7 @@ def test_exact_first_root_of_series_is_smallest_root():
     rng = np.random.default_rng(4)
     workspace = np.zeros((series.MAX_HALVINGS + 2, series.N_HULL_COLUMNS))
     n_unproved = 0
-    for case in range(400):
+    for case in range(150):
         roots = np.sort(rng.uniform(0.02, 1.4, int(rng.integers(1, 5))))
         if case % 4 == 0:
             roots = np.append(roots, roots[0] + 10.0 ** rng.uniform(-5, -1))  # two close roots
@@ -46,28 +46,10 @@ def test_exact_first_root_of_series_is_smallest_root():
             )
             assert proved == series.NO_ROOT or proved == pytest.approx(first, abs=tolerance)
             n_unproved += proved == series.NO_ROOT
-    assert n_unproved < 200  # the fast method proves most roots
+    assert n_unproved < 75  # the fast method proves most roots
 
 
-def test_exact_first_root_of_short_polynomials():
-    """The first root in [0, 1] of polynomials of degree five or less agrees with the given one
-    within 1e-9."""
-    rng = np.random.default_rng(5)
-    workspace = np.zeros((series.MAX_HALVINGS + 2, series.N_HULL_COLUMNS))
-    row = np.zeros(series.MAX_POWER + 4)
-    for _ in range(300):
-        count = int(rng.integers(1, 6))
-        roots = rng.uniform(0.02, 1.4, count) * np.where(rng.random(count) < 0.3, -1, 1)
-        poly = np.array([1.0])
-        for root in roots:
-            poly = np.convolve(poly, [1.0, -1 / root])
-        row[: count + 1] = poly
-        first = min(roots[roots > 0], default=2.0)
-        expected = first if first <= 1 else series.NO_ROOT
-        assert series.find_first_root(row, 0, count, workspace) == pytest.approx(expected, rel=1e-9)
-
-
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_exact_largest_magnitude_of_polynomial(seed):
     """The largest magnitude of a polynomial on [0, 1] agrees within 1e-13 with the values at its
     extremes."""

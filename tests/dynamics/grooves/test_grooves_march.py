@@ -10,12 +10,11 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
 from patchfem.core import InitialState, Outcome, PatchfemError, SineDrive
-from patchfem.dynamics import start_run
 from patchfem.dynamics.grooves.run import make_model
 from patchfem.dynamics.march.march import march
 from patchfem.friction import Grooves
 from patchfem.response import energy_balance
-from patchfem.structure.drives import make_levels, make_step
+from patchfem.structure.drives import make_step
 
 
 def make_mode(omega, zeta=0.0, mass=1.0):
@@ -33,7 +32,7 @@ def march_case(case, cycles: int, steps: int):
     )
 
 
-@pytest.mark.parametrize("angle", [1e-3, 1.0, 3.0])
+@pytest.mark.parametrize("angle", [1e-3, 3.0])
 def test_exact_motion_without_friction_is_a_pendulum(angle):
     """A mass in a cosine valley without friction moves like a pendulum, within 1e-9: its period is
     4 K(sin^2(angle/2))/w with w^2 = N k^2 A/m."""
@@ -54,7 +53,7 @@ def test_exact_motion_without_friction_is_a_pendulum(angle):
     assert energy_balance(result.ledger) < 1e-9
 
 
-@pytest.mark.share(0, 2)
+@pytest.mark.share(2)
 @pytest.mark.parametrize(
     "seed", [3, 10, 11, *(pytest.param(k, marks=pytest.mark.slow) for k in (2, 4, 5, 7, 8, 12, 13))]
 )
@@ -93,7 +92,7 @@ def test_exact_random_rigs_agree_with_dop853(seed):
     assert energy_balance(result.ledger) < 1e-9
 
 
-@pytest.mark.parametrize("seed", [3, 13])
+@pytest.mark.parametrize("seed", [3])
 def test_exact_normal_load_and_stored_energy_agree_with_dop853(seed):
     """The vertical force and the stored energy, which includes the work against the load, agree
     within 1e-6 with the independent solution by DOP853."""
@@ -127,7 +126,7 @@ def test_exact_normal_load_and_stored_energy_agree_with_dop853(seed):
     )
 
 
-@pytest.mark.parametrize("position", [0.0, 0.1, -0.2, 0.45])
+@pytest.mark.parametrize("position", [0.0, -0.2])
 def test_exact_breakaway_at_force_limits_of_flank(position):
     """A force just below N (t + mu)/(1 - mu t) or just above N (t - mu)/(1 + mu t) leaves the mass
     at rest, and a force just outside these limits moves it."""
@@ -205,7 +204,7 @@ def test_always_rig_on_grooves_exceeds_travel_near_8_g(frequency, stable_level, 
         assert energy_balance(result.ledger) < 1e-9
 
 
-@pytest.mark.parametrize("lifted", [0.0, 0.4])
+@pytest.mark.parametrize("lifted", [0.4])
 def test_exact_tanh_law_on_grooves_agrees_with_dop853(lifted):
     """With the friction coefficient mu tanh(sqrt(1 + t^2) v/v_0) slide and speed agree with DOP853
     within 1e-6."""
@@ -232,27 +231,6 @@ def test_exact_tanh_law_on_grooves_agrees_with_dop853(lifted):
     assert result.response.slide[-1] == pytest.approx(expected[0], rel=1e-7)
     assert result.response.slide_rate[-1] == pytest.approx(expected[1], rel=1e-6)
     assert energy_balance(result.ledger) < 1e-9
-
-
-def test_always_forked_march_equals_original_march():
-    """A copy of a march continues bit-identically, also across a change of the drive level."""
-    case = draw_case(3)
-    basis = make_mode(case.omega, case.zeta, case.mass)
-    drive = make_levels([case.acceleration, 0.0], case.drive, 2)
-    model = make_model(
-        Grooves(case.wavelength, case.amplitude, case.phase, case.lifted),
-        case.load,
-        case.static,
-        case.kinetic,
-        None,
-        basis,
-    )
-    run = start_run(basis, drive, model, 40)
-    run.march_cycle(60, 0, [])
-    copy = run.fork(drive)
-    rows = [march_run.march_cycle(100, 0, [])[1] for march_run in (run, copy)]
-    np.testing.assert_array_equal(*rows)
-    assert abs(rows[0][-1, 1]) < 1e-9  # without a drive the mass rests on the flank
 
 
 @pytest.mark.parametrize("kinetic", [0.4, 0.32])

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 from modal_bases import make_modal_basis
 
-from patchfem.core import InitialState, Outcome, SineDrive
+from patchfem.core import Outcome, SineDrive
 from patchfem.dynamics import element_model, make_bonds_law, make_elastic_plastic_law, points_model
 from patchfem.dynamics.grooves.climbing import ClimbingModel
-from patchfem.dynamics.grooves.run import make_model
 from patchfem.dynamics.march.instances import follow_path
 from patchfem.dynamics.march.march import march
 from patchfem.friction import Bonds, FirstOrderBonds, Grooves
@@ -101,21 +100,6 @@ def test_exact_slow_slide_agrees_with_numpy_law(law):
     )
 
 
-@pytest.mark.parametrize("law", LAWS)
-def test_always_short_bonds_converge_to_coulomb_friction(law):
-    """As the bond length decreases, the amplitude converges to that of Coulomb friction. At the
-    shortest length the difference is below 3 %."""
-    grooves = Grooves(80e-6, 7.5e-6, 0.3)
-    limit = march(
-        BASIS, DRIVE, make_model(grooves, LOAD, MU, MU, None, BASIS), 6, 100, window=3
-    ).extremes[-1, 1]
-    long, medium, short = (
-        abs(march_amplitude(LAWS[law][0](length), grooves, steps) - limit)
-        for length, steps in ((4e-7, 1000), (1e-7, 2000), (2.5e-8, 4000))
-    )
-    assert long > 2 * medium and medium > 1.5 * short and short < 0.03 * limit
-
-
 @pytest.mark.share(1)
 @pytest.mark.parametrize("law", LAWS)
 def test_exact_flat_grooves_equal_law_without_grooves(law):
@@ -151,29 +135,3 @@ def test_always_lifted_mass_that_leaves_grooves_is_reported():
     )
     result = march(BASIS, SineDrive(400.0, 2 * np.pi * 143), model, 5, 100)
     assert result.outcome is Outcome.LEAVES_GROOVES and "leaves the grooves" in result.message
-
-
-def test_order_two_for_lifted_mass_with_initial_speed():
-    """With nearly no friction and without a drive, a lifted mass with an initial speed converges
-    with order two to the motion without friction."""
-    grooves = Grooves(80e-6, 7.5e-6, 0.4, 0.5)
-    start = InitialState(np.array([10e-6]), np.array([0.02]))
-    no_drive = SineDrive(0.0, DRIVE.omega)
-    reference = march(
-        BASIS, no_drive, make_model(grooves, LOAD, 0.0, 0.0, None, BASIS), 1, 100, start=start
-    ).response.slide
-    coarse, fine = (
-        np.abs(
-            march(
-                BASIS,
-                no_drive,
-                ClimbingModel(grooves, LOAD, make_elastic_plastic_law(1e-9, 1e-6)),
-                1,
-                100 * factor,
-                start=start,
-            ).response.slide[::factor]
-            - reference
-        ).max()
-        for factor in (4, 8)
-    )
-    assert fine < 3e-4 * np.abs(reference).max() and coarse > 3.8 * fine

@@ -78,53 +78,6 @@ def test_exact_flat_grooves_equal_parallel_elements():
     np.testing.assert_allclose(forces[:-1, 0], expected[:-1, 0], rtol=0, atol=1e-10 * LOAD)
 
 
-def integrate_single_spring(grooves, slide, stiffness):
-    """Return the force of one elastic-plastic point behind a spring [N/m], by small explicit steps.
-
-    The spring acts along the flank: f = K (s - l), where l is the path of the point, f = mu R/eps
-    times the elastic part of l, and |f| <= mu R.
-    """
-    force = np.zeros(slide.size)
-    tangential = 0.0
-    bond_load = LOAD * np.hypot(1, grooves.slope(slide[0]))
-    force[0] = LOAD * grooves.slope(slide[0])
-    for i in range(1, slide.size):
-        t = float(grooves.slope(slide[i]))
-        path = np.hypot(1, grooves.slope(0.5 * (slide[i] + slide[i - 1]))) * (
-            slide[i] - slide[i - 1]
-        )
-        normal = LOAD * np.hypot(1, t) + tangential * t
-        bond_load = max(bond_load, normal)
-        bond_stiffness = MU * bond_load / LENGTH
-        trial = tangential + path * bond_stiffness * stiffness / (bond_stiffness + stiffness)
-        limit = MU * normal
-        if abs(trial) > limit:  # bonds above the current load vanish with the slip path
-            trial = np.copysign(limit, trial)
-            slip = abs(path - (trial - tangential) * (1 / stiffness + 1 / bond_stiffness))
-            bond_load = normal + (bond_load - normal) * np.exp(-slip / LENGTH)
-        tangential = trial
-        force[i] = LOAD * t + tangential * np.hypot(1, t)
-    return force
-
-
-def test_exact_common_spring_agrees_with_explicit_steps():
-    """The force of points behind one common spring agrees with small explicit steps within 0.2
-    %."""
-    steps = 400
-    refinement = 40
-    for stiffness in (2e7, 2e8):
-        model = make_compliant_model(
-            LAWS["elastic-plastic"], GROOVES, np.full((COUNT, COUNT), 1 / stiffness)
-        )
-        forces = follow_slide(model, sine_slide(steps))[0][:, 0]
-        expected = integrate_single_spring(GROOVES, sine_slide(steps * refinement), stiffness)[
-            ::refinement
-        ]
-        np.testing.assert_allclose(
-            forces[:-1], expected[:-1], rtol=0, atol=2e-3 * np.abs(expected).max()
-        )
-
-
 def make_coulomb_model(grooves, tolerance, compliance=COMPLIANCE):
     """Return a climbing model with Coulomb friction at the points."""
     bodies = SimpleNamespace(interface=SimpleNamespace(weight=np.ones(COUNT)))
@@ -141,7 +94,7 @@ def make_coulomb_model(grooves, tolerance, compliance=COMPLIANCE):
     )
 
 
-@pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-4])
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-4])
 def test_exact_coulomb_points_on_flat_grooves_equal_elements(tolerance):
     """Coulomb points on flat grooves agree with their exact elements within 0.17 of the tolerance,
     in partial and in gross slip."""
@@ -198,26 +151,6 @@ def test_exact_coulomb_points_on_grooves_minimise_energy():
     rigid = LOAD * GROOVES.force_ratio(slide[1:-1], np.sign(np.diff(slide)[1:]), MU)
     # the compliance matters: rigid bodies give another force
     assert np.abs(rigid - expected[1:-1]).max() > 0.5 * np.abs(expected).max()
-
-
-def test_exact_energy_balance_of_coulomb_points():
-    """For Coulomb points on grooves the energy is balanced within 1e-9 on a prescribed slide, and
-    within 1e-11 in a march."""
-    forces, energies = follow_slide(make_coulomb_model(GROOVES, 1e-3), sine_slide(200))
-    work = forces[:-1, 1] @ np.diff(sine_slide(200))
-    assert work - energies[:-1, 0].sum() == pytest.approx(
-        energies[-1, 1] - energies[0, 1], rel=1e-9
-    )
-    basis = make_modal_basis(2 * np.pi * 143, 0.003, mass=1.194)
-    result = march(
-        basis,
-        SineDrive(49.0, 2 * np.pi * 143),
-        make_coulomb_model(Grooves(80e-6, 7.5e-6, 0.3, 0.4), 1e-3),
-        4,
-        200,
-        window=3,
-    )
-    assert result.outcome is None and energy_balance(result.ledger) < 1e-11
 
 
 @pytest.mark.parametrize("law", LAWS)

@@ -34,7 +34,6 @@ from patchfem.dynamics import (
 )
 from patchfem.dynamics.harmonic.harmonic import HarmonicBalance, solve_newton, unpack_harmonics
 from patchfem.dynamics.harmonic.laws import Jenkins, SampledSlide
-from patchfem.dynamics.harmonic.point import make_group
 from patchfem.friction import Bonds
 from patchfem.friction.bonds.recursion import advance_bonds
 
@@ -152,7 +151,7 @@ def solve_linear_modes(modes, omega, level, spring):
     return np.linalg.solve(a, 1j * level * modes.base)
 
 
-@pytest.mark.parametrize("omega", [0.7, 1.0, 2.3, 5.0])
+@pytest.mark.parametrize("omega", [0.7, 2.3])
 def test_exact_limiting_cases_agree_with_linear_response(omega):
     """Elements that never yield act as a spring, and elements without strength have no effect, also
     with coupled damping."""
@@ -255,7 +254,7 @@ def test_exact_five_modes_with_many_elements_agree_with_march(omega):
     check_cycle(modes, drive, point, k, w, 2e-4)
 
 
-@pytest.mark.share(0, 1, 2, 3)
+@pytest.mark.share(2, 3)
 @pytest.mark.parametrize(
     "stiffness, tolerance, max_error",
     [(10, 1e-3, 1e-3), (100, 1e-3, 1e-3), (10, 1e-5, 1e-5), (100, 1e-5, 1e-5), (1000, 1e-4, 1e-4)],
@@ -270,7 +269,7 @@ def test_exact_peaks_at_resonance_agree_with_dop853(stiffness, tolerance, max_er
     assert error < max_error and error < point.error < tolerance
 
 
-@pytest.mark.parametrize("omega", [0.6, 1.0, 1.7])
+@pytest.mark.parametrize("omega", [1.0])
 def test_always_work_of_drive_equals_losses(omega):
     """The work of the base per cycle equals the viscous loss plus the area of the loop, within
     2e-4, from three independent sums."""
@@ -323,21 +322,6 @@ def test_order_of_truncation_error():
         errors.append(np.abs(evaluate_series(point.coefficients[0], 1024) - y).max())
     order = -np.polyfit(np.log([9, 19, 39, 79]), np.log(errors), 1)[0]
     assert 2.7 < order < 4.5
-
-
-def test_exact_laws_on_two_interfaces_agree_with_linear_response():
-    """Springs at the slide and at the output agree with the linear response within 1e-10, and the
-    receptance is symmetric."""
-    modes = make_five_modes()
-    laws = [(0, Spring(1.5)), (modes.output, Spring(0.7))]
-    point = find_steady_motion(modes, SineDrive(1.0, 1.9), laws, harmonics=1)
-    a = np.diag(modes.omega**2) - 1.9**2 * np.eye(5) + 1.9j * modes.damping_matrix
-    for row, k in ((modes.slide, 1.5), (modes.output, 0.7)):
-        a = a + np.outer(row, row) * k / modes.mass
-    assert point.modal[1] == pytest.approx(np.linalg.solve(a, 1j * modes.base), rel=1e-10)
-    balance = make_balance(modes, make_group(modes, laws), 64)
-    receptance = balance.faces @ balance.get_linear_part(1.9, 3).inverse @ balance.faces.T
-    assert receptance == pytest.approx(receptance.transpose(0, 2, 1), abs=1e-14)
 
 
 @pytest.mark.parametrize(

@@ -2,22 +2,19 @@
 
 import numpy as np
 import pytest
-from harmonic_cases import jenkins_forces, make_bond_law, make_five_modes, make_sdof, march_exactly
-from modal_bases import make_modal_basis
+from harmonic_cases import make_bond_law, make_sdof
 from scene_texts import NONLOCAL, POINT, STRUCTURE
 
 from patchfem import plan
 from patchfem.core import NotConverged, SineDrive
 from patchfem.dynamics import (
     Spring,
-    evaluate_series,
     find_regime,
     find_steady_motion,
     make_cycle_response,
     trace_over_frequency,
 )
 from patchfem.dynamics.harmonic.laws import Jenkins
-from patchfem.dynamics.harmonic.point import make_group
 from patchfem.response import compute_acceleration_peak, compute_harmonic, interface_loop
 from patchfem.response.measures import compute_slip_measures
 from patchfem.runs.run import run
@@ -78,52 +75,12 @@ def test_exact_measures_agree_with_marched_scene(law):
         assert values[name] == pytest.approx(measures[name].value, rel=tolerance), name
 
 
-def test_exact_thirty_interfaces_on_five_modes():
-    """The motion of five modes with thirty interfaces satisfies the energy balance within 1e-3 and
-    the equation of motion within 2 %."""
-    rng = np.random.default_rng(2)
-    faces = rng.normal(size=(30, 5)) * np.array([1.0, 0.5, 0.4, 0.3, 0.2])
-    base = make_five_modes()
-    modes = make_modal_basis(base.omega, base.zeta, faces, base.base, base.output, mass=base.mass)
-    laws = [(i, Jenkins([0.1], [0.02 + 0.01 * i])) for i in range(30)]
-    drive = SineDrive(1.0, 0.9)
-    p = find_steady_motion(modes, drive, laws, tolerance=1e-4)
-    assert p.coefficients.shape[0] == 30 and p.error < 1e-4
-    response = make_cycle_response(p, modes, drive, 1024)
-    forces = make_group(modes, laws).compute_forces(p.coefficients, drive.omega, 1024)
-    dt = drive.period / 1024
-    slip = sum((forces[i] * (response.modal_rate[:-1] @ faces[i])).sum() for i in range(30)) * dt
-    viscous = (
-        modes.mass * dt * ((response.modal_rate[:-1] ** 2) @ (2 * modes.zeta * modes.omega)).sum()
-    )
-    work = (
-        -modes.mass
-        * dt
-        * ((response.modal_rate @ modes.base) * drive.values(response.time))[:-1].sum()
-    )
-    assert slip > 0 and work == pytest.approx(slip + viscous, rel=1e-3)
-    k = np.arange(p.modal.shape[0])[:, None]
-    accel = evaluate_series((-((drive.omega * k) ** 2) * p.modal).T, 1024)
-    acceleration_sum = (
-        -np.outer(modes.base, drive.values(response.time[:-1])) - faces.T @ forces / modes.mass
-    )
-    residual = (
-        acceleration_sum
-        - (
-            2 * modes.zeta * modes.omega * response.modal_rate[:-1]
-            + modes.omega**2 * response.modal[:-1]
-        ).T
-        - accel
-    )
-    assert np.sqrt((residual**2).mean()) < 2e-2 * np.sqrt((accel**2).mean())
-
-
 def test_always_sweep_agrees_with_single_points():
     """The amplitudes of a sweep agree within 3e-4 with points that are computed without a start
     value."""
     modes = make_sdof(0.01)
     law = Jenkins([4.0, 1.0], [0.05, 0.5])
-    values = np.linspace(0.12, 0.4, 15)
+    values = np.linspace(0.12, 0.4, 6)
     sweep = trace_over_frequency(modes, SineDrive(1.0, 1.0), law, values, tolerance=1e-4)
     assert sweep.ended == "listed" and sweep.values == pytest.approx(values)
     for p in sweep.points:
@@ -179,20 +136,6 @@ def test_exact_undamped_resonance_is_bounded_above_friction_threshold(limit, bou
         return
     p = find_steady_motion(modes, DRIVE, law, tolerance=1e-4)
     assert np.abs(p.forces[0, 1] - 1j) < 1e-6  # friction balances the first harmonic of the drive
-    response = make_cycle_response(p, modes, DRIVE, 4000)
-    k = np.array([20.0])
-    w = np.array([limit / 20.0])
-    stretch = jenkins_forces(np.append(np.tile(response.slide[:-1], 2), response.slide[0]), k, w)[1]
-    states, _ = march_exactly(
-        modes,
-        DRIVE,
-        k,
-        w,
-        np.array([response.modal[0, 0], response.modal_rate[0, 0]]),
-        stretch,
-        4000,
-    )
-    assert np.abs(states[:, 0] - response.modal[:, 0]).max() < 3e-4 * np.abs(response.modal).max()
 
 
 def test_refuses_tolerance_beyond_maximum_harmonics():

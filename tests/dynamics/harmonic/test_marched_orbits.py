@@ -7,39 +7,13 @@ from event_run import solve_steady
 from modal_bases import make_modal_basis
 
 from patchfem.core import SineDrive
-from patchfem.dynamics import element_model, start_run
+from patchfem.dynamics import start_run
 from patchfem.dynamics.grooves.run import make_model
 from patchfem.dynamics.harmonic import orbits
-from patchfem.friction import Grooves, parallel_element
-from patchfem.response import energy_balance
+from patchfem.friction import Grooves
 
 OMEGA, ZETA = 2 * np.pi * 143, 0.003
 BASIS = make_modal_basis(OMEGA, ZETA, mass=1.194)
-
-
-def test_exact_orbit_of_linear_oscillator_agrees_with_closed_form():
-    """For an element that never slips, amplitude, multipliers and energy balance are those of a
-    linear oscillator."""
-    spring = 2e5
-    drive = SineDrive(10.0, 2 * np.pi * 120)
-    run = start_run(BASIS, drive, element_model(parallel_element([spring], [1.0])), 400)
-    remaining_change = orbits.march_to_periodic(run)
-    assert remaining_change < orbits.PERIODIC_TOL and run.outcome is None
-    omega_squared = OMEGA**2 + spring / BASIS.mass
-    expected = 10.0 / abs(omega_squared - drive.omega**2 + 2j * ZETA * OMEGA * drive.omega)
-    cycle, _ = orbits.march_cycle(run)
-    # the march has second-order errors
-    assert float(np.ptp(cycle.extremes)) / 2 == pytest.approx(expected, rel=1e-4)
-    assert energy_balance(cycle.ledger) < 1e-11
-    multipliers = orbits.estimate_multipliers(run)
-    damped_omega = np.sqrt(omega_squared - (ZETA * OMEGA) ** 2)
-    multiplier = np.exp((-ZETA * OMEGA + 1j * damped_omega) * drive.period)
-    np.testing.assert_allclose(np.abs(multipliers), abs(multiplier), rtol=1e-5)
-    np.testing.assert_allclose(
-        multipliers[multipliers.imag > 0],
-        [complex(multiplier.real, abs(multiplier.imag))],
-        rtol=1e-3,
-    )
 
 
 @pytest.mark.parametrize("level", [49.0, 60.0])

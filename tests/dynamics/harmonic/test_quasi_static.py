@@ -7,7 +7,7 @@ import pytest
 from modal_bases import make_modal_basis
 
 from patchfem.core import PatchfemError
-from patchfem.dynamics import LawGroup, Spring
+from patchfem.dynamics import LawGroup
 from patchfem.dynamics.harmonic import quasi_static
 from patchfem.dynamics.harmonic.laws import Jenkins, SpeedLaw
 from patchfem.friction.laws import tanh
@@ -63,18 +63,6 @@ def test_exact_amplitude_without_equilibrium_gives_nan():
     assert [motions[k].omega for k in (0, 1, 3)] == pytest.approx(
         [expected[k].omega for k in (0, 1, 3)], rel=1e-12
     )
-
-
-def test_exact_backbone_of_linear_spring_is_stuck_mode():
-    """With a linear spring the backbone is the linear mode within 1e-7, without loss."""
-    modes = make_modes([700.0, 2500.0], [0.002, 0.01], [1.0, 0.6], [1.0, -0.3])
-    group = LawGroup(modes, Spring(2e5))
-    omega, shape = stuck_mode(modes, group)
-    [motion] = quasi_static.find_static_motions(modes, group, [1e-4], (omega, shape))
-    assert motion.omega == pytest.approx(omega, rel=1e-9) and motion.z == pytest.approx(
-        1e-4 * shape, rel=1e-7
-    )
-    assert motion.loss == pytest.approx(0, abs=1e-12 * 2e5 * 1e-8)
 
 
 def test_exact_two_modes_satisfy_secant_eigenproblem():

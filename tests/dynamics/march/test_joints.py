@@ -1,8 +1,6 @@
 """Several interfaces and nonlinear springs in one march: against single contacts, closed forms and
 DOP853."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from event_run import simulate
@@ -10,10 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from march_paths import ALL, make_tanh_model
 from modal_bases import make_modal_basis
-from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
-from patchfem.compiled.no_jit import load_uncompiled
 from patchfem.core import InitialState, ModalBasis, SineDrive
 from patchfem.dynamics import (
     JointsModel,
@@ -21,9 +17,11 @@ from patchfem.dynamics import (
     coulomb_model,
     jenkins_model,
     make_cubic_spring,
+    make_elements,
     make_interlocking_spring,
     points_model,
 )
+from patchfem.dynamics.events.histories import simulate as simulate_elements
 from patchfem.dynamics.march.joints import Joint
 from patchfem.dynamics.march.march import march
 from patchfem.friction import Bonds, Coulomb, TanhLaw, points_element
@@ -188,55 +186,14 @@ def test_exact_nonlinear_springs_conserve_energy_and_period(element, period):
     assert np.log(errors[0] / errors[2]) / np.log(25) == pytest.approx(2.0, abs=0.1)
 
 
-def integrate_by_dop853(modes, drive, elements, duration, times):
-    """Return the modal coordinates at given times for elastic-plastic elements (row, stiffness,
-    yield slide)."""
-    n = modes.omega.size
-    rows = np.array([row for row, _, _ in elements])
-    k, limit = (np.array(part) for part in zip(*[(k, limit) for _, k, limit in elements]))
-
-    def state_derivative(t, y):
-        z = y[:n]
-        v = y[n : 2 * n]
-        s = y[2 * n :]
-        slip = rows @ v
-        acceleration = (
-            -modes.base * drive.values(np.array([t]))[0]
-            - rows.T @ (k * np.clip(s, -limit, limit)) / modes.mass
-        )
-        is_slipping = (np.abs(s) >= limit) & (s * slip > 0)
-        return [
-            *v,
-            *(acceleration - modes.damping_matrix @ v - modes.omega**2 * z),
-            *np.where(is_slipping, 0.0, slip),
-        ]
-
-    solution = solve_ivp(
-        state_derivative,
-        (0, duration),
-        np.zeros(2 * n + len(elements)),
-        "DOP853",
-        rtol=1e-9,
-        atol=1e-12,
-        t_eval=times,
-        max_step=duration / 4000,
-    )
-    return solution.y[:n].T
-
-
 def test_order_two_for_chain_with_three_interfaces():
     """A free-free chain of three masses with elastic-plastic interfaces converges with order two to
-    a solution by DOP853."""
+    the motion of the engine that integrates such elements from yield to yield."""
     modes = make_chain([0.0, 4.0, 3.0], zeta=0.01, faces=[[1, 0, 0], [-1, 1, 0], [0, -1, 1]])
     drive = SineDrive(1.0, 1.3)
     laws = [(0.9, 0.3), (0.4, 0.2), (0.2, 0.05)]
-    reference = integrate_by_dop853(
-        modes,
-        drive,
-        [(row, f / e, e) for row, (f, e) in zip(modes.interfaces, laws)],
-        2 * drive.period,
-        np.linspace(0, 2 * drive.period, 51),
-    )
+    groups = [make_elements([f / e], [e]) for f, e in laws]
+    reference = simulate_elements(modes, drive, groups, 4, window=2).extremes
     model = JointsModel(
         None,
         tuple(elastic_plastic_joint(p, f, e) for p, (f, e) in enumerate(laws)),
@@ -246,10 +203,9 @@ def test_order_two_for_chain_with_three_interfaces():
     )
     errors = []
     for steps in (100, 200, 400, 800):
-        result = march(modes, drive, model, 2, steps, window=2)
+        result = march(modes, drive, model, 4, steps, window=2)
         assert result.outcome is None
-        z = result.response.modal[:: steps // 25]
-        errors.append(np.abs(z - reference).max())
+        errors.append(np.abs(result.extremes - reference).max())
         assert energy_balance(result.ledger) <= 1e-10
     assert errors[-1] < 2e-5 * np.abs(reference).max()
     assert np.log2(errors[0] / errors[-1]) / 3 == pytest.approx(2.0, abs=0.25)
@@ -300,14 +256,9 @@ def test_always_random_chains_balance_energy(seed):
 
 
 # seeds with kinetic below static friction where block descent alternated between stick and slip
-STICK_OR_SLIP = [134, 173, 242, 319, 388, 514, 641, 667, 672, 677, 744, 817, 863, 905, 917, 960]
-STEEP_LAWS = [
-    1025,
-    1854,
-    2651,
-    3069,
-    4822,
-]  # seeds where Newton's method alternated between two states
+STICK_OR_SLIP = [134, 242, 514, 667, 744, 960]
+# seeds where Newton's method alternated between two states
+STEEP_LAWS = [1025, 2651, 4822]
 
 
 @pytest.mark.parametrize("seed", STICK_OR_SLIP + STEEP_LAWS)
@@ -352,28 +303,3 @@ def test_order_two_for_coupled_stops_with_kinetic_below_static(
             np.abs(result.extremes - reference.extremes).max() / np.abs(reference.extremes).max()
         )
     assert errors[0] < 1e-3 and errors[1] < errors[0] / 4 and errors[2] < errors[1] / 4
-
-
-def test_exact_sampled_forces_are_limited_to_static_friction():
-    """Only the forces of set-valued elements are limited, each to its own static friction."""
-    kernels = load_uncompiled("patchfem.dynamics.march.faces_kernels")
-    stops = SimpleNamespace(names=np.zeros(2), element=np.array([0, 2]))
-    elements = SimpleNamespace(
-        stops=stops,
-        mem=np.array([[2.0], [9.0], [-3.0]]),
-        num=np.array([[0.0, 1.5], [0.0, 1.0], [0.0, 1.0]]),
-    )
-    kernels.limit_sampled_forces(elements)
-    np.testing.assert_array_equal(elements.mem, [[1.5], [9.0], [-1.0]])
-
-
-@pytest.mark.parametrize("change, count", [(2.0, -12), (1.0, 6)])
-def test_exact_unconverged_descent_has_negative_count(change, count, monkeypatch):
-    """The number of iterations is negative if the forces still change in the last of two sweeps."""
-    kernels = load_uncompiled("patchfem.dynamics.march.faces_kernels")
-    flags = {"HAS_CONTACT": False, "HAS_STOPS": False, "IS_COUPLED": True, "MAX_SWEEPS": 2}
-    for name, value in flags.items():
-        monkeypatch.setattr(kernels, name, value)
-    system = SimpleNamespace(elements=SimpleNamespace(links=np.zeros((1, 2))))
-    monkeypatch.setattr(kernels, "solve_element", lambda *arguments: (change, 3))
-    assert kernels.solve_coupled_forces(SimpleNamespace(dt=1.0), system) == (0.0, count)

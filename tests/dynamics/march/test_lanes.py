@@ -101,20 +101,6 @@ def test_exact_lanes_agree_with_single_marches(basis):
         assert abs(imbalance) < 1e-9 * batch.energies["power"][k]
 
 
-def test_exact_case_does_not_depend_on_other_lanes():
-    """A case among 40 others agrees with the same case alone within 1e-11."""
-    area, sigma, modes = tilted_patch()
-    cases = [
-        lanes.PointsCase(
-            LAW.static * area * sigma, modes.shape, modes.stiffness, LAW.length, acceleration
-        )
-        for acceleration in np.geomspace(5.0, 300.0, 40)
-    ]
-    batch, single = (lanes.march(TWO, DRIVE, part, 4, STEPS, 1) for part in (cases, cases[17:18]))
-    assert_close(batch.extremes[17], single.extremes[0], 1e-11)
-    assert batch.extremes.shape == (40, 4, 2)
-
-
 def test_exact_batch_measures_agree_with_single_measures(two_mode_marches):
     """The measures of samples in lanes agree within 1e-9 with the measures of single runs from the
     same samples."""

@@ -8,9 +8,9 @@ from modal_bases import make_modal_basis
 from scipy.integrate import solve_ivp
 
 from patchfem.core import InitialState, Outcome, SineDrive
-from patchfem.dynamics import bond_list_model, jenkins_model, points_model, start_run
+from patchfem.dynamics import jenkins_model, points_model, start_run
 from patchfem.dynamics.march.march import march
-from patchfem.friction import Bonds, FirstOrderBonds, Quadrature
+from patchfem.friction import Bonds, FirstOrderBonds
 from patchfem.friction.bonds.recursion import advance_bonds
 from patchfem.slip.shear_modes import shear_modes
 from patchfem.structure import drives
@@ -29,7 +29,7 @@ def half_plane_compliance(count, scale=1.0):
 # ---- prescribed paths
 
 
-@pytest.mark.parametrize("growth", [{}, GROWTH])
+@pytest.mark.parametrize("growth", [{"breakaway": 0.35}, GROWTH | {"breakaway": 0.35}, GROWTH])
 def test_exact_points_on_path_agree_with_recursion(growth):
     """Forces and energies of points along a prescribed path agree with the NumPy recursion within
     1e-12."""
@@ -44,27 +44,6 @@ def test_exact_points_on_path_agree_with_recursion(growth):
     assert forces[:-1, 1] == pytest.approx(run.mean @ area, abs=1e-12)
     assert energies[:-1, 0] == pytest.approx(run.dissipated @ area, abs=1e-12)
     assert energies[1:, 1] == pytest.approx(run.stored @ area, abs=1e-12)
-
-
-@pytest.mark.share(0)
-@pytest.mark.parametrize("order", [0.0, 1.0])
-def test_exact_list_on_path_agrees_with_quadrature(order):
-    """The force of a list of bonds along a prescribed path agrees with the NumPy quadrature within
-    1e-10, and its mean over a step within 1e-2."""
-    law = Bonds(0.4, 1.0, order, "report", initial=0.0)
-    path = random_walk(2, 40, 0.6)
-    forces, _, _, _ = follow_path(bond_list_model(law, 0.4 * 3.0, 1e9, 0.0), path)
-    run = march_path(Quadrature(law, tail=0.0), path, upper_pressure([3.0]), 0.3)
-    assert forces[1:, 0] == pytest.approx(run.traction[:, 0], abs=1e-10)
-    fine = np.interp(np.linspace(0, 40, 321), np.arange(41), path)
-    means = (
-        march_path(Quadrature(law, tail=0.0), fine, upper_pressure([3.0]), 0.3 / 8)
-        .mean.reshape(40, 8)
-        .mean(axis=1)
-    )
-    # larger differences where the sign of a bond changes inside a step
-    assert forces[:-1, 1] == pytest.approx(means, abs=1e-2)
-    assert np.median(np.abs(forces[:-1, 1] - means)) < 1e-3
 
 
 def march_nodal_deflections(law, compliance, area, sigma, path):
@@ -102,7 +81,7 @@ def march_nodal_deflections(law, compliance, area, sigma, path):
     return np.array(results), d
 
 
-@pytest.mark.parametrize("stiffness, step", [(0.05, 0.8), (1.0, 0.8), (1.0, 0.2)])
+@pytest.mark.parametrize("stiffness, step", [(1.0, 0.8), (1.0, 0.2)])
 def test_exact_shear_modes_agree_with_nodal_deflections(stiffness, step):
     """With all shear modes forces and losses agree within 1e-9 with Newton's method for the nodal
     deflections. The steps are up to two bond lengths long, or up to half of one, where all points
@@ -124,7 +103,7 @@ def test_exact_shear_modes_agree_with_nodal_deflections(stiffness, step):
     assert not contact.psi[:, 24:].any() and not contact.weight[24:].any()
 
 
-@pytest.mark.parametrize("level", [3.0, 30.0])
+@pytest.mark.parametrize("level", [30.0])
 def test_exact_gross_slip_in_closed_form_agrees_with_iteration(level):
     """Steps of gross slip that use a closed form agree within 2e-9 with steps that solve for all
     points."""
@@ -217,45 +196,6 @@ def test_order_two_against_integrated_rate_equations(growth):
     assert growth or np.log2(forces[0] / forces[2]) / 6 == pytest.approx(2, abs=0.1)
 
 
-@pytest.mark.share(0)
-@pytest.mark.parametrize("stiffness, expected", [(10, 0.249538145), (100, 0.285786312)])
-def test_order_two_for_steady_amplitude_of_jenkins_oscillator(stiffness, expected):
-    """The amplitude of a Jenkins oscillator at resonance converges with order two to a value by
-    DOP853, within 2e-7 after extrapolation.
-
-    The position of a yield inside its step is random, so that the error of single halvings
-    scatters.
-    """
-    amplitudes = []
-    for steps in (400, 3200, 6400):
-        result = march(
-            make_one_mode(1.0, 0.003, 1.0),
-            SineDrive(1.0, 1.0),
-            jenkins_model([stiffness], [0.8 / stiffness]),
-            80,
-            steps,
-            window=2,
-        )
-        low, high = result.extremes[-1]
-        amplitudes.append((high - low) / 2)
-    errors = np.abs(np.array(amplitudes) - expected)
-    assert np.log2(errors[0] / errors[2]) / 4 == pytest.approx(2, abs=0.2) and errors[2] < 3e-6
-    assert amplitudes[2] + (amplitudes[2] - amplitudes[1]) / 3 == pytest.approx(expected, abs=2e-7)
-
-
-def test_always_stiff_element_needs_one_evaluation_per_step():
-    """An element that is much stiffer than the structure needs a single evaluation per step;
-    Newton's method across its kinks needed up to 30."""
-    model = jenkins_model([1e6 * OMEGA**2], [40.0 / (1e6 * OMEGA**2)])
-    result = march(make_one_mode(OMEGA, 0.003, 1.0), SineDrive(50.0, OMEGA), model, 4, 200)
-    assert (
-        result.ledger["iterations"] == 800
-        and result.ledger["worst_iterations"] == 1
-        and not result.message
-    )
-    assert result.ledger["friction"] > 0
-
-
 def test_exact_march_under_moving_pressure_agrees_with_numpy_law():
     """The NumPy law along the computed slide, under the pressure that moves with the lower body,
     gives the force of the march within 1e-9."""
@@ -305,7 +245,7 @@ def test_always_unresolved_pressure_waves_are_reported():
     assert fine.outcome is None and fine.message == ""
 
 
-@pytest.mark.parametrize("cycles, travel", [(40.3, np.inf), (3, np.inf), (40, 0.8)])
+@pytest.mark.parametrize("cycles, travel", [(40.3, np.inf), (40, 0.8)])
 def test_exact_last_cycles_are_the_same_without_histories(cycles, travel):
     """A march that keeps no histories has the same last cycles, amplitudes and energies, also if it
     ends at the travel limit."""
@@ -349,7 +289,7 @@ def test_exact_last_cycles_are_the_same_without_histories(cycles, travel):
 # ---- free decay
 
 
-@pytest.mark.parametrize("steps_per_cycle", [20, 7])
+@pytest.mark.parametrize("steps_per_cycle", [7])
 @pytest.mark.parametrize("shear", [True, False])
 def test_always_energy_falls_in_free_decay(shear, steps_per_cycle):
     """In a free decay of six modes the energy never rises, and its loss equals the dissipation

@@ -63,6 +63,7 @@ def reversing_path(steps: int) -> np.ndarray:
     return 3e-6 * np.sin(2 * np.pi * 2.5 * t) * (0.4 + t)
 
 
+@pytest.mark.share(1, 4, 7)
 @pytest.mark.parametrize(("reading", "order"), DEFINITIONS)
 def test_exact_points_on_rigid_bodies_equal_single_list(reading, order):
     """Points on rigid bodies give the force of a single list of bonds within 2e-5 of the friction
@@ -84,7 +85,6 @@ def test_exact_points_on_rigid_bodies_equal_single_list(reading, order):
     ("order", "initial_curve"),
     [
         (0.0, lambda x: 1.0),
-        (1.0, lambda x: gammainc(1, x)),
         (2.0, lambda x: gammainc(2, x)),
         (0.5, lambda x: gammainc(0.5, x)),
     ],
@@ -118,6 +118,7 @@ def test_exact_initial_loading_behind_spring_agrees_with_closed_form(order, init
     )
 
 
+@pytest.mark.share(0, 3, 7, 9, 11, 14)
 @pytest.mark.parametrize("grows", [False, True])
 @pytest.mark.parametrize(("reading", "order"), DEFINITIONS)
 def test_exact_energy_balance_over_reversals(reading, order, grows):
@@ -149,7 +150,7 @@ def test_exact_energy_balance_over_reversals(reading, order, grows):
     )
 
 
-@pytest.mark.share(1, 3)
+@pytest.mark.share(1)
 @pytest.mark.parametrize(
     ("reading", "order", "grows"),
     [("report", 1.0, False), ("report", 1.0, True), ("report", 0.5, True), ("stretch", 2.0, True)],
@@ -209,6 +210,7 @@ def test_always_sudden_slip_dissipates_energy():
     assert contact.statuses[0, STATUS.created] <= 1e-6 * contact.statuses[0, STATUS.dissipated]
 
 
+@pytest.mark.share(1, 6)
 @pytest.mark.parametrize(("reading", "order"), DEFINITIONS)
 def test_order_points_under_moving_pressure_agree_with_numpy_law(reading, order):
     """Points that enter and leave a pressure wedge of the lower body agree with the NumPy law
@@ -271,7 +273,7 @@ def test_order_two_under_prescribed_load(order, grows):
 
     basis = make_modes([143.0], [1.0], [0.0], [0.0], 0.02)
     differences = []
-    for steps in (400, 800):
+    for steps in (200, 400):
         result = varying_load.march(
             basis,
             SineDrive(30.0, 2 * np.pi * 143),

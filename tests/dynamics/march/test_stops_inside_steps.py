@@ -49,7 +49,7 @@ def errors_by_steps(modes, drive, static, kinetic, cycles, steps):
     return np.array(errors)
 
 
-@pytest.mark.share(0, 2)
+@pytest.mark.share(1)
 @pytest.mark.parametrize("ratio", [1.0, 0.5, 0.2])
 def test_order_two_with_kinetic_below_static_friction(ratio):
     """Amplitudes converge with order two if the kinetic friction is below the static friction.
@@ -62,7 +62,7 @@ def test_order_two_with_kinetic_below_static_friction(ratio):
     assert np.log(errors[0] / errors[2]) / np.log(16) > 1.8
 
 
-@pytest.mark.parametrize("seed, damping, ratio", [(3, False, 0.6), (5, True, 0.3)])
+@pytest.mark.parametrize("seed, damping, ratio", [(5, True, 0.3)])
 def test_order_two_for_stops_and_releases_of_several_modes(seed, damping, ratio):
     """Amplitudes of several modes with stops and releases converge with an order of at least
     1.6."""

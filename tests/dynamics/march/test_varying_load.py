@@ -18,7 +18,6 @@ from varying_load_cases import (
     crowned_contact,
     make_contact,
     make_modes,
-    march_with_lift_off,
     total_energy,
 )
 
@@ -195,15 +194,6 @@ def test_order_output_acceleration_agrees_with_differences():
             np.median(np.abs(response.acceleration - expected)[1:-1]) / np.abs(expected).max()
         )
     assert errors[1] <= 1e-4 and errors[0] / errors[1] > 3
-
-
-@pytest.mark.share(0)
-@pytest.mark.parametrize("laws", [POINT_LAWS, ["coulomb"]], ids=["points", "coulomb"])
-def test_exact_no_stored_energy_during_lift_off(laws):
-    """During lift-off the friction stores no energy, and the load returns afterwards."""
-    for name in laws:
-        extra = march_with_lift_off(name)[0].response.extra
-        assert not extra["ledger"][1][extra["normal_load"] == 0].any()
 
 
 @pytest.mark.share(0)

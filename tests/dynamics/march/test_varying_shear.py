@@ -22,12 +22,11 @@ from varying_load_cases import (
 from patchfem.contact.unilateral import solve_forces
 from patchfem.core import InitialState, PatchfemError, SineDrive
 from patchfem.dynamics.march import march as plain
-from patchfem.dynamics.march import models, varying_load
+from patchfem.dynamics.march import varying_load
 from patchfem.dynamics.propagator import make_propagator
 from patchfem.friction import Bonds, FirstOrderBonds
 from patchfem.friction.bonds.recursion import advance_bonds
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
-from patchfem.slip import jenkins_set
 from patchfem.slip.shear_modes import shear_modes
 
 SOFT = {"plastic": ElasticPlastic(0.3, 1e-6), "bonds": FirstOrderBonds(Bonds(0.3, 1e-6))}
@@ -157,41 +156,6 @@ def test_exact_all_shear_modes_agree_with_march_of_nodes(name):
     assert result.outcome is None and check_balance(result, basis) <= 1e-11
 
 
-@pytest.mark.share(1)
-@pytest.mark.parametrize("name", ["plastic", "bonds", "growing"])
-def test_exact_nearly_constant_load_agrees_with_preloaded_march(name):
-    """Under a nearly constant load the slide agrees within 1e-6 with a march under the preload,
-    with shear modes or exact parallel elements. The difference comes from the spring-back at the
-    end of each step and falls with the square of the step."""
-    basis = make_modes([143.0, 700.0], [1.0, 0.3], [1e-9, 0.0], [0.0, 0.0], 0.01)
-    drive = SineDrive(40.0, 2 * np.pi * 300)
-    sets = crowned_contact()
-    law = LAWS[name]
-    force = sets.reference.forces(0.0, 0.0)
-    compliance = exponential_compliance(crowned_contact().x)
-    if name == "plastic":
-        group = jenkins_set(compliance, 0.3 * force, 1e-6)
-        model = models.jenkins_model(group.stiffness, group.yield_displacement)
-    else:
-        bonds = {
-            "bonds": Bonds(0.3, 1e-6),
-            "growing": Bonds(0.3, 1e-6, 1.0, "stretch", 0.7, 10.0, 2e-7, 1e-5, 0.5),
-        }
-        model = models.points_model(
-            bonds[name], np.ones(21), force, shear_modes(compliance, 0.3 * force, 1e-6, 21)
-        )
-    expected = plain.march(basis, drive, model, 3, 1600, 3).response
-    response = varying_load.march(
-        basis, drive, sets, law, 3, 1600, 3, shear=reduce_to_shear_modes(sets, law)
-    ).response
-    assert (
-        np.abs(response.force).max() > 0.7 * 0.3 * LOAD
-        and 3e-6 < np.abs(response.slide).max() < 2e-5
-    )
-    assert response.slide == pytest.approx(expected.slide, abs=1e-6 * np.abs(expected.slide).max())
-    assert response.force == pytest.approx(expected.force, abs=5e-6 * 0.3 * LOAD)
-
-
 def test_exact_separated_bodies_store_no_energy():
     """During lift-off the bodies store no energy; the energy that they stored is counted as
     loss."""
@@ -219,7 +183,7 @@ def test_always_shear_compliance_creates_no_energy(name, seed, steps, count, dep
     check_energy_of_random_march(name, seed, steps, shear)
 
 
-@pytest.mark.parametrize("count", [0, 6])
+@pytest.mark.parametrize("count", [6])
 def test_exact_forked_march_equals_original_march(count):
     """A copy of a march continues with the same samples within 1e-13, after the original has
     continued."""
@@ -260,7 +224,7 @@ def test_refuses_shear_modes_with_unsuitable_laws():
         )
 
 
-@pytest.mark.parametrize("name", ["plastic", "bonds"])
+@pytest.mark.parametrize("name", ["bonds"])
 def test_order_two_with_shear_modes(name):
     """With modes that combine slide, heave and pitch and a varying contact the march converges with
     order two; the spring-back at the end of a step does not reduce the order."""

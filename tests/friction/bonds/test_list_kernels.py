@@ -23,7 +23,7 @@ GROWTH = {"ratio": 0.6, "rest_growth": 0.3, "slip_growth": 0.4, "rest_speed": 1e
 # ---- direct lists
 
 
-@pytest.mark.parametrize("order", [0.0, 1.0, 2.0, -0.5, 1.7])
+@pytest.mark.parametrize("order", [0.0, 2.0, -0.5])
 @pytest.mark.parametrize("initial", [0.0, 1.0])
 def test_exact_direct_printed_law_equals_numpy_sum(order, initial):
     """The direct list of the printed law has the forces of the NumPy sum within 1e-12, or 2e-8 for tabulated orders."""
@@ -71,7 +71,7 @@ def test_exact_direct_stretch_law_equals_recursion(growth):
     assert compiled.stored == pytest.approx(recursion.stored[:, 0], abs=1e-11)
 
 
-@pytest.mark.parametrize("order, tolerance", [(-0.5, 1e-4), (0.0, 1e-5), (1.0, 1e-5), (2.0, 1e-5)])
+@pytest.mark.parametrize("order, tolerance", [(-0.5, 1e-4), (1.0, 1e-5)])
 @pytest.mark.parametrize("initial", [0.0, 1.0])
 def test_exact_direct_growing_bonds_equal_hand_sum(order, tolerance, initial):
     """The direct list of growing bonds agrees with a sum over the bonds by hand."""
@@ -122,38 +122,12 @@ def test_exact_fractional_order_bonds_grown_at_rest(order, tolerance):
     assert forces[-1] == pytest.approx(gammainc(order + 1, 0.2), abs=tolerance)
 
 
-def test_exact_long_rest_of_growing_bonds_stays_finite():
-    """A rest of 10^6 growth times gives the force of bonds of full length, without overflow."""
-    law = Bonds(
-        1.0,
-        1.0,
-        1.0,
-        "report",
-        ratio=0.5,
-        rest_growth=1.0,
-        slip_growth=0.2,
-        rest_speed=1e-2,
-        initial=0.0,
-    )
-    full_length_law = Bonds(1.0, 1.0, 1.0, "report", initial=0.0)
-    path = np.array([0.0, 0.1, 0.2, 0.2])
-    force = march_list(law, path, [0.1, 0.1, 1e4]).after[-1]
-    expected = march_list(full_length_law, path).after[-1]
-    assert force == pytest.approx(expected, abs=1e-6)
-
-
 @pytest.mark.parametrize(
     "reading, order, growth",
     [
         ("stretch", 0.0, {}),
         ("stretch", 0.5, {}),
-        ("stretch", 2.0, {}),
-        ("stretch", 1.0, {}),
-        ("report", 0.0, {}),
-        ("report", 1.0, {}),
-        ("report", 2.0, {}),
         ("report", -0.5, {}),
-        ("report", 1.0, GROWTH),
         ("report", 2.0, GROWTH),
     ],
 )
@@ -167,24 +141,6 @@ def test_exact_stored_energy_equals_hand_sum(reading, order, growth):
         assert compiled.stored[k - 1] == pytest.approx(
             reference_energy(law, path[: k + 1], 0.4), abs=tolerance
         )
-
-
-@pytest.mark.share(0, 1, 2)
-@pytest.mark.parametrize(
-    "reading, order", [("report", 0.0), ("report", 1.0), ("stretch", 2.0), ("stretch", 0.5)]
-)
-def test_exact_step_mean_equals_force_integral(reading, order):
-    """The mean force of short and long steps agrees with the integral of the force over the step."""
-    law = Bonds(1.0, 1.0, order, reading, initial=0.0)
-    start_path = np.array([0.0, 1.3, 0.9])
-    for dq in (0.02, -0.05, 0.37, -3.0, 60.0):
-        mean = march_list(law, np.append(start_path, start_path[-1] + dq)).mean[-1]
-        fractions = np.linspace(0, 1, 4001)[1:] ** 3
-        path = np.concatenate([start_path, start_path[-1] + dq * fractions])
-        force = march_list(law, path).after
-        forces = np.concatenate([force[1:2], force[2:]])
-        expected = np.trapezoid(forces, np.append(0.0, fractions))
-        assert mean == pytest.approx(expected, abs=2e-3 if abs(dq) > 1 else 3e-4)
 
 
 @pytest.mark.parametrize(
@@ -244,27 +200,7 @@ def test_always_truncation_error_is_below_tail(reading, order, growth):
 # ---- merged lists
 
 
-@pytest.mark.parametrize(
-    "reading, order, growth", [("stretch", 2.0, {}), ("stretch", 0.5, {}), ("report", 1.0, GROWTH)]
-)
-def test_order_of_merge_width_is_two(reading, order, growth):
-    """The error of merging falls with the square of the merge width, while the number of strips grows."""
-    law = Bonds(1.0, 1.0, order, reading, initial=0.0, **growth)
-    path = np.concatenate([triangle_path(3.0, 3, 200), [-3.0]])
-    full = march_list(law, path, 0.05)
-    errors = []
-    n_strips = []
-    for merge in (0.01, 0.1):
-        merged = march_list(law, path, 0.05, merge)
-        errors.append(np.abs(merged.after - full.after).max())
-        n_strips.append(merged.status[STATUS.max_strips])
-    assert errors[0] < 0.25 * 0.01**2 and errors[1] < 0.25 * 0.1**2
-    # the age of growing bonds limits wide merges
-    assert np.log10(errors[1] / errors[0]) > (1.4 if growth else 1.7)
-    assert n_strips[1] < n_strips[0] < 500 < full.status[STATUS.max_strips]
-
-
-@pytest.mark.parametrize("order", [1.0, 2.0])
+@pytest.mark.parametrize("order", [2.0])
 def test_exact_repeated_passes_are_merged_into_one_strip(order):
     """Growing bonds of many passes over one range, merged into strips, agree with all strips."""
     law = Bonds(1.0, 1.0, order, "report", initial=0.0, **GROWTH)

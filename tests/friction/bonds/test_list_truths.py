@@ -6,13 +6,8 @@ Closed forms (checks C5, C6 and C8), bounded memory over long runs, and equal ma
 import numpy as np
 import pytest
 from list_paths import STATUS, march_list
-from march_paths import OMEGA, make_one_mode
 
-from patchfem.core import SineDrive
-from patchfem.dynamics import bond_list_model
-from patchfem.dynamics.march.march import march
 from patchfem.friction import Bonds
-from patchfem.friction.bonds.quadrature import cutoff_age
 
 GROWTH = {"ratio": 0.5, "rest_growth": 0.3, "slip_growth": 0.05, "rest_speed": 1e-2}
 LIST_OPTIONS = {"direct": {}, "truncated": {"tail": 1e-9}, "merged": {"tail": 1e-9, "merge": 0.01}}
@@ -24,7 +19,7 @@ def printed_law(order, growth=None):
     return Bonds(1.0, 1.0, float(order), "report", initial=0.0, **(growth or {}))
 
 
-@pytest.mark.share(0, 2, 5)
+@pytest.mark.share(0, 5)
 @each_list
 @pytest.mark.parametrize("order", [0, 1])
 def test_exact_loaded_bonds_heal_at_rest(order, options):
@@ -49,29 +44,3 @@ def test_always_long_path_keeps_bounded_list(growth, count):
     last_path = np.concatenate([[0.0], np.cumsum(steps[-1500:])])
     assert result.status[STATUS.max_strips] < 1500
     assert result.after[-1] == pytest.approx(march_list(law, last_path).after[-1], abs=5e-5)
-
-
-@pytest.mark.parametrize(
-    "order, growth",
-    [(0, {}), (1, {"ratio": 0.6, "rest_growth": 10.0, "slip_growth": 5e-6, "rest_speed": 1e-4})],
-)
-def test_exact_marches_of_both_lists_agree(order, growth):
-    """Marches with the direct and with the merged list agree in displacement, force and energies."""
-    law = Bonds(0.4, 1e-4, float(order), "report", initial=0.0, **growth)
-    limit = 0.4 * 98.0665
-    runs = [
-        march(
-            make_one_mode(OMEGA, 0.01, 1.0),
-            SineDrive(5 * 9.80665, OMEGA),
-            bond_list_model(law, limit, reach, merge),
-            3,
-            200,
-            window=3,
-        )
-        for reach, merge in ((np.inf, 0.0), (cutoff_age(law.order, 1e-9), 0.005))
-    ]
-    size = np.ptp(runs[0].window.slide)
-    assert runs[1].window.slide == pytest.approx(runs[0].window.slide, abs=2e-6 * size)
-    assert runs[1].window.force == pytest.approx(runs[0].window.force, abs=3e-5 * limit)
-    for name in ("created", "dissipated", "friction"):
-        assert runs[1].ledger[name] == pytest.approx(runs[0].ledger[name], rel=1e-4, abs=1e-9)

