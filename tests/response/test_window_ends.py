@@ -34,7 +34,7 @@ def compute_measures(w, cycles):
     }
 
 
-@pytest.mark.parametrize("cycles", [1.0, 3.0])
+@pytest.mark.parametrize("cycles", [3.0])
 @pytest.mark.parametrize("end", [3.7, 4.05])
 def test_exact_window_shift_changes_measures_to_first_order(cycles, end):
     """The estimated change of each measure agrees with that of a shifted window within 5 %."""

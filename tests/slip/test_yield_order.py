@@ -51,8 +51,8 @@ def half_plane_compliance(count: int):
         (0, -1),
     ],
 )
-@pytest.mark.parametrize("count", [1, 2, 7, 60])
-@pytest.mark.parametrize("bond_length", [0.0, 0.05])
+@pytest.mark.parametrize("count", [1, 7, 60])
+@pytest.mark.parametrize("bond_length", [0.05])
 def test_exact_yield_order_agrees_with_repeated_solution(
     count, bond_length, max_passes, max_exchanges, monkeypatch
 ):

@@ -4,10 +4,6 @@ pairs."""
 import numpy as np
 import pytest
 
-import patchfem as pf
-from patchfem import build
-from patchfem.runs.bench.engine import uses_parallel_elements
-from patchfem.scene import loads
 from patchfem.slip import spread_elements
 
 
@@ -75,12 +71,3 @@ def test_exact_nodes_of_flat_contact_are_not_spread():
     assert y[0] > 4.9e-7
     k, y = spread_elements(np.array([3.0]), np.array([2e-7]))
     assert k.tolist() == [3.0] and y.tolist() == [2e-7]
-
-
-def test_exact_spreading_applies_only_to_parallel_elements():
-    """A joint with Coulomb friction uses parallel elements; a joint with nonlocal bonds does
-    not."""
-    text = pf.new("joint")
-    assert uses_parallel_elements(build(loads(text, "joint.toml")))
-    bonds = text.replace('law = "coulomb"', 'law = "nonlocal"\nbond_length = "1 um"')
-    assert not uses_parallel_elements(build(loads(bonds, "joint.toml")))

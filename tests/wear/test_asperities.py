@@ -19,8 +19,8 @@ def make_surfaces(shape=(40, 60), seed=0):
     return (report_area(shape, STEP, 2 * seed)[2], report_area(shape, STEP, 2 * seed + 1)[2])
 
 
-@pytest.mark.parametrize("stroke", [0, 1, 4, 30])
-@pytest.mark.parametrize("upper_share", [0.0, 0.3, 0.5, 1.0])
+@pytest.mark.parametrize("stroke", [0, 1, 30])
+@pytest.mark.parametrize("upper_share", [0.3, 1.0])
 def test_exact_worn_volume_is_divided_by_wear_share(stroke, upper_share):
     """Each surface loses its prescribed fraction of the worn volume, and no height rises."""
     lower, upper = make_surfaces()
@@ -54,7 +54,7 @@ def test_exact_wear_without_stroke_truncates_combined_heights():
         assert lower - result.lower == pytest.approx(upper - result.upper, rel=1e-12, abs=1e-18)
 
 
-@pytest.mark.parametrize("stroke", [0, 3, 20])
+@pytest.mark.parametrize("stroke", [0, 20])
 def test_exact_hard_plane_truncates_peaks_at_any_stroke(stroke):
     """A hard plane truncates the peaks of a rough surface at one height, whatever the stroke."""
     lower, _ = make_surfaces()

@@ -78,7 +78,7 @@ def run_wear(problem, tolerance=1e-3, count=None):
     return state, jumps
 
 
-@pytest.mark.parametrize("multiple", [0.1, 1, 10, 100, 1000])
+@pytest.mark.parametrize("multiple", [0.1, 10, 1000])
 def test_exact_volume_without_pressure_oscillation_at_any_step(multiple):
     """The worn volume is exact within 1e-12 and the pressure does not oscillate from node to node,
     for steps up to 1000 times the explicit stability limit."""
