@@ -6,17 +6,13 @@ The scenes are random ones, a patch, runs with too few steps and bolted joints t
 
 import pytest
 from remedies import draw_scene, parse_remedies, run_tables, try_remedy
-from scene_texts import DRIVE, JOINT_SHAKEN, MODE, NONLOCAL, POINT
+from scene_texts import JOINT_SHAKEN
 
-from patchfem import build, run
-from patchfem.core import ErrorCauses, Measure
-from patchfem.runs.accuracy_warnings import AccuracyContext, tolerance_warnings
+from patchfem import run
 from patchfem.scene import choose_law, compose_scene
 
-SHAKEN_RIG = POINT + NONLOCAL + MODE + DRIVE
-SIXTEEN_STEPS = "[accuracy]\ntolerance = 1e-2\nsteps_per_cycle = 16\n"
 # Seeds of the fastest scenes of every kind, which run in a normal test run.
-FAST_SEEDS = (10, 18, 31, 34, 45, 78, 89, 116, 117, 144, 146, 150, 163, 175, 182)
+FAST_SEEDS = (10, 18, 31, 34, 78, 89, 146, 163)
 # Seeds whose remedies failed in an earlier version, out of 500 more scenes.
 FAILED_SEEDS = 460, 482, 484, 725
 
@@ -55,55 +51,6 @@ def test_always_remedies_of_19_in_20_scenes_have_promised_effect():
     """
     failed = [seed for seed in range(200) if find_failed_remedies(seed)]
     assert len(failed) <= 0.05 * 200
-
-
-def test_always_automatic_steps_meet_tolerance():
-    """If the changes of the measures do not fall from 2 to 8 steps per cycle, the warning advises
-    automatic steps, which meet the tolerance."""
-    eight_steps = SIXTEEN_STEPS.replace("steps_per_cycle = 16", "steps_per_cycle = 8")
-    coarse = run(SHAKEN_RIG + eight_steps)
-    main = "relative_displacement_amplitude"
-    warnings = [
-        text for text in coarse.warnings if text.startswith(f"{main} has an estimated error of ")
-    ]
-    assert len(warnings) == 1
-    assert "absolute_acceleration_peak of " in warnings[0]
-    assert "loop_area of " in warnings[0]
-    assert (
-        "; leave out accuracy.steps_per_cycle, so that patchfem doubles the number of steps"
-        in warnings[0]
-    )
-    automatic = run(SHAKEN_RIG + SIXTEEN_STEPS.replace("steps_per_cycle = 16\n", "")).measures[main]
-    assert automatic.error <= 1e-2 * automatic.value < coarse.measures[main].error
-
-
-@pytest.mark.parametrize(
-    "errors, warning",
-    [
-        (
-            {"slip_start_phase": 0.5, "relative_displacement_amplitude": 0.08, "loop_area": 0.1},
-            "relative_displacement_amplitude has an estimated error of 0.08 of its value, loop_area of 0.1 of its value; "
-            "the tolerance is 0.01 (1 other measure also exceeds the tolerance); set accuracy.steps_per_cycle = 64",
-        ),
-        (
-            {"slip_start_phase": 0.5, "stick_fraction": 0.1},
-            "slip_start_phase has an estimated error of 0.5 of its value; the tolerance is 0.01 (1 other measure also "
-            "exceeds the tolerance); set "
-            "accuracy.steps_per_cycle = 128",
-        ),
-    ],
-)
-def test_exact_warning_names_main_measures_first(errors, warning):
-    """A warning about several measures names the main ones first; errors of second order with 16
-    steps fall by 16 with 64 steps and by 64 with 128."""
-    measures = {
-        name: Measure(1.0, "1", error, causes=ErrorCauses({"steps": error}, 2.0))
-        for name, error in errors.items()
-    }
-    finding = AccuracyContext(
-        build(SHAKEN_RIG + SIXTEEN_STEPS), measures, None, {"steps_per_cycle": 16}
-    )
-    assert tolerance_warnings(finding) == [warning]
 
 
 def test_error_without_order_of_convergence_meets_tolerance_with_proposed_steps():

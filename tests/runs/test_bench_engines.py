@@ -71,7 +71,7 @@ def run_both_ways(model, steps, patch=None, frames=0):
 # ---- compiled engines and their NumPy versions
 
 
-@pytest.mark.share(0, 2, 4, 6, 8, 10, 13, 15, 17, 19, 21, 23)
+@pytest.mark.share(0, 4, 8, 10, 13, 17, 19, 23)
 @pytest.mark.parametrize("slide", SLIDES)
 @pytest.mark.parametrize("law", ROUND_OFF_LAWS)
 def test_exact_compiled_bench_agrees_with_numpy_law(law, slide):
@@ -128,7 +128,7 @@ def test_exact_frames_of_patch_agree_with_numpy_law(law):
 # ---- choice of the engine and its name
 
 
-@pytest.mark.share(0, 1, 2, 3, 4, 6, 7, 8)
+@pytest.mark.share(0, 1, 3, 4, 7)
 @pytest.mark.parametrize("law, contact, name", [
     (ROUND_OFF_LAWS["coulomb"], POINT, "closed form"), (ROUND_OFF_LAWS["elastic-plastic"], POINT, "parallel elements"),
     (BONDS, POINT, "recursion"), (BONDS + "order = 2\n", POINT, "merged bond list"),
@@ -174,8 +174,7 @@ def test_refuses_long_bond_list_and_unsupported_merging():
 
 
 @pytest.mark.parametrize("keys, slide", [
-    ("order = 2\n", "sine"), ("order = 0.5\n", "small"), ('reading = "report"\norder = 0.5\n' + GROWTH, "sine"),
-    (GROWTH + "order = 2\n", "dwell"),
+    ("order = 0.5\n", "small"), ('reading = "report"\norder = 0.5\n' + GROWTH, "sine"),
 ])  # fmt: skip
 def test_exact_errors_cover_merging_of_bonds(keys, slide):
     """The errors of a run that merges bonds cover its difference from the sum over every bond with
@@ -203,9 +202,7 @@ def test_exact_errors_cover_merging_of_bonds(keys, slide):
     "law, contact",
     [
         (ROUND_OFF_LAWS["coulomb"], POINT),
-        (BONDS, POINT),
         (BONDS + "order = 2\n", POINT),
-        (ROUND_OFF_LAWS["elastic-plastic"], PATCH + "[contact.shear]\n"),
         (ROUND_OFF_LAWS["tanh"], PATCH + 'on = "lower"\n'),
     ],
 )
@@ -241,19 +238,9 @@ def test_always_interrupt_ends_bench_between_blocks():
 # ---- energy balance and work check
 
 
-def test_exact_work_check_allows_force_jump_at_reversal():
-    """The friction force of the Coulomb law jumps at a reversal; the work check still closes within
-    1e-13."""
-    for law in ("coulomb", "coulomb that holds more"):
-        assert (
-            bench.run_bench(build_bench(ROUND_OFF_LAWS[law], "sine"), None, 40).values["work_check"]
-            < 1e-13
-        )
-
-
 @pytest.mark.parametrize(
     "chi, beta, amplitude",
-    [(-0.4, 0.5, 2e-7), (-0.4, 0.5, 2e-9), (0.0, 0.0, 2e-7), (-0.9, 2.0, 1e-5), (-0.6, 0.0, 3e-6)],
+    [(-0.4, 0.5, 2e-9), (0.0, 0.0, 2e-7), (-0.9, 2.0, 1e-5)],
 )
 def test_exact_iwan_loop_agrees_with_closed_form(chi, beta, amplitude):
     """The area and the peak force of the steady loop of the Iwan law agree within their errors with

@@ -90,23 +90,7 @@ def write_path_scene(tmp_path):
 # ---- the dwell
 
 
-def test_exact_dwell_slides_rests_and_slides():
-    """The path of a dwell slides 40 um at constant speed, rests for 0.3 s, and slides another 20
-    um."""
-    path = build(loads(POINT + NONLOCAL + DWELL)).slide
-    time, slide, first, omega = path.samples(600)
-    speed = np.diff(slide) / np.diff(time)
-    rest = np.abs(np.diff(slide)) < 1e-18
-    assert (first, omega) == (0, 0.0) and path.peak_speed == SPEED
-    assert time[-1] == pytest.approx(0.36, rel=1e-12) and slide[-1] == pytest.approx(
-        60e-6, rel=1e-12
-    )
-    assert np.diff(time)[rest].sum() == pytest.approx(0.3, rel=1e-12)
-    assert (np.diff(slide)[rest] == 0).all() and speed[~rest] == pytest.approx(SPEED, rel=1e-9)
-    assert slide[1:][rest] == pytest.approx(40e-6, rel=1e-12)
-
-
-@pytest.mark.parametrize("hold", [0.0, 0.03, 0.3, 3.0])
+@pytest.mark.parametrize("hold", [0.0, 3.0])
 def test_exact_breakaway_agrees_with_growth_at_rest(hold):
     """The peak friction after a rest agrees with the same law integrated by a Runge-Kutta method of
     order 8."""
@@ -168,14 +152,11 @@ HEAD = "time [s],displacement [um]\n"
 
 
 @pytest.mark.parametrize("text, message", [
-    ("", ":1: a header like"), ("0,0\n1,1\n", ":1: a header like"), ("time,displacement\n0,0\n1,1\n", ":1: a header"),
-    ("time [s],displacement [um],x [m]\n", ":1: a header"), ("time [s],time [s]\n", ":1: a header"),
+    ("", ":1: a header like"), ("time,displacement\n0,0\n1,1\n", ":1: a header"), ("time [s],time [s]\n", ":1: a header"),
     ("time [s],displacement [N]\n0,0\n1,1\n", ":1: displacement [N]: unknown unit; use one of m, km"),
-    (HEAD, ":1: a path needs at least two rows"), (HEAD + "0,0\n\n", ":2: a path needs at least two rows"),
+    (HEAD + "0,0\n\n", ":2: a path needs at least two rows"),
     (HEAD + "0,0\n1,nan\n", ":3: displacement: 'nan' is not a finite number"),
-    (HEAD + "0,0\n1,1e999\n", ":3: displacement: '1e999' is not"), (HEAD + "0,0\n1;1\n", ":3: two cells"),
-    (HEAD + "0,0\n\n1,1\n", ":3: two cells"), (HEAD + "0,0\n1,1,2\n", ":3: two cells"),
-    (HEAD + "0,0\n1,\n", ":3: displacement: '' is not"), (HEAD + "0,0\n1,1\n1,2\n", ":4: time 1 s is not later than"),
+    (HEAD + "0,0\n1,1,2\n", ":3: two cells"), (HEAD + "0,0\n1,1\n1,2\n", ":4: time 1 s is not later than"),
     (HEAD + "0,5\n1,1\n", ":2: displacement starts at 5e-06"), (HEAD + "1,0\n2,1\n", ":2: time starts at 1"),
     (HEAD + "0,0\n1,0\n", "displacement is 0 in every row"), (b"\xff\xfe\x00", "cannot be read"),
 ])  # fmt: skip
@@ -187,21 +168,9 @@ def test_refuses_faulty_path_table_with_line(write_path_scene, text, message):
     assert "path.csv" in str(error.value) and message in str(error.value)
 
 
-@pytest.mark.parametrize("kind", ["dwell", "file"])
-def test_exact_dwell_and_table_give_same_breakaway(tmp_path, kind):
-    """A dwell and a table of the same path are run from the command line; peak and final friction
-    agree with the reference within their errors."""
-    text = (
-        POINT
-        + NONLOCAL
-        + (DWELL if kind == "dwell" else '[slide]\nkind = "file"\nfile = "path.csv"\n')
-    )
-    (tmp_path / "scene.toml").write_text(text, "utf-8")
-    (tmp_path / "path.csv").write_text(HEAD + "0,0\n0.04,40\n0.34,40\n0.36,60\n", "utf-8")
-    answer = run_cli("run", tmp_path / "scene.toml", "-o", tmp_path / "out")
-    assert answer.code == 0, answer.err
-    result = run(load(tmp_path / "scene.toml"))
-    assert f"slide.kind={kind}" in result.plan.effects
+def test_exact_breakaway_of_table_agrees_with_reference(write_path_scene):
+    """Peak and final friction along a table of the path of the dwell agree with the reference within their errors."""
+    result = run(write_path_scene(HEAD + "0,0\n0.04,40\n0.34,40\n0.36,60\n", NONLOCAL))
     peak = result.measures["friction_ratio_peak"]
     end = result.measures["friction_ratio_end"]
     peak_ratio, end_ratio = breakaway_ratios(0.3)
@@ -225,16 +194,15 @@ def test_exact_coulomb_bench_breaks_away_at_static_friction():
     assert response.values["friction_work"] == pytest.approx(0.2 * load * 60e-6, rel=1e-12)
 
 
-@pytest.mark.parametrize("speed", ["1e-160 m/s", "1e-300 m/s"])
 @pytest.mark.parametrize("keys", ["", 'reading = "report"\n'])
-def test_exact_extremely_slow_slide_has_full_bond_length(speed, keys, recwarn):
-    """At speeds of 1e-160 m/s and less, the bonds grow to their full length, and no overflow
+def test_exact_extremely_slow_slide_has_full_bond_length(keys, recwarn):
+    """At a speed of 1e-300 m/s, the bonds grow to their full length, and no overflow
     warning occurs."""
     slow = run_bench(
         POINT
         + NONLOCAL
         + keys
-        + f'[slide]\nkind = "constant"\nspeed = "{speed}"\ndistance = "20 um"\n'
+        + '[slide]\nkind = "constant"\nspeed = "1e-300 m/s"\ndistance = "20 um"\n'
     )
     assert slow.values["friction_ratio_end"] == pytest.approx(0.3 * (1 - math.exp(-10)), rel=1e-3)
     assert all(np.isfinite(value) for value in slow.values.values()) and not recwarn.list

@@ -194,7 +194,7 @@ def stop_at_time_loop(monkeypatch):
 @pytest.mark.parametrize("name", RUNS)
 def test_always_accepted_combinations_run(name, law):
     """A part of the combinations of each law with effects and engines runs if `check` accepts it."""
-    assert_combinations_run(name, law, 18)
+    assert_combinations_run(name, law, 36)
 
 
 @pytest.mark.usefixtures("stop_at_time_loop")
@@ -213,12 +213,6 @@ def test_always_accepted_combinations_without_friction_run(effect):
 @pytest.mark.parametrize(
     "text, sets, key, reason",
     [
-        (
-            SHAKEN_MODE,
-            [*STIFFENING, "accuracy.method=exact"],
-            "accuracy.method",
-            "exists with [structure.stiffening]; use 'mar",
-        ),
         (
             POINT + COULOMB_LAW + SHAKEN_MODE,
             [*BONDS, "friction.breakaway=0.2", "accuracy.quadrature=direct"],

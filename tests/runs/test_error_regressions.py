@@ -15,12 +15,9 @@ from patchfem import run
 FOUND = Path(__file__).parent / "found"
 FILE_REFERENCES = [  # Scene, measure, reference, half a unit of its last digit.
     ("s77_21", "relative_displacement_amplitude", 3.5862e-5, 5e-10),
-    ("s77_21", "absolute_acceleration_peak", 3.562, 5e-4),
-    ("s77_21", "friction_force_peak", 2.820, 5e-4),
     ("s77_41", "relative_displacement_amplitude", 6.458e-5, 5e-9),
     ("s20261120_51", "friction_force_peak", 28.747, 5e-4),
     ("s20261120_10", "drift_per_cycle", 1.891e-8, 5e-12),
-    ("s77_40", "drift_per_cycle", -1.02e-8, 5e-11),
 ]
 
 

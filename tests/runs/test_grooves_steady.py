@@ -68,7 +68,7 @@ def march_last_cycle(text, cycles=40, steps=400):
     )
 
 
-@pytest.mark.share(1, 4, 6)
+@pytest.mark.share(4, 6)
 @pytest.mark.parametrize(("law", "frequency"), LAW_AND_FREQUENCY)
 def test_always_steady_state_agrees_with_march(law, frequency):
     """Steady states of every law agree with a march from rest within their errors plus 0.15 %."""

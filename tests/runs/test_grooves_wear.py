@@ -64,12 +64,11 @@ def slip_path_per_cycle(amplitude, reach=15e-6):
     return sum(quad(slip_rate, -reach, reach, args=(direction,))[0] for direction in (-1, 1))
 
 
-@pytest.mark.parametrize("upper_share", [0.5, 0.3])
-def test_exact_worn_amplitude_agrees_with_differential_equation(upper_share):
+def test_exact_worn_amplitude_agrees_with_differential_equation():
     """The worn amplitude agrees with dA/dn = -share kappa N int R ds/N divided by the area, for the
     piece that wears more; the worn volume is that of both pieces."""
-    result = run_with_keys(PIECES + SLIDE, **{"wear.upper_share": upper_share})
-    larger_share = max(upper_share, 1 - upper_share)
+    result = run_with_keys(PIECES + SLIDE, **{"wear.upper_share": 0.3})
+    larger_share = 0.7
     solution = solve_ivp(
         lambda n, a: -larger_share * KAPPA * LOAD * slip_path_per_cycle(a[0]) / AREA,
         (0, 4e6),

@@ -78,7 +78,7 @@ SECOND = '[[structure.mode]]\nname = "other"\nfrequency = "271 Hz"\ndamping = 0.
 
 
 @pytest.mark.parametrize("second_mode", ["", SECOND], ids=["one mode", "general"])
-@pytest.mark.parametrize("exponent", range(4, 11))
+@pytest.mark.parametrize("exponent", [4, 7, 10])
 def test_exact_first_slip_near_friction_limit(exponent, second_mode):
     """For a friction limit of D times the peak drive force, with D just below 1, the first slip is
     9/2 (1 - D)^2 a/omega^2, up to terms of relative order 1 - D and round-off over 1 - D."""
@@ -234,23 +234,6 @@ def test_exact_slip_and_loop_agree_with_independent_program(name, method):
     assert measure_value(result, "loop_area") == pytest.approx(area, rel=rel_tol)
     if method != "harmonic":
         assert_energy_balance(result, 1e-10 if method == "auto" else 1e-8)
-
-
-@pytest.mark.share(1)
-@pytest.mark.parametrize(
-    "damping, expected", [(0.0, 0.29943104174842751488), (0.003, 0.28704671337871602595)]
-)
-def test_exact_amplitude_at_resonance_agrees_with_printed_value(damping, expected):
-    """The amplitude for D = 0.8 agrees with the printed value in every engine."""
-    text = format_rig("static = 0.3", format_base_drive(37.5, 200), damping)
-    assert measure_value(run_text(text)) == pytest.approx(expected * 37.5 / OMEGA**2, rel=1e-11)
-    for method in ("march", "harmonic"):
-        assert_within_error(
-            run_text(text, f"accuracy.method={method}"),
-            "relative_displacement_amplitude",
-            expected * 37.5 / OMEGA**2,
-            1e-10 * expected * 37.5 / OMEGA**2,
-        )
 
 
 @pytest.mark.parametrize("cycles", [4000, 60_000, pytest.param(1_000_000, marks=pytest.mark.slow)])

@@ -34,19 +34,6 @@ def test_exact_coulomb_with_holder_spring_is_jenkins_element():
     assert response.force.max() == pytest.approx(LIMIT, rel=1e-12)
 
 
-@pytest.mark.parametrize("law", ["elastic-plastic", "nonlocal"])
-def test_exact_initial_stiffness_is_series_stiffness(law):
-    """The initial stiffness is 1/(1/k_h + eps/(mu N)), and the friction limit stays mu N."""
-    response = run_bench(f'"{law}"\nbond_length = "1 um"', "accuracy.steps_per_cycle=20000")
-    series = 1 / (1 / HOLDER_STIFFNESS + 1e-6 / LIMIT)
-    assert response.force[1] / response.slide[1] == pytest.approx(
-        series, rel=1e-12 if law != "nonlocal" else 5e-3
-    )
-    assert np.abs(response.force).max() == pytest.approx(
-        LIMIT, rel=1e-6 if law != "nonlocal" else 5e-3
-    )
-
-
 def test_exact_bonds_with_holder_spring_agree_with_differential_equation():
     """The first loading of Dahl's law behind a spring k_h agrees with an integration of F' = (mu N
     - F)/eps (1 - F'/k_h)."""

@@ -2,12 +2,11 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scene_texts import COATING, PIECE
 
 from patchfem import build
-from patchfem.contact.gaps import step
 from patchfem.core import Outcome
 from patchfem.runs import solve_with_coarser
 from patchfem.runs.patch.values import compute_static_values
@@ -49,6 +48,7 @@ def test_exact_holder_limits_are_free_and_clamped():
         assert stiff_holder[name] == pytest.approx(clamped[name], rel=1e-6)
 
 
+@settings(settings.get_profile("costly"))
 @given(st.floats(0, 8), st.floats(-2e-4, 2e-4), st.floats(-5e-3, 5e-3))
 def test_always_moments_of_holder_and_pressure_balance(exponent, angle, offset):
     """The moment of the pressure about the middle is N offset + K (rotation - angle)."""
@@ -87,16 +87,7 @@ def test_exact_compliances_of_unlike_pieces_add():
     )
 
 
-def test_exact_step_opens_gap_on_one_side():
-    """A step opens the gap on one side by its height; the pressure is zero there."""
-    patch, patch_values = solve_patch(tables='[contact.step]\nheight = "1 um"\nat = "2 mm"\n')
-    x = patch.pair.grid.x
-    assert patch.unloaded_gap == pytest.approx(np.where(x > 2e-3, 1e-6, 0.0))
-    assert patch.pressure.sigma_n[x > 2e-3].max() == 0 and patch_values["pressure_centre"] < 0
-    assert step(np.array([-1.0, 0.0, 1.0]), 2.0, 0.0).tolist() == [0.0, 1.0, 2.0]
-
-
-@pytest.mark.parametrize("angle", [5e-6, 1e-4, 1e-3])
+@pytest.mark.parametrize("angle", [5e-6, 1e-3])
 def test_exact_soft_linear_skin_agrees_with_wedge_on_foundation(angle):
     """If the pieces are a thousand times stiffer than the skin, the contact length is sqrt(2 N/(k
     theta b)), and contact is full below the angle 2 p/(k L)."""
@@ -131,7 +122,7 @@ ROTATION_TABLES = {
 }
 
 
-@pytest.mark.share(0, 2, 5)
+@pytest.mark.share(2, 5)
 @pytest.mark.parametrize("tables", ROTATION_TABLES.values(), ids=ROTATION_TABLES.keys())
 def test_exact_approach_with_rotation_returns_load(tables):
     """The approach that results from a load, prescribed instead of the load, returns this load, its

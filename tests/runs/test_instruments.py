@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from patchfem import SceneError, run
-from patchfem.response import measure_half_range, read_instrument
+from patchfem.response import read_instrument
 from patchfem.scene import loads
 
 MODES = """
@@ -52,7 +52,7 @@ def run_instruments(text, *options):
     return result, [result.measures[name] for name in NAMES]
 
 
-@pytest.mark.share(0, 2, 4, 6)
+@pytest.mark.share(0, 4, 6)
 @pytest.mark.parametrize(
     "law, method",
     [
@@ -137,13 +137,3 @@ def test_refuses_instruments_if_output_limits_the_run(settings, message):
     """Separate instruments are refused with travel, a stiffening spring or levels, which depend on the output."""
     with pytest.raises(SceneError, match=message):
         loads(POINT + LAWS["coulomb"] + MODES, sets=["structure.mode.yaw.gauge=0.2", *settings])
-
-
-def test_exact_half_range_of_cubic_motion():
-    """Half of the range of a motion of cubic pieces is computed from their extrema, not from the samples."""
-    t = np.array([0.0, 1.0, 3.0])
-    y = t**3 - 4 * t**2 + 2 * t
-    v = 3 * t**2 - 8 * t + 2
-    peak = (lambda x: x**3 - 4 * x**2 + 2 * x)((8 - np.sqrt(40)) / 6)
-    valley = (lambda x: x**3 - 4 * x**2 + 2 * x)((8 + np.sqrt(40)) / 6)
-    assert measure_half_range(t, y, v) == pytest.approx((peak - valley) / 2, rel=1e-14)

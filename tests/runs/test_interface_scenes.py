@@ -38,47 +38,6 @@ law = "coulomb"
 static = 0.3
 load = "{2} N"
 """
-SIDE_BY_SIDE = (
-    """\
-[structure]
-masses = ["0.884 kg", "0.884 kg"]
-[[structure.spring]]
-between = [1, 0]
-stiffness = "713 N/mm"
-[[structure.spring]]
-between = [2, 0]
-stiffness = "713 N/mm"
-[[structure.damper]]
-between = [1, 0]
-coefficient = "30 N s/m"
-[[structure.damper]]
-between = [2, 0]
-coefficient = "30 N s/m"
-"""
-    + INTERFACE.format(1, 0, 115)
-    + INTERFACE.format(2, 0, 115)
-)
-DRIVE = """\
-[drive]
-kind = "base"
-frequency = "143 Hz"
-acceleration = "6 g"
-cycles = 60
-"""
-SINGLE_MASS = f"""\
-[normal]
-load = "115 N"
-[friction]
-law = "coulomb"
-static = 0.3
-[structure]
-moving_mass = "0.884 kg"
-[[structure.mode]]
-name = "axial"
-frequency = "{float(np.sqrt(713e3 / 0.884)) / (2 * np.pi)!r} Hz"
-damping = {30 / (2 * float(np.sqrt(713e3 * 0.884)))!r}
-slide = 1.0
-"""
 CHAIN = (
     """\
 [structure]
@@ -155,39 +114,6 @@ def test_exact_figure_16_of_the_report(run_scene):
         "steady",
         "transient",
     )
-
-
-@pytest.mark.share(0)
-@pytest.mark.parametrize("method", ["exact", "march"])
-def test_exact_two_equal_masses_agree_with_single_mass(run_scene, method):
-    """Two equal masses with equal interfaces move as a single mass: measures, histories and events agree."""
-    arguments = ("--set", f"accuracy.method={method}")
-    if method == "march":
-        arguments += ("--set", "accuracy.steps_per_cycle=400")
-    pair, data = run_scene(SIDE_BY_SIDE + DRIVE, *arguments)
-    single, single_data = run_scene(SINGLE_MASS + DRIVE, *arguments)
-    for name in ("slip_amplitude", "stick_fraction", "friction_force_peak", "loop_area"):
-        expected = single["measures"][name]
-        first = pair["measures"][name]
-        second = pair["measures"][f"{name}_2"]
-        assert first["value"] == pytest.approx(expected["value"], rel=1e-8), name
-        # The area of the second loop is computed from samples.
-        rel_tol = 1e-4 if (method, name) == ("march", "loop_area") else 1e-8
-        assert second["value"] == pytest.approx(expected["value"], rel=rel_tol), name
-        assert (second["unit"], second["floor"]) == (
-            expected["unit"],
-            expected["floor"],
-        ) and second["error"] >= 0
-    assert data.interface.values.tolist() == ["1-0", "2-0"]
-    for name in ("relative_displacement", "relative_velocity", "friction_force", "normal_load"):
-        assert data[name].dims == ("interface", "time")
-        assert np.abs(data[name][0] - data[name][1]).max() <= 1e-9 * np.abs(data[name]).max(), name
-    for number in (1, 2):
-        expected = data.event_interface.values == number
-        assert data.event_kind.values[expected].tolist() == single_data.event_kind.values.tolist()
-        assert data.event_time.values[expected] == pytest.approx(
-            single_data.event_time.values, abs=1e-10
-        )
 
 
 def test_exact_slip_of_second_interface_alone_is_not_stuck():

@@ -4,9 +4,6 @@ arrays."""
 import numpy as np
 
 from patchfem import run
-from patchfem.export import summarise_run
-from patchfem.runs.patch.values import compute_static_values
-from patchfem.runs.results import patch_rows
 
 PATCH = """
 [contact]
@@ -29,32 +26,6 @@ kind = "sine"
 amplitude = "5 um"
 frequency = "143 Hz"
 """
-
-
-def test_always_summary_names_method_of_each_measure():
-    """A measure has the value of the finest mesh if and only if the summary names the finest mesh
-    as its method."""
-    result = run(PATCH.format(1e-3))
-    on_mesh = compute_static_values(result.patch)
-    methods = summarise_run(result)["numerics"]["measures"]
-    assert methods.keys() == {
-        name for name, measure in result.measures.items() if measure.value is not None
-    }
-    assert patch_rows.EXTRAPOLATED_SOURCE in methods.values()
-    for name, method in methods.items():
-        is_of_mesh = result.measures[name].value == on_mesh[name]
-        assert (
-            is_of_mesh
-            if method == patch_rows.FINEST_MESH_SOURCE
-            else on_mesh[name] == 0 or not is_of_mesh
-        ), name
-
-
-def test_always_motion_measures_name_engine_of_run():
-    """Measures of the motion name the engine of the run, those of the patch the finite elements."""
-    numerics = summarise_run(run(PATCH.format(1e-2) + SLIDE))["numerics"]
-    assert numerics["measures"]["secant_stiffness"] == numerics["engine"]
-    assert numerics["measures"]["normal_stiffness"].startswith("finite elements")
 
 
 def test_exact_arrays_of_static_patch_balance_load():

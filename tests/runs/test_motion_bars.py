@@ -9,7 +9,7 @@ from random_rigs import compare_rig
 SEEDS = (11, 21, 30, 111)  # Seeds of scenes of the engines exact, piecewise, exact and march.
 
 
-@pytest.mark.share(0, 2)
+@pytest.mark.share(2)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_always_errors_of_random_rig_cover_independent_program(seed, tmp_path):
     """All errors of a random rig cover the result of the independent program."""

@@ -37,12 +37,3 @@ def test_exact_warning_names_cycles_until_loop_is_steady():
     assert two_cycles.measures["loop_area"].value == pytest.approx(steady, rel=1e-3)
     assert abs(one_cycle.measures["loop_area"].value - steady) > 0.03 * steady
     assert f"{1e6 * steady:.4g} uJ" in warnings[0]
-
-
-@pytest.mark.parametrize("cycles", [1, 2, 1.5])
-def test_exact_rigid_loop_is_steady_from_first_cycle(cycles):
-    """The loop of Coulomb's law has the area 4 mu N A from the first cycle and gives no warning."""
-    result, warnings = run_with_loop_warnings('law = "coulomb"', cycles)
-    assert not warnings and result.measures["loop_area"].value == pytest.approx(
-        4 * 0.3 * 115 * 2e-6, rel=1e-6
-    )

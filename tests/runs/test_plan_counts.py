@@ -5,8 +5,6 @@ import numpy as np
 import pytest
 
 from patchfem import load, plan
-from patchfem.runs import choose_numerics
-from patchfem.runs.rig.bond_lists import estimate_bond_list_cost
 from patchfem.runs.run import run
 
 APPROACH_WITH_MOMENT = """[contact]
@@ -52,105 +50,6 @@ def test_always_plan_load_includes_moment_with_approach():
         result.measures["normal_load"].value, rel=0.1
     )
     assert result.extra["book"]["iterations"] <= 1.5 * run_plan.steps
-
-
-STEP_LOAD = """[normal]
-load = "310.4 N"
-[friction]
-law = "nonlocal"
-static = 0.352
-bond_length = "1.023 um"
-order = 0.9949
-rest_growth = "29.36 m/s^2"
-slip_growth = "0.199 um"
-[structure]
-moving_mass = "0.8552 kg"
-[[structure.mode]]
-name = "m0"
-frequency = "261.8 Hz"
-damping = 0.003
-slide = 1.0
-base = 0.8
-[[structure.mode]]
-name = "m1"
-frequency = "616 Hz"
-damping = 0.003
-slide = 0.3
-base = 0.1
-[drive]
-kind = "base"
-waveform = "step"
-acceleration = "26.94 m/s^2"
-cycles = {cycles}
-[accuracy]
-tolerance = 0.01
-"""
-
-
-def test_always_plan_estimates_bond_list_under_step_load():
-    """The plan estimates the number of strips of bonds of a block under a step load. The block
-    hardly moves and each step adds a strip; an earlier version estimated 66 of 3800 strips."""
-    scene = load(STEP_LOAD.format(cycles=12))
-    estimate = plan(scene).unknowns["bond_list_about"]
-    counts = run(scene, estimate=False).extra["book"]
-    assert counts["strips"] <= 1.2 * estimate
-
-
-STUCK_CHAIN = """[structure]
-masses = ["0.3454 kg", "1.339 kg"]
-[[structure.spring]]
-between = [1, 0]
-stiffness = "1523000 N/m"
-[[structure.spring]]
-between = [2, 1]
-stiffness = "209600 N/m"
-[[structure.spring]]
-between = [2, 0]
-stiffness = "1670000 N/m"
-[[structure.damper]]
-between = [1, 0]
-coefficient = "5.339 N s/m"
-[[structure.damper]]
-between = [2, 1]
-coefficient = "44.18 N s/m"
-[[structure.interface]]
-between = [1, 0]
-load = "34.74 N"
-law = "nonlocal"
-static = 0.527
-bond_length = "0.1298 um"
-kinetic = 0.2237
-order = {order}
-reading = "report"
-[drive]
-kind = "base"
-waveform = "levels"
-levels = ["24.7 m/s^2", "29.5 m/s^2"]
-frequency = "257.1 Hz"
-cycles = {cycles}
-[accuracy]
-tolerance = 0.003
-"""
-
-
-def test_always_plan_estimates_time_of_stuck_block():
-    """The computing time of the bond list of a stuck block is estimated within a factor of 12. The
-    reference is 2.5e-7 s (measured) per increment and strip, with half of the final strips on
-    average."""
-    sine = (
-        STUCK_CHAIN.format(order=1.085, cycles=4)
-        .replace('levels = ["24.7 m/s^2", "29.5 m/s^2"]', 'acceleration = "29.5 m/s^2"')
-        .replace('"levels"', '"sine"')
-    )
-    scene = load(sine)
-    model = plan(scene).model
-    counts = run(scene, estimate=False).extra["book"]
-    reference_seconds = 2.5e-7 * counts["iterations"] * counts["strips"] / 2
-    assert (
-        reference_seconds / 12
-        <= estimate_bond_list_cost(model, choose_numerics(model))[1]
-        <= 12 * reference_seconds
-    )
 
 
 BARELY_STUCK = """[normal]

@@ -3,17 +3,14 @@ the NumPy law."""
 
 import numpy as np
 import pytest
-import xarray as xr
-from command_line import run_cli
-from scene_texts import NONLOCAL, POINT, SMALL_PATCH, TRIANGLE
+from scene_texts import NONLOCAL, POINT, SMALL_PATCH
 
 from patchfem import build, plan
 from patchfem.core import PatchfemError
 from patchfem.friction import Bonds, FirstOrderBonds
 from patchfem.runs import solve_with_coarser
 from patchfem.runs.bench import bench as law_bench
-from patchfem.runs.run import run
-from patchfem.scene import load, loads
+from patchfem.scene import load
 
 LONGER_BONDS = NONLOCAL.replace("1 um", "2 um")
 FILE_SLIDE = '[slide]\nkind = "file"\nfile = "path.csv"\n'
@@ -112,41 +109,13 @@ def test_exact_patch_on_plane_path_agrees_with_pointwise_law(write_path_scene, s
         assert yaw[response.slide.argmax()] == pytest.approx(patch.strips.yaw_moment(0.3), rel=0.01)
 
 
-def test_exact_files_contain_histories_of_both_directions(write_path_scene, tmp_path):
-    """The dataset contains lateral displacement, lateral force and yaw moment; a long lateral slide gives a warning."""
-    scene = write_path_scene(
-        L_SHAPE, SMALL_PATCH + STRIPS + LONGER_BONDS + "[accuracy]\nsteps_per_cycle = 100\n"
-    )
-    answer = run_cli("run", scene.path, "-o", tmp_path / "out")
-    assert answer.code == 0, answer.err
-    result = run(scene, estimate=False)
-    with xr.open_dataset(tmp_path / "out" / "result.nc", engine="h5netcdf") as data:
-        for name, unit in (
-            ("lateral_displacement", "m"),
-            ("lateral_force", "N"),
-            ("yaw_moment", "N m"),
-        ):
-            assert data[name].attrs["units"] == unit and data[name].dims == ("time",)
-        assert data["lateral_force"].values == pytest.approx(result.response.lateral_force)
-        assert data["lateral_displacement"].values[-1] == pytest.approx(24e-6)
-    long_path = write_path_scene(
-        L_SHAPE.replace("24", "2400"), SMALL_PATCH + LONGER_BONDS, "accuracy.steps_per_cycle=50"
-    )
-    assert any(
-        "0.189 of the width" in warning or "0.19 of the width" in warning
-        for warning in run(long_path, estimate=False).warnings
-    )
-
-
 @pytest.mark.parametrize(
     "text, message",
     [
         (L_SHAPE + "9,4\n", ":6: three cells"),
-        (L_SHAPE + "9,4,x\n", ":6: lateral: 'x' is not a finite"),
         (L_SHAPE.replace("0,0,0", "0,0,3"), ":2: lateral starts at 3e-06"),
         (L_SHAPE.replace("lateral [um]", "lateral [s]"), ":1: lateral [s]: unknown unit"),
         (L_SHAPE.replace("lateral [um]", "sideways [um]"), ":1: a header like"),
-        (L_SHAPE.replace("lateral [um]", "time [s]"), ":1: a header like"),
         ("time [s],displacement [um],lateral [um]\n0,0,0\n1,0,0\n", "nothing slides"),
     ],
 )
@@ -161,9 +130,6 @@ def test_refuses_faulty_lateral_column(write_path_scene, text, message):
     "scene, sets, option",
     [
         (POINT, ["friction.law=coulomb"], "law 'coulomb'"),
-        (POINT, ["friction.law=elastic-plastic"], "law 'elastic-plastic'"),
-        (POINT, ["friction.law=tanh", "friction.reference_speed=1 mm/s"], "law 'tanh'"),
-        (POINT, ["friction.law=convolution"], "law 'convolution'"),
         (POINT, ["normal.width=1 mm", "friction.spread=1 um"], "friction.spread"),
         (POINT, ["friction.breakaway=0.2"], "friction.breakaway"),
         (POINT, ["normal.amplitude=1 N", "normal.frequency=50 Hz"], "normal.amplitude"),
@@ -184,32 +150,3 @@ def test_refuses_unsupported_options_of_plane_path(write_path_scene, scene, sets
 
 
 # ---- strips along one direction
-
-
-@pytest.mark.parametrize("side", ["upper", "lower"])
-def test_exact_level_strips_agree_with_patch_and_point(side):
-    """Four level strips of a crown give the bench of the patch without strips, on either piece. The
-    friction force is that of a point, except for the contact edges that move over the lower piece.
-    """
-    level = STRIPS.replace('roll = "0.02 mrad"\n', "")
-    crown = (
-        SMALL_PATCH.split("[contact.tilt]")[0]
-        + f'[contact.crown]\nradius = "20 m"\non = "{side}"\n'
-    )
-    patch, strips = (
-        run_bench(crown + write_path_scene + LONGER_BONDS) for write_path_scene in ("", level)
-    )
-    assert strips.force == pytest.approx(patch.force, rel=1e-9, abs=1e-9 * patch.force.max())
-    assert strips.tau == pytest.approx(patch.tau, rel=1e-6, abs=1e-6 * patch.tau.max())
-    point = run_bench(POINT + LONGER_BONDS)
-    assert strips.force == pytest.approx(
-        point.force, abs=(1e-9 if side == "upper" else 1e-3) * point.force.max()
-    )
-    assert side == "upper" or strips.force != pytest.approx(point.force, rel=1e-9)
-
-
-def run_bench(text, *sets):
-    """Return the response of a bench of a scene with a triangular slide."""
-    model = build(loads(text + TRIANGLE, sets=sets))
-    patch = solve_with_coarser(model.patch, 1e-3, False)[0] if model.patch is not None else None
-    return law_bench.run_bench(model, patch, 120, 4)

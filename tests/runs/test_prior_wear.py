@@ -10,8 +10,6 @@ from test_worn_friction import ALPHA, AREA, DEPTH, LOAD, MU, PATH, SCENE
 
 import patchfem as pf
 from patchfem.core import PatchfemError
-from patchfem.export import folder
-from patchfem.runs.run import run
 from patchfem.scene import loads
 
 HALF_CYCLES = "wear.cycles=1e6"
@@ -45,34 +43,6 @@ def test_exact_two_half_runs_agree_with_closed_form(earlier_run_folder):
     np.testing.assert_array_equal(second.extra["wear"]["cycle"][[0, -1]], [0, 1e6])
 
 
-def test_exact_comparison_states_cycles_of_earlier_run(earlier_run_folder):
-    """The comparison of both runs states the wear cycles of the earlier run."""
-    run_in_folder(earlier_run_folder, HALF_CYCLES, "wear.start=one/result.nc").save(
-        earlier_run_folder / "two"
-    )
-    comparison = pf.compare(earlier_run_folder / "one", earlier_run_folder / "two")
-    assert (
-        "1e+06 cycles of wear after those of one/result.nc (the surface before: 1e+06 cycles)"
-        in comparison["sentences"][0]
-    )
-    assert comparison["worn_depth_mean"]["value"] < 1.1e-6
-
-
-def test_exact_volumes_of_successive_runs_add(earlier_run_folder):
-    """With constant friction, V = kappa N s n: the volume of two successive runs with different
-    amplitudes is the sum of separate runs within 1e-12; a note names the earlier run."""
-    archard = [HALF_CYCLES, "wear.form=archard", "wear.friction.coefficient_factor=[1, 1]"]
-    stroke = "slide.amplitude=5 um"
-    first = run_in_folder(earlier_run_folder, *archard)
-    second = run_in_folder(earlier_run_folder, *archard, stroke)
-    first.save(earlier_run_folder / "archard")
-    continued = run_in_folder(earlier_run_folder, *archard, stroke, "wear.start=archard/result.nc")
-    volume = sum(result.measures["worn_volume"].value for result in (first, second))
-    assert continued.measures["worn_volume"].value == pytest.approx(volume, rel=1e-12, abs=0)
-    assert volume == pytest.approx(ALPHA * LOAD * 1.5 * PATH * 1e6, rel=1e-8, abs=0)
-    assert "continues from archard/result.nc, where up to " in continued.extra["notes"][-1]
-
-
 def test_exact_run_continues_on_other_mesh(earlier_run_folder):
     """One whole run, and half of it continued on a finer mesh, differ by less than their errors."""
     sets = "contact.crown.radius=50 m", "contact.element_size=0.4 mm"
@@ -87,22 +57,6 @@ def test_exact_run_continues_on_other_mesh(earlier_run_folder):
             <= continued[name].error + whole_run[name].error
         ), name
     assert continued["worn_volume"].error < 1e-2 * whole_run["worn_volume"].value
-
-
-def test_exact_sweep_over_two_earlier_runs(earlier_run_folder):
-    """A sweep over two earlier runs agrees with single runs from each of them."""
-    run_in_folder(earlier_run_folder, "wear.cycles=2e6").save(earlier_run_folder / "long")
-    sweep = pf.sweep(
-        loads(SCENE, earlier_run_folder / "a.toml", [HALF_CYCLES]),
-        {"wear.start": ["one/result.nc", "long/result.nc"]},
-    )
-    for value, file in zip(sweep["worn_volume"].values, ("one", "long")):
-        single = (
-            run_in_folder(earlier_run_folder, HALF_CYCLES, f"wear.start={file}/result.nc")
-            .measures["worn_volume"]
-            .value
-        )
-        assert value == pytest.approx(single, rel=1e-12, abs=0)
 
 
 @pytest.mark.parametrize(
@@ -146,20 +100,6 @@ def test_refuses_worn_depth_of_other_profile(earlier_run_folder):
         PatchfemError, match="the unworn surfaces of that run differ from those of this scene"
     ):
         pf.run(scene)
-
-
-def test_exact_missing_error_of_earlier_run_leaves_no_error(earlier_run_folder):
-    """If the earlier run has no error, the worn volume of the continued run has none."""
-    folder.save_run(
-        run(loads(SCENE, earlier_run_folder / "a.toml", [HALF_CYCLES]), estimate=False),
-        earlier_run_folder / "rough",
-    )
-    assert (
-        run_in_folder(earlier_run_folder, HALF_CYCLES, "wear.start=rough/result.nc")
-        .measures["worn_volume"]
-        .error
-        is None
-    )
 
 
 def test_refuses_to_continue_with_worn_through_coating(earlier_run_folder):

@@ -1,16 +1,12 @@
 """Estimates of memory and time: their parts, the limits, and refusals before large arrays are
 allocated."""
 
-import json
-import os
 import resource
 import subprocess
 import sys
-import time
 import tracemalloc
 from dataclasses import replace
 
-import numpy as np
 import plan_trial
 import pytest
 from scene_texts import BENCH, COULOMB, MODE, PATCH, POINT, STRUCTURE
@@ -32,7 +28,7 @@ def plan_text(text, *sets):
     return plan(loads(text, "a.toml", sets))
 
 
-@pytest.mark.share(0, 1, 2, 3, 5)
+@pytest.mark.share(0, 2, 3)
 @pytest.mark.parametrize(
     "text, sets, key",
     [
@@ -71,12 +67,13 @@ def test_refuses_large_run_before_allocation_with_key(text, sets, key, monkeypat
     assert peak < (7e8 if run_plan.kind == "bench" else 3e7)
 
 
+@pytest.mark.share(1)
 @pytest.mark.parametrize("method", ["march", "exact"])
 def test_always_plan_estimates_memory_of_histories(method):
-    """The memory of the histories of 1e6 cycles, beyond that of 1000 cycles, is estimated within a
+    """The memory of the histories of 3e5 cycles, beyond that of 1000 cycles, is estimated within a
     factor of 2.5. An earlier plan estimated a tenth."""
     text = POINT + COULOMB + STRUCTURE
-    cycles = 1e6
+    cycles = 3e5
     code = (
         "import sys; import patchfem as pf; pf.run(sys.argv[1], say=lambda text: None, "
         "**{'drive.cycles': float(sys.argv[2]), 'accuracy.method': sys.argv[3]}); "
@@ -101,22 +98,6 @@ def test_always_plan_estimates_memory_of_histories(method):
     assert any("drive.cycles sets their size" in text_line for text_line in long_plan.verdict)
     assert UPPER_LIMIT_NOTE in long_plan.verdict
     assert UPPER_LIMIT_NOTE not in plan_text(text, "drive.cycles=50").verdict
-
-
-def test_exact_memory_estimate_scales_with_nodes_and_steps():
-    """The estimated memory grows with the square of the number of nodes, and linearly with the
-    steps of the stored cycles."""
-    coarse_bytes, fine_bytes = (
-        plan_text(PATCH, f"contact.element_size={size} um").bytes for size in (2, 1)
-    )
-    assert 3.6 < fine_bytes / coarse_bytes < 4.0
-    coarse_bytes, fine_bytes = (
-        plan_text(RIG, MARCH, f"accuracy.steps_per_cycle={n}00000").bytes for n in (2, 4)
-    )
-    # Of 30 cycles, the last 3 are stored.
-    assert fine_bytes - coarse_bytes == pytest.approx(
-        costs.MARCH_HISTORY.sample * 20 * 3 * 2e5, rel=0.01
-    )
 
 
 def test_refuses_extremely_long_run_with_key():
@@ -192,44 +173,6 @@ def test_always_plans_agree_in_nine_of_ten_scenes(tmp_path):
     assert time >= 0.9 and memory_ >= 0.9
 
 
-TWO_INTERFACES = """[structure]
-masses = ["1 kg", "2 kg"]
-[[structure.spring]]
-between = [1, 0]
-stiffness = "1 N/um"
-[[structure.spring]]
-between = [2, 1]
-stiffness = "2 N/um"
-[[structure.interface]]
-between = [1, 0]
-load = "30 N"
-law = "coulomb"
-static = 0.3
-[[structure.interface]]
-between = [2, 1]
-load = "20 N"
-law = "coulomb"
-static = 0.3
-[drive]
-kind = "base"
-acceleration = "2 m/s^2"
-frequency = "100 Hz"
-cycles = 2
-"""
-
-
-def test_always_short_run_of_two_interfaces_is_planned(tmp_path):
-    """The command `plan` of a short run states no compile time, because such a run is not compiled."""
-    (tmp_path / "scene.toml").write_text(TWO_INTERFACES, "utf-8")
-    command = [sys.executable, "-m", "patchfem", "plan", tmp_path / "scene.toml", "--json"]
-    # An empty cache: nothing is compiled yet.
-    environment = os.environ | {"PATCHFEM_CACHE": str(tmp_path)}
-    process = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
-    output = json.loads(process.stdout)
-    assert output["engine"] == "exact" and output["compile_seconds"] == 0
-    assert 7e7 < output["bytes"] < 2e8
-
-
 RANDOM_VIBRATION = """[structure]
 moving_mass = "1 kg"
 [[structure.mode]]
@@ -254,26 +197,3 @@ def test_always_random_run_stores_planned_number_of_samples():
     expected = costs.count_stored_samples(choose_numerics(run_plan.model))
     assert run.run(run_plan).window.time.size == pytest.approx(expected, rel=0.01)
     assert 1e9 < plan_text(RANDOM_VIBRATION.format(60)).bytes < 2e9
-
-
-def test_plan_includes_solution_on_points_of_rough_trace(tmp_path):
-    """The plan of a patch with a rough trace agrees with the CPU time of its run within a factor of 4; almost all of it
-    is spent on points of the trace."""
-    rng = np.random.default_rng(2)
-    x = np.linspace(0.0, 12.7e-3, 4001)
-    waves = np.arange(1, 1300)
-    heights = np.where(waves > 6, waves**-1.3, 0.0) * rng.normal(size=waves.size)
-    z = np.cos(np.pi * np.outer(x / x[-1], waves)) @ heights
-    z *= 0.3e-6 / z.std()
-    rows = "".join(f"{1e6 * place:.4f},{1e6 * height:.6f}\n" for place, height in zip(x, z))
-    (tmp_path / "trace.csv").write_text(f"x [um],z [um]\n{rows}", "utf-8")
-    text = '[contact]\nlength = "12.7 mm"\nwidth = "12.7 mm"\nheight = "6.35 mm"\nload = "500 N"\n'
-    text += 'substrate = "steel"\n[contact.profile]\nfile = "trace.csv"\nheights = "surface"\n'
-    scene = loads(text, tmp_path / "a.toml")
-    planned = plan(scene)
-    start = time.process_time()
-    result = run.run(scene)
-    seconds = time.process_time() - start
-    assert result.patch.points is not None
-    assert planned.cost.times["points"] > planned.seconds / 2
-    assert seconds / 4 <= planned.seconds <= 4 * seconds

@@ -41,28 +41,6 @@ def build_family(*angles, **keys):
     return [build_model(angle, **keys) for angle in angles]
 
 
-@pytest.mark.parametrize("angle", [1e-6, 1e-3])
-def test_exact_cached_run_agrees_with_fresh_run_on_shared_mesh(angle):
-    """A run on a shared mesh that uses the cache agrees with a fresh run."""
-    case = next(
-        expected
-        for expected in with_shared_meshes(build_family(1e-6, 1e-5, 1e-3))
-        if expected.patch.gap.angle == angle
-    )
-    run(case)
-    cached = run(case)
-    fresh = run(case, fresh=True)
-    assert cached.patch.x.size == fresh.patch.x.size
-    for name, expected in fresh.measures.items():
-        actual = cached.measures[name]
-        assert actual.value == pytest.approx(
-            expected.value, rel=1e-12, abs=1e-12 * expected.floor
-        ), name
-        assert actual.error == pytest.approx(
-            expected.error, rel=1e-12, abs=1e-12 * abs(expected.value)
-        ), name
-
-
 def test_always_shared_mesh_meets_tolerance_of_every_case():
     """The mesh is refined until the errors of the worst case are below the tolerance."""
     text = TEXT.replace("1e-2", "1e-3")
@@ -124,16 +102,3 @@ def test_always_loop_errors_of_sweep_are_close_to_single_runs():
         )
         assert on_shared_mesh.error <= 1.5 * single.error
         assert abs(on_shared_mesh.value - single.value) <= on_shared_mesh.error + single.error
-
-
-def test_always_remedies_of_sweep_agree_with_single_runs():
-    """A shared mesh has other nodes, so that errors differ a little, but the remedies are the same."""
-    text = JOINT.replace("tolerance = 1e-2", "tolerance = 1e-3")
-    cases = [build(scene.loads(text.format(size))) for size in (0.2, 1.4)]
-    for single_case, shared_case in zip(cases, with_shared_meshes(cases), strict=True):
-        single = run(single_case)
-        on_shared_mesh = run(shared_case)
-        assert any("interface nodes) causes this error" in warning for warning in single.warnings)
-        assert [warning.rpartition("; ")[2] for warning in on_shared_mesh.warnings] == [
-            warning.rpartition("; ")[2] for warning in single.warnings
-        ]

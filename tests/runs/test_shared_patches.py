@@ -52,18 +52,11 @@ def test_exact_runs_with_shared_patch_agree_with_separate_runs():
     [
         {"contact.load": 100.0},
         {"contact.tilt.angle": 3e-5},
-        {"contact.crown.radius": 3.0},
         {"contact.step.height": 1e-6, "contact.step.at": 1e-3},
-        {"contact.width": 0.01},
-        {"contact.height": 0.006},
         {"contact.plane": "stress"},
-        {"contact.pairs": 2},
-        {"contact.substrate": "WC-Co"},
         {"contact.coating.thickness": 1e-4},
-        {"contact.upper.height": 0.005},
         {"contact.element_size": 1e-3},
         {"contact.asperities.law": "linear", "contact.asperities.normal_stiffness": 1e14},
-        {"contact.holder.tangential_stiffness": 1e7},
         {"contact.holder.rotational_stiffness": 1e3},
     ],
 )

@@ -7,7 +7,7 @@ import patchfem as pf
 from patchfem.scene import loads
 
 
-@pytest.mark.share(1, 2)
+@pytest.mark.share(1)
 @pytest.mark.parametrize(
     "compare, seed", [(compare_joint, 3024), (compare_rig, 3000), (compare_chain, 3000)]
 )

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from patchfem.runs.wear.slip import Frames, choose_frame_count, compute_frame_slip
+from patchfem.runs.wear.slip import Frames, compute_frame_slip
 
 PHASES = np.linspace(0, 1, 41)
 
@@ -46,11 +46,3 @@ def test_always_error_of_slip_path_covers_hidden_reversals(slip, path, energy):
             rel_difference = abs(frame_slip.path[0] / path - 1)
             assert rel_difference <= frame_slip.error + 1e-12 and frame_slip.error < 5 / count
             assert frame_slip.path[1] == pytest.approx(frame_slip.path[0], rel=1e-12)
-
-
-def test_order_of_frame_count_in_tolerance():
-    """The number of frames grows with the inverse square root of the tolerance."""
-    assert choose_frame_count(1e-2) == 223 and choose_frame_count(1e-3) / choose_frame_count(
-        1e-2
-    ) == pytest.approx(10**0.5, rel=0.01)
-    assert choose_frame_count(1e-9) == 800

@@ -30,17 +30,13 @@ ACCURACY_TABLE = "cycles = 30\n[accuracy]\n"
 @pytest.mark.parametrize(
     "name, old, new",
     [
-        ("smooth", CONSTANT_BONDS, CONSTANT_BONDS),
         ("smooth", CONSTANT_BONDS, GROWING_BONDS),
         ("smooth", CONSTANT_BONDS, CONSTANT_BONDS + "\nbreakaway = 0.3"),
         ("smooth", LAW_NAME, 'law = "lugre"\nstiffness = "1e7 N/m"\nstribeck_speed = "1 cm/s"'),
-        ("smooth", LAW_NAME, 'law = "bouc-wen"\nstiffness = "1e7 N/m"'),
         ("march", CONSTANT_BONDS, SHORT_BONDS),
         ("march", CONSTANT_BONDS, GROWING_BONDS + "\nbreakaway = 0.3"),
         ("march", CONSTANT_BONDS, CONSTANT_BONDS + "\norder = 0.5"),
-        ("march", CONSTANT_BONDS, CONSTANT_BONDS + '\nreading = "report"'),
         ("march", "cycles = 30", ACCURACY_TABLE + "steps_per_cycle = 400"),
-        ("march", "cycles = 30", ACCURACY_TABLE + 'method = "march"'),
         ("march", 'waveform = "sine"', 'waveform = "levels"\nlevels = ["3 g", "5 g"]'),
         ("march", "slide = 1.0", 'slide = 1.0\n[structure.stiffening]\ncubic = "1e12 N/m^3"'),
     ],

@@ -158,7 +158,7 @@ MISSES = {601: {("rotational_stiffness", 1e-3)}}
 MAX_MISS = 1.5  # Largest ratio of true to stated error of an exception.
 
 
-@pytest.mark.share(0)
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(600, 600 + len(KINDS)))
 def test_always_errors_of_random_patch_cover_independent_program(seed):
     """For one random scene of each kind, the errors cover an independent program, apart from

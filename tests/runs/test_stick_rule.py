@@ -55,7 +55,7 @@ def run_exact_and_march(scene, steps: int) -> list:
     return rows
 
 
-@pytest.mark.share(0, 2, 4)
+@pytest.mark.share(2, 4)
 @pytest.mark.parametrize(
     "law, omega, second_mode",
     [

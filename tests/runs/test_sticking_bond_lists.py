@@ -100,7 +100,7 @@ tolerance = 0.003
 """
 
 
-@pytest.mark.share(0, 1)
+@pytest.mark.share(0)
 @pytest.mark.parametrize(
     "text",
     [

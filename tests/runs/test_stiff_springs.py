@@ -17,12 +17,8 @@ DRIVE = '[drive]\nkind = "base"\nfrequency = "180 Hz"\nacceleration = "8 g"\ncyc
 RIG = POINT + LAW + MODE + DRIVE
 RUNS = {
     "a point on a bench": POINT + LAW + TRIANGLE,
-    "a patch": SMALL_PATCH + LAW + TRIANGLE,
     "a patch that gives way": SMALL_PATCH + SHEAR + LAW + TRIANGLE,
-    "a rig": RIG,
     "a balance": RIG + '[accuracy]\nmethod = "harmonic"\n',
-    "a march": RIG + '[accuracy]\nmethod = "march"\n',
-    "a patch in a rig": SMALL_PATCH + SHEAR + LAW + MODE + DRIVE,
     "modes of a bolted rig": RIG.replace('"0.884 kg"', '"0.884 kg"\nmeasured = "stuck"').replace(
         "143", "800"
     ),
@@ -109,16 +105,3 @@ def test_refuses_stiffness_with_incompatible_keys(sets, key, message):
         loads(
             text.replace(f'stiffness = "{STIFFNESS} N/m"', 'bond_length = "5 um"'), "a.toml", sets
         )
-
-
-def test_refuses_stiffness_with_approach_or_worn_bonds():
-    """A stiffness is refused with a prescribed approach and with a bond length that changes with wear."""
-    text = format_both_ways(SMALL_PATCH + LAW + TRIANGLE)[0].replace('load = "26 lbf"', "")
-    text += '[contact.approach]\ndistance = "0.2 um"\n'
-    assert "or contact.load in place of [contact.approach]" in list_mistakes(text)[0]
-    worn = (
-        format_both_ways(SMALL_PATCH + LAW + TRIANGLE)[0]
-        + '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1e5\n'
-        '[wear.friction]\ndepth = ["0 um", "1 um"]\nbond_length_factor = [1, 2]\n'
-    )
-    assert "give friction.bond_length" in list_mistakes(worn)[0]

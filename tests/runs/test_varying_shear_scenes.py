@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scene_texts import RIG
 
-from patchfem import plan
 from patchfem.runs.run import run
 from patchfem.scene import loads
 
@@ -13,7 +12,6 @@ MOVING_RIG = MOVING_RIG.replace("cycles = 200", "cycles = 12")
 MOVING_RIG = MOVING_RIG.replace("slide = 0.1", 'slide = 0.1\nnormal = 0.3\npitch = "40 rad/m"')
 SETTINGS = ["contact.element_size=200 um", "accuracy.steps_per_cycle=200", "contact.shear={}"]
 PLASTIC = "friction.law=elastic-plastic"
-SKIN = 'contact.asperities={law="linear", normal_stiffness="2e14 Pa/m", tangential_ratio=0.8}'
 
 
 def run_rig(*sets, estimate=False):
@@ -70,32 +68,6 @@ def test_exact_fields_of_sheared_patch_satisfy_friction_law():
         assert (stretch > 0).all() and stretch.max() <= 1 + 1e-6
         n_checked += in_contact.sum()
     assert n_checked > 100
-
-
-def test_exact_run_states_shear_modes_and_includes_their_error():
-    """A warning states the number of tangential modes; the error of every measure includes half as
-    many modes, coarser steps and a coarser mesh."""
-    result = run_rig(*SETTINGS, SKIN, estimate=True)
-    warnings = [line for line in result.warnings if "tangential modes" in line]
-    assert len(warnings) == 1 and warnings[0].startswith(
-        "[contact.shear]: the normal load changes with the"
-    )
-    amplitude_measure = result.measures["relative_displacement_amplitude"]
-    assert 0 < amplitude_measure.error < 0.1 * amplitude_measure.value
-    run_plan = plan(loads(MOVING_RIG, "a.toml", [*SETTINGS, SKIN, PLASTIC]))
-    assert [line for line in run_plan.verdict if "tangential modes" in line] and run_plan.unknowns[
-        "shear_modes"
-    ] == 4
-    assert not [
-        line for line in plan(loads(RIG, "a.toml", SETTINGS)).verdict if "tangential modes" in line
-    ]
-    assert not [
-        line
-        for line in run(
-            loads(RIG, "a.toml", [*SETTINGS, "drive.cycles=4"]), estimate=False
-        ).warnings
-        if "tangential modes" in line
-    ]
 
 
 def test_exact_holder_spring_of_rigid_piece_is_one_mode():

@@ -35,7 +35,7 @@ def build_wear_model(shape: str, keys: str):
     return pf.build(SCENE.replace("[friction]", shape + "[friction]") + keys)
 
 
-@pytest.mark.share(1, 3)
+@pytest.mark.share(1)
 @pytest.mark.parametrize(
     "shape, cycles",
     [

@@ -2,7 +2,6 @@
 
 import io
 import json
-import re
 
 import h5py
 import numpy as np
@@ -25,12 +24,10 @@ from scene_texts import (
 from scipy.optimize import brentq
 
 import patchfem as pf
-from patchfem import build
 from patchfem.closed_forms.contact import hertz_half_width, hertz_peak
 from patchfem.contact.unilateral import solve_forces
 from patchfem.core import Compliance, Interface
 from patchfem.elasticity import Piece, interface_compliance
-from patchfem.runs.patch.result import solve_with_coarser
 from patchfem.runs.wear import evolve
 from patchfem.scene import loads
 from patchfem.slip import jenkins_set
@@ -51,30 +48,6 @@ LONG_WEAR = WEAR.replace("135723", "1e9").replace("1e-14", "1e-13")
 WORN_THROUGH_SCENE = (
     TILTED + COULOMB + SINE + LONG_WEAR
 )  # The coating is worn through before the last cycle.
-WORN_CROWN = """[contact]
-length = "6 mm"
-width = "8 mm"
-height = "5 mm"
-load = "800 N"
-substrate = "Ti-8Al-1Mo-1V"
-[contact.upper]
-coating = {{material = "WC-Co", thickness = "60 um"}}
-[contact.crown]
-radius = "200 mm"
-[accuracy]
-tolerance = {tolerance}
-[slide]
-kind = "sine"
-amplitude = "40 um"
-frequency = "10 Hz"
-cycles = 3
-[wear]
-coefficient = "1e-14 m^2/N"
-cycles = 100000
-[friction]
-law = "coulomb"
-static = 0.6
-"""
 LARGE_TOLERANCE = "[accuracy]\ntolerance = 2e-2\n"
 
 
@@ -108,17 +81,7 @@ def test_exact_point_contact_wear_agrees_with_archard(motion):
     assert "worn_depth_max" not in result.measures
 
 
-def test_exact_energy_form_agrees_with_archard():
-    """The form 'energy' with the coefficient kappa/mu agrees with Archard's law."""
-    archard = run_text(TILTED + COULOMB + SINE + WEAR)
-    energy = run_text(
-        TILTED + COULOMB + SINE + WEAR.replace("1e-14", repr(KAPPA / 0.3)) + 'form = "energy"\n'
-    )
-    for name in ("worn_volume", "worn_depth_max", "pressure_peak"):
-        assert energy.measures[name].value == pytest.approx(archard.measures[name].value, rel=1e-9)
-
-
-@pytest.mark.share(0, 2, 3, 4)
+@pytest.mark.share(0, 3)
 @pytest.mark.parametrize(
     "table",
     [
@@ -171,21 +134,6 @@ def worn_folder(tmp_path_factory):
     answer = run_cli("run", scene, "-o", scene.parent / "out", "-q")
     assert answer.code == 0, answer.err
     return scene.parent / "out"
-
-
-def test_exact_dataset_contains_wear_history(worn_folder):
-    """The dataset contains worn depth, volume and cycles of every wear step; each frame balances the load."""
-    with xr.open_dataset(worn_folder / "result.nc", engine="h5netcdf") as data:
-        load = (data.weight * data.normal_stress).sum("x")
-        assert load.values == pytest.approx(LOAD, rel=1e-10)
-        depth = data.worn_depth.values
-        assert (np.diff(depth, axis=0) >= -1e-20).all()
-        assert not depth[0].any()
-        assert depth[-1].max() > 0
-        volume = data.wear_worn_volume.values
-        assert volume == pytest.approx(KAPPA * LOAD * 40e-6 * data.wear_cycle.values, rel=1e-12)
-        assert data.wear_cycle.values[[0, -1]].tolist() == [0.0, CYCLES]
-        assert (np.diff(data.frame_time.values) > 0).all()
 
 
 def test_exact_piece_displacements_agree_with_gap_and_worn_depth(worn_folder):
@@ -273,20 +221,6 @@ def test_exact_wear_shakedown_of_crown_agrees_with_closed_form():
     )
 
 
-def test_exact_recommended_tolerance_refines_mesh_under_wear():
-    """The warning of a worn patch recommends a tolerance with a finer mesh. The mesh is chosen for
-    the unworn patch; a tolerance derived from the worn patch led to the same mesh."""
-    text = WORN_CROWN.format(tolerance=1e-2)
-    result = run_text(text)
-    warnings = [warning for warning in result.warnings if "finer mesh" in warning]
-    nodes, tolerance = re.search(
-        r"\((\d+) interface nodes\).*accuracy\.tolerance = (\S+) for", warnings[0]
-    ).groups()
-    assert int(nodes) == result.patch.x.size
-    patch_model = build(loads(WORN_CROWN.format(tolerance=tolerance), "s.toml")).patch
-    assert solve_with_coarser(patch_model, float(tolerance))[0].x.size > int(nodes)
-
-
 def test_refuses_wear_without_steady_motion():
     """Wear is refused for a static patch and for a release, which has no steady motion."""
     assert any("wear" in line for line in list_mistakes(TILTED + WEAR))
@@ -314,7 +248,7 @@ def test_always_unbounded_motion_has_no_wear():
         assert any("nothing was worn" in line for line in result.warnings)
 
 
-@pytest.mark.share(1, 4)
+@pytest.mark.share(1)
 @pytest.mark.parametrize(
     "text",
     [
@@ -327,7 +261,7 @@ def test_always_unbounded_motion_has_no_wear():
     ids=["bench_jumps", "rig_jumps", "bench", "rig", "worn_through"],
 )
 def test_exact_resumed_wear_run_writes_identical_files(tmp_path, monkeypatch, text):
-    """A run that is resumed from its first, middle and last saved state writes the same bytes as
+    """A run that is resumed from its first and last saved state writes the same bytes as
     the uninterrupted run."""
     scene = tmp_path / "worn.toml"
     states = []
@@ -343,7 +277,7 @@ def test_exact_resumed_wear_run_writes_identical_files(tmp_path, monkeypatch, te
         patched.setattr(evolve, "save_wear_state", save_and_record)
         assert run_cli("run", scene, "-o", tmp_path / "whole", "-q", "--no-page").code == 0
     assert len(states) >= 2
-    for state in (states[0], states[len(states) // 2], states[-1]):
+    for state in (states[0], states[-1]):
         (tmp_path / "out.partial").mkdir()
         (tmp_path / "out.partial" / "wear.npz").write_bytes(state)
         resumed = run_cli("run", scene, "-o", tmp_path / "out", "--resume", "-q", "--no-page")
@@ -416,9 +350,7 @@ def test_refuses_to_resume_run_of_other_scene(tmp_path, monkeypatch):
     assert not (tmp_path / "out" / "wear.npz").exists() and not (tmp_path / "out.partial").exists()
 
 
-@pytest.mark.parametrize(
-    "quiet, state, n_messages", [((), "wear.npz", 1), (("-q",), "wear.npz", 0), ((), "", 0)]
-)
+@pytest.mark.parametrize("quiet, state, n_messages", [((), "wear.npz", 1), ((), "", 0)])
 def test_exact_new_run_reports_discarded_state_once(tmp_path, quiet, state, n_messages):
     """A new run reports once that it discards the saved state of an interrupted run."""
     scene = tmp_path / "plain.toml"

@@ -35,7 +35,7 @@ def run_with_work_check(text, *sets):
     return result.measures["work_check"].value, result
 
 
-@pytest.mark.share(0, 1, 2, 4)
+@pytest.mark.share(1, 4)
 @pytest.mark.parametrize("law", LAWS)
 def test_order_of_work_check_of_march_is_two(law):
     """The work check converges with second order; a wrong factor in the friction work would leave a
@@ -81,7 +81,6 @@ def test_exact_work_check_of_two_interfaces_closes(monkeypatch):
 @pytest.mark.parametrize(
     "text",
     [
-        POINT + LAWS["bonds"] + RIG,
         POINT + 'law = "nonlocal"\nbond_length = "1 um"\n'
         '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "10 Hz"\n',
     ],

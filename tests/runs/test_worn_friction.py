@@ -3,7 +3,6 @@ refusals."""
 
 import numpy as np
 import pytest
-from command_line import run_cli
 
 import patchfem as pf
 from patchfem import SceneError
@@ -54,10 +53,10 @@ def run_scene(*sets):
     return pf.run(loads(SCENE, "a.toml", sets))
 
 
-@pytest.mark.parametrize("tolerance", [1e-2, 1e-3])
-def test_exact_run_in_agrees_with_exponential_closed_form(tolerance):
+def test_exact_run_in_agrees_with_exponential_closed_form():
     """The mean worn depth agrees with h = H (1 - exp(-alpha mu_0 p s n/H)), the solution of dh/dn =
     alpha mu_0 (1 - h/H) p s, at every wear step."""
+    tolerance = 1e-3
     result = run_scene(f"accuracy.tolerance={tolerance}")
     coefficient = result.measures["static_coefficient"]
     volume = result.measures["worn_volume"]
@@ -74,20 +73,6 @@ def test_exact_run_in_agrees_with_exponential_closed_form(tolerance):
         abs(loop.value - PATH * LOAD * MU * (1 - depth[-1] / DEPTH))
         <= loop.error
         < tolerance * loop.value
-    )
-
-
-def test_exact_archard_volume_does_not_depend_on_friction():
-    """The slide is prescribed, so that Archard's volume does not depend on friction; the friction
-    force follows the worn depth."""
-    result = run_scene(
-        "wear.form=archard", "wear.friction.coefficient_factor=[1,1.8]", "wear.cycles=1e6"
-    )
-    volume = ALPHA * LOAD * PATH * 1e6
-    # The bond stretch changes the volume by 1e-9.
-    assert result.measures["worn_volume"].value == pytest.approx(volume, rel=1e-8, abs=0)
-    assert result.measures["friction_force_peak"].value == pytest.approx(
-        MU * LOAD * (1 + 0.8 * volume / AREA / 8e-6), rel=1e-8
     )
 
 
@@ -152,10 +137,6 @@ def test_always_wear_beyond_friction_table_gives_warning():
             "2 factors for 3 depths; give one factor for each",
         ),
         (
-            ['wear.friction.depth=["0 um"]'],
-            "wear.friction.depth: at least 2 values are needed, not 1",
-        ),
-        (
             ["wear.friction.coefficient_factor=[1.1,2]"],
             "the first factor must be 1, not 1.1, because [friction] itself",
         ),
@@ -187,24 +168,3 @@ def test_refuses_friction_table_of_point_contact():
         SceneError, match=r"wear.friction: a \[normal\] contact has no area.*: use \[contact\]"
     ):
         loads(text, "a.toml")
-
-
-def test_exact_sweep_over_friction_tables(tmp_path):
-    """A sweep can vary the table of friction over depth."""
-    scene = tmp_path / "a.toml"
-    scene.write_text(SCENE)
-    answer = run_cli(
-        "sweep",
-        scene,
-        "--over",
-        "wear.friction.coefficient_factor=[1,1],[1,0.5]",
-        "-o",
-        tmp_path / "out",
-        "-q",
-        "--set",
-        "wear.jumps=4",
-        "--json",
-    )
-    assert answer.code == 0, answer.err
-    rows = (tmp_path / "out" / "sweep.csv").read_text()
-    assert '"[1,0.5]"' in rows and "static_coefficient" in rows

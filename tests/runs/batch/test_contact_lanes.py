@@ -6,13 +6,10 @@ The long campaign against single runs is `lanes` of tests/support/campaigns.py.
 
 import numpy as np
 import pytest
-from lane_cases import PATCH, compare_answers, draw_patches
+from lane_cases import compare_answers, draw_patches
 
-import patchfem as pf
-from patchfem.api import get_base_scene
 from patchfem.runs.batch import batches, meshes
 from patchfem.runs.batch.lumped import sheared, tabled
-from patchfem.scene import format_assignments
 
 
 def compare_lanes_with_exact(family: str, seed: int, count: int) -> tuple:
@@ -46,33 +43,3 @@ def test_always_patch_larger_than_table_is_solved_exactly(monkeypatch):
     assert all(numerics["engine"] == "piecewise" for numerics in lanes.numerics.values())
     for name, column in exact.values.items():
         np.testing.assert_array_equal(lanes.values[name], column)
-
-
-def test_always_stuck_patch_is_solved_in_lanes():
-    """A stuck patch is solved in lanes although the relative change of its loop area with the steps
-    is large: the loop area is a small difference, and only the amplitude decides."""
-    base = get_base_scene(pf.load(PATCH))
-    sets = [
-        {
-            "drive.acceleration": "50 m/s^2",
-            "friction.static": static,
-            "contact.tilt.angle": f"{tilt} rad",
-        }
-        for static, tilt in ((0.57, 3.7e-6), (0.54, 1.2e-6), (0.59, 4e-6))
-    ]
-    models = meshes.with_shared_meshes(
-        [pf.build(base.override(format_assignments(assignments))) for assignments in sets]
-    )
-    lanes = tabled.solve(models)
-    exact = sheared.solve(models)
-    assert all(assignments["engine"] == "lanes" for assignments in lanes.numerics.values())
-    assert list(lanes.outcome) == list(exact.outcome) == 3 * ["stuck"]
-    for name in ("relative_displacement_amplitude", "friction_force_peak", "ring_frequency"):
-        differences = np.abs(lanes.values[name] - exact.values[name])
-        assert (differences <= lanes.errors[name] + exact.errors[name]).all()
-        # The errors of the exact batch come only from the mesh.
-        step_errors = lanes.errors[name] - 1.1 * exact.errors[name]
-        assert (
-            step_errors
-            <= models[0].accuracy.tolerance * np.abs(exact.values[name]) + lanes.floors[name]
-        ).all()

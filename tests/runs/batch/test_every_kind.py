@@ -100,12 +100,3 @@ def assert_equal_to_single_runs(kind: str, seed: int, count: int) -> int:
 def test_exact_batch_agrees_with_single_runs(kind):
     """A batch of each kind of run agrees with single runs of its cases."""
     assert assert_equal_to_single_runs(kind, 1, 2) == 2
-
-
-def test_exact_benches_without_wear_form_a_batch():
-    """Benches without wear share one pressed patch and form a batch; benches with wear run one by
-    one."""
-    batch_by_kind = {
-        kind: batches.choose_batch(draw_models(kind, 1, 2)[0]) for kind in ("bench", "bench wear")
-    }
-    assert batch_by_kind["bench"].name == "benches" and batch_by_kind["bench wear"] is None

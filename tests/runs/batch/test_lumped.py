@@ -67,34 +67,8 @@ def solve_by_group(cases) -> CaseResults:
 
 
 @pytest.mark.share(0, 1, 2, 3, 5, 6, 7)
-@pytest.mark.parametrize(("law", "count"), [(law, 6 if law == "iwan" else 20) for law in LAWS])
+@pytest.mark.parametrize(("law", "count"), [(law, 4 if law == "iwan" else 8) for law in LAWS])
 def test_exact_batch_agrees_with_single_runs(law, count):
     """The exact batch of lumped cases agrees with single runs in values, errors and texts."""
     cases = draw_models(law, 1, count)
     assert_equal_to_single_runs(cases, one_by_one.solve(cases), solve_by_group(cases))
-
-
-def test_always_errors_of_coarse_iwan_cells_cover_fine_cells():
-    """The results with the number of Iwan cells for a tolerance of 1e-3 agree within their errors
-    with those for 1e-6, also for small cycles that slip only the first cells."""
-    base = get_base_scene(
-        load(SCENE.format(law=LAWS["iwan"], kind="base", kind_size=SIZES["base"]))
-    )
-    for acceleration in ("20 m/s^2", "2 m/s^2", "0.3 m/s^2"):
-        coarse_model, fine_model = (
-            build(
-                base.override(
-                    [f"drive.acceleration={acceleration}", f"accuracy.tolerance={tolerance}"]
-                )
-            )
-            for tolerance in (1e-3, 1e-6)
-        )
-        coarse = lumped.solve([coarse_model])
-        fine = lumped.solve([fine_model])
-        for name, value in coarse.values.items():
-            if np.isfinite(value[0]) and name not in ("energy_balance", "work_check"):
-                assert (
-                    abs(value[0] - fine.values[name][0])
-                    <= coarse.errors[name][0] + coarse.floors[name][0]
-                ), name
-                assert coarse.errors[name][0] <= 1e-3 * abs(value[0]) + coarse.floors[name][0], name

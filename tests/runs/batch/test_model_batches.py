@@ -107,24 +107,6 @@ def test_exact_case_error_is_not_noted_as_batch_fault(set_batch):
     assert not results.notes
 
 
-def test_exact_groups_of_batch_return_in_case_order(set_batch):
-    """A batch receives its cases group by group, and the results have the order of the cases."""
-    groups = []
-
-    def solve(models, say):
-        groups.append([model.point.load for model in models])
-        results = CaseResults(np.full(len(models), "done", object))
-        results.add_measure("load", "N")
-        results.values["load"][:] = groups[-1]
-        return results
-
-    loads = [1.0, 2.0, 3.0, 4.0]
-    models = [pf.build(BENCH, **{"normal.load": load}) for load in loads]
-    set_batch("parity", lambda model: "", lambda model: model.point.load % 2, solve)
-    assert batches.solve_models(models).values["load"].tolist() == loads
-    assert groups == [[1.0, 3.0], [2.0, 4.0]]
-
-
 def test_always_fault_of_one_case_keeps_other_results(monkeypatch):
     """An internal error of one case makes this case fail; the other case has the result of a single
     run."""

@@ -5,12 +5,11 @@ from pathlib import Path
 
 import pytest
 from lane_cases import PATCH, draw_patches, draw_points
-from scene_texts import BENCH, SMALL_PATCH
+from scene_texts import SMALL_PATCH
 
 import patchfem as pf
 from patchfem.runs import with_shared_meshes
-from patchfem.runs.batch import batches, gathered, one_by_one
-from patchfem.runs.batch.lumped import lane_runs, lumped, sheared
+from patchfem.runs.batch import batches, one_by_one
 
 STUDIES = Path(__file__).parents[3] / "studies"
 SHEARED_BENCH = """[contact]
@@ -105,26 +104,3 @@ def test_always_batch_solves_its_cases_together(name, single_runs):
     assert not [
         note for notes in results.notes.values() for note in notes if "internal fault" in note
     ]
-
-
-@pytest.mark.parametrize(
-    ("name", "module", "function"),
-    [
-        ("lumped.lanes", lane_runs, "collect_runs"),
-        ("lumped.lumped", lumped, "assemble_results"),
-        ("lumped.sheared", sheared, "YieldingElements"),
-        ("gathered", gathered, "reduce_to_few_points"),
-    ],
-)
-def test_always_batch_fault_is_noted_in_each_case(
-    name, module, function, replace_single_runs, monkeypatch
-):
-    """If a step of a batch fails, its cases run one by one, and a note of each case names the
-    fault."""
-    models = MODELS[name]()
-    monkeypatch.setattr(module, function, lambda *given, **options: 1 / 0)
-    # Any result will do: the test reads only the notes.
-    replace_single_runs(lambda plan, *given, **options: pf.run(BENCH))
-    results = batches.solve_models(models)
-    for case in range(len(models)):
-        assert f"{name}: ZeroDivisionError: division by zero" in results.notes[case][-1]

@@ -1,20 +1,14 @@
 """Static patches that are pressed together agree with single runs in values, errors, warnings and
 notes."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scene_texts import COATING, PIECE
 
 from patchfem import build
-from patchfem.campaigns import Cases, SweepScene
-from patchfem.campaigns.sweeps.executors import LocalExecutor
-from patchfem.export import compute_in_memory
-from patchfem.runs import solve_with_coarser, with_shared_meshes
+from patchfem.runs import with_shared_meshes
 from patchfem.runs.batch import batches, one_by_one, patches
-from patchfem.runs.patch.grids import find_contact_extent
-from patchfem.scene import make_axis, scene
+from patchfem.scene import scene
 
 TEXT = (
     PIECE
@@ -26,7 +20,6 @@ TILT, LINE = '[contact.tilt]\nangle = "{} rad"\n', '[contact.load_line]\noffset 
 SKIN = (
     '[contact.asperities]\nlaw = "linear"\nnormal_stiffness = "1e14 Pa/m"\ntangential_ratio = 0.8\n'
 )
-CROWN = '[contact.crown]\nradius = "2 m"\n'
 HOLDER = '[contact.holder]\nrotational_stiffness = "100 N m/rad"\n'
 # Relative tolerance of the end pressure of uncoated pieces, a mean over a cell of 1 um (largest
 # difference seen: 1.5e-12).
@@ -82,7 +75,6 @@ def assert_equal_to_single_runs(models, solve_together=None):
     [
         (TILT, (-2e-4, 0.0, 1e-5, 1e-4)),
         (TILT + SKIN, (-1e-4, 1e-5, 2e-4)),
-        (LINE, (-5e-3, -1e-3, 3e-3)),
         (TILT + HOLDER, (1e-5, -2e-4)),
     ],
 )
@@ -142,76 +134,6 @@ def test_exact_mixed_patches_agree_with_single_runs():
         "accuracy.quadrature = 'merged' has no meaning",
     ):
         assert any(part in line for line in texts_by_case), part
-
-
-@pytest.mark.parametrize("tables", [TILT, TILT + SKIN])
-def test_exact_pressed_patches_agree_with_separate_solutions(tables):
-    """Pressure, gap, compliance and the remaining fields of patches that are pressed together agree
-    with separate solutions; motions start from these fields."""
-    models = build_family(tables, -1e-4, 1e-5, 3e-4)
-    for model, pressed in zip(models, patches.attach_solved_patches(models)):
-        assert model.patch.solved is None and pressed.patch.solved is not None
-        for together, separate in zip(
-            pressed.patch.solved.patches, solve_with_coarser(model.patch, 1e-2)
-        ):
-            peak_pressure = separate.pressure.sigma_n.max()
-            assert (
-                np.abs(together.pressure.sigma_n - separate.pressure.sigma_n).max()
-                < 1e-11 * peak_pressure
-            )
-            np.testing.assert_array_equal(together.active, separate.active)
-            np.testing.assert_array_equal(together.unloaded_gap, separate.unloaded_gap)
-            np.testing.assert_array_equal(together.slip_compliance, separate.slip_compliance)
-            assert together.pressure.gap == pytest.approx(
-                separate.pressure.gap, rel=1e-9, abs=1e-9 * np.ptp(separate.unloaded_gap)
-            )
-            for name in ("approach", "rotation", "load", "moment"):
-                assert getattr(together.pressure, name) == pytest.approx(
-                    getattr(separate.pressure, name), rel=1e-11
-                )
-            assert find_contact_extent(together).places == pytest.approx(
-                find_contact_extent(separate).places, rel=1e-9
-            )
-
-
-def test_exact_columns_of_sweep_agree_with_separate_models():
-    """A sweep stored as one model with columns of numbers agrees with separate models of its cases
-    within 1e-12."""
-    values = [(-4.5, 2.0, 300.0), (-3.2, 0.4, 700.0), (-3.9, 20.0, 90.0)]
-    text = TEXT.format(FIXED_SIZE, 100.0, TILT.format(1e-4) + CROWN)
-    keys = {
-        "contact.tilt.angle": [f"{10**a!r} rad" for a, _, _ in values],
-        "contact.crown.radius": [f"{r!r} m" for _, r, _ in values],
-        "contact.load": [f"{load!r} N" for _, _, load in values],
-    }
-    cases = Cases(tuple(make_axis(key, texts, distinct=False) for key, texts in keys.items()), True)
-    results = compute_in_memory(SweepScene(Path("patch.toml"), text), cases, LocalExecutor())
-    models = with_shared_meshes(
-        [
-            build(scene.loads(text, sets=[f"{key}={texts[k]}" for key, texts in keys.items()]))
-            for k in range(3)
-        ]
-    )
-    expected = batches.solve_models(models)
-    for name, column in expected.values.items():
-        for actual, reference in (
-            (results.values[name], column),
-            (results.errors[name], expected.errors[name]),
-        ):
-            assert actual == pytest.approx(reference, rel=1e-12), name
-
-
-def test_refuses_measured_profile_in_patch_batch(tmp_path):
-    """A patch with a measured profile is not pressed with others, because its errors contain the
-    variation along the profile."""
-    (tmp_path / "waves.csv").write_text(
-        "x [mm],z [um]\n" + "".join(f"{0.1 * k},{k % 3}\n" for k in range(-70, 71))
-    )
-    text = TEXT.format(FIXED_SIZE, 100.0, '[contact.profile]\nfile = "waves.csv"\n')
-    models = with_shared_meshes(
-        [build(scene.loads(text, tmp_path / "patch.toml")) for _ in range(2)]
-    )
-    assert "profile" in patches.refusal_reason(models[0])
 
 
 def test_refuses_own_mesh_or_hertz_skin_in_patch_batch():
