@@ -60,13 +60,6 @@ def test_exact_displacement_gauge_has_own_factor(tmp_path):
     assert "(computed displacement multiplied by the reading factor 0.8)" in run_page(result, {})
 
 
-def test_exact_reading_is_listed_as_effect(tmp_path):
-    """The reading is listed as an effect after the measured data."""
-    effects = load_scene(tmp_path, "measured.reading=fundamental").effect_names()
-    assert effects[-2:] == ["measured", "measured.reading=fundamental"]
-    assert load_scene(tmp_path).effect_names()[-1] == "measured"
-
-
 @pytest.mark.parametrize(
     "settings, message",
     [

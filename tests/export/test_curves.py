@@ -7,14 +7,11 @@ import pytest
 import xarray as xr
 from command_line import run_cli
 from matplotlib.figure import Figure
-from matplotlib.text import Annotation
 from page_data import read_charts
 from scene_texts import COULOMB, MODE, POINT
 
-from patchfem.core import Outcome
-from patchfem.export import netcdf, report
+from patchfem.export import netcdf
 from patchfem.export.drawing import charts, pictures
-from patchfem.export.page_data import RunData, SceneText, Verdict
 
 FOLDED = {
     "frequency": np.array([10.0, 11, 12, 13, 12.5, 12, 11.5, 12.5, 14]),
@@ -76,15 +73,6 @@ def run_results(tmp_path_factory):
     return run_scene
 
 
-def test_exact_regime_sections_of_folded_curve():
-    """A folded curve has a stable, an unstable and again a stable section."""
-    assert charts.regime_stretches(FOLDED) == [
-        ("stable", 0, 4),
-        ("unstable", 4, 7),
-        ("stable", 7, 9),
-    ]
-
-
 def test_exact_chart_of_folded_curve():
     """The chart of a folded curve names its stable and unstable parts and its folds; drawing is reproducible."""
     text = pictures.draw_charts(charts.curve_charts(FOLDED))
@@ -119,17 +107,6 @@ def test_exact_chart_of_unbounded_level_curve():
     assert "no bounded motion" in charts.curve_caption(
         curve
     ) and ">unbounded<" in pictures.draw_charts(charts.curve_charts(curve))
-
-
-def test_exact_regime_sentence_states_stability():
-    """The sentence about the regime states from the Floquet multiplier whether a disturbance decays."""
-    assert charts.regime_sentence(None) == ""
-    assert "decays" in charts.regime_sentence({"regime": "2 stops", "multiplier": 0.2})
-    assert "grows or persists" in charts.regime_sentence({"regime": "unstable", "multiplier": 1.2})
-    assert (
-        charts.regime_sentence({"regime": "stuck", "multiplier": 0.0})
-        == " Regime: stuck; largest Floquet multiplier 0."
-    )
 
 
 def test_exact_curve_is_stored_in_netcdf():
@@ -205,41 +182,6 @@ def test_exact_page_lists_levels_in_order(run_results):
     assert data.level_drive.values == pytest.approx(9.80665 * np.array([3, 5, 6, 5, 4, 3]))
 
 
-def test_exact_level_arrows_follow_test_order():
-    """The arrows between drive levels point in the order of the test."""
-    rows = [
-        {"drive": d, "stuck": d < 2, "values": {"relative_displacement_amplitude": a}, "errors": {}}
-        for d, a in ((1.0, 0.0), (2.0, 1e-6), (3.0, 4e-6), (2.0, 2e-6))
-    ]
-    axes = Figure().subplots()
-    pictures.draw_charts(charts.levels_chart(rows), axes_to_use=axes)
-    arrows = [text for text in axes.texts if isinstance(text, Annotation) and text.arrow_patch]
-    upwards = [(arrow.xyann[0] < arrow.xy[0], arrow.xyann[1] < arrow.xy[1]) for arrow in arrows]
-    assert upwards == [(True, True), (True, True), (False, False)]
-
-
-def test_exact_page_without_curve_has_no_curve_section():
-    """A page of a run without a curve and levels has no sections about them, and states the computing time."""
-    summary = {
-        "patchfem": "0",
-        "title": "",
-        "kind": "patch",
-        "outcome": "done",
-        "measures": {},
-        "effects": [],
-        "not_in_scene": [],
-        "warnings": [],
-        "notes": [],
-        "seconds": {},
-    }
-    data = RunData(SceneText("a", "", ""), Verdict(summary, Outcome.DONE.sentence), {})
-    assert "Floquet" not in report.page_html(data) and "<h2>Levels" not in report.page_html(data)
-    summary["seconds"] = {"total": 0.434, "files": 0.1}
-    text = report.page_html(data)
-    assert "computed in 0.43 s" in text
-    assert "Wall-clock seconds: total 0.434 s, files 0.100 s" in text
-
-
 def test_exact_levels_over_three_decades_are_logarithmic():
     """Levels with amplitudes of 2 nm and 40 um have a logarithmic axis; a level without motion is not drawn."""
     rows = [
@@ -267,10 +209,3 @@ def test_exact_levels_over_three_decades_are_logarithmic():
         axes = Figure().subplots()
         pictures.draw_charts(charts.levels_chart(chosen), axes_to_use=axes)
         assert axes.get_yscale() == scale
-
-
-@pytest.mark.parametrize("length, frame", [(8e-3, [216, 270]), (20e-3, [300, 150])])
-def test_exact_worn_map_keeps_aspect_ratio(length, frame):
-    """The map of the worn depth keeps the ratio of length to width, within 300 x 270 pixels."""
-    (chart,) = charts.worn_map_chart(np.linspace(0, length, 9), 10e-3, np.full((4, 9), 1e-6))
-    assert chart["frame"] == frame

@@ -22,7 +22,7 @@ REPLACEMENTS = {
     "none": np.full(5, np.nan),
 }
 SLIDE = '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "143 Hz"\ncycles = 2\n'
-SAMPLE_INTERVAL = 571  # Interval of the damages that are tested in a quick run.
+SAMPLE_INTERVAL = 907  # Interval of the damages that are tested in a quick run.
 # A complex error of a sweep is always tested: NumPy would drop its imaginary part with a Python warning.
 ALWAYS_TESTED = ("s", "sweep.nc", "slip_amplitude_error", "complex")
 

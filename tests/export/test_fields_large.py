@@ -14,7 +14,7 @@ import h5py
 import numpy as np
 import pytest
 import pyvista
-from exported import UNITS, frame_values, make_wave_block, write_small_series
+from exported import frame_values, write_small_series
 from scene_texts import COATED
 from vtkmodules.vtkIOHDF import vtkHDFReader
 
@@ -24,14 +24,13 @@ from patchfem.elasticity import get_cells, lame, make_points
 from patchfem.export.fields import bodies, vtkhdf
 from patchfem.export.fields.series import Series
 from patchfem.export.fields.vtkhdf import NAME, round_to_bits, round_to_step
-from patchfem.export.fields.vtu import export_fields
 
 KILLED = """\
 import os, sys
 from pathlib import Path
 from patchfem.export.fields import vtkhdf
 sys.path[:0] = {paths!r}
-from exported import write_small_series, write_wave_series
+from exported import write_small_series
 calls, inner, vtkhdf.MIN_FRAMEWISE_BYTES = [0], vtkhdf._rounding_function, 0
 def counted(nearest):
     def one(values):
@@ -233,36 +232,6 @@ def test_always_killed_writer_leaves_complete_frames(tmp_path):
         )
         assert np.array_equal(grids["upper"].cell_data["von_mises"], expected)
     assert number == count - 1
-
-
-@pytest.mark.usefixtures("framewise_writing")
-def test_always_exported_series_is_compact(tmp_path):
-    """An exported series takes at most 1.15 times the space of the fields file, with equal numbers.
-
-    With a mesh in every frame it took 2.4 times as much.
-    """
-    piece = make_wave_block(12, 90, 60)
-    line = make_wave_block(12, 90, 1)
-    piece.cell_data["material"] = np.zeros((1, 90 * 60), np.int8)
-    line.point_data.update(
-        dict.fromkeys(("gap", "normal_stress"), np.zeros((1, len(line.points)), np.float32))
-    )
-    blocks = {"lower": piece, "upper": piece, "interface": line}
-    steps = {"stress": 4096.0, "von_mises": 5000.0, "displacement": 2e-10}
-    vtkhdf.write_series(
-        tmp_path / NAME, blocks, np.arange(12) * 1e-4, UNITS, dict.fromkeys(blocks, steps)
-    )
-    export_fields(tmp_path, tmp_path / "out.pvd")
-    size = sum(path.stat().st_size for path in (tmp_path / "out_frames").iterdir())
-    assert size < 1.15 * (tmp_path / NAME).stat().st_size, (size, (tmp_path / NAME).stat().st_size)
-    with Series(tmp_path) as series:
-        frame = series.frame(7)
-    mesh = pyvista.read(tmp_path / "out_frames" / "frame_0007_lower.vtu")
-    for name in ("stress", "von_mises"):
-        assert np.array_equal(mesh.cell_data[name], frame.blocks["lower"].cell_data[name])
-    assert np.array_equal(
-        mesh.point_data["displacement"], frame.blocks["lower"].point_data["displacement"]
-    )
 
 
 @pytest.mark.parametrize("power", [-30, -3, 0, 12])

@@ -1,4 +1,4 @@
-"""Animations of the last cycle: all frames with one scale of colours and magnification; refused options."""
+"""Animations of the last cycle: their frames agree with the pictures of single frames; refused options."""
 
 from __future__ import annotations
 
@@ -69,52 +69,6 @@ def test_exact_last_cycle_excludes_pressed_state():
     assert last_consecutive_frames(np.array([0.0])) == (0,) and last_consecutive_frames(
         np.array([0.0, 2.0])
     ) == (0, 1)
-
-
-def test_exact_frames_share_scale_and_window(small_folder):
-    """All frames have one scale, window and magnification, which contain all stresses and positions."""
-    with Series(small_folder) as series:
-        settings = make_film(series)
-        frames = [series.frame(number) for number in settings.numbers]
-    line = frames[0].interface()
-    stress = [frame.point_data["normal_stress"][line] for frame in frames]
-    assert settings.reach == (np.min(stress), np.max(stress))
-    for panels, window, top in zip(
-        zip(*map(settings.panels, frames)), settings.windows, settings.tops, strict=True
-    ):
-        positions = []
-        for panel, frame in zip(panels, frames):
-            assert (panel.window, panel.top, panel.slide_factor) == (
-                window,
-                top,
-                settings.slide_factor,
-            )
-            assert panel.factor == panels[0].factor
-            cells = np.repeat(panel.cells, np.diff(frame.offsets))
-            positions.append(panel.places[np.unique(frame.connectivity[cells])])
-        (left, bottom), (right, top_edge) = (
-            np.min(positions, axis=(0, 1)),
-            np.max(positions, axis=(0, 1)),
-        )
-        assert (left, right, bottom, top_edge) == tuple(window)
-
-
-def test_exact_colour_range_is_constant(small_folder):
-    """The range of colours is the same in every frame, and the colours show its stresses."""
-    with Series(small_folder) as series:
-        settings = make_film(series)
-        first_frame = series.frame(settings.numbers[0])
-        picture = Picture(first_frame, "", settings.panels(first_frame), FRAME_SIZE, settings.reach)
-        assert len(picture.bodies[0].cells) == 2  # triangles and quadrilaterals
-        for number in settings.numbers:
-            frame = series.frame(number)
-            picture.show(frame, "", settings.panels(frame))
-            for bodies, top in zip(picture.bodies, settings.tops):
-                for indices, _, cells in bodies.cells:
-                    assert cells.get_clim() == (0, top * bodies.scale)
-                    assert np.array_equal(
-                        cells.get_array(), frame.cell_data["von_mises"][indices] * bodies.scale
-                    )
 
 
 def test_exact_gif_frames_agree_with_pictures(small_folder, drawn_frames, tmp_path):

@@ -122,26 +122,6 @@ def test_exact_script_colours_stress_component(
     assert (line.Ambient, line.Diffuse) == (1.0, 0.0)
 
 
-def test_exact_script_shows_stick_and_slip(bench_folder, tmp_path, monkeypatch):
-    """A script shows the status of the interface (open, stick, slip) with the values of every frame."""
-    assert run_cli("export", bench_folder, "-o", tmp_path / "play.py", "--of", "status").code == 0
-    simple = run_script(tmp_path / "play.py", monkeypatch)
-    _, (line, display), (clock, _) = simple.shown
-    assert simple.coloured[id(display)] == ("POINTS", "status") and display.LineWidth == 6
-    table = simple.tables["status"]
-    assert table.Annotations == ["0", "open", "1", "sticks", "2", "slips"]
-    assert len(table.IndexedColors) == 9
-    files = read_frames(clock.Input)
-    statuses = set()
-    with Series(bench_folder) as series:
-        for (_, file), number in zip(files, make_film(series).numbers):
-            expected = series.frame(number).blocks["interface"].point_data["status"]
-            ((_, points, _),) = compute_blocks(line, file)
-            assert points["status"].tolist() == expected.tolist()
-            statuses |= set(expected.tolist())
-    assert {1, 2} <= statuses <= {0, 1, 2}
-
-
 def test_refuses_unknown_stress_component(bench_folder, tmp_path):
     """An unknown stress component is refused, and so is a component for a file other than a script."""
     unknown = run_cli("export", bench_folder, "-o", tmp_path / "play.py", "--of", "sigma")

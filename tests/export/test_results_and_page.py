@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 from command_line import CommandResult, run_cli
 from limits import limit_file_size
-from scene_texts import BENCH, COATED
+from scene_texts import BENCH
 
 from patchfem import plan
 from patchfem.core import Missing
@@ -84,15 +84,6 @@ def test_exact_netcdf_file_equals_that_of_xarray(tmp_path):
             written[name].encoding["complevel"] == 1 for name in ("force", "modal", "status")
         )
     assert not list(tmp_path.glob("*.partial"))
-
-
-def test_exact_run_without_page_writes_all_results(scene_file, tmp_path):
-    """With --no-page a run writes all results except report.html."""
-    answer = run_cli("run", scene_file, "-o", tmp_path / "out", "--no-page")
-    assert answer.code == 0 and "without report.html" in answer.out
-    assert {path.name for path in (tmp_path / "out").iterdir()} == RESULT_FILES
-    answer_json = run_cli("run", scene_file, "-o", tmp_path / "out", "--no-page", "--json")
-    assert json.loads(answer_json.out)["outcome"] == "done" and not answer_json.err
 
 
 def test_exact_page_is_added_to_results(scene_file, tmp_path):
@@ -207,12 +198,3 @@ def test_refuses_page_for_moved_folder(scene_file, tmp_path):
     # The page follows the folder, not its name.
     results_folder.write_run_page(run, tmp_path / "moved")
     assert (tmp_path / "moved" / "report.html").is_file()
-
-
-def test_exact_page_of_patch_shows_both_pieces(tmp_path):
-    """The page of a patch has three figures, one of them of both pieces with their coatings."""
-    (tmp_path / "scene.toml").write_text(COATED, "utf-8")
-    assert run_cli("run", tmp_path / "scene.toml", "-o", tmp_path / "out").code == 0
-    page = (tmp_path / "out" / "report.html").read_text("utf-8")
-    assert page.count("<figure") == page.count("</figure>") == 3
-    assert "Both pieces with their coatings" in page

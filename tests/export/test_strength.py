@@ -3,14 +3,12 @@
 import json
 import re
 from math import pi
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from command_line import run_cli
 
 import patchfem as pf
-from patchfem.export.fields.strength import find_yielding
 from patchfem.scene import MATERIALS
 
 RADIUS, WIDTH = 14.5e-3, 10e-3
@@ -93,11 +91,6 @@ def test_exact_yield_note_agrees_with_hertz(tmp_path):
     assert "235 MPa (EN 10025-2: minimum yield strength of S235" in note
 
 
-def test_exact_custom_material_has_no_yield_note(tmp_path):
-    """A material that is defined in the scene without a yield strength has no note."""
-    assert find_yield_notes(tmp_path, 2 * YIELD / 0.558, CUSTOM_MATERIAL) == []
-
-
 def test_exact_yield_note_of_custom_material(tmp_path):
     """For a material that is defined in the scene, the note uses the yield strength of the scene."""
     material = CUSTOM_MATERIAL.replace("}", ', yield = "400 MPa"}')
@@ -146,51 +139,6 @@ def test_exact_fixed_corners_are_ignored_in_yield_note(tmp_path, load, n_notes):
     result = pf.run(FLAT_SCENE.format(load=load))
     result.save(tmp_path / "out")
     assert sum("yield strength" in note for note in result.notes) == n_notes
-
-
-def test_exact_coating_of_same_metal_is_one_piece():
-    """If substrate and coating of one piece yield, the note names this piece only."""
-    steel = SimpleNamespace(
-        name="steel",
-        young=MATERIALS["steel"].young,
-        poisson=MATERIALS["steel"].poisson,
-        yield_=None,
-    )
-    piece = SimpleNamespace(substrate=steel, coating=SimpleNamespace(material=steel))
-    points = np.array([[x, y] for x in (0.0, 1.0, 2.0) for y in (0.0, 1.0)])
-    bodies = {
-        side: {
-            "points": points,
-            "blocks": [np.array([[0, 2, 3, 1], [2, 4, 5, 3]])],
-            "material": [False, True],
-            "mises": np.full((1, 2), stress),
-        }
-        for side, stress in (("lower", 100e6), ("upper", 300e6))
-    }
-    pieces = SimpleNamespace(lower=piece, upper=piece, plane="strain")
-    (note,) = find_yielding(SimpleNamespace(pieces=pieces), bodies).values()
-    assert "300 MPa in the steel of the upper piece" in note and "other piece" not in note
-
-
-@pytest.mark.parametrize("peak, n_notes", [(500e6, 1), (5e9, 0)])
-def test_exact_smaller_stress_of_mesh_gives_no_note(peak, n_notes):
-    """The stress of the mesh has no note if the peak pressure causes more stress at the face."""
-    steel = SimpleNamespace(
-        name="steel",
-        young=MATERIALS["steel"].young,
-        poisson=MATERIALS["steel"].poisson,
-        yield_=None,
-    )
-    piece = SimpleNamespace(substrate=steel, coating=None)
-    body = {
-        "points": np.array([[x, y] for x in (0.0, 1.0) for y in (0.0, 1.0)]),
-        "blocks": [np.array([[0, 2, 3, 1]])],
-        "material": [False],
-        "mises": np.array([[300e6]]),
-    }
-    pieces = SimpleNamespace(lower=piece, upper=piece, plane="strain")
-    notes = find_yielding(SimpleNamespace(pieces=pieces), {"lower": body, "upper": body}, peak)
-    assert len(notes) == n_notes
 
 
 @pytest.mark.slow

@@ -1,7 +1,5 @@
 """Exports of the structure of a scene: read again they give the same rig, and their elements the same friction."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from command_line import run_cli
@@ -143,39 +141,6 @@ def test_exact_matlab_file_has_nlvib_elements(tmp_path):
         )
 
 
-FORCE_DRIVEN_RIG = FRICTION_RIG.replace('kind = "base"', 'kind = "force"').replace(
-    'acceleration = "5 g"', 'force = "40 N"'
-)
-
-
-def test_exact_documentation_lists_exported_variables(tmp_path):
-    """The documentation lists the variables of .mat and .npz exports, their sizes and the fields of an element."""
-    page = (Path(pf.__file__).parent / "scene/MATRICES.md").read_text("utf-8")
-    rows = {
-        row[1].strip("` "): [cell.strip("` ") for cell in row[2:-1]]
-        for row in (line.split("|") for line in page.splitlines() if line.startswith("| `"))
-    }
-    shapes = {".mat": {}, ".npz": {}}
-    for text in (FRICTION_RIG, FORCE_DRIVEN_RIG, POINT + make_friction_table("tanh") + STRUCTURE):
-        for ending, shape_by_name in shapes.items():
-            path = export_structure(tmp_path, text, ending)[1]
-            values = loadmat(path) if ending == ".mat" else dict(np.load(path))
-            shape_by_name |= {
-                name: value.shape for name, value in values.items() if not name.startswith("__")
-            }
-    for ending, shape_by_name in shapes.items():
-        assert set(shape_by_name) == {
-            name for name, row in rows.items() if row[0] in ("both", ending)
-        }, ending
-        for name, shape in shape_by_name.items():
-            size = rows[name][1]
-            assert len(shape) == (
-                2 if ending == ".mat" else 0 if size in ("1", "text") else 1 + size.count("×")
-            ), name
-    cell = loadmat(tmp_path / "rig.mat")["nonlinear_elements"].ravel()[0].dtype.names
-    assert all(f"`{field}`" in page for field in (*cell, "stiffness"))
-
-
 def test_exact_tanh_element_has_reference_speed(tmp_path):
     """The element of the law tanh has its reference speed."""
     _, path = export_structure(tmp_path, POINT + make_friction_table("tanh") + STRUCTURE, ".mat")
@@ -247,16 +212,6 @@ def test_always_export_states_omitted_features(tmp_path, text, message):
             POINT + make_friction_table("tanh") + STRUCTURE.replace("[drive]", CUBIC + "[drive]"),
             ".mat",
             "cannot be written with [structure.stiffening]",
-        ),
-        (
-            STRUCTURE.replace("[drive]", CUBIC + "[drive]"),
-            ".npz",
-            "cannot be written with [structure.stiffening]",
-        ),
-        (
-            POINT + WAVE + make_friction_table("tanh") + STRUCTURE,
-            ".npz",
-            "cannot be written under a load that changes",
         ),
         (
             POINT + WAVE + PLASTIC + STRUCTURE,

@@ -8,7 +8,7 @@ import numpy as np
 from scene_texts import COATED, COULOMB
 
 from patchfem.export.fields import vtkhdf
-from patchfem.export.fields.blocks import Block, build_blocks
+from patchfem.export.fields.blocks import build_blocks
 
 UNITS = {
     "displacement": "m",
@@ -80,60 +80,6 @@ def write_small_series(folder, frames: int = 3, seed: int = 0, times=None):
     folder.mkdir(exist_ok=True)
     vtkhdf.write_series(folder / vtkhdf.NAME, blocks, times, UNITS)
     return SimpleNamespace(blocks=blocks, times=times, pair=pair, interface=interface)
-
-
-def make_wave_block(frames: int, across: int, deep: int) -> Block:
-    """Return a block of quadrilaterals with smooth fields that move along x, as in a sliding body."""
-    x, y = np.meshgrid(
-        np.linspace(0, 12.7e-3, across + 1), np.linspace(0, 6.35e-3, deep + 1), indexing="ij"
-    )
-    node = np.arange(x.size).reshape(x.shape)
-    quads = np.stack([node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:]], axis=-1).reshape(
-        -1, 4
-    )
-    points = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
-    centroids = points[quads].mean(axis=1)
-    phase_sine = np.sin(2 * np.pi * np.arange(frames) / frames)[:, None]
-    mises = 8e6 * np.exp(
-        -(((centroids[:, 0] - 2e-3 * (2 + phase_sine)) / 3e-3) ** 2) - centroids[:, 1] / 2e-3
-    )
-    displacement = np.zeros((frames, x.size, 3), np.float32)
-    displacement[..., 0] = 1e-5 * phase_sine + 1e-7 * np.cos(300 * points[:, 0]) * np.exp(
-        -points[:, 1] / 3e-3
-    )
-    displacement[..., 1] = (
-        -1e-6
-        * np.exp(-(((points[:, 0] - 2e-3 * (2 + phase_sine)) / 4e-3) ** 2))
-        * (1 - points[:, 1] / 7e-3)
-    )
-    stress = np.zeros((frames, len(quads), 6), np.float32)
-    for number, factor in enumerate((-0.7, -1.1, -0.5, 0.3)):
-        stress[..., number] = factor * mises * np.cos(number + 200 * centroids[:, 0])
-    return Block(
-        points,
-        quads.ravel(),
-        np.arange(len(quads) + 1) * 4,
-        np.full(len(quads), 9, np.uint8),
-        {"displacement": displacement},
-        {
-            "stress": stress,
-            "von_mises": mises.astype(np.float32),
-            "stress_error": (0.03 + 1e-9 * mises).astype(np.float32),
-        },
-    )
-
-
-def write_wave_series(path, frames: int, across: int, deep: int) -> Block:
-    """Write a series with the single block of `make_wave_block`, and return the block."""
-    block = make_wave_block(frames, across, deep)
-    vtkhdf.write_series(
-        path,
-        {"lower": block},
-        np.arange(frames) * 1e-4,
-        {"displacement": "m", "von_mises": "Pa"},
-        {"lower": {"stress": 4096.0, "von_mises": 5000.0, "displacement": 2e-10}},
-    )
-    return block
 
 
 def frame_values(values, frame: int):

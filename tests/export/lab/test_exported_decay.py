@@ -44,14 +44,10 @@ IWAN = (
     + LOAD
     + '[friction]\nlaw = "iwan"\nstatic = 0.3\nstiffness = "0.2 N/um"\nchi = -0.4\nbeta = 0.5\n'
 )
-PLASTIC = (
-    MODE + LOAD + '[friction]\nlaw = "elastic-plastic"\nstatic = 0.3\nstiffness = "0.2 N/um"\n'
-)
 RELEASED = '[drive]\nkind = "free"\ndisplacement = "300 um"\ncycles = 40\n'
 CASES = {
-    "exact": (IWAN, ()),
-    "march": (PLASTIC, ("--set", "accuracy.method=march")),
-    "masses": (MASSES, ()),
+    "exact": IWAN,
+    "masses": MASSES,
 }
 
 
@@ -64,17 +60,14 @@ def decay_folders(tmp_path_factory):
     def run_case(name):
         """Return the results folder of a case, which is run at its first use."""
         if name not in folders:
-            text, words = CASES[name]
+            text = CASES[name]
             drive = (
                 RELEASED.replace('displacement = "300 um"\n', "") if "start" in text else RELEASED
             )
             (folder / f"{name}.toml").write_text(text + drive, "utf-8")
             folders[name] = folder / name
             assert (
-                run_cli(
-                    "run", folder / f"{name}.toml", "-o", folders[name], "--no-page", *words
-                ).code
-                == 0
+                run_cli("run", folder / f"{name}.toml", "-o", folders[name], "--no-page").code == 0
             )
         return folders[name]
 
@@ -95,7 +88,7 @@ def read_decay_curve(folder) -> DecayCurve:
         return DecayCurve(**{name: data[f"decay_{name}"].values for name in names})
 
 
-@pytest.mark.parametrize("name, ending", [("exact", "csv"), ("march", "csv"), ("masses", "uff")])
+@pytest.mark.parametrize("name, ending", [("exact", "csv"), ("masses", "uff")])
 def test_exact_imported_decay_agrees_with_run(decay_folders, tmp_path, name, ending):
     """The decay imported from exported histories agrees with that of the run in frequency and damping.
 
@@ -119,28 +112,6 @@ def test_exact_imported_decay_agrees_with_run(decay_folders, tmp_path, name, end
         assert np.mean(ratio[inside] <= 1) >= 0.95 and ratio[inside].max() < 2
     assert np.median(frequency_error / frequency) < 5e-3
     assert np.median(damping_error / np.abs(damping)) < 0.25
-
-
-def test_exact_decay_of_march_agrees_with_exact_method(tmp_path):
-    """The decay of a march agrees with that of the exact method within both errors, at all amplitudes.
-
-    Earlier only nine amplitudes at the end of 60 cycles were returned.
-    """
-    exact, march = (
-        pf.run(PLASTIC + RELEASED, **{"accuracy.method": method}).extra["decay"]
-        for method in ("auto", "march")
-    )
-    assert march.amplitude[0] == pytest.approx(exact.amplitude[0], rel=0.02)
-    reference = exact.interpolate(march.amplitude)
-    inside = np.isfinite(reference.frequency)
-    assert inside.sum() > 30 and march.time.size > 0.7 * exact.time.size
-    assert (
-        np.abs(march.frequency - reference.frequency)
-        <= march.frequency_error + reference.frequency_error
-    )[inside].all()
-    assert (
-        np.abs(march.damping - reference.damping) <= march.damping_error + reference.damping_error
-    )[inside].all()
 
 
 def test_always_export_states_time_of_reduced_rows(decay_folders, tmp_path):

@@ -202,24 +202,6 @@ def test_always_answer_states_that_no_case_is_steady(random_sweep):
     assert summarise_sweep(table | {"outcome": ["failed"] * count}).texts.qualification == ""
 
 
-@pytest.mark.parametrize(
-    "count, has_motion, ending",
-    [
-        (3, False, "; 3 cases that miss the tolerance are included."),
-        (1, False, "; 1 case that misses the tolerance is included."),
-        (1, True, "; 1 case that has not settled is included with its last value."),
-        (3, True, "; 3 cases that have not settled are included with their last values."),
-    ],
-)
-def test_exact_ranking_states_why_cases_are_uncertain(count, has_motion, ending):
-    """The ranking states whether uncertain cases miss the tolerance or are not steady.
-
-    Cases of patches without motion can only miss the tolerance.
-    """
-    ranks = {"pressure_peak": [SobolIndex("contact.load", 0.8, 0.9, 0.8, 1.0)]}
-    assert ranked.ranking_sentence(ranks, count, has_motion).endswith(ending)
-
-
 def find_amplitude_peaks(keys: list, values):
     """Return the peaks of the amplitude over the cases of a grid, all steady and without errors."""
     measures = {AMPLITUDE: (values, 0 * values, "m")}
@@ -315,39 +297,9 @@ def test_exact_too_few_steady_cases_give_no_ranking():
         "Only 1 of 64 cases settled (32 failed, 31 transient), so no ranking is possible; raise drive.cycles so that "
         "the transient cases settle and correct what the messages of the failed cases name."
     )
-    assert summary.texts.span.startswith(
-        "31 of 64 cases did not settle; their relative displacement amplitude at the end"
-    )
     assert "; relative displacement amplitude of the only settled case is " in summary.texts.span
-    assert "throughout" not in summary.texts.span and summary.texts.span in summary.sentences()
-    table = table | {"outcome": ["failed"] * 32 + ["transient"] * 32}
-    assert (
-        summarise_sweep(table)
-        .answer()
-        .startswith("None of 64 cases settled (32 failed, 32 transient), so no ranking")
-    )
     table = table | {"outcome": ["failed"] * 40 + ["done"] * 24}
     assert "so no ranking is possible" not in "".join(summarise_sweep(table).sentences())
-
-
-def test_exact_maxima_at_range_ends_are_counted():
-    """The answer states that three of five curves have their maximum at an end of the swept frequencies.
-
-    A case without motion is not counted.
-    """
-    height = np.array([4.0, 3, 0.2, 0.1, 0.0]) * 1e-3
-    frequency = np.array([364.0, 372, 372 * (1 + 1e-13), 300, 300])
-    columns = ((AMPLITUDE, "m", height), ("peak_frequency", "Hz", frequency))
-    measures = {
-        name: make_sweep_measure(values, 1e-9 * values, unit, floors=np.zeros(5))
-        for name, unit, values in columns
-    }
-    table = make_sweep_table([make_sweep_key("normal.load", [1, 2, 3, 4, 5], "N")], measures)
-    sentence = "n 3 of 5 cases the largest response lies at an end of the swept frequencies, so that it may be no resonance"
-    for ends in ((300.0, 372.0), (np.full(5, 372.0), np.full(5, 300.0))):
-        assert sentence in summarise_sweep(table | {"ends": ends}).answer()
-    for ends in ({}, {"ends": (200.0, 500.0)}, {"ends": (np.nan, np.nan)}):
-        assert "end of the swept" not in summarise_sweep(table | ends).answer()
 
 
 def test_exact_swept_frequency_range_is_stored(tmp_path):
@@ -488,31 +440,11 @@ def test_always_stuck_case_has_no_peak_frequency(tmp_path):
         "drive.from=142 Hz",
         "drive.to=144 Hz",
         "drive.rate=1 Hz/s",
+        "drive.acceleration=2 g",
         "accuracy.method=harmonic",
     ]
-    run_cli(
-        "sweep",
-        scene,
-        *(word for setting in settings for word in ("--set", setting)),
-        "--over",
-        "drive.acceleration=2 g,6 g",
-        "-o",
-        tmp_path / "out",
-    )
-    table = read_table(tmp_path / "out")
-    assert np.isnan(table["measures"]["peak_frequency"]["values"][0])
-    text = (tmp_path / "out" / "report.html").read_text("utf-8")
-    cases = text[text.index("id=cases") :] if "id=cases" in text else text[text.index(">Cases<") :]
-    assert "peak frequency [Hz]" in cases[: cases.index("</table>")].replace("</a>", "")
-    output = run_cli(
-        "run",
-        scene,
-        *(word for setting in settings for word in ("--set", setting)),
-        "--set",
-        "drive.acceleration=2 g",
-        "-o",
-        tmp_path / "run",
-    ).out
+    words = [word for setting in settings for word in ("--set", setting)]
+    output = run_cli("run", scene, *words, "--no-page", "-o", tmp_path / "run").out
     assert (
         "peak_frequency                     - (the output does not move at any of the swept frequencies"
         in output

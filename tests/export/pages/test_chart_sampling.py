@@ -1,10 +1,9 @@
-"""Charts of a page contain sampled points that keep the extremes of a line, within a limit of characters."""
+"""Charts of a page contain sampled points that keep the extremes of a line."""
 
 import numpy as np
 import pytest
 
 from patchfem.export.drawing import charts
-from patchfem.export.pages.document import document_html
 
 
 @pytest.mark.parametrize("size", [1000, 4001, 100_003])
@@ -29,26 +28,3 @@ def test_exact_sampled_line_keeps_extremes_and_ends(size):
         section_indices = indices[(indices >= first) & (indices < first + width)]
         assert y[section_indices].max() == y[first : first + width].max()
         assert x[section_indices].min() == x[first : first + width].min()
-
-
-def test_always_charts_stay_within_size_limit():
-    """Charts of 40 lines with 30 000 points are reduced to a given number of characters and keep their maxima."""
-    x = np.linspace(0, 1, 30_000)
-    all_charts = [
-        charts.make_chart(
-            "a",
-            charts.make_axis("x"),
-            charts.make_axis("y"),
-            [charts.make_line(x, np.sin(40 * x + k), "accent") for k in range(40)],
-        )
-    ]
-    for max_characters in (700_000, 200_000):
-        reduced = charts.limit_characters(all_charts, max_characters)
-        text = document_html("", "", [], {"charts": reduced}, ("figures.js",))
-        bare = document_html("", "", [], {"charts": []}, ("figures.js",))
-        assert len(text) - len(bare) < 1.1 * max_characters
-        assert all(
-            max(mark["y"]) == max(full["y"])
-            for mark, full in zip(reduced[0]["marks"], all_charts[0]["marks"])
-        )
-    assert charts.limit_characters(all_charts[:0], 10) == []

@@ -1,14 +1,13 @@
-"""Description of the drive of a run, the command that repeats it, and captions and links of its page."""
+"""Description of the drive of a run, and captions and links of its page."""
 
 import tomllib
-from pathlib import Path
 
 import numpy as np
 import pytest
 from page_data import read_charts
 
 import patchfem as pf
-from patchfem.export.pages.driven import describe_drive, run_command
+from patchfem.export.pages.driven import describe_drive
 
 MODES = (
     '[structure]\nmoving_mass = "2 kg"\n[[structure.mode]]\nname = "a"\nfrequency = "100 Hz"\ndamping = 0.01\n'
@@ -67,20 +66,6 @@ def test_exact_description_of_recorded_and_absent_drive():
     assert (
         describe_drive({"drive": {"kind": "base", "waveform": "file", "file": "b.csv"}})
         == "recorded base acceleration of b.csv"
-    )
-
-
-def test_exact_command_is_quoted_and_has_no_folders():
-    """The command that repeats a run quotes its settings and contains no folders."""
-    command = run_command(
-        Path("/home/one/rig.toml"), ("drive.acceleration=6 g", "slide.file=/home/one/a.csv")
-    )
-    assert command == "patchfem run rig.toml --set 'drive.acceleration=6 g' --set slide.file=a.csv"
-    assert (
-        pf.build(
-            pf.load(BENCH + '[slide]\nkind = "sine"\namplitude = "1 um"\nfrequency = "1 Hz"')
-        ).source.sets
-        == ()
     )
 
 

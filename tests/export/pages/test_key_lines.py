@@ -1,8 +1,8 @@
-"""Text of the values of swept keys, and the order of the cases along a key."""
+"""Text of the values of swept keys."""
 
 import numpy as np
 
-from patchfem.export.pages.key_lines import group_cases_along_key, is_varied, key_formatter
+from patchfem.export.pages.key_lines import key_formatter
 
 
 def make_tilt_key(values, texts) -> dict:
@@ -23,11 +23,3 @@ def test_exact_digits_of_values_follow_their_spacing():
     ):
         texts = [f"{value!r} urad" for value in values.tolist()]
         assert key_formatter(make_tilt_key(values * 1e-6, texts))(2) == expected
-
-
-def test_exact_lines_of_cases_are_ordered_by_key():
-    """The cases of a line are ordered by one key, and all other keys are constant along it."""
-    tilt = make_tilt_key([3, 1, 2, 1, 3, 2], ["3", "1", "2", "1", "3", "2"])
-    load = {"name": "normal.load", "texts": ["10 N"] * 3 + ["20 N"] * 3}
-    assert [line.tolist() for line in group_cases_along_key(tilt, [load])] == [[1, 2, 0], [3, 5, 4]]
-    assert is_varied(load) and not is_varied({"texts": ["10 N", "10 N"]})

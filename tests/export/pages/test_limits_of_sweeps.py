@@ -1,7 +1,6 @@
 """Limit of a key beyond which a measure changes by more than 5 %, compared with closed forms."""
 
 import json
-import re
 from math import log
 
 import numpy as np
@@ -10,7 +9,7 @@ from page_data import make_sweep_key, make_sweep_measure, make_sweep_table, stri
 from scipy.optimize import brentq
 
 from patchfem.export import summarise_sweep
-from patchfem.export.pages.limits import find_limits, limits_json, limits_sentence, limits_table
+from patchfem.export.pages.limits import find_limits, limits_json, limits_sentence
 from patchfem.export.pages.sweep import page_html
 from patchfem.export.sweeps.answer import sweep_summary
 
@@ -51,19 +50,6 @@ def test_exact_limit_of_linear_measure():
     assert limits_sentence(tilt_limits({"loop_area": LINE})) == (
         "Tilt may reach 0.25 mrad (3.2 um over the patch; interpolated between the cases at 0.2 and 0.5 mrad) before "
         "loop area changes by 5 % (first to change: loop area)."
-    )
-
-
-@pytest.mark.parametrize("unit, size", [("rad", 1e3), ("mrad", 1.0), ("urad", 1e-3)])
-def test_exact_limit_is_independent_of_unit(unit, size):
-    """The sentence about a limit is the same for cases written in rad, mrad and urad."""
-    tilt_key = make_key(TILT / size, unit=unit) | {"values": TILT * 1e-3}
-    values = LINE
-    limits_found = find_limits(
-        [tilt_key], {"loop_area": (values, 0 * values)}, {"loop_area": np.ones(5, bool)}
-    )
-    assert limits_sentence(limits_found).startswith(
-        "Tilt may reach 0.25 mrad (interpolated between the cases at 0.2 and 0.5 mrad) before"
     )
 
 
@@ -110,12 +96,6 @@ def test_exact_limit_of_patch_stiffness():
     assert (stiffness_limit["low"], stiffness_limit["high"]) == pytest.approx(
         (1e-5, 10**-4.5)
     ) and stiffness_limit["low"] < 25e-6 < stiffness_limit["high"]
-
-
-def test_exact_gap_follows_rounded_angle():
-    """The gap in the sentence belongs to the rounded angle: 0.169 mrad is written as 0.16 mrad, 2.03 um over 12.7 mm."""
-    sentence = limits_sentence(tilt_limits({"loop_area": 1 + (TILT - 0.05) * 0.05 / 0.119}))
-    assert sentence.startswith("Tilt may reach 0.16 mrad (2 um over the patch; interpolated")
 
 
 def test_exact_uncertain_case_does_not_bound_limit():
@@ -203,21 +183,6 @@ def test_exact_limit_within_errors_is_given_as_interval():
     )
     measures = {"slip_amplitude": [1, 1.01, 1.05, 1.05], "loop_area": [1, 1.01, 1.01, 1.2]}
     assert limits_sentence(tilt_limits(measures, 5e-4, tilt)) == expected
-
-
-def test_exact_undetermined_measure_is_omitted():
-    """A measure whose limit cannot be determined is not named in the sentence."""
-    sentence = limits_sentence(tilt_limits({"loop_area": LINE, "slip_amplitude": [0, 1, 1, 1, 1]}))
-    assert "before loop area changes by 5 %" in sentence
-    line = {
-        "loop_area": LINE,
-        "slip_amplitude": 1 + 0 * TILT,
-        "stick_fraction": [0.06, 0.07, 0.08, 0.09, 0.1],
-    }
-    assert (
-        "before slip amplitude or loop area changes by 5 % (first to change: loop area)"
-        in limits_sentence(tilt_limits(line))
-    )
 
 
 def test_exact_measures_of_roundoff_are_ignored():
@@ -311,55 +276,17 @@ def test_exact_page_and_summary_state_limits():
     json.dumps(summary, allow_nan=False)
 
 
-def test_always_sweep_over_words_has_no_limit():
-    """A key with words as values, such as the friction law, has no limit."""
-    table = make_tilt_sweep() | {
-        "keys": [make_sweep_key("friction.law", TILT, texts=list("abcde"), words=True)]
-    }
-    summary = sweep_summary(summarise_sweep(table), table["outcome"])
-    assert summary["limits"] == []
-    assert "moment; the largest error, at friction.law e" in summary["answer"]
-
-
-def test_exact_changes_of_roundoff_are_zero():
-    """A change of 4e-13 of the value is given as 0 %. Earlier it was given as -4.26e-11 %."""
-    fraction = (TILT - TILT[0]) / np.ptp(TILT)
-    changes = {"friction_force_peak": -4.26e-13, "slip_amplitude": -0.0836, "loop_area": 58.6}
-    values = {name: 1 + change * fraction for name, change in changes.items()}
-    text = limits_table(
-        tilt_limits(values), {name: (values[name], 0 * fraction, "N") for name in values}
-    )
-    cells = re.findall(r"<td[^>]*>(0 %|[-+]\S+ %|&times; \S+?)</td>", text)
-    assert sorted(cells) == ["&times; 59.6", "-8.36 %", "0 %"]
-
-
-def test_exact_all_possible_first_measures_are_named():
-    """Two measures that fall with the square of the tilt are both named, if the cases do not show which changes first."""
-    tilt = np.geomspace(1e-3, 1, 7)
-    limits_found = tilt_limits(
-        {"slip_amplitude": 1 - 14 * tilt**2, "loop_area": 1 - 13 * tilt**2}, tilt=tilt, factors=True
-    )
-    assert "(first to change: slip amplitude or loop area)" in limits_sentence(limits_found)
-
-
 @pytest.mark.parametrize(
     "curve",
     [
         lambda t: 14 * t**2,
-        lambda t: 0.2 * t,
-        lambda t: 0.3 * t**0.7,
         lambda t: np.maximum(t - 0.03, 0),
         lambda t: 0.06 * (1 - np.exp(-t / 0.1)),
-        lambda t: 0.03 * np.log1p(t / 0.02),
-        lambda t: t / (1 + 8 * t),
         lambda t: 1 - np.maximum(t / 0.04, 1.0) ** -0.5,
-        lambda t: 0.4 * np.tanh(np.maximum(t - 0.1, 0)),
     ],
 )
 @pytest.mark.parametrize("error", [0, 1e-3])
-@pytest.mark.parametrize(
-    "tilt", [np.geomspace(1e-3, 1, 7), np.geomspace(2e-3, 3, 12), np.linspace(0, 1.3, 12)]
-)
+@pytest.mark.parametrize("tilt", [np.geomspace(1e-3, 1, 7), np.linspace(0, 1.3, 12)])
 def test_always_limit_lies_between_named_cases(curve, error, tilt):
     """The limit of curves with a kink, with and without an inflection lies between the two cases that are named."""
     (limit_found,) = tilt_limits(
@@ -374,18 +301,3 @@ def test_always_limit_lies_between_named_cases(curve, error, tilt):
         limit_found.beyond is None
         or tilt[limit_found.inside] <= 1e3 * limit_found.value <= tilt[limit_found.beyond]
     )
-
-
-def test_exact_sentence_has_single_unit():
-    """All limits of a sentence have the same unit; earlier one sentence contained mrad and urad."""
-    tilt = np.geomspace(1e-3, 1, 7)
-    texts = [f"{1e3 * value!r} urad" for value in tilt.tolist()]
-    measures = {
-        "loop_area": make_sweep_measure(1 - 0.1 * tilt**0.4),
-        "normal_stiffness": make_sweep_measure(1 - np.minimum(1e3 * tilt / 300, 0.9)),
-        "moment": make_sweep_measure(np.ones(7), np.array([0, 0, 0, 0, 0, 0.4, 0.2])),
-    }
-    table = make_sweep_table([make_key(tilt, log=True) | {"texts": texts}], measures)
-    sentences = summarise_sweep(table | {"patch": {"length": 12.7e-3}}).sentences()
-    assert "0.316228 mrad, is 40 %" in sentences[0]
-    assert all(("mrad" in text) + ("urad" in text) < 2 for text in sentences)

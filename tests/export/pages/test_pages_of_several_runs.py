@@ -134,16 +134,6 @@ def test_exact_change_is_percentage_or_factor(tmp_path, value, first, error, cha
     assert f"</b> <span class=v>({change})</span>" in text
 
 
-def test_always_runs_of_same_name_are_numbered(tmp_path):
-    """Runs whose folders have the same name are numbered."""
-    (tmp_path / "x").mkdir()
-    (tmp_path / "y").mkdir()
-    text = page_html(
-        [read_run(write_run_folder(tmp_path / name / "out", 10.0, 2e-6, 1e-9)) for name in "xy"]
-    )
-    assert "out (1)" in text and "out (2)" in text
-
-
 def test_always_levels_of_different_units_have_separate_charts(tmp_path):
     """Levels in m/s^2 and in N have separate charts, because an axis has one unit.
 

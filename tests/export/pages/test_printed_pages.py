@@ -1,14 +1,13 @@
 """Printed pages have the colours of the light theme, also if the screen has the dark theme."""
 
 import io
-import re
 
 import numpy as np
 import pytest
 from chromium import LATER, Chromium
 
-from patchfem.export.drawing import charts, pictures
-from patchfem.export.pages.document import PAGE_COLOURS, Section, document_html, figure_html
+from patchfem.export.drawing import charts
+from patchfem.export.pages.document import Section, document_html
 from patchfem.export.pages.sweep import page_html
 
 TURN = "const e=document.getElementById('shown');e.value='map';e.dispatchEvent(new Event('change'))"
@@ -86,30 +85,6 @@ def test_exact_printed_map_is_independent_of_theme(chromium, sweep_table, kind):
     light, dark = (printed_chart_pixels(chromium, text, theme) for theme in (False, True))
     assert light.shape == dark.shape and light.std() > 0.1
     assert np.mean(np.abs(light - dark) > 0.02) < 2e-3
-
-
-@pytest.mark.parametrize("dark, ink", [(False, "rgb(28, 36, 48)"), (True, "rgb(228, 233, 239)")])
-def test_exact_static_figure_follows_page_theme(chromium, dark, ink):
-    """A figure that is drawn before the page is opened has the text colour of the theme of the page."""
-    svg = pictures.draw_charts(
-        [
-            charts.make_chart(
-                "Trace",
-                charts.make_axis("x", "mm"),
-                charts.make_axis("z", "um"),
-                [charts.make_line([0.0, 1.0], [0.0, 1.0], "accent", "before")],
-            )
-        ]
-    )
-    text = document_html(
-        "Traces", "", [Section("a", "Traces", figure_html(0, svg, "Two", "a line"))]
-    )
-    assert not re.search("|".join(PAGE_COLOURS), text[text.index("<svg") :]) and set(
-        pictures.COLOURS.values()
-    ) < set(PAGE_COLOURS)
-    page = chromium.open_html(text, dark=dark)
-    assert page.evaluate("getComputedStyle(document.querySelector('figure text')).fill") == ink
-    assert page.evaluate("getComputedStyle(document.body).color") == ink
 
 
 def test_always_dark_page_is_printed_light(chromium):
