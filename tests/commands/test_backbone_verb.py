@@ -3,17 +3,12 @@
 import csv
 import json
 
-import numpy as np
 import pytest
 import xarray as xr
 from scene_texts import IWAN, make_shaken_block
 
 from patchfem import formatting
 from patchfem.__main__ import main
-from patchfem.campaigns import Backbone, Curve
-from patchfem.campaigns.backbone.records import LossExponents, ModeFrequencies
-from patchfem.export import backbone_charts
-from patchfem.export.backbone import page_html
 
 COLUMNS = [
     "method",
@@ -100,55 +95,3 @@ def test_always_screen_names_unknown_results(scene_folder, capsys):
     assert "\nThe natural frequency of mode axial is 100 Hz without the contact.\n" in shown
     assert "quasi-static: not known: " in shown
     assert not (scene_folder / "out" / "joint-backbone" / "report.html").exists()
-
-
-def test_always_largest_damping_names_computed_amplitudes(scene_folder, capsys):
-    """The largest damping ratio is printed with the number of computed amplitudes, and omitted for a single one."""
-    for amplitudes, expected in (
-        ("10 um..1 mm:3", "Among these 3 amplitudes the damping ratio is largest at "),
-        ("10 um", ""),
-    ):
-        assert (
-            run_command(
-                "backbone",
-                "joint.toml",
-                "--amplitudes",
-                amplitudes,
-                "--method",
-                "quasi-static",
-                "--no-page",
-                "-q",
-                "-o",
-                f"out{len(expected)}",
-            )
-            == 0
-        )
-        shown = capsys.readouterr().out
-        assert expected in shown and ("largest" in shown) == bool(expected)
-
-
-def test_exact_uncertain_frequency_is_omitted_from_chart():
-    """A frequency of 3.6 +- 9.8 kHz appears in the table and not in the chart, whose axis it would stretch."""
-    a = np.array([1e-6, 2e-6, 3e-6])
-    unknown = np.full(3, np.nan)
-    curve = Curve(
-        a,
-        np.array([100.0, 90.0, 3.6e3]),
-        np.array([1.0, 1.0, 9.8e3]),
-        np.array([1e-4, 2e-3, 0.28]),
-        np.array([2e-4, 1e-4, 0.34]),
-        unknown,
-    )
-    backbone = Backbone(
-        "first", ModeFrequencies(50.0, 100.0), {"decay": curve}, {}, LossExponents(), None, ()
-    )
-    frequency, damping = backbone_charts(backbone.curves)
-    assert [list(each["x"]) for each in frequency["marks"]] == [[1.0, 2.0]] * 2
-    assert [list(each["x"]) for each in damping["marks"]] == [[1.0, 2.0, 3.0]] * 2
-    # the bar of 1e-4 +- 2e-4 ends at a tenth of the smallest value on the logarithmic axis
-    assert damping["y"]["log"] and damping["marks"][1]["floor"] == pytest.approx(1e-5)
-    assert "9.8 kHz" in page_html(backbone, "") and "left out of the picture" in page_html(
-        backbone, ""
-    )
-    page_without_frequency = page_html(backbone._replace(curves={"decay": curve.at(slice(2))}), "")
-    assert "left out of the picture" not in page_without_frequency

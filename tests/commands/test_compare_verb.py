@@ -6,11 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import ALWAYS, FROM_SHELL, modules_after, run_cli
+from command_line import run_cli
 from pairs import UM, make_worn_pair
 from synthetic import report_area
 
-import patchfem as pf
 from patchfem.surface import Profile
 
 NAMES = (
@@ -166,29 +165,6 @@ def test_always_four_traces_and_scans_give_two_directions(trace_pair, tmp_path):
     found = json.loads(run_cli("compare", scan, scan, "--json", "-o", tmp_path / "out").out)
     assert found["verdict"] == "no change shown"
     assert "agree up to a plane" in found["worn_depth_max"]["reason"]
-
-
-def test_exact_python_equals_compare_command(trace_pair, comparison):
-    """`pf.compare` returns the data that the command writes."""
-    written_data = json.loads((comparison[1] / "compare.json").read_text("utf-8"))
-    found = pf.compare(str(trace_pair[0]), trace_pair[1], direction="y")
-    assert json.loads(json.dumps(found)) == written_data and found["direction"] == "y"
-    assert found["verdict"] == "worn, waves reduced"
-
-
-@pytest.mark.parametrize(
-    "count, direction, says", [(3, "", "compare: 3 files; two"), (2, "z", "x or y is needed")]
-)
-def test_refuses_invalid_arguments_from_python(trace_pair, count, direction, says):
-    """`pf.compare` refuses three files and an unknown direction."""
-    with pytest.raises(pf.PatchfemError, match=says):
-        pf.compare(*(trace_pair[0],) * count, direction=direction)
-
-
-def test_exact_compare_loads_no_mesh_or_compiler(trace_pair, tmp_path):
-    """`patchfem compare` imports neither scikit-fem nor numba."""
-    modules = modules_after(FROM_SHELL, "compare", *trace_pair[:2], "-o", tmp_path / "out")
-    assert not modules & {*ALWAYS, "skfem"}
 
 
 @pytest.mark.parametrize("verb", ["compare", "profile"])

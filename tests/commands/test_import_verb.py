@@ -52,10 +52,6 @@ def test_exact_imported_table_is_read_by_all_readers(tmp_path):
     """One imported table is read by the readers of slide, drive and loop.
 
     Every reader takes the channels that it needs.
-
-    Every reader takes the channels that it needs.
-
-    Each reader takes its own channels.
     """
     time = np.arange(9) / 100
     slide = 1e-5 * np.sin(70 * time + 0.4)

@@ -24,7 +24,6 @@ FILES = {
     "bare.csv": TRACE.partition("\n")[2],
 }
 STATIC = ("--over", "friction.static=0.1,0.2")
-LOADS = ("--over", "normal.load=10 N,20 N")
 MODE = "--over=structure.mode.0.frequency=100 Hz,110 Hz"
 MODE_NAMED = "--over=structure.mode.axial.frequency=100 Hz,110 Hz"
 FREQUENCY = "structure.mode[1].frequency=90 Hz"
@@ -34,12 +33,7 @@ REFUSED = {  # command -> [(arguments, texts of the lines of the message)]; exit
             ("--over", "normal.load=1 lb", "--over", "friction.statc=1"),
             ("'lbf'", "did you mean 'static'"),
         ),
-        (
-            ("--over", "normal.load=1 lb", "--set", "drive.cycles=0"),
-            ("'lbf'", "drive.cycles: must be > 0"),
-        ),
         (("--over", "normal.load=-1 N,-2 N"), ("-1 N", "-2 N")),
-        (("--set", "drive.cycles=0", *LOADS), ("drive.cycles: must be > 0",)),
         ((), ("no key to sweep is given",)),
         (
             ("--over", "friction.static=0.1..0.2:4000", "--over", "normal.load=1 N..2 N:4000"),
@@ -47,12 +41,9 @@ REFUSED = {  # command -> [(arguments, texts of the lines of the message)]; exit
         ),
         (("--random", "4"), ("give each range by --over",)),
         (("--random", "4", "--sobol", "4", "--over", "friction.static=0.1..0.2"), ("one of them",)),
-        (("--random", "4", "--over", "friction.static=0.1..0.2:3"), ("leave out :3",)),
         ((*STATIC, "--shard", "5/4"), ("--shard 5/4",)),
-        ((*STATIC, "-j", "0"), ("the number of processes must be",)),
         ((*STATIC, "--of", "damping"), ("did you mean 'equivalent_damping', ",)),
         ((*STATIC, "--of", "zzz"), ("--of zzz: unknown measure; use a name that",)),
-        ((*STATIC, "--executor", "slurm"), ("--executor slurm: not possible",)),
         ((*STATIC, "-o", "."), ("bare.csv",)),
         ((*STATIC, "--keep", "pages", "--no-page"), ("--no-page",)),
         (
@@ -68,10 +59,6 @@ REFUSED = {  # command -> [(arguments, texts of the lines of the message)]; exit
             (f"--set {FREQUENCY}: the sweep already sets structure.mode.0.frequency",),
         ),
         (
-            (MODE, "--set", "structure.mode.axial.frequency=90 Hz"),
-            ("the sweep already sets structure.mode.0.frequency",),
-        ),
-        (
             ("--over", "contact.tilt=1 urad,2 urad"),
             ("choose a key of this table: contact.tilt.angle",),
         ),
@@ -79,10 +66,6 @@ REFUSED = {  # command -> [(arguments, texts of the lines of the message)]; exit
     "sweep own.toml": [(("--set", "friction.static=0.3"), ("sets friction.static in every",))],
     "plan rig.toml": [
         ((*STATIC, "--probe"), ("--probe works for a single case",)),
-        (
-            (MODE, "--set", FREQUENCY),
-            (f"--set {FREQUENCY}: the sweep already sets structure.mode.0.frequency",),
-        ),
     ],
     **{
         f"{verb} refused.toml": [((), ("must be >= 0", "must be >= 0"))]
@@ -144,13 +127,11 @@ REFUSED = {  # command -> [(arguments, texts of the lines of the message)]; exit
             ("misalignment", "tilts.toml"),
             ("patchfem: unexpected 'tilts.toml'; see `patchfem new --help`",),
         ),
-        (("rig", "-o", "rig.toml"), ("already exists",)),
     ],
     "backbone joint.toml": [
         (("--amplitudes", "1..2"), ("bare number",)),
         (("--amplitudes", "1 um..x"), ("--amplitudes",)),
         (("--amplitudes", "0 um,1 um"), ("--amplitudes",)),
-        (("--mode", "yaw", "-o", "result"), ("the modes of the rig are axial",)),
         (("--method", "static"), ("balance",)),
     ],
     "swep rig.toml": [((), ("unknown verb 'swep'; did you mean `sweep`? see `patchfem --help`",))],

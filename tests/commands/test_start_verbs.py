@@ -4,7 +4,6 @@ import json
 import re
 import shlex
 import subprocess
-import sys
 import tomllib
 from importlib.metadata import PackageNotFoundError
 from pathlib import Path
@@ -66,15 +65,6 @@ def test_exact_demo_runs_shipped_rig(tmp_path):
     )
 
 
-def test_exact_schema_file_equals_printed_schema(tmp_path):
-    """`patchfem schema` writes the same JSON to a file as to the screen, with examples."""
-    assert run_cli("schema", "-o", tmp_path / "a.json").code == 0
-    assert (tmp_path / "a.json").read_text("utf-8") == run_cli("schema").out
-    assert json.loads(run_cli("schema").out)["$defs"]["Contact"]["properties"]["length"][
-        "examples"
-    ] == ["12.7 mm"]
-
-
 def replace_versions(monkeypatch, version_of) -> None:
     """Let the doctor find the versions that a function returns."""
     monkeypatch.setattr(examine, "version", version_of)
@@ -108,23 +98,6 @@ def broken_opengl(tmp_path, monkeypatch):
         f"import sys; sys.exit('{clock}Failed to load an X11 library')"
     )
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-
-
-def test_always_doctor_reports_missing_packages(monkeypatch, broken_opengl):
-    """The doctor reports missing packages and a failing OpenGL with the command that installs them."""
-    packages = {"imageio-ffmpeg"} | {*examine.REQUIRED_PACKAGES, *examine.OPTIONAL_PACKAGES} - {
-        "scipy",
-        "trame",
-    }
-    found = examine_with(monkeypatch, versions_of_only(*packages))
-    assert found["numpy"]["fine"] and not found["scipy"]["fine"]
-    assert found["scipy"]["cure"] == "pip install scipy"
-    assert found["trame (fields in a browser)"]["cure"] == 'pip install "patchfem[web]"'
-    window = found["the window by OpenGL"]
-    assert window["found"] == "Failed to load an X11 library" and window["cure"]
-    lines = run_cli("doctor").out.splitlines()
-    assert len(lines) == len(found)
-    assert [line.split()[1] for line in lines if line.startswith("--")] == ["scipy", "the", "trame"]
 
 
 def test_always_doctor_checks_all_dependencies(tmp_path, monkeypatch, broken_opengl):
@@ -199,24 +172,6 @@ def test_always_shell_completion_covers_commands(shell):
             timeout=30,
         )
         assert "sweep" in done.stdout.split()
-
-
-def test_always_help_imports_no_command_internals():
-    """Registering the commands imports only their definitions, and for one command only its own module."""
-    code = (
-        "import sys; from patchfem.__main__ import register_verbs; register_verbs([{}]); "
-        "print([m for m in sys.modules if m.startswith('patchfem.')])"
-    )
-    all_, run = (
-        subprocess.run(
-            [sys.executable, "-c", code.format(verb)], capture_output=True, text=True, check=True
-        ).stdout
-        for verb in ("", "'run'")
-    )
-    assert "patchfem.commands.start" in all_ and "patchfem.commands.run" in run
-    for name in ("examine", "sources", "starting", "schema"):
-        assert name not in all_
-    assert "patchfem.commands.start" not in run and "patchfem.commands.sweep" not in run
 
 
 @pytest.mark.parametrize("verb", VERBS)

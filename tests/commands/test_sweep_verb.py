@@ -113,44 +113,6 @@ def test_exact_sweep_case_equals_single_run(whole_sweep, rig_scene):
             assert entry.get("reason", "") == measure.reason
 
 
-def test_exact_refused_case_has_row_with_message(whole_sweep):
-    """A refused case has a row with its message in the table, and the answer counts it as failed."""
-    out, answer = whole_sweep
-    for row in read_rows(out)[4:]:
-        assert row["outcome"] == "failed" and "normal.load: must be >= 0" in row["message"]
-        assert row["loop_area"] == ""
-        assert (
-            json.loads((out / "cases" / row["case"] / "summary.json").read_text())["message"]
-            == row["message"]
-        )
-    assert "6 cases:" in answer.out and "2 failed" in answer.out
-    assert f"page: {out / 'report.html'}\nresults: {out / 'sweep.csv'}" in answer.out
-    assert (out / "report.html").is_file()
-    found = [
-        float(row["relative_displacement_amplitude"])
-        for row in read_rows(out)[:4]
-        if row["outcome"] != "transient"
-    ]
-    assert len(found) == 2 and re.search(
-        rf"ranges from 0 \(.*\) to {max(found) * 1e6:.4g} um \(", answer.out
-    )
-    assert "case 5 and 1 more: normal.load: must be >= 0" in answer.err
-
-
-def test_exact_finished_sweep_leaves_no_partial_files(whole_sweep):
-    """A finished sweep leaves only its tables, its report and one folder per case."""
-    out, _ = whole_sweep
-    assert sorted(file_names(out)) == [
-        "cases",
-        "chunks",
-        "report.html",
-        "sweep.csv",
-        "sweep.json",
-        "sweep.nc",
-    ]
-    assert sorted(file_names(out / "cases")) == sorted(row["case"] for row in read_rows(out))
-
-
 def test_exact_sweep_table_of_scene_equals_options(whole_sweep, tmp_path):
     """A table [sweep] in the scene gives the same results as --over, and `run` refuses such a scene."""
     path = tmp_path / "rig.toml"
@@ -276,18 +238,6 @@ def test_exact_old_tables_are_set_aside_during_sweep(rig_scene, tmp_path, monkey
     assert len(list((out / "cases").iterdir())) == 2
 
 
-def test_exact_sweep_prints_one_json_object(rig_scene, tmp_path):
-    """`sweep --json -q` prints one JSON object with the counts of cases and outcomes."""
-    answer = sweep_into(
-        tmp_path / "a", rig_scene, "--over", "friction.static=0.1,0.2", "--json", "-q"
-    )
-    assert answer.code == 0 and answer.err == ""
-    summary = json.loads(answer.out)
-    assert (
-        summary["cases"] == 2 and summary["failed"] == 0 and sum(summary["outcomes"].values()) == 2
-    )
-
-
 def test_refuses_second_sweep_in_folder(rig_scene, tmp_path, monkeypatch):
     """A folder in which another sweep runs is refused, unless that process has died."""
     words = ("sweep", rig_scene, "--over", "friction.static=0.1,0.2", "-o", tmp_path / "a")
@@ -345,24 +295,6 @@ def test_exact_tables_of_many_cases_need_collect(whole_sweep, rig_scene, tmp_pat
         assert "with --collect" in (out / "report.html").read_text("utf-8")
         assert sweep_into(out, rig_scene, *OVER, "--collect").code == answer.code
     assert_same_tables(out, whole_sweep[0])
-
-
-def test_always_two_shards_can_set_tables_aside_at_once(tmp_path, monkeypatch):
-    """Two shards that rename an older table at the same time cause no error."""
-    (tmp_path / "sweep.csv").write_text("older")
-    real = os.replace
-
-    def rename_twice(old, new):
-        """Rename a file twice, the first time in place of another process."""
-        real(old, new)  # another process renames the file between the check and this call
-        real(old, new)
-
-    with Folder(tmp_path, (), True) as folder, monkeypatch.context() as twice:
-        twice.setattr(os, "replace", rename_twice)
-        folder.mark_tables_outdated()
-    assert (tmp_path / "sweep.csv.partial").read_text() == "older" and not (
-        tmp_path / "sweep.csv"
-    ).exists()
 
 
 @pytest.mark.slow
@@ -555,28 +487,6 @@ def test_exact_sweep_plan_counts_cases(rig_scene):
         single_plan["effects"],
     )
     assert "6 cases of 3 normal.load, 2 drive.acceleration" in run_cli("plan", rig_scene, *OVER).out
-
-
-def test_exact_sweep_plan_names_its_case(rig_scene):
-    """The plan of a sweep prints the values of its first case and names this case."""
-    axes = "--over", "friction.static=0.41,0.1"
-    sweep_plan = json.loads(run_cli("plan", rig_scene, *axes, "--json").out)
-    assert sweep_plan["case"] == {"friction.static": "0.41"}
-    assert (
-        sweep_plan["groups"]
-        == json.loads(run_cli("plan", rig_scene, "--set", "friction.static=0.41", "--json").out)[
-            "groups"
-        ]
-    )
-    assert run_cli("plan", rig_scene, *axes).out.startswith(
-        "case     friction.static 0.41 (the first case); "
-    )
-    scene_with_axes = rig_scene.with_name("own.toml")
-    scene_with_axes.write_text(RIG + '\n[sweep]\n"friction.static" = [0.1, 0.2]\n', "utf-8")
-    chosen = run_cli(
-        "plan", scene_with_axes, "--set", "friction.static=0.3"
-    )  # --set selects a single case
-    assert chosen.code == 0 and "sweep " not in chosen.out and "kind     rig" in chosen.out
 
 
 class QuickProgress(Progress):
