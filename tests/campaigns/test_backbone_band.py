@@ -142,14 +142,6 @@ def test_band_of_single_mode_is_narrow_except_at_onset_of_slip():
     assert (backbone.band_damping_low.values > 0.0049).all()
 
 
-def test_advice_for_single_method_omits_other_methods():
-    """The advice for a single method does not state that all methods agree."""
-    modes = "100 Hz:0.005:0.5"
-    advice = pf.backbone(LAW + SLIDE, modes=modes, method="quasi-static").attrs["advice"]
-    assert "Use method quasi-static" in advice
-    assert "methods and" not in advice and "other kinds of test" not in advice
-
-
 @pytest.mark.share(0)
 @pytest.mark.parametrize(("cubic", "start"), [(4e10, 6.5e-3), (-2e10, 2.75e-3)])
 def test_exact_predicted_ring_down_agrees_with_duffing_oscillator(cubic, start):
@@ -220,14 +212,6 @@ def test_band_beside_onset_of_slip_does_not_depend_on_other_amplitudes(ratio):
     amplitudes, damping = march_decay(1.4 * amplitude)
     decrement = np.interp(-amplitude, -amplitudes, damping)
     assert low <= decrement <= high < 1.15 * decrement
-
-
-def test_quasi_static_curve_tends_to_free_frequency():
-    """The quasi-static frequency tends to the stuck and the free frequency at the ends, within 1e-3."""
-    backbone = pf.backbone(LAW + STRUCTURE, amplitudes=[1e-6, 1.0], method="quasi-static")
-    assert backbone.quasi_static_frequency.values == pytest.approx(
-        [100, backbone.attrs["free_frequency"]], rel=1e-3
-    )
 
 
 def test_new_joint_scene_has_a_backbone(tmp_path, monkeypatch, capsys):

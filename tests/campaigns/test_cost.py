@@ -3,7 +3,6 @@
 import csv
 import json
 import re
-from dataclasses import replace
 
 import pytest
 from command_line import run_cli
@@ -12,17 +11,14 @@ from scene_texts import BENCH, PIECE
 import patchfem as pf
 from patchfem import build
 from patchfem.campaigns import (
-    TOLERANCE,
     Cost,
     compute_setting_costs,
     cost,
     describe_fastest_setting,
-    find_fastest_settings,
     numerical_settings,
 )
 from patchfem.campaigns.cost import find_fastest_run
 from patchfem.core import NotConverged, PatchfemError
-from patchfem.export import format_cost
 from patchfem.runs.run import run
 
 LENGTH = 12.7e-3
@@ -127,20 +123,6 @@ def test_exact_table_contains_values_errors_and_distances(tmp_path):
     assert "<svg" in (tmp_path / "out" / "cost_element_size.svg").read_text("utf-8")
 
 
-def test_exact_fastest_run_is_confirmed_by_finer_runs():
-    """The fastest run of a measure meets the tolerance together with all finer runs."""
-    runs = [
-        make_cost("lucky", 1, 1e-6, 1e-6),
-        make_cost("bad", 2, 1e-1, 1e-1),
-        make_cost("good", 3, 1e-3, 1e-3),
-        make_cost("best", 9, 1e-5),
-    ]
-    assert find_fastest_settings(runs, 1e-2) == {"a": "good"} and find_fastest_settings(
-        runs, 1e-6
-    ) == {"a": None}
-    assert find_fastest_settings(runs, 0.2) == {"a": "lucky"}
-
-
 def test_exact_summary_states_fastest_run_or_worst_measure():
     """The summary states the fastest run within the tolerance, or else the measure with the largest error."""
     runs = [make_cost("2", 1, 4e-2, 3e-2), make_cost("4", 2, 8e-3, 6e-3), make_cost("8", 5, 2e-3)]
@@ -184,43 +166,6 @@ def test_exact_smallest_of_equally_fast_settings_is_proposed():
         "fastest in these timings: a knob at 2, 1 CPU s per run"
     )
     assert describe_fastest_setting(slow, 5e-3).endswith("within the tolerance 0.005")
-
-
-def test_exact_missed_tolerance_is_stated_with_sufficient_steps():
-    """A row whose run misses its tolerance states so, with the number of steps that meets it.
-
-    Rows of a tolerance of 1e-4 once had errors of 2.7e-4 to 9.5e-3 without a remark.
-    """
-
-    def run_at(tolerance, error, steps, remedies=()):
-        label = (
-            f"{tolerance:g}"
-            if not remedies or steps == 800
-            else f"{tolerance:g}, {steps} steps per cycle"
-        )
-        return replace(
-            make_cost(label, steps / 800, error),
-            tolerance=tolerance,
-            steps=steps,
-            remedies=remedies,
-        )
-
-    met = run_at(1e-2, 2e-3, 800)
-    missed = run_at(1e-4, 4e-4, 800, ("set accuracy.steps_per_cycle = 3200",))
-    sufficient = replace(run_at(1e-4, 8e-5, 3200), label="0.0001, 3200 steps per cycle")
-    insufficient = replace(
-        run_at(1e-4, 2e-4, 6400, ("use the value",)), label="0.0001, 6400 steps per cycle"
-    )
-    assert format_cost(TOLERANCE, [met, missed, sufficient], 1e-2) == [
-        "tolerance   CPU s     error  worst measure",
-        "0.01            1     0.002  a",
-        "0.0001          1    0.0004  a; not with 800 steps per cycle, but with 3200 steps per cycle (4 CPU s)",
-    ]
-    assert format_cost(TOLERANCE, [met, missed, insufficient], 1e-2)[2:] == [
-        "0.0001          1    0.0004  a; not with 800 steps per cycle, nor with 6400 steps per cycle (8 CPU s): 0.0002 "
-        "in a",
-        "tolerance 0.0001: use the value",
-    ]
 
 
 def test_exact_proposed_steps_meet_the_tolerance_in_a_run(
@@ -267,14 +212,6 @@ def test_refuses_settings_that_do_not_apply_to_scene(tmp_path, words, message):
     scene.write_text(TEXT.format(keys="", tolerance=0.05), "utf-8")
     answer = run_cli("cost", scene, *words)
     assert answer.code == 2 and message in answer.err
-
-
-def test_exact_steps_are_the_only_setting_of_a_point_scene():
-    """The steps per cycle are the only setting of a single point, for a law with and without memory."""
-    for text in (BENCH, BENCH.replace('law = "coulomb"', 'law = "nonlocal"\nbond_length = "1 um"')):
-        found = build(text)
-        assert numerical_settings.find_applicable_settings(found) == ["steps_per_cycle"]
-    assert len(compute_setting_costs(found, "steps_per_cycle")) > 2
 
 
 def test_always_each_value_of_a_setting_runs_once(monkeypatch):

@@ -11,7 +11,6 @@ import patchfem as pf
 from patchfem.campaigns.fits import curve as curves
 from patchfem.campaigns.fits.curve import read_damping_curve
 from patchfem.core import PatchfemError
-from patchfem.scene import loads
 
 IWAN = (
     POINT
@@ -150,17 +149,3 @@ def test_refuses_fewer_values_than_parameters(tmp_path):
 def test_fit_reaches_minimum_chi_square_near_true_parameters(seed, tmp_path):
     """The chi-square of a fit to a noisy synthetic decay is within 1 % of the minimum near the truth."""
     assert all(row.holds for row in decay_fits.compare_fit(seed, tmp_path)["rows"])
-
-
-def test_exact_progress_counts_computed_curves(monkeypatch):
-    """The progress of a fit counts computed curves, without repeated ones."""
-    messages = []
-    monkeypatch.setattr(curves, "PROGRESS_SECONDS", 0.0)
-    monkeypatch.setattr(curves.CurveModel, "build_model", lambda self, values: None)
-    monkeypatch.setattr(
-        curves.CurveModel, "compute_model_curve", lambda self, model, method: np.zeros((2, 3))
-    )
-    curve_model = curves.CurveModel(loads(IWAN), [], AMPLITUDES, messages.append)
-    for value in (1.0, 2.0, 2.0, 3.0):
-        curve_model.compute_curve("balance", [value])
-    assert [message.split(" ")[0] for message in messages] == ["0", "1", "2"]

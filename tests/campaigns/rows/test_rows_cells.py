@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from patchfem.campaigns import NULL_MODELS, compute_rms_scores
-from patchfem.campaigns.rows.cells import MAX_LOG_RATIO, MIN_DISPLACEMENT, read_response_table
+from patchfem.campaigns.rows.cells import MAX_LOG_RATIO, read_response_table
 from patchfem.campaigns.rows.null_models import fit_null_model
 from patchfem.core import G_N, PatchfemError
 
@@ -47,27 +47,6 @@ def test_exact_repeated_conditions_are_separate_readings(tmp_path):
     assert logs == pytest.approx(
         [np.log(0.9), np.log(2), np.log(4.5 / 4), MAX_LOG_RATIO], rel=1e-14
     )
-
-
-def test_exact_displacements_are_limited_by_floor(tmp_path):
-    """Displacements below the floor count as the floor."""
-    cells = read_response_table(write_table(tmp_path, "143,4,,0.001,", "143,5,,0.02,"))
-    logs = cells.compute_log_ratios([1.0, 1.0], [MIN_DISPLACEMENT / 10, MIN_DISPLACEMENT / 10])
-    assert logs == pytest.approx([0.0, np.log(0.5)], abs=1e-14)
-
-
-def test_exact_scores_are_rms_by_kind(tmp_path):
-    """Scores are the rms of the log ratios by kind of reading, or None without readings."""
-    cells = read_response_table(write_table(tmp_path, "143,4,5.0,0.1,", "143,5,6,,"))
-    found = compute_rms_scores(cells, [0.3, 0.4, -0.5], np.array([True, True, True]))
-    assert found == pytest.approx(
-        {"acceleration": np.sqrt(0.17), "displacement": 0.4, "all": np.sqrt(0.5 / 3)}
-    )
-    assert (
-        compute_rms_scores(cells, [0.3, 0.4, -0.5], np.array([True, False, False]))["displacement"]
-        is None
-    )
-    assert compute_rms_scores(cells, [0.3, 0.4, -0.5], np.zeros(3, bool)) is None
 
 
 def test_exact_rows_are_selected_by_frequency_input_flag_or_run(tmp_path):

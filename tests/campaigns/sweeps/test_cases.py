@@ -10,7 +10,7 @@ from scene_texts import BENCH, PATCH, SMALL_PATCH
 from patchfem import SceneError
 from patchfem.campaigns import Cases, Request, SweepScene, read_cases
 from patchfem.campaigns.sweeps.cases import combine_cases
-from patchfem.scene import loads, read_axes
+from patchfem.scene import read_axes
 
 THREE = ["normal.load=1 N,2 N", "friction.static=0.1,0.2,0.3", "slide.speed=1 mm/s,2 mm/s"]
 
@@ -32,12 +32,6 @@ def test_exact_cases_are_all_combinations():
         2,
     )
     assert cases.assignments(11) == ("normal.load=2 N", "friction.static=0.3", "slide.speed=2 mm/s")
-
-
-def test_exact_combined_cases_equal_direct_product():
-    """Cases combined from two parts equal those of all axes at once."""
-    whole = make_cases(*THREE)
-    assert combine_cases([make_cases(THREE[0]), make_cases(*THREE[1:])]) == whole
 
 
 def test_exact_rows_are_combined_with_axes():
@@ -139,33 +133,6 @@ def test_exact_case_name_depends_on_file_content(tmp_path):
         cases.compute_hashes(scene)[0] != before[0][0]
         and beside.compute_hashes(asked_beside)[0] != before[1][0]
     )
-
-
-def test_exact_case_equals_scene_with_settings():
-    """A case equals the scene loaded with its values, also if the base scene lacks a required key."""
-    for text in (
-        BENCH,
-        BENCH.replace("static = 0.3\n", ""),
-        BENCH + '[sweep]\n"friction.static" = "0.1, 0.2"\n',
-    ):
-        for sets in (("friction.static=0.1",), ("friction.static=0.2", "normal.load=1 N")):
-            case = SweepScene(Path("a.toml"), text).read_scene(sets)
-            want = loads(BENCH, "a.toml", sets)
-            assert case.tables() == want.tables() and case.sweep == () and case.kind == want.kind
-
-
-def test_always_spread_cases_contain_axis_ends():
-    """A selection of at most 100 cases contains the first and the last value of every axis."""
-    cases = make_cases(
-        "normal.load=1 N..9 N:9", "friction.static=0.1..0.9:40lin", "slide.speed=1 mm/s,2 mm/s"
-    )
-    some = cases.spread_case_numbers(100)
-    assert len(set(some)) == len(some)
-    assert 50 < len(some) <= 100
-    assert all(0 <= one < len(cases) for one in some)
-    for axis, size in enumerate(cases.shape):
-        assert {0, size - 1} <= {cases.axis_indices(one)[axis] for one in some}
-    assert cases.spread_case_numbers(720) == list(range(720))
 
 
 def test_exact_common_mistake_is_reported_once():

@@ -128,6 +128,7 @@ def random_cases(seed: int, count: int):
 RARELY_DERIVED = ("weakening", "two loads", "bonded")
 
 
+@pytest.mark.share(0, 2, 4, 5, 9)
 @pytest.mark.parametrize("name", SCENES)
 def test_exact_derived_models_equal_models_built_from_text(name):
     """Models of rigs derived from the first model equal those built from text, to the bit."""
@@ -144,6 +145,7 @@ def test_exact_derived_models_equal_models_built_from_text(name):
     assert n_derived == 0 if name == "duration" else n_derived > 5
 
 
+@pytest.mark.share(0, 2, 5)
 @pytest.mark.parametrize("name", PATCHES)
 def test_exact_derived_patches_equal_patches_built_from_text(name):
     """Models of patches derived from the first model equal those built from text, to the bit.
@@ -237,6 +239,7 @@ def collect_stretch_numbers(model) -> list:
     return [*law.numbers, law.length]
 
 
+@pytest.mark.share(0, 2, 4, 6)
 @pytest.mark.parametrize("name", LUMPED)
 def test_exact_columns_of_similar_models_agree_with_each_model(name):
     """The columns of similar models contain the numbers of each single model.
@@ -273,22 +276,3 @@ def test_exact_columns_of_similar_models_agree_with_each_model(name):
         np.testing.assert_array_equal(
             selected, collect_columns(single_models, collect_contact_numbers)[:, [4, 2]]
         )
-
-
-def test_exact_derived_models_follow_a_changed_load(monkeypatch):
-    """A change of how [normal] sets the load acts on derived models as well.
-
-    Here the load is doubled.
-    """
-    from patchfem.model import load
-
-    point = load.PointLoad
-    monkeypatch.setattr(load, "PointLoad", lambda force, *others: point(2 * force, *others))
-    sweep_scene = SweepScene(Path("a.toml"), SCENES["coulomb"])
-    sets = ("normal.load=3 N",)
-    values = (3.0,)
-    assert sweep_scene._derive_model(sets, values) is not None
-    assert sweep_scene.build_model(sets, values).point.load == 6.0
-    assert are_identical(
-        model_or_reason(sweep_scene, sets, values), model_or_reason(sweep_scene, sets, ())
-    )

@@ -97,16 +97,6 @@ def assert_only_killing_case_fails(tmp_path: Path, once: bool, executor) -> None
         assert results.outcome[number] == FAILED_OUTCOME and "died" in results.messages[number]
 
 
-def test_exact_chunks_contain_each_case_once():
-    """The chunks contain every case exactly once."""
-    chunks = ChunkQueue(range(1000), 2)
-    seen = []
-    while (chunk := chunks.take_chunk()) is not None:
-        seen += chunk
-        chunks.record_time(chunk, 0.01 * len(chunk))
-    assert seen == list(range(1000))
-
-
 def test_exact_chunk_size_follows_time_per_case():
     """The size of a chunk follows the measured time per case."""
     chunks = ChunkQueue(range(1000), 2)
@@ -146,24 +136,6 @@ class IdleExecutor:
             yield chunk, 1.0, (None, [])
 
 
-def test_exact_failed_case_is_retried_last():
-    """A case that killed its worker is retried alone after all others, and then given up."""
-    chunks = ChunkQueue(range(3), 1)
-    assert (
-        chunks.take_chunk() == [0] and chunks.record_death([0]) == [] and chunks.take_chunk() == [1]
-    )
-    chunks.take_chunk()
-    assert (
-        chunks.take_chunk(is_idle=False) is None
-        and chunks.take_chunk() == [0]
-        and chunks.take_chunk() is None
-    )
-    assert chunks.record_death([0]) == []
-    assert chunks.take_chunk() == [0]
-    assert chunks.record_death([0]) == [0]
-    assert chunks.take_chunk() is None
-
-
 def test_exact_failed_chunk_is_bisected():
     """A chunk of 1000 cases with a failing case is bisected into at most 10 chunks of the others."""
     chunks = ChunkQueue(range(1000), 1, 1000)
@@ -188,6 +160,7 @@ def test_exact_remaining_time_after_first_chunks():
     assert clock(1000, 2.0) < 2000 * 0.01 / 2 and clock.n_remaining == 2000
 
 
+@pytest.mark.slow
 def test_exact_cluster_equals_local_executor():
     """A Dask cluster gives the same results as a single process."""
     pytest.importorskip("distributed")

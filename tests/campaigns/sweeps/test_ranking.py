@@ -44,7 +44,7 @@ def collect_indices(indices):
     }
 
 
-@pytest.mark.parametrize("count", [128, 256, 1024])
+@pytest.mark.parametrize("count", [128, 1024])
 def test_exact_intervals_cover_sobol_indices_of_ishigami(count):
     """The intervals cover the total indices of the Ishigami function.
 
@@ -58,10 +58,10 @@ def test_exact_intervals_cover_sobol_indices_of_ishigami(count):
     assert np.all((indices["low"] <= TOTAL) & (TOTAL <= indices["high"]))
     assert np.abs(indices["total"] - TOTAL).max() < 0.03
     assert np.abs(indices["first"] - FIRST).max() < 0.03
-    assert np.all(indices["high"] - indices["low"] < {128: 1, 256: 0.6, 1024: 0.2}[count])
+    assert np.all(indices["high"] - indices["low"] < {128: 1, 1024: 0.2}[count])
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_always_intervals_cover_indices_of_discontinuous_function(seed):
     """The intervals cover the total indices of a discontinuous function."""
     rng = np.random.default_rng(9)
