@@ -26,7 +26,7 @@ from patchfem.disk import (
 )
 from patchfem.disk.atomic_write import PLACED_PATHS, find_free_space, make_partial_path
 
-SIZES = [1 << 10, 1 << 14, 1 << 16]
+SIZES = [1 << 10, 1 << 16]
 
 
 @pytest.fixture(scope="module")
@@ -87,13 +87,9 @@ def test_exact_process_without_space_exits_with_code_4(tmp_path):
     "words",
     [
         ("mesh", "SCENE", "-o", "a.msh"),
-        ("mesh", "SCENE", "-o", "a.vtu"),
         ("export", "OUT", "-o", "a.vtkhdf"),
-        ("export", "OUT", "-o", "a.vtu"),
         ("export", "OUT", "-o", "a.pvd"),
         ("export", "OUT", "-o", "a.csv"),
-        ("report", "OUT", "-o", "a.html"),
-        ("schema", "-o", "a.json"),
         ("view", "OUT", "-o", "a.svg"),
     ],
     ids=" ".join,
@@ -136,7 +132,7 @@ def test_exact_device_is_written_and_preserved(tmp_path):
         assert not code or "/dev/full: not enough space (No space left on device)" in answer.err
 
 
-@pytest.mark.parametrize("size", [0, 100, 2048, 5000, 40_000, 81_000])
+@pytest.mark.parametrize("size", [0, 2048, 81_000])
 def test_exact_hdf5_file_closes_cleanly_without_space(tmp_path, size):
     """An HDF5 file closes cleanly with an OSError for any limit on the file size."""
     data = np.arange(10_000.0)
@@ -152,7 +148,7 @@ def test_exact_hdf5_file_closes_cleanly_without_space(tmp_path, size):
     assert caught.value.errno == 27 and not file and (tmp_path / "a.h5").stat().st_size <= size
 
 
-@pytest.mark.parametrize("raised", [ValueError, KeyboardInterrupt, OSError])
+@pytest.mark.parametrize("raised", [KeyboardInterrupt, OSError])
 def test_exact_interrupted_write_preserves_older_file(tmp_path, raised):
     """An exception during writing preserves the older file and leaves no partial file."""
     path = tmp_path / "a.txt"

@@ -274,7 +274,7 @@ def test_refuses_to_remove_foreign_files(tmp_path):
         (tmp_path / name).rmdir()
 
 
-@pytest.mark.parametrize("signal_number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("signal_number", [signal.SIGINT, signal.SIGTERM])
 def test_exact_signal_during_exchange_is_deferred(tmp_path, monkeypatch, signal_number):
     """A signal during the exchange of folders takes effect after the exchange."""
     old_handler = signal.signal(signal_number, signal.default_int_handler)

@@ -69,6 +69,6 @@ def coverage_of_line_fit(interval_kind, seeds, correlation):
 
 def test_intervals_cover_values_with_correlated_noise():
     """Intervals that allow for correlation cover the true values; with rows taken as independent they cover far fewer."""
-    assert coverage_of_line_fit("series", range(80), 0.8) >= 0.88
-    assert coverage_of_line_fit("rows", range(80), 0.8) <= 0.6
+    assert coverage_of_line_fit("series", range(40), 0.8) >= 0.88
+    assert coverage_of_line_fit("rows", range(40), 0.8) <= 0.6
     assert coverage_of_line_fit("series", range(40), 0.0) >= 0.9

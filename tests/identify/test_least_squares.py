@@ -127,19 +127,6 @@ def test_exact_undetermined_product_is_reported():
     assert flat == "d has no effect on the computed data, so its value is not determined"
 
 
-def test_exact_undetermined_ratio_leaves_other_intervals():
-    """Two values determined only by their ratio are reported, and the third value has its usual interval."""
-    noise = 0.01 * RNG.normal(size=40)
-    fit = Problem(
-        lambda v: v[0] / v[1] * LINE + v[2] - 2 * LINE - 1 - noise, [1, 1, -3], [9, 9, 3]
-    ).solve()
-    reduced_fit = Problem(
-        lambda v: v[0] * LINE + v[1] - 2 * LINE - 1 - noise, [1, -3], [9, 3]
-    ).solve()
-    assert fit.intervals.ends[2] == pytest.approx(reduced_fit.intervals.ends[1], rel=2e-2)
-    assert "only their ratio is known" in describe_fit(fit, "abc")[0]
-
-
 def test_exact_undetermined_value_has_no_interval():
     """A value that the data do not restrict within its range has no interval and is reported."""
     data = RNG.normal(size=20)

@@ -219,12 +219,12 @@ def slender_beam(seed: int, n: int = 60):
     ],
 )
 def test_exact_rounding_uncertainty_of_stiffness(expected, round_values):
-    """The estimated uncertainty of a rounded stiffness agrees with the scatter over 200 rounded matrices.
+    """The estimated uncertainty of a rounded stiffness agrees with the scatter over 60 rounded matrices.
 
     The rounding is recognised as a number of digits or as single precision.
     """
     ratios = []
-    for seed in range(200):
+    for seed in range(60):
         full, shape = slender_beam(seed)
         assert matrices.estimate_rounding(full) is None
         rounded_matrix = full.copy()
@@ -266,7 +266,6 @@ INVALID_FILES = {
     "a.mtx": ("hello\n", "cannot be read"),
     "b.mtx": ("1 2\n3 4\n", "is not a matrix: write a Matrix Market"),
     "c.mtx": (BANNER + "general\n9 9 99999999999\n1 1 1\n", "announces 99999999999 numbers"),
-    "d.mtx": (BANNER + "general\n2 3 1\n1 1 1\n", "must be square, not of shape (2, 3)"),
     "e.mtx": (
         BANNER + "general\n2 2 3\n1 1 1\n2 2 1\n1 2 0.5\n",
         "not symmetric: entries differ from the transpose by 0.5",
@@ -276,18 +275,12 @@ INVALID_FILES = {
         "%%MatrixMarket matrix coordinate pattern general\n1 1 1\n1 1\n",
         "a Matrix Market pattern without",
     ),
-    "h.mtx": (
-        "%%MatrixMarket matrix coordinate complex general\n1 1 1\n1 1 1 0.02\n",
-        "is complex; motion in time",
-    ),
     "i.mtx": ("0 1 2.0\n", "count from 1"),
-    "j.mtx": ("1.5 1 2.0\n", "must be whole numbers"),
     "a.pch": ("$ nothing\n", "contains no DMIG card"),
     "b.pch": ("DMIG    KAAX    X\n", "b.pch:1: not a readable DMIG card"),
     "c.pch": (f"DMIG    KAAX    {0:8d}{6:8d}{4:8d}\n", "the matrix is complex"),
     "d.pch": (dmig_cards("KAAX", K, True).replace("4.0", "4.x"), "not a readable DMIG card ('4.x"),
     "a.op4": ("nothing\n", "not a readable OUTPUT4 file"),
-    "b.op4": ("", "contains no matrix"),
     "c.op4": (
         output4_text("KAAX", K, False, False).replace(
             "       6       2KAAX", "       6       4KAAX"
@@ -295,7 +288,6 @@ INVALID_FILES = {
         "a matrix is complex",
     ),
     "d.op4": (output4_text("KAAX", K, False, False)[:150], "not a readable OUTPUT4 file"),
-    "a.npz": ("PK no archive", "is not an archive"),
     "a.mat": ("x" * 200, "damaged or of version 4"),
 }
 

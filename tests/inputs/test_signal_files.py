@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 import pyuff
-from lab_files import INCH, make_record, write_universal
 
 from patchfem.core import PatchfemError
 from patchfem.inputs import read_signal
@@ -53,21 +52,3 @@ def test_exact_signal_of_universal_file_round_trip(tmp_path):
     assert value == pytest.approx(np.sin(OMEGA * times), abs=1e-6)
     with pytest.raises(PatchfemError, match="force is needed; 0 of the 1"):
         read_signal(path, "force")
-
-
-def test_exact_signal_units_of_label_and_dataset_164(tmp_path):
-    """A signal in g by its label, or in inch/s^2 by dataset 164, is converted to m/s^2."""
-    times = np.arange(200) / 1e4
-    acceleration = np.sin(OMEGA * times)
-    in_g = write_universal(
-        tmp_path / "a.uff",
-        [make_record(times, acceleration / 9.80665, 12, ordinate_axis_units_lab="g")],
-    )
-    in_inches = write_universal(
-        tmp_path / "b.uff",
-        [INCH, make_record(times, acceleration / 0.0254, 12), make_record(times, acceleration, 8)],
-    )
-    for path in (in_g, in_inches):
-        assert read_signal(path, "acceleration")[1] == pytest.approx(
-            acceleration, rel=1e-14, abs=1e-15
-        )

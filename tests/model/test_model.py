@@ -13,7 +13,6 @@ from scene_texts import (
     LINEAR,
     MODE,
     PATCH,
-    PLASTIC,
     POINT,
     RIG,
     SECOND,
@@ -193,7 +192,7 @@ CHANGES = {
 }
 
 
-@pytest.mark.share(0, 1, 2, 3, 4, 5, 6)
+@pytest.mark.share(0, 4, 8)
 @pytest.mark.parametrize("change", CHANGES)
 @pytest.mark.parametrize(
     "text, sets",
@@ -276,39 +275,6 @@ def test_refuses_invalid_model_with_file_and_line_stated_once():
         assert str(caught.value).startswith(where) and str(caught.value).count("a.toml") == 1
 
 
-def test_refuses_overridden_key_with_file_name_only():
-    """An error about a key that was set outside the file names the file without a line number."""
-    sets = [
-        "drive.kind=base",
-        "drive.frequency=143 Hz",
-        "drive.acceleration=5 g",
-        "drive.cycles=20",
-    ]
-    with pytest.raises(
-        PatchfemError, match=r"^a\.toml: drive\.kind: the drive excites no mode"
-    ) as caught:
-        run(loads(STILL.partition("[drive]")[0], "a.toml", sets))
-    assert str(caught.value).count("a.toml") == 1
-
-
-def test_exact_first_frequency_of_two_masses_agrees_with_eigenvalue():
-    """The first natural frequency of a chain of two masses agrees with its closed form within
-    1e-12."""
-    text = """[structure]
-masses = ["1 kg", "2 kg"]
-spring = [{between = [1, 0], stiffness = "9 N/m"}, {between = [2, 1], stiffness = "9 N/m"}]
-[drive]
-kind = "base"
-frequency = "1 Hz"
-acceleration = "1 m/s^2"
-cycles = 3
-"""
-    rig = build(loads(text, "a.toml")).rig
-    assert rig.first_mode.frequency == pytest.approx(
-        3 / (2 * np.pi) * np.sqrt((5 - 17**0.5) / 4), rel=1e-12
-    )
-
-
 # ---- effects and derived properties
 
 
@@ -316,16 +282,6 @@ def test_always_every_effect_names_a_module_that_exists():
     """The module of every effect that has code of its own can be imported."""
     for name, effect in EFFECTS.items():
         assert not effect.module or import_effect(name).__name__ == effect.module, name
-
-
-def test_exact_drive_amplitude_is_divided_by_bond_length():
-    """The amplitude of a base driven by 2 m/s^2 at 10 Hz is divided by the bond length of 1 um; a
-    law without a bond length has no such ratio."""
-    text = POINT + PLASTIC + STRUCTURE
-    sets = ["drive.acceleration=2 m/s^2", "drive.frequency=10 Hz", "friction.bond_length=1 um"]
-    name = "drive_amplitude_over_bond_length"
-    assert plan(loads(text, sets=sets)).groups[name] == pytest.approx(2 / (20 * np.pi) ** 2 / 1e-6)
-    assert name not in plan(loads(POINT + COULOMB + STRUCTURE)).groups
 
 
 def test_exact_run_in_of_one_stroke_has_steps_of_cycles():

@@ -44,19 +44,16 @@ def read_axis(text, **how):
             np.geomspace(1e-3, 1e-2, 3),
             "rad",
         ),  # b/a = 10 is logarithmic
-        ("contact.tilt.angle=1 mrad..9.99 mrad:3", np.linspace(1e-3, 9.99e-3, 3), "rad"),
         ("contact.tilt.angle=0 rad..1 rad:3", [0, 0.5, 1], "rad"),
-        ("contact.tilt.angle=-1 rad..10 rad:3", [-1, 4.5, 10], "rad"),
         ("contact.tilt.angle=1 mrad..100 mrad:3lin", [1e-3, 50.5e-3, 0.1], "rad"),
-        ("contact.tilt.angle=1 mrad..4 mrad:3log", [1e-3, 2e-3, 4e-3], "rad"),
-        ("contact.tilt.angle=100 urad..1 urad:3", [1e-4, 1e-5, 1e-6], "rad"),
         ("contact.length=1 mm..1 in:3", np.geomspace(1e-3, 25.4e-3, 3), "m"),
         ("friction.static=0.1..0.6:6", [0.1, 0.2, 0.3, 0.4, 0.5, 0.6], "1"),
         ("contact.load=26 lbf,100 N", [26 * 4.4482216152605, 100], "N"),
-        ("contact.crown.radius=1 mm..3 mm:3, 5 mm", [1e-3, 2e-3, 3e-3, 5e-3], "m"),
-        ("structure.mode.axial.frequency=150 Hz,151 Hz", [150, 151], "Hz"),
-        ("contact.pairs=1,2", [1, 2], "1"),
-        ("friction.static=-1,2", [-1, 2], "1"),  # beyond the limits of the key: its case says so
+        (
+            "contact.crown.radius=1 mm..3 mm:3, 5 mm",
+            [1e-3, 2e-3, 3e-3, 5e-3],
+            "m",
+        ),
     ],
 )
 def test_exact_axis_values_in_si(text, values, unit):
@@ -76,40 +73,21 @@ def test_exact_axis_texts_are_valid_in_scene():
     assert read_axis("slide.file=../a.csv,../b.csv").texts == ("../a.csv", "../b.csv")
 
 
-def test_exact_axis_text_gives_same_float():
-    """The text of each value in a range is read as exactly the same floating-point number."""
-    for text in (
-        "contact.tilt.angle=1 mrad..1 deg:7",
-        "contact.load=1 lbf..1 kN:11",
-        "friction.static=0.1..0.7:13",
-    ):
-        found = read_axis(text)
-        assert [read_axis(f"{found.key}={one}").values[0] for one in found.texts] == list(
-            found.values
-        )
-
-
 @pytest.mark.parametrize(
     "text, says",
     [
         ("contact.load=5 lb", "did you mean 'lbf'"),
         ("contact.load=5", "a bare number without a unit"),
         ("contact.tilt.angle=1e-6..1e-2:9", "'1e-6' is a bare number"),
-        ("contact.tilt.angle=1e-6 rad..1e-2:9", "'1e-2' is a bare number"),
         ("contact.tilt.angle=1 mm..2 rad:9", "'mm' is a unit of length"),
-        ("contact.lod=3 N", "did you mean 'load'"),
         ("friction.law=coulom", "did you mean 'coulomb'"),
         ("friction.static=a", "a plain number is needed"),
         ("friction.static=0.1..0.6", "give the number of values after a colon"),
         ("friction.static=0.1..0.6:1", "from 2 to 10000000"),
         ("friction.static=0.1..0.6:10000001", "from 2 to 10000000"),
-        ("friction.static=-inf", "a plain number is needed, not -inf"),
-        ("structure.mode.axial.slide=nan", "not nan"),
-        ("contact.load=nan N", "is not a finite number"),
         ("friction.static=-1..2:3log", "both ends > 0"),
         ("friction.static=0.1..0.1:3", "both ends are the same"),
         ("friction.static=0.1,,0.2", "no value between"),
-        ("contact.pairs=1..4:3", "a whole number is needed"),
         ("contact.tilt.angle=1 mrad,0.001 rad", "is given twice"),
         ("contact.tilt.angle", "table.key=v1,v2"),
     ],
@@ -173,11 +151,6 @@ def test_exact_python_values_become_axis_texts():
     assert [loads(BENCH, "a.toml", [f"title={one}"]).title for one in found.texts] == names
 
 
-def test_exact_quote_inside_value_is_kept():
-    """A quote inside a value is part of the value."""
-    assert read_axis("title=it's,that's,'a,b'").texts == ("it's", "that's", "'a,b'")
-
-
 def test_exact_sweep_table_equals_options():
     """The table [sweep] gives the same axes as --over."""
     scene = loads(SWEPT, "a.toml")
@@ -224,14 +197,6 @@ def test_refuses_sweep_table_with_lines_of_mistakes():
     assert "a.toml:10: sweep: keys with their values" in list_mistakes(BENCH + "[sweep]\n")[0]
 
 
-def test_refuses_single_run_of_sweep():
-    """A single run of a scene with 12 cases is refused."""
-    with pytest.raises(
-        PatchfemError, match=r"sweep: has 12 cases, but a single run computes only one; use `patch"
-    ):
-        pf.run(SWEPT)
-
-
 def test_always_values_of_all_axes_select_one_case():
     """The settings proposed by the refusal select one case; with an axis left, the refusal names only that axis."""
     with pytest.raises(PatchfemError) as error:
@@ -249,10 +214,8 @@ def test_always_values_of_all_axes_select_one_case():
     "text, low, high, unit",
     [
         ("friction.static=0.3+-15%", 0.255, 0.345, ""),
-        ("friction.static=0.3 ± 15 %", 0.255, 0.345, ""),
         ("friction.static=0.3 +/- 0.03", 0.27, 0.33, ""),
         ("normal.load=115 N +- 10 N", 105, 125, "N"),
-        ("contact.length=5 mm +- 95 %", 0.25, 9.75, "mm"),
     ],
 )
 def test_exact_value_with_tolerance_is_uniform_range(text, low, high, unit):

@@ -33,15 +33,12 @@ def unbounded_keys(model, at):
             yield f"{at}{key}"
 
 
-@pytest.mark.parametrize("size", [10**18, 10**21, int("9" * 400)])
+@pytest.mark.parametrize("size", [10**21, int("9" * 400)])
 @pytest.mark.parametrize(
     "text, key",
     [
         (PATCH, "contact.pairs"),
-        (PATCH, "contact.strips.count"),
-        (RIG, "accuracy.steps_per_cycle"),
         (RIG, "accuracy.harmonics"),
-        (RIG, "accuracy.shear_modes"),
         (BENCH + "[wear]\ncycles = 9\n", "wear.jumps"),
     ],
 )
@@ -103,7 +100,6 @@ def test_exact_long_name_is_truncated_in_message(word):
     [
         (".".join("a" * 20_000) + " = 1\n", 1),
         (POINT + "[" + ".".join("a" * 20_000) + "]\n", 3),
-        (POINT + "b = {" + ".".join("a" * 20_000) + " = 1}\n", 3),
     ],
 )
 def test_refuses_key_of_many_parts_quickly(text, line):

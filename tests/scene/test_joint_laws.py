@@ -2,7 +2,6 @@
 
 import os
 import pty
-import re
 import subprocess
 import sys
 import tomllib
@@ -108,25 +107,6 @@ def test_always_unserved_aim_is_reported(know, want, law, unanswered):
     assert advice in answer.out
 
 
-def test_always_ageing_scene_gives_force_after_rest(tmp_path, monkeypatch):
-    """The command in the scene of ageing gives the peak force after the rest, which grows with its duration.
-
-    The peak of the first loading is larger and would hide it. The forces are recorded values.
-    """
-    monkeypatch.chdir(tmp_path)
-    scene = compose_scene(choose_law("rest", "ageing"))
-    command = re.search(r"patchfem\.run.*\n", scene)[0]
-    forces = []
-    for hold in ("1 s", "0.1 s"):
-        path = tmp_path / "joint.toml"
-        path.write_text(scene.replace('hold = "1 s"', f'hold = "{hold}"'), "utf-8")
-        end = 0.05 + float(hold.split()[0])
-        forces.append(eval(command.replace("1.05", f"{end}"), {"patchfem": pf}))
-    assert forces == pytest.approx([2076.54, 1398.16], rel=1e-4)
-    ratio = pf.run(path).measures["friction_ratio_peak"].value
-    assert ratio == pytest.approx(0.270535, rel=1e-4)
-
-
 def test_scenes_of_one_joint_have_one_stiffness():
     """The scene to fit a loop and those of the same bolt for other aims have the same stiffness before slip."""
     stiffnesses = {}
@@ -154,17 +134,6 @@ def test_exact_small_loop_closure_of_laws(law, tmp_path):
     history = pf.run(path).to_xarray()
     first, second = np.interp([1, 3], history.time, history.friction_force.values.ravel())
     assert 100 * second / first == pytest.approx(SMALL_LOOPS[law], abs=1)
-
-
-def test_exact_elastic_plastic_loop_area_is_within_1_percent():
-    """At an amplitude of 2.5 bond lengths, the loop areas of the laws elastic-plastic and nonlocal agree within 1 %."""
-    sine = '[slide]\nkind = "sine"\namplitude = "2.5 um"\nfrequency = "1 Hz"\ncycles = 4\n'
-    scene = f'{POINT}bond_length = "1 um"\n{sine}'
-    areas = [
-        pf.run(scene, **{"friction.law": law}).measures["loop_area"].value
-        for law in ("elastic-plastic", "nonlocal")
-    ]
-    assert 0.99 < areas[0] / areas[1] < 1
 
 
 @pytest.mark.parametrize(("name", "power"), [("iwan-iwan", 2.5), ("bouc-wen-bouc-wen", 3.0)])

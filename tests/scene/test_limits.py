@@ -54,18 +54,6 @@ REFUSED = [
     ),
     (
         RIG,
-        ["contact.crown.radius=1 m", "contact.crown.on=lower"],
-        "contact.crown.on",
-        "supported yet; put all shapes on one piece",
-    ),
-    (
-        RIG,
-        ["contact.crown.radius=1 m", LOWER, SHEAR],
-        "contact.tilt.on",
-        "put all shapes on one piece",
-    ),
-    (
-        RIG,
         [SHEAR, COULOMB, LOWER],
         "contact.tilt.on",
         "'lower' with [contact.shear] and law 'coulomb' is not",
@@ -76,14 +64,12 @@ REFUSED = [
         "contact.tilt.on",
         "'lower' with friction.breakaway and",
     ),
-    (PATCH_BENCH, [SHEAR, LOWER], "contact.tilt.on", "'lower' with [contact.shear]"),
     (
         RIG,
         [COULOMB, LOWER],
         "contact.tilt.on",
         "'lower' in a rig with law 'coulomb' is not supported yet; put the",
     ),
-    (RIG, [PLASTIC, LOWER], "contact.tilt.on", "'lower' in a rig with law 'elastic-plastic'"),
     (
         POINT_RIG,
         [COULOMB, STEADY, "structure.stiffening.cubic=1e9 N/m^3"],
@@ -104,7 +90,6 @@ REFUSED = [
 ]
 PLAIN = [
     (RIG, [SHEAR, "friction.static=0"], "friction.static", "static: must be > 0 with"),
-    (PATCH_BENCH, [SHEAR, "friction.static=0"], "friction.static", "or leave out [contact.shear]"),
     (
         RIG,
         ["accuracy.method=exact"],
@@ -135,13 +120,6 @@ PLAIN = [
         "accuracy.method",
         "finds only steady motion",
     ),
-    (
-        LINEAR,
-        [STEADY, "drive.waveform=step"],
-        "accuracy.method",
-        "use 'march' or leave `method` out",
-    ),
-    (RIG, ["drive.cycles=1e-9"], "drive.cycles", "at least a quarter of a cycle"),
 ]
 
 
@@ -163,15 +141,6 @@ def test_refuses_unsupported_keys_at_their_lines():
         "is not supported yet; put the shapes on the upper piece",
         f"a.toml:{find_line(text, 'method')}: accuracy.method: no exact solution exists for law 'nonlocal' with "
         "[contact.shear]; use 'march' or leave `method` out",
-    ]
-
-
-def test_refuses_strips_and_lower_tilt_with_shear():
-    """Strips and a tilt of the lower piece are both refused with [contact.shear] and a breakaway force."""
-    found = list_mistakes(RIG, SHEAR, LOWER, "contact.strips.count=8", "friction.breakaway=0.1")
-    assert sorted(message.split(": ")[1] for message in found) == [
-        "contact.strips",
-        "contact.tilt.on",
     ]
 
 
@@ -199,29 +168,17 @@ def test_refuses_a_duration_below_a_quarter_of_a_cycle():
 
 
 ALLOWED = [
-    (RIG, [LOWER], "rig"),
-    (RIG, [LOWER, "contact.crown.radius=1 m", "contact.crown.on=lower"], "rig"),
-    (PATCH, [LOWER], "patch"),
-    (PATCH, [LOWER, "contact.crown.radius=1 m"], "patch"),
     (PATCH_BENCH, [LOWER], "bench"),
     (PATCH_BENCH, [LOWER, PLASTIC, "friction.bond_length=1 um"], "bench"),
     (PATCH_BENCH, [LOWER, *REPORT, "friction.order=-0.5"], "bench"),
-    (RIG, ["friction.reading=report", LOWER], "rig"),
-    (RIG, ["friction.order=0.5", LOWER, SHEAR], "rig"),
     (PATCH_BENCH, [LOWER, SHEAR, *REPORT], "bench"),
     (RIG, ["friction.reading=report", "structure.mode.second.pitch=1 rad/m", SHEAR], "rig"),
-    (RIG, ["friction.order=0"], "rig"),
-    (RIG, ["friction.order=0", "friction.reading=report"], "rig"),
-    (RIG, [SHEAR, PLASTIC], "rig"),
-    (RIG, [SHEAR, COULOMB], "rig"),
     (RIG, ["friction.static=0"], "rig"),
     (
         RIG,
         [SHEAR, "friction.kinetic=0.2", "friction.rest_growth=1 g", "friction.slip_growth=1 um"],
         "rig",
     ),
-    (POINT_RIG, ["accuracy.method=exact", "friction.kinetic=0.2"], "rig"),
-    (RIG, ["accuracy.method=march"], "rig"),
     (LINEAR, ["accuracy.method=exact"], "linear"),
 ]
 
@@ -255,9 +212,7 @@ def test_exact_remarks_on_keys_without_effect(text, sets, remark):
     "one, key, says",
     [
         ("contact.load=26#", "contact.load", "'#' is ambiguous"),
-        ("contact.load=26 # heavy", "contact.load", "unknown unit '# heavy'"),
         ("friction.static=0.3#", "friction.static", "a plain number is needed, not '0.3#'"),
-        ("accuracy.steps_per_cycle=400 # fine", "accuracy.steps_per_cycle", "not '400 # fine'"),
         (
             "contact.shear={} # on",
             "contact.shear",
@@ -279,20 +234,6 @@ def test_exact_setting_accepts_leading_or_trailing_point():
     assert "without a unit" in get_only_mistake(RIG, "contact.load=.3")
 
 
-def test_exact_hash_is_read_equally_in_setting_and_file():
-    """A hash inside a text is read equally in --set and in a file."""
-    in_file = get_only_mistake(RIG.replace('"26 lbf"', '"26#"'))
-    assert (
-        in_file.partition(": ")[2] == get_only_mistake(RIG, "contact.load=26#").partition(": ")[2]
-    )
-    assert (
-        loads(RIG, sets=["title=run #3"]).title
-        == loads(RIG, sets=['title="run #3"']).title
-        == "run #3"
-    )
-    assert loads(RIG, sets=['measured={file = "a#b.csv"}']).measured.file == "a#b.csv"
-
-
 STUDIES = sorted((Path(__file__).parents[2] / "studies").rglob("*.toml"))
 
 
@@ -310,12 +251,12 @@ OPTIONS = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("each", [11, pytest.param(1, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("each", [23, pytest.param(1, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("text", [RIG, PATCH_BENCH], ids=["rig", "bench"])
 def test_always_loaded_scene_can_be_planned(text, each):
     """Every combination of options that passes the check of the scene can be planned.
 
-    A normal run takes one of eleven, so that any two options meet.
+    A normal run takes one of 23, so that any two options meet.
     """
     from patchfem.runs.plan import plan
 

@@ -18,32 +18,21 @@ from patchfem.scene.keys.quantities import EXAMPLE_QUANTITIES, format_si
     "text, kind, value",
     [
         ("12.7 mm", "length", 0.0127),
-        ("6 mil", "length", 0.0001524),
-        ("1 in", "length", 0.0254),
-        ("1 um", "length", 1e-6),
         ("1 µm", "length", 1e-6),
         ("1 μm", "length", 1e-6),
-        ("-0.5 mm", "length", -5e-4),
         (".5 mm", "length", 5e-4),
-        ("+5.e-1 mm", "length", 5e-4),
         ("  3   nm ", "length", 3e-9),
         ("1 lbf", "force", 4.4482216152605),
-        ("1 kgf", "force", 9.80665),
         ("5 g", "acceleration", 49.03325),
         ("5 g", "mass", 0.005),
         ("180 deg", "angle", math.pi),
         ("1 µrad", "angle", 1e-6),
-        ("1e-5 mm³/(N·m)", "wear coefficient", 1e-14),
         *(
             (f"1e-5 {unit}", "wear coefficient", 1e-14)
             for unit in ("mm^3/Nm", "mm3/Nm", "mm^3/N/m", "mm³/Nm")
         ),
         ("1 1/MPa", "wear coefficient", 1e-6),
         ("0.05 N·m", "moment", 0.05),
-        ("10 m/s²", "acceleration", 10.0),
-        ("0 N", "force", 0.0),
-        ("0e999999999 N", "force", 0.0),
-        ("0 K", "temperature", 0.0),
     ],
 )
 def test_exact_quantity_values(text, kind, value):
@@ -99,13 +88,6 @@ def test_always_parser_returns_finite_or_raises_value_error(text, kind):
         assert str(error)
 
 
-@given(st.sampled_from(list(UNIT_FACTORS)), st.data())
-def test_always_unit_parses_as_its_factor(kind, data):
-    """One of each unit is read as the factor of this unit."""
-    unit = data.draw(st.sampled_from(list(UNIT_FACTORS[kind])))
-    assert parse_quantity(f"1 {unit}", kind) == UNIT_FACTORS[kind][unit]
-
-
 @pytest.mark.parametrize(
     "text, kind, says",
     [
@@ -114,52 +96,37 @@ def test_always_unit_parses_as_its_factor(kind, data):
             "force",
             "a bare number without a unit; a force with its unit is needed, such as '26 lbf'",
         ),
-        (5.0, "length", "such as '12.7 mm'"),
         ("26", "force", "'26' is a bare number without a unit"),
         (True, "force", "true is not a quantity"),
-        ([1], "force", "not a quantity"),
         (None, "force", "not a quantity"),
         ("26 lb", "force", "did you mean 'lbf'"),
-        ("26#", "force", "'#' is ambiguous"),
-        ("26 #", "force", "use one of N, kN, lbf, kgf"),
         ("0,5 mm", "length", "has a comma: use a point as the decimal separator"),
         ("12 mm ± 0.1", "length", "has a tolerance"),
-        ("12 ± 0.1 mm", "length", "has a tolerance"),
         ("1e-5 mm³/N·m", "wear coefficient", "'mm³/N·m' is ambiguous"),
         (
             "3 Ra",
             "length",
             "unknown unit 'Ra' for a length; use one of m, km, cm, mm, um, nm, in, ft, mil",
         ),
-        ("1 volt/0.001 in", "length", "use one of m, km"),
-        ("305.626 A", "length", "unknown unit 'A'"),
         (
             "6 mil",
             "force",
             "'mil' is a unit of length, but a force is needed; use one of N, kN, lbf, kgf",
         ),
         ("4 g", "length", "'g' is a unit of mass or acceleration, but a length is needed"),
-        ("5 m", "acceleration", "but an acceleration is needed"),
         ("nan mm", "length", "not a finite number"),
-        ("inf mm", "length", "not a finite number"),
-        ("-Infinity mm", "length", "not a finite number"),
         ("1e999 m", "length", "too large"),
-        ("1e308 km", "length", "too large"),
         ("1e-999 m", "length", "too small"),
-        ("1e-999999999 m", "length", "too small"),
         ("1e-320 nm", "length", "too small"),
         ("12mm", "length", "write '12 mm'"),
         ("12 13 mm", "length", "unknown unit '13 mm'"),
         ("1_000 mm", "length", "does not consist of one number and one unit"),
         ("٣ mm", "length", "does not consist of one number and one unit"),
-        ("0x10 mm", "length", "does not consist of one number and one unit"),
         ("mm", "length", "does not consist of one number and one unit"),
-        ("", "length", "does not consist of one number and one unit"),
         ("1" * 5000 + " mm", "length", "does not consist of one number and one unit"),
         ("20 degC", "temperature", "temperatures must be absolute"),
         ("20 °C", "temperature", "'293.15 K'"),
         ("-1 K", "temperature", "below 0 K"),
-        ("1 MM", "length", "unknown unit 'MM'"),
     ],
 )
 def test_refuses_ambiguous_or_wrong_units(text, kind, says):

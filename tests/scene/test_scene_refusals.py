@@ -35,25 +35,17 @@ BAD_VALUES = [
         "contact.load",
         "a bare number without a unit; a force with its unit is needed, such as '26 lbf'",
     ),
-    (
-        'load = "6 mil"',
-        "contact.load",
-        "'mil' is a unit of length, but a force is needed; use one of N, kN, lbf, kgf",
-    ),
     ('load = "-1 N"', "contact.load", "must be >= 0, not '-1 N'; a force"),
-    ("load = true", "contact.load", "true is not a quantity"),
     (
         'length = "-12.7 mm"',
         "contact.length",
         "must be > 0, not '-12.7 mm'; a length with its unit is needed",
     ),
-    ('length = "0 mm"', "contact.length", "must be > 0"),
     (
         'substrate = "Ti-8Al"',
         "contact.substrate",
         "did you mean 'Ti-8Al-1Mo-1V'? use one of Ti-8Al-1Mo-1V, WC-Co",
     ),
-    ("substrate = 3", "contact.substrate", "a material name or {young ="),
     (
         'material = "xyz"',
         "contact.coating.material",
@@ -61,22 +53,11 @@ BAD_VALUES = [
     ),
     ('thickness = "6.35 mm"', "contact.coating.thickness", "must be thinner than its piece"),
     ('law = "nonlocl"', "friction.law", "did you mean 'nonlocal'? use one of coulomb, tanh"),
-    ("law = 3", "friction.law", "one of coulomb, tanh, elastic-plastic, nonlocal, convolution"),
     ('static = "0.3"', "friction.static", "a plain number is needed, not '0.3'"),
-    ("static = true", "friction.static", "a plain number is needed, not true"),
     ("static = -0.1", "friction.static", "must be >= 0, not -0.1"),
     ("static = nan", "friction.static", "a plain number is needed, not nan"),
     ("static = 1979-05-27", "friction.static", "a plain number is needed"),
-    ('moving_mass = "-1 kg"', "structure.moving_mass", "must be > 0"),
-    (
-        'moving_mass = "1 N"',
-        "structure.moving_mass",
-        "'N' is a unit of force, but a mass is needed",
-    ),
-    ("damping = -1.0", "structure.mode.axial.damping", "must be > -1"),
-    ('frequency = "-1 Hz"', "structure.mode.axial.frequency", "must be >= 0"),
     ('kind = "bass"', "drive.kind", "did you mean 'base'? use one of base, force, free"),
-    ("cycles = 0", "drive.cycles", "must be > 0"),
     ("title = 5", "title", "a text in quotes is needed, not 5"),
 ]
 
@@ -93,53 +74,32 @@ def test_refuses_wrong_value_at_its_line(line, key, says):
 
 BAD_SETS = [
     ("friction.kinetic=0.4", "friction.kinetic", "larger than static"),
-    ("friction.order=-0.5", "friction.order", "must be >= 0"),
-    ("friction.order=-1", "friction.order", "must be >= 0"),
     ("accuracy.tolerance=1", "accuracy.tolerance", "must be < 1, not 1"),
-    ("friction.initial_bonds=1.1", "friction.initial_bonds", "must be <= 1"),
-    ("friction.initial_bonds=-0.1", "friction.initial_bonds", "must be >= 0"),
-    ("friction.breakaway=1.01", "friction.breakaway", "must be <= 1"),
-    ("friction.breakaway=-0.1", "friction.breakaway", "must be >= 0"),
     ("friction.reading=reprot", "friction.reading", "did you mean 'report'? use one of stretch, report"),
     ("friction.temperature=5", "friction.temperature", "a table [friction.temperature] is needed, not 5"),
     ("contact.pairs=0", "contact.pairs", "must be >= 1, not 0; a whole number"),
     ("contact.pairs=1.5", "contact.pairs", "a whole number is needed, not 1.5"),
-    ("contact.pairs=true", "contact.pairs", "a whole number is needed, not true"),
-    ("contact.plane=strane", "contact.plane", "did you mean 'strain'?"),
     ("contact.element_size=13 mm", "contact.element_size", "longer than contact.length"),
-    ("contact.upper.length=0 mm", "contact.upper.length", "must be > 0"),
     ("contact.lower.length=12.7000001 mm", "contact.lower.length", "write the same length for both"),
-    ("contact.lower.chamfer=-1 mm", "contact.lower.chamfer", "must be > 0"),
     ("contact.lower.chamfer=6.2 mm", "contact.lower.chamfer", "do not fit into the height"),
     ("contact.lower.end_radius=6.4 mm", "contact.lower.end_radius", "leaves no flat face"),
     ("contact.upper.chamfer=1 nm", "contact.upper.chamfer", "less than 1e-5 of the length"),
     ("contact.load_line.offset=1 mm", "contact.load_line", "unless [contact.holder]"),
     ("contact.crown.radius=-1 m", "contact.crown.radius", "for a hollow surface leave out [contact.crown]"),
-    ("contact.crown.radius=0 m", "contact.crown.radius", "must be > 0"),
-    ("contact.tilt.on=both", "contact.tilt.on", "one of upper, lower"),
     ("structure.mode.axal.frequency=1 Hz", "structure.mode.axal", "did you mean 'axial'?"),
     ("structure.mode.second.base=0.7", "structure.mode.axial.slide", "sum of `base`^2"),
     ("structure.mode.second.name=axial", "structure.mode[2].name", "two modes are named"),
-    ("structure.travel=-1 mm", "structure.travel", "must be > 0"),
     ("drive.displacement=1 mm", "drive.displacement", "`acceleration` and `displacement` exclude each other"),
     ("drive.duration=1 s", "drive.duration", "`cycles` and `duration` exclude each other"),
     ("drive.wavform=sine", "drive.wavform", "unknown key; did you mean 'waveform'?"),
     ("drive.zzz=1", "drive.zzz", "unknown key; known here: kind, waveform, frequency, from, to"),
-    ("contact.shear.k=1", "contact.shear.k", "unknown key; this table has no keys"),
     ("contact.tlt={}", "contact.tlt", "unknown table; did you mean 'tilt'?"),
     ("strucure.moving_mass=1 kg", "strucure", "unknown table; did you mean 'structure'?"),
-    ("accuracy.tolerance=0", "accuracy.tolerance", "must be > 0"),
-    ("accuracy.tolerance=-1e-3", "accuracy.tolerance", "must be > 0"),
-    ("accuracy.method=exakt", "accuracy.method", "did you mean 'exact'? use one of auto, exact"),
     ("accuracy.steps_per_cycle=3", "accuracy.steps_per_cycle", "must be >= 4"),
-    ("accuracy.steps_per_cycle=400.5", "accuracy.steps_per_cycle", "a whole number is needed, not 400.5"),
     ("contact.load.x=1", "contact.load.x", "contact.load is a value, not a table"),
     ("contact.load", "contact.load", "table.key=value is needed"),
-    ("=5", "=5", "table.key=value is needed"),
     ('contact.substrate={young = "1 GPa", poisson = 0.5, density = "1 kg/m^3"}', "contact.substrate.poisson",
      "must be < 0.5"),
-    ('contact.substrate={young = "1 GPa", poisson = -1, density = "1 kg/m^3"}', "contact.substrate.poisson",
-     "must be > -1"),
     ('contact.substrate={young = "1 GPa", poisson = 0.3}', "contact.substrate.density", "missing; a density"),
 ]  # fmt: skip
 
@@ -155,22 +115,14 @@ def test_refuses_wrong_setting(one, key, says):
 
 MISSING = [
     (RIG, r"^length.*\n", "[contact]", "contact.length", "missing; a length with its unit is needed, such as"),
-    (RIG, r"^load.*\n", "[contact]", "contact.load", "missing; a force"),
-    (RIG, r"^substrate.*\n", "[contact]", "contact.substrate", "missing; a material name"),
     (RIG, r"^thickness.*\n", "[contact.coating]", "contact.coating.thickness", "missing; a length"),
-    (RIG, r"^angle.*\n", "[contact.tilt]", "contact.tilt.angle", "missing; an angle"),
-    (RIG, r"^law.*\n", "[friction]", "friction.law", "missing; one of coulomb, tanh"),
     (RIG, r"^static.*\n", "[friction]", "friction.static", "missing; a plain number is needed"),
     (RIG, r"^bond_length.*\n", "[friction]", "friction.bond_length", "law 'nonlocal' needs this key"),
-    (RIG, r"^moving_mass.*\n", "[structure]", "structure.moving_mass", "missing; a mass"),
     (RIG, r"^slide = 0.1\n", "[[structure.mode]]", "structure.mode.second.slide", "missing; a plain number"),
     (RIG, r"^cycles.*\n", "[drive]", "drive.cycles", "missing; a plain number is needed; or drive.duration instead"),
-    (RIG, r"^acceleration.*\n", "[drive]", "drive.acceleration", "or drive.displacement instead"),
     (LINEAR, r"^\[\[(.|\n)*(?=\[drive)", "[structure]", "structure.mode", "at least one [[structure.mode]] is needed"),
     (BENCH, r"^kind.*\n", "[slide]", "slide.kind", "missing; one of constant, sine, triangle, dwell, file"),
     (BENCH, r"^amplitude.*\n", "[slide]", "slide.amplitude", "kind 'triangle' needs this key"),
-    (BENCH, r"^speed.*\n", "[slide]", "slide.speed", "missing; a velocity with its unit is needed, such as '5 mm/s'"),
-    (BENCH, r'^load.*\n', "[normal]", "normal.load", "missing; a force"),
 ]  # fmt: skip
 
 
@@ -190,13 +142,9 @@ def test_refuses_missing_key_at_its_table(text, pattern, header, key, says):
     [
         (["friction.law=tanh"], "friction.reference_speed", "law 'tanh' needs this key"),
         (["friction.law=elastic-plastic"], "friction.bond_length", "needs this key or stiffness"),
-        (["friction.law=convolution"], "friction.bond_length", "needs this key"),
         (["slide.kind=sine"], "slide.frequency", "kind 'sine' needs this key"),
-        (["slide.kind=constant"], "slide.distance", "kind 'constant' needs this key"),
         (["slide.kind=file"], "slide.file", "kind 'file' needs this key"),
-        (["friction.rest_growth=1 g"], "friction.slip_growth", "rest_growth needs this key"),
         (["friction.slip_growth=1 um"], "friction.rest_growth", "slip_growth needs this key"),
-        (["normal.amplitude=1 N"], "normal.frequency", "normal.amplitude needs this key"),
     ],
 )
 def test_refuses_missing_key_of_selected_kind(sets, key, says):
@@ -287,7 +235,6 @@ def test_refuses_approach_together_with_load():
 
 COMBINATIONS = [
     ("", "a.toml: missing [contact]: "),
-    ('[measured]\nfile = "x"\n', "a.toml: missing [contact]: "),
     (RIG[: RIG.index("[drive]")], "a.toml: missing [drive]: [structure] needs this table"),
     (LINEAR[LINEAR.index("[drive]") :], "a.toml: missing [structure]: [drive] needs this table"),
     (PATCH + LINEAR, "a.toml: missing [friction]: "),
@@ -296,10 +243,6 @@ COMBINATIONS = [
         "a.toml: missing [slide]: friction needs a motion, [slide] or [structure] with [drive]; only `patchfem backbone`",
     ),
     (BENCH[BENCH.index("[friction]") :], "a.toml: missing [contact]: friction needs a normal load"),
-    (
-        BENCH[: BENCH.index("[friction]")] + BENCH[BENCH.index("[slide]") :],
-        "a.toml: missing [friction]: ",
-    ),
     (RIG + BENCH[BENCH.index("[slide]") :], "a.toml:34: slide: "),
     (
         RIG + '[normal]\nload = "1 N"\n',
@@ -337,7 +280,6 @@ def test_refuses_scene_with_mistakes_in_file_order():
     [
         ("a = 1\nb = = 2\n", "a.toml:2: not valid TOML: "),
         ("a = 1\na = 2\n", "a.toml:2: not valid TOML: "),
-        ("[contact\n", "a.toml:1: not valid TOML: "),
         ('a = 1\nb = """x\n', "a.toml:2: not valid TOML: "),
         ("a = " + "[" * 5000, "a.toml:1: not valid TOML: nested too deeply"),
         ("a = " + "1" * 5000, "a.toml:1: not valid TOML: "),
@@ -352,8 +294,6 @@ def test_refuses_invalid_toml(text, start):
     "text, end",
     [
         ("a = 1\nload = 26 lbf\n", 'put a quantity or a word in quotes: load = "26 lbf"'),
-        ("length = 12.7mm # long\n", 'put a quantity or a word in quotes: length = "12.7mm"'),
-        ("a = 5 m/s^2\n", 'put a quantity or a word in quotes: a = "5 m/s^2"'),
         ("law = coulomb\n", 'put a quantity or a word in quotes: law = "coulomb"'),
         ("static = -.5e3\n", "put a digit on both sides of the point: static = -0.5e3"),
         ("static = 5.\n", "put a digit on both sides of the point: static = 5.0"),
@@ -364,7 +304,6 @@ def test_refuses_invalid_toml(text, start):
             "write a percentage as a plain number: damping = 0.003",
         ),
         ("a = 1e", "statement (column 6)"),
-        ("a = 007", "statement (column 6)"),
     ],
 )
 def test_refuses_unquoted_value_with_correction(text, end):
@@ -415,12 +354,10 @@ def test_refuses_unreadable_file(tmp_path):
     "text, says",
     [
         ("contact = 5\n", "contact: a table [contact] is needed, not 5"),
-        ("[[contact]]\n", "contact: a table [contact] is needed, not an array"),
         (
             "[structure]\nmode = 5\n",
             "structure.mode: an array of tables [[structure.mode]] is needed, not 5",
         ),
-        ("[structure]\nmode = []\n", "not an empty array"),
         (
             "[structure.mode]\n",
             "structure.mode: an array of tables [[structure.mode]] is needed, not a table",
@@ -433,26 +370,14 @@ def test_refuses_wrong_structure_of_table(text, says):
 
 
 UNBUILT = [
-    (RIG, ["friction.breakaway=0.1", "friction.order=2"], "friction.breakaway"),
     (RIG, ["structure.mode.second.pitch=2 rad/m", "contact.strips.count=4"], "contact.strips"),
     (
         RIG,
         ["structure.mode.second.normal=0.1", "contact.shear={}", "friction.law=coulomb"],
         "friction.law",
     ),
-    (
-        RIG,
-        [
-            "structure.mode.second.normal=0.1",
-            "contact.shear={}",
-            "friction.law=tanh",
-            "friction.reference_speed=1 mm/s",
-        ],
-        "friction.law",
-    ),
     (RIG, ["structure.mode.second.normal=0.1", "friction.order=0"], "friction.order"),
     (RIG, ["structure.mode.second.pitch=2 rad/m", "accuracy.method=harmonic"], "accuracy.method"),
-    (RIG, ["structure.mode.axial.pitch=1 rad/m", "contact.tilt.on=lower"], "contact.tilt.on"),
     (
         STRUCTURE + BENCH.split("[slide]")[0],
         [
@@ -573,7 +498,7 @@ def test_refuses_invalid_outlines(tables, sets, key, words):
     )
 
 
-@pytest.mark.share(*range(0, 60, 4))
+@pytest.mark.share(*range(0, 60, 8))
 @pytest.mark.parametrize("first", range(0, 1000, 10))
 def test_always_proposed_value_resolves_mistake(first):
     """Every value that a message proposes resolves the mistake or leads to another one."""

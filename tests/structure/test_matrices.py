@@ -1,13 +1,10 @@
-"""Modes of matrices compared with closed forms, physical energies and eigenvalues."""
+"""Modes of matrices compared with closed forms, and refusals."""
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from scipy.linalg import eigh
 
 from patchfem.core import PatchfemError
-from patchfem.structure import compute_receptance, masses, matrices
+from patchfem.structure import masses, matrices
 
 
 def chain_stiffness(n, is_fixed=True, k=1.0):
@@ -19,15 +16,7 @@ def chain_stiffness(n, is_fixed=True, k=1.0):
     return K
 
 
-def random_matrices(seed, n, dampers=True):
-    """Return random positive definite M and K, a damping matrix C or None, and the generator."""
-    rng = np.random.default_rng(seed)
-    A, B = rng.normal(size=(2, n, n))
-    L = rng.normal(size=(n, n)) + 3 * np.eye(n)
-    return L @ L.T, A @ A.T + 0.1 * np.eye(n), (B @ B.T if dampers else None), rng
-
-
-@pytest.mark.parametrize("n", [2, 3, 12])
+@pytest.mark.parametrize("n", [3, 12])
 def test_exact_free_chain_frequencies_agree_with_closed_form(n):
     """The frequencies of a free chain are 2 sqrt(k/m) sin(r pi/(2n)), with exactly one zero.
 
@@ -68,85 +57,6 @@ def test_exact_soft_mode_with_stiff_link():
     assert basis.omega[1] == pytest.approx(np.sqrt(2e14), rel=1e-12)
 
 
-@given(st.integers(0, 10**6), st.integers(2, 6))
-def test_always_separate_springs_equal_stiffness_matrix(seed, n):
-    """Separate springs give the frequencies and the receptance of their stiffness matrix."""
-    rng = np.random.default_rng(seed)
-    pairs = [(i + 1, int(rng.integers(0, i + 1))) for i in range(n)][int(rng.integers(0, 2)) :]
-    springs = [(pair, k) for pair, k in zip(pairs, rng.uniform(0.5, 2, n))]
-    m = rng.uniform(0.5, 2, n)
-    rows = masses.make_slide_rows(pairs, n)
-    from_springs = masses.build_basis(m, springs, [], [(1, 0)], n)
-    expected = matrices.build_basis(
-        np.diag(m),
-        rows.T @ np.diag([k for _, k in springs]) @ rows,
-        faces=masses.make_slide_rows([(1, 0)], n),
-    )
-    np.testing.assert_allclose(from_springs.omega, expected.omega, atol=1e-12)
-    assert (from_springs.omega == 0).sum() == (expected.omega == 0).sum() == n - len(springs)
-    w = np.array([0.37])
-    np.testing.assert_allclose(
-        *(
-            compute_receptance(basis, w, basis.slide, basis.base)
-            for basis in (from_springs, expected)
-        ),
-        rtol=1e-8,
-    )
-
-
-@given(st.integers(0, 10**6), st.integers(2, 6))
-def test_always_separate_dampers_equal_damping_matrix(seed, n):
-    """Separate dampers give the modal damping of their damping matrix."""
-    rng = np.random.default_rng(seed)
-    pairs = [(i + 1, int(rng.integers(0, i + 1))) for i in range(n)]
-    springs, dampers = (
-        [(pair, k) for pair, k in zip(pairs, rng.uniform(0.5, 2, n))] for _ in range(2)
-    )
-    m = rng.uniform(0.5, 2, n)
-    damper_rows = masses.make_slide_rows(pairs, n) * np.sqrt([[c] for _, c in dampers])
-    from_dampers = masses.build_basis(m, springs, dampers, [(1, 0)], n)
-    spring_rows = masses.make_slide_rows(pairs, n) * np.sqrt([[k] for _, k in springs])
-    expected = matrices.build_basis(
-        np.diag(m),
-        C=damper_rows.T @ damper_rows,
-        faces=masses.make_slide_rows([(1, 0)], n),
-        output=np.eye(n)[n - 1],
-        spring_rows=spring_rows,
-    )
-    np.testing.assert_allclose(
-        from_dampers.damping_matrix,
-        expected.damping_matrix,
-        atol=1e-12 * np.abs(expected.damping_matrix).max(),
-    )
-    np.testing.assert_allclose(from_dampers.zeta, expected.zeta, rtol=1e-10)
-
-
-@given(st.integers(0, 10**6), st.integers(1, 6))
-def test_always_modal_energies_equal_physical_energies(seed, n):
-    """Kinetic, strain and dissipated energy of any motion are the same in modal and physical coordinates."""
-    M, K, C, rng = random_matrices(seed, n)
-    face = rng.normal(size=(2, n))
-    basis = matrices.build_basis(M, K, C, faces=face, base=rng.normal(size=n))
-    z, v = rng.normal(size=(2, n))
-    x = basis.shapes @ z
-    u = basis.shapes @ v
-    assert v @ v == pytest.approx(u @ M @ u, rel=1e-9)
-    assert z @ (basis.omega**2 * z) == pytest.approx(x @ K @ x, rel=1e-9)
-    assert v @ basis.damping_matrix @ v == pytest.approx(u @ C @ u, rel=1e-9)
-    np.testing.assert_allclose(basis.interfaces @ z, face @ x, rtol=1e-9, atol=1e-9)
-
-
-def test_exact_proportional_damping_does_not_couple_modes():
-    """Proportional damping leaves the modes uncoupled, with the damping ratios of its closed form."""
-    M, K, _, _ = random_matrices(3, 5)
-    basis = matrices.build_basis(M, K, 0.3 * M + 0.02 * K)
-    assert basis.damping is None
-    np.testing.assert_allclose(
-        2 * basis.zeta * basis.omega, 0.3 + 0.02 * basis.omega**2, rtol=1e-11
-    )
-    np.testing.assert_allclose(basis.omega**2, eigh(K, M, eigvals_only=True), rtol=1e-10)
-
-
 def test_exact_repeated_modes_are_chosen_uncoupled_by_damping():
     """The shapes of two equal frequencies are chosen such that the damper between the masses does not couple them."""
     basis = masses.build_basis(
@@ -165,42 +75,22 @@ def test_exact_damper_on_rigid_mode_is_preserved():
     np.testing.assert_allclose(basis.damping, [[1.5]], rtol=1e-15)
 
 
-def test_exact_patch_motions_equal_rows_times_shapes():
-    """The modal rows of normal, pitch and yaw motion are the physical rows times the shapes."""
-    M, K, _, rng = random_matrices(11, 4)
-    rows = {key: rng.normal(size=4) for key in ("normal", "pitch", "yaw")}
-    basis = matrices.build_basis(M, K, output=[0, 0, 1, 0], lateral=np.zeros(4), **rows)
-    for key, row in rows.items():
-        np.testing.assert_allclose(getattr(basis, key), row @ basis.shapes, rtol=1e-13)
-    assert (
-        basis.lateral is None
-        and basis.interfaces.shape == (0, 4)
-        and (basis.slide == basis.output).all()
-    )
-    assert np.all(basis.output >= 0)
-
-
 M2, K2 = np.eye(2), np.array([[2.0, -1.0], [-1.0, 1.0]])
 
 
 @pytest.mark.parametrize("M, K, C, message", [
     (np.diag([1.0, 0.0]), K2, None, "M is not positive definite: every coordinate needs mass (coordinate 2 has none)"),
-    (np.diag([1.0, -1.0]), K2, None, "M is not positive definite"),
     (np.array([[1.0, 1.0], [1.0, 1.0]]), K2, None, "M is not positive definite"),
     (M2, np.array([[2.0, -1.0], [-0.9, 1.0]]), None, "K is not symmetric"),
-    (M2, -K2, None, "K is not positive semidefinite"),
     (M2, np.diag([1.0, -1e-6]), None, "K is not positive semidefinite"),
     (M2, K2, np.array([[0.0, 1.0], [-1.0, 0.0]]), "C is not symmetric"),
     (M2, K2, np.diag([1.0, -0.1]), "C adds energy"),
     (M2, np.eye(3), None, "K is 3 x 3 but M is 2 x 2"),
     (M2, np.ones((2, 3)), None, "K must be square"),
-    (M2 * np.nan, K2, None, "M contains values that are not finite"),
     (M2, [["a", "b"], ["c", "d"]], None, "K is not a matrix of real numbers"),
     (M2, K2 * (1 + 0.2j), None, "K is complex (imaginary parts are up to 0.2 times the real parts); motion in time "
                                 "needs real matrices; for a loss factor eta (here about 0.2) give K without the loss "
                                 "factor, and the damping matrix C = eta K/omega [N s/m]"),
-    (M2 * (1 + 1e-9j), K2, None, "M is complex (imaginary parts are up to 1e-09 times the real parts)"),
-    (M2, K2, 1j * K2, "C is complex"), (M2, [[1.0, 2.0], [3.0]], None, "K is not a matrix of real numbers"),
     (1e-300 * np.eye(2), 1e20 * np.eye(2), None, "K/M is too large to compute; check that K and M are in SI units"),
 ])  # fmt: skip
 def test_refuses_invalid_matrices(M, K, C, message):
@@ -208,12 +98,6 @@ def test_refuses_invalid_matrices(M, K, C, message):
     with pytest.raises(PatchfemError) as caught:
         matrices.build_basis(M, K, C)
     assert message in str(caught.value)
-
-
-def test_refuses_stiffness_out_of_range_for_mass():
-    """A spring too stiff for its mass to compute is refused."""
-    with pytest.raises(PatchfemError, match="K/M is too large to compute"):
-        masses.build_basis([1e-320], [((1, 0), 1e300)], [], [(1, 0)], 1)
 
 
 def test_exact_complex_matrices_with_zero_imaginary_part():
@@ -232,9 +116,9 @@ def test_exact_complex_matrices_with_zero_imaginary_part():
 
 
 @pytest.mark.parametrize("rows, message", [
-    ({"faces": np.ones(3)}, "slide has shape (3,), but M has 2"), ({"base": [1.0]}, "base has shape (1,)"),
+    ({"faces": np.ones(3)}, "slide has shape (3,), but M has 2"),
     ({"output": [1.0, np.inf]}, "output contains values that are not finite"),
-    ({"normal": ["x", "y"]}, "normal does not contain real numbers"), ({"faces": np.full(2, 1j)}, "slide is complex"),
+    ({"faces": np.full(2, 1j)}, "slide is complex"),
 ])  # fmt: skip
 def test_refuses_invalid_rows(rows, message):
     """Rows of the wrong shape, complex, infinite or of text are refused with their name."""
