@@ -16,7 +16,6 @@ from patchfem import api
 from patchfem.core import Measure
 from patchfem.export import measure_object
 from patchfem.export.pages.sentences import format_with_error
-from patchfem.response import TABLE
 from patchfem.runs import describe_measure
 
 RIG = POINT + COULOMB + SHORT
@@ -180,12 +179,6 @@ def test_exact_python_value_sets_same_as_text(key, written, value, tmp_path):
     assert pf.load(pf.load(SMALL_PATCH), **{key: value}).tables() == by_text.tables()
 
 
-@pytest.mark.parametrize("value", [0.1, 1 / 3, 1e-300, 12345.678901234567, 5e22])
-def test_exact_number_is_set_without_rounding(value):
-    """A floating-point number set from Python is stored without rounding."""
-    assert pf.load(BENCH, **{"normal.load": value}).normal.load == value
-
-
 def test_exact_lists_and_named_modes_are_set():
     """Lists and their elements, and modes by name or number, can be set from Python."""
     levels = (
@@ -324,15 +317,6 @@ def test_always_measures_have_description_and_unit(name, results):
         ), key
 
 
-def test_exact_name_suffix_numbers_interfaces_and_strips(results):
-    """The number at the end of the name of a measure is the number of the interface or of the strip."""
-    assert results["two interfaces"].measures["slip_amplitude_2"].text.endswith("; of interface 2")
-    assert describe_measure("loop_area_13", "strip") == TABLE["loop_area"].text + "; of strip 13"
-    assert describe_measure("relative_displacement_amplitude_steady").startswith(
-        "steady amplitude under a periodic drive"
-    )
-
-
 def test_exact_measures_table_is_rounded_by_error(results):
     """The printed table of measures has aligned lines below 80 characters, with values rounded by their errors."""
     lines = repr(results["patch"].measures).splitlines()[1:]
@@ -342,13 +326,6 @@ def test_exact_measures_table_is_rounded_by_error(results):
         assert first == name and text == format_with_error(name, measure_object(measure))
     assert repr(api.Measures({})) == ""
     assert repr(api.Measures({"a": Measure(2.0, "m")})) == "motion\n  a  2 m (error unknown)"
-
-
-def test_exact_measure_text_has_value_and_error():
-    """The text of a Measure gives value, error and unit."""
-    assert str(Measure(1.48083e-5, "m", 4.4e-8)) == "14.808 ± 0.044 um"
-    assert str(Measure(0.25, "1", 0.12)) == "0.25 ± 0.12" and str(Measure(None, "N")) == "- N"
-    assert repr(Measure(3.0, "N", None, 0.0, "a force")) == "3 N (a force)"
 
 
 @pytest.mark.parametrize("name", KINDS)
@@ -366,18 +343,6 @@ def test_always_repr_is_short(name, results):
         assert shown.startswith(type(one).__name__) and "<text>" in shown and "array" not in shown
         assert len(shown.splitlines()) <= 8 and max(map(len, shown.splitlines())) < 260, shown
     assert "accuracy.tolerance=0.002" in shown
-
-
-def test_exact_result_has_documented_attributes(results):
-    """A Result has outcome, measures, warnings, notes and methods for xarray, files and plots."""
-    result = results["rig"]
-    assert isinstance(result, pf.Result)
-    assert isinstance(result.outcome, pf.Outcome)
-    assert result.notes == []
-    assert result.outcome.sentence in repr(result) and isinstance(result.warnings, list)
-    assert {"to_xarray", "save", "plot", "measures", "outcome", "warnings", "notes"} <= set(
-        dir(result)
-    )
 
 
 PICTURES = {

@@ -169,39 +169,6 @@ def test_exact_edited_law_is_compiled_again(tmp_path, shared_cache, parallel_res
     assert len(list((cache / "patchfem").iterdir())) == 2
 
 
-def one_run(shared_cache: Path):
-    """Yield the arguments of one run without a page."""
-    (shared_cache / "slide.toml").write_text(SCENE, "utf-8")
-    yield "run", shared_cache / "slide.toml", "--no-page"
-
-
-def test_exact_prebuilt_code_serves_first_run(tmp_path, parallel_results):
-    """A package with prebuilt machine code compiles nothing at its first run; edited kernels do not use this code."""
-    package = copy_package(tmp_path / "home")
-    hook.build_machine_code(package / "patchfem" / "compiled" / "generic", one_run)
-    first = run_slide(package, tmp_path / "cache")
-    compiled_run = parallel_results[0]
-    assert not first["numba"]
-    assert first["said"] == []
-    assert not list((tmp_path / "cache").rglob("*.code"))
-    assert compiled_run["numba"] and compiled_run["said"]
-    assert (first["work"], first["peak"]) == pytest.approx(
-        (compiled_run["work"], compiled_run["peak"]), rel=1e-9
-    )
-    for law in (package / "patchfem" / "friction" / "laws").glob("*kernels.py"):
-        law.write_text(law.read_text("utf-8") + "# edited\n", "utf-8")
-    code = "from patchfem import compiled; print(compiled.prebuilt.find_folder(compiled.hash_sources), compiled.__file__)"
-    output = subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=package,
-        env=os.environ | {"PYTHONPATH": str(package)},
-        text=True,
-        capture_output=True,
-        check=True,
-    ).stdout
-    assert output.startswith(f"None {package}")
-
-
 def test_exact_prebuilt_code_needs_matching_machine(tmp_path, monkeypatch):
     """Prebuilt code is used only on the machine type for which it was built.
 

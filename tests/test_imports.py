@@ -14,7 +14,6 @@ import pytest
 from command_line import (
     FROM_PYTHON,
     FROM_SHELL,
-    MODULES,
     assert_not_loaded,
     has_code_of,
     modules_after,
@@ -99,7 +98,7 @@ FOLDERS = {  # kind of scene -> text, folders that `patchfem run` loads for the 
 }
 
 
-@pytest.mark.share(0, 1, 3, 7, 8)
+@pytest.mark.share(3, 7, 8)
 @pytest.mark.parametrize("kind", FOLDERS)
 def test_exact_run_loads_folders_of_its_scene(write_scene, tmp_path, kind):
     """`patchfem run` in a new process loads the physics folders listed for its kind of scene and no others."""
@@ -162,7 +161,7 @@ def modules_of_run(text: str) -> set:
         return modules_after(FROM_PYTHON, path)
 
 
-@pytest.mark.share(0, 3, 6)
+@pytest.mark.share(0, 6)
 @pytest.mark.parametrize("name", MODULES_OF_SCENES)
 def test_exact_run_loads_modules_of_its_keys(name):
     """A run from Python loads the modules of the keys in its scene, and not those of absent keys."""
@@ -223,7 +222,7 @@ COMMANDS = {  # command -> scene, arguments, modules of patchfem and packages th
 }
 
 
-@pytest.mark.share(0, 2, 3, 5, 6, 7, 10, 11)
+@pytest.mark.share(0, 3, 6, 10, 11)
 @pytest.mark.parametrize("name", COMMANDS)
 def test_exact_command_loads_only_needed_packages(write_scene, tmp_path, name):
     """A command does not load the modules and packages listed as unnecessary for it."""
@@ -234,18 +233,6 @@ def test_exact_command_loads_only_needed_packages(write_scene, tmp_path, name):
     roots = {one.partition(".")[0] for one in found} | found
     assert not roots & set(packages.split())
     assert not list(tmp_path.glob("out/fields*")) or "patch" in name or words[1] == str(RIG)
-
-
-@pytest.mark.share(0)
-@pytest.mark.parametrize("law", [COULOMB, PLASTIC], ids=["coulomb", "plastic"])
-def test_exact_sweep_loads_only_its_engine(write_scene, law):
-    """A sweep of rigs does not load the smooth engine, and writes its Dataset without Dask."""
-    code = f"import sys, patchfem\npatchfem.sweep(sys.argv[1], {{'friction.static': [0.1, 0.2]}})\n{MODULES}"
-    modules = modules_after_cached(
-        code, write_scene(POINT + law + STRUCTURE.replace("cycles = 30", "cycles = 20"))
-    )
-    assert_not_loaded(modules, "dynamics.smooth")
-    assert "xarray" in modules and "dask.array" not in modules
 
 
 def test_exact_few_modules_load_before_signal_handling():

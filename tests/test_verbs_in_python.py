@@ -40,14 +40,6 @@ def test_exact_scene_from_dict_equals_text():
     assert pf.sweep(BLOCK, {"normal.load": ["90 N", "100 N"]})["outcome"].size == 2
 
 
-def test_refuses_dict_with_mistakes():
-    """A dict with an unknown key or an unsuitable value is refused with the name of the key."""
-    with pytest.raises(pf.SceneError, match=r"normal\.lod: unknown key; did you mean 'load'"):
-        pf.load({"normal": {"lod": 1.0}})
-    with pytest.raises(pf.SceneError, match="cannot be a value of a scene"):
-        pf.load({"normal": {"load": object()}})
-
-
 def test_exact_result_table_lists_measures():
     """`Result.table` lists all measures with their values."""
     result = pf.run(BLOCK)
@@ -151,12 +143,6 @@ def test_exact_export_equals_command_line(results_folder, tmp_path, folder, name
         pf.export(results_folder / folder, tmp_path / name, **given).read_bytes()
         == (tmp_path / f"shell_{name}").read_bytes()
     )
-
-
-def test_refuses_view_settings_of_other_formats(results_folder, tmp_path):
-    """`pf.view` refuses a magnification for an HTML page, which has a slider for it."""
-    with pytest.raises(pf.PatchfemError, match="sliders for frame and magnification"):
-        pf.view(results_folder / "pieces", tmp_path / "a.html", magnify=2.0)
 
 
 @pytest.mark.parametrize("amplitudes", [1e-6, "1 um", np.array([1e-6]), ["1 um"]])

@@ -1,7 +1,6 @@
 """The study of a measured damper loop: the figures of its docstring, from the measured file."""
 
 import os
-import subprocess
 import sys
 from pathlib import Path
 
@@ -44,19 +43,3 @@ def test_bond_law_fits_the_plateaus_but_not_the_backlash():
     limit = stretch.fitted.keys.fit.values[0] * damper.LOAD
     assert np.abs(loop.reading).max() > 2 * limit
     assert 40 < stretch.fitted.keys.fit.intervals.rows < 90
-
-
-@pytest.mark.share(0)
-@pytest.mark.parametrize("words", [(), ("nothing_here.csv",)])
-def test_refuses_missing_measured_file(words):
-    """Without its measured file the study stops with one line that names the source and the command."""
-    script = Path(__file__).parents[2] / "studies" / "damper" / "damper.py"
-    process = subprocess.run(
-        [sys.executable, str(script), *words], capture_output=True, text=True, check=False
-    )
-    assert process.returncode == 1 and not process.stdout
-    (message,) = process.stderr.splitlines()
-    assert (
-        "ARTS-Laboratory" in message and "run: python studies/damper/damper.py FILE.csv" in message
-    )
-    assert message.startswith("nothing_here.csv is no file" if words else "the record is not part")

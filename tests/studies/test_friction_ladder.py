@@ -4,7 +4,7 @@ import friction_forms
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from study_module import load_study, make_study_fixture
+from study_module import make_study_fixture
 
 from patchfem.friction import FirstOrderBonds
 
@@ -151,10 +151,3 @@ def test_always_table_of_friction_laws_has_the_stated_values(table, capsys):
         values = [rows[growth, law, a].top[1] for a in table.AMPLITUDES]
         assert values == pytest.approx(expected, abs=6e-4), law
     assert "against the rung above" in capsys.readouterr().out
-
-
-@pytest.mark.slow
-def test_always_picture_of_friction_laws_labels_its_curves(tmp_path):
-    """The picture of the friction laws has labels at its axis and its curves."""
-    text = load_study("friction_ladder/picture.py").main(tmp_path / "x.svg", (0.3, 3.0)).read_text()
-    assert all(word in text for word in ("amplitude [bond lengths]", "LuGre", "Iwan 20, reversals"))

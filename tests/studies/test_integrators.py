@@ -13,21 +13,6 @@ from patchfem.core import Missing
 failure = make_study_fixture("integrators/failure.py")
 
 
-def test_exact_two_masses_by_the_event_driven_solver(failure):
-    """The event-driven solver agrees with a 40-digit computation of two masses within 1e-10."""
-    times = np.array(
-        [8.079711463905416, 10.00410372419476, 12.96534318337974, 15.73725378200728, 400.0]
-    )
-    motion = failure.exact("two", times)
-    assert np.abs(failure.exact("two", np.linspace(0, 8.0797, 50)).slide).max() <= 1e-15
-    assert motion.slide == pytest.approx(
-        [0, 0.8994115234033145, -0.5914209838254593, 0.8835834423211487, -0.37952939486], abs=1e-10
-    )
-    assert np.abs(
-        failure.exact("sdof", np.linspace(199, 200, 4001) * 2 * np.pi).slide
-    ).max() == pytest.approx(0.28704671337871602595, abs=1e-7)
-
-
 @pytest.mark.slow
 def test_exact_failures_of_the_report_method_are_those_stated(failure, capsys):
     """Early slip, force errors and failed steps of the report's method are those stated."""
@@ -101,7 +86,7 @@ def find_row(table, problem, name, setting):
     )
 
 
-@pytest.mark.parametrize("where", ["decay", "block", "two"])
+@pytest.mark.parametrize("where", ["block", "two"])
 def test_exact_dop853_restarted_at_events(engines, problem, where):
     """DOP853 restarted at each event has an error below 5e-9."""
     case = problem(where)

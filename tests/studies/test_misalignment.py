@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 import pytest
-from study_module import load_study, make_study_fixture
+from study_module import make_study_fixture
 
 from patchfem.closed_forms import contact as exact
 from patchfem.runs.patch.press import solve_patch_contact
@@ -81,26 +81,6 @@ def test_always_error_estimates_cover_an_independent_solution(tilted, fixtures):
     }
     for name, value in reference.items():
         assert abs(measures[name].value - value) <= measures[name].error <= 0.2 * value
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("angle", "skin"), [(3e-5, "bare"), (1e-2, "bare"), (1e-2, "linear")])
-def test_always_two_mesh_gradings_agree_within_error_estimates(tilted, angle, skin):
-    """Solutions on two differently graded meshes differ by less than the sum of their error estimates."""
-    from patchfem.runs import solve_with_coarser
-
-    pieces = tilted.case(angle, skin)
-    ours = tilted.compute_measures(pieces)
-    other = solve_with_coarser(pieces, 1e-3)[0].measures
-    for name in (
-        "contact_fraction",
-        "loaded_fraction",
-        "pressure_peak",
-        "pressure_centre",
-        "normal_stiffness",
-        "tangential_stiffness",
-    ):
-        assert abs(ours[name].value - other[name].value) <= ours[name].error + other[name].error
 
 
 def test_always_free_piece_loses_contact_inside_the_kern(tilted, fixtures):
@@ -181,14 +161,6 @@ def test_always_tilt_and_moment_of_a_contact_fraction(conclusion):
     assert conclusion.neutral(0.5, "bare", conclusion.ROCKING, 1) == pytest.approx(
         1.57e-3, rel=0.01
     )
-
-
-def test_always_admissible_fixture_stiffness_has_stated_limits(conclusion):
-    """The range of fixture stiffness that a misalignment of 2 mrad allows is that stated."""
-    lowest, highest = conclusion.springs_for(2e-3, "bare", halvings=1)
-    assert (lowest, highest) == (pytest.approx(125, rel=0.02), pytest.approx(480, rel=0.02))
-    assert conclusion.springs_for(2e-3, "linear", halvings=1)[1] == np.inf
-    assert conclusion.springs_for(4e-4, "exponential", halvings=1) is None
 
 
 # ---- roll
@@ -283,21 +255,6 @@ def test_always_opening_tilts_of_pieces_and_layer_add(rough):
         assert pieces_alone < rough.opening(k, 1) == pytest.approx(pieces_alone + rigid, rel=0.01)
 
 
-@pytest.mark.slow
-def test_always_misalignment_picture_labels_its_curves(tmp_path):
-    """The picture of misalignment has labels at its axes and curves, and the curves fall."""
-    picture = load_study("misalignment/picture.py")
-    text = picture.main(tmp_path / "x.svg", np.array([1e-5, 1e-4])).read_text()
-    for word in (
-        "misalignment [mrad]",
-        "height over the patch [um]",
-        *picture.FIXTURES.values(),
-        *picture.SKINS.values(),
-    ):
-        assert word in text
-    assert np.all(np.diff(picture.portions(None, "bare", 10.0 ** np.arange(-5.5, -2), 0)) < 0)
-
-
 # ---- in motion
 
 
@@ -360,28 +317,3 @@ def test_always_table_of_the_moving_rig_has_stated_values(moving, maps_at_one_lo
     assert 1e6 * slipping["relative_displacement_amplitude"].values[at] == pytest.approx(
         [12.91, 12.38], rel=2e-3
     )
-
-
-def test_always_stuck_interface_is_softer_than_series_of_springs(maps_at_one_load):
-    """A stuck interface is up to 6 % softer than pieces and bonds in series.
-
-    Some nodes at the edge already slip.
-    """
-    stuck = maps_at_one_load.isel(drive_acceleration=0)
-    bonds = 0.30 * LOAD / 1e-6
-    series = 1 / (1 / bonds + 1 / stuck["tangential_stiffness"].values)
-    assert stuck["equivalent_stiffness"].values[0] == pytest.approx(series[0], rel=0.06)
-    assert (stuck["equivalent_stiffness"].values < series).all()
-
-
-@pytest.mark.slow
-def test_always_misalignment_maps_have_labels(moving, maps, tmp_path):
-    """The maps of misalignment have labels at their axes and panels."""
-    text = moving.picture(maps, tmp_path / "x.svg").read_text()
-    for word in (
-        "misalignment [mrad]",
-        "26 lbf, 5 g",
-        "rubbed share",
-        "loop energy, to that at 1e-06 rad",
-    ):
-        assert word in text

@@ -39,7 +39,7 @@ def free_motion(modes, drive: SineDrive, time: float) -> np.ndarray:
     return (expm(system * time) @ np.append(np.zeros(2 * n + 1), 1.0))[: 2 * n]
 
 
-@pytest.mark.parametrize("omega, zeta", [(0.0, 0.0), (0.3, 0.5), (1.0, 1.0), (7.0, 0.01)])
+@pytest.mark.parametrize("omega, zeta", [(0.0, 0.0), (1.0, 1.0), (7.0, 0.01)])
 def test_exact_duhamel_maps_satisfy_the_equation_of_motion(omega, zeta):
     """The maps satisfy z'' + 2 zeta omega z' + omega^2 z = f0 + (f1 - f0) t/h at the end of a step."""
     modes = problems.basis([omega], [zeta], [1.0], [1.0])
@@ -80,16 +80,6 @@ def test_order_of_time_integrators_without_friction(solve, steps, order):
     assert errors[0] < {1: 0.1, 2: 1e-3}[order]
 
 
-def test_exact_free_mass_under_constant_force():
-    """A free mass under a constant force has constant acceleration beyond the friction limit."""
-    drive = RecordedDrive(np.array([0.0, 10.0]), np.array([3.0, 3.0]), 10.0, False)
-    start = InitialState(np.zeros(1), np.array([0.1]))
-    motion = solve_newmark(FREE, drive, coulomb(1.0), (10.0, 50), start=start)
-    assert motion.v[-1, 0] == pytest.approx(0.1 + 2.0 * 10)
-    assert motion.z[-1, 0] == pytest.approx(1.0 + 100.0)
-    assert motion.accelerations(FREE)[-1] == pytest.approx([2.0])
-
-
 def test_exact_mass_sticks_up_to_the_friction_limit():
     """Under 0.5 m/s^2 a mass of 2 kg sticks by a friction force of 1 N, and slips at a limit of 0.9 N."""
     modes = replace(FREE, mass=2.0)
@@ -98,17 +88,6 @@ def test_exact_mass_sticks_up_to_the_friction_limit():
         motion = solve_newmark(modes, drive, coulomb(limit, 1e-3), (1.0, 100), needs_force=True)
         assert motion.force == pytest.approx(force)
         assert motion.v[-1, 0] == pytest.approx(speed, abs=1e-12)
-
-
-@pytest.mark.parametrize("needs_force, release_at", [(False, 3.0), (True, 1.0)])
-def test_exact_stick_speed_delays_the_release(needs_force, release_at):
-    """A stick speed of 0.01 m/s delays the slip of a mass under 1 N/s to 3 N, three times the limit.
-
-    With the criterion on the force it slips at the limit of 1 N.
-    """
-    drive = RecordedDrive(np.array([0.0, 4.0]), np.array([0.0, 4.0]), 4.0, False)
-    motion = solve_newmark(FREE, drive, coulomb(1.0, 0.01), (4.0, 400), needs_force=needs_force)
-    assert motion.time[np.argmax(motion.v[:, 0] > 0)] == pytest.approx(release_at, abs=0.021)
 
 
 @pytest.mark.parametrize("needs_force, order", [(True, 2), (False, 1)])
@@ -192,10 +171,8 @@ def test_exact_convergence_criterion_controls_the_force_error():
         # the error grows with the number of steps until the block never moves; the exact peak is 0.28705
         (1e-3, 100, False, 0.28705 * 1.057, 1e-3),
         (1e-3, 1000, False, 0.0, 1e-3),
-        (1e-4, 100, False, 0.28705 * 1.26, 1e-3),
         (1e-4, 1000, False, 0.28705 * 0.989, 1e-3),
         # a stop by force: a larger stick speed lowers the peak towards the 0.15 of Fig 2
-        (0.05, 500, True, 0.281, 2e-3),
         (0.2, 500, True, 0.172, 2e-3),
     ],
 )

@@ -152,6 +152,7 @@ def test_always_page_links_resolve_and_its_python_parses(page):
         ast.parse(code)
 
 
+@pytest.mark.slow
 def test_always_commands_of_the_paraview_page_run(tmp_path, monkeypatch):
     """The nine commands of the page on ParaView run without error."""
     monkeypatch.chdir(tmp_path)

@@ -78,9 +78,7 @@ def apply_block(block: CodeBlock, package: Path) -> None:
 
 def copy_package(folder: Path, page: str) -> Path:
     """Copy the package into a folder, apply every Python block of a page, and return the path of the copy."""
-    copy = shutil.copytree(
-        PACKAGE, folder / "patchfem", ignore=shutil.ignore_patterns("__pycache__")
-    )
+    copy = shutil.copytree(PACKAGE, folder / "patchfem")
     for block in find_code_blocks(page):
         if block.language == "python":
             apply_block(block, copy)

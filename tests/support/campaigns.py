@@ -32,8 +32,6 @@ KINDS = {  # Name on the command line -> module and function.
     "planes": ("plane_chains", "compare_chain"),
     "point-benches": ("point_benches", "compare_bench"),
     "partial-slip": ("micro_slip", "compare_bench"),
-    "printed-benches": ("printed_sums", "compare_bench"),
-    "printed-rigs": ("printed_sums", "compare_rig"),
     "shear-joints": ("shear_scenes", "compare_joint"),
     "shear-rigs": ("shear_scenes", "compare_rig"),
     "shear-chains": ("shear_scenes", "compare_chain"),
@@ -43,11 +41,9 @@ KINDS = {  # Name on the command line -> module and function.
     "wear": ("wear_scenes", "compare_bench"),
     "predicted-wear": ("predicted_pairs", "compare_pair"),
     "stick-together": ("sticks_together", "compare_rig"),
-    "lanes": ("lane_cases", "compare_cases"),
     "decay-fits": ("decay_fits", "compare_fit"),
     "scan-pairs": ("surface_pairs", "compare_scans"),
     "trace-pairs": ("surface_pairs", "compare_traces"),
-    "roughness": ("roughness_coverage", "compare_trace"),
     "backbone-bands": ("backbone_band", "compare_band"),
 }
 # Time limit of a scene with its reference; a longer one is recorded as failed.

@@ -36,13 +36,30 @@ def read_sources(root: Path, folder: str = PACKAGE) -> dict:
     return tree
 
 
+def child_nodes(node: ast.AST) -> list:
+    """Return the nodes directly inside a node, without the contexts of names (Load, Store, Del).
+
+    It takes a third of the time of `ast.iter_child_nodes`.
+    """
+    children = []
+    for value in node.__dict__.values():
+        if isinstance(value, list):
+            children += [part for part in value if isinstance(part, ast.AST)]
+        elif isinstance(value, ast.AST) and not isinstance(value, ast.expr_context):
+            children.append(value)
+    return children
+
+
 @cache
 def syntax_nodes(text: str) -> tuple:
-    """Parse a source file once and return all its nodes, the module first."""
+    """Parse a source file once and return all its nodes but the contexts of names, the module first."""
     was_enabled = gc.isenabled()
     gc.disable()  # Otherwise the garbage collector would visit all nodes of all files repeatedly.
     try:
-        return tuple(ast.walk(ast.parse(text)))
+        nodes = [ast.parse(text)]
+        for node in nodes:
+            nodes += child_nodes(node)
+        return tuple(nodes)
     finally:
         if was_enabled:
             gc.enable()

@@ -1,12 +1,8 @@
 """Random cases of sweeps that are integrated together, in lanes, against single runs.
 
-Campaign `lanes` of `campaigns`: each seed selects one law, or one family of rigs with a patch. The
-uncertainty of a single run is its stated error, so a row holds if the two results agree within the
-sum of both errors.
+The uncertainty of a single run is its stated error, so a row holds if the two results agree within
+the sum of both errors.
 """
-
-from pathlib import Path
-from time import process_time
 
 import numpy as np
 from campaigns import Row, strip_number
@@ -16,7 +12,6 @@ import patchfem as pf
 from patchfem.api import get_base_scene
 from patchfem.response import TABLE as MOTION
 from patchfem.runs import TABLE as STATIC
-from patchfem.runs.batch import meshes, one_by_one
 from patchfem.runs.batch.lumped import lane_ringing, lanes
 from patchfem.scene import format_assignments
 
@@ -78,9 +73,6 @@ FAMILIES = {
         "contact.load": lambda r: 10 ** r.uniform(1.3, 2.5),
     },
 }
-N_CASES = 400  # Cases of a sweep without a patch.
-N_PATCHES = 64  # Cases of a sweep with patches: the smallest number that is integrated in lanes.
-N_SINGLES = 30  # Cases that are also computed by single runs.
 
 
 def draw_points(law: str, seed: int, count: int) -> list:
@@ -176,35 +168,3 @@ def compare_answers(sweep_answers, singles) -> list[list]:
             case_rows.append(Row(name, value, error, FLOORS[strip_number(name)], truth, doubt))
         out.append(case_rows)
     return out
-
-
-def compare_cases(seed: int, folder: Path, earlier: dict | None = None) -> dict:
-    """Compare the sweep of a seed with single runs of its first cases; see `campaigns`."""
-    groups = [*LAWS, *FAMILIES]
-    group = groups[seed % len(groups)]
-    models = (
-        draw_points(group, seed, N_CASES) if group in LAWS else draw_patches(group, seed, N_PATCHES)
-    )
-    started = process_time()
-    sweep_answers = pf.run_many(models)
-    seconds = process_time() - started
-    singles = models if group in LAWS else meshes.with_shared_meshes(models)
-    lane_cases = [
-        case
-        for case in range(N_SINGLES)
-        if sweep_answers.numerics.get(case, {}).get("engine") == "lanes"
-    ]
-    single_answers = one_by_one.solve([singles[case] for case in lane_cases])
-    same_outcome = [
-        sweep_answers.outcome[case] == outcome
-        for case, outcome in zip(lane_cases, single_answers.outcome)
-    ]
-    pairs = compare_answers(sweep_answers.select(np.array(lane_cases)), single_answers)
-    return {
-        "group": group,
-        "engine": "lanes",
-        "seconds": seconds,
-        "cases": len(models),
-        "other_outcomes": same_outcome.count(False),
-        "rows": [row for case_rows in pairs for row in case_rows],
-    }

@@ -18,11 +18,7 @@ ALWAYS = {
     "words": 0.003,
     "energy": 0.002,
     "profiles": 0.002,
-    "signals": 0.002,
-    "paths": 0.003,
-    "rows": 0.002,
-    "loops": 0.002,
-    "universal": 0.001,
+    "tables": 0.002,
     "hostile": 0.004,
 }
 SEED = 4

@@ -1,12 +1,11 @@
-"""Number files with wrong cells, headers and bytes: traces, signals, paths, rows, loops and universal files.
+"""Number files with wrong cells, headers and bytes: traces, signals, paths, rows and loops.
 
 Damage that leaves no meaning (a word for a number, no unit, no rows, decreasing time) must be
 refused.
 """
 
 import numpy as np
-import pyuff  # These are imported before any fork, so that not every trial has to import them.
-import scipy.optimize  # noqa: F401
+import scipy.optimize  # noqa: F401  (imported before any fork, so that not every trial has to)
 
 from .results import run_scene
 from .scenes import damage_bytes
@@ -225,35 +224,25 @@ def run_json_command(trial: Trial, is_invalid: bool, *words) -> None:
         parse_strict_json(result.out)
 
 
-def run_signals_trial(trial: Trial) -> None:
-    """Run a rig with a recorded base motion."""
-    data, is_invalid = make_damaged_csv(trial, "signal")
-    run_scene_with_file(
-        trial,
-        RIG | {"drive": {"kind": "base", "waveform": "file", "file": "s.csv"}},
-        "s.csv",
-        data,
-        is_invalid,
-    )
+# Kind of table -> scene that reads it from the file table.csv.
+SCENES = {
+    "signal": RIG | {"drive": {"kind": "base", "waveform": "file", "file": "table.csv"}},
+    "path": RUBS | {"slide": {"kind": "file", "file": "table.csv"}},
+    "rows": RIG | {"drive": BASE, "measured": {"file": "table.csv"}},
+}
 
 
-def run_paths_trial(trial: Trial) -> None:
-    """Run a bench with a recorded displacement."""
-    data, is_invalid = make_damaged_csv(trial, "path")
-    run_scene_with_file(
-        trial, RUBS | {"slide": {"kind": "file", "file": "p.csv"}}, "p.csv", data, is_invalid
-    )
+def run_table_trial(trial: Trial) -> None:
+    """Run a rig with a recorded base motion or measured rows, or a bench with a recorded slide; or read a loop."""
+    kind = trial.draw(*SCENES, "loop")
+    if kind == "loop":
+        run_loop_trial(trial)
+        return
+    data, is_invalid = make_damaged_csv(trial, kind)
+    run_scene_with_file(trial, SCENES[kind], "table.csv", data, is_invalid)
 
 
-def run_rows_trial(trial: Trial) -> None:
-    """Run a rig with measured rows."""
-    data, is_invalid = make_damaged_csv(trial, "rows")
-    run_scene_with_file(
-        trial, RIG | {"drive": BASE, "measured": {"file": "t.csv"}}, "t.csv", data, is_invalid
-    )
-
-
-def run_loops_trial(trial: Trial) -> None:
+def run_loop_trial(trial: Trial) -> None:
     """Fit a bench to a friction loop, or import the loop."""
     data, is_invalid = make_damaged_csv(trial, "loop")
     (trial.folder / "loop.csv").write_bytes(data)
@@ -278,35 +267,3 @@ def run_loops_trial(trial: Trial) -> None:
         "--json",
         "-q",
     )
-
-
-def run_universal_trial(trial: Trial) -> None:
-    """Import records of a universal file."""
-    time = np.arange(64) / 500
-    record = {
-        "type": 58,
-        "binary": trial.draw(0, 1),
-        "func_type": trial.draw(1, 1, 4),
-        "rsp_node": 1,
-        "rsp_dir": 1,
-        "ref_node": 0,
-        "ref_dir": 0,
-        "abscissa_spacing": trial.draw(0, 1),
-        "abscissa_spec_data_type": 17,
-        "ordinate_spec_data_type": trial.draw(8, 9, 12, 13),
-        "orddenom_spec_data_type": 0,
-        "x": time,
-        "data": trial.r.normal(size=64) * trial.draw(1.0, 1e300, np.nan),
-    }
-    pyuff.UFF(str(trial.folder / "made.uff")).write_sets([record, record | {"rsp_node": 2}], "add")
-    data = (trial.folder / "made.uff").read_bytes()
-    (trial.folder / "lab.uff").write_bytes(data if trial.chance(0.2) else damage_data(trial, data))
-    out = trial.draw("out.csv", "out.csv", "out.toml", "out.uff")
-    channel = trial.draw("force=1:+x", "displacement=2:+x", "acceleration=1:+x")
-    trial.run("import", "lab.uff", "-o", out, "--map", channel)
-    if trial.chance(0.3):
-        (trial.folder / "scene.toml").write_text(
-            to_toml(RUBS | {"structure": {"file": "lab.uff", "slide_at": "1:+x"}, "drive": BASE}),
-            "utf-8",
-        )
-        run_scene(trial, "scene.toml")
