@@ -127,25 +127,6 @@ def self_affine(
     )
 
 
-def report_sigma(amplitude: float, amplitude_kind: str) -> float:
-    """Return the standard deviation [m] of the report's surface from the amplitude [m] of its 80 um waves and its kind.
-
-    amplitude_kind: "peak-to-valley": the upper quartile of the height from a peak to the next valley, 2.5 sigma in
-    traces less their waves below half of 80 um (2.6 where peaks must stand out by 0.3 sigma instead); "zero-to-peak":
-    half of that; "rms": sigma itself. The report's "amplitude of 13 to 18 microns" does not say which: 5.2 to 7.2 um of
-    sigma, 10.4 to 14.4 um, 13 to 18 um. Only the first fits the range of 30.6 um that Fig. 30 seems to print.
-    """
-    if amplitude_kind not in SWINGS:
-        raise PatchfemError(
-            f"amplitude_kind '{amplitude_kind}' is not known; use {', '.join(SWINGS)}"
-        )
-    if not (np.isfinite(amplitude) and amplitude >= 0):
-        raise PatchfemError(
-            f"the amplitude of a made surface is a length of zero or more, not {amplitude:g}"
-        )
-    return float(amplitude) / SWINGS[amplitude_kind]
-
-
 def report_density(q: np.ndarray) -> np.ndarray:
     """Return the spectral density of the report's surface before the tests, up to a factor.
 

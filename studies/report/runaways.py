@@ -47,7 +47,6 @@ FREQUENCIES = (135.0, 143.0, 150.0, 155.0)  # [Hz] frequencies of Table 1
 LEVELS = [4 + 0.25 * k for k in range(33)]  # [g] of the base acceleration
 AWAY = 2 * MIL  # [m] amplitude of slip above which the motion counts as a runaway
 GROOVED_SCENE = (FOLDER / "grooved.toml").read_text("utf-8")
-LIFT = "normal.grooves.lifted_mass"
 YAW = "structure.mode.yaw.slide"
 KINETIC = "friction.kinetic"
 STILL = {YAW: 0.0}

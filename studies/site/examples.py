@@ -30,7 +30,6 @@ amplitude = "2 um"
 frequency = "1 Hz"
 cycles = 2
 """
-RUBBED_PATCH = PATCH + '[contact.crown]\nradius = "10 m"\n[contact.shear]\n' + LAW + SLIDE
 POINT = '[normal]\nload = "115 N"\n' + LAW + SLIDE + "[accuracy]\ntolerance = 1e-2\n"
 BONDS = POINT.replace('law = "coulomb"', 'law = "nonlocal"\nbond_length = "1 um"')
 RIG = (

@@ -144,11 +144,6 @@ class NodeBonds:
             self.eps = eps
         return (contributions * side).sum(axis=0) + initial_bonds
 
-    def break_bonds(self, is_unloaded):
-        """Break the bonds of points without pressure, off (m,) bool."""
-        self.dense[:, is_unloaded] = 0.0
-        self.first[is_unloaded] = 0.0
-
 
 def solve_displacements(bonds: NodeBonds, limit, c, q: float, dt: float, guess):
     """Solve s = q - c F(s) by Newton's method with step halving.
