@@ -50,16 +50,6 @@ def test_exact_reversals_without_stop_are_detected():
     assert found.time == pytest.approx(0.25 + 0.5 * np.arange(8), abs=0.01)
 
 
-def test_exact_slip_below_threshold_gives_no_event():
-    """Slip below the threshold gives no event."""
-    time, slip = make_stick_slip()
-    assert (
-        detect_events(time, 1e-9 * slip[:, None], slip[:, None], 1.0, max_stick_slip=1e-8).time.size
-        == 0
-    )
-    assert detect_events(time, 0 * slip[:, None], slip[:, None], 1.0).time.size == 0
-
-
 @given(st.floats(0.05, 0.4), st.floats(0, 1.3), st.floats(1.6, 3))
 def test_always_stick_intervals_and_slip_fill_window(rest, begin, end):
     """The total stick time between events agrees with that of the samples within eight samples."""

@@ -5,8 +5,6 @@ from math import acos, pi, sin
 import friction_forms
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from scene_texts import COULOMB, DRIVE, MODE, POINT
 
 from patchfem import run
@@ -83,24 +81,6 @@ def test_exact_jenkins_loop_agrees_with_closed_form(amplitude, length):
     assert found["equivalent_damping"] == pytest.approx(
         float(area) / (2 * pi * 0.5 * amplitude**2), rel=1e-6, abs=1e-12
     )
-
-
-@given(st.floats(0.1, 10), st.floats(-2, 2), st.floats(-3, 3), st.floats(-pi, pi))
-def test_always_loop_stiffness_ignores_offset_and_phase(amplitude, offset, slope, shift):
-    """The stiffness of a loop is independent of the offset and the phase of the slide."""
-    time, phase = evenly(1, 128)
-    slide = offset + amplitude * np.sin(phase + shift)
-    force = slope * (slide - offset) + 0.3 * np.cos(phase + shift) + 0.1 * np.cos(3 * phase)
-    found = loops.interface_loop(
-        np.ptp(slide) / 2, *fourier_coefficients(time, slide, force), 1.0, 0.0
-    )
-    assert found["equivalent_stiffness"] == pytest.approx(slope, abs=1e-10)
-    turns = loops.find_reversals(
-        time, slide, amplitude * OMEGA * np.cos(phase + shift), slope * (slide - offset), PERIOD
-    )
-    assert loops.mean_half_range(turns) == pytest.approx(amplitude, rel=1e-7)
-    # the force is straight between samples: (pi/128)^2/2 of it at the top
-    assert loops.secant_stiffness(turns) == pytest.approx(slope, abs=1e-3)
 
 
 def test_order_half_range_between_samples_is_four():

@@ -203,44 +203,6 @@ def test_exact_load_near_edge_is_carried_at_edge():
     assert result.patch.active.sum() <= 2
 
 
-def write_wavy_profile(path, with_faults=False) -> list:
-    """Write a smooth profile of two waves and return the settings that use it; `with_faults` adds
-    spikes and missing heights."""
-    x = np.linspace(0, 12.7, 1271)
-    z = 2.0 * np.cos(2 * np.pi * x / 6.35) + 0.5 * np.cos(2 * np.pi * x / 3.175)
-    cells = [f"{v:.9g}" for v in z]
-    if with_faults:
-        for index, height in ((200, 50), (640, -40), (641, -45), (1100, 30)):
-            cells[index] = str(height)
-        for start in (100, 500, 900):
-            cells[start : start + 12] = ["nan"] * 12
-    path.write_text(
-        "x [mm],z [um]\n" + "\n".join(f"{a:.9g},{b}" for a, b in zip(x, cells, strict=True)),
-        "utf-8",
-    )
-    return [f"contact.profile.file={path}", "contact.element_size=0.1 mm", "contact.load=1e4 N"]
-
-
-def test_always_spikes_and_missing_heights_are_interpolated(tmp_path):
-    """Spikes and missing heights are counted in warnings and replaced by straight lines of 0.12 mm,
-    which deviate from the profile by at most 0.12^2/8 z'' = 7 nm."""
-    clean = run_and_check(*write_wavy_profile(tmp_path / "clean.csv"))
-    faulty = run_and_check(*write_wavy_profile(tmp_path / "spoilt.csv", with_faults=True))
-    warnings = " ".join(faulty.warnings)
-    assert "4 of 1271 heights are spikes" in warnings and "36 of 1271" in warnings
-    assert not any("are spikes" in line for line in clean.warnings)
-    assert np.abs(faulty.patch.unloaded_gap - clean.patch.unloaded_gap).max() <= 2e-8
-    assert measure_value(faulty, "pressure_peak") == pytest.approx(
-        measure_value(clean, "pressure_peak"), rel=0.02
-    )
-    assert measure_value(faulty, "contact_fraction") == pytest.approx(
-        measure_value(clean, "contact_fraction"), abs=0.02
-    )
-    assert measure_value(faulty, "approach") == pytest.approx(
-        measure_value(clean, "approach"), abs=2e-8
-    )
-
-
 @pytest.mark.share(0)
 @pytest.mark.parametrize("mesh", [COARSE, "accuracy.tolerance=1e-2"])
 def test_exact_approach_below_first_contact_has_no_load(mesh):

@@ -144,20 +144,6 @@ def test_exact_rolled_rigid_strips_agree_with_closed_form():
     assert weight @ patch.pressure.sigma_n == pytest.approx(LOAD, rel=1e-10)
 
 
-def test_exact_eccentric_load_on_strips_agrees_with_closed_form():
-    """The pressure is N/A + N e y/I and the roll -N e/(k I), with I = L W^3 (1 - 1/count^2)/12 for
-    the strips."""
-    arm = 0.8e-3
-    count = 6
-    tables = SKINS["linear"] + f'[contact.strips]\ncount = {count}\noffset = "{arm} m"\n'
-    patch, patch_values = solve_patch(tables, material=RIGID)
-    inertia = LENGTH * WIDTH**3 / 12 * (1 - 1 / count**2)
-    assert patch_values["pressure_centre_lateral"] == pytest.approx(arm, rel=1e-9)
-    assert patch_values["roll"] == pytest.approx(-LOAD * arm / (1e13 * inertia), rel=1e-5)
-    edge_pressure = LOAD / (LENGTH * WIDTH) + LOAD * arm * patch.strips.offsets[-1] / inertia
-    assert patch.strips.pressure[-1] == pytest.approx(edge_pressure, rel=1e-4)
-
-
 def test_always_errors_of_free_roll_cover_strip_count():
     """The errors of a patch that can roll cover the result with 48 strips."""
     tables = '[contact.crown]\nradius = "5 m"\n[contact.strips]\ncount = {}\noffset = "1 mm"\n'

@@ -287,22 +287,6 @@ def test_always_shipped_scenes_load_and_plan(path):
 # Exit codes.
 
 
-def test_refuses_resume_mesh_and_exact_method_without_support(write_scene, tmp_path):
-    """A run without wear cannot be resumed, a point has no mesh, and a nonlocal law has no exact solution."""
-    scene = write_scene(POINT + COULOMB + STRUCTURE)
-    assert "only a run with [wear]" in run_cli("run", scene, "--resume").err
-    assert run_cli("mesh", scene, "-o", tmp_path / "m.msh").code == 2
-    answer = run_cli(
-        "run",
-        write_scene(POINT + NONLOCAL + STRUCTURE),
-        "--set",
-        "accuracy.method=exact",
-        "-o",
-        tmp_path / "o",
-    )
-    assert answer.code == 2 and "no exact solution" in answer.err
-
-
 def test_refuses_too_long_run_and_unwritable_folder(write_scene, tmp_path):
     """A run with a too long bond list, or with a results folder inside a file, ends with exit code 4."""
     scene = write_scene(POINT + NONLOCAL + STRUCTURE)

@@ -54,21 +54,6 @@ def test_exact_wear_without_stroke_truncates_combined_heights():
         assert lower - result.lower == pytest.approx(upper - result.upper, rel=1e-12, abs=1e-18)
 
 
-@pytest.mark.parametrize("stroke", [0, 20])
-def test_exact_hard_plane_truncates_peaks_at_any_stroke(stroke):
-    """A hard plane truncates the peaks of a rough surface at one height, whatever the stroke."""
-    lower, _ = make_surfaces()
-    out = rub(
-        lower, np.zeros_like(lower), STEP, stroke * STEP, 3 * UM, upper_share=0.0, bite=0.1 * UM
-    )
-    top = out.lower.max()
-    assert (
-        out.lower == pytest.approx(np.minimum(lower, top), abs=0.1 * UM * 1e-9)
-        and not out.upper.any()
-    )
-    assert top < lower.max()
-
-
 def test_exact_hard_surface_leaves_its_envelope():
     """A hard rough surface leaves its envelope over the stroke in the soft surface: every point of
     the soft surface touches at some position, and none penetrates."""
