@@ -350,12 +350,14 @@ def test_exact_primal_method_follows_failed_active_sets(monkeypatch):
 
 
 def test_refuses_solution_with_large_residual(monkeypatch):
-    """A solution whose forces or motion are wrong by 1e-9 is refused."""
+    """A solution whose forces or motion are wrong by 1e-9, or in which nodes without force overlap, is refused."""
     pair = make_coated_pair(100)
-    solution = solve(
-        StripCompliance(pair.normal), patch_problem(pair.interface.x, np.zeros(101), LOAD)
+    solution, without_ends = (
+        solve(StripCompliance(pair.normal), patch_problem(pair.interface.x, gap, LOAD))
+        for gap in (np.zeros(101), np.where(np.abs(np.arange(101) - 50) > 45, 1.0, 0.0))
     )
     for wrong in (
+        without_ends,
         solution._replace(motion=solution.motion * (1 + 1e-9)),
         solution._replace(force=solution.force * (1 + 1e-9)),
     ):

@@ -239,7 +239,7 @@ def test_refuses_heave_of_rigid_point_contact():
     """Heave with a rigid point contact is refused; the message names the table to use."""
     with pytest.raises(PatchfemError, match=r"\[contact\] in place of \[normal\]"):
         varying_load.march(
-            make_modes([100.0], [1.0], [1.0], [0.0]),
+            make_modes([100.0, 200.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]),
             STILL,
             None,
             LAWS["coulomb"],
