@@ -14,6 +14,7 @@ from patchfem.response import (
     locate_reversals,
     make_half_cycles,
 )
+from patchfem.runs import estimate_decay_mesh_errors
 
 RELEASED = DRIVE[: DRIVE.index("kind")] + 'kind = "free"\ndisplacement = "2 mm"\ncycles = 30\n'
 
@@ -262,6 +263,28 @@ def test_always_release_and_ringing_errors_cover_mindlin_damping():
         0
     ]
     assert abs(ring.value - beside) <= ring.error and beside > 1.5 * ring.value
+
+
+@pytest.mark.parametrize(
+    "old, new, why",
+    [
+        (
+            "[contact.shear]",
+            '[contact.shear]\n[contact.grooves]\nwavelength = "80 um"\namplitude = "2 um"',
+            "the contact slides on grooves",
+        ),
+        ("slide = 1.0", "slide = 1.0\nnormal = 0.1", "the normal load changes"),
+    ],
+)
+def test_always_missing_static_loop_gives_reason(old, new, why):
+    """If the friction law has no static loop, the mesh error of a decay is zero and has a reason."""
+    scene = CROWNED.replace('"coulomb"', '"elastic-plastic"\nbond_length = "1 um"').replace(
+        old, new, 1
+    )
+    error, said = estimate_decay_mesh_errors(
+        pf.build(scene), None, None, np.array([1e-7, 1e-6]), int
+    )
+    assert said == why and not error.any()
 
 
 @pytest.mark.parametrize("begin", [100.0])
