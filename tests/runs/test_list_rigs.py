@@ -71,6 +71,8 @@ def test_always_energy_balance_of_random_rigs_closes():
         result = run(load(text), estimate=False)
         values = {name: measure.value for name, measure in result.measures.items()}
         assert values["energy_balance"] <= 1e-8 and values["work_check"] <= 5e-3, text
+        is_created = values["energy_created"] > 1e-9 * values["energy_dissipated"]
+        assert any("in the report created" in line for line in result.warnings) == is_created, text
         if '"stretch"' in text:
             exchanged = values["energy_dissipated"] + result.extra["book"]["power"]
             assert values["energy_created"] <= 1e-12 * exchanged, text

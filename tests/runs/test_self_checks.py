@@ -138,8 +138,15 @@ def test_always_correct_runs_pass_all_self_checks():
             SCENES["march"],
             ["loop_area", "equivalent_stiffness"],
         ),
+        (
+            rows,
+            "compute_acceleration_peak",
+            lambda peak: 0.8 * peak,
+            SCENES["march"],
+            ["self-check.*absolute_acceleration_peak"],
+        ),
     ],
-    ids=["mode shape", "energy balance", "loop measures"],
+    ids=["mode shape", "energy balance", "loop measures", "acceleration peak"],
 )
 def test_always_wrong_numbers_are_detected(monkeypatch, owner, name, fault, scene, warnings):
     """A wrong result of a function leads to not_converged without errors, and to these warnings."""
