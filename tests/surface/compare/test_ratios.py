@@ -128,12 +128,12 @@ def test_always_scan_comparison_shows_smoother_direction():
 
 
 def test_always_pairs_of_two_directions_are_compared():
-    """Two pairs of traces, along x and y, are compared for anisotropy before and after wear."""
-    parts = [
-        compare_traces(*make_worn_pair(seed)[:2], name)
-        for seed, name in ((30001, "x"), (30002, "y"))
-    ]
+    """Two pairs of traces, along x and y, are compared for anisotropy before and after wear, at their coarser step."""
+    pairs = [make_worn_pair(30001), make_worn_pair(30002, step=2 * UM)]
+    parts = [compare_traces(p.before, p.after, name) for p, name in zip(pairs, "xy")]
     found = compare_directions(parts)
+    sizes = [measure_size(p.before, 2 * UM) for p in pairs]
+    assert found[0].slope.value == divide_sizes("slope", "", *sizes).value
     assert [entry[0] for entry in found] == ["before", "after"]
     assert found[0][1].low < 1 < found[0][1].high
     data = comparison_data(parts, compose_verdict(parts, found), found)

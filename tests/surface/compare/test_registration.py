@@ -209,6 +209,14 @@ def test_exact_groove_in_straight_line():
     assert found.flanks.start == pytest.approx(0.6e-3, abs=25 * UM)
 
 
+@pytest.mark.filterwarnings("error")
+def test_always_short_traces_have_no_flanks():
+    """Traces of two places with fewer samples than a search for flanks needs have no depth and give no raw warning."""
+    traces = make_worn_pair(1).before, make_worn_pair(2).after
+    found = compare_traces(*(Profile(one.x[:38] * 6, one.z[:38], one.source) for one in traces))
+    assert found.basis == "" and "no common part" in found.worn.mean.reason
+
+
 def test_refuses_trace_with_few_samples():
     """Traces of fewer than 16 samples are refused."""
     short = Profile(np.arange(5.0), np.zeros(5), "short")

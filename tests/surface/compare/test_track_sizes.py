@@ -140,6 +140,16 @@ def test_always_interval_covers_missing_wall(missing):
     assert worn.area.high - worn.area.low < 50 * UM**2
 
 
+def test_always_slope_ratio_from_noise_is_refused():
+    """The slope ratio is not given where the noise of the second trace is steeper than the surface."""
+    before, after, _ = make_ridged_track("band", HELD_OUT + 3, 0.0, 0.0)
+    noise = 0.06 * UM * np.random.default_rng(2).standard_normal(COUNT)
+    slope = compare_traces(
+        before, Profile(after.x, frozen_array(after.z + noise), "after")
+    ).ratios.slope
+    assert slope.value is None and "noise" in slope.reason
+
+
 def test_always_area_interval_covers_removed_scratch():
     """The upper end of the worn area covers a narrow scratch that is removed as a spike."""
     before, after, truth = make_ridged_track("band", HELD_OUT + 5, 0.0, 0.0)

@@ -83,7 +83,14 @@ def test_exact_track_direction_section_and_volume(angle, length, ridges):
             truth[name], abs=0.15 * max(left, right) + 1e-15
         ), name
     volume = found.values["volume"]
-    if length:  # the round ends are half a paraboloid each
+    if (
+        length
+    ):  # the round ends are half a paraboloid each, of half the area at 0.61 times its radius
+        found_length = found.values["length"]
+        assert found_length.value == pytest.approx(
+            length + np.sqrt(1 - 0.5 ** (2 / 3)) * WIDTH, rel=0.005
+        )
+        assert found_length.low < found_length.value < found_length.high
         assert volume.value == pytest.approx(
             area * length + np.pi * DEPTH * (WIDTH / 2) ** 2 / 2, rel=0.02
         )
