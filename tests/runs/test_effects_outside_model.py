@@ -100,6 +100,16 @@ def test_exact_warning_states_slide_amplitude_over_contact_length(fraction, has_
     assert result.outcome == outcome
 
 
+def test_exact_warning_states_contact_length_of_tilted_patch():
+    """The contact length in the warning about a large slide is that of the loaded part of a tilted patch."""
+    tilt = '[contact.tilt]\nangle = "0.02 mrad"\n'
+    result = run_text(COATED + tilt + COULOMB + SINE.format("3 mm"), False)
+    (warning,) = [text for text in result.warnings if text.startswith("the slide amplitude")]
+    length = float(warning.partition("contact length ")[2].split(" mm")[0])
+    fraction = result.measures["contact_fraction"].value
+    assert 0.2 < fraction < 0.9 and length == pytest.approx(12.7 * fraction, abs=0.5)
+
+
 def test_exact_lateral_slide_beyond_width_leaves_contact(tmp_path):
     """A lateral slide beyond the width has the outcome leaves_contact."""
     for across, outcome in ((12.6, "done"), (12.8, "leaves_contact")):
