@@ -1,5 +1,4 @@
-"""Periodic motions by shooting with a time-stepping march, against a linear mode and the map of the
-event engine."""
+"""Periodic motions by shooting with a time-stepping march, against the map of the event engine."""
 
 import numpy as np
 import pytest

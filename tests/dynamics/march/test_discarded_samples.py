@@ -38,8 +38,8 @@ def march_both_ways(basis, acceleration: float, cycles: float, steps: int = 80, 
 @pytest.mark.parametrize("basis", [BASIS, COUPLED], ids=["one mode", "coupled by damping"])
 @pytest.mark.parametrize(
     "acceleration, cycles",
-    [(5.0, 37), (49.0, 40.25)],
-    ids=["sticks", "slips"],
+    [(49.0, 40.25), (300.0, 37)],
+    ids=["slips", "drags"],
 )
 def test_exact_condensed_cycles_agree_with_complete_samples(basis, acceleration, cycles):
     """Extremes, phasors, last cycles and energies agree within 1e-12 with a march that keeps its

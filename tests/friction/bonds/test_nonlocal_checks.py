@@ -49,7 +49,7 @@ def test_exact_dwell_of_stretch_law_agrees_with_closed_form(dwell_time):
         assert force == pytest.approx(eps + (0.5 - eps) * np.exp(-x / eps), abs=1e-12)
 
 
-# ---- C9, C10: pressure on the lower piece
+# ---- C9: pressure on the lower piece
 
 
 def pad_traction(engine, depth, width, pressure_beyond=0.0, distance_beyond=0.0):
