@@ -440,8 +440,8 @@ def test_exact_trace_of_instrument_keeps_metres(tmp_path, monkeypatch):
     monkeypatch.setattr(
         instruments, "_run_script", lambda path, file: {"x": x, "z": z, "about": about}
     )
-    found = read_bytes(tmp_path, b"\x00\x01\x02" * 99, "trace.opdx")
-    assert isinstance(found, Profile)
+    found = read_bytes(tmp_path, b"\x00\x01\x02" * 99, "trace.opdx", UM)
+    assert isinstance(found, Profile) and "units" in found.notes[-1]
     assert found.x == pytest.approx(x, rel=1e-12) and np.ptp(found.z) == pytest.approx(6e-9)
 
 
