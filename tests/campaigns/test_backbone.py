@@ -357,8 +357,10 @@ def test_curve_continues_beyond_a_fold():
     """
     amplitudes = np.array([25e-6, 28e-6, 40e-6])
     rig = pf.build(FOLDED, **{"accuracy.tolerance": 0.1})
-    backbone = compute_backbone(rig, "", amplitudes, ("balance",))
-    found_alone = compute_backbone(rig, "", amplitudes[1:], ("balance",), errors=False)
+    backbone, found_alone = (
+        compute_backbone(rig, "", given, ("balance",), errors=False)
+        for given in (amplitudes, amplitudes[1:])
+    )
     whole = backbone.curves["balance"]
     beyond = found_alone.curves["balance"]
     assert whole.amplitude == pytest.approx(amplitudes) and beyond.amplitude == pytest.approx(

@@ -109,6 +109,7 @@ def test_band_by_balance_contains_curve_of_decay(three_curves):
     backbone = pf.backbone(LAW + SLIDE, modes=MODES, amplitudes=AMPLITUDES, method="balance")
     assert set(backbone.data_vars) & {"decay_damping", "quasi_static_damping"} == set()
     assert "is predicted to read" in backbone.attrs["advice"]
+    assert "For the curve of a ring-down, run --method decay." in backbone.attrs["advice"]
     amplitude = three_curves.decay_amplitude.values
     high = np.interp(amplitude, backbone.band_amplitude, backbone.band_damping_high)
     low = np.interp(amplitude, backbone.band_amplitude, backbone.band_damping_low)
@@ -188,7 +189,7 @@ def march_decay(start: float) -> tuple:
     return np.sqrt(peaks[:-2] * peaks[2:]), decrement / np.hypot(1, decrement)
 
 
-@pytest.mark.share(0)
+@pytest.mark.slow
 @pytest.mark.parametrize("ratio", [1.01, 1.06, 1.2])
 def test_band_beside_onset_of_slip_does_not_depend_on_other_amplitudes(ratio):
     """The band at an amplitude contains the decrement of a decay, whichever other amplitudes are given.
@@ -215,36 +216,24 @@ def test_band_beside_onset_of_slip_does_not_depend_on_other_amplitudes(ratio):
 
 
 def test_new_joint_scene_has_a_backbone(tmp_path, monkeypatch, capsys):
-    """The unchanged scene of `new joint` has a backbone with a band and advice."""
+    """The scene of `new joint` with two given modes has a backbone with a band and advice."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "joint.toml").write_text(pf.new("joint"), "utf-8")
-    for options, stuck in (((), 100), (("--modes", "120 Hz:0.01, 170 Hz:0.02"), 120)):
-        with pytest.raises(SystemExit) as ended:
-            main(
-                [
-                    "backbone",
-                    "joint.toml",
-                    "--json",
-                    "--no-page",
-                    "--amplitudes",
-                    "9 um..1 mm:3",
-                    *options,
-                ]
-            )
-        assert not ended.value.code
-        answer = json.loads(capsys.readouterr().out)
-        assert set(answer["band"]) == {
-            "amplitude", "frequency_low", "frequency_high", "damping_low", "damping_high"
-        }  # fmt: skip
-        assert answer["stuck_frequency"] == pytest.approx(stuck, rel=1e-4)
-        assert set(answer["curves"]) == {"balance", "quasi-static"}
-        assert answer["advice"].startswith("Use method balance, the bold curve of the page")
-        # A patch in partial slip dissipates energy at each amplitude.
-        assert "dissipates nothing" not in answer["advice"]
-        assert any("[slide] is ignored" in note for note in answer["notes"])
-        assert any("`slide` is assumed such" in note for note in answer["notes"])
-        has_two_modes = bool(options)
-        assert has_two_modes == any("assumed `slide` is positive" in n for n in answer["notes"])
+    options = ("--modes", "120 Hz:0.01, 170 Hz:0.02", "--amplitudes", "9 um..1 mm:3")
+    with pytest.raises(SystemExit) as ended:
+        main(["backbone", "joint.toml", "--json", "--no-page", *options])
+    assert not ended.value.code
+    answer = json.loads(capsys.readouterr().out)
+    assert set(answer["band"]) == {
+        "amplitude", "frequency_low", "frequency_high", "damping_low", "damping_high"
+    }  # fmt: skip
+    assert answer["stuck_frequency"] == pytest.approx(120, rel=1e-4)
+    assert set(answer["curves"]) == {"balance", "quasi-static"}
+    assert answer["advice"].startswith("Use method balance, the bold curve of the page")
+    # A patch in partial slip dissipates energy at each amplitude.
+    assert "dissipates nothing" not in answer["advice"]
+    for text in ("[slide] is ignored", "`slide` is assumed such", "assumed `slide` is positive"):
+        assert any(text in note for note in answer["notes"])
 
 
 @pytest.mark.parametrize(

@@ -58,7 +58,7 @@ def compute_balance(law: str, damping: float):
     return compute_backbone(make_rig(law, damping), "", AMPLITUDES, ("balance",))
 
 
-@pytest.mark.share(0, 1, 3)
+@pytest.mark.share(0, 1)
 @pytest.mark.parametrize("damping", DAMPING)
 @pytest.mark.parametrize("law", LAWS)
 def test_balance_gives_curve_or_reason_for_each_sign_of_damping(law, damping):
@@ -72,6 +72,7 @@ def test_balance_gives_curve_or_reason_for_each_sign_of_damping(law, damping):
         assert (curve.frequency > 0).all() and np.isfinite(curve.damping).all()
 
 
+@pytest.mark.share(0)
 @pytest.mark.parametrize("law", LAWS)
 def test_exact_viscous_damping_adds_to_friction_damping(law):
     """The viscous damping of a single mode adds zeta_s f_0/f to the damping by friction.

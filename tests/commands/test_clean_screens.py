@@ -17,7 +17,6 @@ STEADY = (
     "linear",
 )  # templates whose motion becomes steady; all other runs are done at their end
 # scenes of a normal run; the others are slow
-CHEAP = ("studies/bench/loop.toml", "studies/report/block.toml", "studies/rig/rig.toml")
 MEANT = {  # expected warnings of a scene, each with its remedy and the reason to keep it
     "studies/rig/report.toml": (
         "the shape of the patch does not",
@@ -85,9 +84,8 @@ def test_always_templates_run_without_warnings(kind, tmp_path):
         assert summary["outcome"] == ("steady" if kind in STEADY else "done")
 
 
-@pytest.mark.parametrize(
-    "scene", [one if one in CHEAP else pytest.param(one, marks=pytest.mark.slow) for one in SCENES]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("scene", SCENES)
 def test_always_shipped_scenes_give_expected_warnings(scene, tmp_path):
     """Every shipped scene gives exactly the warnings listed for it."""
     found = run_and_list_warnings(ROOT / scene, tmp_path / "out", "run")

@@ -17,7 +17,7 @@ from patchfem.__main__ import VERBS, app, register_verbs
 from patchfem.commands import examine
 from patchfem.commands.sources import SOURCES, bibtex
 from patchfem.effects import EFFECTS
-from patchfem.scene import NEXT_VERBS, TEMPLATE_DESCRIPTIONS, find_shipped_scene, read_template
+from patchfem.scene import NEXT_VERBS, TEMPLATE_DESCRIPTIONS, read_template
 
 register_verbs([])  # all verbs
 
@@ -56,12 +56,6 @@ def test_exact_demo_runs_shipped_rig(tmp_path):
     amplitude = summary["measures"]["relative_displacement_amplitude"]
     assert answer.code == 0 and amplitude["value"] == pytest.approx(
         14.8028e-6, abs=amplitude["error"]
-    )
-    settings = {"drive.cycles": 3}
-    assert (
-        pf.demo(**settings).measures["loop_area"].value
-        == pf.run(find_shipped_scene(), **settings).measures["loop_area"].value
-        > 0
     )
 
 

@@ -198,10 +198,8 @@ def test_refuses_incomplete_sweep_table(results_folders, tmp_path, change):
 @pytest.mark.parametrize(
     "name, value",
     [
-        ("sets", "5"),
         ("sets", "[5]"),
         ("scene", 'title = ["a"]'),
-        ("scene", "title ="),
         ("tolerance", "x"),
         ("source", 5),
     ],

@@ -371,6 +371,19 @@ def test_exact_caption_names_stress_singularity(cell, place):
     )
 
 
+def test_exact_caption_names_cycles_with_peak_at_edge():
+    """The caption of the wear names the cycles at which the peak pressure lies at the edge, and its largest height."""
+    history = {"cycle": np.array([0, 2e4, 5e4]), "pressure_peak_at_edge": np.array([0, 3e6, 2e6])}
+    states = {"time": np.array([0, 5e4 * PERIOD]), "normal_stress": np.ones((2, 201))}
+    states["worn_depth"] = np.ones((2, 201))
+    data = make_patch_data()
+    wear = SimpleNamespace(history=history, states=states, period=PERIOD)
+    data = replace(data, evaluations=replace(data.evaluations, wear=wear))
+    caption = report.find_picture("wear", data).caption
+    assert "After 20000, 50000 cycles the peak pressure" in caption
+    assert "up to 3 MPa above" in caption or "up to 3.0 MPa above" in caption
+
+
 def test_exact_contact_range_and_extrapolated_fraction():
     """If the extrapolated contact fraction differs from that of the finest mesh, the sentence states both.
 

@@ -94,7 +94,6 @@ def test_exact_yield_note_agrees_with_hertz(tmp_path):
 def test_exact_yield_note_of_custom_material(tmp_path):
     """For a material that is defined in the scene, the note uses the yield strength of the scene."""
     material = CUSTOM_MATERIAL.replace("}", ', yield = "400 MPa"}')
-    assert find_yield_notes(tmp_path, 0.9 * 400e6 / 0.558, material) == []
     (note,) = find_yield_notes(tmp_path, 1.1 * 400e6 / 0.558, material)
     assert "in the material of the" in note and "400 MPa (given in the scene)" in note
 

@@ -347,6 +347,7 @@ def test_exact_fit_command_writes_documented_json(tmp_path):
         "150 Hz",
     ]
     assert "null power_input_frequency" in text and "held out" in text
+    assert "2 of 2 starts led to within 1 %" in text
     with open(out / "fit.csv", newline="", encoding="utf-8") as file:
         written = list(csv.DictReader(file))
     damping = answer["values"]["structure.mode.axial.damping"]["value"]

@@ -106,6 +106,7 @@ def test_always_undetermined_indices_are_omitted():
         and compute_indices(x[:20], evaluate_ishigami(x[:20])) is None
     )
     assert compute_indices(x, x[:, 0], errors=1.0) is None  # variation below the numerical error
+    assert compute_indices(x, x[:, 0] + x[:, 1], errors=0.2)  # a variation of 0.41
     assert compute_indices(x[:, :1], x[:, 0]) is None  # a single key
     # The points with a value are no uniform sample.
     assert compute_indices(x, np.where(x[:, 0] < 0.3, np.nan, x[:, 1])) is None

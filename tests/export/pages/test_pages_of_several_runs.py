@@ -43,7 +43,7 @@ cycles = 10
 
 
 def write_run_folder(folder, load: float, amplitude: float, error: float):
-    """Write a results folder of a sine of 100 Hz with 20 cycles of 50 samples, and return it."""
+    """Write a results folder of a sine of 100 Hz with 30 cycles of 50 samples, and return it."""
     folder.mkdir()
     measures = {
         "relative_displacement_amplitude": Measure(amplitude, "m", error, 0.0),
@@ -54,7 +54,7 @@ def write_run_folder(folder, load: float, amplitude: float, error: float):
         folder / "summary.json",
     )
     (folder / "scene.resolved.toml").write_text(SCENE.format(load=load))
-    time = np.linspace(0.0, 0.2, 1001)
+    time = np.linspace(0.0, 0.3, 1501)
     displacement = amplitude * np.sin(2 * np.pi * 100 * time)
     write_netcdf(
         run_contents(
