@@ -43,7 +43,6 @@ KINDS = {  # Name on the command line -> module and function.
     "stick-together": ("sticks_together", "compare_rig"),
     "decay-fits": ("decay_fits", "compare_fit"),
     "scan-pairs": ("surface_pairs", "compare_scans"),
-    "trace-pairs": ("surface_pairs", "compare_traces"),
     "backbone-bands": ("backbone_band", "compare_band"),
 }
 # Time limit of a scene with its reference; a longer one is recorded as failed.

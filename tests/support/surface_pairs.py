@@ -1,7 +1,7 @@
-"""Campaigns `scan-pairs` and `trace-pairs`: answers of `patchfem compare` on pairs with known truth.
+"""Campaign `scan-pairs`: answers of `patchfem compare` on pairs of areal scans with known truth.
 
-The generators (`scan_pairs`, `known_pairs`) were written by somebody who had not seen the method.
-Seeds of scans below 1000 and seeds of traces from 41000 to 41019 were used to develop it.
+The generator (`scan_pairs`) was written by somebody who had not seen the method. Seeds below 1000 were used to develop
+it. Pairs of traces by such a generator are scored in tests/surface/compare/test_laboratory_pairs.py.
 
 A row is an interval of the answer: its middle, its half-width and the true value. The row
 `false_claims` counts the claims that contradict the truth: wear of an unworn surface, growth
@@ -15,7 +15,6 @@ import re
 from pathlib import Path
 from typing import NamedTuple
 
-import known_pairs
 import numpy as np
 import scan_pairs
 from campaigns import Row
@@ -97,36 +96,6 @@ def make_line(kind: str, files: tuple, units: tuple | None, worn: WearTruth, tru
     rows = [Row(name, count, 0.0, 0.0, 0.0, 0.0) for name, count in counts.items()]
     rows += interval_rows(answer, truths)
     return {"rows": rows, "group": kind, "outcome": answer["verdict"], "claims": claims}
-
-
-def compare_traces(seed: int, folder: Path, _) -> dict:
-    """Compare the pair of traces of a seed; consecutive seeds have different kinds."""
-    kind = known_pairs.KINDS[seed % len(known_pairs.KINDS)]
-    pair = known_pairs.draw_pair(kind, seed)
-    files = (folder / "before.csv", folder / "after.csv")
-    for file, (x, z) in zip(files, (pair.before, pair.after), strict=True):
-        columns = np.column_stack([x * 1e3, z * 1e6])
-        np.savetxt(file, columns, "%.7f", ",", header="x [mm],z [um]", comments="")
-    x = pair.after[0]
-    is_common = (x + pair.shift >= 0) & (x + pair.shift <= pair.before[0][-1])
-    lost = np.maximum(pair.worn, 0.0)[is_common]  # Grown material does not count as negative wear.
-    can_show = kind in known_pairs.RUBBED
-    worn = WearTruth(
-        can_show=can_show,
-        grew=kind in ("deposits", "exchanged"),
-        is_changed=kind not in known_pairs.SAME,
-        is_elsewhere=kind == "elsewhere",
-        is_hidden=kind in ("even", "wedge"),
-        mean=lost.mean(),
-        largest=lost.max(),
-    )
-    area = lost.sum() * (x[1] - x[0])
-    truths = {
-        "worn_depth_mean": (worn.mean,),
-        "worn_depth_max": (worn.largest,),
-        "worn_area": (area,),
-    }
-    return make_line(kind, files, None, worn, truths if can_show else {})
 
 
 def compare_scans(seed: int, folder: Path, _) -> dict:
