@@ -26,8 +26,7 @@ from scene_texts import (
 
 from patchfem.core import Missing, PatchfemError
 from patchfem.effects import EFFECTS, import_effect
-from patchfem.model import build
-from patchfem.model.gap import longest_loaded_cell
+from patchfem.model import build, gap
 from patchfem.runs import find_drive_and_knee
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
@@ -322,4 +321,4 @@ def test_exact_only_base_sine_at_resonance_of_single_mode_has_knee(text, sets, h
 def test_exact_longest_loaded_cell(loaded, length):
     """Only cells next to a node with pressure count; without such nodes all cells count."""
     x = np.array([0.0, 1.0, 3.0, 6.0])
-    assert longest_loaded_cell(x, np.isin(range(4), loaded)) == length
+    assert gap.longest_loaded_cell(x, np.isin(range(4), loaded)) == length
