@@ -206,7 +206,7 @@ def run_command(*words: str) -> dict:
     return {
         "code": code,
         "out": "" if words[0] == "run" else out.getvalue(),
-        "said": err.getvalue() if code else "",
+        "err": err.getvalue() if code else "",
     }
 
 
@@ -219,15 +219,11 @@ def compare_folders(a: Path, b: Path, within: float) -> int:
             key: value for key in one | two if (value := relative_change(key, one, two)) > within
         }
         for key, value in sorted(changed.items()):
-            said = [" ".join(str(found.get(key, "absent")).split()) for found in (one, two)]
+            texts = [" ".join(str(found.get(key, "absent")).split()) for found in (one, two)]
             # start of the excerpt: 30 characters before the first difference
-            at = max(0, next((k for k, (p, q) in enumerate(zip(*said)) if p != q), 0) - 30)
-            said = (
-                f"{said[0][at : at + 90]} | {said[1][at : at + 90]}"
-                if value == np.inf
-                else f"{value:.2e}"
-            )
-            print(f"{name}: {key}: {said}")
+            at = max(0, next((k for k, (p, q) in enumerate(zip(*texts)) if p != q), 0) - 30)
+            excerpts = " | ".join(text[at : at + 90] for text in texts)
+            print(f"{name}: {key}: {excerpts if value == np.inf else f'{value:.2e}'}")
         differ += bool(changed)
     print(f"{len(names)} scenes, {len(names) - differ} identical, {differ} differ")
     return 1 if differ or not names else 0
@@ -237,7 +233,10 @@ def read_results(folder: Path, name: str) -> dict:
     """Return {name: number, text or array} of all results of a scene."""
     out = {}
     place = folder / name
-    for at, path in {"told": folder / f"{name}.json", "summary": place / "summary.json"}.items():
+    for at, path in {
+        "commands": folder / f"{name}.json",
+        "summary": place / "summary.json",
+    }.items():
         flatten(at, json.loads(path.read_text("utf-8")) if path.is_file() else {}, out)
     for path in (place / "result.nc", place / "fields.vtkhdf"):
         if path.is_file():
@@ -260,7 +259,7 @@ def read_results(folder: Path, name: str) -> dict:
 
 def flatten(at: str, value: object, out: dict) -> None:
     """Store the leaves of nested tables under dotted names, without computing times and versions."""
-    value = json.loads(value) if at == "told.plan.out" and value else value
+    value = json.loads(value) if at == "commands.plan.out" and value else value
     value = dict(enumerate(value)) if isinstance(value, list) else value
     out |= {} if isinstance(value, dict) else {at: value}
     for key in value.keys() - {"seconds", "patchfem"} if isinstance(value, dict) else ():

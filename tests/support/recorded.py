@@ -64,7 +64,7 @@ def run_group(name: str, folder: Path) -> dict:
     known = set(folder.rglob("*"))
     for command in group["commands"]:
         answer = same_answers.run_command(*shlex.split(command))
-        out[command] = {"code": answer["code"], "stdout": answer["out"], "stderr": answer["said"]}
+        out[command] = {"code": answer["code"], "stdout": answer["out"], "stderr": answer["err"]}
         written = sorted(set(folder.rglob("*")) - known)
         known.update(written)
         for path in written:
