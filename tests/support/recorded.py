@@ -32,7 +32,7 @@ sys.path[:0] = [str(HERE), str(TESTS)] if __name__ == "__main__" else []
 
 import same_answers  # noqa: E402
 import scene_texts  # noqa: E402
-from known_pairs import draw_pair  # noqa: E402
+from known_pairs import KINDS, draw_pair  # noqa: E402
 from page_data import read_page_data  # noqa: E402
 from traces import format_trace  # noqa: E402
 
@@ -58,7 +58,8 @@ def run_group(name: str, folder: Path) -> dict:
         text = "".join(getattr(scene_texts, block) for block in blocks.split())
         (folder / f"{stem}.toml").write_text(text, "utf-8")
     write_measurements(folder)
-    write_surfaces(folder)
+    if name in ("surfaces", "traces"):
+        write_surfaces(folder)
     os.chdir(folder)
     out = {}
     known = set(folder.rglob("*"))
@@ -86,6 +87,7 @@ def run_scene(name: str, folder: Path) -> dict:
         "check": ["check", *words],
         "run": ["run", *words, "-o", f"../{name}", "-q", "--fresh"],
         "plan": ["plan", *words, "--json"],
+        "cite": ["cite", *words],
     }
     answers = {verb: same_answers.run_command(*command) for verb, command in commands.items()}
     (folder / f"{name}.json").write_text(json.dumps(answers), "utf-8")
@@ -110,10 +112,15 @@ def write_measurements(folder: Path) -> None:
 
 
 def write_surfaces(folder: Path) -> None:
-    """Write a pair of traces with a worn groove, a table of two pairs, and a pair of scans."""
+    """Write a pair of traces of each kind, a table of two pairs, and a pair of scans."""
     pair = draw_pair("groove", 41003)
     for name, (x, z) in {"before": pair.before, "after": pair.after}.items():
         (folder / f"{name}.csv").write_text(format_trace(1e6 * x, 1e6 * z, digits=9), "utf-8")
+    for kind in KINDS:
+        pair = draw_pair(kind, 41003)
+        for name, (x, z) in {"before": pair.before, "after": pair.after}.items():
+            path = folder / f"{kind}_{name}.csv"
+            path.write_text(format_trace(1e6 * x, 1e6 * z, digits=9), "utf-8")
     (folder / "pairs.csv").write_text(
         "before,after\nbefore.csv,after.csv\nafter.csv,before.csv\n", "utf-8"
     )
