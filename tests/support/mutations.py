@@ -24,8 +24,8 @@ random order, so that the first of them are a fair sample if not all can be run:
     python tests/support/mutations.py run FAULTS.json RESULTS --without studies torture --seconds 60
 
 A compiled kernel is compiled anew for each fault in it, which takes 10 to 60 s of CPU time. Its lines cannot be traced;
-the tests that reach its folder or a module that names the kernel's module are run. Tests hang if they take several
-times their CPU time without a fault, so a busy machine changes no outcome.
+first the tests of files that name its module are run, then those that reach its folder or a module that names it. Tests
+hang if they take several times their CPU time without a fault, so a busy machine changes no outcome.
 """
 
 import argparse
@@ -727,13 +727,14 @@ def link_file(source: str, target: str) -> None:
 
 
 def choose_tests(
-    number: int, fault: Fault, rows: list[dict], max_seconds: float
+    number: int, fault: Fault, rows: list[dict], max_seconds: float, root: Path
 ) -> list[list[str]]:
     """Return the tests for a fault in two stages, the quick tests of its own folder first.
 
     The list is empty if no test reaches the fault. The second stage ends with the other tests of
     the same files: the first test of a file may have run a shared set-up, so the fault is recorded
-    only for that test.
+    only for that test. The files of tests that name a compiled kernel's module come before all
+    others, as they may call the kernel directly.
     """
     own_folder = f"tests/{Path(fault.file).parts[1]}/"
     reaching = [row for row in rows if number in row["reached"]]
@@ -748,7 +749,14 @@ def choose_tests(
         """Sort tests of the fault's own folder first, then by duration."""
         return not row["test"].startswith(own_folder), row["seconds"]
 
-    ordered = [*sorted(reaching, key=sort_key), *sorted(same_file, key=sort_key)]
+    if fault.file.endswith("kernels.py"):
+        naming = find_naming_tests(Path(fault.file).stem, rows, root)
+        reaching = [row for row in reaching if row not in naming]
+        same_file = [row for row in same_file if row not in naming]
+        reaching_first = sorted(naming, key=sort_key)
+    else:
+        reaching_first = []
+    ordered = [*reaching_first, *sorted(reaching, key=sort_key), *sorted(same_file, key=sort_key)]
     first = []
     second = []
     spent = 0.0
@@ -759,6 +767,13 @@ def choose_tests(
         elif spent <= max_seconds:
             second.append(row["test"])
     return [group_by_file(stage) for stage in (first, second) if stage]
+
+
+def find_naming_tests(stem: str, rows: list[dict], root: Path) -> list[dict]:
+    """Return the rows of the tests in files that name a module."""
+    files = {row["test"].partition("::")[0] for row in rows}
+    naming = {file for file in files if stem in (root / file).read_text("utf-8")}
+    return [row for row in rows if row["test"].partition("::")[0] in naming]
 
 
 def group_by_file(tests: list[str]) -> list[str]:
@@ -849,7 +864,7 @@ class MutationRun:
     def run_fault(self, number: int) -> None:
         """Run the tests on a fault and store its outcome."""
         fault = self.faults[number]
-        stages = choose_tests(number, fault, self.tests, self.options.seconds)
+        stages = choose_tests(number, fault, self.tests, self.options.seconds, self.root)
         durations = {row["test"]: row["seconds"] for row in self.tests}
         with self.borrow_copy() as checkout:
             started = time.monotonic()
