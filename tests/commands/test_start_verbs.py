@@ -144,6 +144,9 @@ def test_exact_cite_lists_sources_of_effects(tmp_path):
         keys(bibtex(load(read_template("wear")).effect_names()))
     )
     assert {name for names, _ in SOURCES for name in names} <= set(EFFECTS)
+    for _, (_, key, fields) in SOURCES:  # A key is made of the first author's surname and the year.
+        surname = re.sub(r"[^a-z ,]", "", fields["author"].lower()).replace(",", " ").split()[0]
+        assert key == surname + fields["year"]
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
