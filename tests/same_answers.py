@@ -240,21 +240,23 @@ def read_results(folder: Path, name: str) -> dict:
         flatten(at, json.loads(path.read_text("utf-8")) if path.is_file() else {}, out)
     for path in (place / "result.nc", place / "fields.vtkhdf"):
         if path.is_file():
-            with h5py.File(path) as data:
-                data.visit((inside := ["/"]).append)
-                for key in inside:
-                    out |= (
-                        {f"{path.name}/{key}": data[key][()]}
-                        if isinstance(data[key], h5py.Dataset)
-                        else {}
-                    )
-                    out |= {
-                        f"{path.name}/{key}@{at}": value
-                        for at, value in data[key].attrs.items()
-                        if at not in REPEATED and not at.startswith("_")
-                    }
+            out |= read_arrays(path, path.name)
     resolved = place / "scene.resolved.toml"
     return out | ({resolved.name: resolved.read_text("utf-8")} if resolved.is_file() else {})
+
+
+def read_arrays(path: Path, name: str) -> dict:
+    """Return the datasets of an HDF5 file as {name/key: array}, and its attributes as {name/key@attribute: value}."""
+    out = {}
+    with h5py.File(path) as data:
+        data.visit((inside := ["/"]).append)
+        for key in inside:
+            if isinstance(data[key], h5py.Dataset):
+                out[f"{name}/{key}"] = data[key][()]
+            for attribute, value in data[key].attrs.items():
+                if attribute not in REPEATED and not attribute.startswith("_"):
+                    out[f"{name}/{key}@{attribute}"] = value
+    return out
 
 
 def flatten(at: str, value: object, out: dict) -> None:
@@ -262,8 +264,9 @@ def flatten(at: str, value: object, out: dict) -> None:
     value = json.loads(value) if at == "commands.plan.out" and value else value
     value = dict(enumerate(value)) if isinstance(value, list) else value
     out |= {} if isinstance(value, dict) else {at: value}
-    for key in value.keys() - {"seconds", "patchfem"} if isinstance(value, dict) else ():
-        flatten(f"{at}.{key}", value[key], out)
+    for key, item in value.items() if isinstance(value, dict) else ():
+        if key not in ("seconds", "patchfem"):
+            flatten(f"{at}.{key}", item, out)
 
 
 def relative_change(key: str, one: dict, two: dict) -> float:

@@ -1,4 +1,4 @@
-"""Correction of partial slip for the finite mesh: a friction element gets a range of yield displacements.
+"""Correct partial slip for the finite size of the elements by giving each friction element a range of yield displacements.
 
 Slip starts where a contact carries least and proceeds from node to node. At a relative displacement below the first yield
 displacement, a mesh shows no slip, and neither does a mesh of half as many nodes. The joint, however, dissipates energy

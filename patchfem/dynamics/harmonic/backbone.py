@@ -27,8 +27,8 @@ from .harmonic import (
 
 # Largest number of times that the step between two amplitudes is halved if no solution is found.
 MAX_HALVINGS = 6
-# Largest number of Newton iterations at one amplitude of a continuation. If more were needed, the next
-# amplitude is too far away, and it is cheaper to halve the ratio of the amplitudes than to iterate on.
+# Largest number of Newton iterations at each amplitude of a continuation. If they do not converge, an amplitude between
+# the last solution and this one is solved first, which takes fewer evaluations than more iterations.
 MAX_CONTINUATION_ITERATIONS = 10
 
 

@@ -168,7 +168,7 @@ ROWS = (
 # The following texts name the method that computed a static measure, in `numerics.measures` of
 # summary.json.
 FINEST_MESH_SOURCE = "finite elements, finest mesh"
-# The value is extrapolated from the nested meshes if this has a smaller error than the finest mesh.
+# This method is used if its estimated error is smaller than that of the finest mesh.
 EXTRAPOLATED_SOURCE = "finite elements, extrapolated over nested meshes"
 HALF_SPACE_SOURCE = "points on layered half-spaces"
 WORN_SOURCE = "wear in jumps of cycles"

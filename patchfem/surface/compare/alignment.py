@@ -32,7 +32,8 @@ MIN_UNWORN_FRACTION = 0.7
 # Length of a flank relative to the trace, from which on a scar is distinguished from a bent datum.
 LONG_FLANK = 0.05
 SHORT_FLANK = 0.02  # length of a flank relative to the trace, below which a scar is excluded
-# Length of the two ends of a trace, relative to the trace, whose median depths are compared with the noise.
+# Length of each outermost end, relative to the trace. The median depth of such an end shows whether it stands above the
+# floor of a scar.
 OUTERMOST_FLANK = 0.005
 MAX_CHI2 = 30.0  # largest chi-squared of the bow of a flank, with two or three degrees of freedom
 # Number of parts of the trace, out of N_PARTS, that remain on either side of a shallow track.
@@ -331,8 +332,9 @@ def find_shallow_track(depth, scale: float) -> tuple:
         return None, np.inf
     edges = part_edges(depth.size, N_PARTS)
     clipped = np.clip(depth, -MAX_NOISE * scale, MAX_NOISE * scale)
-    # Zero depth may be the floor of a wide scar. Its flanks, which stand clearly above it, must not make the
-    # floor look like a shallow track. If most heights stand above it, they are the surface, and it is a track.
+    # Depths are measured from a supposed surface, which may be the floor of a wide scar. The flanks of such a scar stand
+    # clearly above the floor and are left out, because the floor between them would look like a shallow track. If most
+    # heights stand above the supposed surface, they are the real surface, and the part at zero depth is a track.
     is_above = depth < -MAX_NOISE * scale
     if 2 * np.count_nonzero(is_above) < depth.size:
         clipped[is_above] = 0.0
@@ -412,12 +414,12 @@ def _are_straight(depth, ends) -> bool:
 
 
 def _check_for_wide_scar(model, best: Alignment) -> Alignment:
-    """Return the alignment with a second reading, by which the trace is worn everywhere except at its ends.
+    """Compare the alignment with another one, in which the trace is worn everywhere except at its ends.
 
-    In the second reading, the unworn surface is a line through both ends. It replaces the given alignment if
-    the ends are long, and is stored as its rival if they are short. If an end stands above the given
-    surface, the outermost heights alone are tried as ends as well, because a wedge-shaped scar with a short
-    flank at its deep end looks like a tilted surface with material that grew at this end.
+    In the other alignment, the unworn surface is a line through both ends. If the ends are long, the other alignment is
+    returned, with the given one as its rival. If they are short, the given one is returned, with the other as its rival.
+    If an end stands above the given surface, the outermost heights alone are tried as ends as well, because a wedge-shaped
+    scar with a short flank at its deep end looks like a tilted surface with material that grew at this end.
     """
     count = max(int(OUTERMOST_FLANK * best.depth.size), MIN_HEIGHTS)
     ends = [
