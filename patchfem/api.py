@@ -63,7 +63,7 @@ from .scene.files import require_files
 from .scene.keys import removed
 from .scene.keys.quantities import parse_quantity
 from .scene.overrides import BaseScene
-from .scene.scene import Scene, SceneError, loads
+from .scene.scene import Scene, SceneError, loads, remember_written
 from .scene.scene import load as load_file
 from .scene.sets import (
     find_oversized_lengths,
@@ -531,11 +531,12 @@ def backbone(
     """
     methods = backbones.choose_methods(_require_string(method, "backbone: method"))
 
-    def build_with(tables: BackboneTables) -> Model:
-        """Build the model of the scene with the changed tables that a backbone requires."""
+    def build_with(tables: BackboneTables, *, is_written: bool) -> Model:
+        """Build the model of the scene, or of the scene as written, with the tables of a backbone."""
         if isinstance(scene, Model):
             return build(scene, **sets)
-        return build_model(_load_and_prepare(scene, tables, sets))
+        loaded = _load_and_prepare(scene, tables, {} if is_written else sets)
+        return build_model(remember_written(loaded, _count_written(scene), tables))
 
     if not isinstance(modes, str) and isinstance(modes, Iterable):
         modes = list(modes)
@@ -850,7 +851,7 @@ def fit(
     names = {field.name for field in fields(FitOptions)}
     changes = {name: value for name, value in keywords.items() if name in names}
     sets = {key: value for key, value in keywords.items() if key not in names | {"to"}}
-    loaded = load(scene, **sets)
+    loaded = remember_written(load(scene, **sets), _count_written(scene))
     if not isinstance(free, Mapping | None):
         raise PatchfemError(
             f"fit: `free` must be a dict of keys and their ranges (low, high), not {free!r:.60}"
@@ -1322,7 +1323,12 @@ def _read_sweep_scene(scene: str | Path | Scene, measure: str) -> case_models.Sw
     else:
         path = _require_path(scene, "a scene")
         text = read_text(scene)
-    return case_models.SweepScene(path, text, sets, measure)
+    return case_models.SweepScene(path, text, sets, measure, len(sets))
+
+
+def _count_written(scene) -> int:
+    """Return the number of assignments that a scene contains before the keywords of a study."""
+    return len(scene.sets) if isinstance(scene, Scene) else 0
 
 
 def _require_path(value: Any, name: str) -> Path:

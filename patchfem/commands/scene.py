@@ -16,6 +16,7 @@ from ..model import files as model_files
 from ..response import rows
 from ..runs import plan as plans
 from ..runs.patch import faces, result
+from ..runs.patch import plan as patch_plan
 from ..scene.files import list_named_files
 from .shared import Json, Sets, UsageError, flag_option, load_model, load_scene, note, print_message
 from .sweep import CaseOptions
@@ -108,16 +109,12 @@ def plan(
         )
     if probe and (static_measures := faces.static_measures_without_errors(run_plan.model)):
         chain = plan_data["stiffness_chain"]
-        chain |= {
-            name: static_measures[name.replace("pieces_shear", "tangential_stiffness")]
-            for name, link in chain.items()
-            if name.startswith("pieces_shear") and link != "rigid"
-        }
+        chain |= patch_plan.find_solved_links(chain, static_measures)
         plan_data["probe"], plan_data["modes"] = static_measures, run_plan.modes(chain)
     if json_:
         print(json.dumps(plan_data))
         return
-    _print_plan(plan_data, probe, verbose)
+    _print_plan(plan_data, probe or run_plan.model.has_bolted_patch, verbose)
 
 
 def _plan_sweep(scene: Path, sets, what: CaseOptions, json_: bool, verbose: bool) -> None:
@@ -144,9 +141,10 @@ def _plan_sweep(scene: Path, sets, what: CaseOptions, json_: bool, verbose: bool
     )
 
 
-def _print_plan(plan_data: dict, probe: bool, verbose: bool) -> None:
+def _print_plan(plan_data: dict, is_solved: bool, verbose: bool) -> None:
     """Print a plan: effects, cost, sentences, stiffnesses and groups.
 
+    is_solved: whether the stiffness of the pieces is that of a solved patch.
     verbose: whether to list the effects that the scene does not have.
     """
     print(f"kind     {plan_data['kind']}, engine {plan_data['engine']}")
@@ -169,7 +167,7 @@ def _print_plan(plan_data: dict, probe: bool, verbose: bool) -> None:
         for name, link in plan_data["stiffness_chain"].items()
     ]
     print("chain    " + " -> ".join(links))
-    is_upper_estimate = not probe and any(
+    is_upper_estimate = not is_solved and any(
         not isinstance(link, str)
         for name, link in plan_data["stiffness_chain"].items()
         if rows.remove_interface_number(name) == "pieces_shear"

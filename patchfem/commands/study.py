@@ -18,6 +18,7 @@ from ..export.fits import request as fits
 from ..export.fits.options import FitOptions
 from ..model import model
 from ..scene import axes
+from ..scene.scene import remember_written
 from .shared import (
     Json,
     NoPage,
@@ -117,9 +118,13 @@ def backbone(
 
     Example: patchfem backbone joint.toml --modes "120 Hz:0.01, 170 Hz:0.02"
     """
-    free_model, notes = given_modes.prepare_model(
-        lambda tables: model.build(load_scene(scene, set_, prepare=tables)), modes
-    )
+
+    def build_model(tables, *, is_written: bool):
+        """Build the model of the scene, or of the scene as written, with the tables of a backbone."""
+        loaded_scene = load_scene(scene, () if is_written else set_, prepare=tables)
+        return model.build(remember_written(loaded_scene, prepare=tables))
+
+    free_model, notes = given_modes.prepare_model(build_model, modes)
     methods = backbones.choose_methods(method)
     lengths = axes.read_lengths(amplitudes, "--amplitudes") if amplitudes else None
     target = choose_folder(out, f"{free_model.source.path.stem}-backbone")
@@ -228,7 +233,7 @@ def fit(
 
     Example: patchfem fit bench.toml --to loop.csv --free "friction.static=0.1..0.6"
     """
-    loaded_scene = load_scene(scene, set_)
+    loaded_scene = remember_written(load_scene(scene, set_))
     target = choose_folder(out, f"{scene.stem}-fit")
     options = FitOptions(
         hold, offset, warm_up, from_patch=from_patch, amplitudes=amplitudes, **vars(rows)

@@ -14,11 +14,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from ..core import PatchfemError
 from ..effects import law_has_trait, list_absent_effects
+from ..formatting import format_quantity
+from ..scene.keys.memoize import memoize
 from ..scene.keys.tables import Accuracy, Friction, Temperature
 from ..scene.scene import Scene
 from . import load, patch, rig, slide, wear
 from .law import find_normal_load, find_pad_width, make_bond_parameters, make_effective_law
 from .source import Source, locate_errors
+from .structure import find_bolted_scene
 
 if TYPE_CHECKING:
     from ..friction.bonds.parameters import Bonds
@@ -114,6 +117,30 @@ class Model:
         return any(interface.patch is not None for interface in self.rig.friction.interfaces)
 
     @property
+    def has_bolted_patch(self) -> bool:
+        """Whether the stiffness of a patch is still to be subtracted from modes that were measured with it."""
+        bolted = None if self.rig is None else self.rig.structure.bolted
+        return bolted is not None and bolted.build_rig is not None
+
+    def with_coarse_joint(self) -> Model:
+        """Return the model of a comparison run on a coarser mesh, from which its own joint is subtracted."""
+        bolted = self.rig.structure.bolted
+        if bolted is None or bolted.coarse_rig is None:
+            return self
+        return replace(self, rig=replace(bolted.coarse_rig, drive=self.rig.drive))
+
+    def describe_removed_joint(self) -> list[str]:
+        """Return a list with a sentence on the joint that was subtracted from the modes, or []."""
+        bolted = None if self.rig is None else self.rig.structure.bolted
+        if bolted is None or not bolted.stiffness:
+            return []
+        stiffness = " and ".join(format_quantity(k, "N/m", 4) for k in bolted.stiffness)
+        return [
+            f"the modes were measured with the joint bolted, so the stiffness of the joint of {bolted.scene}, "
+            f"{stiffness}, is subtracted from them"
+        ]
+
+    @property
     def load_varies(self) -> bool:
         """Whether the normal load is prescribed as a function of time."""
         return self.point is not None and bool(self.point.amplitude)
@@ -172,7 +199,10 @@ def build(scene: Scene) -> Model:
         point = load.build_point_load(scene)
         grooves = load.build_grooves(scene)
     path = slide.build_slide(scene) if scene.slide is not None else None
-    rig_model = rig.build_rig(scene) if scene.structure is not None else None
+    rig_model = None
+    if scene.structure is not None:
+        rig_model = rig.build_rig(scene)
+        rig_model = _attach_bolted_model(scene, rig_model)
     law = _build_law(scene, rig_model)
     if patch_model is not None:
         edge_motion = _find_edge_motion(scene, rig_model)
@@ -205,6 +235,16 @@ def build(scene: Scene) -> Model:
         notes=scene.notes,
     )
     return replace(model, source=source)
+
+
+def _attach_bolted_model(scene: Scene, rig_model: Rig) -> Rig:
+    """Return the rig with the model of the joint that was bolted in the modal test, if it is another joint."""
+    bolted = rig_model.structure.bolted
+    bolted_scene = find_bolted_scene(scene)
+    if bolted is None or bolted.build_rig is None or bolted_scene is scene:
+        return rig_model
+    bolted = bolted._replace(model=_build_bolted_model(bolted_scene))
+    return replace(rig_model, structure=replace(rig_model.structure, bolted=bolted))
 
 
 def write_resolved(scene: Scene, model: Model) -> str:
@@ -263,6 +303,10 @@ def _build_measured(scene: Scene) -> MeasuredFile | None:
         return None
     gains = (keys.acceleration_gain, keys.displacement_gain)
     return MeasuredFile(scene.resolve_path(keys.file), gains, keys.reading, keys.reading_cutoff)
+
+
+# The scene as written is the same object in all cases of a study, so that its model is built once.
+_build_bolted_model = memoize(build)
 
 
 @lru_cache(64)

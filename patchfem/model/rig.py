@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,7 +22,9 @@ from .structure import (
     build_modes,
     build_own_modes,
     build_start,
+    compute_joint_stiffnesses,
     compute_natural_frequencies,
+    find_bolted_scene,
     find_first_elastic_mode,
     has_pressed_joint,
     has_varying_load,
@@ -36,6 +39,13 @@ MIN_RUN_CYCLES = 0.25
 # Slide of the first mode per modal coordinate, relative to the largest one of all
 # modes, below which it is round-off.
 MIN_SLIDE_FRACTION = 1e-9
+
+# The scene whose joint is subtracted from bolted modes, by the value of structure.measured_joint.
+JOINT_SCENES = {
+    None: "the scene as written",
+    "written": "the scene as written",
+    "case": "each case",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,6 +171,28 @@ class FirstMode:
         return float(np.ptp(slides[:, 1:], axis=0).max(initial=0.0)) / whole_range
 
 
+class BoltedJoint(NamedTuple):
+    """Joint that was bolted when the modes of a rig were measured.
+
+    - scene: the scene with this joint, in words.
+    - stiffness: stiffness [N/m] of the joint, or of each joint, that was subtracted from the modes; () as long as
+      a patch has to be solved for it.
+    - build_rig: function of the stiffness [N/m] of a joint with a patch that returns the rig without this joint;
+      None if the stiffness follows from the friction laws alone.
+    - model: Model of the scene with this joint; None if it is the model of the rig itself.
+    - stuck_stiffness: stiffness [N/m] of the solved patch of the rig in full stick; None without one.
+    - coarse_rig: rig of a comparison run on a coarser mesh, from which its own joint was subtracted; None if it is
+      the rig itself.
+    """
+
+    scene: str
+    stiffness: tuple[float, ...] = ()
+    build_rig: Callable | None = None
+    model: object = None
+    stuck_stiffness: float | None = None
+    coarse_rig: "Rig | None" = None
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class RigStructure:
     """Structure of a rig: its natural frequencies, and where its modes come from.
@@ -168,9 +200,7 @@ class RigStructure:
     - frequencies: natural frequencies [Hz], with the bonded spring, shape (n,).
     - lists_modes: whether the scene lists the modes.
     - notes: sentences for the user on a structure file.
-    - without_joint: function of the stiffness [N/m] of the joint that returns the rig without the
-      joint, if the modes were measured with the joint and the stiffness follows from a patch.
-    - joint_stiffness: stiffness [N/m] of the joint that was subtracted from modes measured with it.
+    - bolted: joint with which the modes were measured; None for modes without a joint.
     - richer_rig: rig of a reduced structure with more modes, None if no mode is left out.
     - reduction_notes: sentences for the user on the reduction.
     - max_modes: number of modes that a reduced structure can keep, 0 for other structures.
@@ -179,8 +209,7 @@ class RigStructure:
     frequencies: np.ndarray
     lists_modes: bool
     notes: tuple
-    without_joint: Callable | None = None
-    joint_stiffness: float | None = None
+    bolted: BoltedJoint | None = None
     richer_rig: "Rig | None" = None
     reduction_notes: tuple = ()
     max_modes: int = 0
@@ -344,13 +373,19 @@ def _build_first_mode(scene, own_modes: ModalBasis, modes: ModalBasis) -> FirstM
 def _build_structure(scene, modes: ModalBasis, joint: float | None) -> RigStructure:
     """Build the RigStructure of a scene from the modes of its rig."""
     structure = scene.structure
-    without_joint = None
-    if structure.measured == "stuck" and joint is None and has_pressed_joint(scene):
-        without_joint = partial(build_rig, scene)
+    bolted = None
+    if structure.measured == "stuck":
+        bolted_scene = find_bolted_scene(scene)
+        bolted = BoltedJoint(JOINT_SCENES[structure.measured_joint])
+        if joint is not None:
+            bolted = bolted._replace(stiffness=(joint,))
+        elif has_pressed_joint(bolted_scene):
+            bolted = bolted._replace(build_rig=partial(build_rig, scene))
+        else:
+            bolted = bolted._replace(stiffness=tuple(compute_joint_stiffnesses(bolted_scene)))
     return RigStructure(
         frequencies=compute_natural_frequencies(structure, modes),
         lists_modes=bool(structure.mode),
         notes=tuple(read_file_notes(scene)),
-        without_joint=without_joint,
-        joint_stiffness=joint,
+        bolted=bolted,
     )

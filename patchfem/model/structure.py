@@ -78,10 +78,11 @@ def build_own_modes(scene, joint: float | None = None) -> ModalBasis:
         were measured with a pressed patch are not changed until its stiffness is given.
     """
     modes = _build_given_modes(scene)
-    if scene.structure.measured == "free" or (joint is None and has_pressed_joint(scene)):
+    bolted_scene = find_bolted_scene(scene)
+    if scene.structure.measured == "free" or (joint is None and has_pressed_joint(bolted_scene)):
         return modes
-    bonded = scene.structure.bonded
-    stiffness = np.array(_compute_joint_stiffnesses(scene) if joint is None else [joint])
+    bonded = bolted_scene.structure.bonded
+    stiffness = np.array(compute_joint_stiffnesses(bolted_scene) if joint is None else [joint])
     damping = 0.0
     if bonded is not None:
         damping = bonded.damping
@@ -100,6 +101,16 @@ def build_own_modes(scene, joint: float | None = None) -> ModalBasis:
         ) from None
 
 
+def find_bolted_scene(scene):
+    """Return the scene whose joint was bolted when the modes were measured.
+
+    In a sweep, fit or backbone it is the scene as written, unless each case has its own modal test.
+    """
+    if scene.written is None or scene.structure.measured_joint == "case":
+        return scene
+    return scene.written
+
+
 def has_pressed_joint(scene) -> bool:
     """Return whether the joint stiffness depends on a pressed patch in addition to the friction law."""
     contact = scene.contact
@@ -108,7 +119,7 @@ def has_pressed_joint(scene) -> bool:
     return bool(contact.compliance_key or contact.load is None)
 
 
-def _compute_joint_stiffnesses(scene) -> list:
+def compute_joint_stiffnesses(scene) -> list:
     """Compute the stiffness [N/m] of each sticking interface from its law."""
     scene_load = find_normal_load(scene)
     stiffnesses = []

@@ -1,7 +1,7 @@
 """Plan of a scene before it is run: engine, sizes, cost, stiffnesses and dimensionless groups.
 
 In: a Scene or a Model. Out: a `Plan`. Nothing is solved, except for the contact search by which an
-automatic mesh is graded.
+automatic mesh is graded, and for the patch of a joint that was bolted when the modes were measured.
 """
 
 from dataclasses import dataclass, replace
@@ -18,7 +18,7 @@ from ..model.model import Model, build
 from ..model.source import locate_errors
 from ..response import rows
 from ..structure import drive_sizes
-from . import memory
+from . import joint, memory
 from .bench import engine as of_bench
 from .cost import Cost, MemoryPart
 from .patch import plan as patch_plan
@@ -191,11 +191,16 @@ def _make_plan(model: Model) -> Plan:
     chain = {"holder": "rigid", "pieces_shear": "rigid", "asperities": "rigid"}
     groups = {}
     rig = model.rig
-    if rig is not None and rig.structure.without_joint is not None:
-        stiffnesses = patch_plan.stiffness_chain(model.patch) | _interface_stiffnesses(model)
-        rig = of_rig.remove_expected_joint(rig, stiffnesses)
-        model = replace(model, rig=rig)
     motion_sentences = []
+    if model.has_bolted_patch:
+        build_rig = rig.structure.bolted.build_rig
+        model, patches = joint.solve_without_joint(model)
+        values = {name: measure.value for name, measure in patches[0].measures.items()}
+        # The run subtracts the joint again, because its comparison run needs the solved patch.
+        bolted = model.rig.structure.bolted._replace(build_rig=build_rig)
+        rig = replace(model.rig, structure=replace(model.rig.structure, bolted=bolted))
+        model = replace(model, rig=rig)
+    motion_sentences += model.describe_removed_joint()
     patch_sentences = []
     law_sentences = []
     if rig is not None:
@@ -206,6 +211,8 @@ def _make_plan(model: Model) -> Plan:
         )
     if model.patch is not None:
         chain |= patch_plan.stiffness_chain(model.patch)
+        if model.has_bolted_patch:
+            chain |= patch_plan.find_solved_links(chain, values)
         groups |= patch_plan.compute_patch_groups(model)
         patch_sentences += patch_plan.describe_patch_plan(groups, model.patch)
     interfaces = rig.friction.interfaces if rig is not None else ()

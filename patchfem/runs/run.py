@@ -124,11 +124,13 @@ def _run_plan(
     if model.patch is not None:
         meshes = _solve_contact_patch(model, estimate=estimate, fresh=fresh)
         seconds["contact"] = perf_counter() - start
-        if model.rig is not None and model.rig.structure.without_joint is not None:
-            model = joint.remove_joint(model, meshes.patch)
+        if model.has_bolted_patch:
+            model, (patch, *coarse) = joint.remove_joint(model, (meshes.patch, *meshes.coarse))
+            meshes = meshes._replace(patch=patch, coarse=tuple(coarse))
             run_plan = replace(run_plan, model=model)
         warnings += _warn_of_coarse_patch_mesh(model, meshes, estimate=estimate)
         notes += patch_result.notes_on_neglected_effects(model, meshes.patch, meshes.coarse)
+    notes += model.describe_removed_joint()
     if model.has_interface_patches:
         if fresh:
             faces.recondense_interface_pieces(model)
@@ -180,7 +182,10 @@ def _run_plan(
 def _solve_contact_patch(model: Model, *, estimate: bool, fresh: bool) -> PatchMeshes:
     """Solve the patch of [contact] on the meshes of the run and of its error estimate."""
     tolerance = model.accuracy.tolerance
-    patch, *coarse = patch_result.solve_with_coarser(model.patch, tolerance, estimate, fresh)
+    if model.has_bolted_patch and not fresh:
+        patch, *coarse = joint.solve_patch(model)
+    else:
+        patch, *coarse = patch_result.solve_with_coarser(model.patch, tolerance, estimate, fresh)
     static = ()
     if model.kind == "bench" and not _is_open(patch):
         static = patch_result.solve_on_static_meshes(model.patch, tolerance, estimate, fresh)

@@ -86,6 +86,7 @@ PUBLIC = {
         "Scene",
         "load",
         "loads",
+        "remember_written",
         "move_scene",
         "read_sweep_axes",
     ),

@@ -86,6 +86,8 @@ class BaseScene:
                 _copy_tables(draft.raw, assignment.partition("=")[0])
                 apply_set(draft, assignment)
         scene = require_files(finish_scene(draft, base.path, base.text, (*base.sets, *sets)))
+        if base.written is not None:
+            scene = replace(scene, written=base.written)
         for group in (
             changed_groups
         ):  # no SceneError was raised, so these tables are valid and can be reused

@@ -26,7 +26,16 @@ from .sets import format_assignments, require_units
 from .text import format_toml, list_named_effects
 from .toml_text import parse_text, read_text
 
-__all__ = ["Scene", "SceneError", "load", "loads", "move_scene", "read_sweep_axes"]
+__all__ = [
+    "Scene",
+    "SceneError",
+    "add_sets",
+    "load",
+    "loads",
+    "move_scene",
+    "read_sweep_axes",
+    "remember_written",
+]
 
 # Largest number of characters of the effects, and of the --set values, in the repr of a Scene.
 MAX_LISTED_CHARACTERS = 160
@@ -45,6 +54,8 @@ class Scene:
     - sets: the ``table.key=value`` of --set, in their order.
     - sweep: axes of the table [sweep].
     - notes: sentences about what the defaults leave out.
+    - written: the scene before the changes of a sweep, fit or backbone, if its modes were measured with
+      a joint (`remember_written`); None for a scene without such changes.
     """
 
     path: Path
@@ -64,6 +75,7 @@ class Scene:
     sets: tuple[str, ...] = ()
     sweep: tuple = ()
     notes: tuple[str, ...] = ()
+    written: Scene | None = None
 
     def __repr__(self) -> str:
         effects = shorten(", ".join(self.effect_names()), MAX_LISTED_CHARACTERS)
@@ -221,6 +233,48 @@ def finish_scene(
         notes=tuple(describe_hidden_modes(draft.tables)),
         **{name: getattr(completed, name) for name in tables.Tables.model_fields},
     )
+
+
+def add_sets(scene: Scene, sets: Iterable[str]) -> Scene:
+    """Return a copy of a scene of a study with further assignments `table.key=value`."""
+    changed = loads(scene.text, scene.path, [*scene.sets, *sets])
+    return replace(changed, written=scene.written)
+
+
+def remember_written(scene: Scene, n_written: int = 0, prepare: Callable | None = None) -> Scene:
+    """Return a scene of a sweep, fit or backbone that remembers the scene as written.
+
+    The joint that was bolted in the modal test is that of the scene as written, so that all cases of the study
+    have the same structure. A scene without such modes is returned unchanged.
+
+    Parameters
+    ----------
+    scene : Scene
+    n_written : int
+        Number of the first assignments in `scene.sets` that belong to the scene as written.
+    prepare : Callable, optional
+        As in `loads`.
+
+    Raises
+    ------
+    SceneError
+        If the scene as written is not valid.
+    """
+    if scene.structure is None or scene.structure.measured == "free":
+        return scene
+    sets = scene.sets[:n_written]
+    if sets == scene.sets:
+        return replace(scene, written=scene)
+    try:
+        written = require_files(loads(scene.text, scene.path, sets, prepare=prepare))
+    except SceneError as error:
+        raise SceneError(
+            [
+                f"{scene.where('structure.measured')}: the joint that was bolted in the modal test is that of the scene "
+                f"as written, without --set, --over and --free, but that scene has a mistake: {error.mistakes[0]}"
+            ]
+        ) from None
+    return replace(scene, written=replace(written, sweep=()))
 
 
 def move_scene(scene: Scene, path: Path) -> Scene:

@@ -9,7 +9,6 @@ import patchfem as pf
 from patchfem.campaigns import compute_backbone
 from patchfem.export import backbone as backbone_files
 from patchfem.export.drawing import pictures
-from patchfem.runs import joint
 
 LAWS = {
     "coulomb": 'law = "coulomb"',
@@ -22,8 +21,7 @@ AMPLITUDES = np.geomspace(1e-5, 8e-3, 5)
 def make_rig(law: str, damping: float, drive: str = ""):
     """Return the Model of a block of 0.5 kg at 100 Hz with a friction limit of 30 N."""
     drive = drive or 'kind = "base"\nfrequency = "100 Hz"\nacceleration = "1 g"'
-    return joint.remove_joint(
-        pf.build(f"""
+    return pf.build(f"""
 [normal]
 load = "100 N"
 [friction]
@@ -40,7 +38,6 @@ slide = 1.0
 {drive}
 cycles = 20
 """)
-    )
 
 
 def write_page(backbone) -> str:

@@ -92,26 +92,38 @@ def test_exact_two_stuck_modes_return_free_modes():
 
 
 def test_exact_stuck_patch_has_measured_frequency():
-    """A rig whose patch sticks has the measured frequency, because the run removes the stiffness of
-    the pressed patch, not the estimate of the plan."""
+    """A rig whose patch sticks has the measured frequency. The stiffness that is subtracted is the
+    extrapolated one that the run prints, and plan and run have the same modes."""
     measured = pf.build(SHEARED + MODES % (STUCK, 14300.0, 1.0, 1.0) + DRIVE.replace("143", "9000"))
-    model = joint.remove_joint(measured)
-    patch, *_ = joint.patch_result.solve_with_coarser(model.patch, 1e-3)
-    stuck = np.sqrt(
-        model.rig.modes.omega[0] ** 2 + joint.compute_full_stick_stiffness(model, patch) / 0.884
-    )
-    assert stuck / (2 * np.pi) == pytest.approx(14300.0, rel=1e-12)
-    assert pf.run(measured).plan.model.rig.modes.omega[0] == pytest.approx(
-        model.rig.modes.omega[0], rel=1e-12
-    )
+    model, patches = joint.solve_without_joint(measured)
+    omega = model.rig.modes.omega[0]
+    stiffness = joint.compute_full_stick_stiffness(model, patches[0])
+    assert np.sqrt(omega**2 + stiffness / 0.884) == pytest.approx(2 * np.pi * 14300.0, rel=1e-12)
+    run = pf.run(measured)
+    printed = run.measures["tangential_stiffness"]
+    assert stiffness == pytest.approx(printed.value, rel=1e-12)
+    assert model.rig.structure.bolted.stiffness == pytest.approx([printed.value], rel=1e-12)
+    assert run.plan.model.rig.modes.omega[0] == pytest.approx(omega, rel=1e-12)
     mode_of_plan = pf.plan(measured).as_json()["modes"][0]
-    assert (
-        mode_of_plan["free_frequency"]
-        < model.rig.modes.omega[0] / (2 * np.pi)
-        < mode_of_plan["stuck_frequency"]
-    )
+    assert mode_of_plan["free_frequency"] == pytest.approx(omega / (2 * np.pi), rel=1e-12)
+    assert mode_of_plan["stuck_frequency"] == pytest.approx(14300.0, rel=1e-12)
+    assert any("joint bolted" in note for note in run.notes)
     outcomes = pf.run_many([measured]).outcome
     assert "failed" not in [str(outcome) for outcome in outcomes]
+
+
+def test_exact_coarse_run_subtracts_its_own_joint():
+    """The comparison run has a joint whose stiffness differs by the error of the printed stiffness, in the
+    patch and in the modes, so that it sticks at the measured frequency, too."""
+    measured = pf.build(SHEARED + MODES % (STUCK, 14300.0, 1.0, 1.0) + DRIVE.replace("143", "9000"))
+    model, patches = joint.solve_without_joint(measured)
+    coarse = model.with_coarse_joint()
+    stiffness = joint.compute_full_stick_stiffness(coarse, patches[1])
+    printed = patches[0].measures["tangential_stiffness"]
+    assert abs(stiffness - printed.value) == pytest.approx(printed.error, rel=1e-9)
+    omega = coarse.rig.modes.omega[0]
+    assert np.sqrt(omega**2 + stiffness / 0.884) == pytest.approx(2 * np.pi * 14300.0, rel=1e-12)
+    assert omega != model.rig.modes.omega[0]
 
 
 @pytest.mark.parametrize(

@@ -61,7 +61,7 @@ def compute_balance_curve(joint: JointMode, amplitudes) -> Curve:
         if (error[:2] <= tolerance * np.abs(values[:2]))[:, known].all():
             break
     error += joint.spatial_discretization_errors(
-        lambda group: _tabulate_free_motions(group, joint, amplitudes, HARMONIC_COUNTS[0])
+        lambda mode, group: _tabulate_free_motions(group, mode, amplitudes, HARMONIC_COUNTS[0])
     )
     known = np.isfinite(values + error).all(axis=0)
     if not known.any():

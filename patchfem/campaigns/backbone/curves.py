@@ -185,7 +185,11 @@ def _assemble_backbone(joint: JointMode, amplitudes, curves: dict, missing: dict
     """Assemble the backbone from its curves at the requested amplitudes (k,) [m]."""
     exponents = LossExponents()
     first = curves.get("quasi-static", curves.get("balance"))
-    sentences = [*notes.note_linear_rig(joint), *notes.note_gaps(amplitudes, curves)]
+    sentences = [
+        *joint.model.describe_removed_joint(),
+        *notes.note_linear_rig(joint),
+        *notes.note_gaps(amplitudes, curves),
+    ]
     if not joint.is_linear:
         exponents = _fit_exponents(joint, first)
         sentences += notes.note_differences(curves)
@@ -239,7 +243,7 @@ def _mode_frequencies(joint: JointMode) -> ModeFrequencies:
         return ModeFrequencies(free, None)
     measure = stuck_patch_stiffness(model, joint.patch, joint.coarser)
     # Modes that were measured with the joint include the stiffness of the joint.
-    has_joint = len(modes.interfaces) > 1 or model.rig.structure.joint_stiffness is not None
+    has_joint = len(modes.interfaces) > 1 or model.rig.structure.bolted is not None
     if measure is None or has_joint:
         return ModeFrequencies(free, stuck / (2 * np.pi))
     stuck = _stuck_frequency(joint, measure.value)

@@ -40,21 +40,25 @@ def prepare_model(build: Callable, modes: str | Iterable = "") -> PreparedModel:
     Parameters
     ----------
     build : callable
-        Maps `BackboneTables` to the model of the scene with these tables.
+        Function of `BackboneTables` that returns the model of the scene with these tables; with
+        `is_written` that of the scene as written, before the changes by --set.
     modes : str or iterable
         See `scene.backbone_scene.parse_modes`; "" for the modes of the scene.
     """
     tables = BackboneTables(parse_modes(modes) if modes else (), stuck=False)
-    model = build(tables)
+    model = build(tables, is_written=False)
     notes = _note_ignored_tables(tables.ignored)
     if not tables.modes:
-        return PreparedModel(joint.remove_joint(model), notes)
-    patch, stiffness = _solve_sticking_contact(model)
+        return PreparedModel(model, notes)
     given_modes = tables.modes
+    # The joint that was bolted in the modal test is that of the scene as written.
+    stiffness = _find_sticking_stiffness(
+        build(BackboneTables(given_modes, stuck=False), is_written=True)
+    )
     used_modes = given_modes
     if stiffness is not None:
         used_modes = _assume_slides(given_modes, stiffness / model.rig.modes.mass)
-        model = joint.remove_joint(build(BackboneTables(used_modes)), patch)
+        model = build(BackboneTables(used_modes), is_written=False)
     notes += _note_modes(used_modes, is_assumed=tables.is_assumed, is_stuck=stiffness is not None)
     if tables.assumes_mass and not tables.is_assumed:
         notes += (
@@ -68,27 +72,19 @@ def prepare_model(build: Callable, modes: str | Iterable = "") -> PreparedModel:
     return PreparedModel(model, notes)
 
 
-class StickingContact(NamedTuple):
-    """Solved patch of a sticking contact (or None), and its stiffness [N/m] (None if rigid)."""
-
-    patch: object
-    stiffness: float | None
-
-
-def _solve_sticking_contact(model: Model) -> StickingContact:
-    """Solve the contact of a rig with a single interface, and compute its sticking stiffness."""
+def _find_sticking_stiffness(model: Model) -> float | None:
+    """Return the stiffness [N/m] of the sticking contact of a rig with a single interface; None if it is rigid."""
     interfaces = model.rig.friction.interfaces
     if len(interfaces) != 1 or model.friction is None:
-        return StickingContact(None, None)
+        return None
     if model.patch is not None:
         patch = patch_result.solve_with_coarser(model.patch, model.accuracy.tolerance)[0]
         stiffness = joint.compute_full_stick_stiffness(model, patch)
-        is_elastic = 0 < stiffness < np.inf
-        return StickingContact(patch, stiffness if is_elastic else None)
+        return stiffness if 0 < stiffness < np.inf else None
     try:
-        return StickingContact(None, compute_sticking_stiffness(interfaces[0], model.nominal_load))
+        return compute_sticking_stiffness(interfaces[0], model.nominal_load)
     except PatchfemError:
-        return StickingContact(None, None)
+        return None
 
 
 def _assume_slides(modes: tuple, stiffness_per_mass: float) -> tuple:

@@ -1,6 +1,7 @@
 """Mode of a rig with its contact: shape of the stuck mode and scales of its amplitudes."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
@@ -12,7 +13,7 @@ from ...dynamics.harmonic.forces import LawGroup
 from ...effects import describe_unsupported, law_has_trait
 from ...model.model import Model
 from ...response.errors import convergence_error
-from ...runs.patch import result as patch_result
+from ...runs.joint import solve_without_joint
 from ...runs.plan import plan
 from ...runs.rig import decays
 from ...runs.rig.plan import stuck_stiffnesses
@@ -249,7 +250,10 @@ class JointMode(NamedTuple):
     def spatial_discretization_errors(self, compute: Callable) -> np.ndarray | float:
         """Return the error estimates of a quantity for the mesh and the discrete sliders of a law.
 
-        `compute` maps a LawGroup to the quantity.
+        Parameters
+        ----------
+        compute : callable
+            Function of a JointMode and a LawGroup that returns the quantity as an array.
         """
         model = self.model
         laws = [interface.numbers.law for interface in model.rig.friction.interfaces]
@@ -261,16 +265,26 @@ class JointMode(NamedTuple):
         group = self.steady_laws()
         if has_partial_slip:
             error = error + decays.estimate_mesh_error(
-                group, decays.make_laws_on_coarse_meshes(model, self.coarse), compute
+                group,
+                decays.make_laws_on_coarse_meshes(model, self.coarse),
+                lambda laws: compute(self.with_modes(laws.modes, laws.stiffness()), laws),
             )
         if has_cells:
-            best = compute(group)
+            best = compute(self, group)
             changes = []
             for cells in CELL_MERGES:
                 merged = group.with_elements(partial(join_cells, *cells))
-                changes.append(np.abs(compute(merged) - best))
+                changes.append(np.abs(compute(self, merged) - best))
             error = error + convergence_error(np.max(changes, axis=0), ratio=4.0, order=2.0)
         return error
+
+    def with_modes(self, modes, stiffness: np.ndarray) -> "JointMode":
+        """Return the mode in another modal basis, with interfaces of stiffness (i,) [N/m] in stick."""
+        if modes is self.modes:
+            return self
+        rig = replace(self.model.rig, modes=modes)
+        stuck_mode = modes.compute_stuck_mode(modes.interfaces, stiffness, self.mode)
+        return self._replace(model=replace(self.model, rig=rig), stuck_mode=StuckMode(*stuck_mode))
 
 
 def build_joint(model: Model, name: str) -> JointMode:
@@ -293,17 +307,17 @@ def build_joint(model: Model, name: str) -> JointMode:
             "a backbone needs the scene of a rig; add the tables [structure] and [drive]",
             "structure",
         )
-    modes = model.rig.modes
+    patch = None
+    coarser: tuple = (None,)
+    if model.patch is not None:
+        model, (patch, *others) = solve_without_joint(model)
+        coarser = (*others, None)
     number = _find_mode(model.rig, name)
+    modes = model.rig.modes
     if modes.lateral_faces is not None:
         lateral = [face for face in model.rig.friction.interfaces if face.lateral]
         refusal = describe_unsupported("a backbone with interfaces that slide in a plane", "out")
         raise PatchfemError(refusal, f"{lateral[0].key}.lateral")
-    patch = None
-    coarser: tuple = (None,)
-    if model.patch is not None:
-        patch, *others = patch_result.solve_with_coarser(model.patch, model.accuracy.tolerance)
-        coarser = (*others, None)
     free_mode = StuckMode(None, np.eye(modes.omega.size)[number])
     joint = JointMode(model, patch, coarser, number, free_mode, np.zeros(len(modes.interfaces)))
     if not joint.is_linear:

@@ -31,7 +31,7 @@ from ..backbone.curves import compute_backbone
 from .problem import (
     FittedKeys,
     FreeKeys,
-    build_model_without_joint,
+    build_changed_model,
     format_assignments,
     parse_ranges,
 )
@@ -193,8 +193,8 @@ class CurveModel:
         return self._cached_curve(tuple(map(float, values)), method)
 
     def build_model(self, values):
-        """Build the rig model for given free parameters; its modes are those without the joint."""
-        return build_model_without_joint(self.base, format_assignments(self.ranges, values))
+        """Build the rig model for given free parameters."""
+        return build_changed_model(self.base, format_assignments(self.ranges, values))
 
     def compute_model_curve(self, model, method: str) -> np.ndarray:
         """Compute frequency and damping ratio of any model at the measured amplitudes."""

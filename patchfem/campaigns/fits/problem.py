@@ -14,16 +14,17 @@ from ...core import Outcome, PatchfemError
 from ...identify.fit_sentences import describe_fit
 from ...identify.least_squares import Fit, Problem
 from ...model.model import Model, build
-from ...runs import joint
 from ...runs.patch import mesh_levels
 from ...scene.lines import split_key
 from ...scene.overrides import BaseScene
 from ...scene.ranges import Range, read_ranges
-from ...scene.scene import Scene, SceneError, loads
+from ...scene.scene import Scene, SceneError, add_sets
 
 # Largest ratio high/low of a range whose middle is the arithmetic mean; the middle of a wider range
 # is the geometric mean, as in `identify.space`.
 MAX_LINEAR_RATIO = 10.0
+# Tables of the joint that was bolted when the modes were measured.
+JOINT_TABLES = ("contact.", "normal.", "friction.", "structure.bonded.", "structure.interface.")
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -59,7 +60,7 @@ class FittedKeys:
 
     def fitted_scene(self) -> Scene:
         """Return the scene with the fitted values."""
-        return loads(self.scene.text, self.scene.path, [*self.scene.sets, *self.sets])
+        return add_sets(self.scene, self.sets)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -118,6 +119,7 @@ class FreeKeys:
         """
         undetermined = describe_fit(fit, [bound.key for bound in self.bounds])
         warnings = [*self.scene.remarks, *self.notes, *undetermined, *extra_warnings]
+        warnings += warn_of_bolted_joint(self.scene, self.ranges)
         sets = [*self.sets, *format_assignments(self.ranges, fit.values)]
         return FittedKeys(self.scene, self.ranges, fit, sets, warnings, perf_counter() - start_time)
 
@@ -138,8 +140,8 @@ def parse_ranges(texts: Iterable) -> list:
     return ranges
 
 
-def build_model_without_joint(base: BaseScene, sets: Iterable) -> Model:
-    """Build a rig model with the modes of the structure without the joint.
+def build_changed_model(base: BaseScene, sets: Iterable) -> Model:
+    """Build the model of a scene with changes.
 
     Parameters
     ----------
@@ -154,9 +156,23 @@ def build_model_without_joint(base: BaseScene, sets: Iterable) -> Model:
         If the changed scene is invalid; a search counts this as a failed evaluation.
     """
     try:
-        return joint.remove_joint(build(base.override(sets)))
+        return build(base.override(sets))
     except SceneError as error:
         raise PatchfemError(error.mistakes[0]) from None
+
+
+def warn_of_bolted_joint(scene: Scene, ranges: Iterable) -> list:
+    """Return a list with a warning if a free parameter changes a joint that was bolted in the modal test, or []."""
+    structure = scene.structure
+    if structure is None or structure.measured == "free" or structure.measured_joint == "case":
+        return []
+    keys = [bound.key for bound in ranges if bound.key.startswith(JOINT_TABLES)]
+    if not keys:
+        return []
+    return [
+        f"the joint of the scene as written is subtracted from the bolted modes for every value of {' and '.join(keys)}; if "
+        'the fitted joint is the one that was bolted in the modal test, set structure.measured_joint = "case"'
+    ]
 
 
 def solve_contact(model: Model):

@@ -8,8 +8,8 @@ from ...core import PatchfemError, SineDrive
 from ...effects import find_waveform
 from ...model.model import Model, build
 from ...scene.overrides import BaseScene
-from ...scene.scene import Scene, SceneError, loads
-from ..fits.problem import build_model_without_joint
+from ...scene.scene import Scene, SceneError, add_sets, loads
+from ..fits.problem import build_changed_model
 
 # Scene keys of instrument gains, which scale the readings but do not change the motion.
 GAIN_KEYS = ("measured.acceleration_gain", "measured.displacement_gain")
@@ -27,7 +27,7 @@ class FitRequest:
         """Return the rig models at conditions (c, 2), with additional --set strings."""
         scene = self.scene
         if sets:
-            scene = loads(scene.text, scene.path, [*scene.sets, *sets])
+            scene = add_sets(scene, sets)
         return ConditionModels(scene, conditions, self.ranges, self.measured)
 
 
@@ -63,7 +63,7 @@ class ConditionModels:
             self.sets.append(f"measured.file={measured.resolve().as_posix()}")
         if scene.accuracy.method in (None, "auto"):
             self._choose_steady_state_method()
-        start = loads(scene.text, scene.path, [*scene.sets, *self.sets])
+        start = add_sets(scene, self.sets)
         self.base = BaseScene(start)
         self.instrument = start.measured
         self.model_parameters = [k for k, bound in enumerate(ranges) if bound.key not in GAIN_KEYS]
@@ -118,7 +118,7 @@ class ConditionModels:
     def build_model(self, values) -> Model:
         """Build the rig model for values (n,) of the free parameters, with the drive of the scene."""
         sets = [self.ranges[k].format_assignment(values[k]) for k in self.model_parameters]
-        return build_model_without_joint(self.base, sets)
+        return build_changed_model(self.base, sets)
 
     def with_condition_drive(self, model: Model, condition: int) -> Model:
         """Return the model with the drive of a measured condition."""

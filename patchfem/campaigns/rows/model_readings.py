@@ -5,6 +5,7 @@ import numpy as np
 from ...model.source import locate_errors
 from ...response.spectrum import read_instrument
 from ...runs.batch.motion_observer import MotionObserver
+from ...runs.joint import solve_without_joint
 from ..fits.problem import solve_contact
 from .condition_models import GAIN_KEYS, ConditionModels
 
@@ -62,7 +63,7 @@ class ModelReadings:
         model = self.models.build_model(values)
         readings = {}
         with locate_errors(model.source):
-            patch = self._get_solved_patch(model)
+            model, patch = self._solve_contact(model)
             needs_cycle = self.reading[0] not in ("peak", "fundamental")
             observer = MotionObserver(model, patch, self.say, needs_cycle, self.observer)
             self.observer = observer
@@ -87,11 +88,18 @@ class ModelReadings:
             return abs(motion.fundamental)
         return read_instrument(motion.window, drive, motion.acceleration, *self.reading)
 
-    def _get_solved_patch(self, model):
-        """Return the solved contact patch of a model; None for a [normal] contact.
+    def _solve_contact(self, model) -> tuple:
+        """Return a model without the joint of bolted modes, and its solved patch; None for a [normal] contact.
 
         The contact is solved again only if a free parameter changes it.
         """
+        if model.has_bolted_patch:
+            model, patches = solve_without_joint(model)
+            return model, patches[0]
+        return model, self._get_solved_patch(model)
+
+    def _get_solved_patch(self, model):
+        """Return the solved patch of a model whose modes are those without the joint."""
         if model.patch is None:
             return None
         if self.patch is None or self.models.changes_contact:

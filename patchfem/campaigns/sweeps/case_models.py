@@ -24,7 +24,7 @@ from ...model.model import Model, build
 from ...model.similar_models import SimilarModels
 from ...scene.files import require_files
 from ...scene.overrides import BaseScene
-from ...scene.scene import Scene, SceneError, loads, read_sweep_axes
+from ...scene.scene import Scene, SceneError, loads, read_sweep_axes, remember_written
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,12 +40,16 @@ class SweepScene:
         --set strings of all cases.
     of : str
         Requested measure; "" for the default measure.
+    n_written : int
+        Number of the first strings of `sets` that belong to the scene as written, whose joint is
+        subtracted from bolted modes.
     """
 
     path: Path
     text: str
     sets: tuple = ()
     of: str = ""
+    n_written: int = 0
 
     def read_scene(self, sets: Sequence[str]) -> Scene:
         """Return the scene with additional `table.key=value` strings."""
@@ -54,7 +58,8 @@ class SweepScene:
 
     def _parse_scene(self, sets: Sequence[str]) -> Scene:
         """Parse the scene text with additional `table.key=value` strings."""
-        return replace(require_files(loads(self.text, self.path, (*self.sets, *sets))), sweep=())
+        scene = require_files(loads(self.text, self.path, (*self.sets, *sets)))
+        return remember_written(replace(scene, sweep=()), self.n_written)
 
     def build_model(self, sets: Sequence[str], values: Sequence[float | str] = ()) -> Model:
         """Build the model of a single case of the sweep.
@@ -159,6 +164,8 @@ class SweepScene:
         tables.pop("sweep", None)
         files = hash_named_files([*iterate_texts(tables), *self.sets], self.path.parent)
         shared = [__version__, tables, self.sets, files]
+        if self.n_written:
+            shared.append(self.n_written)
         return sha256(json.dumps(shared, sort_keys=True, default=str).encode()).hexdigest()
 
     def has_shared_meshes(self, keys: Sequence[str]) -> bool:

@@ -19,7 +19,8 @@ class LawGroup:
 
     `parts` is a law, a pair (row, law) or a list of them. A row is the number of an interface of
     `modes` or participations (n,); a law alone acts on
-    interface 0; a ContactModel is converted to its law. rows: (i, n); laws: a tuple of laws for every row.
+    interface 0; a ContactModel is converted to its law. rows: (i, n); laws: a tuple of laws for every row;
+    modes: the modal basis.
     A call with the harmonics (i, H + 1) of the slides and omega returns a
     `harmonic.ContactResponse`.
     """
@@ -41,6 +42,7 @@ class LawGroup:
             laws.setdefault(key, []).append(law)
         if not rows:
             raise PatchfemError("harmonic balance needs a friction law on at least one interface")
+        self.modes = modes
         self.rows = frozen_array(np.array(list(rows.values())))
         self.laws = [tuple(v) for v in laws.values()]
         self.samples = samples
@@ -48,6 +50,7 @@ class LawGroup:
     def with_samples(self, samples: int) -> "LawGroup":
         """Return a copy with a different number of samples per cycle."""
         copy = object.__new__(LawGroup)
+        copy.modes = self.modes
         copy.rows = self.rows
         copy.laws = self.laws
         copy.samples = samples

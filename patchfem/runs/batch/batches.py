@@ -18,7 +18,6 @@ from ... import compiled
 from ...core import PatchfemError
 from ...model.model import Model
 from ...model.similar_models import SimilarModels, select_models
-from .. import joint
 from . import one_by_one
 from .case_results import CaseResults
 
@@ -56,6 +55,8 @@ class Batch:
         """Return the reason why the batch cannot compute a model, or ""."""
         if model.kind != self.kind:
             return f"it is a {model.kind}"
+        if model.has_bolted_patch:
+            return "its joint is subtracted from bolted modes with the error of its stiffness"
         return _reason_for_single_runs(self.kind) or self._implementation.refusal_reason(model)
 
     def group_key(self, model: Model) -> Hashable:
@@ -190,8 +191,6 @@ def solve_models(
     n_study_cases : int
         Number of cases of the whole study, if the models are a part of it; 0 for len(models).
     """
-    if not isinstance(models, SimilarModels):
-        models = [_model_without_joint(model) for model in models]
     results = CaseResults.blank(len(models))
     n_study_cases = n_study_cases or len(models)
     groups = {}
@@ -213,20 +212,6 @@ def solve_models(
         part = _solve_group(assignment, select_models(models, cases), solve_one_by_one, report)
         results.insert(cases, part)
     return results
-
-
-def _model_without_joint(model: Model | PatchfemError) -> Model | PatchfemError:
-    """Return a model without the joint of its measured modes, or the error of its removal."""
-    if (
-        isinstance(model, PatchfemError)
-        or model.rig is None
-        or model.rig.structure.without_joint is None
-    ):
-        return model
-    try:
-        return joint.remove_joint(model)
-    except PatchfemError as error:
-        return error
 
 
 def _assign_similar_models(models: Sequence, n_study_cases: int) -> tuple[np.ndarray, dict]:

@@ -61,8 +61,13 @@ def with_shared_meshes(models: Sequence[Model | PatchfemError]) -> list:
 
 
 def _may_share_meshes(model: Model | PatchfemError) -> bool:
-    """Return whether a model has a patch without a common mesh."""
-    return isinstance(model, Model) and model.patch is not None and model.patch.mesh.shared is None
+    """Return whether a model has a patch without a common mesh.
+
+    The patch of a bolted joint keeps its own mesh, so that a case is equal to a single run.
+    """
+    if not isinstance(model, Model) or model.patch is None or model.has_bolted_patch:
+        return False
+    return model.patch.mesh.shared is None
 
 
 def _mesh_key(model: Model) -> tuple:

@@ -207,6 +207,33 @@ def stiffness_chain(patch_model) -> dict:
     return stiffnesses
 
 
+def find_solved_links(chain: dict, static_measures: dict) -> dict:
+    """Return the stiffness [N/m] of the pieces in the stiffness chain, from that of the solved patch.
+
+    The stiffness of the patch is that of the pieces and the asperities in series.
+
+    Parameters
+    ----------
+    chain : dict
+        Stiffness chain of a plan by name.
+    static_measures : dict
+        Values of the static measures by name.
+    """
+    links = {}
+    for name, link in chain.items():
+        if not name.startswith("pieces_shear") or link == "rigid":
+            continue
+        stiffness = static_measures.get(name.replace("pieces_shear", "tangential_stiffness"))
+        if not stiffness:
+            continue
+        compliance = 1 / stiffness
+        asperities = chain.get(name.replace("pieces_shear", "asperities"), "rigid")
+        if not isinstance(asperities, str):
+            compliance -= 1 / asperities
+        links[name] = 1 / compliance
+    return links
+
+
 def compute_patch_groups(model: Model) -> dict:
     """Compute the dimensionless groups of a patch, and with friction its slip length [m].
 

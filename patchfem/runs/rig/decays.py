@@ -130,7 +130,7 @@ def make_laws_on_coarse_meshes(model, coarse) -> list:
 
     `coarse` is the Patch of [contact] on a coarser mesh, or None.
     """
-    laws = [] if coarse is None else [make_laws_on_mesh(model, coarse)]
+    laws = [] if coarse is None else [make_laws_on_mesh(model.with_coarse_joint(), coarse)]
     for numbers in faces.group_interfaces_with_coarse_mesh(model):
         laws.append(make_laws_on_mesh(model, None, numbers))
     return laws
@@ -249,7 +249,7 @@ def estimate_decay_mesh_errors(model, patch, coarse, amplitudes, find_mode) -> t
             fine,
             make_laws_on_coarse_meshes(model, coarse),
             lambda laws: compute_static_curve(
-                rig.modes, laws, mode_index, amplitudes, balance.SAMPLES_PER_CYCLE
+                laws.modes, laws, mode_index, amplitudes, balance.SAMPLES_PER_CYCLE
             )[1:3],
         )
     except NotConverged as reason:

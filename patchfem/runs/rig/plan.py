@@ -10,7 +10,6 @@ from math import inf, pi
 import numpy as np
 
 from ... import cost_model
-from ...core import PatchfemError
 from ...dynamics.march import capacity
 from ...effects import LAWS, law_has_trait
 from ...friction.bonds import parameters
@@ -102,28 +101,18 @@ def stuck_interface_stiffness(chain: dict, index: int = 0) -> float:
 def stuck_stiffnesses(rig, chain: dict) -> np.ndarray:
     """Return the tangential stiffness (i,) [N/m] of each stuck interface of a rig.
 
-    Strips have the stiffness of their patch. Without friction the stiffness is inf.
+    Strips have the stiffness of their patch. Without friction the stiffness is inf. A patch that was
+    solved to subtract a bolted joint has its own stiffness instead of that of the chain.
     """
+    bolted = rig.structure.bolted
+    if bolted is not None and bolted.stuck_stiffness is not None:
+        return np.full(len(rig.modes.interfaces), bolted.stuck_stiffness)
     n_interfaces = len(rig.friction.interfaces)
     stiffness = np.full(len(rig.modes.interfaces), inf)
     if n_interfaces:
         for k in range(stiffness.size):
             stiffness[k] = stuck_interface_stiffness(chain, k if k < n_interfaces else 0)
     return stiffness
-
-
-def remove_expected_joint(rig, links: dict):
-    """Return the rig without the joint that was present in the modal test.
-
-    The stiffness of the joint follows from the stiffness chain, because the patch has not been
-    solved yet. If it is larger than the modes allow, the Rig is returned unchanged.
-    """
-    try:
-        bare_rig = rig.structure.without_joint(stuck_interface_stiffness(links))
-        structure = replace(bare_rig.structure, without_joint=rig.structure.without_joint)
-        return replace(bare_rig, structure=structure)
-    except PatchfemError:
-        return rig
 
 
 def mode_frequencies(rig, chain: dict) -> list:

@@ -70,7 +70,10 @@ class Runner:
             has_fields = self.inputs.patch is not None and not model.patch.mesh.can_gather_points
             if has_fields or model.rig.friction.has_partial_slip:
                 frames = N_FRAMES
-        patch = self.inputs.coarse[0] if numerics.coarse_patch else self.inputs.patch
+        patch = self.inputs.patch
+        if numerics.coarse_patch:
+            patch = self.inputs.coarse[0]
+            model = model.with_coarse_joint()
         report = self.progress.make_callback(numerics.steps)
         begin = process_time()
         solution = solve_rig(model, numerics, patch, frames, say, report)

@@ -424,6 +424,12 @@ class Structure(Table):
         "frequencies and damping were measured with the joint bolted, and the stiffness of the joint is "
         "subtracted from the stiffness of the modes",
     ) = "free"
+    measured_joint: key(
+        Literal["written", "case"] | None,
+        "which joint is subtracted in a sweep, fit or backbone that changes the joint: 'written' (the default): in "
+        "every case that of the scene as written, before --set, --over and --free; 'case': in each case its own, as "
+        "if each joint had been measured bolted with these frequencies",
+    ) = None
     stiffening: Stiffening | None = None
     bonded: Bonded | None = None
     masses: key(

@@ -230,6 +230,12 @@ BONDED_RULES = (
 )
 STUCK_RULES = (
     MistakeRule(
+        lambda s: s.measured_joint and not s.is_stuck,
+        "structure.measured_joint",
+        'names the joint that is subtracted from the modes, but nothing is subtracted; add measured = "stuck" or leave '
+        "`measured_joint` out",
+    ),
+    MistakeRule(
         lambda s: s.is_stuck and not s.has_joint,
         "structure.measured",
         "'stuck' subtracts the stiffness of the joint from the modes, but this scene has no joint; add [friction] and "

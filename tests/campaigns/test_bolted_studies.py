@@ -1,0 +1,184 @@
+"""Sweeps, backbones and fits of a rig whose modes were measured with the joint bolted.
+
+The joint that is subtracted from the modes is that of the scene as written, so that all cases have the
+same structure.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import patchfem as pf
+from patchfem.core import PatchfemError
+from patchfem.model import build
+from patchfem.scene import BaseScene, loads, remember_written
+
+MASS = 1.3  # modal mass [kg]
+SLIDE = 0.0169  # motion of the contact per motion of the output
+POINT = """\
+[normal]
+load = "4 kN"
+[friction]
+law = "elastic-plastic"
+static = 0.3
+bond_length = "1.5 um"
+"""
+ROUGH = """\
+[contact]
+length = "40 mm"
+width = "30 mm"
+height = "10 mm"
+load = "4 kN"
+substrate = "steel"
+[contact.asperities]
+law = "exponential"
+decay_length = "2 um"
+tangential_ratio = 0.8
+[contact.shear]
+[friction]
+law = "coulomb"
+static = 0.3
+"""
+MODE = f"""\
+[structure]
+moving_mass = "{MASS} kg"
+measured = "stuck"
+[[structure.mode]]
+name = "first"
+frequency = "212 Hz"
+damping = 0.002
+slide = {SLIDE}
+output = 1.0
+"""
+DRIVE = """\
+[drive]
+kind = "force"
+frequency = "212 Hz"
+force = "0.2 N"
+cycles = 60
+"""
+LOADS = ("3.2 kN", "4 kN", "4.8 kN")
+
+
+def free_frequency(joint_stiffness: float) -> float:
+    """Return the frequency [Hz] of the mode without a joint of a stiffness [N/m]."""
+    square = (2 * np.pi * 212.0) ** 2 - joint_stiffness * SLIDE**2 / MASS
+    return float(np.sqrt(square) / (2 * np.pi))
+
+
+def stuck_frequency(joint_stiffness: float, bolted_stiffness: float) -> float:
+    """Return the frequency [Hz] of the mode with a sticking joint, after another joint was subtracted."""
+    square = (2 * np.pi * 212.0) ** 2 + (joint_stiffness - bolted_stiffness) * SLIDE**2 / MASS
+    return float(np.sqrt(square) / (2 * np.pi))
+
+
+def write_free_scene(contact: str, joint_stiffness: float) -> str:
+    """Return the same rig with the frequency and damping of the mode without the joint."""
+    frequency = free_frequency(joint_stiffness)
+    damping = 0.002 * 212.0 / frequency
+    free = MODE.replace('measured = "stuck"\n', "").replace("212 Hz", f"{frequency!r} Hz")
+    return contact + free.replace("0.002", repr(damping)) + DRIVE
+
+
+def test_exact_sweep_over_load_keeps_the_structure():
+    """A sweep over the load of a point equals runs of the same structure given by its free modes."""
+    stiffness = 0.3 * 4000 / 1.5e-6
+    free = write_free_scene(POINT, stiffness)
+    swept = pf.sweep(POINT + MODE + DRIVE, {"normal.load": list(LOADS)})
+    assert len(set(swept["relative_displacement_amplitude"].values.tolist())) == 3
+    for name in ("relative_displacement_amplitude", "friction_force_peak"):
+        single = [pf.run(free, **{"normal.load": load}).measures[name].value for load in LOADS]
+        assert swept[name].values == pytest.approx(single, rel=1e-9)
+
+
+def test_exact_sweep_over_load_of_patch_equals_single_runs():
+    """A case of a sweep of a patch equals, to round-off, the run of a model with the same joint subtracted,
+    and its measures are those of the structure given by its free modes within their errors."""
+    swept = pf.sweep(ROUGH + MODE + DRIVE, {"contact.load": list(LOADS)})
+    scene = loads(ROUGH + MODE + DRIVE, "rough.toml")
+    base = BaseScene(remember_written(scene))
+    bolted = pf.run(ROUGH + MODE + DRIVE).measures["tangential_stiffness"].value
+    for number, load in enumerate(LOADS):
+        case = pf.run(build(base.override([f"contact.load={load}"])))
+        single = pf.run(write_free_scene(ROUGH, bolted), **{"contact.load": load})
+        for name in ("relative_displacement_amplitude", "friction_force_peak", "loop_area"):
+            assert swept[name].values[number] == pytest.approx(case.measures[name].value, rel=1e-9)
+            error = case.measures[name].error + single.measures[name].error
+            assert abs(single.measures[name].value - case.measures[name].value) <= error
+        assert any("the scene as written" in note for note in case.notes)
+
+
+@pytest.mark.parametrize("contact, key", [(POINT, "normal.load"), (ROUGH, "contact.load")])
+def test_exact_backbone_over_load_has_stuck_frequency_of_each_load(contact, key):
+    """The stuck frequency rises with the load as the stiffness of the joint does, and the free one stays."""
+    stiffnesses = []
+    for load in LOADS:
+        if contact is POINT:
+            stiffnesses.append(0.3 * float(load.split()[0]) * 1e3 / 1.5e-6)
+        else:
+            run = pf.run(contact + MODE + DRIVE, **{key: load})
+            stiffnesses.append(run.measures["tangential_stiffness"].value)
+    for load, stiffness in zip(LOADS, stiffnesses):
+        curves = pf.backbone(
+            contact + MODE + DRIVE, amplitudes="0.1 um", method="balance", **{key: load}
+        )
+        expected = stuck_frequency(stiffness, stiffnesses[1])
+        assert curves.attrs["stuck_frequency"] == pytest.approx(expected, rel=1e-9)
+        assert curves.attrs["free_frequency"] == pytest.approx(
+            free_frequency(stiffnesses[1]), rel=1e-9
+        )
+        assert "the scene as written" in str(curves.attrs["notes"])
+
+
+def test_exact_modes_given_beside_the_scene_keep_their_slide():
+    """Modes given beside the scene have the slide and the free frequency of the scene as written."""
+    text = ROUGH + f'[structure]\nmoving_mass = "{MASS} kg"\n'
+    free = [
+        pf.backbone(text, modes="212 Hz:0.002", amplitudes="0.1 um", **changes).attrs[
+            "free_frequency"
+        ]
+        for changes in ({}, {"contact.load": "4.8 kN"})
+    ]
+    assert free[1] == pytest.approx(free[0], rel=1e-12)
+
+
+def test_exact_joint_of_each_case_is_subtracted_if_asked():
+    """With measured_joint = "case" every load has the measured frequency while it sticks."""
+    text = (POINT + MODE + DRIVE).replace('"stuck"', '"stuck"\nmeasured_joint = "case"')
+    curves = pf.backbone(text, amplitudes="0.1 um", method="balance", **{"normal.load": "3.2 kN"})
+    assert curves.attrs["stuck_frequency"] == pytest.approx(212.0, rel=1e-9)
+
+
+def test_exact_fit_of_the_bolted_joint_finds_its_stiffness(tmp_path: Path):
+    """A fit of a joint that was bolted in the modal test finds the bond length of synthetic data with
+    measured_joint = "case"; with the joint of the scene as written it warns."""
+    case = (POINT + MODE + DRIVE).replace('"stuck"', '"stuck"\nmeasured_joint = "case"')
+    truth = pf.backbone(case, amplitudes="20 um..400 um:8", method="balance")
+    rows = zip(
+        truth["balance_amplitude"].values,
+        truth["balance_frequency"].values,
+        truth["balance_damping"].values,
+    )
+    table = tmp_path / "curve.csv"
+    table.write_text(
+        "amplitude [m],frequency [Hz],damping\n"
+        + "\n".join(f"{a:.17g},{f:.17g},{z:.17g}" for a, f, z in rows)
+    )
+    free = {"friction.bond_length": ("1 um", "3 um")}
+    guess = case.replace("1.5 um", "2.2 um")
+    fitted = pf.fit(guess, table, free=free)
+    assert fitted["values"]["friction.bond_length"]["value"] == pytest.approx(1.5e-6, rel=1e-4)
+    assert not any("measured_joint" in text for text in fitted["warnings"])
+    written = pf.fit(guess.replace('measured_joint = "case"\n', ""), table, free=free)
+    assert any('measured_joint = "case"' in text for text in written["warnings"])
+
+
+def test_refuses_study_whose_scene_as_written_is_not_valid():
+    """A scene that has a load only by the values of a study has no joint that could have been bolted."""
+    text = (POINT + MODE + DRIVE).replace('load = "4 kN"\n', "")
+    with pytest.raises(PatchfemError, match=r"the scene as written.*normal.load"):
+        pf.backbone(text, **{"normal.load": "4 kN"})
+    scene = replace(loads(text, "a.toml", ["normal.load=4 kN"]), written=None)
+    assert remember_written(scene, 1).written is scene
