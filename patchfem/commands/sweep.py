@@ -194,8 +194,12 @@ def sweep(
     if not quiet:
         for text in axes.describe_ranges(what.over if what else ()):
             note(text)
-        if wrong := parse_request.warn_of_invalid_cases(sweep_scene, cases):
-            note(wrong)
+        for text in (
+            parse_request.warn_of_invalid_cases(sweep_scene, cases),
+            sweep_scene.note_bolted_joint(),
+        ):
+            if text:
+                note(text)
     line = Progress(quiet)
     try:
         place = run.SweepTarget(target, resume, keep or "", part, not no_page)

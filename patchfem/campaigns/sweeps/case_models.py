@@ -21,6 +21,7 @@ from ... import __version__
 from ...core import PatchfemError
 from ...disk.file_hashes import hash_named_files, iterate_texts
 from ...model.model import Model, build
+from ...model.rig import JOINT_SCENES
 from ...model.similar_models import SimilarModels
 from ...scene.files import require_files
 from ...scene.overrides import BaseScene
@@ -136,6 +137,17 @@ class SweepScene:
         except SceneError as error:
             return _format_case_errors(error)
         return []
+
+    def note_bolted_joint(self) -> str:
+        """Return a note on the joint that is subtracted from modes that were measured with it; "" without them."""
+        base = _get_cached_base(self).scene
+        structure = None if base is None else base.scene.structure
+        if structure is None or structure.measured == "free":
+            return ""
+        return (
+            "the modes were measured with the joint bolted, so the stiffness of the joint of "
+            f"{JOINT_SCENES[structure.measured_joint]} is subtracted from them"
+        )
 
     def read_axes(self) -> tuple[list, list[str]]:
         """Return the axes of the table [sweep] and its validation errors; both are [] without a table."""
