@@ -122,13 +122,6 @@ class Model:
         bolted = None if self.rig is None else self.rig.structure.bolted
         return bolted is not None and bolted.build_rig is not None
 
-    def with_coarse_joint(self) -> Model:
-        """Return the model of a comparison run on a coarser mesh, from which its own joint is subtracted."""
-        bolted = self.rig.structure.bolted
-        if bolted is None or bolted.coarse_rig is None:
-            return self
-        return replace(self, rig=replace(bolted.coarse_rig, drive=self.rig.drive))
-
     def describe_removed_joint(self) -> list[str]:
         """Return a list with a sentence on the joint that was subtracted from the modes, or []."""
         bolted = None if self.rig is None else self.rig.structure.bolted

@@ -181,8 +181,6 @@ class BoltedJoint(NamedTuple):
       None if the stiffness follows from the friction laws alone.
     - model: Model of the scene with this joint; None if it is the model of the rig itself.
     - stuck_stiffness: stiffness [N/m] of the solved patch of the rig in full stick; None without one.
-    - coarse_rig: rig of a comparison run on a coarser mesh, from which its own joint was subtracted; None if it is
-      the rig itself.
     """
 
     scene: str
@@ -190,7 +188,6 @@ class BoltedJoint(NamedTuple):
     build_rig: Callable | None = None
     model: object = None
     stuck_stiffness: float | None = None
-    coarse_rig: "Rig | None" = None
 
 
 @dataclass(frozen=True, eq=False, slots=True)

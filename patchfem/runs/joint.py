@@ -1,13 +1,12 @@
 """Removal of a joint from the modes of a rig that were measured with the joint bolted.
 
 In: a model with such modes, and its solved patch. Out: the model with the modes without the joint, and the
-patch whose shear compliance has the same stiffness in full stick as the joint.
+patch with the same stiffness in full stick as the joint.
 
 The stiffness that is subtracted is the extrapolated one that a run prints (`tangential_stiffness`), not
-that of the finest mesh. The compliance of the patch is scaled to the same stiffness, so that a sticking
-joint gives the measured frequency again. The comparison run on a coarser mesh has a stiffness that
-differs by the error of the extrapolated one, in the modes and in the patch, so that this error enters
-the errors of all measures.
+that of the finest mesh. Springs at the edges of the contact give the patch this stiffness on each mesh, so that
+a sticking joint has the measured frequency again. In one more comparison run the joint is stiffer by the error of
+this stiffness, in the modes and in the patch, so that this error enters the errors of all measures.
 """
 
 from collections.abc import Sequence
@@ -22,6 +21,7 @@ from ..friction import record
 from ..model.model import Model
 from ..model.source import locate_errors
 from ..model.structure import compute_sticking_stiffness
+from ..slip.edge_springs import add_edge_springs
 from .patch import result as patch_result
 from .patch import store
 from .patch.jenkins_elements import elements, strip_elements
@@ -32,10 +32,19 @@ class FreeRig(NamedTuple):
 
     - model: Model whose modes are those without the joint.
     - patches: the patch, from fine to coarse; None for a missing mesh; empty without [contact].
+    - stiffer: the same for a joint that is stiffer by the error of its stiffness; None without such a joint.
     """
 
     model: Model
     patches: Sequence
+    stiffer: "FreeRig | None" = None
+
+
+class _StickStiffness(NamedTuple):
+    """Tangential stiffness of a patch in full stick, without the bonds of its law, and its error [N/m]."""
+
+    value: float
+    error: float
 
 
 def solve_without_joint(model: Model) -> FreeRig:
@@ -88,19 +97,28 @@ def remove_joint(model: Model, patches: Sequence) -> FreeRig:
     if not model.has_bolted_patch:
         return FreeRig(model, patches)
     bolted = model.rig.structure.bolted
+    written = bolted.model or model
     with locate_errors(model.source):
-        patches = _scale_shear(model, patches)
-        own = _compute_stiffnesses(model, patches)
-        taken_off = own
-        if bolted.model is not None:
-            written = bolted.model
-            taken_off = _compute_stiffnesses(written, _scale_shear(written, solve_patch(written)))
-        rig, *coarse_rigs = map(bolted.build_rig, taken_off)
-        removed = bolted._replace(build_rig=None, stiffness=(taken_off[0],), stuck_stiffness=own[0])
-        if coarse_rigs and len(own) > 1:
-            removed = removed._replace(coarse_rig=coarse_rigs[0])
-        rig = replace(rig, structure=replace(rig.structure, bolted=removed))
-        return FreeRig(replace(model, rig=rig), patches)
+        written_patches = patches if bolted.model is None else solve_patch(written)
+        own = _find_stick_stiffness(model, patches)
+        taken_off = _find_stick_stiffness(written, written_patches)
+
+        def subtract(n_errors: float) -> FreeRig:
+            """Subtract the joint with a stiffness that is larger by a number of its errors."""
+            own_patches = _match_stiffness(patches, own, n_errors)
+            written_patch, *_ = _match_stiffness(written_patches, taken_off, n_errors)
+            stiffness = compute_full_stick_stiffness(written, written_patch)
+            rig = bolted.build_rig(stiffness)
+            removed = bolted._replace(
+                build_rig=None,
+                stiffness=(stiffness,),
+                stuck_stiffness=compute_full_stick_stiffness(model, own_patches[0]),
+            )
+            rig = replace(rig, structure=replace(rig.structure, bolted=removed))
+            return FreeRig(replace(model, rig=rig), own_patches)
+
+        free = subtract(0.0)
+        return free if own is None else free._replace(stiffer=subtract(1.0))
 
 
 def compute_full_stick_stiffness(model: Model, patch) -> float:
@@ -123,12 +141,6 @@ def compute_full_stick_stiffness(model: Model, patch) -> float:
     return _sum_elements(patch, f.static, f.static * load / stiffness)
 
 
-def _compute_stiffnesses(model: Model, patches: Sequence) -> list:
-    """Return the stiffness [N/m] of a joint on its mesh and, if there is one, on a coarser mesh."""
-    solved = [patch for patch in patches[:2] if patch is not None]
-    return [compute_full_stick_stiffness(model, patch) for patch in solved]
-
-
 def _sum_elements(patch, static: float, length: float) -> float:
     """Return the summed stiffness [N/m] of the elements of a patch, with bonds of a length [m]."""
     if patch.strips is not None:
@@ -137,39 +149,48 @@ def _sum_elements(patch, static: float, length: float) -> float:
     return float(elements(patch, static, length).stiffness.sum())
 
 
-def _scale_shear(model: Model, patches: Sequence) -> list:
-    """Scale the shear compliance of a patch to the extrapolated stiffness in full stick.
+def _find_stick_stiffness(model: Model, patches: Sequence) -> _StickStiffness | None:
+    """Return the stiffness of a patch in full stick; None for a rigid or unloaded patch.
 
-    A patch on a coarser mesh gets a stiffness that differs from it by its error, to the side on which
-    the coarser mesh lies. Without this error, and for pieces that are rigid in shear, the patches are
-    returned unchanged, so that each one has the stiffness of its own mesh.
+    It is the extrapolated one in series with the holder. Without it, for strips and for pieces that are rigid in
+    shear, it is that of the finest mesh, with the change from the coarser mesh as error.
     """
-    fine, coarse, *others = patches
+    fine, coarse, *_ = patches
+    if not (model.partial_slip and fine.pressure.load > 0):
+        return None
     measure = (fine.measures or {}).get("tangential_stiffness")
     is_known = measure is not None and None not in (measure.value, measure.error)
-    if not (model.patch.interface.has_shear and is_known and fine.pressure.load > 0):
+    if is_known and model.patch.interface.has_shear and fine.strips is None:
+        holder_compliance = 0.0
+        if model.patch.loading.tangential_stiffness is not None:
+            holder_compliance = 1 / model.patch.loading.tangential_stiffness
+        value = 1 / (1 / measure.value + holder_compliance)
+        return _StickStiffness(value, measure.error * (value / measure.value) ** 2)
+    value = _sum_elements(fine, 1.0, 0.0)
+    if coarse is None or not coarse.pressure.load > 0:
+        return _StickStiffness(value, 0.0)
+    return _StickStiffness(value, abs(_sum_elements(coarse, 1.0, 0.0) - value))
+
+
+def _match_stiffness(patches: Sequence, stiffness: _StickStiffness | None, n_errors: float) -> list:
+    """Return patches with a given stiffness in full stick, plus a number of its errors."""
+    if stiffness is None:
         return list(patches)
-    holder = model.patch.loading.tangential_stiffness
-    own_stiffness = _pieces_stiffness(fine, holder)
-    fine = _with_pieces_stiffness(fine, holder, measure.value)
-    if coarse is not None and coarse.pressure.load > 0:
-        difference = np.sign(_pieces_stiffness(coarse, holder) - own_stiffness) * measure.error
-        coarse = _with_pieces_stiffness(coarse, holder, measure.value + difference)
-    return [fine, coarse, *others]
+    target = stiffness.value + n_errors * stiffness.error
+    out = []
+    for patch in patches:
+        if patch is not None and patch.pressure.load > 0:
+            patch = replace(patch, slip_compliance=_match_compliance(patch, target))
+        out.append(patch)
+    return out
 
 
-def _pieces_stiffness(patch, holder: float | None) -> float:
-    """Return the stiffness [N/m] of a patch in full stick, without its holder [N/m] in series."""
-    stiffness = _sum_elements(patch, 1.0, 0.0)
-    return stiffness if holder is None else 1 / (1 / stiffness - 1 / holder)
-
-
-def _with_pieces_stiffness(patch, holder: float | None, stiffness: float):
-    """Return a patch with a given stiffness [N/m] in full stick, without its holder [N/m] in series."""
-    holder_compliance = 0.0 if holder is None else 1 / holder
-    factor = _pieces_stiffness(patch, holder) / stiffness
-    compliance = holder_compliance + factor * (patch.slip_compliance - holder_compliance)
-    return replace(patch, slip_compliance=frozen_array(compliance))
+def _match_compliance(patch, stiffness: float) -> np.ndarray:
+    """Return the tangential compliance (m, m) [m/N] of a patch with a given stiffness [N/m] in full stick."""
+    if patch.strips is None:
+        return add_edge_springs(patch.slip_compliance, patch.pressure.sigma_n > 0, stiffness)
+    # The strips share a compliance but not their edges, so that all of it is scaled.
+    return frozen_array(patch.slip_compliance * (_sum_elements(patch, 1.0, 0.0) / stiffness))
 
 
 def stuck_patch_stiffness(model: Model, patch, coarse: tuple):

@@ -194,7 +194,7 @@ def _make_plan(model: Model) -> Plan:
     motion_sentences = []
     if model.has_bolted_patch:
         build_rig = rig.structure.bolted.build_rig
-        model, patches = joint.solve_without_joint(model)
+        model, patches, _ = joint.solve_without_joint(model)
         values = {name: measure.value for name, measure in patches[0].measures.items()}
         # The run subtracts the joint again, because its comparison run needs the solved patch.
         bolted = model.rig.structure.bolted._replace(build_rig=build_rig)

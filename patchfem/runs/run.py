@@ -119,13 +119,16 @@ def _run_plan(
     warnings = list(model.source.remarks)
     notes = list(model.source.notes)
     meshes = PatchMeshes()
+    stiffer = None
     if model.rig is not None:
         warnings += engines.describe_unused_settings(model, run_plan.engine)
     if model.patch is not None:
         meshes = _solve_contact_patch(model, estimate=estimate, fresh=fresh)
         seconds["contact"] = perf_counter() - start
         if model.has_bolted_patch:
-            model, (patch, *coarse) = joint.remove_joint(model, (meshes.patch, *meshes.coarse))
+            model, (patch, *coarse), stiffer = joint.remove_joint(
+                model, (meshes.patch, *meshes.coarse)
+            )
             meshes = meshes._replace(patch=patch, coarse=tuple(coarse))
             run_plan = replace(run_plan, model=model)
         warnings += _warn_of_coarse_patch_mesh(model, meshes, estimate=estimate)
@@ -138,7 +141,7 @@ def _run_plan(
         notes += faces.collect_notes(model)
         seconds["contact"] = perf_counter() - start
     inputs = RunInputs(
-        run_plan, meshes.patch, meshes.coarse, seconds, warnings, say, progress, estimate
+        run_plan, meshes.patch, meshes.coarse, seconds, warnings, say, progress, estimate, stiffer
     )
     if _is_open(meshes.patch) and model.kind != "patch":
         result = patch_result.make_static_result(replace(inputs, warnings=[*warnings, NO_MOTION]))

@@ -72,7 +72,7 @@ def compute_decay_curve(joint: JointMode, amplitudes, progress=None) -> Curve:
             f"motion of other modes is more than {100 * MAX_OTHER_MODES:.0f} % of its amplitude"
         )
     mesh_error, reason = decays.estimate_decay_mesh_errors(
-        joint.model, joint.patch, joint.coarse, amplitudes, lambda laws: joint.mode
+        joint.model, joint.patch, joint.coarse, amplitudes, lambda laws: joint.mode, joint.stiffer
     )
     error = np.fmax(identified.run_error, mesh_error) + identified.evaluation_error
     notes = [
@@ -186,12 +186,8 @@ class _CoarserReleases:
     def evaluate_run(self, settings) -> np.ndarray:
         """Return frequency and damping of a coarser run; NaN at amplitudes it does not reach."""
         if settings not in self.computed:
-            patch = self.joint.patch
-            model = self.release.model
-            if settings.coarse_patch:
-                patch = self.joint.coarse
-                model = model.with_coarse_joint()
-            solution = solve.solve_rig(model, replace(settings, whole=True), patch)
+            patch = self.joint.coarse if settings.coarse_patch else self.joint.patch
+            solution = solve.solve_rig(self.release.model, replace(settings, whole=True), patch)
             decay = identify_decay(self.joint, solution.response).interpolate(self.amplitudes)
             self.computed[settings] = np.array([decay.frequency, decay.damping])
         return self.computed[settings]

@@ -13,7 +13,7 @@ from ...dynamics.harmonic.forces import LawGroup
 from ...effects import describe_unsupported, law_has_trait
 from ...model.model import Model
 from ...response.errors import convergence_error
-from ...runs.joint import solve_without_joint
+from ...runs.joint import FreeRig, solve_without_joint
 from ...runs.plan import plan
 from ...runs.rig import decays
 from ...runs.rig.plan import stuck_stiffnesses
@@ -71,6 +71,8 @@ class JointMode(NamedTuple):
         Tangential stiffness [N/m] of each interface while nothing slips.
     has_errors : bool
         Whether the errors of the mesh and of the cells of a law are computed.
+    stiffer : FreeRig or None
+        Rig and patch with a stiffer joint, if a joint was subtracted from the modes.
     """
 
     model: Model
@@ -80,6 +82,7 @@ class JointMode(NamedTuple):
     stuck_mode: StuckMode
     stiffness: np.ndarray
     has_errors: bool = True
+    stiffer: FreeRig | None = None
 
     @property
     def modes(self):
@@ -266,7 +269,7 @@ class JointMode(NamedTuple):
         if has_partial_slip:
             error = error + decays.estimate_mesh_error(
                 group,
-                decays.make_laws_on_coarse_meshes(model, self.coarse),
+                decays.make_laws_on_coarse_meshes(model, self.coarse, self.stiffer),
                 lambda laws: compute(self.with_modes(laws.modes, laws.stiffness()), laws),
             )
         if has_cells:
@@ -308,9 +311,10 @@ def build_joint(model: Model, name: str) -> JointMode:
             "structure",
         )
     patch = None
+    stiffer = None
     coarser: tuple = (None,)
     if model.patch is not None:
-        model, (patch, *others) = solve_without_joint(model)
+        model, (patch, *others), stiffer = solve_without_joint(model)
         coarser = (*others, None)
     number = _find_mode(model.rig, name)
     modes = model.rig.modes
@@ -319,7 +323,9 @@ def build_joint(model: Model, name: str) -> JointMode:
         refusal = describe_unsupported("a backbone with interfaces that slide in a plane", "out")
         raise PatchfemError(refusal, f"{lateral[0].key}.lateral")
     free_mode = StuckMode(None, np.eye(modes.omega.size)[number])
-    joint = JointMode(model, patch, coarser, number, free_mode, np.zeros(len(modes.interfaces)))
+    joint = JointMode(
+        model, patch, coarser, number, free_mode, np.zeros(len(modes.interfaces)), stiffer=stiffer
+    )
     if not joint.is_linear:
         planned = joint._replace(stiffness=stuck_stiffnesses(model.rig, plan(model).chain))
         stiffness = _stuck_stiffness(planned)

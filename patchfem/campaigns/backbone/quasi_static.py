@@ -140,9 +140,8 @@ def _compute_from_bench_loops(joint: JointMode, amplitudes) -> Curve:
     error = ROUND_OFF_ERROR * np.abs(best)
     for moved in (loops_with_tip_error, loops_with_area_error):
         error += np.abs(_compute_from_loops(joint, slides, moved) - best)
-    coarse_modes = joint.model.with_coarse_joint().rig.modes
-    if coarse_modes is not joint.modes:
+    if joint.stiffer is not None:
         # The stiffness of the joint that is subtracted from bolted modes has an error of its own.
-        coarse_joint = joint.with_modes(coarse_modes, joint.stiffness)
-        error += np.abs(_compute_from_loops(coarse_joint, slides, loops) - best)
+        stiffer = joint.with_modes(joint.stiffer.model.rig.modes, joint.stiffness)
+        error += np.abs(_compute_from_loops(stiffer, slides, loops) - best)
     return _select_rising_part(best, error)

@@ -94,7 +94,7 @@ class ModelReadings:
         The contact is solved again only if a free parameter changes it.
         """
         if model.has_bolted_patch:
-            model, patches = solve_without_joint(model)
+            model, patches, _ = solve_without_joint(model)
             return model, patches[0]
         return model, self._get_solved_patch(model)
 

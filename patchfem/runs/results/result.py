@@ -39,6 +39,8 @@ class RunInputs:
     - warnings: sentences on the scene and the patch.
     - say, progress: callbacks for a line of text and for the completed fraction, or None.
     - estimate: whether to estimate the errors from coarser runs.
+    - stiffer: rig and patch with a stiffer joint (`joint.FreeRig`), if a joint was subtracted from the
+      modes; else None.
     """
 
     plan: object
@@ -49,6 +51,7 @@ class RunInputs:
     say: Callable | None
     progress: Callable | None
     estimate: bool
+    stiffer: object = None
 
 
 @dataclass(frozen=True, eq=False, slots=True)

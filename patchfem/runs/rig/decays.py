@@ -125,12 +125,20 @@ def make_laws_on_mesh(model, patch, meshed: tuple = ()):
     )
 
 
-def make_laws_on_coarse_meshes(model, coarse) -> list:
+def make_laws_on_coarse_meshes(model, coarse, stiffer=None) -> list:
     """Return a list of friction laws of a rig, each with one patch on its coarser mesh.
 
-    `coarse` is the Patch of [contact] on a coarser mesh, or None.
+    Parameters
+    ----------
+    model : Model
+    coarse : Patch or None
+        Patch of [contact] on a coarser mesh.
+    stiffer : joint.FreeRig, optional
+        Rig and patch with a stiffer joint, whose laws are added to the list.
     """
-    laws = [] if coarse is None else [make_laws_on_mesh(model.with_coarse_joint(), coarse)]
+    laws = [] if coarse is None else [make_laws_on_mesh(model, coarse)]
+    if stiffer is not None:
+        laws.append(make_laws_on_mesh(stiffer.model, stiffer.patches[0]))
     for numbers in faces.group_interfaces_with_coarse_mesh(model):
         laws.append(make_laws_on_mesh(model, None, numbers))
     return laws
@@ -215,7 +223,7 @@ def _spread_elements(stiffness, slide) -> tuple:
     return spread_elements(stiffness[order], slide[order])
 
 
-def estimate_decay_mesh_errors(model, patch, coarse, amplitudes, find_mode) -> tuple:
+def estimate_decay_mesh_errors(model, patch, coarse, amplitudes, find_mode, stiffer=None) -> tuple:
     """Estimate the mesh errors of frequency and damping ratio of a mode.
 
     Parameters
@@ -228,6 +236,8 @@ def estimate_decay_mesh_errors(model, patch, coarse, amplitudes, find_mode) -> t
         is found.
     find_mode : callable
         Function of a LawGroup that returns the index of the mode.
+    stiffer : joint.FreeRig, optional
+        Rig and patch with a stiffer joint, if a joint was subtracted from the modes.
 
     Returns
     -------
@@ -247,7 +257,7 @@ def estimate_decay_mesh_errors(model, patch, coarse, amplitudes, find_mode) -> t
         mode_index = find_mode(fine)
         error = estimate_mesh_error(
             fine,
-            make_laws_on_coarse_meshes(model, coarse),
+            make_laws_on_coarse_meshes(model, coarse, stiffer),
             lambda laws: compute_static_curve(
                 laws.modes, laws, mode_index, amplitudes, balance.SAMPLES_PER_CYCLE
             )[1:3],
@@ -269,7 +279,9 @@ def _interpolate_over_amplitude(amplitudes, known_amplitudes, rows) -> np.ndarra
     return np.array([np.interp(at, known, row) for row in rows])
 
 
-def estimate_stuck_mode_mesh_errors(amplitude, frequency: float, model, patch, coarse) -> tuple:
+def estimate_stuck_mode_mesh_errors(
+    amplitude, frequency: float, model, patch, coarse, stiffer=None
+) -> tuple:
     """Estimate the mesh errors of frequency and damping ratio of a mode with stuck interfaces.
 
     Parameters
@@ -280,12 +292,19 @@ def estimate_stuck_mode_mesh_errors(amplitude, frequency: float, model, patch, c
         [Hz].
     model : Model
     patch, coarse : Patch or None
-        See `estimate_decay_mesh_errors`.
+        Patch of [contact], and the same on a coarser mesh.
+    stiffer : joint.FreeRig, optional
+        Rig and patch with a stiffer joint, if a joint was subtracted from the modes.
     """
     low, high = np.log10([amplitude.min(), amplitude.max()])
     at = np.logspace(low, high, 2 + int(AMPLITUDES_PER_DECADE * (high - low)))
     errors, reason = estimate_decay_mesh_errors(
-        model, patch, coarse, at, lambda laws: _find_nearest_mode(model.rig.modes, laws, frequency)
+        model,
+        patch,
+        coarse,
+        at,
+        lambda laws: _find_nearest_mode(model.rig.modes, laws, frequency),
+        stiffer,
     )
     return _interpolate_over_amplitude(amplitude, at, errors), reason
 

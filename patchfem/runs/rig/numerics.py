@@ -41,6 +41,7 @@ class Numerics:
     - richer: whether the run has more modes of a reduced structure.
     - meshed: indices of the interfaces whose patches have a coarser mesh.
     - coarse_patch: whether the patch of [contact] has a coarser mesh.
+    - stiffer_joint: whether a joint that is subtracted from bolted modes is stiffer by its error.
     """
 
     engine: str
@@ -58,6 +59,7 @@ class Numerics:
     richer: bool = False
     meshed: tuple = ()
     coarse_patch: bool = False
+    stiffer_joint: bool = False
 
     def finer(self):
         """Return finer settings for the next run.

@@ -168,6 +168,7 @@ def add_decay_curve(run: CoupledRun) -> CoupledRun:
             model,
             run.patch,
             coarse,
+            run.inputs.stiffer,
         )
         measures = dict(run.measures)
         for name, error in zip(("ring_frequency", "ring_damping"), errors[:, 0]):
@@ -179,7 +180,12 @@ def add_decay_curve(run: CoupledRun) -> CoupledRun:
         run = replace(run, measures=measures)
     if run.decay is not None:
         errors, causes["the decay curve"] = decays.estimate_stuck_mode_mesh_errors(
-            run.decay.amplitude, run.decay.frequency[-1], model, run.patch, coarse
+            run.decay.amplitude,
+            run.decay.frequency[-1],
+            model,
+            run.patch,
+            coarse,
+            run.inputs.stiffer,
         )
         decay = run.decay._replace(
             frequency_error=np.fmax(run.decay.frequency_error, errors[0]),

@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import Outcome, PatchfemError
-from ...response.errors import add_errors
+from ...response.coarser import CoarserRuns
+from ...response.errors import absolute_change, add_errors
 from ...response.reasons import find_missing_unbounded
 from ...response.rows import set_final_floors
 from ...response.settling import slip_period
@@ -135,6 +136,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> RefinedRun:
         *engine.coarser_in_space(model, numerics, inputs.patch, inputs.coarse[0], solution),
         *engine.list_runs_with_more_modes(model, numerics),
     ]
+    space_runs += _list_joint_runs(inputs, space_runs)
     space_errors = runner.estimate_errors(space_runs, solution)
     displacement_errors = []  # Error of the displacement [m] of each run, from coarse to fine.
     while True:
@@ -167,6 +169,22 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> RefinedRun:
     measures |= compute_peak_frequency(solution.extra, runner.solutions.values())
     solution = replace(solution, extra=solution.extra | {"step_runs": step_runs})
     return RefinedRun(numerics, solution, measures)
+
+
+def _list_joint_runs(inputs: RunInputs, space_runs: list) -> list:
+    """List the comparison run with a stiffer joint, if a joint was subtracted from the modes.
+
+    Its stiffness is larger by the error of the stiffness that was subtracted, so that the change of a
+    measure is its error. The run has the steps of the run on a coarser mesh.
+    """
+    if inputs.stiffer is None:
+        return []
+    joint_runs = []
+    for kind in space_runs:
+        if kind.runs and kind.runs[0].coarse_patch:
+            stiffer = replace(kind.runs[0], coarse_patch=False, stiffer_joint=True)
+            joint_runs.append(CoarserRuns((stiffer,), absolute_change, kind.reference, "mesh"))
+    return joint_runs
 
 
 def _count_slip_period_cycles(model, numerics, solution) -> int:

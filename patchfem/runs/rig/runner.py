@@ -73,7 +73,9 @@ class Runner:
         patch = self.inputs.patch
         if numerics.coarse_patch:
             patch = self.inputs.coarse[0]
-            model = model.with_coarse_joint()
+        if numerics.stiffer_joint:
+            stiffer_model, (patch, *_) = self.inputs.stiffer[:2]
+            model = replace(stiffer_model, rig=replace(stiffer_model.rig, drive=model.rig.drive))
         report = self.progress.make_callback(numerics.steps)
         begin = process_time()
         solution = solve_rig(model, numerics, patch, frames, say, report)
