@@ -69,6 +69,7 @@ def backbone_data(backbone: Backbone) -> dict:
     return {
         "mode": backbone.mode,
         "free_frequency": frequencies.free,
+        "free_frequency_error": frequencies.free_error,
         "stuck_frequency": frequencies.stuck,
         "stuck_frequency_error": frequencies.stuck_error,
         "curves": curves,
@@ -353,20 +354,21 @@ def _format_point(curve: Curve, k: int) -> FormattedPoint:
     )
 
 
-def _format_stuck(backbone: Backbone) -> str:
-    """Format the frequency of the mode while the contact sticks, with its error if the error is known."""
-    _, stuck, error = backbone.frequencies
+def _format_frequency(value: float, error: float | None) -> str:
+    """Format a natural frequency [Hz] with its error [Hz], which may be 0 or None."""
     if error:
-        return formatting.format_value(stuck, error, unit="Hz")
-    return formatting.format_quantity(stuck, "Hz", 5)
+        return formatting.format_value(value, error, unit="Hz")
+    return formatting.format_quantity(value, "Hz", 5)
 
 
 def summarise_backbone(backbone: Backbone) -> list:
     """Return sentences on the results of a backbone, first on both ends of its best curve."""
-    free = formatting.format_quantity(backbone.frequencies.free, "Hz", 5)
+    frequencies = backbone.frequencies
+    free = _format_frequency(frequencies.free, frequencies.free_error)
     stuck = ""
-    if backbone.frequencies.stuck is not None:
-        stuck = f", and {_format_stuck(backbone)} while the contact sticks"
+    if frequencies.stuck is not None:
+        text = _format_frequency(frequencies.stuck, frequencies.stuck_error)
+        stuck = f", and {text} while the contact sticks"
     out = [f"The natural frequency of mode {backbone.mode} is {free} without the contact{stuck}."]
     methods = [method for method in PREFERRED_METHODS if method in backbone.curves]
     curve = backbone.curves[methods[0]] if methods else None

@@ -44,7 +44,7 @@ PUBLIC = {
     ),
     "bench.errors": ("estimate_bench_errors",),
     "bench.ledger": ("BenchOptions",),
-    "joint": ("stuck_patch_stiffness",),
+    "joint": ("find_stuck_patch_stiffness",),
     "patch.faces": (
         "NO_ERROR_ESTIMATE",
         "has_error_meshes",

@@ -40,7 +40,7 @@ class FreeRig(NamedTuple):
     stiffer: "FreeRig | None" = None
 
 
-class _StickStiffness(NamedTuple):
+class StickStiffness(NamedTuple):
     """Tangential stiffness of a patch in full stick, without the bonds of its law, and its error [N/m]."""
 
     value: float
@@ -149,30 +149,30 @@ def _sum_elements(patch, static: float, length: float) -> float:
     return float(elements(patch, static, length).stiffness.sum())
 
 
-def _find_stick_stiffness(model: Model, patches: Sequence) -> _StickStiffness | None:
+def _find_stick_stiffness(model: Model, patches: Sequence) -> StickStiffness | None:
     """Return the stiffness of a patch in full stick; None for a rigid or unloaded patch.
 
-    It is the extrapolated one in series with the holder. Without it, for strips and for pieces that are rigid in
-    shear, it is that of the finest mesh, with the change from the coarser mesh as error.
+    It is the extrapolated one in series with the holder. Without it, and for pieces that are rigid in shear, it is
+    that of the finest mesh, with the change from the coarser mesh as error.
     """
     fine, coarse, *_ = patches
     if not (model.partial_slip and fine.pressure.load > 0):
         return None
     measure = (fine.measures or {}).get("tangential_stiffness")
     is_known = measure is not None and None not in (measure.value, measure.error)
-    if is_known and model.patch.interface.has_shear and fine.strips is None:
+    if is_known and model.patch.interface.has_shear:
         holder_compliance = 0.0
         if model.patch.loading.tangential_stiffness is not None:
             holder_compliance = 1 / model.patch.loading.tangential_stiffness
         value = 1 / (1 / measure.value + holder_compliance)
-        return _StickStiffness(value, measure.error * (value / measure.value) ** 2)
+        return StickStiffness(value, measure.error * (value / measure.value) ** 2)
     value = _sum_elements(fine, 1.0, 0.0)
     if coarse is None or not coarse.pressure.load > 0:
-        return _StickStiffness(value, 0.0)
-    return _StickStiffness(value, abs(_sum_elements(coarse, 1.0, 0.0) - value))
+        return StickStiffness(value, 0.0)
+    return StickStiffness(value, abs(_sum_elements(coarse, 1.0, 0.0) - value))
 
 
-def _match_stiffness(patches: Sequence, stiffness: _StickStiffness | None, n_errors: float) -> list:
+def _match_stiffness(patches: Sequence, stiffness: StickStiffness | None, n_errors: float) -> list:
     """Return patches with a given stiffness in full stick, plus a number of its errors."""
     if stiffness is None:
         return list(patches)
@@ -193,28 +193,15 @@ def _match_compliance(patch, stiffness: float) -> np.ndarray:
     return frozen_array(patch.slip_compliance * (_sum_elements(patch, 1.0, 0.0) / stiffness))
 
 
-def stuck_patch_stiffness(model: Model, patch, coarse: tuple):
-    """Return the tangential stiffness [N/m] of a patch in full stick with its error, or None.
-
-    It is the extrapolated value that the run reports. It is None unless the pieces alone are
-    compliant.
+def find_stuck_patch_stiffness(model: Model, patches: Sequence) -> StickStiffness | None:
+    """Return the stiffness of a patch in full stick, or None unless the pieces alone are compliant.
 
     Parameters
     ----------
     model : Model
-    patch : Patch or None
-    coarse : tuple
-        The patch on coarser meshes; None for a missing one.
-
-    Returns
-    -------
-    Measure or None
+    patches : sequence of Patch or None
+        The patch of [contact] on its meshes, from fine to coarse; None for a missing mesh.
     """
-    if (
-        patch is None
-        or not model.partial_slip
-        or not law_has_trait(model.friction.law, "set-valued")
-    ):
+    if patches[0] is None or not law_has_trait(model.friction.law, "set-valued"):
         return None
-    measure = patch_result.static_measures(model, patch, tuple(coarse)).get("tangential_stiffness")
-    return None if measure is None or measure.value is None or measure.error is None else measure
+    return _find_stick_stiffness(model, patches)

@@ -11,7 +11,7 @@ from ...formatting import format_length
 from ...model.model import Model
 from ...model.source import locate_errors
 from ...response.errors import finer_errors
-from ...runs.joint import stuck_patch_stiffness
+from ...runs.joint import find_stuck_patch_stiffness
 from . import notes
 from .advice import write_advice
 from .balance import compute_balance_curve
@@ -241,14 +241,22 @@ def _mode_frequencies(joint: JointMode) -> ModeFrequencies:
     stuck = joint.stuck_mode.omega
     if stuck is None:
         return ModeFrequencies(free, None)
-    measure = stuck_patch_stiffness(model, joint.patch, joint.coarser)
+    stiffness = find_stuck_patch_stiffness(model, (joint.patch, *joint.coarser))
     # Modes that were measured with the joint include the stiffness of the joint.
     has_joint = len(modes.interfaces) > 1 or model.rig.structure.bolted is not None
-    if measure is None or has_joint:
-        return ModeFrequencies(free, stuck / (2 * np.pi))
-    stuck = _stuck_frequency(joint, measure.value)
-    high = _stuck_frequency(joint, measure.value + measure.error)
+    if stiffness is None or has_joint:
+        return ModeFrequencies(free, stuck / (2 * np.pi), free_error=_free_frequency_error(joint))
+    stuck = _stuck_frequency(joint, stiffness.value)
+    high = _stuck_frequency(joint, stiffness.value + stiffness.error)
     return ModeFrequencies(free, stuck, high - stuck)
+
+
+def _free_frequency_error(joint: JointMode) -> float:
+    """Return the error [Hz] of the frequency without the contact, due to the joint that was subtracted."""
+    if joint.stiffer is None:
+        return 0.0
+    omega = joint.stiffer.model.rig.modes.omega[joint.mode]
+    return abs(float(omega - joint.modes.omega[joint.mode])) / (2 * np.pi)
 
 
 def _stuck_frequency(joint: JointMode, stiffness: float) -> float:

@@ -83,12 +83,14 @@ def make_curve(amplitude, values, errors, **columns) -> Curve:
 class ModeFrequencies(NamedTuple):
     """Frequencies [Hz] of a mode without its contact and with a sticking contact.
 
-    stuck: None if the contact does not move in the mode; stuck_error: None if it is not known.
+    stuck: None if the contact does not move in the mode; stuck_error: None if it is not known; free_error: due to a
+    joint that was subtracted from the modes.
     """
 
     free: float
     stuck: float | None
     stuck_error: float | None = None
+    free_error: float = 0.0
 
 
 class LossExponents(NamedTuple):

@@ -17,7 +17,7 @@ from ...friction.laws.elastic_plastic import masing_loop
 from ...friction.record import make_law
 from ...model.model import Model, build
 from ...model.source import locate_errors
-from ...runs.joint import stuck_patch_stiffness
+from ...runs.joint import find_stuck_patch_stiffness
 from ...runs.patch import jenkins_elements, mesh_levels
 from ...scene.scene import Scene
 from .patch_laws import FITTED_LAWS, MIN_LOSS, LawProblem, LoopCurves
@@ -128,7 +128,7 @@ def fit_patch(scene: Scene, amplitudes=None) -> FittedPatch:
     with locate_errors(scene):
         _check_model(model)
         meshed = _solve_with_refined_mesh(model, amplitudes)
-        stuck = stuck_patch_stiffness(model, meshed.patch, meshed.coarser_patches or (None,))
+        stuck = find_stuck_patch_stiffness(model, (meshed.patch, *meshed.coarser_patches, None))
     elements = meshed.elements
     loops = PatchLoops(
         load=meshed.patch.pressure.load,
