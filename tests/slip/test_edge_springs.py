@@ -23,16 +23,18 @@ def stick_stiffness(compliance, loaded) -> float:
     return float(np.linalg.inv(compliance[np.ix_(points, points)]).sum())
 
 
-@pytest.mark.parametrize("ratio", [1.05, 1.0, 0.99, 0.9, 0.5])
+@pytest.mark.parametrize("ratio", [2.0, 1.002, 1.0, 0.99, 0.5])
 def test_exact_stiffness_is_that_prescribed(ratio):
-    """The matrix stays positive definite and has the prescribed stiffness, above and below its own."""
+    """The matrix stays positive definite and has the prescribed stiffness; a large change scales all of it."""
     compliance, limit = make_patch()
     target = ratio * stick_stiffness(compliance, limit > 0)
     changed = add_edge_springs(compliance, limit > 0, target)
     assert stick_stiffness(changed, limit > 0) == pytest.approx(target, rel=1e-9)
     assert np.linalg.eigvalsh(changed).min() > 0
-    inner = np.abs(np.arange(COUNT) - 20) < 12
-    assert (ratio < 0.6) or (changed == compliance)[np.ix_(inner, inner)].all()
+    if 0.9 < ratio < 1.1:
+        assert set(np.flatnonzero(np.diag(changed - compliance))) <= {4, 36}
+    else:
+        assert changed == pytest.approx(compliance / ratio, rel=1e-12)
 
 
 def test_exact_force_is_unchanged_once_the_edges_slip():
@@ -58,9 +60,9 @@ def test_two_contacts_have_edges_of_their_own():
     assert np.flatnonzero(np.diag(changed) - np.diag(compliance)).tolist() == [4, 17, 22, 36]
 
 
-def test_exact_scaled_compliance_of_a_few_nodes():
-    """If springs at the edges cannot give the stiffness, the whole compliance is scaled."""
+def test_exact_scaled_compliance_of_a_contact_without_edges():
+    """A contact that ends only at the ends of the interface has a scaled compliance."""
     compliance, _ = make_patch()
-    loaded = np.arange(COUNT) == 20
-    changed = add_edge_springs(compliance, loaded, 1e9 * stick_stiffness(compliance, loaded))
-    assert changed == pytest.approx(1e-9 * compliance, rel=1e-12)
+    loaded = np.ones(COUNT, bool)
+    changed = add_edge_springs(compliance, loaded, 0.99 * stick_stiffness(compliance, loaded))
+    assert changed == pytest.approx(compliance / 0.99, rel=1e-12)
