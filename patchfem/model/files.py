@@ -1,8 +1,8 @@
 """Check of the files that a scene names.
 
 Each file is read as a run reads it, so that a run does not refuse a file that passes here. Nothing is
-computed, and only the first bytes of a large mesh are examined. The module that reads a kind of file is
-imported only if a scene names such a file, because the imports are half of the time of a check.
+computed. The module that reads a kind of file is imported only if a scene names such a file, because
+the imports are half of the time of a check.
 """
 
 from pathlib import Path
@@ -25,17 +25,7 @@ from . import (
     structure_files,
     structure_reduced,
 )
-
-# File size in bytes above which only the start of a mesh file is examined.
-MAX_FULLY_READ_MESH_BYTES = 2 * 2**20
-MESH_START_BYTES = 4096  # number of bytes at the start of a mesh file that are examined
-# Text at the start of a mesh file, by its extension.
-MESH_STARTS = {
-    ".msh": (b"$MeshFormat",),
-    ".vtu": (b"<?xml", b"<VTKFile"),
-    ".inp": (b"*",),
-    ".unv": (b"-1", b"    -1"),
-}
+from .pieces import check_mesh_size
 
 
 def find_file_faults(
@@ -115,17 +105,13 @@ def _check_reduction(tables, folder: Path) -> list:
 
 
 def _check_mesh(path: Path, tables, *, is_valid: bool) -> None:
-    """Check a mesh file by reading it, or only its beginning if it is large."""
-    starts = MESH_STARTS.get(path.suffix)
-    if starts is None or path.stat().st_size <= MAX_FULLY_READ_MESH_BYTES:
+    """Check a mesh file by reading it, and compare its sizes with those of the scene."""
+    if not is_valid:
         files.read_pieces(path)
         return
-    with open(path, "rb") as file:
-        if not file.read(MESH_START_BYTES).lstrip().startswith(starts):
-            raise PatchfemError(
-                f"{path}: not a readable {path.suffix} file (the content does not start as in such a "
-                "file)"
-            )
+    _, unit = patch.find_mesh_file(tables.contact, Path)
+    pair = files.read_pieces(path, unit)
+    check_mesh_size(patch.build_pieces(tables.contact), pair.lower, pair.upper, unit)
 
 
 def _check_profile(path: Path, tables, *, is_valid: bool) -> tuple:

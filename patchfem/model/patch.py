@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from ..mesh.ends import SHARP_END, End
 from ..scene.keys.contact import Asperities, Coating, Contact, Material, OnePiece
+from ..scene.keys.quantities import UNIT_FACTORS
 from . import peaks, profile
 from .gap import DEFAULT_CELLS, Gap, ProfileLengths, find_shape_side, list_gap_shapes
 
@@ -203,6 +204,17 @@ class PrescribedSlip(NamedTuple):
     bond_length: float
 
 
+class MeshFile(NamedTuple):
+    """Mesh file of the two pieces.
+
+    - path: path of the file.
+    - unit: length unit [m] of its coordinates.
+    """
+
+    path: Path
+    unit: float
+
+
 @dataclass(frozen=True, slots=True)
 class PatchMesh:
     """Settings of the mesh of a patch.
@@ -219,7 +231,7 @@ class PatchMesh:
     """
 
     element_size: float | None
-    file: Path | None
+    file: MeshFile | None
     is_static: bool = False
     edge_motion: str = ""
     tolerance: float | None = None
@@ -349,10 +361,17 @@ def build_patch(contact: Contact, kind: str, resolve_path: Callable) -> PatchMod
         interface=PatchInterface(skin, strips, contact.shear is not None, contact.compliance_key),
         mesh=PatchMesh(
             element_size=contact.element_size,
-            file=resolve_path(contact.mesh) if contact.mesh is not None else None,
+            file=find_mesh_file(contact, resolve_path),
             is_static=kind == "patch",
         ),
     )
+
+
+def find_mesh_file(contact: Contact, resolve_path: Callable) -> MeshFile | None:
+    """Return the mesh file of a table [contact]; None if the mesh is made from the dimensions."""
+    if contact.mesh is None:
+        return None
+    return MeshFile(resolve_path(contact.mesh), UNIT_FACTORS["length"][contact.mesh_unit or "m"])
 
 
 def replace_loading_and_shapes(patch: PatchModel, contact: Contact) -> PatchModel:

@@ -50,7 +50,9 @@ def geometry_key(patch_model) -> tuple:
     mesh = patch_model.mesh
     gap = patch_model.gap
     file = mesh.file
-    modification_time = file.stat().st_mtime_ns if file is not None and file.exists() else 0
+    modification_time = (
+        file.path.stat().st_mtime_ns if file is not None and file.path.exists() else 0
+    )
     return (
         patch_model.pieces,
         mesh.element_size,
