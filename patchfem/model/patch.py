@@ -195,8 +195,7 @@ class PrescribedSlip(NamedTuple):
 
     - amplitude: half the range of the slide [m].
     - static: coefficient of friction.
-    - bond_length: bond length [m] of the springs of the law in series with the pieces, 0 without
-      them.
+    - bond_length: bond length [m]; 0 if the law has no springs.
     """
 
     amplitude: float

@@ -224,7 +224,7 @@ def _make_common_layout(
     ----------
     cases : list of PatchModel
     has_intermediate_cases : bool
-        Whether there are more cases, whose contacts end between those of neighbouring cases.
+        Whether the sweep contains cases between the given ones.
     halvings_by_case : dict
         Halvings of the cells by case, from `_count_extra_halvings`, beyond those that all cases need.
     """
