@@ -57,7 +57,8 @@ def measure_volumes(alignment: ScanAlignment, x, y) -> Volumes:
 
     A volume is the sum of the depths over the changed points and those around them. Its error
     combines two errors: that of the depth, from simulated error fields (`errors`), and that of steep
-    walls, which the instrument does not see. If another part may be unworn instead, each interval also covers the result for that part.
+    walls, which the instrument does not see. If another part may be unworn instead, each interval also
+    covers the result for that part.
     """
     first = _measure(alignment, x, y)
     if alignment.alternative is None:
