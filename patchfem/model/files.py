@@ -20,12 +20,12 @@ from . import (
     gap,
     patch,
     peaks,
+    pieces,
     profile,
     slide,
     structure_files,
     structure_reduced,
 )
-from .pieces import check_mesh_size
 
 
 def find_file_faults(
@@ -111,7 +111,7 @@ def _check_mesh(path: Path, tables, *, is_valid: bool) -> None:
         return
     _, unit = patch.find_mesh_file(tables.contact, Path)
     pair = files.read_pieces(path, unit)
-    check_mesh_size(patch.build_pieces(tables.contact), pair.lower, pair.upper, unit)
+    pieces.check_mesh_size(patch.build_pieces(tables.contact), pair.lower, pair.upper, unit)
 
 
 def _check_profile(path: Path, tables, *, is_valid: bool) -> tuple:
@@ -122,14 +122,14 @@ def _check_profile(path: Path, tables, *, is_valid: bool) -> tuple:
     contact = tables.contact
     if not is_valid or contact.mesh is not None:
         return ()
-    pieces = patch.build_pieces(contact)
-    even_cell = pieces.length / gap.DEFAULT_CELLS
-    n_cells = max(1, round(pieces.length / (contact.element_size or even_cell)))
-    x = np.linspace(-pieces.length / 2, pieces.length / 2, n_cells + 1)
+    patch_pieces = patch.build_pieces(contact)
+    even_cell = patch_pieces.length / gap.DEFAULT_CELLS
+    n_cells = max(1, round(patch_pieces.length / (contact.element_size or even_cell)))
+    x = np.linspace(-patch_pieces.length / 2, patch_pieces.length / 2, n_cells + 1)
     _, notes = profile.compute_profile_gap(
         path,
         x,
-        patch.find_profile_lengths(contact, pieces),
+        patch.find_profile_lengths(contact, patch_pieces),
         even_cell,
         is_rough=contact.asperities is not None,
         is_material=contact.profile.heights == "surface",
