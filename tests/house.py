@@ -63,6 +63,7 @@ RULES = {
     "D3": "a docstring begins with a tuple",
     "D4": "a docstring begins with What, Who, How many, With, As ...",
     "D5": "the first line of a docstring is not a sentence",
+    "D6": "the names in the section Parameters are not the parameters",
     "F1": "a function returns a bare tuple of 3 or more values",
     "F2": "a function has more than 6 parameters",
     "F3": "a flag that can be passed by position",
@@ -97,6 +98,8 @@ PREPOSITIONS = frozenset("after at before beyond by from in of over under withou
 VERBS_BEFORE_PREPOSITION = ("from_", "to_", "as_", "on_", "at_", "in_", "by_")
 AXES = frozenset("xyztnm_")  # letters of coordinates, time and counts need no explanation
 SECTION = re.compile(r"^ *(Parameters|Returns|Yields|Attributes)\n *---", re.M)
+# Lines of the section Parameters, without its end; a line that is not indented names parameters
+PARAMETERS = re.compile(r"^Parameters\n-+\n(.*?)(?=^\w+\n-+\n|\Z)", re.M | re.S)
 OPENING = re.compile(
     r"(What|Who|Whether what|How many|How far|That|With|As|Where|Why|Between which)\b"
 )
@@ -178,6 +181,12 @@ def parameter_rules(node, documentation: str):
     is_public = bool(documentation) and not node.name.startswith("_")
     if is_public and len(parameters) >= 3 and not SECTION.search(documentation):
         yield "D2", node, node.name
+    if section := PARAMETERS.search(documentation):
+        heads = re.findall(r"^(\S.*?)(?: : .*)?$", section[1], re.M)
+        documented = {name.strip(" *") for head in heads for name in head.split(",")}
+        stars = [arg for arg in (node.args.vararg, node.args.kwarg) if arg]
+        if documented != {arg.arg for arg in (*parameters, *stars)}:
+            yield "D6", node, f"{node.name}: {', '.join(sorted(documented))}"
 
 
 def docstring_rules(node, documentation: str):

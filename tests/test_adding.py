@@ -1,6 +1,7 @@
 """The examples of ADDING.md (new laws, shapes, drives and measures) run as printed on the page."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 import xarray
 from support import adding
 
-from patchfem.core import G_N
+from patchfem.core import G_N, Response
 
 PAGE = (adding.PACKAGE / "ADDING.md").read_text("utf-8")
 LATER = (
@@ -112,6 +113,19 @@ def test_always_ripple_contact_fraction_agrees_with_westergaard(example_folder):
     assert read_measures(example_folder / "waved")["contact_fraction"]["value"] == pytest.approx(
         touching, rel=0.1
     )
+
+
+def test_always_files_and_histories_of_page_exist():
+    """Every file that the page names exists, and it names every history that a measure can use."""
+    made = "# new file ", "NAME"
+    files = set(re.findall(r"`([\w./]+/[\w.]+|\w+\.(?:py|md|toml))`", PAGE))
+    assert len(files) > 20
+    for name in files:
+        if not any(word in name or word + name in PAGE for word in made):
+            places = (adding.PACKAGE, adding.PACKAGE / "friction", adding.PACKAGE.parent)
+            assert any((place / name).exists() for place in places), name
+    histories = [name for name in Response.__dataclass_fields__ if name != "extra"]
+    assert not [name for name in histories if f"`{name}`" not in PAGE]
 
 
 def test_refuses_shape_table_without_piece_key(tmp_path):

@@ -26,6 +26,8 @@ def solve_steps(matrix, load, *, is_linear=False):
     Parameters
     ----------
     matrix, load : arrays
+        Both of n rows.
+    is_linear : bool
     """
     low, high = limits(matrix)
     return [row * load for row in matrix if row], low
@@ -43,6 +45,7 @@ PLANTED = {
     "D2": 'def solve(first, second, third):\n    """Solve."""',
     "D3": 'def solve():\n    """(force, slip) of a rig."""',
     "D4": 'def solve():\n    """What a rig does."""',
+    "D6": 'def solve(modes, *drives):\n    """Solve.\n\n    Parameters\n    ----------\n    mode, drives : int\n    """',
     "D5": 'def solve():\n    """Solve a rig that has\n    two masses."""',
     "F1": "def solve():\n    return 1, 2, 3",
     "F2": "def solve(a1, a2, a3, a4, a5, a6, a7): pass",

@@ -20,6 +20,7 @@ from command_line import run_cli  # noqa: E402
 from scene_texts import BENCH, COULOMB, POINT, RIG, SHORT, SMALL_PATCH  # noqa: E402
 
 import patchfem as pf  # noqa: E402
+from patchfem.effects import LAWS  # noqa: E402
 
 NUMBER = re.compile(r"(?<![\w.])-?\d+(\.\d+)?(e[+-]?\d+)?")
 BLOCK = POINT + COULOMB + SHORT
@@ -110,8 +111,9 @@ def first_lines(text: str) -> str:
 
 
 def replace_numbers(text: str, folder: Path) -> str:
-    """Return a text with # for every number and FOLDER for the folder."""
-    return NUMBER.sub("#", text.replace(str(folder), "FOLDER")).strip()
+    """Return a text with # for every number, FOLDER for the folder and LAWS for the list of laws."""
+    text = text.replace(str(folder), "FOLDER").replace(", ".join(LAWS), "LAWS")
+    return NUMBER.sub("#", text).strip()
 
 
 def write_list(found: dict) -> None:

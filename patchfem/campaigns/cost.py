@@ -291,15 +291,17 @@ def compute_setting_costs(model: Model, setting_name: str, say=None) -> list:
 def _find_best_run(runs: list) -> Cost:
     """Return the reference run: that of the finest value or that of the automatic setting.
 
-    Of these two runs, it is the one with the smaller error estimates of most measures.
+    Of these two runs, it is the one whose least accurate measure has the smaller error estimate.
     """
     last = runs[-1]
     if last.value is not None:
         return last
     finest = runs[-2]
     common_names = last.errors.keys() & finest.errors.keys()
-    n_smaller = sum(last.errors[name] <= finest.errors[name] for name in common_names)
-    return last if 2 * n_smaller >= len(common_names) else finest
+    return min(
+        (last, finest),
+        key=lambda run: find_worst_error(run, common_names, run.tolerance).fraction,
+    )
 
 
 def _compute_distances(cost: Cost, best: Cost) -> dict:

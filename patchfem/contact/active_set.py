@@ -406,8 +406,8 @@ def find_rest_motion(problem: ContactProblem) -> np.ndarray:
 def guess_contact_set(compliance, problem: ContactProblem) -> np.ndarray:
     """Guess the nodes in contact from the gap between rigid pieces in equilibrium.
 
-    The load closes the gap by the geometric mean of what a point load and a uniform load would. Under a prescribed
-    approach these are the nodes that overlap.
+    The closing is estimated as the geometric mean of the deflections under a point load and under a uniform load.
+    Under a prescribed approach these are the nodes that overlap.
     """
     gap = problem.gap
     if not problem.target.size:

@@ -112,7 +112,7 @@ def find_relay_cycles(modes: ModalBasis, row, slip_force: float, stick_force: fl
         Modes, none of which is rigid.
     row : ndarray
         (n,) slide per coordinate.
-    slides, holds : float
+    slip_force, stick_force : float
         Kinetic and static friction force [N].
 
     Returns

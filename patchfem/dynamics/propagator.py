@@ -25,7 +25,7 @@ MAX_CACHED = 4
 MAX_CACHED_COORDINATES = 32
 # Largest product of fastest rate and step length [rad] that MAX_GAUSS_POINTS resolve.
 MAX_RATE_TIME = 20.0
-# Product of fastest rate and length of the short step that is doubled [rad].
+# Product [rad] of the fastest rate and the short step, which is doubled until it is the whole step.
 SHORT_STEP_RATE_TIME = 4.0
 
 

@@ -271,7 +271,26 @@ def _interface_picture(data: RunData) -> Picture | None:
             ". Only the part in contact is drawn; the whole length is "
             f"{(data.patch.x[-1] - data.patch.x[0]) * scale:.4g} {length}"
         )
-    return Picture(charts.interface_charts, (data.patch.x, fields), caption + ".")
+    caption += f".{_peak_pressure_sentence(data)}"
+    return Picture(charts.interface_charts, (data.patch.x, fields), caption)
+
+
+def _peak_pressure_sentence(data: RunData) -> str:
+    """State why the largest pressure drawn for a static patch is not `pressure_peak`; "" if both are equal."""
+    summary = data.verdict.summary
+    peak = summary["measures"].get("pressure_peak")
+    if summary["kind"] != "patch" or peak is None or peak["value"] is None:
+        return ""
+    drawn = float(np.max(data.patch.fields["normal_stress"]))
+    largest = formatting.format_quantity(drawn, "Pa", 4)
+    estimate = formatting.format_quantity(peak["value"], "Pa", 4)
+    if largest == estimate:
+        return ""
+    strips = any(effect["effect"] == "contact.strips" for effect in summary["effects"])
+    return (
+        f" The drawn pressures are means over the elements beside a node{' and over the strips' * strips}, at most "
+        f"{largest}; the measure pressure_peak, {estimate}, is the estimated maximum of the continuous pressure."
+    )
 
 
 def _faces_picture(data: RunData) -> Picture | None:

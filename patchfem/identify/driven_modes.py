@@ -326,10 +326,11 @@ def _find_starts(record: _ModeProblem, estimate: FrequencyResponse, residual) ->
 
 
 def _fit_estimate(estimate: FrequencyResponse, w, zeta, derivative: int) -> np.ndarray:
-    """Return the damping ratios (n,) of a fit to the windowed frequency response.
+    """Return the damping ratios (n,) of a fit to the windowed frequency response `estimate`.
 
-    `w` (n,) are the natural frequencies [rad/s]. Returns the damping ratios (n,); nan for a mode whose
-    frequency changes by 10 % or more.
+    The fit starts from the natural frequencies `w` (n,) [rad/s] and the damping ratios `zeta` (n,); `derivative` is
+    the number of time derivatives between displacement and response. The ratio is nan for a mode whose frequency
+    changes by 10 % or more.
     """
     fit = ModalFit(2 * np.pi * estimate.frequency, estimate.value[:, None], np.array([derivative]))
     theta, _ = fit.refine(np.log(np.concatenate([w, zeta])))

@@ -44,8 +44,9 @@ PUBLIC = {
     ),
     "shaped": ("shaped_grid",),
     "tensor": (
-        "ROW_GROWTH",
+        "ROW_SLOPE",
         "TensorGrid",
         "graded_grid",
+        "row_scale",
     ),
 }

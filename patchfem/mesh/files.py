@@ -7,6 +7,7 @@ one at y >= 0, and each has interface nodes of its own.
 
 import re
 from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 from typing import NamedTuple
@@ -36,7 +37,7 @@ def write_mesh(lower, path: Path, upper=None) -> None:
     Parameters
     ----------
     lower, upper : TensorGrid or PieceMesh
-        upper is None if it equals the lower piece.
+        Their coordinates are written in m; upper is None if it equals the lower piece.
     path : Path
         Its suffix selects the format: .msh or .vtu.
 
@@ -71,12 +72,14 @@ def write_mesh(lower, path: Path, upper=None) -> None:
         meshio.write(partial, mesh, **options)
 
 
-def read_bodies(path: Path) -> tuple:
+def read_bodies(path: Path, unit: float = 1.0) -> tuple:
     """Read a tagged mesh of any format as two tensor grids if possible, otherwise as unstructured meshes.
 
     Parameters
     ----------
     path : Path
+    unit : float
+        Length unit [m] of the coordinates in the file.
 
     Returns
     -------
@@ -89,11 +92,11 @@ def read_bodies(path: Path) -> tuple:
     PatchfemError
         As `read_pieces`.
     """
-    pair = read_pieces(path)
+    pair = read_pieces(path, unit)
     return recognise_grids(pair) or (pair.lower, pair.upper)
 
 
-def read_pieces(path: Path) -> PairMesh:
+def read_pieces(path: Path, unit: float = 1.0) -> PairMesh:
     """Read both pieces of a tagged mesh of triangles and quads: .msh, .vtu, .inp or .med.
 
     The interfaces need the same ends; their nodes between may differ (`PairMesh.has_matching_nodes`).
@@ -101,10 +104,13 @@ def read_pieces(path: Path) -> PairMesh:
     Parameters
     ----------
     path : Path
+    unit : float
+        Length unit [m] of the coordinates in the file.
 
     Returns
     -------
     PairMesh
+        Its coordinates are in m.
 
     Raises
     ------
@@ -134,7 +140,7 @@ def read_pieces(path: Path) -> PairMesh:
         )
     else:
         raise PatchfemError(f"{path}: a mesh can be read only from .msh, .vtu, .inp or .med")
-    return build_pair(mesh, path)
+    return build_pair(replace(mesh, points=unit * mesh.points), path)
 
 
 class _Tags(NamedTuple):

@@ -29,6 +29,7 @@ SURFACE_KEYS = (
     "tilt",
     "profile",
     "mesh",
+    "mesh_unit",
 )
 # Largest difference between the gaps of one patch on two meshes, relative to the range of the gap.
 GAP_DIFFERENCE_FRACTION = 1e-2

@@ -1,8 +1,8 @@
 """Check of the files that a scene names.
 
 Each file is read as a run reads it, so that a run does not refuse a file that passes here. Nothing is
-computed, and only the first bytes of a large mesh are examined. The module that reads a kind of file is
-imported only if a scene names such a file, because the imports are half of the time of a check.
+computed. The module that reads a kind of file is imported only if a scene names such a file, because
+the imports are half of the time of a check.
 """
 
 from pathlib import Path
@@ -20,22 +20,12 @@ from . import (
     gap,
     patch,
     peaks,
+    pieces,
     profile,
     slide,
     structure_files,
     structure_reduced,
 )
-
-# File size in bytes above which only the start of a mesh file is examined.
-MAX_FULLY_READ_MESH_BYTES = 2 * 2**20
-MESH_START_BYTES = 4096  # number of bytes at the start of a mesh file that are examined
-# Text at the start of a mesh file, by its extension.
-MESH_STARTS = {
-    ".msh": (b"$MeshFormat",),
-    ".vtu": (b"<?xml", b"<VTKFile"),
-    ".inp": (b"*",),
-    ".unv": (b"-1", b"    -1"),
-}
 
 
 def find_file_faults(
@@ -115,17 +105,13 @@ def _check_reduction(tables, folder: Path) -> list:
 
 
 def _check_mesh(path: Path, tables, *, is_valid: bool) -> None:
-    """Check a mesh file by reading it, or only its beginning if it is large."""
-    starts = MESH_STARTS.get(path.suffix)
-    if starts is None or path.stat().st_size <= MAX_FULLY_READ_MESH_BYTES:
+    """Check a mesh file by reading it, and compare its sizes with those of the scene."""
+    if not is_valid:
         files.read_pieces(path)
         return
-    with open(path, "rb") as file:
-        if not file.read(MESH_START_BYTES).lstrip().startswith(starts):
-            raise PatchfemError(
-                f"{path}: not a readable {path.suffix} file (the content does not start as in such a "
-                "file)"
-            )
+    _, unit = patch.find_mesh_file(tables.contact, Path)
+    pair = files.read_pieces(path, unit)
+    pieces.check_mesh_size(patch.build_pieces(tables.contact), pair.lower, pair.upper, unit)
 
 
 def _check_profile(path: Path, tables, *, is_valid: bool) -> tuple:
@@ -136,14 +122,14 @@ def _check_profile(path: Path, tables, *, is_valid: bool) -> tuple:
     contact = tables.contact
     if not is_valid or contact.mesh is not None:
         return ()
-    pieces = patch.build_pieces(contact)
-    even_cell = pieces.length / gap.DEFAULT_CELLS
-    n_cells = max(1, round(pieces.length / (contact.element_size or even_cell)))
-    x = np.linspace(-pieces.length / 2, pieces.length / 2, n_cells + 1)
+    patch_pieces = patch.build_pieces(contact)
+    even_cell = patch_pieces.length / gap.DEFAULT_CELLS
+    n_cells = max(1, round(patch_pieces.length / (contact.element_size or even_cell)))
+    x = np.linspace(-patch_pieces.length / 2, patch_pieces.length / 2, n_cells + 1)
     _, notes = profile.compute_profile_gap(
         path,
         x,
-        patch.find_profile_lengths(contact, pieces),
+        patch.find_profile_lengths(contact, patch_pieces),
         even_cell,
         is_rough=contact.asperities is not None,
         is_material=contact.profile.heights == "surface",

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from ..mesh.ends import SHARP_END, End
 from ..scene.keys.contact import Asperities, Coating, Contact, Material, OnePiece
+from ..scene.keys.quantities import UNIT_FACTORS
 from . import peaks, profile
 from .gap import DEFAULT_CELLS, Gap, ProfileLengths, find_shape_side, list_gap_shapes
 
@@ -194,13 +195,23 @@ class PrescribedSlip(NamedTuple):
 
     - amplitude: half the range of the slide [m].
     - static: coefficient of friction.
-    - bond_length: bond length [m] of the springs of the law in series with the pieces, 0 without
-      them.
+    - bond_length: bond length [m]; 0 if the law has no springs.
     """
 
     amplitude: float
     static: float
     bond_length: float
+
+
+class MeshFile(NamedTuple):
+    """Mesh file of the two pieces.
+
+    - path: path of the file.
+    - unit: length unit [m] of its coordinates.
+    """
+
+    path: Path
+    unit: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,7 +230,7 @@ class PatchMesh:
     """
 
     element_size: float | None
-    file: Path | None
+    file: MeshFile | None
     is_static: bool = False
     edge_motion: str = ""
     tolerance: float | None = None
@@ -349,10 +360,17 @@ def build_patch(contact: Contact, kind: str, resolve_path: Callable) -> PatchMod
         interface=PatchInterface(skin, strips, contact.shear is not None, contact.compliance_key),
         mesh=PatchMesh(
             element_size=contact.element_size,
-            file=resolve_path(contact.mesh) if contact.mesh is not None else None,
+            file=find_mesh_file(contact, resolve_path),
             is_static=kind == "patch",
         ),
     )
+
+
+def find_mesh_file(contact: Contact, resolve_path: Callable) -> MeshFile | None:
+    """Return the mesh file of a table [contact]; None if the mesh is made from the dimensions."""
+    if contact.mesh is None:
+        return None
+    return MeshFile(resolve_path(contact.mesh), UNIT_FACTORS["length"][contact.mesh_unit or "m"])
 
 
 def replace_loading_and_shapes(patch: PatchModel, contact: Contact) -> PatchModel:

@@ -6,8 +6,9 @@ from ..closed_forms import contact
 from ..core import PatchfemError
 from ..elasticity.elasticity import Layers
 from ..mesh import files, shaped
-from ..mesh.tensor import ROW_GROWTH, TensorGrid, graded_grid
-from .patch import PatchModel, PatchPiece
+from ..mesh.tensor import ROW_SLOPE, TensorGrid, graded_grid, row_scale
+from ..scene.keys.quantities import UNIT_FACTORS
+from .patch import PatchModel, PatchPiece, PatchPieces
 
 # Largest difference of equal sizes, as a fraction of the interface length; mesh files
 # contain coordinates of few digits.
@@ -40,10 +41,11 @@ def _make_flat_grid(patch: PatchModel, piece: PatchPiece):
     grid = graded_grid(
         patch.pieces.length, piece.height, patch.uniform_element_size, piece.thickness
     )
-    return extend_grid(patch, piece, grid)
+    growth = 1 + ROW_SLOPE * row_scale(grid.x.size - 1)
+    return extend_grid(patch, piece, grid, growth)
 
 
-def extend_grid(patch: PatchModel, piece: PatchPiece, grid: TensorGrid, growth: float = ROW_GROWTH):
+def extend_grid(patch: PatchModel, piece: PatchPiece, grid: TensorGrid, growth: float):
     """Extend a grid over the interface to the ends of its piece.
 
     Parameters
@@ -52,7 +54,7 @@ def extend_grid(patch: PatchModel, piece: PatchPiece, grid: TensorGrid, growth: 
     piece : PatchPiece
     grid : TensorGrid
     growth : float
-        Growth of the columns beyond the interface.
+        Ratio of the lengths of successive columns beyond the interface.
 
     Returns
     -------
@@ -104,27 +106,46 @@ def make_piece_meshes(patch: PatchModel) -> tuple:
         return lower, None if pieces.are_alike else _make_flat_grid(patch, pieces.upper)
 
     try:
-        lower, upper = files.read_bodies(patch.mesh.file)
+        lower, upper = files.read_bodies(*patch.mesh.file)
     except PatchfemError as error:
         error.key = error.key or "contact.mesh"
         raise
-    _check_mesh_size(patch, "lower", lower)
-    _check_mesh_size(patch, "upper", upper or lower)
+    check_mesh_size(pieces, lower, upper or lower, patch.mesh.file.unit)
     if upper is None and not pieces.are_alike:
         upper = lower
     return lower, upper
 
 
-def _check_mesh_size(patch: PatchModel, side: str, body) -> None:
-    """Raise PatchfemError unless a body in the mesh file has the size of its piece."""
-    piece = getattr(patch.pieces, side)
-    for key, in_file, in_scene in (
-        ("length", body.length, patch.pieces.length),
-        ("height", body.height, piece.height),
-        ("coating.thickness", body.coating_thickness, piece.thickness),
-    ):
-        if abs(in_file - in_scene) > MESH_SIZE_TOL * patch.pieces.length:
+def check_mesh_size(pieces: PatchPieces, lower, upper, unit: float) -> None:
+    """Raise PatchfemError unless both bodies of a mesh file have the sizes of the pieces of the scene.
+
+    Parameters
+    ----------
+    pieces : PatchPieces
+    lower, upper : TensorGrid or PieceMesh
+        Bodies of the file, in m.
+    unit : float
+        Length unit [m] that was used for the coordinates in the file.
+
+    Raises
+    ------
+    PatchfemError
+        With the key of the size that differs. If another unit gives this size, the message names it.
+    """
+    for side, piece, body in (("lower", pieces.lower, lower), ("upper", pieces.upper, upper)):
+        for key, in_file, in_scene in (
+            ("length", body.length, pieces.length),
+            ("height", body.height, piece.height),
+            ("coating.thickness", body.coating_thickness, piece.thickness),
+        ):
+            if abs(in_file - in_scene) <= MESH_SIZE_TOL * pieces.length:
+                continue
+            advice = ""
+            for name, factor in UNIT_FACTORS["length"].items():
+                if in_scene and abs(in_file / unit * factor / in_scene - 1) <= MESH_SIZE_TOL:
+                    advice = f': set contact.mesh_unit = "{name}"'
             raise PatchfemError(
-                f"{in_scene:.9g} m in the scene, but {in_file:.9g} m in the {side} piece of the mesh",
+                f"{in_scene:.9g} m in the scene, but {in_file:.9g} m in the {side} piece of the mesh"
+                f"{advice}",
                 f"contact.{key}",
             )

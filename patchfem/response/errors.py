@@ -65,7 +65,7 @@ def convergence_error(change, *coarser_changes, ratio: float = 2.0, order: float
     ----------
     change : float or (n,)
         Change from the second finest to the finest run.
-    coarser_changes : float or (n,)
+    *coarser_changes : float or (n,)
         Changes between the runs before, from fine to coarse; nan if unknown. Arrays only for up to
         three runs.
     ratio : float
@@ -104,7 +104,7 @@ def convergence_errors(
 
     Parameters
     ----------
-    values : dict
+    *values : dict
         Measures by name of the runs, from fine to coarse; floats or arrays (n,) of many runs.
     ratio, order : float
         Ratio of the step or cell sizes of successive runs, and order of convergence.
@@ -165,7 +165,7 @@ def merged_cell_errors(fine: dict, *coarse: dict) -> dict:
     ----------
     fine : dict
         Measures by name; floats or arrays (n,) of many runs.
-    coarse : dict
+    *coarse : dict
         Measures of each coarse run; the largest change is used.
 
     Returns
@@ -240,7 +240,7 @@ def observed_orders(*values: dict) -> dict:
 
     Parameters
     ----------
-    values : dict
+    *values : dict
         Measures by name of three runs, with all, a half and a quarter of the steps; with fewer runs, the
         result is empty.
 

@@ -125,7 +125,7 @@ def extrapolate_steady_amplitudes(amplitudes, phasors) -> tuple:
 
     Parameters
     ----------
-    amplitudes, p : (n, w)
+    amplitudes, phasors : (n, w)
         Amplitudes [m] and phasors [m] of the last cycle of successive windows. A phasor is the Fourier
         coefficient of the motion at the drive frequency.
 

@@ -36,7 +36,7 @@ from .reader import read_set_value
 LENGTH_KEY = "drive.displacement"  # key of a length whose values `read_lengths` reads
 # Largest number of values in one range; the cases of a larger sweep would exhaust the memory.
 MAX_RANGE_VALUES = 10_000_000
-# Smallest ratio of the ends from which on a range of positive numbers is logarithmic by default.
+# Ratio of the ends of a range of positive numbers; at and above it the range is logarithmic by default.
 MIN_LOG_RATIO = 10
 MAX_SUGGESTED_KEYS = 4  # largest number of keys of a table that a message suggests
 # Number of significant digits of a value, so that a tenth of a range is

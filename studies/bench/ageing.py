@@ -60,6 +60,10 @@ def dwell(hold: float, part: float, *more, steps: int = 2000) -> tuple:
         Duration of the rest [s].
     part : float
         l_k / eps_0.
+    *more : str
+        Keys and values that replace others.
+    steps : int
+        Time steps.
     """
     sets = [
         f"slide.hold={float(hold)!r} s",

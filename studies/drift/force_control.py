@@ -118,6 +118,8 @@ def drift(engine, forces, loads, cycles: int = 12, **more) -> float:
     forces, loads : sequence of float
         As in `slides`.
     cycles : int
+    **more
+        Further parameters of `slides`.
     """
     ends = slides(engine, forces, loads, cycles, **more)
     return float(ends[-1] - ends[-2])

@@ -10,8 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from patchfem.mesh import Layout, TensorGrid, divide_into_columns
-from patchfem.mesh.tensor import graded_depth
+from patchfem.mesh import Layout, TensorGrid, divide_into_columns, divide_into_rows
 from patchfem.model import build
 from patchfem.model.patch import PatchModel
 from patchfem.runs.patch.condensed import CondensedPair, condense
@@ -59,10 +58,11 @@ def pair(halvings: int = 2) -> CondensedPair:
     x = divide_into_columns(
         Layout(-half, half, ((-half, -half, 1.2e-6),), (-half, half), half / 30, half / 30, 0.06)
     )
-    depth, rows = graded_depth(
-        asked.pieces.height, x[1] - x[0], asked.pieces.lower.thickness, 1.25, 2
+    height = asked.pieces.height
+    rows = Layout(
+        0.0, height, ((0.0, 0.0, x[1] - x[0]),), (0.0, height), height / 3, height / 3, 0.25
     )
-    grid = TensorGrid(x, depth, rows)
+    grid = TensorGrid(x, *divide_into_rows(rows, asked.pieces.lower.thickness))
     for _ in range(halvings):
         grid = grid.refine()
     return condense(asked, grid)

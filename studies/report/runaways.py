@@ -135,6 +135,8 @@ def motion(name: str, frequency: float, level: float, **more) -> tuple:
         [Hz]
     level : float
         [g]
+    **more
+        Keys of the scene that replace others.
     """
     text, sets = PATHS[name]
     how = {"structure.travel": "6 mil", "drive.cycles": 150, "accuracy.tolerance": 1e-2} | more

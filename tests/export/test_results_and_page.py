@@ -10,12 +10,13 @@ import pytest
 import xarray as xr
 from command_line import CommandResult, run_cli
 from limits import limit_file_size
-from scene_texts import BENCH
+from scene_texts import BENCH, COATED
 
-from patchfem import plan
+from patchfem import load, plan, run
 from patchfem.core import Missing
 from patchfem.export import folder as results_folder
 from patchfem.export import netcdf, report
+from patchfem.formatting import format_quantity
 
 RESULT_FILES = {"summary.json", "result.nc", "scene.resolved.toml"}
 
@@ -130,6 +131,28 @@ def check_results_without_page(out) -> None:
     assert json.loads((out / "summary.json").read_text("utf-8"))["outcome"] == "done"
     with xr.open_dataset(out / "result.nc", engine="h5netcdf") as data:
         assert data.friction_force.size == data.time.size > 0
+
+
+@pytest.mark.parametrize(
+    "tables", ["", "[contact.strips]\ncount = 3\n", '[contact.crown]\nradius = "1 m"\n']
+)
+def test_exact_page_says_why_largest_drawn_pressure_is_not_the_peak(tmp_path, tables):
+    """The page states the largest drawn pressure and the measure where they differ, and says what each of them is."""
+    path = tmp_path / "scene.toml"
+    path.write_text(COATED + '[contact.tilt]\nangle = "0.02 mrad"\n' + tables, "utf-8")
+    result = run(load(path))
+    result.save(tmp_path / "out")
+    page = (tmp_path / "out/report.html").read_text("utf-8")
+    drawn = float(result.to_xarray().normal_stress.max())
+    largest, peak = (
+        format_quantity(value, "Pa", 4) for value in (drawn, result.measures["pressure_peak"].value)
+    )
+    assert ("crown" in tables) == (largest == peak)
+    sentence = (
+        f"means over the elements beside a node{' and over the strips' * ('strips' in tables)}, at most {largest}; "
+        f"the measure pressure_peak, {peak}, is the estimated maximum"
+    )
+    assert (sentence in page) == (largest != peak) == ("the measure pressure_peak" in page)
 
 
 def test_always_interrupt_before_page_leaves_results(scene_file, tmp_path):

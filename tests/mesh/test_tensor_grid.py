@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from patchfem.core import PatchfemError
-from patchfem.mesh import ROW_GROWTH, graded_grid
-from patchfem.mesh.tensor import MIN_COATING_ROWS
+from patchfem.mesh import ROW_SLOPE, graded_grid, row_scale
+from patchfem.mesh.tensor import MIN_ROWS
 
 
 @st.composite
@@ -23,7 +23,7 @@ def piece_dimensions(draw):
 
 @given(piece_dimensions())
 def test_always_grid_has_given_dimensions_and_coating_rows(piece):
-    """The grid has the given dimensions, at least four rows in the coating, and bounded growth of rows."""
+    """The grid has the given dimensions, at least two rows in the coating, and bounded growth of rows."""
     length, height, size, coating = piece
     grid = graded_grid(*piece)
     assert grid.length == pytest.approx(length, rel=1e-14)
@@ -32,14 +32,35 @@ def test_always_grid_has_given_dimensions_and_coating_rows(piece):
     assert grid.coating_thickness == coating
     assert np.diff(grid.x).max() <= min(size, length / 2) * (1 + 1e-9)
     assert np.ptp(np.diff(grid.x)) <= 1e-12 * length
-    assert grid.coating_rows >= MIN_COATING_ROWS if coating else grid.coating_rows == 0
+    assert grid.coating_rows >= 2 if coating else grid.coating_rows == 0
     rows = np.diff(grid.depth)
-    assert rows.min() > 0 and rows[0] <= length / (grid.x.size - 1) * (1 + 1e-5)
-    assert np.all(rows[1:] <= rows[:-1] * ROW_GROWTH * (1 + 1e-5))
+    assert rows.min() > 0 and rows.max() <= height / MIN_ROWS * (1 + 1e-5)
+    columns = grid.x.size - 1
+    for face_row in (rows[0], rows[-1]):
+        assert face_row <= length / columns * (1 + ROW_SLOPE)
+    growth = 1.1 + ROW_SLOPE * row_scale(columns)
     for layer in (rows[: grid.coating_rows], rows[grid.coating_rows :]):
-        assert np.all(np.diff(layer) >= -1e-12 * height)
+        ratio = layer[1:] / layer[:-1]
+        assert np.all(ratio <= growth) and np.all(ratio >= 1 / growth)
     assert grid.is_coating_cell().shape == (grid.x.size - 1, rows.size)
     assert np.all(grid.is_coating_cell() @ rows == pytest.approx(coating, rel=1e-12))
+
+
+@pytest.mark.parametrize("coating", [0.0, 0.152e-3, 1.5e-3])
+@pytest.mark.parametrize("columns", [32, 50, 120])
+def test_always_half_element_size_halves_every_cell(columns, coating):
+    """With half the element size, each row of the grid becomes two rows of about half its height."""
+    coarse = graded_grid(12e-3, 6e-3, 12e-3 / columns, coating).refine()
+    fine = graded_grid(12e-3, 6e-3, 6e-3 / columns, coating)
+    assert abs(fine.depth.size - coarse.depth.size) <= 3
+    position = np.linspace(0, 1, 200)
+    layers = [(slice(coarse.coating_rows, None), slice(fine.coating_rows, None))]
+    if coating:
+        layers.append((slice(coarse.coating_rows + 1), slice(fine.coating_rows + 1)))
+    for coarse_rows, fine_rows in layers:
+        depths = coarse.depth[coarse_rows], fine.depth[fine_rows]
+        levels = [np.interp(position, np.linspace(0, 1, depth.size), depth) for depth in depths]
+        assert np.abs(levels[0] - levels[1]).max() <= 0.03 * np.ptp(depths[0])
 
 
 @given(piece_dimensions())

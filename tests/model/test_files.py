@@ -3,13 +3,16 @@ scene."""
 
 import json
 
+import meshio
 import numpy as np
 import pytest
 import surfaces as write
 from command_line import run_cli
 from scene_texts import BENCH, COATED, COULOMB, POINT, STRUCTURE, find_line
 
-from patchfem import SceneError, load
+from patchfem import SceneError, load, run
+from patchfem.mesh import graded_grid, write_mesh
+from patchfem.scene import loads
 
 PROFILE = COATED + '[contact.profile]\nfile = "{}"\n'
 SLIDE = POINT + COULOMB + '[slide]\nkind = "file"\nfile = "{}"\n'
@@ -73,6 +76,70 @@ def test_refuses_faulty_file_at_its_scene_line(tmp_path, text, name, content, ke
     )
     answer = run_cli("run", tmp_path / "scene.toml", "-o", tmp_path / "out")
     assert answer.code == 2 and answer.err.splitlines() == lines
+
+
+def write_meshes(folder) -> None:
+    """Write meshes of the pieces of COATED: one in m, one in mm, one in mm with quadratic edges."""
+    write_mesh(graded_grid(12.7e-3, 6.35e-3, 1e-3, 152.4e-6), folder / "m.vtu")
+    mesh = meshio.read(folder / "m.vtu")
+    mesh.points *= 1e3
+    mesh.write(folder / "mm.vtu")
+    for block in mesh.cells:
+        if block.type == "line":
+            block.type = "line3"
+            block.data = np.column_stack([block.data, block.data[:, 0]])
+    mesh.write(folder / "quadratic.vtu")
+
+
+MESH_FAULTS = [
+    ("mm.vtu", (), 'contact.length: 0.0127 m in the scene, but 12.7 m in the lower piece of the mesh: set '
+                   'contact.mesh_unit = "mm"'),
+    ("m.vtu", ("contact.mesh_unit=mm",), 'contact.length: 0.0127 m in the scene, but 12.7 um in the lower piece of '
+                                         'the mesh: set contact.mesh_unit = "m"'),
+    ("mm.vtu", ("contact.mesh_unit=mm", "contact.height=6 mm"),
+     "contact.height: 0.006 m in the scene, but 0.00635 m in the lower piece of the mesh"),
+    ("quadratic.vtu", (), "contact.mesh: quadratic.vtu: line3 cells; only linear triangles, quads and lines"),
+    ("m.vtu", ("contact.mesh_unit=furlong",), "contact.mesh_unit: unknown value 'furlong'; use one of m, km, cm, mm"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("name, sets, message", MESH_FAULTS)
+def test_refuses_mesh_of_wrong_size_unit_or_order(tmp_path, name, sets, message):
+    """`check` and `run` report a mesh of another size, in another unit or of quadratic cells with the same line."""
+    write_meshes(tmp_path)
+    (tmp_path / "scene.toml").write_text(mesh_text(name), "utf-8")
+    options = [word for text in sets for word in ("--set", text)]
+    answers = [
+        run_cli(*command, *options)
+        for command in (
+            ("check", tmp_path / "scene.toml"),
+            ("run", tmp_path / "scene.toml", "-o", tmp_path / "out"),
+        )
+    ]
+    assert [answer.code for answer in answers] == [2, 2]
+    assert message in answers[0].err.replace(f"{tmp_path}/", "")
+    assert message in answers[1].err.replace(f"{tmp_path}/", "")
+    assert [answer.err.count("\n") for answer in answers] == [1, 1]
+
+
+def test_exact_mesh_in_millimetres_gives_results_of_mesh_in_metres(tmp_path):
+    """A mesh in mm with `mesh_unit` gives the results of the same mesh in m; without a mesh the key is refused."""
+    write_meshes(tmp_path)
+    (tmp_path / "scene.toml").write_text(mesh_text("m.vtu"), "utf-8")
+    scenes = [
+        load(tmp_path / "scene.toml", **sets)
+        for sets in ({}, {"contact.mesh": "mm.vtu", "contact.mesh_unit": "mm"})
+    ]
+    assert run_cli(
+        "check", tmp_path / "scene.toml", "--set", "contact.mesh=mm.vtu", "--set", "contact.mesh_unit=mm"
+    ).code == 0  # fmt: skip
+    metres, millimetres = (run(scene).measures for scene in scenes)
+    for name, measure in metres.items():
+        assert millimetres[name].value == pytest.approx(measure.value, rel=1e-9), name
+    with pytest.raises(
+        SceneError, match=r"contact\.mesh_unit: is the unit of the file of contact\.mesh"
+    ):
+        loads(COATED, sets=["contact.mesh_unit=mm"])
 
 
 @pytest.mark.parametrize("text, name, content, key, message", FAULTS.values(), ids=FAULTS)

@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 from command_line import run_cli
-from scene_texts import COATED, PIECE
+from scene_texts import COATED, COATING, PIECE
 
 from patchfem import build
 from patchfem.closed_forms import contact as exact
@@ -274,6 +274,35 @@ def test_refuses_mesh_with_other_dimensions_than_scene(tmp_path):
             f"{faulty_scene.path}:4: contact.height: 0.009 m" in message
             and message.count("scene.toml") == 1
         ), command
+
+
+CONVERGING = {
+    "approach": 1.3,
+    "normal_stiffness": 1.3,
+    "tangential_stiffness": 1.3,
+    "moment": 1.3,
+    "pressure_peak": 0.5,
+}  # measure: smallest order of convergence; the stress is singular at the far corners and at the coating
+
+
+def test_exact_element_size_converges_to_value_of_automatic_mesh():
+    """With half the element size, errors and stated errors fall with the order of the singularity at the far corners."""
+    tables = COATING + TILT.format(2e-5)
+    keys = 'load = "2 kN"\n'
+    reference = solve_with_coarser(build_patch_model(tables, keys), 1e-4)[0].measures
+    errors, stated = [], []
+    for cells in (48, 96, 192):
+        pinned = build_patch_model(tables, f'{keys}element_size = "{12.7 / cells} mm"')
+        measures = solve_with_coarser(pinned, 1e-3)[0].measures
+        errors.append(
+            {name: abs(measures[name].value - reference[name].value) for name in CONVERGING}
+        )
+        stated.append({name: measures[name].error for name in CONVERGING})
+        for name in CONVERGING:
+            assert errors[-1][name] <= stated[-1][name] + reference[name].error, (cells, name)
+    for name, order in CONVERGING.items():
+        assert errors[2][name] <= errors[0][name] / 4**order + reference[name].error, name
+        assert stated[2][name] <= stated[0][name] / 4, name
 
 
 # ---- the automatic mesh

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from pieces import grow_depth
 from scene_texts import COATED
 from wedges import singularity_exponent
 
@@ -14,7 +15,7 @@ from patchfem.closed_forms.contact import rounded_punch_pressure
 from patchfem.core import PatchfemError, frozen_array
 from patchfem.elasticity import compute_coating_traction, compute_displacement, get_cells
 from patchfem.mesh import TensorGrid, write_mesh
-from patchfem.mesh.tensor import graded_depth, graded_rows
+from patchfem.mesh.tensor import graded_rows
 from patchfem.model import extend_grid, find_file_faults, find_rounded_edges, make_piece_meshes
 from patchfem.runs import solve_with_coarser
 from patchfem.runs.patch.press import solve
@@ -69,7 +70,7 @@ def solve_on_columns(patch, x, growth: float = 1.2, halvings: int = 0):
     )
     fine = float(np.diff(x).min())
     grids = [
-        TensorGrid(x, *graded_depth(piece.height, fine, piece.thickness, growth, 2))
+        TensorGrid(x, *grow_depth(piece.height, fine, piece.thickness, growth, 2))
         for piece in pieces
     ]
     bodies = [extend_grid(patch, piece, grid, growth) for piece, grid in zip(pieces, grids)]

@@ -63,16 +63,14 @@ def apply_block(block: CodeBlock, package: Path) -> None:
         assert not path.exists(), f"{path} exists"
         path.write_text(code, "utf-8")
         return
-    file, position, mark = re.fullmatch(
-        r"# in (\S+), (before|in place of|at the end) ?(.*)", head
-    ).groups()
+    file, position, mark = re.fullmatch(r"# in (\S+), (before|at the end) ?(.*)", head).groups()
     path = package / file
     lines = path.read_text("utf-8").splitlines(keepends=True)
     if position == "at the end":
         path.write_text("".join(lines) + "\n\n" + code, "utf-8")
         return
     line_number = next(number for number, line in enumerate(lines) if line.strip().startswith(mark))
-    lines[line_number : line_number + (position == "in place of")] = [code]
+    lines.insert(line_number, code)
     path.write_text("".join(lines), "utf-8")
 
 

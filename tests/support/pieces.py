@@ -35,10 +35,30 @@ def make_compliance(grid: TensorGrid, layers: Layers, width: float = WIDTH) -> C
     )
 
 
+def grow_depth(height: float, first: float, coating: float, growth: float, coating_rows: int):
+    """Return the depths of rows that grow from the interface to the far face, and the number in the coating.
+
+    `first` is the height of the first row, or a little more.
+    """
+    rows = np.empty(0)
+    if coating:
+        rows = graded_rows(min(first, coating / coating_rows), coating, growth, coating_rows)
+        first = rows[-1] * growth
+    depth = np.cumsum(
+        np.concatenate([[0.0], rows, graded_rows(first, height - coating, growth, 3)])
+    )
+    return depth, rows.size
+
+
 @cache
 def make_coated_pair(cells: int) -> Compliance:
-    """Return the compliance of the coated pair of the test specimen with `cells` columns."""
-    return make_compliance(graded_grid(LENGTH, HEIGHT, LENGTH / cells, COATING), COATED)
+    """Return the compliance of the coated pair of the test specimen with `cells` columns.
+
+    The rows grow by the factor 1.1, as in the mesh of the uncondensed bodies of `test_unilateral`.
+    """
+    x = np.linspace(-LENGTH / 2, LENGTH / 2, cells + 1)
+    grid = TensorGrid(x, *grow_depth(HEIGHT, LENGTH / cells, COATING, 1.1, 4))
+    return make_compliance(grid, COATED)
 
 
 @cache

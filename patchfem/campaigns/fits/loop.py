@@ -23,7 +23,7 @@ from .loop_model import BenchModel
 from .loop_path import DEFAULT_OPTIONS, LoopOptions, make_offsets
 from .problem import FittedKeys, FreeKeys, parse_ranges
 
-# Number of time steps between two rows from which the steps are no longer halved.
+# Number of time steps between two rows at which the steps are not halved any more.
 MAX_STEPS_PER_ROW = 64
 # Largest ratio of a change of the force to the tolerance at which the change is negligible in a
 # fit.

@@ -8,7 +8,7 @@ import numpy as np
 class NestedStretches(NamedTuple):
     """Arrays for the solution of contacts in which consecutive nodes touch.
 
-    A stretch begins at a left end, from which on the Cholesky factor is kept.
+    A stretch is a run of consecutive nodes; the Cholesky factor is kept from its left end on.
 
     - c (m, m) [m/N]; x (m,) [m].
     - upper (m, m): upper Cholesky factor U of the nodes from the left end on.

@@ -156,11 +156,19 @@ def write_resistance(friction, friction_slope, middle, dt, flank, climb):
 
     Parameters
     ----------
-    pulled, gain : float
-        Mean friction force along the flank [N] and its derivative [N/m].
+    friction : float
+        Mean friction force along the flank [N].
+    friction_slope : float
+        Derivative of this force with respect to the path along the flank [N/m].
     middle : float
         Relative displacement in the middle of the step [m].
-    dt, flank, at
+    dt : float
+        Duration of the step [s].
+    flank : ndarray
+        Numbers of the grooves (`FlankIndex`).
+    climb : ndarray
+        State of the climb (`ClimbIndex`); mean force [N], force along the flank [N] and stiffness [N/m]
+        are written.
     """
     wave_number = flank[FlankIndex.WAVE_NUMBER]
     slope = climb[ClimbIndex.MEAN_SLOPE]
@@ -261,7 +269,7 @@ def apply_increment(dq, start, contact, goal):
     Returns
     -------
     force : float
-        Path mean [N].
+        Mean of the force over the path dq [N].
     is_solved : bool
         Always true.
     """

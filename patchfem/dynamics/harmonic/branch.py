@@ -71,7 +71,7 @@ def trace_over_frequency(
         at each of which a point is solved from the one before.
     stability : bool, optional
         Whether multipliers are computed.
-    **how
+    **numerics
         Fields of `CurveNumerics`.
 
     Returns
@@ -90,7 +90,7 @@ def trace_over_level(
 
     Parameters
     ----------
-    modes, drive, group, stability, **how
+    modes, drive, group, stability, **numerics
         See `trace_over_frequency`.
     accelerations : sequence of float
         As `frequencies` there [m s-2].
@@ -233,8 +233,9 @@ def measure_distance(first: SteadyMotion, second: SteadyMotion, width: float) ->
 
     Parameters
     ----------
-    one, other : SteadyMotion
+    first, second : SteadyMotion
     width : float
+        Frequency step [rad/s] that counts as 1.
 
     Returns
     -------
@@ -261,7 +262,7 @@ def find_point_between(
     Parameters
     ----------
     modes, drive
-    one, other : SteadyMotion
+    first, second : SteadyMotion
     fraction : float
         Fraction of the step.
     width : float

@@ -65,8 +65,8 @@ def find_monodromy(
     omega : float
     slope, by_rate : ndarray
         (i, N) mean local stiffness [N/m] and damping [N s/m] in each cell.
-    marks, fading : sequence, optional
-        TurningPoint and FadingMemory records.
+    reversals, fading : sequence, optional
+        Records TurningPoint and FadingMemory.
 
     Returns
     -------

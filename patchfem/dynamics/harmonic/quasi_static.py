@@ -32,7 +32,7 @@ SPEED_MESSAGE = "a friction force that depends on the sliding speed has no stati
 
 
 class StaticLoops(NamedTuple):
-    """Force [N] at the tip, and area [J], of the friction loop on an interface row."""
+    """Force [N] at the tip, and area [J], of the friction loop of an interface."""
 
     tip: float
     area: float

@@ -85,7 +85,7 @@ def find_friction_force(dq, kind, contact):
     Returns
     -------
     force : float
-        Path mean [N].
+        Mean of the force over the path dq [N].
     slope : float
         [N/m].
     """
@@ -130,12 +130,12 @@ def apply_increment(dq, start, contact, goal):
     start : arrays.StepStart
     contact : arrays.PressedPoints
     goal : float
-        Tolerance of the residual Path mean [N].
+        Tolerance of the residual [N].
 
     Returns
     -------
     force : float
-        Path mean Path mean [N].
+        Mean of the force over the path dq [N].
     is_solved : bool
         Whether the solution converged.
     """
@@ -190,7 +190,7 @@ def commit_points(dq, force, start, end_velocity, kind, contact):
     dq : float
         Increment of the relative displacement [m].
     force : float
-        Path-mean force over dq Path mean [N].
+        Mean of the force over the path dq [N].
     start : arrays.StepStart
     end_velocity : float
         Relative velocity at the end of the step [m/s].

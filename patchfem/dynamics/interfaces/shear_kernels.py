@@ -110,7 +110,7 @@ def apply_increment(dq, start, contact, goal):
     Returns
     -------
     force : float
-        Path mean [N].
+        Mean of the force over the path dq [N].
     is_solved : bool
         Whether the solution converged.
     """
@@ -132,7 +132,7 @@ def commit_step(dq, force, start, end_velocity, contact):
     dq : float
         Increment of the relative displacement [m].
     force : float
-        Path mean over dq [N].
+        Mean of the force over the path dq [N].
     start : arrays.StepStart
     end_velocity : float
         Relative velocity at the end of the step [m/s].

@@ -58,7 +58,7 @@ def apply_increment(dq, start, contact, goal):
     Returns
     -------
     force : float
-        Path mean [N].
+        Mean of the force over the path dq [N].
     is_solved : bool
         Whether the solution converged.
     """

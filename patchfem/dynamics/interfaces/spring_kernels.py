@@ -40,7 +40,7 @@ def mean_force(numbers, memory, q, dq, eps, dt):
     Returns
     -------
     force : float
-        Path mean [N].
+        Mean of the force over the path dq [N].
     slope : float
         Derivative with respect to dq [N/m].
     """
@@ -78,7 +78,7 @@ def update_memory(numbers, memory, dq, force, v0, v1, dt, eps):
     dq : float
         Increment of the relative displacement [m].
     force : float
-        Path mean over dq Path mean [N].
+        Mean of the force over the path dq [N].
     v0 : float
         Not used.
     v1 : float

@@ -349,7 +349,8 @@ def friction_at_reversal(x, slip_sign, memory, event_memory, workspace, lane):
 def stick_fractions(start, end, workspace, lane, angle):
     """Return the stick and slip fractions in a segment of a step.
 
-    The interface sticks while less than half of the friction slips.
+    An interface counts as sticking while the elements that slip carry less than half of the friction
+    limit. A stick fraction of 2.0 stands for no fraction.
 
     Parameters
     ----------

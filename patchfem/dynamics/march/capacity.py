@@ -75,6 +75,8 @@ def enlarge_list(contact, saved_state: SavedState, location: str, *others):
     saved_state : SavedState
     location : str
         Position of the run in the message, such as "at step 10".
+    *others : ndarray
+        Arrays that are restored in place, in the order of `saved_state.others`.
     """
     rows, old_capacity = contact.bondlist.shape
     if old_capacity >= MAX_ENTRIES:

@@ -339,7 +339,7 @@ def lower_pressure_fields(x, sigma, measure: float) -> dict:
 def nodal_load_fields(force, measure) -> dict:
     """Return fields of `point_lists_model` for points under varying nodal forces.
 
-    Both arguments are (m,) arrays [N]; `measure` has the forces of the friction limits.
+    `force` (m,) [N] are the present normal forces, `measure` (m,) [N] those for which the friction limits hold.
     """
     return {"pressed": np.stack([force, force]), "at first": force / measure}
 

@@ -725,8 +725,8 @@ def advance_motion(motion, record, until, segment_end, tolerance, travel):
     ----------
     motion : MotionArrays
     record : MotionRecord
-    until, edge : float
-        Time to reach, and end of the segment [s].
+    until, segment_end : float
+        Time to reach, and end of the drive segment [s].
     tolerance : float
         Relative tolerance of a step.
     travel : float

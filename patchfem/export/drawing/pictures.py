@@ -45,7 +45,7 @@ def make_figure(columns: int = 1, height: float = 3.2, axes_to_use=None, **layou
         [inch]
     axes_to_use : Axes, optional
         Axes that replace all of them.
-    layout
+    **layout
         Passed to `subplots`.
 
     Returns

@@ -227,7 +227,7 @@ def _trend_sentence(
     name : str
         The measure.
     key : dict
-    middle, off : (N_TREND_GROUPS,) array
+    medians, uncertainties : (N_TREND_GROUPS,) array
         Medians of the measure in groups of the cases by the value of the key, and their
         uncertainties.
     groups : list or None

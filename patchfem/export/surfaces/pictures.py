@@ -18,7 +18,7 @@ MAX_SPECTRUM_POINTS = 400
 N_BINS = 120  # number of bins of a histogram
 MAX_PIXELS = 400  # largest number of heights of a map along each axis, as many as the page can show
 MIN_DETAIL_SAMPLES = 400  # smallest number of samples in the enlarged part, both traces together
-# Number of sections of a roughness profile from which their limits are not drawn.
+# Number of sections of a roughness profile at which their limits are not drawn any more.
 MAX_SECTION_RULES = 60
 COLOUR_QUANTILES = (0.002, 0.998)  # quantiles of the heights at the ends of the colour scale
 UM3_PER_M3 = 1e18  # number of cubic micrometres in a cubic metre

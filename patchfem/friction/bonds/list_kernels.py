@@ -485,8 +485,13 @@ def list_slope(increment, bond_list, v0, dt):
 
     Parameters
     ----------
-    increment, bond_list, v0, dt : float, BondList, float, float
-        As in the docstring of the module.
+    increment : float
+        Increment of the relative displacement [m].
+    bond_list : BondList
+    v0 : float
+        Velocity at the start of the increment [m/s].
+    dt : float
+        Duration of the increment [s].
 
     Returns
     -------

@@ -279,7 +279,7 @@ def elastic_bond_step(m, z, s2, play, half, increment, sigma, eps):
 
 @njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def grow(eps, v0, v1, path, dt, growth):
-    """Return the length of growing bonds after a time step (eq. 2.10).
+    """Return the length of growing bonds after a time step (eq. 2.10 of the 1985 report).
 
     Parameters
     ----------
@@ -287,8 +287,9 @@ def grow(eps, v0, v1, path, dt, growth):
         Bond length before [m].
     v0, v1, path, dt : float
         Speeds [m/s] at the ends, path [m] and duration [s] of the step.
-    growth : array
-        a_s [m s-2], below 0 for a constant length, l_k [m], v_h [m/s], eps_0 and eps_k [m].
+    growth : ndarray
+        Growth a_s at rest [m s-2], below 0 for a constant length; path l_k of the weakening [m]; floor
+        v_h of the speed [m/s]; lengths eps_0 at rest and eps_k of sliding bonds [m].
 
     Returns
     -------

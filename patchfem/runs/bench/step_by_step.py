@@ -204,10 +204,11 @@ def refuse_expensive_sum(model, law, n_samples: int, n_points: int, slide) -> No
     ----------
     model : Model
     law
-    n_samples, points : int
+        Friction law; a law that does not sum over bonds is never refused.
+    n_samples, n_points : int
         Number of samples and of points.
     slide : (k,)
-        [m].
+        Relative displacement of the samples [m].
     """
     if not hasattr(law, "weights"):
         return

@@ -199,7 +199,7 @@ def cache_condensed_pairs(patch_model, meshes, pairs) -> None:
     patch_model : PatchModel
         One of the patches that use the meshes.
     meshes : SharedMeshes
-    sequence of CondensedPair
+    pairs : sequence of CondensedPair
         From fine to coarse.
     """
     for level, pair in enumerate(pairs):

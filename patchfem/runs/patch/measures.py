@@ -107,7 +107,7 @@ def estimate_static_measures(
     Parameters
     ----------
     fine : Patch
-    coarse : Patch or None
+    *coarse : Patch or None
         The patch on coarser meshes, from fine to coarse; None where there is no such mesh.
     tolerance : float or None
         Values whose error exceeds this tolerance are extrapolated. None: nothing is extrapolated.

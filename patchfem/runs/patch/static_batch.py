@@ -282,7 +282,7 @@ def max_mesh_error_ratios(patch_models, pairs: list, tolerance: float) -> list:
     ----------
     patch_models : sequence of PatchModel
         Patches of equal geometry.
-    list of CondensedPair
+    pairs : list of CondensedPair
         From fine to coarse.
     tolerance : float
 
@@ -314,7 +314,7 @@ def solve_patch_batch(
     loads : PatchLoads
     tolerance : float
         Values with a larger relative error are extrapolated.
-    list of CondensedPair, optional
+    pairs : list of CondensedPair, optional
         Condensed pieces, from fine to coarse, that replace those of the shared meshes; the opposite
         plane state is then not solved.
 

@@ -50,7 +50,9 @@ def geometry_key(patch_model) -> tuple:
     mesh = patch_model.mesh
     gap = patch_model.gap
     file = mesh.file
-    modification_time = file.stat().st_mtime_ns if file is not None and file.exists() else 0
+    modification_time = (
+        file.path.stat().st_mtime_ns if file is not None and file.path.exists() else 0
+    )
     return (
         patch_model.pieces,
         mesh.element_size,
@@ -222,7 +224,7 @@ def _make_common_layout(
     ----------
     cases : list of PatchModel
     has_intermediate_cases : bool
-        Whether there are more cases, whose contacts end between those of neighbouring cases.
+        Whether the sweep contains cases between the given ones.
     halvings_by_case : dict
         Halvings of the cells by case, from `_count_extra_halvings`, beyond those that all cases need.
     """

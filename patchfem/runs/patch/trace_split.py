@@ -74,6 +74,8 @@ def split_trace(
     patch_model : PatchModel
     cutoff : float, optional
         Cutoff wavelength [m]; None: chosen from the element length and the mean pressure.
+    element : float, optional
+        Element length [m]; None: that of the uniform mesh of the patch.
 
     Returns
     -------

@@ -163,7 +163,7 @@ def make_interface_frames(patch, time, tau, node_slip, slide, rule=GRADUAL_SLIP)
     patch : Patch
     time : (f,)
         [s].
-    tau, local : (f, m)
+    tau, node_slip : (f, m)
         Traction [Pa] and slip [m] of the nodes.
     slide : (f,)
         Displacement of the upper holder [m].

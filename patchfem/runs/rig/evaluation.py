@@ -253,7 +253,7 @@ class RunEvaluator:
             CPU time of the run [s].
         drive : optional
             Drive of the run; default: that of the model.
-        more
+        **other_fields
             Further fields of the Solution.
         """
         drive = drive or self.model.rig.drive.signal

@@ -46,7 +46,8 @@ MOTION_MEASURES = (
 MAX_CHANGE_RATIO = 1e-2  # Largest ratio of the change of a steady motion to the tolerance.
 # Number of windows at the end of a run from which the change of the motion is determined.
 N_CHANGE_WINDOWS = 3
-# Assumed relative decay of a free motion over the last windows at smaller damping.
+# Smallest relative decay of a free motion over the last windows that is assumed; less damping counts
+# as this decay.
 MIN_RELATIVE_DECAY = 1e-6
 
 
@@ -379,7 +380,7 @@ def find_steady_motion(modes, drive, groups, run) -> tuple | None:
         Drive.
     groups : tuple
         Elements of each interface.
-    done : EventRunResult
+    run : EventRunResult
 
     Returns
     -------

@@ -28,8 +28,7 @@ Method = Annotated[Literal["auto", "exact", "march", "harmonic"], BeforeValidato
 
 
 class Accuracy(Table):
-    """The tolerance determines the numerical settings; a key that is given fixes its own setting in place of the
-    tolerance."""
+    """Tolerance and numerical settings. A setting that is not given follows from the tolerance."""
 
     tolerance: key(
         number(gt=0, lt=1),

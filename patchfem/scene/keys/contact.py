@@ -11,6 +11,7 @@ from typing import Annotated, Literal
 from pydantic import BeforeValidator, Field
 
 from .materials import MATERIALS, advise_on_material, find_material_name
+from .quantities import UNIT_FACTORS
 from .types import (
     Force,
     Length,
@@ -27,6 +28,7 @@ from .types import (
 )
 
 Piece = Literal["upper", "lower"]
+LengthUnit = Literal[tuple(UNIT_FACTORS["length"])]
 MAX_PAIRS = 1_000_000  # largest number of equal patches, far more than any joint has
 # Largest number of strips over the width; the pressures of more strips do not fit into memory.
 MAX_STRIPS = 10_000
@@ -350,8 +352,8 @@ class Contact(Table):
     plane: key(Literal["strain", "stress"], "plane strain or plane stress in the pieces") = "strain"
     element_size: key(
         Length | None,
-        "length of the elements along the interface in a uniform mesh; default: a graded "
-        "mesh that meets the tolerance",
+        "length of the elements along the interface in a uniform mesh; with half this length the elements are "
+        "half as long in depth as well; default: a graded mesh that meets the tolerance",
     ) = None
     substrate: key(
         Substance,
@@ -362,6 +364,9 @@ class Contact(Table):
         Text | None,
         "file with a mesh of both pieces, which needs the tags listed in MESH.md; default: a mesh "
         "is made from the dimensions",
+    ) = None
+    mesh_unit: key(
+        LengthUnit | None, "unit of the coordinates in the file of `mesh`; default: m"
     ) = None
     coating: Coating | None = None
     upper: OnePiece | None = None

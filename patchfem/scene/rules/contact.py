@@ -88,6 +88,11 @@ PATCH_RULES = (
         f"elements of {{element_size:g}} m on a length of {{length:g}} m are more than {MAX_ELEMENTS}; use at least "
         "{min_element_size:.3g} m, or leave this key out",
     ),
+    MistakeRule(
+        lambda p: p.has("mesh_unit") and not p.has("mesh"),
+        "{table_key}.mesh_unit",
+        "is the unit of the file of contact.mesh, which is missing: leave mesh_unit out",
+    ),
     RemarkRule(
         lambda p: p.element_size and p.mesh,
         "{table_key}.element_size",

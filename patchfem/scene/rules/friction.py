@@ -14,7 +14,7 @@ from .methods import find_climbed_grooves
 from .rule_table import MissingKeyRule, MistakeRule, RemarkRule, TableFacts, apply_rules
 from .scene_draft import SceneDraft
 from .selectors import LAW_SELECTOR, check_selector
-from .view import TableView
+from .view import UNKNOWN_VALUE, TableView
 
 
 class LawFacts(TableFacts):
@@ -33,6 +33,12 @@ class LawFacts(TableFacts):
     def has_trait(self, trait: str) -> bool:
         """Return whether the law has a trait of `effects.LAWS[...].traits`."""
         return law_has_trait(self.table.law, trait)
+
+    @property
+    def normal_load(self) -> float:
+        """Mean normal load [N] of the contact, or UNKNOWN_VALUE if the scene prescribes its approach."""
+        own = self.load if self.table_key != "friction" else UNKNOWN_VALUE
+        return own or self.contact.load or self.scene.normal.load
 
     @property
     def has_unsupported_kinetic(self) -> bool:

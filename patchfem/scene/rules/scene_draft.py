@@ -16,7 +16,7 @@ from .view import TableView
 
 # Sort order of mistakes in --set, which are listed after those of all lines of a file.
 SET_MISTAKE_ORDER = 10**9
-# Length in characters from which on a message cuts a word; keys, units and file names are shorter.
+# Length in characters above which a message cuts a word; keys, units and file names are shorter.
 MAX_WORD_CHARACTERS = 200
 N_SHOWN_CHARACTERS = 60  # number of characters of a cut word that a message shows
 _LONG_WORD_PATTERN = re.compile(rf"[^\s/\\:]{{{MAX_WORD_CHARACTERS},}}")

@@ -19,7 +19,7 @@ N_PARTS = 8  # number of parts of a window; the parabola must also fit the mean 
 MAX_MISFIT = 2.5
 # Number of standard deviations subtracted from each depth when the largest depth is selected.
 PENALTY = 3.0
-# Number of samples from which on the slopes are fitted to a quarter of the window on either side.
+# Number of samples of a window that is long: a quarter of it on either side gives the slopes.
 LONG_WINDOW = 64
 
 

@@ -36,7 +36,9 @@ MAX_SIDE = 1000  # largest number of pixels along a side of the finest image, wh
 # which either may be the unworn one.
 MIN_RIVAL = 0.5
 MIN_DISTANCE = 3.0  # smallest distance of two different planes, in standard deviations
-MARGIN = 0.1  # fraction of the shorter side within which wear may fade out undetected
+# Width of the margin around worn points, as a fraction of the shorter side, in which wear may fade
+# out undetected
+MARGIN = 0.1
 
 
 @dataclass(frozen=True, eq=False)

@@ -56,8 +56,9 @@ def measure_volumes(alignment: ScanAlignment, x, y) -> Volumes:
     """Compute worn volumes, areas and depths from a depth map.
 
     A volume is the sum of the depths over the changed points and those around them. Its error
-    combines the drawn errors of the depth (`errors`) with that of steep walls, which instruments
-    miss. If another part may be unworn instead, each interval also covers the result for that part.
+    combines two errors: that of the depth, from simulated error fields (`errors`), and that of steep
+    walls, which the instrument does not see. If another part may be unworn instead, each interval also
+    covers the result for that part.
     """
     first = _measure(alignment, x, y)
     if alignment.alternative is None:

@@ -237,6 +237,12 @@ def format_effects() -> str:
     return format_table(("effect", "required keys", "optional keys", "equations"), rows)
 
 
+def find_example(model: type, name: str) -> str:
+    """Return an example of the value of a key of a table, as it is written in a scene."""
+    kind = find_quantity_kind(model, name)
+    return f'"{EXAMPLE_QUANTITIES[kind]}"' if kind else "1.0"
+
+
 def format_table(head: tuple, rows: list) -> str:
     """Return a Markdown table from its head and rows of texts."""
     lines = [

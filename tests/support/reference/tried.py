@@ -5,8 +5,10 @@ from functools import cache
 from typing import NamedTuple
 
 from patchfem.effects import LAWS
-from patchfem.scene import find_lateral_slide_obstacle, loads
+from patchfem.scene import Friction, find_lateral_slide_obstacle, loads
 from patchfem.scene.scene import SceneError
+
+from .keys import find_example
 
 PATCH = """\
 [contact]
@@ -51,15 +53,8 @@ cycles = 20
 """
 GROOVES = '[{}.grooves]\nwavelength = "80 um"\namplitude = "2 um"\n'
 STRIPS = "[contact.strips]\ncount = 4\n"
-VALUES = {
-    "reference_speed": '"1 mm/s"',
-    "stiffness": '"1e7 N/m"',
-    "chi": "-0.5",
-    "beta": "0.5",
-    "exponent": "1.0",
-    "stribeck_speed": '"1 mm/s"',
-    "bond_length": '"1 um"',
-}
+# Values of required keys of laws; other keys have the example of their kind, or 1
+VALUES = {"chi": "-0.5", "beta": "0.5", "bond_length": '"1 um"'}
 FORMS = {
     "nonlocal": {
         "nonlocal": "",
@@ -144,7 +139,9 @@ def list_laws() -> dict:
     out = {}
     for law, effect in LAWS.items():
         needs = effect.keys[0].replace("|stiffness", "").split()
-        needed = "".join(f"{key} = {VALUES[key]}\n" for key in needs if key in VALUES)
+        needed = "".join(
+            f"{key} = {VALUES.get(key) or find_example(Friction, key)}\n" for key in needs
+        )
         for name, extra in FORMS.get(law, {law: ""}).items():
             out[name] = f'law = "{law}"\nstatic = 0.3\n{needed}{extra}'
     return out

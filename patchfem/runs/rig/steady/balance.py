@@ -328,7 +328,7 @@ class BalanceFinder:
 
         Parameters
         ----------
-        first, other : CurvePoint
+        first, second : CurvePoint
         fraction : float
             Fraction of the arc length between the points, from the first one.
         """

@@ -142,7 +142,7 @@ class TracedCurve:
 
         Parameters
         ----------
-        first, other : CurvePoint
+        first, second : CurvePoint
         fraction : float
             Fraction of the distance between the points, from the first one.
         """
