@@ -21,7 +21,7 @@ from .reader import apply_set, read_tables
 from .rules.check import check_scene
 from .rules.limits import check_combinations, find_unsupported_lateral_modes
 from .rules.scene_draft import SceneDraft, SceneError
-from .rules.structure import describe_hidden_modes
+from .rules.structure import describe_default_outputs
 from .sets import format_assignments, require_units
 from .text import format_toml, list_named_effects
 from .toml_text import parse_text, read_text
@@ -218,7 +218,7 @@ def finish_scene(
         kind=kind,
         remarks=draft.remarks,
         sets=sets,
-        notes=tuple(describe_hidden_modes(draft.tables)),
+        notes=tuple(describe_default_outputs(draft.tables)),
         **{name: getattr(completed, name) for name in tables.Tables.model_fields},
     )
 

@@ -243,10 +243,10 @@ COMBINATIONS = [
         "a.toml: missing [slide]: friction needs a motion, [slide] or [structure] with [drive]; only `patchfem backbone`",
     ),
     (BENCH[BENCH.index("[friction]") :], "a.toml: missing [contact]: friction needs a normal load"),
-    (RIG + BENCH[BENCH.index("[slide]") :], "a.toml:34: slide: "),
+    (RIG + BENCH[BENCH.index("[slide]") :], "a.toml:35: slide: "),
     (
         RIG + '[normal]\nload = "1 N"\n',
-        "a.toml:34: normal: [contact] and [normal] exclude each other",
+        "a.toml:35: normal: [contact] and [normal] exclude each other",
     ),
     (LINEAR + '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 5\n', "a.toml: missing [friction]: "),
 ]
