@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 from ..exceptions import PatchfemError
-from .keys.quantities import format_si, parse_quantity
+from .keys.quantities import format_si, parse_quantity, read_percentage
 
 MODES_FORM = 'write "FREQUENCY:DAMPING" or "FREQUENCY:DAMPING:SLIDE" for each mode, such as "120 Hz:0.01, 170 Hz:0.02"'
 ASSUMED_MODES = "100 Hz:0.001"  # modes of a scene that states none
@@ -82,9 +82,9 @@ def _parse_mode(frequency, damping, slide=None) -> GivenMode:
 def _parse_ratio(value) -> float:
     """Parse a damping ratio or a slide; raise ValueError if it is not a number."""
     try:
-        return float(value)
+        return float(read_percentage(value))
     except ValueError:
-        raise ValueError(f"{value!r} is not a number without a unit; 1 % is 0.01") from None
+        raise ValueError(f"{value!r} is neither a number nor a percentage such as '1 %'") from None
 
 
 def _write_mode(number: int, mode: GivenMode) -> dict[str, Any]:

@@ -301,7 +301,7 @@ def test_refuses_invalid_toml(text, start):
         ("a = True\n", "; a = true"),
         (
             "damping = 0.3 %  # of the mode\n",
-            "write a percentage as a plain number: damping = 0.003",
+            'put a quantity or a word in quotes: damping = "0.3 %"',
         ),
         ("a = 1e", "statement (column 6)"),
     ],

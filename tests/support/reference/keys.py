@@ -29,9 +29,10 @@ HEAD = """\
 # Keys of a scene
 
 `python tests/support/reference` generates this page from the program's own records. A quantity is written as a text
-with one number and one unit, such as `"12.7 mm"`; the last section lists the units of each kind of quantity. An effect
-takes part in the computation if the scene contains the table of this effect. The column "required" says "yes" or gives
-the condition under which the key is required. A number in brackets, such as (2.17), is an equation of the report.
+with one number and one unit, such as `"12.7 mm"`; the last section lists the units of each kind of quantity. A number
+without a unit may be given in percent, as a text such as `"0.2 %"`. An effect takes part in the computation if the scene
+contains the table of this effect. The column "required" says "yes" or gives the condition under which the key is
+required. A number in brackets, such as (2.17), is an equation of the report.
 
 See also [the guide](GUIDE.md), [the measures of a run](MEASURES.md), [materials by name](MATERIALS.md),
 [limits](LIMITS.md) and [the equations of all effects](../../studies/site/theory.md#equations-of-all-effects).
