@@ -19,7 +19,7 @@ from .keys import tables
 from .lines import locate_key
 from .reader import apply_set, read_tables
 from .rules.check import check_scene
-from .rules.limits import check_combinations, find_unsupported_lateral_modes
+from .rules.limits import check_combinations
 from .rules.scene_draft import SceneDraft, SceneError
 from .rules.structure import describe_default_outputs
 from .sets import format_assignments, require_units
@@ -207,8 +207,6 @@ def finish_scene(
     is_valid = not draft.has_mistakes
     check_combinations(draft, kind)
     completed = complete_tables(draft.tables, kind) if is_valid else None
-    for key, message in find_unsupported_lateral_modes(completed) if completed else ():
-        draft.add_mistake(key, message)
     for key, message in faults(draft.tables, not draft.has_mistakes) if faults else ():
         draft.add_mistake(key, message)
     draft.raise_mistakes()

@@ -24,7 +24,6 @@ from scene_texts import (
 )
 
 from patchfem.scene import load, loads
-from patchfem.scene.rules.limits import UNSUPPORTED_KEY
 from patchfem.scene.scene import SceneError
 
 # (text, sets, key whose line is named, what the message says)
@@ -409,16 +408,6 @@ def test_refuses_other_mistakes_before_unsupported_features():
     assert "not supported yet" not in get_only_mistake(
         RIG, "friction.breakaway=0.1", "drive.cycles=0"
     )
-
-
-def test_refuses_unsupported_key_of_mode():
-    """An unsupported key of a mode is reported with the name of the mode, and accepted if it is zero."""
-    assert UNSUPPORTED_KEY == "structure.mode.lateral"
-    assert (
-        get_only_mistake(RIG, "structure.mode.second.lateral=0.2")
-        == "--set: structure.mode.second.lateral: not supported yet"
-    )
-    assert loads(RIG, sets=["structure.mode.second.lateral=0"]).structure.mode[1].lateral == 0
 
 
 def test_always_masses_and_interfaces_are_read():

@@ -235,7 +235,6 @@ class Mode(Table):
     pitch: key(
         PerMetre, "rotation of the patch in the plane of the model per unit of the modal coordinate"
     ) = 0.0
-    lateral: key(Number, "motion of the patch across x per unit of the modal coordinate") = 0.0
     yaw: key(
         PerMetre,
         "rotation of the patch about its normal per unit of the modal coordinate; needs "

@@ -16,7 +16,6 @@ from patchfem.scene.keys.types import (
     find_quantity_kind,
     iterate_annotation_parts,
 )
-from patchfem.scene.rules.limits import UNSUPPORTED_KEY
 from patchfem.scene.rules.selectors import SELECTORS, split_keys
 
 FOLDER = Path(__file__).parents[3] / "patchfem" / "scene"
@@ -126,8 +125,7 @@ def _format_row(model: type, key: str, at: str) -> tuple:
     required = (
         "yes" if field.is_required() else _format_condition(model, key, path.rpartition(".")[0])
     )
-    said = find_meaning(model, key) + ("; not supported yet" if path == UNSUPPORTED_KEY else "")
-    return f"`{key}`", _format_kind(model, name), default, required, said
+    return f"`{key}`", _format_kind(model, name), default, required, find_meaning(model, key)
 
 
 def _format_condition(model: type, key: str, table: str) -> str:
