@@ -11,7 +11,7 @@ from ..inputs import loops, measured
 from ..response import spectrum
 from ..runs.accuracy_curve import compute_accuracy_curve
 from ..runs.results.result import Result, patch_surface
-from ..structure.drive_sizes import find_max_acceleration
+from ..structure import drive_sizes
 from .histories import largest_multiplier
 from .pages.driven import describe_drive, run_command
 from .pages.released import describe_release
@@ -388,7 +388,9 @@ def _measured_responses(result: Result) -> Measured | None:
     if rig is None:
         return responses
     responses = replace(
-        responses, frequency=rig.drive.frequency, input=find_max_acceleration(rig.drive.signal)
+        responses,
+        frequency=rig.drive.frequency,
+        input=drive_sizes.find_max_acceleration(rig.drive.signal),
     )
     acceleration = result.measures.get("absolute_acceleration_peak")
     if kind == "peak" or not isinstance(rig.drive.signal, SineDrive) or acceleration is None:
