@@ -15,7 +15,7 @@ from .keys.quantities import format_si, parse_quantity, read_percentage
 MODES_FORM = 'write "FREQUENCY:DAMPING" or "FREQUENCY:DAMPING:SLIDE" for each mode, such as "120 Hz:0.01, 170 Hz:0.02"'
 ASSUMED_MODES = "100 Hz:0.001"  # modes of a scene that states none
 ASSUMED_MASS = "1 kg"  # modal mass for the modes of a scene without [structure]
-# Drive of a scene that has none; no result of a backbone depends on it.
+# Drive in place of that of the scene; no result of a backbone depends on it.
 UNUSED_DRIVE = {"kind": "force", "frequency": "100 Hz", "force": "1 N", "cycles": 10}
 STRUCTURES = {"mode", "masses", "reduced", "file"}  # keys of [structure] that give its modes
 MODE_NAMES = ("first", "second", "third", "fourth", "fifth", "sixth")
@@ -141,7 +141,7 @@ class BackboneTables:
         if self.modes:
             self._write_modes(raw)
         if "structure" in raw:
-            raw.setdefault("drive", dict(UNUSED_DRIVE))
+            raw["drive"] = dict(UNUSED_DRIVE)
 
     def _write_modes(self, raw: dict[str, Any]) -> None:
         """Write the modes into [structure]."""

@@ -237,6 +237,19 @@ def test_new_joint_scene_has_a_backbone(tmp_path, monkeypatch, capsys):
         assert any(text in note for note in answer["notes"])
 
 
+def test_exact_drive_of_scene_is_ignored():
+    """A scene whose [drive] is incomplete, or absent, gives the curve of the same scene with a drive."""
+    text, _, drive = (LAW + STRUCTURE).partition("[drive]")
+    curves = [
+        pf.backbone(text + tail, amplitudes=[2e-5], method="quasi-static")
+        for tail in ("[drive]" + drive, '[drive]\nkind = "free"\n', "")
+    ]
+    for name in ("quasi_static_frequency", "quasi_static_damping"):
+        assert len({curve[name].item() for curve in curves}) == 1
+    for curve, is_noted in zip(curves, (True, True, False)):
+        assert any("[drive] is ignored" in note for note in curve.attrs["notes"]) == is_noted
+
+
 @pytest.mark.parametrize(
     "scene, modes, message",
     [
