@@ -289,7 +289,7 @@ def run_command(arguments: list, before=lambda: None) -> int:
         try:
             app(arguments, exit_on_error=False, print_error=False)
         except SystemExit as end:  # cyclopts raises SystemExit at the end of a verb and of its help
-            if end.code or isinstance(end.__context__, BrokenPipeError):
+            if end.code:
                 raise
         sys.stdout.flush()
         return 0
@@ -308,13 +308,6 @@ def run_command(arguments: list, before=lambda: None) -> int:
     except MemoryError:
         print_message(OUT_OF_MEMORY)
         return 4
-    except SystemExit as end:  # raised by the help if the reader closes the pipe
-        if isinstance(end.__context__, BrokenPipeError):
-            return 0
-        raise
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
     except OSError as error:
         print_message(make_printable(_describe_os_error(error)))
         return 4

@@ -510,7 +510,8 @@ def backbone(
     xarray.Dataset
         Variables and amplitudes of each method. Attributes are `free_frequency` and `stuck_frequency` [Hz], the exponents
         `exponent_micro` and `exponent_gross` of the energy dissipated per cycle, and `flutter_amplitude` [m], where they
-        are known. The attribute `missing` gives the reason if a method has no curve. The variables with the prefix "band"
+        are known. The attribute `notes` is a list of sentences (xarray reads a list with one sentence from a netCDF file as
+        a string); `missing` gives the reason if a method has no curve. The variables with the prefix "band"
         are limits of the curve of the recommended method, whose name is the attribute `method`; `advice` describes where
         each method is valid.
 
@@ -704,7 +705,9 @@ class SweepPlots:
 
     @staticmethod
     def backbone(dataset: Dataset, ax: Axes | None = None) -> Axes:
-        """Plot frequency and damping ratio of a mode against its amplitude, with error bars, for each method.
+        """Plot frequency and damping ratio of a mode against its amplitude, for each method.
+
+        The recommended curve is bold, on top, and lies in its band. Without a band all curves have error bars.
 
         Parameters
         ----------
@@ -743,7 +746,15 @@ class SweepPlots:
                 "plot.backbone: a Dataset returned by pf.backbone is needed, with at least one curve"
                 + (f"; {reason}" if reason else "")
             )
-        figure = pictures.draw_charts.figure(backbone_files.backbone_charts(curves), axes_to_use=ax)
+        band = None
+        if "band_amplitude" in coordinates:
+            band = SimpleNamespace(
+                method=dataset.attrs["method"], amplitude=dataset["band_amplitude"].values
+            )
+            for name in backbone_files.BAND_VARIABLES:
+                setattr(band, name, dataset[f"band_{name}"].values)
+        drawn_charts = backbone_files.backbone_charts(curves, band)
+        figure = pictures.draw_charts.figure(drawn_charts, axes_to_use=ax)
         return figure.axes[0] if ax is None else ax
 
 

@@ -188,7 +188,6 @@ class ModalBasis:
       `slide`.
     - normal (n,): participation of the motion that opens the contact, or None.
     - pitch (n,): participation of the pitch of the patch [rad/m], or None.
-    - lateral (n,): participation of the motion of the patch across the sliding direction, or None.
     - yaw (n,): participation of the yaw of the patch [rad/m], or None.
     - shapes (p, n): shapes of the coordinates at the modes or masses in `names`; None for the identity.
     - gauge (n,): participation of the point whose displacement is measured; None if it is the same point as `output`,
@@ -208,7 +207,6 @@ class ModalBasis:
     faces: np.ndarray | None = None
     normal: np.ndarray | None = None
     pitch: np.ndarray | None = None
-    lateral: np.ndarray | None = None
     yaw: np.ndarray | None = None
     shapes: np.ndarray | None = None
     gauge: np.ndarray | None = None

@@ -12,11 +12,6 @@ from math import isfinite, log10
 
 MAX_SIGNIFICANT_DIGITS = 7  # largest number of significant digits of a value
 DIGITS_WITHOUT_ERROR = 6  # number of significant digits of a value without a known error
-# largest round-off of a value with a unit, as a fraction of its floor
-MAX_ROUND_OFF_FRACTION = 1e-6
-MAX_RATIO_ROUND_OFF = 0.1  # largest round-off of a dimensionless value, as a fraction of its floor
-# largest relative error of a value below its floor that is not displayed as 0
-MAX_RELATIVE_ERROR = 0.1
 MIN_PLAIN_POWER = -4  # smallest power of ten of a number without an exponent
 FIRST_EXPONENT_POWER = 7  # smallest power of ten of a large number with an exponent
 ZERO_ERROR_POWER = -400  # power of ten of a vanishing error, smaller than that of any float
@@ -90,9 +85,7 @@ def needs_log_scale(values) -> bool:
     return bool(positive.size and positive.max() > 1e3 * positive.min() and not np.any(values < 0))
 
 
-def round_to_error(
-    value: float | None, error: float | None = None, floor: float = 0.0, *, is_ratio: bool = False
-) -> tuple:
+def round_to_error(value: float | None, error: float | None = None, floor: float = 0.0) -> tuple:
     """Format a value and its error so that both end at the second digit of the error.
 
     Parameters
@@ -102,9 +95,7 @@ def round_to_error(
     error : float or None
         Numerical error (half-width); None if it is unknown.
     floor : float
-        Absolute floor of the measure. A smaller value is displayed as 0 if its error is large or if it is round-off.
-    is_ratio : bool
-        Whether the value is dimensionless, so that its floor does not depend on the size of the rig.
+        Absolute floor of the measure; a smaller value is displayed as 0.
 
     Returns
     -------
@@ -115,7 +106,7 @@ def round_to_error(
         return "-", ""
     if not isfinite(value):
         return f"{value:g}", ""
-    if _is_displayed_as_zero(value, error, floor, is_ratio):
+    if abs(value) <= floor:
         return "0", format_number(error, 2) if error is not None and 0 < floor <= error else ""
     if error is None or not isfinite(error):
         return format_number(value, DIGITS_WITHOUT_ERROR), "" if error is None else f"{error:g}"
@@ -182,7 +173,7 @@ def format_value(
         return f"- {unit}".removesuffix(" 1")
     name, scale = choose_display_unit(value, unit, error)
     scaled_error = None if error is None else error * scale
-    texts = round_to_error(value * scale, scaled_error, floor * scale, is_ratio=unit == "1")
+    texts = round_to_error(value * scale, scaled_error, floor * scale)
     return format_with_error(*texts, name)
 
 
@@ -245,14 +236,6 @@ def rewrite_powers_of_ten(text: str) -> str:
         return format_quantity(float(number), SENTENCE_UNITS[unit], digits)
 
     return _POWER_PATTERN.sub(rewrite, text)
-
-
-def _is_displayed_as_zero(value: float, error: float | None, floor: float, is_ratio: bool) -> bool:
-    """Return whether a value is displayed as 0, given its error and the floor of the measure."""
-    if abs(value) > floor or (error or 0.0) > floor:
-        return False
-    round_off = (MAX_RATIO_ROUND_OFF if is_ratio else MAX_ROUND_OFF_FRACTION) * floor
-    return error is None or error > MAX_RELATIVE_ERROR * abs(value) or abs(value) <= round_off
 
 
 def _is_written_without_exponent(power: int) -> bool:

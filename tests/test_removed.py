@@ -1,5 +1,6 @@
-"""Each feature removed in patchfem 1.0 is refused with one sentence that names its replacement."""
+"""Each feature removed in patchfem 1.0 or 1.1 is refused with one sentence that names its replacement."""
 
+import re
 from functools import partial
 from importlib.util import find_spec
 
@@ -64,12 +65,20 @@ TRIED = {  # removed feature -> (function that uses it, replacement that the mes
         for name in removed.REMOVED_METHODS
     },
     **{
-        key: (partial(load, WORN if key.startswith("wear.") else RIG, {key: value}), instead)
+        key: (
+            partial(
+                load,
+                WORN if key.startswith("wear.") else RIG,
+                {key.replace(".mode.", ".mode.axial."): value},
+            ),
+            instead,
+        )
         for key, value, instead in (
             ("accuracy.convergence", "force", "use method 'march' without it"),
             ("accuracy.convergence_tolerance", 1e-4, "use method 'march' without it"),
             ("accuracy.stick_speed", "1 mm/s", "use method 'march' without it"),
             ("wear.scheme", "explicit", "contact and wear are always solved together"),
+            ("structure.mode.lateral", 0.2, "the patch slides along x alone"),
         )
     },
     "quadrature exponential": (
@@ -125,7 +134,7 @@ def test_refuses_removed_feature(tmp_path, name):
     with pytest.raises(pf.PatchfemError) as refused:
         attempt(tmp_path)
     sentence = str(refused.value)
-    assert "removed in patchfem 1.0" in sentence and instead in sentence
+    assert re.search(r"removed in patchfem 1\.[01]\b", sentence) and instead in sentence
     assert len(sentence.strip().splitlines()) == 1
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from command_line import run_cli
-from scene_texts import make_shaken_block
+from scene_texts import BENCH, make_shaken_block
 
 import patchfem as pf
 
@@ -360,12 +360,29 @@ def test_refuses_arguments_of_wrong_type(odd):
             verb(odd)
 
 
+@pytest.mark.parametrize("text", [BENCH, TEXT], ids=["bench", "rig"])
+@pytest.mark.parametrize("keys", [{}, {"accuracy.method": "march", "accuracy.steps_per_cycle": 60}])
+def test_exact_rigid_loop_has_vertical_jumps(text, keys):
+    """In the plot of the loop of a rigid contact under a constant load, the force jumps at a fixed slide."""
+    line = pf.run(text, **keys).plot.loop().lines[0]
+    slide, force = np.diff(line.get_xydata().T)
+    jumps = np.abs(force) > 1e-9
+    assert jumps.sum() >= 2 and not slide[jumps].any()
+
+
 def test_exact_backbone_and_stress_plots_show_values():
     """The plot of a backbone has its frequencies on the axis, and the plot of stresses shows positive values."""
     found = pf.backbone(PLASTIC_BLOCK, amplitudes="0.1 um..10 um:5", method="quasi-static")
     axes = pf.plot.backbone(found)
     assert axes.lines[0].get_ydata() == pytest.approx(found["quasi_static_frequency"].values)
     assert len(axes.figure.axes) == 2 and pf.plot.backbone(found, axes) is axes
+    # The recommended curve is the last one, thick, in its band.
+    found = pf.backbone(PLASTIC_BLOCK, amplitudes="0.1 um..10 um:5")
+    for axes, name in zip(pf.plot.backbone(found).figure.axes, ("frequency", "damping")):
+        thin, bold = axes.lines
+        assert bold.get_ydata() == pytest.approx(found[f"balance_{name}"].values)
+        assert bold.get_label() == "balance (use this)"
+        assert bold.get_linewidth() > 2 * thin.get_linewidth() and len(axes.collections) == 1
     shown = pf.run(PIECES).plot.stress()
     assert shown.collections[0].get_array().max() > 0 and "m" in shown.get_xlabel()
     with pytest.raises(pf.PatchfemError, match="no \\[contact\\]"):

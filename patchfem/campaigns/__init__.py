@@ -30,7 +30,6 @@ PUBLIC = {
         "DEFAULT_STARTS",
         "FittedCurve",
         "fit_curve",
-        "is_damping_curve_file",
     ),
     "fits.loop": (
         "FittedLoop",

@@ -1,5 +1,6 @@
 """Standard streams that work even if they are closed, full or of a limited encoding."""
 
+import io
 import os
 import re
 import sys
@@ -10,11 +11,26 @@ import warnings
 LONG_WORD = re.compile(r"\S{401,}")
 
 
+class _OutputPipe(io.FileIO):
+    """File that discards what is written after the reader of the pipe has gone.
+
+    A command that prints its answer before it has written all of its files (`patchfem run ... | head`) goes on.
+    """
+
+    def write(self, data) -> int:
+        """Write bytes and return their number."""
+        try:
+            return super().write(data)
+        except BrokenPipeError:
+            return len(data)
+
+
 def prepare_streams() -> None:
     """Prepare the standard streams of the process.
 
     A closed stream is connected to the null device, because a file that is opened while 0, 1 or 2
-    is closed would get its number and then everything that is printed. A character that the
+    is closed would get its number and then everything that is printed. Output to
+    a pipe that nobody reads any more is discarded. A character that the
     encoding of a stream does not have is written as a backslash with its code. Warnings of
     libraries are suppressed, because a user cannot act on them: what matters shows in the numbers
     and is reported by the run. Python's option -W and PYTHONWARNINGS restore these warnings.
@@ -26,6 +42,10 @@ def prepare_streams() -> None:
             # The null device gets the lowest free file descriptor,
             # which is that of the closed stream.
             os.open(os.devnull, os.O_RDWR)
+    if sys.stdout is not None and not sys.stdout.isatty():
+        sys.stdout = io.TextIOWrapper(
+            io.BufferedWriter(_OutputPipe(1, "w", closefd=False)), encoding=sys.stdout.encoding
+        )
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is None:

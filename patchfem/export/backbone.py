@@ -124,7 +124,7 @@ def backbone_contents(backbone: Backbone, title: str = "") -> Contents:
         "exponent_micro": backbone.exponents.micro,
         "exponent_gross": backbone.exponents.gross,
         "flutter_amplitude": backbone.flutter,
-        "notes": "; ".join(backbone.notes) or None,
+        "notes": list(backbone.notes),
         "method": band and band.method,
         "advice": backbone.answer.advice or None,
     }
@@ -192,7 +192,9 @@ def backbone_charts(curves: dict, band: Band | None = None) -> list:
         damping.append(
             _band_mark(band, scale, "damping", floor=_damping_floor(curves, is_log=is_log))
         )
-    for method, curve in curves.items():
+    # The recommended curve is drawn last, over the others.
+    recommended = band.method if band is not None else ""
+    for method, curve in sorted(curves.items(), key=lambda item: item[0] == recommended):
         x = curve.amplitude * scale
         has_small_error = _has_small_error(curve)
         style = _curve_style(method, band)

@@ -11,7 +11,7 @@ from ..inputs import loops, measured
 from ..response import spectrum
 from ..runs.accuracy_curve import compute_accuracy_curve
 from ..runs.results.result import Result, patch_surface
-from ..structure.drive_sizes import find_max_acceleration
+from ..structure import drive_sizes
 from .histories import largest_multiplier
 from .pages.driven import describe_drive, run_command
 from .pages.released import describe_release
@@ -291,9 +291,8 @@ def _collect_evaluations(result: Result) -> Evaluations:
 def _bench_motion(result: Result, tables: dict) -> Motion:
     """Return the histories of a bench run for its page."""
     response = result.response
-    window = result.window
     history = {"time": response.time, "displacement": response.slide, "force": response.force}
-    loop = {"slide": window.slide, "force": window.force, "time": window.time}
+    loop = _trace_loop(result)
     recorded = None
     recorded_loop = _read_recorded_loop(
         result.plan.model.source.path.parent, tables["slide"], response
@@ -303,6 +302,26 @@ def _bench_motion(result: Result, tables: dict) -> Motion:
         history["measured"] = time, force
         recorded = Path(tables["slide"]["file"]).name, slide, force
     return Motion(history, loop, recorded=recorded)
+
+
+def _trace_loop(result: Result) -> dict:
+    """Return slide, force and time of the friction loop, with the jumps of the force of a rigid interface.
+
+    The force after a sample acts from the sample on, so a jump is drawn at the slide of the sample before it.
+    """
+    window = result.window
+    loop = {"slide": window.slide, "force": window.force, "time": window.time}
+    if not result.plan.model.sticks_rigidly:
+        return loop
+    rows = np.arange(window.force.size)
+    before = np.flatnonzero(np.diff(np.sign(window.force)))
+    rows_of_force = np.insert(rows, before + 1, before + 1)
+    rows = np.insert(rows, before + 1, before)
+    return {
+        "slide": window.slide[rows],
+        "force": window.force[rows_of_force],
+        "time": window.time[rows],
+    }
 
 
 def _read_recorded_loop(folder: Path, slide: dict, response) -> tuple | None:
@@ -329,7 +348,7 @@ def _rig_motion(result: Result) -> Motion:
     response = result.response
     window = result.window
     rig = result.plan.model.rig
-    loop = {"slide": window.slide, "force": window.force, "time": window.time}
+    loop = _trace_loop(result)
     if rig.friction.names and "slides" in window.extra:
         loop["each"] = list(
             zip(rig.friction.names, window.extra["slides"].T, window.extra["forces"].T)
@@ -369,7 +388,9 @@ def _measured_responses(result: Result) -> Measured | None:
     if rig is None:
         return responses
     responses = replace(
-        responses, frequency=rig.drive.frequency, input=find_max_acceleration(rig.drive.signal)
+        responses,
+        frequency=rig.drive.frequency,
+        input=drive_sizes.find_max_acceleration(rig.drive.signal),
     )
     acceleration = result.measures.get("absolute_acceleration_peak")
     if kind == "peak" or not isinstance(rig.drive.signal, SineDrive) or acceleration is None:

@@ -14,7 +14,10 @@ COLUMN_UNITS = {
     "displacement": {"mil": 25.4e-6, "in": 0.0254, "m": 1.0, "mm": 1e-3, "um": 1e-6},
 }
 TABLE_FORMAT = TableFormat(
-    COLUMN_UNITS, ("frequency", "input"), "frequency [Hz],input [g],flag", "a measured table"
+    COLUMN_UNITS,
+    ("frequency", "input"),
+    "frequency [Hz],input [g],acceleration [g],displacement [um],flag",
+    "a measured table",
 )
 UNIVERSAL_EXTENSIONS = (".uff", ".unv", ".uf", ".58")
 FLAG_MEANINGS = {"U": "unstable", "*": "the gauge gave no reading", "R": "repeat run"}

@@ -110,6 +110,13 @@ class Model:
         return self.patch.interface.partial_slip if self.patch is not None else ""
 
     @property
+    def sticks_rigidly(self) -> bool:
+        """Whether the first interface sticks without any displacement, so that its force jumps at a reversal."""
+        is_partial = self.partial_slip or (self.rig and self.rig.friction.has_partial_slip)
+        has_law = self.friction is not None and law_has_trait(self.friction.law, "set-valued")
+        return has_law and not is_partial
+
+    @property
     def has_interface_patches(self) -> bool:
         """Whether at least one interface of the rig has a patch."""
         if self.rig is None:

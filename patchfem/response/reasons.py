@@ -10,7 +10,7 @@ import numpy as np
 
 from ..core import Measure, Outcome
 from ..formatting import format_number
-from ..structure.drive_sizes import has_full_cycle, is_periodic, is_sinusoidal
+from ..structure import drive_sizes
 from .measures import lateral_history
 from .rows import TABLE
 
@@ -121,7 +121,7 @@ def find_missing_steady(values, outcome: Outcome, drive) -> dict:
         Measure by name; {} if the value exists or the drive is not periodic.
     """
     is_known = STEADY_AMPLITUDE in values
-    if is_known or outcome is not Outcome.TRANSIENT or not is_periodic(drive):
+    if is_known or outcome is not Outcome.TRANSIENT or not drive_sizes.is_periodic(drive):
         return {}
     return {STEADY_AMPLITUDE: _make_missing_measure(STEADY_AMPLITUDE, CHANGE_NOT_RESOLVED_REASON)}
 
@@ -154,7 +154,7 @@ def find_missing_drift(values, drive) -> dict:
         Measure by name; {} if the value remains valid.
     """
     drift = values.get("drift_per_cycle")
-    if drift is None or is_periodic(drive):
+    if drift is None or drive_sizes.is_periodic(drive):
         return {}
     reason = BEATS_REASON if hasattr(drive, "beat") else APERIODIC_REASON
     return {"drift_per_cycle": _remove_value(drift, reason)}
@@ -187,7 +187,7 @@ def find_missing_loops(values, window, drive) -> dict:
     """
     ledger = window.extra.get("ledger")
     loop = values.get("loop_area")
-    if ledger is None or loop is None or is_periodic(drive):
+    if ledger is None or loop is None or drive_sizes.is_periodic(drive):
         return {}
     _, stored, dissipated, created = np.abs(ledger[:, -1] - ledger[:, 0])
     names = [name for name in values if name.startswith("loop_area")]
@@ -206,7 +206,7 @@ def find_missing_loops(values, window, drive) -> dict:
 
 def _reason_for_missing_phase(values, drive) -> str:
     """Return the reason why the phase of slip onset has no value."""
-    if not is_sinusoidal(drive):
+    if not drive_sizes.is_sinusoidal(drive):
         return "the drive is not a sine at the end of the run, so the start of slip has no phase"
     stick_fraction = getattr(values.get("stick_fraction"), "value", values.get("stick_fraction"))
     if stick_fraction == 1.0:
@@ -220,9 +220,9 @@ def _reason_for_missing_cycle_value(
     name: str, values, window, drive, other_modes_fraction: float
 ) -> str:
     """Return the reason why a cycle measure has no value."""
-    if not is_sinusoidal(drive):
+    if not drive_sizes.is_sinusoidal(drive):
         return "this measure exists only for a drive that is a sine at the end of the run"
-    if not has_full_cycle(window.time[-1] - window.time[0], drive):
+    if not drive_sizes.has_full_cycle(window.time[-1] - window.time[0], drive):
         return "the run contains no whole cycle of the drive"
     if name in ACCELERATIONS and ACCELERATIONS[0] in values:
         return OUTPUT_AT_REST_REASON

@@ -433,7 +433,7 @@ def _make_value_reader(key: str) -> Callable[[str], float | str]:
         if is_number and takes_float and _PLAIN_NUMBER_PATTERN.fullmatch(text):
             # Most drawn values are plain numbers; `read_set_value` is slow for thousands of them.
             return float(text)
-        value = read_set_value(key, text)
+        value = quantities.read_percentage(read_set_value(key, text))
         if isinstance(value, dict) and find_inner_table(*place) is not None:
             return text
         has_number = isinstance(value, int | float) and not isinstance(value, bool)
@@ -450,6 +450,7 @@ def _read_ends(key: str, written_range: _WrittenRange) -> _RangeEnds:
     kind = find_quantity_kind(*find_key(key))
     texts = written_range[:2]
     if kind is None:
+        texts = tuple(str(quantities.read_percentage(text)) for text in texts)
         if any(re.fullmatch(quantities.NUMBER_PATTERN, text) is None for text in texts):
             raise ValueError(
                 f"{written_range.ends_text}: both ends of this range must be plain numbers"

@@ -10,12 +10,12 @@ from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 from ..exceptions import PatchfemError
-from .keys.quantities import format_si, parse_quantity
+from .keys.quantities import format_si, parse_quantity, read_percentage
 
 MODES_FORM = 'write "FREQUENCY:DAMPING" or "FREQUENCY:DAMPING:SLIDE" for each mode, such as "120 Hz:0.01, 170 Hz:0.02"'
 ASSUMED_MODES = "100 Hz:0.001"  # modes of a scene that states none
 ASSUMED_MASS = "1 kg"  # modal mass for the modes of a scene without [structure]
-# Drive of a scene that has none; no result of a backbone depends on it.
+# Drive in place of that of the scene; no result of a backbone depends on it.
 UNUSED_DRIVE = {"kind": "force", "frequency": "100 Hz", "force": "1 N", "cycles": 10}
 STRUCTURES = {"mode", "masses", "reduced", "file"}  # keys of [structure] that give its modes
 MODE_NAMES = ("first", "second", "third", "fourth", "fifth", "sixth")
@@ -82,9 +82,9 @@ def _parse_mode(frequency, damping, slide=None) -> GivenMode:
 def _parse_ratio(value) -> float:
     """Parse a damping ratio or a slide; raise ValueError if it is not a number."""
     try:
-        return float(value)
+        return float(read_percentage(value))
     except ValueError:
-        raise ValueError(f"{value!r} is not a number without a unit; 1 % is 0.01") from None
+        raise ValueError(f"{value!r} is neither a number nor a percentage such as '1 %'") from None
 
 
 def _write_mode(number: int, mode: GivenMode) -> dict[str, Any]:
@@ -141,7 +141,7 @@ class BackboneTables:
         if self.modes:
             self._write_modes(raw)
         if "structure" in raw:
-            raw.setdefault("drive", dict(UNUSED_DRIVE))
+            raw["drive"] = dict(UNUSED_DRIVE)
 
     def _write_modes(self, raw: dict[str, Any]) -> None:
         """Write the modes into [structure]."""

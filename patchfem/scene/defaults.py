@@ -19,6 +19,7 @@ from .rules.selectors import (
     SLIDE_KIND_SELECTOR,
     list_unused_keys,
 )
+from .rules.structure import default_output
 
 SLIDE_DEFAULTS = {  # default values of the keys that each slide.kind uses
     "sine": {"cycles": 1.0},
@@ -71,8 +72,9 @@ def _complete_interface(interface: tables.Interface) -> tables.Interface:
 
 
 def _complete_mode(mode: tables.Mode, index: int) -> tables.Mode:
-    motion = 0.0 if index else mode.slide
-    mode = _fill_missing_values(mode, {"base": motion, "output": motion})
+    mode = _fill_missing_values(
+        mode, {"base": 0.0 if index else mode.slide, "output": default_output(index)}
+    )
     return _fill_missing_values(mode, {"accelerometer": mode.output, "gauge": mode.output})
 
 

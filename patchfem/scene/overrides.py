@@ -14,6 +14,7 @@ from ..effects import find_waveform
 from .files import list_named_files, require_files
 from .lines import find_key_lines, split_key
 from .reader import apply_set, read_tables
+from .rules.contact import MAX_SMALL_ANGLE, find_max_load
 from .rules.scene_draft import SceneDraft, find_item_or_value
 from .rules.structure import MAX_USUAL_DAMPING
 from .rules.view import TableView
@@ -27,7 +28,7 @@ MAX_CACHED_TABLES = 4096
 PLAIN_KEYS = {
     "normal.load": inf,
     "contact.load": inf,
-    "contact.tilt.angle": inf,
+    "contact.tilt.angle": MAX_SMALL_ANGLE,
     "contact.crown.radius": inf,
     "friction.static": inf,
     "friction.bond_length": inf,
@@ -271,6 +272,8 @@ def _find_plain_key(scene: Scene, key: str) -> PlainKey | None:
     limit = PLAIN_KEYS.get(".".join(pieces))
     if limit is None or (pieces[:2] == ["structure", "mode"] and not isinstance(part, int)):
         return None
+    if key == "contact.load":
+        limit = find_max_load(TableView(scene.contact))
     value = getattr(holder, pieces[-1], None)
     if value is None or not 0 < value < limit:
         return None

@@ -124,8 +124,10 @@ def _report_unknown(
 ) -> None:
     """Report an unknown key with the most similar known key."""
     path = f"{table_key}.{key}" if table_key else key
-    if path in removed.REMOVED_KEYS:
-        draft.add_mistake(path, removed.REMOVED_KEYS[path])
+    # The number of an item, as in structure.mode.0, is no part of the name of its keys.
+    name = ".".join(piece for piece in path.split(".") if not piece.isdecimal())
+    if name in removed.REMOVED_KEYS:
+        draft.add_mistake(path, removed.REMOVED_KEYS[name])
         return
     is_table = _is_table(raw[key])
     known = list(attributes_by_key(model))

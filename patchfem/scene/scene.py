@@ -19,9 +19,9 @@ from .keys import tables
 from .lines import locate_key
 from .reader import apply_set, read_tables
 from .rules.check import check_scene
-from .rules.limits import check_combinations, find_unsupported_lateral_modes
+from .rules.limits import check_combinations
 from .rules.scene_draft import SceneDraft, SceneError
-from .rules.structure import describe_hidden_modes
+from .rules.structure import describe_default_outputs
 from .sets import format_assignments, require_units
 from .text import format_toml, list_named_effects
 from .toml_text import parse_text, read_text
@@ -219,8 +219,6 @@ def finish_scene(
     is_valid = not draft.has_mistakes
     check_combinations(draft, kind)
     completed = complete_tables(draft.tables, kind) if is_valid else None
-    for key, message in find_unsupported_lateral_modes(completed) if completed else ():
-        draft.add_mistake(key, message)
     for key, message in faults(draft.tables, not draft.has_mistakes) if faults else ():
         draft.add_mistake(key, message)
     draft.raise_mistakes()
@@ -230,7 +228,7 @@ def finish_scene(
         kind=kind,
         remarks=draft.remarks,
         sets=sets,
-        notes=tuple(describe_hidden_modes(draft.tables)),
+        notes=tuple(describe_default_outputs(draft.tables)),
         **{name: getattr(completed, name) for name in tables.Tables.model_fields},
     )
 

@@ -7,7 +7,7 @@ import re
 
 from .keys.contact import Material
 from .keys.materials import MATERIALS, SEPARATORS, is_case_sensitive, list_spellings
-from .keys.quantities import NUMBER_PATTERN, UNIT_FACTORS, find_si_unit
+from .keys.quantities import NUMBER_PATTERN, PERCENTAGE_PATTERN, UNIT_FACTORS, find_si_unit
 from .keys.tables import Tables
 from .keys.types import (
     Table,
@@ -20,6 +20,8 @@ from .keys.types import (
 from .rules.selectors import SELECTORS, split_keys
 
 SCHEMA_DIALECT = "https://json-schema.org/draft/2020-12/schema"
+# Words of a schema that restrict a number.
+NUMBER_WORDS = ("type", "exclusiveMinimum", "minimum", "exclusiveMaximum", "maximum")
 # Regular expressions of all spellings of a part of a unit.
 UNIT_SPELLINGS = {"u": "[uµμ]", "^2": "(?:\\^2|²)", "^3": "(?:\\^3|³)", " ": "[ ·]"}
 
@@ -79,6 +81,9 @@ def _describe_key(model: type[Table], key: str, raw: dict) -> dict:
     name = attributes_by_key(model)[key]
     if kind := find_quantity_kind(model, name):
         _add_units(schema, kind)
+    elif schema.get("type") == "number":
+        number = {word: schema.pop(word) for word in NUMBER_WORDS if word in schema}
+        schema["anyOf"] = [number, {"type": "string", "pattern": f"^{PERCENTAGE_PATTERN}$"}]
     if find_inner_table(model, name) in (None, Material):
         clauses = (find_meaning(model, key), _describe_selection(model, key))
         schema["description"] = "; ".join(filter(None, clauses))

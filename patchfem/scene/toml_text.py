@@ -22,7 +22,6 @@ SECONDS_PER_CUBED_MODE = 1.5e-9  # time to compute n modes on one core, divided 
 _BARE_VALUE_PATTERN = re.compile(r"\s*([\w.-]+)\s*=\s*([^#\"'\[{]+)")
 _DECIMAL_POINT_PATTERN = re.compile(r"([-+]?)(\d*)\.(\d*)((?:[eE][-+]?\d+)?)")
 _DECIMAL_COMMA_PATTERN = re.compile(r"[-+]?\d+,\d+")
-_PERCENTAGE_PATTERN = re.compile(r"([-+]?(?:\d+\.?\d*|\.\d+))\s*%")
 _QUANTITY_OR_WORD_PATTERN = re.compile(
     r"[-+]?[\d.]+(?:[eE][-+]?\d+)?\s*(?![eE]$)[a-zA-Z%\u00b5\u03bc][a-zA-Z\u00b5\u03bc/^0-9 -]*|"
     r"[a-zA-Z][\w./ -]*"
@@ -130,7 +129,6 @@ def _advise_spelling(text: str, line: int) -> str:
     key = match[1]
     value = match[2].strip()
     point = _DECIMAL_POINT_PATTERN.fullmatch(value)
-    percentage = _PERCENTAGE_PATTERN.fullmatch(value)
     if point and (point[2] or point[3]):
         number = f"{point[1]}{point[2] or 0}.{point[3] or 0}{point[4]}"
         return f"; put a digit on both sides of the point: {key} = {number}"
@@ -138,9 +136,6 @@ def _advise_spelling(text: str, line: int) -> str:
         return f"; write the decimal comma as a point: {key} = {value.replace(',', '.')}"
     if value.lower() in ("true", "false"):
         return f"; {key} = {value.lower()}"
-    if percentage:
-        number = float(percentage[1]) / 100
-        return f"; write a percentage as a plain number: {key} = {number:.12g}"
     if _QUANTITY_OR_WORD_PATTERN.fullmatch(value) and len(value) < MAX_QUOTED_CHARACTERS:
         return f'; put a quantity or a word in quotes: {key} = "{value}"'
     return ""

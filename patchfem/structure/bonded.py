@@ -17,7 +17,6 @@ PARTICIPATION_FIELDS = (
     "gauge",
     "normal",
     "pitch",
-    "lateral",
     "yaw",
 )  # fields of a basis whose rows run over its coordinates
 

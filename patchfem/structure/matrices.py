@@ -69,7 +69,7 @@ def build_basis(
     damper_rows : (d, n) array_like, optional
         The same for C.
     **rows : (n,) array_like, optional
-        Rows that give the motions normal, pitch, lateral and yaw of the patch.
+        Rows that give the motions normal, pitch and yaw of the patch.
 
     Returns
     -------

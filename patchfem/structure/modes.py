@@ -9,7 +9,7 @@ import numpy as np
 from ..core import ModalBasis, frozen_array
 
 # Motions of the patch in addition to its slide
-PATCH_MOTIONS = ("normal", "pitch", "lateral", "yaw")
+PATCH_MOTIONS = ("normal", "pitch", "yaw")
 
 
 def build_basis(structure, drive_kind: str) -> ModalBasis:
@@ -23,7 +23,7 @@ def build_basis(structure, drive_kind: str) -> ModalBasis:
     structure : Structure
         Table with the modal mass `moving_mass` [kg] and with the sequence `mode` of objects with the
         attributes name, frequency [Hz], damping, slide, base, output, accelerometer and gauge, and
-        with the motions normal, pitch, lateral and yaw of the patch.
+        with the motions normal, pitch and yaw of the patch.
     drive_kind : str
         Kind of the drive; "force" if it is a force, otherwise the base moves.
 

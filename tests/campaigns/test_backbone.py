@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 from scene_texts import IWAN, make_shaken_block
 from scipy.integrate import solve_ivp
 
@@ -573,9 +574,17 @@ def test_quasi_static_curve_ends_at_maximum_force():
     assert backbone.frequencies.free == pytest.approx(np.sqrt(OMEGA**2 + 9.2e6) / (2 * np.pi))
 
 
-def test_python_interface_returns_dataset():
-    """The Python interface returns a dataset with sorted amplitudes and units, and refuses invalid arguments."""
+def test_python_interface_returns_dataset(tmp_path):
+    """The Python interface returns a dataset with sorted amplitudes and units, and refuses invalid arguments.
+
+    Its notes are a list, also if it is read from a netCDF file.
+    """
     backbone = pf.backbone(make_shaken_block(IWAN), amplitudes=[1e-3, 1e-4], method="quasi-static")
+    notes = backbone.attrs["notes"]
+    assert isinstance(notes, list) and notes[0].startswith("[drive] is ignored")
+    backbone.attrs["notes"] = ["a; b", "c"]
+    backbone.to_netcdf(tmp_path / "backbone.nc")
+    assert xr.open_dataset(tmp_path / "backbone.nc").attrs["notes"] == ["a; b", "c"]
     assert backbone["quasi_static_amplitude"].values == pytest.approx([1e-4, 1e-3], rel=1e-9)
     assert (
         backbone["quasi_static_frequency"].attrs["units"] == "Hz"

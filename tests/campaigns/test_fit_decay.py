@@ -1,5 +1,7 @@
 """Tests of fitting the parameters of a joint to its frequency and damping over the amplitude."""
 
+import re
+
 import decay_fits
 import numpy as np
 import pytest
@@ -128,6 +130,50 @@ def test_fit_command_reads_curve_and_refuses_invalid_curves(tmp_path, monkeypatc
     )
     with pytest.raises(PatchfemError, match="errors must be 0 or more"):
         read_damping_curve(table)
+
+
+def test_exact_damping_in_percent_and_assumed_errors(tmp_path):
+    """Damping in percent is read as the ratio, and a table without errors states those that are assumed."""
+    rows = ((1, 100, 0.2, 0.5), (2, 99, 0.3, 0.5))
+    path = tmp_path / "curve.csv"
+    path.write_text(
+        "amplitude [um],frequency [Hz],damping [%],damping_error [%]\n"
+        + "".join(",".join(map(str, row)) + "\n" for row in rows)
+    )
+    curve = read_damping_curve(path)
+    assert curve.value.tolist() == pytest.approx(np.array([[100, 99], [0.002, 0.003]]), rel=1e-15)
+    assert curve.error.tolist() == pytest.approx(np.array([[0.05, 0.0495], [0.0025, 0.0025]]))
+    assert curve.assumed == (
+        "assumed errors of the measured values: 0.1 % of each frequency (no column frequency_error)"
+    )
+
+
+def test_assumed_errors_and_computed_curves_are_printed(tmp_path, monkeypatch):
+    """Screen, fit.json and page state assumed errors; the summary counts all curves of the model."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "rig.toml").write_text(START)
+    rows = np.loadtxt(write_decay(tmp_path / "a.csv", IWAN), delimiter=",", skiprows=1)[
+        :, [0, 1, 3]
+    ]
+    head = "amplitude [m],frequency [Hz],damping"
+    np.savetxt("curve.csv", rows, delimiter=",", header=head, comments="")
+    free = ["friction.chi=-0.9..-0.05"]
+    command = ["fit", "rig.toml", "--free", *free, "--starts", "1", "-o", "out"]
+    answer = run_cli(*command, "--set", "friction.stiffness=1e6 N/m", "--to", "curve.csv")
+    assumed = "0.1 % of each frequency (no column frequency_error) and 5 % of each damping"
+    assert answer.code == 0 and assumed in answer.out
+    fitted = pf.load(tmp_path / "out/scene.fitted.toml")
+    fit = curves.fit_curve(fitted, tmp_path / "curve.csv", free, starts=1)
+    assert fit.n_computed > fit.keys.fit.counts.evaluations
+    assert re.search(r", [0-9]{2,} curves of the model computed", answer.out)
+    assert assumed in (tmp_path / "out/fit.json").read_text("utf-8")
+    page = (tmp_path / "out/report.html").read_text("utf-8")
+    assert assumed in page and "measured values with assumed errors" in page
+    (tmp_path / "curve.csv").write_text("a [m],f [Hz],z\n1e-6,100,0.1\n")
+    answer = run_cli(*command, "--to", "curve.csv")
+    assert answer.code == 2
+    for header in ("amplitude [um],frequency [Hz],damping [%]", "frequency [Hz],input [g],"):
+        assert f"`{header}" in answer.err
 
 
 def test_refuses_fewer_values_than_parameters(tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from dataclasses import replace
 from unittest.mock import MagicMock
@@ -203,3 +204,15 @@ def test_refuses_figure_with_invalid_options(
     answer = run_cli("view", bench_folder, *arguments)
     assert answer.code == code and message in answer.err
     assert not list(tmp_path.iterdir())
+
+
+def test_exact_title_of_picture_is_title_of_scene(bench_folder, tmp_path):
+    """A picture has the title of the scene, or the name of the folder if there is no title."""
+    other = tmp_path / "other"
+    other.mkdir()
+    (other / "fields.vtkhdf").write_bytes((bench_folder / "fields.vtkhdf").read_bytes())
+    assert "a.svg: other, frame" in run_cli("view", other, "-o", tmp_path / "a.svg").out
+    summary = json.loads((bench_folder / "summary.json").read_text("utf-8"))
+    (other / "summary.json").write_text(json.dumps(summary | {"title": "Two pieces"}), "utf-8")
+    assert "b.svg: Two pieces, frame" in run_cli("view", other, "-o", tmp_path / "b.svg").out
+    assert "Two pieces" in (tmp_path / "b.svg").read_text("utf-8")

@@ -65,7 +65,10 @@ def test_refuses_faulty_measurement_table(tmp_path, text, message):
     path.write_text(text, "utf-8")
     with pytest.raises(PatchfemError) as caught:
         read_table(path)
-    message = message.replace("{like}", "a header like `frequency [Hz],input [g],flag` is needed")
+    message = message.replace(
+        "{like}",
+        "a header like `frequency [Hz],input [g],acceleration [g],displacement [um],flag` is needed",
+    )
     assert str(caught.value).startswith(f"{path}{message}")
 
 

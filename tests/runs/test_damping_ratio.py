@@ -43,6 +43,7 @@ name = "first"
 frequency = "120 Hz"
 damping = 0.02
 slide = {slide}
+output = {slide}
 base = {1 / slide}
 {second_mode}
 [drive]

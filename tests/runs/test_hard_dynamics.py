@@ -293,6 +293,7 @@ name = "axial"
 frequency = "100 Hz"
 damping = 0.003
 slide = 0.9
+output = 0.9
 [[structure.mode]]
 name = "bounce"
 frequency = "250 Hz"

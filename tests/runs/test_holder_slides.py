@@ -74,7 +74,7 @@ def test_exact_stuck_rig_vibrates_with_holder_spring():
     ]
     text = RIG[: RIG.index('[[structure.mode]]\nname = "second"')] + RIG[RIG.index("[drive]") :]
     text = text.replace('"nonlocal"', '"coulomb"').replace('bond_length = "1 um"\n', "")
-    text = text.replace("slide = 0.8", "slide = 1.0")
+    text = text.replace("slide = 0.8\noutput = 0.8", "slide = 1.0")
     result = run(loads(text, "a.toml", sets), estimate=False)
     mass = 0.884
     omega = 2 * np.pi * 143

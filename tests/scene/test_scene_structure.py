@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scene_texts import BLOCK, COULOMB, LINEAR, MODE, STRUCTURE, find_line, get_only_mistake
 
+import patchfem as pf
 from patchfem.core import PatchfemError
 from patchfem.model import build, compute_named_motions, locate_errors
 from patchfem.model.structure import build_modes, compute_initial_state
@@ -322,6 +323,27 @@ def test_refuses_unsuitable_structure_files(tmp_path):
         with pytest.raises(SceneError) as caught:
             loads(text)
         assert says in str(caught.value)
+
+
+@pytest.mark.parametrize("output", ["", "output = 0.5\n"])
+def test_exact_force_drive_acts_where_first_mode_moves_by_one(output):
+    """At resonance a force F at the output point moves it by phi^2 F/(2 zeta m omega^2), where phi is 1 by default.
+
+    A note states the default where it decides where the force acts.
+    """
+    text = (
+        '[structure]\nmoving_mass = "1.3 kg"\n[[structure.mode]]\nname = "first"\nfrequency = "212 Hz"\n'
+        f'damping = 0.02\nslide = 0.0118\n{output}[drive]\nkind = "force"\nfrequency = "212 Hz"\nforce = "10 N"\n'
+        'cycles = 400\n[accuracy]\nmethod = "harmonic"\n'
+    )
+    result = pf.run(text)
+    motion = 0.5 if output else 1.0
+    amplitude = motion**2 * 10 / (2 * 0.02 * 1.3 * (2 * np.pi * 212) ** 2)
+    measure = result.measures["relative_displacement_amplitude"]
+    assert measure.value == pytest.approx(amplitude, rel=1e-9)
+    notes = [note for note in result.notes if "(default of `output`)" in note]
+    assert len(notes) == (not output)
+    assert all("the patch moves by 0.0118" in note for note in notes)
 
 
 MODES = (

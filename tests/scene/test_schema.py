@@ -8,7 +8,16 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from patchfem.scene import TEMPLATE_DESCRIPTIONS as TEMPLATES
-from patchfem.scene import UNIT_FACTORS, loads, make_schema, parse_quantity, read_template
+from patchfem.scene import (
+    UNIT_FACTORS,
+    loads,
+    make_schema,
+    parse_modes,
+    parse_quantity,
+    read_axes,
+    read_ranges,
+    read_template,
+)
 from patchfem.scene.keys.quantities import EXAMPLE_QUANTITIES
 from patchfem.scene.scene import SceneError
 from patchfem.scene.schema import make_quantity_pattern
@@ -49,6 +58,23 @@ def test_always_schema_accepts_shipped_scenes(schema_validator, path):
 def test_always_schema_accepts_templates(schema_validator, kind):
     """The schema accepts every template."""
     assert schema_validator.is_valid(tomllib.loads(read_template(kind)))
+
+
+@pytest.mark.parametrize("text, value", [("0.2 %", 0.002), ("2.5e-1%", 0.0025), ("-7 %", -0.07)])
+def test_exact_percentage_is_accepted_by_schema_and_program(schema_validator, text, value):
+    """A number without a unit may be written in percent, in a scene and in --set, --over and --free."""
+    key = "structure.mode.axial.damping"
+    scene = RIG.replace("damping = 0.003", f'damping = "{text}"')
+    assert schema_validator.is_valid(tomllib.loads(scene))
+    assert loads(scene).structure.mode[0].damping == value
+    assert loads(RIG, sets=[f"{key}={text}"]).structure.mode[0].damping == value
+    assert [axis.values for axis in read_axes([f"{key}={text}, 1 %..2 %:2"])[0]] == [
+        (value, 0.01, 0.02)
+    ]
+    assert [(free.low, free.high) for free in read_ranges([f"{key}={text}..50 %"])[0]] == [
+        (value, 0.5)
+    ]
+    assert [mode[:3] for mode in parse_modes(f"212 Hz:{text}:1 %")] == [(212.0, value, 0.01)]
 
 
 @pytest.mark.parametrize("right, wrong", WRONG.values(), ids=WRONG)

@@ -177,7 +177,7 @@ RIG = "".join(
         COATED.replace('element_size = "0.5 mm"\n', ""),
         '[contact.tilt]\nangle = "0.1 mrad"\n',
         NONLOCAL,
-        MODE.replace("slide = 1.0", "slide = 0.8"),
+        MODE.replace("slide = 1.0", "slide = 0.8\noutput = 0.8"),
         SECOND,
         DRIVE.replace("cycles = 30", "cycles = 200"),
     ]

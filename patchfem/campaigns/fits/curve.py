@@ -21,8 +21,9 @@ from ...formatting import format_length
 from ...identify.least_squares import Fit, Problem
 from ...identify.space import make_space_filling_points
 from ...identify.two_models import TwoModels
-from ...inputs.cells import TableFormat, read_text
+from ...inputs.cells import TableFormat
 from ...inputs.columns import read_columns
+from ...inputs.units import RATIO_UNITS
 from ...model.source import locate_errors
 from ...response.errors import convergence_error
 from ...scene.overrides import BaseScene
@@ -39,13 +40,11 @@ from .problem import (
 UNITS = {
     "amplitude": {"m": 1.0, "mm": 1e-3, "um": 1e-6},
     "frequency": {"Hz": 1.0},
-    "damping": {"": 1.0, "1": 1.0},
+    "damping": RATIO_UNITS,
 }
-HEADER = "decay_amplitude [m],decay_frequency [Hz],decay_damping [1]"
-# Relative error of a frequency whose row gives no error.
-DEFAULT_FREQUENCY_ERROR = 1e-3
-# Relative error of a damping ratio whose row gives no error.
-DEFAULT_DAMPING_ERROR = 5e-2
+HEADER = "amplitude [um],frequency [Hz],damping [%]"
+# Errors, relative to the value, of a table without columns of errors.
+DEFAULT_ERRORS = {"frequency": 1e-3, "damping": 5e-2}
 # Smallest relative standard deviation of a value, which keeps its weight finite.
 MIN_SPREAD = 1e-6
 METHODS = ("balance", "quasi-static")  # Reference method and fast method.
@@ -70,11 +69,14 @@ class MeasuredCurve(NamedTuple):
         Frequency [Hz] and damping ratio.
     error : (2, k) array
         Standard deviations of `value`.
+    assumed : str
+        Sentence about errors that the table does not give; "" if it gives all.
     """
 
     amplitude: np.ndarray
     value: np.ndarray
     error: np.ndarray
+    assumed: str
 
     def normalized_residual(self, curve) -> np.ndarray:
         """Return the residual (2k,) of a computed curve (2, k), divided by the standard deviations."""
@@ -96,7 +98,9 @@ class FittedCurve:
     method : {"balance", "quasi-static"}
         Reference method of the computed curve.
     notes : tuple of str
-        Notes about the compared quantities and about neglected modes of a reduced structure.
+        Notes about assumed errors, about the compared quantities and about neglected modes of a reduced structure.
+    n_computed : int
+        Number of computed curves of the model.
     """
 
     keys: FittedKeys
@@ -104,16 +108,8 @@ class FittedCurve:
     measured: MeasuredCurve
     model: np.ndarray
     method: str
-    notes: tuple = ()
-
-
-def is_damping_curve_file(path) -> bool:
-    """Return whether a file is a CSV table of damping against amplitude, judged by its header."""
-    path = Path(path)
-    if path.suffix.lower() != ".csv" or not path.is_file():
-        return False
-    head = read_text(path, "a measured table").split("\n", 1)[0]
-    return "amplitude" in head and "damping" in head
+    notes: tuple
+    n_computed: int
 
 
 def read_damping_curve(path) -> MeasuredCurve:
@@ -129,12 +125,14 @@ def read_damping_curve(path) -> MeasuredCurve:
         )
     columns = {name.removeprefix("decay_"): column for name, column in table.values.items()}
     value = np.array([columns["frequency"], columns["damping"]])
-    error = np.array(
-        [
-            columns.get("frequency_error", DEFAULT_FREQUENCY_ERROR * np.abs(value[0])),
-            columns.get("damping_error", DEFAULT_DAMPING_ERROR * np.abs(value[1])),
-        ]
-    )
+    error = np.zeros_like(value)
+    assumed = []
+    for k, (name, fraction) in enumerate(DEFAULT_ERRORS.items()):
+        if f"{name}_error" in columns:
+            error[k] = columns[f"{name}_error"]
+        else:
+            error[k] = fraction * np.abs(value[k])
+            assumed.append(f"{100 * fraction:g} % of each {name} (no column {name}_error)")
     if (error < 0).any():
         raise PatchfemError(
             f"{path}: errors must be 0 or more; of a value with a confidence interval, give half "
@@ -146,7 +144,8 @@ def read_damping_curve(path) -> MeasuredCurve:
     order = np.argsort(amplitude, kind="stable")
     # An error is half the width of a 95 % interval, which is two standard deviations.
     deviation = np.maximum(error / 2, MIN_SPREAD * np.abs(value))
-    return MeasuredCurve(amplitude[order], value[:, order], deviation[:, order])
+    note = f"assumed errors of the measured values: {' and '.join(assumed)}" if assumed else ""
+    return MeasuredCurve(amplitude[order], value[:, order], deviation[:, order], note)
 
 
 def _read_curve_columns(path):
@@ -156,7 +155,7 @@ def _read_curve_columns(path):
         for name, unit in UNITS.items():
             units[f"{prefix}{name}"] = unit
             units[f"{prefix}{name}_error"] = unit
-    required = tuple(f"decay_{name} {name}" for name in UNITS)
+    required = tuple(f"{name} decay_{name}" for name in UNITS)
     return read_columns(path, TableFormat(units, required, HEADER, "a decay", has_label_units=True))
 
 
@@ -344,7 +343,12 @@ def fit_curve(
         measured=measured,
         model=model(fit.values),
         method=curves.methods[0],
-        notes=_note_different_methods(curve_file, curves.methods[0], measured) + widened.notes,
+        notes=(
+            *filter(None, [measured.assumed]),
+            *_note_different_methods(curve_file, curves.methods[0], measured),
+            *widened.notes,
+        ),
+        n_computed=curves.n_computed,
     )
 
 

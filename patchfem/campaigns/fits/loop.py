@@ -17,6 +17,7 @@ from ...core import NotConverged, PatchfemError
 from ...effects import law_has_trait
 from ...identify.least_squares import Fit, Problem, SearchCounts
 from ...inputs.loops import Loop, read_loop
+from ...inputs.units import RATIO_UNITS
 from ...scene.keys.quantities import UNIT_FACTORS
 from ...scene.scene import Scene, SceneError
 from .loop_model import BenchModel
@@ -38,7 +39,7 @@ LOAD_UNITS = {
     "time": UNIT_FACTORS["time"],
     "displacement": UNIT_FACTORS["length"],
     "force": UNIT_FACTORS["force"],
-    "friction_ratio": {"": 1.0, "1": 1.0},
+    "friction_ratio": RATIO_UNITS,
 }
 
 

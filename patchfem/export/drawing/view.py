@@ -16,6 +16,7 @@ from ...core import Missing, PatchfemError
 from ...disk.atomic_write import write_atomically
 from ...formatting import choose_axis_unit
 from ..fields.series import Frame, Series
+from ..summary import read_summary
 from . import film, flat
 from .panels import Panel, interface_curves, make_panels, outer_edges
 
@@ -68,7 +69,7 @@ def view(
         )
     with Series(folder) as series:
         frame_fields = series.frame(-1 if frame is None else frame)
-        head = series.path.parent.resolve().name
+        head = _find_title(series)
         if len(series) > 1:
             last = len(series) - 1
             place = f"of 0 to {last}" if frame_fields.number < last else "the last"
@@ -81,6 +82,16 @@ def view(
     print(f"{out}: {head}")
 
 
+def _find_title(series: Series) -> str:
+    """Return the title of the scene of a results folder, or the name of the folder if it has none."""
+    folder = series.path.parent.resolve()
+    try:
+        title = read_summary(folder / "summary.json")["title"]
+    except (OSError, ValueError):
+        title = ""
+    return title or folder.name
+
+
 def _write_film(folder: Path, out: Path, frame: int | None, magnify: float | None) -> None:
     """Write the last cycle of a results folder as an animation."""
     if frame is not None:
@@ -90,7 +101,7 @@ def _write_film(folder: Path, out: Path, frame: int | None, magnify: float | Non
     film.check_ffmpeg(out)
     with Series(folder) as series:
         with write_atomically(out) as partial:
-            message = film.write_film(series, series.path.parent.resolve().name, magnify, partial)
+            message = film.write_film(series, _find_title(series), magnify, partial)
     print(f"{out}: {message}")
 
 

@@ -36,7 +36,7 @@ def describe_curve_fit(fit: FittedCurve, folder: Path) -> FitFiles:
     rms = fit_data["rms"]
     head = (
         f"{fit_data['outcome']}: {fit_data['rows']} amplitudes of {fit_data['measured']} by "
-        f"{fit_data['method']}, {fit_data['evaluations']} evaluations"
+        f"{fit_data['method']}, {fit_data['evaluations']} curves of the model computed"
     )
     details = [
         f"  rms of the residual   {100 * rms['frequency']:.2g} % of the frequency, "
@@ -51,8 +51,8 @@ def describe_curve_fit(fit: FittedCurve, folder: Path) -> FitFiles:
         scenes={FITTED_SCENE: scene},
         rows=_csv_rows(fit),
         charts=_draw_charts(fit),
-        caption="Frequency and damping ratio against amplitude: measured values with errors, and "
-        "the fit",
+        caption="Frequency and damping ratio against amplitude: measured values with "
+        f"{'assumed errors' if fit.measured.assumed else 'errors'}, and the fit",
     )
 
 
@@ -68,7 +68,7 @@ def _collect_fit_data(fit: FittedCurve) -> dict:
         "rows": int(measured.amplitude.size),
         "values": describe_values(keys),
         "rms": {"frequency": frequency_rms, "damping": damping_rms},
-        "evaluations": keys.fit.counts.evaluations,
+        "evaluations": fit.n_computed,
         "failures": keys.fit.counts.failures,
         "descents_agreed": keys.fit.agreed,
         "warnings": keys.warnings,

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ...campaigns.fits.curve import DEFAULT_STARTS, fit_curve, is_damping_curve_file
+from ...campaigns.fits.curve import DEFAULT_STARTS, HEADER, UNITS, fit_curve
 from ...campaigns.fits.loop import fit_hysteresis_loop
 from ...campaigns.fits.loop_path import LoopOptions
 from ...campaigns.fits.patch import check_amplitudes, fit_patch
@@ -14,6 +14,8 @@ from ...campaigns.rows.condition_models import FitRequest
 from ...campaigns.rows.fit import RowsOptions, fit_rows
 from ...campaigns.rows.search import UNSTABLE, SearchSettings
 from ...core import PatchfemError
+from ...inputs.cells import read_text
+from ...inputs.measured import COLUMN_UNITS, TABLE_FORMAT
 from ...model.model import build
 from ...scene import axes
 from ...scene.scene import Scene
@@ -142,7 +144,20 @@ def choose_kind(scene: Scene, to: str) -> str:
         return "wear"
     if scene.kind not in ("rig", "linear"):
         return "loop"
-    return "curve" if is_damping_curve_file(to) else "rows"
+    path = Path(to)
+    if path.suffix.lower() != ".csv" or not path.is_file():
+        return "rows"
+    head = read_text(path, "a measured table").split("\n", 1)[0]
+    names = (cell.partition("[")[0].strip().lower() for cell in head.split(","))
+    columns = {name.removeprefix("decay_") for name in names}
+    if columns & (UNITS.keys() - COLUMN_UNITS.keys()):
+        return "curve"
+    if columns & {*COLUMN_UNITS, "time"}:
+        return "rows"
+    raise PatchfemError(
+        f"{path}:1: a header like `{HEADER}` (of a mode, against its amplitude) or `{TABLE_FORMAT.example}` "
+        f"(response to a sine) is needed, not '{head.strip()[:80]}'"
+    )
 
 
 def _check_options(kind: str, options: FitOptions, format_option: Callable) -> None:

@@ -81,6 +81,8 @@
     const fig = figure(chart.x, named(chart.y), {y_axis_type: chart.y.log ? "log" : "linear",
       height: chart.height ?? 330, tools: "pan,box_zoom,wheel_zoom,reset,save", ...ranges,
       ...(chart.frame ? framed(chart.frame, place) : {})});
+    if (chart.frame)                             // few numbers fit under a narrow frame
+      fig.xaxis.ticker = new Bokeh.BasicTicker({desired_num_ticks: Math.max(1, Math.min(6, Math.floor(fig.frame_width / 50)))});
     const shown = chart.marks.map((mark) => kinds[mark.kind](fig, mark)).filter((one) => one);
     const rows = [[named(chart.x), "@x{%.7g}"], [named(chart.y), "@y{%.7g}"]];
     const several = new Set(chart.marks.map((mark) => mark.name)).size > 1;

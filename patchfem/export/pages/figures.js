@@ -8,7 +8,7 @@ const pictures = (() => {
   const within = (v, e, least) => {              // a value with its error, as `formatting.round_to_error` writes it
     if (v === null) return "no value";
     const size = Math.abs(v);
-    if (size <= least && (e === null || (e <= least && (e > 0.1 * size || size <= 1e-6 * least)))) return "0";
+    if (size <= least) return e !== null && e >= least && e > 0 ? `0 ± ${Number(e.toPrecision(2))}` : "0";
     if (e === null || e === 0 || e < 1e-5 * size) return number(v);
     const places = Math.max(0, 1 - Math.floor(Math.log10(Math.abs(e))));
     if (size >= 1e7 || places > 12) {            // one power of ten for both

@@ -144,7 +144,6 @@ def format_value_and_error(name: str, measure: dict, scale: float | None = None)
         value * scale,
         None if error is None else error * scale,
         format_zero(name, measure) * scale,
-        is_ratio=unit == "1",
     )
 
 
@@ -374,7 +373,7 @@ def _bench_loop_sentence(loop: dict, stiffness: dict) -> str:
         if error is not None and factor <= error:
             return f"at most {formatting.format_number((factor + error) * scale, 2)}"
         value, rounded_error = formatting.round_to_error(
-            factor * scale, None if error is None else error * scale, 1e-9, is_ratio=True
+            factor * scale, None if error is None else error * scale, 1e-9
         )
         return formatting.format_with_error(value, rounded_error, "")
 

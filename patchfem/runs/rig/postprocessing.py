@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...core import ErrorCauses, Outcome
-from ...effects import law_has_trait
 from ...model.rig import MAX_TRAVEL
 from ...response import reasons, run_events, stationary
 from ...response.decay_curve import DecayCurve
@@ -132,13 +131,8 @@ def add_missing_value_reasons(run: CoupledRun) -> CoupledRun:
     measures = run.measures
     window = run.solution.window
     model = run.model
-    rig = model.rig
-    is_rigid = (
-        run.has_friction
-        and law_has_trait(model.friction.law, "set-valued")
-        and not (model.partial_slip or rig.friction.has_partial_slip)
-    )
-    other_modes = rig.first_mode.fraction_of_other_modes(window.modal)
+    is_rigid = run.has_friction and model.sticks_rigidly
+    other_modes = model.rig.first_mode.fraction_of_other_modes(window.modal)
     missing = reasons.find_missing_secant(measures) if is_rigid else {}
     missing |= reasons.find_missing_loops(measures, window, run.drive)
     missing |= reasons.find_missing_drift(measures, run.drive)

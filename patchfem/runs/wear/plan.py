@@ -7,7 +7,7 @@ row of independent springs that wears like the patch.
 import numpy as np
 
 from ...core import PatchfemError
-from ...structure.drive_sizes import find_drive_omega, find_max_acceleration
+from ...structure import drive_sizes
 from ...wear.jumps import WearProblem, make_initial_wear_state, take_jump
 from ..cost import Cost
 from .evolve import find_cycle_of_next_table_row
@@ -88,7 +88,7 @@ def _estimate_slip_path(model) -> float:
     if model.rig is None:
         return (4.0 if model.slide.period else 1.0) * model.slide.amplitude
     signal = model.rig.drive.signal
-    return 4 * find_max_acceleration(signal) / find_drive_omega(signal) ** 2
+    return 4 * drive_sizes.find_max_acceleration(signal) / drive_sizes.find_drive_omega(signal) ** 2
 
 
 class _SpringRow:

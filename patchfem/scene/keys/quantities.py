@@ -143,6 +143,7 @@ EXAMPLE_QUANTITIES: dict[str, str] = {
 # Regular expression of a number.
 NUMBER_PATTERN = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _QUANTITY_PATTERN = re.compile(rf"({NUMBER_PATTERN})[ \t]+(\S.*)")
+PERCENTAGE_PATTERN = rf"\s*({NUMBER_PATTERN})[ \t]*%\s*"
 _BARE_NUMBER_PATTERN = re.compile(NUMBER_PATTERN)
 _JOINED_UNIT_PATTERN = re.compile(rf"({NUMBER_PATTERN})([^\s0-9.,#+±-].*)")
 _DECIMAL_COMMA_PATTERN = re.compile(r"[+-]?[0-9]+,[0-9]+")
@@ -173,6 +174,13 @@ def parse_quantity(text: object, kind: str) -> float:
         return _multiply(number, factor, kind)
     except ValueError as error:
         raise ValueError(f"'{words}' is {error}; {describe_requirement(kind)}") from None
+
+
+def read_percentage(value: object) -> object:
+    """Return a percentage such as "0.2 %" as a number, correctly rounded, and any other value unchanged."""
+    is_short = isinstance(value, str) and len(value) <= _MAX_CHARACTERS
+    match = re.fullmatch(PERCENTAGE_PATTERN, value) if is_short else None
+    return _multiply(match[1], 0.01, "") if match else value
 
 
 def split_quantity(text: str) -> tuple[str, str]:

@@ -1,4 +1,4 @@
-"""Options, keys and values that patchfem 1.0 no longer takes, and what to use instead."""
+"""Options, keys and values that patchfem no longer takes, and what to use instead."""
 
 REMOVING_VERSION = "patchfem 1.0"
 REMOVED_METHODS = {  # removed values of accuracy.method
@@ -20,6 +20,9 @@ REMOVED_KEYS = {
 }
 REMOVED_KEYS["wear.scheme"] = (
     f"this key was removed in {REMOVING_VERSION}; leave it out: contact and wear are always solved together in each jump"
+)
+REMOVED_KEYS["structure.mode.lateral"] = (
+    "this key was removed in patchfem 1.1, because no run could use it; leave it out: the patch slides along x alone"
 )
 REMOVED_OPTIONS = {  # advice for each removed (verb, option)
     (

@@ -235,7 +235,6 @@ class Mode(Table):
     pitch: key(
         PerMetre, "rotation of the patch in the plane of the model per unit of the modal coordinate"
     ) = 0.0
-    lateral: key(Number, "motion of the patch across x per unit of the modal coordinate") = 0.0
     yaw: key(
         PerMetre,
         "rotation of the patch about its normal per unit of the modal coordinate; needs "
@@ -248,8 +247,8 @@ class Mode(Table):
     ) = None
     output: key(
         Number | None,
-        "motion of the accelerometer and the gauge per unit of the modal coordinate; default: "
-        "the value of `slide` for the first mode, 0 for the others",
+        "motion of the output point per unit of the modal coordinate: a force drive, a release and `travel` refer to "
+        "this point, and accelerometer and gauge are placed there; default: 1 for the first mode, 0 for the others",
     ) = None
     accelerometer: key(
         Number | None,

@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field, Strict, WithJsonSchema, field
 from pydantic.types import AllowInfNan
 from pydantic_core import core_schema
 
-from .quantities import EXAMPLE_QUANTITIES, parse_quantity
+from .quantities import EXAMPLE_QUANTITIES, parse_quantity, read_percentage
 
 # Largest magnitude of a value in SI; its fourth power, and products with
 # that, stay within double precision.
@@ -95,13 +95,14 @@ def quantity(kind: str, **limits: float) -> Any:
 
 
 def number(**limits: float) -> Any:
-    """Return the type of a key that holds a finite number without unit; limits as in `quantity`."""
+    """Return the type of a key that holds a finite number, also in percent; limits as in `quantity`."""
     return Annotated[
         float,
         Strict(),
         AllowInfNan(False),
         Field(**limits),
         CheckAfter(partial(_require_magnitude, smallest=0.0)),
+        CheckBefore(read_percentage),
     ]
 
 

@@ -19,6 +19,15 @@ MAX_SLENDERNESS = 10_000
 # dense matrices take gigabytes.
 MAX_ELEMENTS = 100_000
 
+# Largest angle [rad] between the pieces; the gap is angle * x, which differs from tan(angle) * x by 0.3 % there.
+MAX_SMALL_ANGLE = 0.1
+
+
+def find_max_load(patch: TableView) -> float:
+    """Return the load [N] at which the mean pressure is the lower Young's modulus of the two substrates."""
+    moduli = [(patch[name].substrate or patch.substrate).young for name in PIECE_NAMES]
+    return min(moduli) * find_flat_length(patch) * patch.width * patch.pairs
+
 
 class PatchFacts(TableFacts):
     """Properties of the scene that the checks of a patch use."""
@@ -37,6 +46,11 @@ class PatchFacts(TableFacts):
     def flat_length_name(self) -> str:
         """Words that a message uses for the flat length."""
         return "contact.length =" if self.flat_length == self.length else "the interface length of"
+
+    @property
+    def max_load(self) -> float:
+        """Load [N] from which on strains are of the order of 1."""
+        return find_max_load(self)
 
     @property
     def max_height(self) -> float:
@@ -69,6 +83,24 @@ PATCH_RULES = (
         lambda p: not p.has_any("load", "approach"),
         "{table_key}.load",
         "or [contact.approach] instead",
+    ),
+    MistakeRule(
+        lambda p: p.load >= p.max_load,
+        "{table_key}.load",
+        "{load:.3g} N is a mean pressure above Young's modulus, but the pieces are elastic and strain little; less than "
+        "{max_load:.3g} N is needed",
+    ),
+    *(
+        MistakeRule(
+            condition,
+            f"{{table_key}}.{key}",
+            f"{{{key}:.3g}} rad is not a small angle, but the gap is computed as the angle times the distance from the "
+            f"middle of the patch; at most {MAX_SMALL_ANGLE} rad is possible",
+        )
+        for key, condition in (
+            ("tilt.angle", lambda p: abs(p.tilt.angle) > MAX_SMALL_ANGLE),
+            ("strips.roll", lambda p: abs(p.strips.roll) > MAX_SMALL_ANGLE),
+        )
     ),
     MistakeRule(
         lambda p: p.height > p.max_height,

@@ -5,7 +5,6 @@ Each sentence has the words "not supported yet" and says what to do instead. To 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import cached_property
 from typing import Any
 
@@ -31,8 +30,6 @@ from .methods import (
 from .rule_table import MissingKeyRule, MistakeRule, TableFacts, apply_rules, make_unsupported_rule
 from .scene_draft import SceneDraft
 from .view import TableView, wrap_value
-
-UNSUPPORTED_KEY = "structure.mode.lateral"  # key that no run supports yet
 
 
 class JointFacts(TableFacts):
@@ -360,13 +357,6 @@ PATCH_LAW_RULES = (
     ),
     *STRIPS_RULES,
 )
-
-
-def find_unsupported_lateral_modes(tables: Tables) -> Iterator[tuple[str, str]]:
-    """Yield key and message for each mode with lateral motion, which no run supports yet."""
-    for index, mode in enumerate(tables.structure.mode if tables.structure else ()):
-        if mode.lateral:
-            yield f"structure.mode.{index}.lateral", "not supported yet"
 
 
 def check_combinations(draft: SceneDraft, kind: str) -> None:

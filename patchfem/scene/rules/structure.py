@@ -396,11 +396,25 @@ def check_energy_gain(draft: SceneDraft, kind: str) -> None:
             )
 
 
-def describe_hidden_modes(tables: Tables) -> list[str]:
-    """Return a sentence about each mode that slides and, by default, does not move the output."""
+def default_output(index: int) -> float:
+    """Return the default of `output` of the mode with this index: the first mode alone moves the output point."""
+    return 0.0 if index else 1.0
+
+
+def describe_default_outputs(tables: Tables) -> list[str]:
+    """Return a sentence about each mode whose default of `output` decides what a drive or a sensor does.
+
+    These are the first mode under a force, which acts at the output point, and other modes that slide.
+    """
     structure = tables.structure
     drive = tables.drive
     sentences = []
+    first = structure.mode[0] if structure is not None and structure.mode else None
+    if first is not None and first.output is None and drive is not None and drive.kind == "force":
+        sentences.append(
+            f"the force acts at the output point, which moves by 1 per unit of the coordinate of mode '{first.name}' "
+            f"(default of `output`); the patch moves by {first.slide:g} (`slide`)"
+        )
     for mode in structure.mode[1:] if structure is not None else ():
         if mode.slide and (mode.output, mode.accelerometer, mode.gauge) == (None, None, None):
             sentence = (
@@ -418,9 +432,7 @@ def _check_instruments(draft: SceneDraft, modes: tuple) -> None:
     """Report sensors whose motion differs from that of the output, if any key refers to the output."""
     written = []
     for index, mode in enumerate(modes):
-        output = mode.output
-        if mode.table.output is None:
-            output = 0.0 if index else mode.slide
+        output = default_output(index) if mode.table.output is None else mode.output
         for key in ("accelerometer", "gauge"):
             if getattr(mode.table, key) is not None and mode[key] != output:
                 written.append(f"structure.mode.{index}.{key}")

@@ -77,8 +77,9 @@ def read_text(raw: RawFile, units: tuple | None = None) -> Profile | Areal:
         )
     line = f"{path}:{named.number or head.number + 1}"
     if not (named.names or units or named.units or "lateral" in facts):
+        example = HEADER_EXAMPLE if width == 2 else HEADER_EXAMPLE.replace(",", ",y [um],")
         raise PatchfemError(
-            f"{line}: there is no header, and units are never guessed; {HEADER_EXAMPLE} above the first "
+            f"{line}: there is no header, and units are never guessed; {example} above the first "
             f"sample, or {GIVE_UNITS}"
         )
     names = named.names or list("xz" if width == 2 else "xyz")

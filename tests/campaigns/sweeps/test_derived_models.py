@@ -158,7 +158,7 @@ def test_exact_derived_patches_equal_patches_built_from_text(name):
     keys += ["friction.static", "drive.acceleration"] if "friction" in PATCHES[name] else []
     for _ in range(20):
         chosen_keys = list(r.choice(keys, r.integers(1, len(keys) + 1), replace=False))
-        values = 10.0 ** r.uniform(-6, 0, (1, len(chosen_keys)))
+        values = 10.0 ** r.uniform(-6, -1, (1, len(chosen_keys)))
         sets = format_case(chosen_keys, values, 0)
         values = tuple(values[0].tolist())
         is_derived = "friction.static" not in chosen_keys or "kinetic" not in PATCHES[name]
@@ -169,6 +169,8 @@ def test_exact_derived_patches_equal_patches_built_from_text(name):
     for sets, values in (
         (("contact.load=-1 N",), (-1.0,)),
         (("contact.tilt.angle=-1 mrad",), (-1e-3,)),
+        (("contact.tilt.angle=0.2 rad",), (0.2,)),
+        (("contact.load=1e12 N",), (1e12,)),
     ):
         assert sweep_scene._derive_model(sets, values) is None and are_identical(
             model_or_reason(sweep_scene, sets, values), model_or_reason(sweep_scene, sets, ())

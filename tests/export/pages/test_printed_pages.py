@@ -13,8 +13,11 @@ from patchfem.export.pages.sweep import page_html
 TURN = "const e=document.getElementById('shown');e.value='map';e.dispatchEvent(new Event('change'))"
 
 
-def stress_page() -> str:
-    """Return a page with a map of stresses over cells and a line, as the page of a run has them."""
+def stress_page(frame: tuple = ()) -> str:
+    """Return a page with a map of stresses over cells and a line, as the page of a run has them.
+
+    `frame` is the size of the map [px].
+    """
     x = np.linspace(0.0, 4.0, 5)
     y = np.linspace(0.0, 3.0, 4)
     value = np.add.outer(np.arange(4.0), np.arange(3.0))
@@ -24,7 +27,8 @@ def stress_page() -> str:
             charts.make_axis("x", "mm"),
             charts.make_axis("y", "mm"),
             [charts.make_mark("cells", "", x=x, y=y, value=value, top=5.0, unit="MPa")],
-        ),
+        )
+        | ({"frame": frame} if frame else {}),
         charts.make_chart(
             "Gap",
             charts.make_axis("x", "mm"),
@@ -111,3 +115,16 @@ def test_always_dark_page_is_printed_light(chromium):
     page.evaluate("new Promise(done => setTimeout(done, 300))")
     assert page.evaluate("document.querySelectorAll('.onpaper').length") == 0
     assert page.print_pdf().startswith(b"%PDF")
+
+
+@pytest.mark.parametrize("width, most", [(27, 1), (60, 3), (300, 9)])
+def test_exact_numbers_under_narrow_map_do_not_overlap(chromium, width, most):
+    """The axis under a map of a tall narrow piece has only as many numbers as fit under it."""
+    page = chromium.open_html(stress_page((width, 270)))
+    assert not page.faults, page.faults
+    count = page.evaluate(
+        "(fig => fig.below[0].ticker.get_ticks(fig.x_range.start, fig.x_range.end, fig.x_range, 0).major"
+        ".filter(x => x >= fig.x_range.start && x <= fig.x_range.end).length)"
+        "(Bokeh.documents.flatMap(one => one.roots()).find(one => one.frame_width))"
+    )
+    assert 1 <= count <= most

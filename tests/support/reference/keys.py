@@ -16,7 +16,6 @@ from patchfem.scene.keys.types import (
     find_quantity_kind,
     iterate_annotation_parts,
 )
-from patchfem.scene.rules.limits import UNSUPPORTED_KEY
 from patchfem.scene.rules.selectors import SELECTORS, split_keys
 
 FOLDER = Path(__file__).parents[3] / "patchfem" / "scene"
@@ -29,9 +28,10 @@ HEAD = """\
 # Keys of a scene
 
 `python tests/support/reference` generates this page from the program's own records. A quantity is written as a text
-with one number and one unit, such as `"12.7 mm"`; the last section lists the units of each kind of quantity. An effect
-takes part in the computation if the scene contains the table of this effect. The column "required" says "yes" or gives
-the condition under which the key is required. A number in brackets, such as (2.17), is an equation of the report.
+with one number and one unit, such as `"12.7 mm"`; the last section lists the units of each kind of quantity. A number
+without a unit may be given in percent, as a text such as `"0.2 %"`. An effect takes part in the computation if the scene
+contains the table of this effect. The column "required" says "yes" or gives the condition under which the key is
+required. A number in brackets, such as (2.17), is an equation of the report.
 
 See also [the guide](GUIDE.md), [the measures of a run](MEASURES.md), [materials by name](MATERIALS.md),
 [limits](LIMITS.md) and [the equations of all effects](../../studies/site/theory.md#equations-of-all-effects).
@@ -125,8 +125,7 @@ def _format_row(model: type, key: str, at: str) -> tuple:
     required = (
         "yes" if field.is_required() else _format_condition(model, key, path.rpartition(".")[0])
     )
-    said = find_meaning(model, key) + ("; not supported yet" if path == UNSUPPORTED_KEY else "")
-    return f"`{key}`", _format_kind(model, name), default, required, said
+    return f"`{key}`", _format_kind(model, name), default, required, find_meaning(model, key)
 
 
 def _format_condition(model: type, key: str, table: str) -> str:

@@ -154,6 +154,8 @@ REFUSED = {
     "# only words\n% more\n": "{path}: no data, only comments",
     "0,1\n1,2\n": "{path}:1: there is no header, and units are never guessed; write the header as `x [um],z [um]` "
                   f"above the first sample, {GIVE}",
+    "0,0,1\n0,1,2\n": "{path}:1: there is no header, and units are never guessed; write the header as "
+                      f"`x [um],y [um],z [um]` above the first sample, {GIVE}",
     "x,z\n0,1\n": "{path}:1: column 'x' has no unit, and units are never guessed; write the header as `x [um],z [um]`, "
                    f"{GIVE}",
     "\nx [um],z []\n0,1\n": "{path}:2: unknown unit '' of z; use one of m, km, cm, mm, um, nm, in, ft, mil",
