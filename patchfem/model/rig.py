@@ -171,7 +171,8 @@ class RigStructure:
     - without_joint: function of the stiffness [N/m] of the joint that returns the rig without the
       joint, if the modes were measured with the joint and the stiffness follows from a patch.
     - joint_stiffness: stiffness [N/m] of the joint that was subtracted from modes measured with it.
-    - richer_rig: rig of a reduced structure with more modes, None if no mode is left out.
+    - other_rigs: rigs of a reduced structure with more modes and with half of them (unless it has
+      fewer than two); () if no mode is left out.
     - reduction_notes: sentences for the user on the reduction.
     - max_modes: number of modes that a reduced structure can keep, 0 for other structures.
     """
@@ -181,9 +182,14 @@ class RigStructure:
     notes: tuple
     without_joint: Callable | None = None
     joint_stiffness: float | None = None
-    richer_rig: "Rig | None" = None
+    other_rigs: tuple["Rig", ...] = ()
     reduction_notes: tuple = ()
     max_modes: int = 0
+
+    @property
+    def richer_rig(self) -> "Rig | None":
+        """Rig of a reduced structure with more modes, None if no mode is left out."""
+        return self.other_rigs[0] if self.other_rigs else None
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -244,12 +250,9 @@ def build_rig(scene, joint: float | None = None) -> Rig:
     if scene.structure.reduced is None:
         return rig
     reduced = structure_reduced.build_reduced_modes(scene)
-    richer_rig = None
-    if reduced.richer_modes is not None:
-        richer_rig = _build(scene, reduced.richer_modes, interfaces)
     structure = replace(
         rig.structure,
-        richer_rig=richer_rig,
+        other_rigs=tuple(_build(scene, modes, interfaces) for modes in reduced.other_modes),
         reduction_notes=tuple(reduced.notes),
         max_modes=reduced.max_modes,
     )

@@ -134,23 +134,27 @@ def convergence_errors(
     return errors
 
 
-def finer_errors(values: dict, finer: dict) -> dict:
+def finer_errors(values: dict, finer: dict, *coarser: dict) -> dict:
     """Estimate the error of each measure from a run with more harmonics, modes or bond strips.
 
-    The finer run has twice as many of them. The truncation error of the Fourier series of a friction
-    force with corners is of second order.
+    The finer run has twice as many of them, and the coarser run half as many. The truncation error of
+    the Fourier series of a friction force with corners is of second order, so the error is four times
+    that of the finer run.
 
     Parameters
     ----------
     values, finer : dict
         Measures by name of the run and of the finer run.
+    coarser : dict, optional
+        Measures by name of the coarser run, which shows whether the change is small by accident.
 
     Returns
     -------
     dict
         Errors by name.
     """
-    return convergence_errors(values, finer, ratio=0.5, order=2.0)
+    errors = convergence_errors(finer, values, *coarser, order=MAX_ORDER)
+    return {name: 2.0**MAX_ORDER * error for name, error in errors.items()}
 
 
 def merged_cell_errors(fine: dict, *coarse: dict) -> dict:

@@ -133,7 +133,7 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> RefinedRun:
         return RefinedRun(numerics, solution, measures)
     space_runs = [
         *engine.coarser_in_space(model, numerics, inputs.patch, inputs.coarse[0], solution),
-        *engine.list_runs_with_more_modes(model, numerics),
+        *engine.list_runs_with_other_modes(model, numerics),
     ]
     space_errors = runner.estimate_errors(space_runs, solution)
     displacement_errors = []  # Error of the displacement [m] of each run, from coarse to fine.
