@@ -198,7 +198,8 @@ class RigStructure:
     - lists_modes: whether the scene lists the modes.
     - notes: sentences for the user on a structure file.
     - bolted: joint with which the modes were measured; None for modes without a joint.
-    - richer_rig: rig of a reduced structure with more modes, None if no mode is left out.
+    - other_rigs: rigs of a reduced structure with more modes and with half of them (unless it has
+      fewer than two); () if no mode is left out.
     - reduction_notes: sentences for the user on the reduction.
     - max_modes: number of modes that a reduced structure can keep, 0 for other structures.
     """
@@ -207,9 +208,14 @@ class RigStructure:
     lists_modes: bool
     notes: tuple
     bolted: BoltedJoint | None = None
-    richer_rig: "Rig | None" = None
+    other_rigs: tuple["Rig", ...] = ()
     reduction_notes: tuple = ()
     max_modes: int = 0
+
+    @property
+    def richer_rig(self) -> "Rig | None":
+        """Rig of a reduced structure with more modes, None if no mode is left out."""
+        return self.other_rigs[0] if self.other_rigs else None
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -270,12 +276,9 @@ def build_rig(scene, joint: float | None = None) -> Rig:
     if scene.structure.reduced is None:
         return rig
     reduced = structure_reduced.build_reduced_modes(scene)
-    richer_rig = None
-    if reduced.richer_modes is not None:
-        richer_rig = _build(scene, reduced.richer_modes, interfaces)
     structure = replace(
         rig.structure,
-        richer_rig=richer_rig,
+        other_rigs=tuple(_build(scene, modes, interfaces) for modes in reduced.other_modes),
         reduction_notes=tuple(reduced.notes),
         max_modes=reduced.max_modes,
     )

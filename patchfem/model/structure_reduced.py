@@ -24,13 +24,14 @@ class ReducedModes(NamedTuple):
     """Modes of a reduced structure.
 
     - modes: modes that the scene keeps.
-    - richer_modes: all modes that were computed, None if the scene keeps all.
+    - other_modes: all modes that were computed, and half of those that the scene keeps (unless it
+      keeps fewer than two); () if the scene keeps all.
     - notes: sentences for the user.
     - max_modes: largest number of modes that the scene can keep.
     """
 
     modes: ModalBasis
-    richer_modes: ModalBasis | None
+    other_modes: tuple[ModalBasis, ...]
     notes: list
     max_modes: int
 
@@ -82,15 +83,16 @@ def build_reduced_modes(scene) -> ReducedModes:
 
         modes = build(table.modes)
         n_computed = reduction.modes.omega.size
-        richer_modes = build(n_computed)
+        keeps_all = reduction.modes.is_complete and table.modes >= n_computed
+        counts = [] if keeps_all else [n_computed, table.modes // 2][: 1 + (table.modes > 1)]
+        other_modes = tuple(build(count) for count in counts)
     except PatchfemError as error:
         raise type(error)(f"{scene.where(error.key or 'structure.reduced')}: {error}") from None
     notes = [*notes, _describe_reduction(reduction, modes, table)]
+    max_modes = n_computed
     if not reduction.modes.is_complete:
-        n_coordinates = reduction.lowest.size
-        return ReducedModes(modes, richer_modes, notes, n_coordinates - len(reduction.boundary))
-    keeps_all = table.modes >= n_computed
-    return ReducedModes(modes, None if keeps_all else richer_modes, notes, n_computed)
+        max_modes = reduction.lowest.size - len(reduction.boundary)
+    return ReducedModes(modes, other_modes, notes, max_modes)
 
 
 def list_slide_pairs(structure) -> tuple:

@@ -134,23 +134,32 @@ def convergence_errors(
     return errors
 
 
-def finer_errors(values: dict, finer: dict) -> dict:
+def finer_errors(values: dict, finer: dict, *coarser: dict) -> dict:
     """Estimate the error of each measure from a run with more harmonics, modes or bond strips.
 
-    The finer run has twice as many of them. The truncation error of the Fourier series of a friction
-    force with corners is of second order.
+    The finer run has twice as many of them, and the coarser run half as many. The truncation error of
+    the Fourier series of a friction force with corners is of second order. Where the change to the
+    finer run is small by accident, the error is that of the change from the coarser run, reduced by
+    2**MAX_ORDER.
 
     Parameters
     ----------
     values, finer : dict
         Measures by name of the run and of the finer run.
+    coarser : dict, optional
+        Measures by name of the coarser run.
 
     Returns
     -------
     dict
         Errors by name.
     """
-    return convergence_errors(values, finer, ratio=0.5, order=2.0)
+    errors = convergence_errors(values, finer, ratio=0.5, order=MAX_ORDER)
+    for run in coarser:
+        for name, error in convergence_errors(values, run, order=MAX_ORDER).items():
+            if name in errors:
+                errors[name] = np.maximum(errors[name], error / 2.0**MAX_ORDER)
+    return errors
 
 
 def merged_cell_errors(fine: dict, *coarse: dict) -> dict:

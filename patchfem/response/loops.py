@@ -45,11 +45,13 @@ def cycle_spans(time, period: float) -> list:
 def reversal_force_rule(model) -> str:
     """Return which rule of `find_reversals` gives the friction force at a reversal."""
     law = model.friction.law
-    soft = model.partial_slip or (
-        model.rig is not None and model.rig.friction.interfaces[0].partial_slip
-    )
+    friction = None if model.rig is None else model.rig.friction
+    soft = model.partial_slip or (friction is not None and friction.interfaces[0].partial_slip)
     if law_has_trait(law, "memoryless") and not soft:
         return "jumps"
+    # Under a load that varies, the force also changes while the interface is at rest.
+    if friction is not None and friction.load_varies:
+        return "rate"
     return (
         "slide" if soft or law_has_trait(law, "timeless") or law_has_trait(law, "bonds") else "rate"
     )
@@ -206,8 +208,8 @@ def interface_loop(amplitude: float, q: complex, f: complex, work: float, stiffn
     Returns
     -------
     dict
-        "loop_area" [J], "equivalent_stiffness" [N/m] and "equivalent_damping" W/(2 pi K A^2) [1];
-        without measures that have no value.
+        "loop_area" [J], "equivalent_stiffness" and "harmonic_force_ratio" |F1/q1| [N/m], and
+        "equivalent_damping" W/(2 pi K A^2) [1]; without measures that have no value.
     """
     measures = interface_loops(amplitude, q, f, work, stiffness)
     return {name: float(value) for name, value in measures.items() if not np.isnan(value)}
@@ -225,9 +227,11 @@ def interface_loops(amplitude, q, f, work, stiffness) -> dict:
     energy = 2 * np.pi * stiffness * np.square(amplitude)
     has_damping = is_moving & (np.asarray(stiffness) > 0)
     damping = np.where(has_damping, work / np.where(has_damping, energy, 1.0), np.nan)
+    ratio = np.where(is_moving, f / np.where(is_moving, q, 1.0), np.nan)
     return {
         "loop_area": work,
-        "equivalent_stiffness": np.where(is_moving, (f / np.where(is_moving, q, 1.0)).real, np.nan),
+        "equivalent_stiffness": ratio.real,
+        "harmonic_force_ratio": np.abs(ratio),
         "equivalent_damping": damping,
     }
 

@@ -132,9 +132,12 @@ def lateral_history(window: Response, name: str, interface: int = 0):
 
 
 def largest_distance(x, y=None) -> float:
-    """Return the largest distance [m] between two points of a path on a line or in a plane."""
+    """Return the largest distance [m] between two points of a path on a line or in a plane.
+
+    The samples (k,) of a path on a line are equally spaced in time (`interpolate_ranges`).
+    """
     if y is None:
-        return float(x.max() - x.min())
+        return float(interpolate_ranges(x[:, None])[0][0])
     distance = 0.0
     angle = 0.0
     directions = np.pi * np.arange(180) / 180
@@ -287,12 +290,18 @@ def work_difference(work, loops, jumps: bool = False) -> float:
     return relative_gap(total, float(work[-1]), float(np.abs(works).sum()))
 
 
-def compute_acceleration_peak(window: Response) -> float:
-    """Return the peak absolute acceleration [m s-2] at the accelerometer in a window.
+def compute_peak(values, lateral=None) -> float:
+    """Return the largest magnitude of a history, or of its resultant with a lateral history.
 
-    The samples must be equally spaced (`interpolate_peaks`).
+    Parameters
+    ----------
+    values : (k,)
+        Equally spaced samples (`interpolate_peaks`).
+    lateral : (k,), optional
+        Samples in the lateral direction.
     """
-    return float(interpolate_peaks(np.abs(window.acceleration)[:, None])[0][0])
+    magnitude = np.abs(values) if lateral is None else np.hypot(values, lateral)
+    return float(interpolate_peaks(magnitude[:, None])[0][0])
 
 
 def interpolate_peaks(magnitude) -> tuple:
@@ -315,44 +324,73 @@ def interpolate_peaks(magnitude) -> tuple:
     """
     columns = np.arange(magnitude.shape[1])
     last = len(magnitude) - 1
-    peak = magnitude.argmax(axis=0)
-    is_inside = (peak > 0) & (peak < last)
-    samples = magnitude[np.clip(peak + np.arange(-2, 3)[:, None], 0, last), columns]
+    largest = magnitude.argmax(axis=0)
+    # The peak beside an end of the window lies on the parabola through its last three samples.
+    middle = np.clip(largest, 1, max(last - 1, 1))
+    samples = magnitude[np.clip(middle + np.arange(-2, 3)[:, None], 0, last), columns]
     curvatures = samples[:-2] - 2 * samples[1:-1] + samples[2:]
     # only second differences of samples inside the window are compared
-    curvatures[0] = np.where(peak >= 2, curvatures[0], curvatures[1])
-    curvatures[2] = np.where(peak <= last - 2, curvatures[2], curvatures[1])
+    curvatures[0] = np.where(middle >= 2, curvatures[0], curvatures[1])
+    curvatures[2] = np.where(middle <= last - 2, curvatures[2], curvatures[1])
     is_smooth = curvatures.max(axis=0) * MAX_SMOOTH_RATIO <= curvatures.min(axis=0)
     left, centre, right = samples[1:4]
-    is_peak = is_inside & is_smooth & (curvatures[1] < 0)
-    rise = -((right - left) ** 2) / (8 * np.where(is_peak, curvatures[1], -1.0)) * is_peak
+    # The slope at the middle sample vanishes within one step of it.
+    is_peak = is_smooth & (curvatures[1] < 0) & (np.abs(right - left) <= -2 * curvatures[1])
+    is_peak &= last >= 2
+    vertex = centre - (right - left) ** 2 / (8 * np.where(is_peak, curvatures[1], np.inf))
+    value = magnitude[largest, columns]
     # a larger increase indicates a jump, not a smooth peak
-    value = np.where(rise < 0.01 * centre, centre + rise, centre)
-    return value, np.where(is_inside & ~is_smooth, centre - np.maximum(left, right), 0.0)
+    is_peak &= vertex < 1.01 * value
+    errors = np.where((middle == largest) & ~is_smooth, centre - np.maximum(left, right), 0.0)
+    return np.where(is_peak, vertex, value), errors
 
 
-def peak_sampling_errors(window: Response, has_grooves: bool = False) -> dict:
-    """Return bounds on the errors of the peaks due to sampling, by measure.
+def interpolate_ranges(values) -> tuple:
+    """Return the ranges of n curves between their peaks, and bounds on the errors due to sampling.
 
-    - Acceleration: see `interpolate_peaks`.
+    Parameters
+    ----------
+    values : (k, n)
+        Equally spaced samples.
+
+    Returns
+    -------
+    tuple
+        Ranges and errors, (n,) each, in the unit of the values.
+    """
+    low = values.min(axis=0)
+    high = values.max(axis=0)
+    rises, rise_errors = interpolate_peaks(values - low)
+    falls, fall_errors = interpolate_peaks(high - values)
+    return rises + falls - (high - low), rise_errors + fall_errors
+
+
+def peak_sampling_errors(window: Response) -> dict:
+    """Return bounds on the errors of peaks and ranges due to sampling, by measure.
+
+    Runs with fewer steps may not show these errors, because they contain some of the same instants.
+
+    - Acceleration, friction forces and slips: see `interpolate_peaks`.
     - Variable normal load: an eighth of the second difference at the smallest and the largest sample.
-    - Friction force over grooves: change to the neighbouring sample. Runs with fewer steps may not show
-      this error, because they contain some of the same instants.
 
     Parameters
     ----------
     window : Response
-    has_grooves : bool
-        Whether the surfaces have grooves, which cause sharp peaks of the force.
+        Equally spaced samples.
     """
-    errors = {}
-    acceleration_error = float(interpolate_peaks(np.abs(window.acceleration)[:, None])[1][0])
-    if acceleration_error > 0:
-        errors["absolute_acceleration_peak"] = acceleration_error
-    if has_grooves and len(window.force) > 2:
-        force = np.abs(window.force)
-        peak = min(max(int(np.argmax(force)), 1), len(force) - 2)
-        errors["friction_force_peak"] = float(force[peak] - max(force[peak - 1], force[peak + 1]))
+    forces = window.extra.get("forces", window.force[:, None])
+    forces = np.hypot(forces, window.extra.get("lateral_forces", 0.0))
+    slips = window.extra.get("slips", window.slip[:, None])
+    errors = {
+        "absolute_acceleration_peak": interpolate_peaks(np.abs(window.acceleration)[:, None])[1][0]
+    }
+    for name, sampling_errors in (
+        ("friction_force_peak", interpolate_peaks(forces)[1]),
+        ("slip_amplitude", interpolate_ranges(slips)[1] / 2),
+    ):
+        for k, error in enumerate(sampling_errors):
+            errors[f"{name}_{k + 1}" if k else name] = error
+    errors = {name: float(error) for name, error in errors.items() if error > 0}
     load = window.extra.get("normal_load")
     if load is not None and len(load) > 2:
         for name, index in (

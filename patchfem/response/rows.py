@@ -25,8 +25,8 @@ from .loops import (
 )
 from .measures import (
     MIN_SLIDE_RANGE,
-    compute_acceleration_peak,
     compute_ledger_measures,
+    compute_peak,
     compute_slip_measures,
     energy_balance,
     lateral_history,
@@ -257,11 +257,6 @@ def lateral_work(window, number: int) -> float:
     return 0.0 if force is None or slide is None else float(np.trapezoid(force, slide))
 
 
-def resultant_peak(force, lateral_force) -> float:
-    """Return the largest magnitude [N] of a force, or of its resultant with a lateral force."""
-    return float((np.abs(force) if lateral_force is None else np.hypot(force, lateral_force)).max())
-
-
 def compute_drift(last_cycles: LastCycles) -> float:
     """Return the drift of the relative displacement of an interface per cycle [m].
 
@@ -283,26 +278,6 @@ def compute_drift(last_cycles: LastCycles) -> float:
             ),
         )
     )
-
-
-def harmonic_force_ratio(values: dict):
-    """Return the ratio |F1/q1| [N/m] of the first harmonics of force and displacement.
-
-    The in-phase part is the equivalent stiffness; the quadrature part is W/(pi A^2), with the loop area W
-    and the slip amplitude A.
-
-    Parameters
-    ----------
-    values : dict
-        Measures of one run, or (n,) of n runs.
-    """
-    in_phase = np.abs(values["equivalent_stiffness"])
-    slip_amplitude = np.asarray(values.get("slip_amplitude", 0.0), float)
-    with np.errstate(all="ignore"):
-        quadrature = np.where(
-            slip_amplitude > 0, values.get("loop_area", 0.0) / (np.pi * slip_amplitude**2), 0.0
-        )
-    return np.hypot(in_phase, np.nan_to_num(quadrature))
 
 
 def _drift_scale(values: dict):
@@ -366,7 +341,7 @@ ROWS = (
         "m s-2",
         1e-4,
         "largest acceleration at the output, base motion included",
-        lambda s: compute_acceleration_peak(s.window),
+        lambda s: compute_peak(s.window.acceleration),
     ),
     MeasureDefinition(
         "friction_force_peak",
@@ -379,7 +354,7 @@ ROWS = (
             if s.load is None
             else s.integrated.loops[0].max_force
             if s.integrated.loops
-            else resultant_peak(s.samples.force, s.lateral_history("forces"))
+            else compute_peak(s.samples.force, s.lateral_history("forces"))
         ),
         group="friction",
     ),
@@ -482,7 +457,7 @@ ROWS = (
         group="friction",
         larger_term=(
             "magnitude of the complex ratio of the two first harmonics",
-            harmonic_force_ratio,
+            lambda values: np.nan_to_num(values.get("harmonic_force_ratio", 0.0)),
         ),
     ),
     MeasureDefinition(
@@ -676,8 +651,19 @@ ROWS = (
     ),
     *SINGLE_RUN_ROWS,
 )
+# Values that only set the floors of measures (`larger_term`); results do not contain them.
+INTERNAL_ROWS = (
+    MeasureDefinition(
+        "harmonic_force_ratio",
+        "N m-1",
+        0.0,
+        "magnitude of the complex ratio of the first harmonics of friction force and slide",
+        lambda s: s.loop_measures.get("harmonic_force_ratio"),
+    ),
+)
+INTERNAL_VALUES = tuple(row.name for row in INTERNAL_ROWS)
 ROWS_NEEDING_RUN = tuple(row for row in ROWS if row.needs_run)
-TABLE = {row.name: row for row in ROWS}
+TABLE = {row.name: row for row in (*ROWS, *INTERNAL_ROWS)}
 # Measures of each interface.
 INTERFACE_MEASURES = (
     "slip_amplitude",
@@ -704,7 +690,7 @@ def compute_measures(last_cycles: LastCycles) -> dict:
     """
     known = last_cycles.integrated.values
     values = {}
-    for row in ROWS:
+    for row in TABLE.values():
         if row.name in known:
             values[row.name] = known[row.name]
         elif row.function is not None and (last_cycles.run is not None or not row.needs_run):
@@ -779,11 +765,14 @@ def larger_term(name: str, values: dict):
 
 
 def set_final_floors(measures: dict, tolerance: float) -> dict:
-    """Return measures with error floors of at least `tolerance` times the terms of a difference."""
+    """Return measures with error floors of at least `tolerance` times the terms of a difference.
+
+    The INTERNAL_VALUES among the measures are used and left out.
+    """
     values = {name: measure.value for name, measure in measures.items()}
     values = {name: value for name, value in values.items() if value is not None}
-    updated = dict(measures)
-    for name in values:
+    updated = {name: one for name, one in measures.items() if name not in INTERNAL_VALUES}
+    for name in values.keys() & updated.keys():
         if remove_interface_number(name) in TABLE:
             floor = tolerance * float(larger_term(name, values))
             if floor > measures[name].floor:

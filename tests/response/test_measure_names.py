@@ -19,6 +19,7 @@ def test_exact_floors_of_differences_follow_amplitudes():
         "slip_start_phase": Measure(1e-4, "rad", 2e-3, 1e-3),
         "stick_fraction": Measure(None, "1", None, 1e-3),
         "equivalent_stiffness": Measure(3e6, "N m-1", 5e3, 1.0),
+        "harmonic_force_ratio": Measure(5e6, "N m-1", 0.0, 0.0),
         "energy_balance": Measure(2e-8, "1", 2e-8, 1e-8),
     }
     floors = {name: one.floor for name, one in set_final_floors(found, 1e-3).items()}
@@ -28,9 +29,8 @@ def test_exact_floors_of_differences_follow_amplitudes():
     assert floors["slip_start_phase"] == pytest.approx(np.pi * 1e-3) and floors[
         "energy_balance"
     ] == pytest.approx(1e-3)
-    assert floors["equivalent_stiffness"] == pytest.approx(
-        1e-3 * np.hypot(3e6, 1e-3 / (np.pi * 1e-10))
-    )
+    assert floors["equivalent_stiffness"] == pytest.approx(5e3)
+    assert "harmonic_force_ratio" not in floors
     assert all(
         floors[name] == found[name].floor
         for name in ("loop_area", "slip_amplitude", "stick_fraction")

@@ -34,8 +34,8 @@ MAIN_MEASURES = ("relative_displacement_amplitude", "absolute_acceleration_peak"
 
 @pytest.fixture(scope="module")
 def marched_result():
-    """Return the result of the scene by time integration."""
-    return pf.run(BLOCK, **MARCH)
+    """Return the result of the scene by time integration with 1600 steps per cycle."""
+    return pf.run(BLOCK, **MARCH, **{"accuracy.steps_per_cycle": 1600})
 
 
 def worst_true_error(steps: int, exact) -> float:

@@ -4,10 +4,13 @@ first.
 The scenes are random ones, a patch, runs with too few steps and bolted joints that stick.
 """
 
+from importlib.resources import files
+
 import pytest
 from remedies import draw_scene, parse_remedies, run_tables, try_remedy
 from scene_texts import JOINT_SHAKEN
 
+import patchfem
 from patchfem import run
 from patchfem.scene import choose_law, compose_scene
 
@@ -69,8 +72,20 @@ def test_always_unresolved_free_vibration_is_solved_by_exact_engine():
     """Steps of 1/800 cycle are too large for a free vibration with 88 periods per cycle. The
     warning advises the exact engine, which reduces the error at least tenfold."""
     loose = "[accuracy]\ntolerance = 0.3\n"
-    marched = run_text(JOINT_SHAKEN + loose + 'method = "march"\n')
+    marched = run_text(JOINT_SHAKEN + loose + 'method = "march"\nsteps_per_cycle = 200\n')
     assert marched.extra["engine"] == "march" and 'accuracy.method = "exact"' in marched.warnings[0]
     exact = run_text(JOINT_SHAKEN + loose + 'method = "exact"\n')
     errors = [result.measures["equivalent_damping"].error for result in (marched, exact)]
     assert errors[1] < errors[0] / 10
+
+
+def test_always_steps_are_refined_until_all_measures_meet_tolerance():
+    """The steps of a march are doubled until its instants of slip meet the tolerance too, not only its
+    displacement, which meets it with 400 steps; prescribed steps are not doubled."""
+    scene = (files(patchfem) / "scene" / "templates" / "rig.toml").read_text("utf-8")
+    refined = run(scene, **{"accuracy.method": "march"})
+    assert not refined.warnings
+    assert all(measure.error_ratio(1e-3) <= 1 for measure in refined.measures.values())
+    prescribed = run(scene, **{"accuracy.method": "march", "accuracy.steps_per_cycle": "400"})
+    assert prescribed.measures["relative_displacement_amplitude"].error_ratio(1e-3) <= 1
+    assert "slip_start_phase has an estimated error" in prescribed.warnings[0]

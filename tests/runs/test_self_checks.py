@@ -140,7 +140,7 @@ def test_always_correct_runs_pass_all_self_checks():
         ),
         (
             rows,
-            "compute_acceleration_peak",
+            "compute_peak",
             lambda peak: 0.8 * peak,
             SCENES["march"],
             ["self-check.*absolute_acceleration_peak"],

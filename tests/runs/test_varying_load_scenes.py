@@ -89,3 +89,41 @@ def test_refuses_normal_motion_of_point_contact():
     assert "no exact solution exists with normal.amplitude" in get_only_mistake(
         POINT, *VARYING_LOAD, "accuracy.method=exact"
     )
+
+
+# Rigs whose friction force and secant stiffness had the same samples in all coarser runs.
+OSCILLATING_LOADS = {
+    "sliding": (
+        'load = "3.72097 N"\namplitude = "1.5994 N"\nfrequency = "140.86 Hz"\nphase = "0.1318 rad"\n'
+        '[friction]\nlaw = "coulomb"\nstatic = 0.3\n[structure]\nmoving_mass = "0.6612 kg"\n',
+        'frequency = "140.86 Hz"\ndamping = 0.003\nslide = 1.0\nbase = 0.69956\noutput = 1.0\n',
+        'frequency = "140.86 Hz"\nacceleration = "5.04404 m/s^2"\n',
+    ),
+    "sticking": (
+        'load = "157.8086 N"\namplitude = "32.241 N"\nfrequency = "115.1918 Hz"\nphase = "2.95912 rad"\n'
+        '[friction]\nlaw = "elastic-plastic"\nbond_length = "4.8684 um"\nstatic = 0.3\n'
+        '[structure]\nmoving_mass = "1.08517 kg"\n',
+        'frequency = "115.1918 Hz"\ndamping = 0.05\nslide = 1.0\nbase = 0.7538\noutput = 1.0\n',
+        'frequency = "115.1918 Hz"\nacceleration = "16.82 m/s^2"\n',
+    ),
+}
+
+
+@pytest.mark.parametrize("kind, steps", [("sliding", 400), ("sticking", 128)])
+def test_always_errors_under_oscillating_load_cover_many_steps(kind, steps):
+    """The errors cover the differences from 16 times the steps, also of values between two samples."""
+    head, mode, drive = OSCILLATING_LOADS[kind]
+    text = (
+        f'[normal]\n{head}[[structure.mode]]\nname = "axial"\n{mode}'
+        f'[drive]\nkind = "base"\n{drive}cycles = 40\n[accuracy]\nmethod = "march"\n'
+    )
+    coarse, fine = (
+        run_text(text + f"steps_per_cycle = {count}\n", estimate=True).measures
+        for count in (steps, 16 * steps)
+    )
+    for name in ("friction_force_peak", "slip_amplitude", "secant_stiffness", "loop_area"):
+        measure, truth = coarse[name], fine[name]
+        if measure.value is not None:
+            gap = abs(measure.value - truth.value)
+            assert gap <= measure.error + truth.error, name
+    assert coarse["friction_force_peak"].error < 0.01 * coarse["friction_force_peak"].value

@@ -40,6 +40,9 @@ SLIP_FRACTION = 0.5
 SLIDE_TOL = 1e-13
 # Largest relative velocity at a reversal, relative to the largest one in the step.
 REST_SPEED_RATIO = 1e-7
+# Error of an instant between stick and slip, in periods. It is larger than the error of a step, because
+# the dense output within a step is less accurate than its end.
+CROSSING_FRACTION_ERROR = 1e-7
 
 
 def make_interpolation_matrix(fractions) -> np.ndarray:
@@ -258,10 +261,37 @@ class StepParts:
         stick_fractions[steps, at] = np.where(
             starts_stuck, left_ends - FINE_FRACTIONS[at], FINE_FRACTIONS[at + 1] - left_ends
         )
-        times = begin[steps] + left_ends * length[steps]
-        between = np.flatnonzero((slip_margin[:-1, -1] < 0) & (slip_margin[1:, 0] >= 0))
         stuck_time = float((stick_fractions.sum(axis=1) * length).sum())
-        return stuck_time, np.append(times[starts_stuck], begin[between + 1])
+
+        # A transition may also lie between the end of a part and the start of the next one.
+        is_stuck_before = slip_margin[:-1, -1] < 0
+        between = np.flatnonzero(is_stuck_before != (slip_margin[1:, 0] < 0))
+        times = np.append(begin[steps] + left_ends * length[steps], begin[between + 1])
+        starts_slip = np.append(starts_stuck, is_stuck_before[between])
+        return stuck_time, self._find_slip_starts(times, starts_slip)
+
+    def _find_slip_starts(self, times, starts_slip) -> np.ndarray:
+        """Return the times [s] at which slip begins after stick.
+
+        Where the sliding reverses, slip and stick shorter than CROSSING_FRACTION_ERROR are round-off
+        and are left out.
+
+        Parameters
+        ----------
+        times : (c,)
+            Times [s] of the transitions between stick and slip, in any order.
+        starts_slip : (c,) of bool
+            Whether slip begins at a transition.
+        """
+        order = np.argsort(times, kind="stable")
+        lasting = [(self.begin[0], False)]
+        for time, starts in [*zip(times[order], starts_slip[order]), (self.time[-1, -1], False)]:
+            # The transitions at both ends of a state that is too short cancel each other.
+            if lasting and time - lasting[-1][0] < CROSSING_FRACTION_ERROR * self.period:
+                lasting.pop()
+            else:
+                lasting.append((time, starts))
+        return np.array([time for time, starts in lasting if starts])
 
 
 def measure_parts(response, drive, ends) -> tuple:
@@ -287,12 +317,16 @@ def measure_parts(response, drive, ends) -> tuple:
     acceleration, acceleration_error = parts.find_magnitude("acceleration")
     max_force, force_error = parts.find_magnitude("force")
     stuck_time, starts = parts.find_sticks()
+    span = parts.time[-1, -1] - parts.time[0, 0]
+    # A slip that is shorter than the error of its instants is none.
+    if stuck_time > span - CROSSING_FRACTION_ERROR * period:
+        stuck_time = span
     loop = InterfaceLoop(
         parts.harmonic("slide"),
         parts.harmonic("force"),
         after[3] - before[3],
         2 * parts.find_half_range("slip"),
-        min(stuck_time, parts.time[-1, -1] - parts.time[0, 0]),
+        stuck_time,
         max_force,
     )
     values = {

@@ -31,7 +31,7 @@ from ...response.errors import (
     friction_errors,
     split_errors,
 )
-from ...response.measures import energy_balance, interpolate_peaks
+from ...response.measures import energy_balance, interpolate_peaks, interpolate_ranges
 from ...response.reasons import MAX_OTHER_MODES_FRACTION
 from ...response.ringing import MIN_PERIODS, MIN_REFINED_FRACTION
 from ..rig.bond_lists import choose_bond_summation
@@ -356,13 +356,19 @@ def _evaluate_march(
         if searches_ringing is not None:
             may_ring &= searches_ringing
         accelerations = samples.acceleration()
-        peak_errors = interpolate_peaks(np.abs(accelerations))[1]
+        peak_errors = {
+            "absolute_acceleration_peak": interpolate_peaks(np.abs(accelerations))[1],
+            "friction_force_peak": interpolate_peaks(np.abs(marched.force))[1],
+            "slip_amplitude": interpolate_ranges(marched.slip)[1] / 2,
+        }
     last = marched.extremes[:, -samples.window :]
     values[MAIN_MEASURE] = (last[:, :, 1].max(axis=1) - last[:, :, 0].min(axis=1)) / 2
     values["energy_balance"] = energy_balance(energies)
     for name in RING_MEASURES:
         values[name] = np.full(len(models), np.nan)
-    error_estimates = [{"absolute_acceleration_peak": float(error)} for error in peak_errors]
+    error_estimates = []
+    for case in range(len(models)):
+        error_estimates.append({name: float(errors[case]) for name, errors in peak_errors.items()})
     for case in np.flatnonzero(may_ring).tolist():
         window = samples.response(case, accelerations[:, case])
         with np.errstate(all="ignore"):

@@ -219,7 +219,7 @@ class MotionObserver:
         )
         return ObservedMotion(
             window,
-            measures.compute_acceleration_peak(window),
+            measures.compute_peak(window.acceleration),
             solution.amplitude(solver.modes.output),
             solution,
         )

@@ -17,6 +17,7 @@ from ...response.measures import (
     compute_negative_fraction,
     compute_slip_excess,
     interpolate_peaks,
+    interpolate_ranges,
     relative_gap,
 )
 from ...response.spectrum import distortion_ratio, harmonic_weights
@@ -85,7 +86,7 @@ class Samples:
         fundamental = self.modal_harmonic(1)
         measures = {
             "absolute_acceleration_peak": interpolate_peaks(np.abs(self.acceleration()))[0],
-            "friction_force_peak": np.abs(self.motion.force).max(axis=0),
+            "friction_force_peak": interpolate_peaks(np.abs(self.motion.force))[0],
             "normal_load": load,
             "drift_per_cycle": self.drift_per_cycle(),
             "friction_work": energies["booked"],
@@ -236,7 +237,7 @@ class Samples:
         count = np.bincount(run, minlength=slip.shape[1])
         sums = [np.bincount(run, trig(2 * phase), slip.shape[1]) for trig in (np.cos, np.sin)]
         return {
-            "slip_amplitude": np.ptp(slip, axis=0) / 2,
+            "slip_amplitude": interpolate_ranges(slip)[0] / 2,
             "stick_fraction": compute_negative_fraction(before, after).mean(axis=0),
             "slip_start_phase": mean_slip_phase(count, *sums),
         }

@@ -2,11 +2,11 @@
 
 In: a Model with a rig, and its Patch. Out: a Result.
 
-Start reading at `rig`. It runs the model with finer and finer numerical settings until the error of
-the displacement meets the tolerance, and then completes the result by `postprocessing`. `runner`
-solves the run and its coarse runs, each only once, and `solve` calls the engine. `engines` has a
-record for each engine with its comparison runs. `scene.rules.methods.ENGINE_SUPPORT` lists what
-each engine can compute, and `runs.memory` the memory of its compiled code.
+Start reading at `rig`. It runs the model with finer and finer numerical settings until the errors
+meet the tolerance, and then completes the result by `postprocessing`. `runner` solves the run and
+its coarse runs, each only once, and `solve` calls the engine. `engines` has a record for each engine
+with its comparison runs. `scene.rules.methods.ENGINE_SUPPORT` lists what each engine can compute,
+and `runs.memory` the memory of its compiled code.
 
 Each engine has a module (`march`, `event_driven`, `smooth`, and the folder `steady`), which
 prepares the integration in `dynamics` and contains the measures that the engine computes itself.

@@ -79,20 +79,22 @@ class Engine(NamedTuple):
     saves_state: bool = False
     finds_periodic_motion: bool = False
 
-    def list_runs_with_more_modes(self, model: Model, numerics) -> list:
-        """List the comparison run with more modes of a reduced structure, if modes are neglected.
+    def list_runs_with_other_modes(self, model: Model, numerics) -> list:
+        """List the comparison runs with other modes of a reduced structure, if modes are neglected.
 
-        The comparison run of a time integration has a quarter of the steps.
+        One has more modes, another one half of them. Those of a time integration have a quarter of
+        the steps.
         """
-        if model.rig.structure.richer_rig is None:
+        n_rigs = len(model.rig.structure.other_rigs)
+        if not n_rigs:
             return []
         beside = None
         coarse_numerics = numerics
         if self.coarser_in_time is _list_march_time_runs:
             coarse_numerics = _divide_steps(numerics, 4)
             beside = coarse_numerics
-        richer = replace(coarse_numerics, richer=True)
-        return [CoarserRuns((richer,), finer_errors, beside, "reduced")]
+        runs = tuple(replace(coarse_numerics, other_rig=number) for number in range(n_rigs))
+        return [CoarserRuns(runs, finer_errors, beside, "reduced")]
 
     def find_unsupported_feature(self, model: Model, *, steady: bool = False) -> str:
         """Describe a property of a model that this engine cannot compute; "" if there is none.

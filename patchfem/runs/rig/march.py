@@ -151,7 +151,7 @@ class MarchEvaluator(RunEvaluator):
         run, drive, values
             See `RunEvaluator.estimate_run_errors`.
         """
-        return peak_sampling_errors(run.window, self.model.grooves is not None)
+        return peak_sampling_errors(run.window)
 
     def choose_bond_summation(self):
         """Return the bond summation of the run; None for a law without bonds."""
@@ -247,7 +247,7 @@ class MarchEvaluator(RunEvaluator):
         span = window.time[-1] - window.time[0]
         work *= drive.period / span if span > 0 else 0.0
         alone = len(rig.modes.interfaces) == 1 and not (
-            rig.friction.load_varies
+            (rig.friction.load_varies and not self.model.load_varies)
             or rig.friction.strips_slide_apart
             or rig.springs.is_nonlinear
             or rig.modes.lateral_faces is not None

@@ -38,7 +38,7 @@ class Numerics:
     - local: largest relative error per step of the smooth engine.
     - pairs: how many times neighbouring slider cells are merged in pairs.
     - joined: (number of cells that are merged into one, index of the first merged cell), or ().
-    - richer: whether the run has more modes of a reduced structure.
+    - other_rig: index of the rig with other modes of a reduced structure, or None.
     - meshed: indices of the interfaces whose patches have a coarser mesh.
     - coarse_patch: whether the patch of [contact] has a coarser mesh.
     - stiffer_joint: whether a joint that is subtracted from bolted modes is stiffer by its error.
@@ -56,7 +56,7 @@ class Numerics:
     local: float = 0.0
     pairs: int = 0
     joined: tuple = ()
-    richer: bool = False
+    other_rig: int | None = None
     meshed: tuple = ()
     coarse_patch: bool = False
     stiffer_joint: bool = False

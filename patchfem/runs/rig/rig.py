@@ -1,8 +1,8 @@
 """Run of a rig: solution with refined numerical settings, and completion of its result.
 
 In: the inputs of a run, i.e. its plan and its Patch. Out: a Result. `run_refined` solves the run
-with finer and finer settings until the displacement meets the tolerance; `run_rig` completes it
-by the functions of `postprocessing`.
+with finer and finer settings until its measures meet the tolerance; `run_rig` completes it by the
+functions of `postprocessing`.
 """
 
 from dataclasses import replace
@@ -25,6 +25,7 @@ from .engines import ENGINES
 from .fields import collect_interface_fields
 from .motion_warnings import collect_notes
 from .numerics import Numerics, choose_numerics
+from .plan import predict_march_cost
 from .postprocessing import CoupledRun
 from .runner import Runner
 from .solution import Solution, compute_peak_frequency
@@ -33,10 +34,13 @@ from .solve import refuse_long_run
 # Outcomes of runs that ended early; more steps do not change them.
 EARLY_OUTCOMES = (Outcome.EXCEEDS_TRAVEL, Outcome.LEAVES_GROOVES)
 MIN_STEP_ERROR = 1e-12  # Smallest relative error per step; below it round-off dominates.
+# Largest predicted CPU time [s] of a run that is repeated with more steps although its displacement
+# meets the tolerance.
+MAX_REFINED_SECONDS = 10.0
 
 
 class RefinedRun(NamedTuple):
-    """Run with the first numerical settings whose displacement error meets the tolerance.
+    """Run with the first numerical settings whose errors meet the tolerance, or with the finest ones.
 
     - numerics, solution: settings and Solution of the engine.
     - measures: measures by name, with error estimates from coarse runs if requested.
@@ -103,7 +107,7 @@ def run_rig(inputs: RunInputs) -> Result:
 
 
 def run_refined(inputs: RunInputs, numerics: Numerics) -> RefinedRun:
-    """Repeat a run with finer settings until the error of the displacement meets the tolerance.
+    """Repeat a run with finer settings until the errors of its measures meet the tolerance.
 
     Only settings that the scene does not fix are refined. All coarse runs are stored in
     `Runner.solutions` by their settings. Runs that are coarser in space are compared with a run
@@ -134,11 +138,12 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> RefinedRun:
         return RefinedRun(numerics, solution, measures)
     space_runs = [
         *engine.coarser_in_space(model, numerics, inputs.patch, inputs.coarse[0], solution),
-        *engine.list_runs_with_more_modes(model, numerics),
+        *engine.list_runs_with_other_modes(model, numerics),
     ]
     space_runs += _list_joint_runs(inputs, space_runs)
     space_errors = runner.estimate_errors(space_runs, solution)
     displacement_errors = []  # Error of the displacement [m] of each run, from coarse to fine.
+    excesses = []  # Largest ratio of an error to the allowed error, where the displacement meets it.
     while True:
         time_runs = engine.coarser_in_time(model, numerics)
         errors = [*runner.estimate_errors(time_runs, solution), *space_errors]
@@ -157,7 +162,11 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> RefinedRun:
             solution = _add_level_errors(solution, coarser_runs, runner.solutions)
         displacement_errors.append(measures["relative_displacement_amplitude"].error or 0.0)
         run = RefinedRun(numerics, solution, measures)
-        if not time_runs or _is_refinement_finished(model, run, displacement_errors):
+        if (
+            not time_runs
+            or _is_finest(model, run, displacement_errors)
+            or _meets_tolerance(CoupledRun(inputs, *run), excesses)
+        ):
             break
         runner.solutions[numerics] = solution
         runner.error_seconds += solution.seconds
@@ -206,8 +215,49 @@ def are_tolerances_met(measures: dict, tolerance: float) -> bool:
     return all(measure.error_ratio(tolerance) <= 1 for measure in measures.values())
 
 
-def _is_refinement_finished(model, run: RefinedRun, displacement_errors: list) -> bool:
-    """Return whether the displacement meets the tolerance or no finer run is possible.
+def _find_step_excess(run: CoupledRun) -> float:
+    """Return the largest ratio of error to allowed error of the measures that need more steps.
+
+    The errors are those of the completed run. A measure needs more steps if it misses the tolerance,
+    but would meet it without the error of the steps. The result is 0 if there is none.
+    """
+    run = postprocessing.add_missing_value_reasons(postprocessing.add_outcome_and_errors(run))
+    tolerance = run.model.accuracy.tolerance
+    largest = 0.0
+    for measure in set_final_floors(run.measures, tolerance).values():
+        ratio = measure.error_ratio(tolerance)
+        if ratio > 1 and measure.causes is not None:
+            step_ratio = ratio * measure.causes.parts.get("steps", 0.0) / measure.error
+            if ratio - step_ratio <= 1:
+                largest = max(largest, ratio)
+    return largest
+
+
+def _meets_tolerance(run: CoupledRun, excesses: list) -> bool:
+    """Return whether the measures meet the tolerance as far as more steps can help.
+
+    The displacement must meet it. Other measures are refined while the next run takes at most
+    MAX_REFINED_SECONDS, and while two doublings of the steps reduce the largest excess.
+
+    Parameters
+    ----------
+    run : CoupledRun
+    excesses : list
+        Result of `_find_step_excess` of the coarser runs; that of the run is added.
+    """
+    displacement = run.measures["relative_displacement_amplitude"]
+    if displacement.error_ratio(run.model.accuracy.tolerance) > 1:
+        return False
+    excesses.append(_find_step_excess(run))
+    if excesses[-1] <= 1 or (len(excesses) > 2 and excesses[-1] >= excesses[-3]):
+        return True
+    n_points = 1 if run.patch is None else run.patch.x.size
+    cost = predict_march_cost(run.model, run.numerics.finer(), n_points)
+    return cost.times["motion"] > MAX_REFINED_SECONDS
+
+
+def _is_finest(model, run: RefinedRun, displacement_errors: list) -> bool:
+    """Return whether no finer run is possible.
 
     Parameters
     ----------
@@ -216,9 +266,6 @@ def _is_refinement_finished(model, run: RefinedRun, displacement_errors: list) -
     displacement_errors : list
         Errors of the displacement [m] of all runs up to this one.
     """
-    displacement = run.measures["relative_displacement_amplitude"]
-    if displacement.error_ratio(model.accuracy.tolerance) <= 1:
-        return True
     numerics = run.numerics
     if numerics.local:
         return numerics.local < MIN_STEP_ERROR

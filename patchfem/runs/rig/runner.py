@@ -125,8 +125,8 @@ class Runner:
     def _solve_coarse_run(self, numerics: Numerics, fine: Solution) -> Solution:
         """Solve the rig with coarser settings."""
         model = self.model
-        if numerics.richer:
-            model = replace(model, rig=model.rig.structure.richer_rig)
+        if numerics.other_rig is not None:
+            model = replace(model, rig=model.rig.structure.other_rigs[numerics.other_rig])
         # The decay curve and some measures need histories from the start of the run.
         needs_whole = self.model.rig.drive.kind == "free" or bool(ROWS_NEEDING_RUN)
         numerics = replace(numerics, whole=needs_whole)
@@ -213,7 +213,7 @@ def _estimate_total_steps(inputs: RunInputs, numerics: Numerics) -> float:
     steps = {numerics: numerics.steps}
     for kind in [
         *engine.coarser_in_time(model, numerics),
-        *engine.list_runs_with_more_modes(model, numerics),
+        *engine.list_runs_with_other_modes(model, numerics),
     ]:
         steps |= {run: run.steps for run in kind.runs}
     n_meshes = int(inputs.coarse[0] is not None and bool(model.partial_slip))

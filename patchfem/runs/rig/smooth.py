@@ -10,6 +10,7 @@ from time import perf_counter
 from ...core import IntegratedMeasures
 from ...dynamics.cycles import SAMPLES_PER_CYCLE
 from ...dynamics.smooth import run as engine
+from ...dynamics.smooth.reader import CROSSING_FRACTION_ERROR
 from ...response.measures import slip_round_off
 from ...response.rows import ROWS_NEEDING_RUN, find_definition
 from .evaluation import RunEvaluator, compute_work_check, thin_samples
@@ -18,9 +19,6 @@ from .solution import Solution
 
 # Smallest ratio of slip to its round-off at which the onset of slip is located within a step.
 MIN_SLIP_OVER_ROUND_OFF = 1e3
-# Error of the stick fraction [1] and of the phase at slip start [rad]. It is larger than the error
-# of a step, because the dense output within a step is less accurate than its end.
-CROSSING_FRACTION_ERROR = 1e-7
 
 
 def integrate_smooth_motion(
@@ -112,7 +110,7 @@ class SmoothEvaluator(RunEvaluator):
         sampling = self.estimate_sampling_errors(run, self.model.rig.drive.signal, values)
         for name in ("stick_fraction", "slip_start_phase"):
             if _has_clear_slip(run):
-                sampling[name] = CROSSING_FRACTION_ERROR
+                sampling[name] = CROSSING_FRACTION_ERROR  # of the run [1], or of the phase [rad]
             elif name not in sampling:
                 sampling[name] = find_definition(name).sample_error / self.steps
         errors = {}

@@ -31,7 +31,7 @@ from ....response.reasons import (
     STICKS_AT_REVERSAL_REASON,
     find_missing,
 )
-from ....response.rows import TABLE, error_floor, larger_term
+from ....response.rows import INTERNAL_VALUES, TABLE, error_floor, larger_term
 from ....response.settling import (
     CLASSES,
     STEADY_CLASS,
@@ -240,7 +240,7 @@ def _insert_measures(results: CaseResults, values: dict, errors: dict, scales: C
     has_wide_error = np.zeros(len(grows), bool)
     for name, value in values.items():
         is_known = ~np.isnan(value)
-        if not is_known.any():
+        if name in INTERNAL_VALUES or not is_known.any():
             continue
         floor = error_floor(name, scales.displacement)
         allowed = scales.tolerance * np.abs(value)

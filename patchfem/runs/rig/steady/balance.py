@@ -23,7 +23,7 @@ from ....dynamics.harmonic.stability import add_stability
 from ....dynamics.integrated import EngineResult
 from ....formatting import format_length
 from ....response.errors import finer_errors
-from ....response.measures import compute_acceleration_peak
+from ....response.measures import compute_peak
 from ....response.spectrum import harmonic_measures, odd_harmonics
 from ..evaluation import RunEvaluator, compute_sampled_work, compute_work_check
 from ..interface import make_single_contact
@@ -273,7 +273,7 @@ class BalanceFinder:
         row = self.modes.output if self.modes.gauge is None else self.modes.gauge
         values = {
             COLUMN_MEASURES["amplitude"]: motion.amplitude(row),
-            COLUMN_MEASURES["acceleration_peak"]: compute_acceleration_peak(response),
+            COLUMN_MEASURES["acceleration_peak"]: compute_peak(response.acceleration),
             **harmonic_measures(*odd_harmonics(response, drive)),
         }
         return {name: value for name, value in values.items() if value is not None}

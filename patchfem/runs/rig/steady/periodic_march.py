@@ -191,7 +191,7 @@ class MarchFinder(TracedCurve):
             run, change = self._march_to_periodic(drive, run, steps)
             reading = self._evaluate_cycle(run, steps, self.frames)
         values, mark, snapshots, is_stuck = reading
-        peak_errors = peak_sampling_errors(mark.window, True)
+        peak_errors = peak_sampling_errors(mark.window)
         multipliers = orbits.estimate_multipliers(run) if run.outcome is None else np.zeros(0)
         regime = "stick-slip" if values.get("stick_fraction") else "sliding"
         outcome = run.outcome or Outcome.STEADY
