@@ -14,6 +14,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import brentq
 
 from ..core import frozen_array
 from ..effects import law_has_trait
@@ -21,10 +22,14 @@ from ..friction import record
 from ..model.model import Model
 from ..model.source import locate_errors
 from ..model.structure import compute_sticking_stiffness
+from ..response.errors import convergence_error
 from ..slip.edge_springs import add_edge_springs
 from .patch import result as patch_result
 from .patch import store
 from .patch.jenkins_elements import elements, strip_elements
+
+# Largest logarithm of the factor by which the compliance of a patch is scaled.
+MAX_LOG_FACTOR = 5.0
 
 
 class FreeRig(NamedTuple):
@@ -41,10 +46,14 @@ class FreeRig(NamedTuple):
 
 
 class StickStiffness(NamedTuple):
-    """Tangential stiffness of a patch in full stick, without the bonds of its law, and its error [N/m]."""
+    """Tangential stiffness of a patch in full stick with its error [N/m], and the bond length [m] of its law.
+
+    The bond length is 0 for a law that is rigid in stick.
+    """
 
     value: float
     error: float
+    bond_length: float
 
 
 def solve_without_joint(model: Model) -> FreeRig:
@@ -130,67 +139,108 @@ def compute_full_stick_stiffness(model: Model, patch) -> float:
     load = patch.pressure.load
     if not load > 0:
         return 0.0
-    stiffness = record.stick_stiffness(f, load)
-    if not model.partial_slip or (
-        np.isfinite(stiffness) and not law_has_trait(f.law, "set-valued")
-    ):
-        stiffness = compute_sticking_stiffness(model.rig.friction.interfaces[0], load)
     if not model.partial_slip:
-        return stiffness
-    # The yield displacement is 0 for a law that is rigid in stick.
-    return _sum_elements(patch, f.static, f.static * load / stiffness)
-
-
-def _sum_elements(patch, static: float, length: float) -> float:
-    """Return the summed stiffness [N/m] of the elements of a patch, with bonds of a length [m]."""
+        return compute_sticking_stiffness(model.rig.friction.interfaces[0], load)
+    length = _find_bond_length(model, load)
     if patch.strips is not None:
-        strips = strip_elements(patch, static, length)
+        strips = strip_elements(patch, f.static, length)
         return float(sum(strip_element.stiffness.sum() for strip_element in strips))
-    return float(elements(patch, static, length).stiffness.sum())
+    return float(elements(patch, f.static, length).stiffness.sum())
+
+
+def _find_bond_length(model: Model, load: float) -> float:
+    """Return the bond length [m] of the law of a patch under a load [N]; 0 for a law that is rigid in stick."""
+    stiffness = record.stick_stiffness(model.friction, load)
+    if np.isfinite(stiffness) and not law_has_trait(model.friction.law, "set-valued"):
+        stiffness = compute_sticking_stiffness(model.rig.friction.interfaces[0], load)
+    return model.friction.static * load / stiffness
 
 
 def _find_stick_stiffness(model: Model, patches: Sequence) -> StickStiffness | None:
-    """Return the stiffness of a patch in full stick; None for a rigid or unloaded patch.
+    """Return the stiffness of a patch in full stick; None for a patch without partial slip, load or friction.
 
-    It is the extrapolated one in series with the holder. Without it, and for pieces that are rigid in shear, it is
-    that of the finest mesh, with the change from the coarser mesh as error.
+    For pieces alone it is the extrapolated stiffness that a run prints, in series with the holder. Otherwise it
+    is that of the finest mesh, with the error that follows from the coarser ones.
     """
-    fine, coarse, *_ = patches
-    if not (model.partial_slip and fine.pressure.load > 0):
+    solved = [patch for patch in patches if patch is not None]
+    load = solved[0].pressure.load
+    if not (model.partial_slip and load > 0 and model.friction.static > 0):
         return None
-    measure = (fine.measures or {}).get("tangential_stiffness")
+    length = _find_bond_length(model, load)
+    measure = (solved[0].measures or {}).get("tangential_stiffness")
     is_known = measure is not None and None not in (measure.value, measure.error)
-    if is_known and model.patch.interface.has_shear:
+    if is_known and model.patch.interface.has_shear and not length:
         holder_compliance = 0.0
         if model.patch.loading.tangential_stiffness is not None:
             holder_compliance = 1 / model.patch.loading.tangential_stiffness
         value = 1 / (1 / measure.value + holder_compliance)
-        return StickStiffness(value, measure.error * (value / measure.value) ** 2)
-    value = _sum_elements(fine, 1.0, 0.0)
-    if coarse is None or not coarse.pressure.load > 0:
-        return StickStiffness(value, 0.0)
-    return StickStiffness(value, abs(_sum_elements(coarse, 1.0, 0.0) - value))
+        return StickStiffness(value, measure.error * (value / measure.value) ** 2, 0.0)
+
+    values = [
+        _sum_nodal_forces(patch, 1.0, length / model.friction.static)
+        for patch in solved[:3]
+        if patch.pressure.load > 0
+    ]
+    changes = np.abs(np.diff(values))
+    error = float(convergence_error(*changes)) if changes.size else 0.0
+    return StickStiffness(values[0], error, length / model.friction.static)
+
+
+def _sum_nodal_forces(patch, factor: float, bond_length: float) -> float:
+    """Return the sum of the nodal forces [N] of a patch in full stick at a displacement of 1 m.
+
+    The node i has the spring F_i/bond_length in series with the compliance, where F_i is its normal force [N].
+
+    Parameters
+    ----------
+    patch : Patch
+    factor : float
+        Factor of the tangential compliance.
+    bond_length : float
+        Bond length of the law over its coefficient of friction [m].
+    """
+    forces = [patch.pressure.sigma_n * patch.pieces.interface.weight]
+    if patch.strips is not None:
+        forces = patch.strips.force
+    # The compliance of a strip is inversely proportional to its fraction of the width.
+    compliance = factor * len(forces) * patch.slip_compliance
+    total = 0.0
+    for force in forces:
+        points = np.flatnonzero(force > 0)
+        nodal = compliance[np.ix_(points, points)] + np.diag(bond_length / force[points])
+        total += float(np.linalg.solve(nodal, np.ones(points.size)).sum())
+    return total
 
 
 def _match_stiffness(patches: Sequence, stiffness: StickStiffness | None, n_errors: float) -> list:
     """Return patches with a given stiffness in full stick, plus a number of its errors."""
     if stiffness is None:
         return list(patches)
-    target = stiffness.value + n_errors * stiffness.error
     out = []
     for patch in patches:
         if patch is not None and patch.pressure.load > 0:
-            patch = replace(patch, slip_compliance=_match_compliance(patch, target))
+            target = stiffness.value + n_errors * stiffness.error
+            compliance = _match_compliance(patch, target, stiffness.bond_length)
+            patch = replace(patch, slip_compliance=compliance)
         out.append(patch)
     return out
 
 
-def _match_compliance(patch, stiffness: float) -> np.ndarray:
-    """Return the tangential compliance (m, m) [m/N] of a patch with a given stiffness [N/m] in full stick."""
-    if patch.strips is None:
+def _match_compliance(patch, stiffness: float, bond_length: float) -> np.ndarray:
+    """Return the tangential compliance (m, m) [m/N] of a patch with a given stiffness [N/m] in full stick.
+
+    Nodes at the edges of a contact have soft bonds, and strips do not share their edges; the whole compliance of
+    such patches is scaled.
+    """
+    if patch.strips is None and not bond_length:
         return add_edge_springs(patch.slip_compliance, patch.pressure.sigma_n > 0, stiffness)
-    # The strips share a compliance but not their edges, so that all of it is scaled.
-    return frozen_array(patch.slip_compliance * (_sum_elements(patch, 1.0, 0.0) / stiffness))
+
+    def excess(log_factor: float) -> float:
+        """Return the relative excess of the stiffness for a scaled compliance."""
+        return _sum_nodal_forces(patch, np.exp(log_factor), bond_length) / stiffness - 1
+
+    factor = np.exp(brentq(excess, -MAX_LOG_FACTOR, MAX_LOG_FACTOR, xtol=1e-14))
+    return frozen_array(factor * patch.slip_compliance)
 
 
 def find_stuck_patch_stiffness(model: Model, patches: Sequence) -> StickStiffness | None:
