@@ -18,10 +18,9 @@ from ..formatting import format_quantity
 from ..scene.keys.memoize import memoize
 from ..scene.keys.tables import Accuracy, Friction, Temperature
 from ..scene.scene import Scene
-from . import load, patch, rig, slide, wear
+from . import load, patch, rig, slide, structure, wear
 from .law import find_normal_load, find_pad_width, make_bond_parameters, make_effective_law
 from .source import Source, locate_errors
-from .structure import find_bolted_scene
 
 if TYPE_CHECKING:
     from ..friction.bonds.parameters import Bonds
@@ -240,7 +239,7 @@ def build(scene: Scene) -> Model:
 def _attach_bolted_model(scene: Scene, rig_model: Rig) -> Rig:
     """Return the rig with the model of the joint that was bolted in the modal test, if it is another joint."""
     bolted = rig_model.structure.bolted
-    bolted_scene = find_bolted_scene(scene)
+    bolted_scene = structure.find_bolted_scene(scene)
     if bolted is None or bolted.build_rig is None or bolted_scene is scene:
         return rig_model
     bolted = bolted._replace(model=_build_bolted_model(bolted_scene))
