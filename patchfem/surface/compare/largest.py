@@ -49,7 +49,8 @@ def measure_largest_depth(section: Section, text: str) -> Quantity:
     depth is read from the parabola through the longest window (5 to 1025 heights) around it that shows no
     misfit beyond the noise; where no window fits, it is the height itself. The remaining excess is that
     of the drawn errors in the same windows about depths whose scatter is that of the surface alone, and
-    is subtracted. The variance is that of the draws and of half of the excess.
+    is subtracted. The variance is that of the draws and of half of the excess. The upper end contains every depth,
+    because a crest to which no parabola fits may be worn as deep as its uncertain height.
 
     Parameters
     ----------
@@ -77,7 +78,8 @@ def measure_largest_depth(section: Section, text: str) -> Quantity:
     deepest = near[np.argmax(clean[near] - penalty[near])]
     excess = float(peaks.mean() - clean[deepest])
     error = float(np.sqrt(peaks.var() + excess**2 / 4))
-    return make_quantity(float(smooth[top] - excess), error, "m", text, 0.0)
+    largest = make_quantity(float(smooth[top] - excess), error, "m", text, 0.0)
+    return largest._replace(high=max(largest.high, float(smooth.max())))
 
 
 def _draw_peaks(section: Section, groups: list, clean, penalty) -> np.ndarray:
