@@ -142,7 +142,9 @@ def draw_other(path: Path, seed: int) -> Iterator[ScoredPair]:
     spec.loader.exec_module(other)
     for pair in (*other.machined_pairs(seed, 25), *other.workshop_pairs(seed, 15)):
         truths = {"mean": (pair["mean_gross"],), "area": (pair["area_gross"],)}
-        if pair["kind"] == "filled floor":
+        if (
+            pair["kind"] == "filled floor"
+        ):  # what stands above the first surface may count as pile-up or not
             length = pair["common_to"] - pair["common_from"]
             truths = {"mean": (pair["mean_gross"], pair["area_net"] / length)}
             truths |= {"area": (pair["area_gross"], pair["area_net"])}
@@ -155,8 +157,8 @@ def draw_other(path: Path, seed: int) -> Iterator[ScoredPair]:
             _make_profile(pair["x_before"], pair["z_before"], "before"),
             _make_profile(pair["x_after"], pair["z_after"], "after"),
             is_worn=None if is_open and pair["really_worn"] else bool(pair["really_worn"]),
-            has_grown=pair["pile_up"] > 0,
-            noise=max(pair["noise_depth"], pair["residual"]),
+            has_grown=(pair["pile_up"] or 0.0) > 0,
+            noise=max(pair["noise_depth"], pair["residual"] or 0.0),
             truths=truths | {"largest": (pair["largest"],)},
             ends=ends,
             side=0,
@@ -199,16 +201,16 @@ def score_pair(pair: ScoredPair) -> dict:
     limit = comparison.detection_limit
     x = pair.after.x
     is_above = (
-        truths["largest"][0] > 20 * pair.noise
+        (truths["largest"][0] or 0.0) > 20 * pair.noise
         if limit is None
-        else truths["area"][0] > limit * (x[-1] - x[0]) / 3
+        else (truths["area"][0] or 0.0) > limit * (x[-1] - x[0]) / 3
     )
     is_false = says_worn and pair.is_worn is False
     is_false |= "material grew" in headline and not pair.has_grown and pair.is_worn is not None
     is_false |= bool(says_none and pair.is_worn and is_above)
     row = {"name": pair.name, "headline": headline, "false": bool(is_false)}
     row["missed"] = bool(pair.is_worn and not says_worn)
-    if not says_worn or pair.is_worn is False:
+    if not says_worn or pair.is_worn is False or truths["mean"][0] is None:
         return row
     names = {"mean": "worn_depth_mean", "area": "worn_area", "largest": "worn_depth_max"}
     for name, key in names.items():
