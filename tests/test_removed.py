@@ -4,7 +4,6 @@ import re
 from functools import partial
 from importlib.util import find_spec
 
-import numpy as np
 import pytest
 import surfaces
 from command_line import run_cli
@@ -45,18 +44,6 @@ def read_file(reader, name: str, folder) -> None:
     path = folder / name
     path.write_text("    -1\n", "utf-8")
     reader(path)
-
-
-def match_inverted(folder) -> None:
-    """Compare a trace with the same trace turned upside down."""
-    x = np.arange(4001) * 1e-3
-    z = np.convolve(np.random.default_rng(1).normal(size=x.size), np.ones(20) / 20, "same")
-    for name, heights in (("before.csv", z), ("after.csv", -z)):
-        rows = "\n".join(f"{place:.4f},{height:.6f}" for place, height in zip(x, heights))
-        (folder / name).write_text(f"x [mm],z [um]\n{rows}\n", "utf-8")
-    raise pf.PatchfemError(
-        pf.compare(folder / "before.csv", folder / "after.csv")["worn_depth_mean"]["reason"]
-    )
 
 
 TRIED = {  # removed feature -> (function that uses it, replacement that the message names)
@@ -123,7 +110,6 @@ TRIED = {  # removed feature -> (function that uses it, replacement that the mes
     "profile(tip=)": (partial(call, pf.profile, "tip"), "compare the tip radius with"),
     "report(measured=)": (partial(call, pf.report, "measured"), "`patchfem import FILE"),
     ".unv mesh": (partial(read_file, read_pieces, "pair.unv"), "use .med or .msh"),
-    "inverted trace": (match_inverted, "change their sign"),
 }
 
 

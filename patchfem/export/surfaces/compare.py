@@ -97,24 +97,13 @@ PAGE_NOTE = (
 )
 
 
-def _averaged_part(comparison: Comparison) -> str | None:
-    """Return the name of the part of two traces over which their mean worn depth is computed.
-
-    None for scans, and if there is no mean.
-    """
-    if not isinstance(comparison.before, Profile) or comparison.worn.mean.value is None:
-        return None
-    return "track" if comparison.reference == "flanks" else "common length"
-
-
 def _quantities_table(comparison: Comparison) -> QuantityTable:
     """Return the table of the quantities of a comparison of two surfaces."""
     rows = []
     for name, quantity in comparison.values.items():
         words = QUANTITY_LABELS[name]
-        part = _averaged_part(comparison)
-        if name == "worn_depth_mean" and part is not None:
-            words = f"{words} over the {part}"
+        if name == "worn_depth_mean" and quantity.value is not None:
+            words = f"{words} over {comparison.mean_region}"
         meaning = quantity.text if quantity.value is not None else f"{quantity.text}: not available"
         rows.append(Row(words, quantity, meaning=meaning))
     return QuantityTable(TABLE_HEADS, rows)
@@ -274,9 +263,9 @@ def _part_data(part: Comparison) -> dict:
     out = {"before": part.before.source, "after": part.after.source}
     out |= {"direction": part.direction or None, "reference": part.basis or None}
     out |= _values_data(part.values)
-    if _averaged_part(part) is not None:
-        out["worn_depth_mean"]["over"] = _averaged_part(part)
     if isinstance(part.before, Profile):
+        if part.worn.mean.value is not None:
+            out["worn_depth_mean"]["over"] = part.mean_region.removeprefix("the ")
         out["registration"] = {
             "shift": quantity_data(part.motion.shift),
             "mirrored": part.is_mirrored,

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...core import PatchfemError, frozen_array
 from ..profile import Profile, find_runs
-from .boxes import N_PARTS, average_parts, make_boxes, part_edges
+from .boxes import N_PARTS
 from .errors import DrawnErrors, correlation_length, draw_errors, estimate_noise
 from .model import (
     BENT_PARAMETERS,
@@ -18,9 +18,9 @@ from .model import (
     Parameter,
     TraceModel,
 )
-from .robust import MAX_NOISE, MAX_UNWORN, MIN_UNWORN, find_floors, fit_biweight, solve_weighted
+from .robust import MAX_UNWORN, MIN_UNWORN, find_floors, fit_biweight, solve_weighted
 from .search import MIN_OVERLAP
-from .section import find_flank_ends, noise_threshold
+from .section import find_flank_ends, find_shallow_track, find_worn_heights
 
 # Largest scale of a floor relative to that of the quietest floor; rougher floors are dropped.
 MAX_SCALE_RATIO = 1.5
@@ -36,16 +36,8 @@ SHORT_FLANK = 0.02  # length of a flank relative to the trace, below which a sca
 # floor of a scar.
 OUTERMOST_FLANK = 0.005
 MAX_CHI2 = 30.0  # largest chi-squared of the bow of a flank, with two or three degrees of freedom
-# Number of parts of the trace, out of N_PARTS, that remain on either side of a shallow track.
-FLANK_PARTS = 6
-MIN_PARTS = 3  # smallest number of parts in a shallow track
-DATUM_DEGREE = 3  # degree of the polynomial that a datum may add to shallow depths
-# Smallest depth of a shallow track in standard deviations; 2 % of random walks have a deeper one.
-MIN_STEP = 8.0
 # Number of samples in the subset that refines the starting points of a fit.
 N_THINNED = 2000
-# Numbers of samples in the running means that detect wear below the noise of a single height.
-MEAN_WINDOWS = (4, 16)
 # Smallest number of samples of a worn run whose flanks may leave the floor gradually.
 MIN_WIDE_RUN = 64
 # Width of the margin beside a worn run relative to the run; slight wear
@@ -63,6 +55,7 @@ class Alignment:
 
     - x, first, depth: samples of the second trace on the first one, heights of the first trace
       there, and depths of the second trace below it, (n,) [m].
+    - curvature: how far heights of the first trace there lie off a smooth line, (n,) [m].
     - unworn: heights on the floor and outside of worn parts, (n,) bool.
     - jacobian: derivatives of the depth by the fitted parameters, (n, k).
     - state: parameters of the model (`model.Parameter`), (5,).
@@ -79,6 +72,7 @@ class Alignment:
     x: np.ndarray
     first: np.ndarray
     depth: np.ndarray
+    curvature: np.ndarray
     unworn: np.ndarray
     jacobian: np.ndarray
     state: np.ndarray
@@ -114,11 +108,8 @@ class Alignment:
     @cached_property
     def noise_at(self) -> np.ndarray:
         """Standard deviation (n,) [m] of each depth."""
-        z = np.pad(self.first, 3, "edge")
-        curvature = z[3:-3] - (9 * (z[2:-4] + z[4:-2]) - z[:-6] - z[6:]) / 16
-        curvature = np.maximum.reduce([np.abs(np.roll(curvature, k)) for k in (-1, 0, 1)])
         slope = np.abs(np.gradient(self.first, self.x))
-        return estimate_noise(self.depth, self.unworn, slope, curvature, self.min_scale)
+        return estimate_noise(self.depth, self.unworn, slope, self.curvature, self.min_scale)
 
     @cached_property
     def errors(self) -> DrawnErrors:
@@ -205,7 +196,10 @@ def align(before: Profile, after: Profile, shift: float, is_straight: bool = Fal
     )
     if bent is not None and bent.scale < BEND_GAIN * max(best.noise, model.min_scale):
         curved = _fit_all_heights(model, bent.state, BENT_PARAMETERS)
-        if curved.noise < BEND_GAIN * best.noise:
+        # A bend without an unworn end fits the inside of a round scar, if both ends lie on a line far above the scar.
+        is_inside = all(best.has_unworn_ends()) and not any(curved.has_unworn_ends())
+        is_inside &= np.quantile(best.depth, 0.9) > 2 * MAX_UNWORN * best.noise
+        if curved.noise < BEND_GAIN * best.noise and not is_inside:
             best = curved
     return _check_for_wide_scar(model, best)
 
@@ -264,6 +258,7 @@ def _make_alignment(model, state, free, scale: float, worn) -> Alignment:
         x=frozen_array(model.x),
         first=frozen_array(model.spline(model.places(state))),
         depth=frozen_array(depth),
+        curvature=frozen_array(model.curvature(model.places(state))),
         unworn=unworn,
         jacobian=frozen_array(jacobian[:, list(free)]),
         state=frozen_array(state),
@@ -277,26 +272,11 @@ def _make_alignment(model, state, free, scale: float, worn) -> Alignment:
 
 
 def find_worn_samples(depth, scale: float) -> np.ndarray:
-    """Find the worn heights (n,) bool from single heights, running means of 4 and 16, and rectangular tracks.
-
-    A box over some of 60 parts of the trace shows a track that is shallower than the noise.
-    """
+    """Find the worn heights (n,) bool, with the sample on either side of them, where wear fades out."""
     quiet = np.abs(depth) <= MAX_UNWORN * scale
     correlation = correlation_length(depth, quiet, depth.size // N_PARTS)
-    threshold = noise_threshold(depth.size)
-    worn = depth > threshold * scale
-    # Deep heights would raise the means of unworn heights next to them.
-    clipped = np.clip(np.where(worn, 0.0, depth), -MAX_NOISE * scale, MAX_NOISE * scale)
-    for window in MEAN_WINDOWS:
-        if window > depth.size // 10:
-            break
-        mean = np.convolve(clipped, np.full(window, 1 / window), "same")
-        deep = mean > threshold * scale * np.sqrt(correlation / window)
-        worn |= np.convolve(deep, np.ones(window), "same") > 0.5
-    track, _ = find_shallow_track(depth, scale)
-    if track is not None:
-        worn[track[0] : track[1] + 1] = True
-    return np.convolve(worn, np.ones(3), "same") > 0.5  # wear fades out in the neighbouring samples
+    worn = find_worn_heights(depth, np.full(depth.size, scale), correlation)
+    return np.convolve(worn, np.ones(3), "same") > 0.5
 
 
 def widen_to_flank_ends(depth, scale: float, worn) -> np.ndarray:
@@ -312,48 +292,6 @@ def widen_to_flank_ends(depth, scale: float, worn) -> np.ndarray:
         out[start.first : first] = True
         out[last : depth.size - end.first] = True
     return out
-
-
-def find_shallow_track(depth, scale: float) -> tuple:
-    """Find a track that is shallower than the noise of single heights, from averages over 60 parts.
-
-    Each box is fitted together with a cubic, which a datum may add. The best box is a track if its depth
-    is eight times its standard deviation, which follows from the residuals and their correlation, so
-    that a slow drift is no track (generalized likelihood ratio test).
-
-    Returns
-    -------
-    run : tuple of first and last sample, or None
-    threshold : float
-        Mean depth [m] from which a track over the middle third would have been found; inf for short
-        traces.
-    """
-    if depth.size < 8 * N_PARTS:
-        return None, np.inf
-    edges = part_edges(depth.size, N_PARTS)
-    clipped = np.clip(depth, -MAX_NOISE * scale, MAX_NOISE * scale)
-    # Depths are measured from a supposed surface, which may be the floor of a wide scar. The flanks of such a scar stand
-    # clearly above the floor and are left out, because the floor between them would look like a shallow track. If most
-    # heights stand above the supposed surface, they are the real surface, and the part at zero depth is a track.
-    is_above = depth < -MAX_NOISE * scale
-    if 2 * np.count_nonzero(is_above) < depth.size:
-        clipped[is_above] = 0.0
-    means = average_parts(clipped, edges)
-    boxes = make_boxes(N_PARTS, FLANK_PARTS, MIN_PARTS, DATUM_DEGREE)
-    means = means - boxes.datum @ (boxes.datum.T @ means)
-    heights = boxes.shapes @ means
-    best = int(np.argmax(heights))
-    residual = means - heights[best] * boxes.shapes[best]
-    freedom = N_PARTS - DATUM_DEGREE - 4
-    correlation = correlation_length(residual, np.ones(N_PARTS, bool))
-    spread = float(np.sqrt(residual @ residual / freedom * correlation))
-    spread = max(spread, 1e-3 * scale)
-    third = boxes.spans.index((N_PARTS // 3, N_PARTS - N_PARTS // 3))
-    threshold = MIN_STEP * spread / float(boxes.sizes[third])
-    if heights[best] <= MIN_STEP * spread:
-        return None, threshold
-    first, last = boxes.spans[best]
-    return (int(edges[first]), int(edges[last]) - 1), threshold
 
 
 def _fit_line_through_ends(

@@ -9,11 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ...formatting import format_length, format_number
-from ..profile import Profile
+from ..profile import Profile, robust_deviation
 from .alignment import SHORT_FLANK, Alignment
 from .boxes import N_PARTS, average_parts, part_edges, subtract_line
 from .errors import correlation_length
 from .flanks import Flanks
+from .reference import MIN_DEPTH_OVER_DRIFT, Reference
 from .robust import MAX_NOISE
 from .section import median_of_five
 
@@ -22,9 +23,6 @@ BENT_DATUM_HEADLINE = "a scar or a bent datum, both are possible"
 GROWN_ENDS_HEADLINE = "a scar or material that grew at the ends, both are possible"
 NOISE = "a scar or noise, both are possible"
 DRIFT = "a scar or a datum that drifts, both are possible"
-# Smallest depth of a scar in standard deviations of the drift: three times the width of
-# an interval of +-2 deviations.
-MIN_DEPTH_OVER_DRIFT = 12.0
 # Smallest covariance of neighbouring unworn parts relative to their variance that shows a drift; it
 # is near 1 for a drift and 0 for noise.
 MIN_SLOW_FRACTION = 0.5
@@ -46,25 +44,26 @@ class Ambiguity(NamedTuple):
     reason: str
 
 
-def find_ambiguity(alignment: Alignment, *, is_referenced: bool, is_changed: bool) -> Ambiguity:
-    """Check whether two interpretations explain the traces equally well.
+def find_ambiguity(alignment: Alignment, reference: Reference, *, has_grown: bool) -> Ambiguity:
+    """Check whether two interpretations explain the traces equally well; wear without a reference may be a drift.
 
     Parameters
     ----------
     alignment : Alignment
-    is_referenced : bool
-        Whether unworn parts or valleys are known.
-    is_changed : bool
-        Whether wear or growth is seen.
+    reference : Reference
+    has_grown : bool
+        Whether growth is seen.
     """
     rival = alignment.rival
     if rival is not None and _have_different_areas(alignment, rival):
         is_deeper = rival.bend != 0 or alignment.depth.mean() > rival.depth.mean()
         is_line = alignment.bend == 0 and is_deeper
-        if not (is_line and is_referenced):
+        if not (is_line and reference.kind):
             bow, line = (rival, alignment) if is_line else (alignment, rival)
             return Ambiguity(_name_ambiguity(bow), describe_both(bow, line))
-    if is_changed and may_be_drift(alignment):
+    is_changed = reference.has_wear or has_grown
+    is_unreferenced = reference.has_wear and not reference.kind
+    if is_unreferenced or (is_changed and may_be_drift(alignment)):
         return Ambiguity(DRIFT, describe_drift(alignment))
     return Ambiguity("", "")
 
@@ -112,7 +111,7 @@ def may_be_drift(alignment: Alignment) -> bool:
     blocks = alignment.unworn.sum() / correlation_length(depth, alignment.unworn)
     if blocks < MIN_BLOCKS and deepest < MIN_DEPTH_OVER_DRIFT * alignment.noise:
         return True
-    return alignment.bend != 0 and float(np.std(residual)) < MAX_SCATTER_RATIO * alignment.noise
+    return alignment.bend != 0 and robust_deviation(residual) < MAX_SCATTER_RATIO * alignment.noise
 
 
 def describe_both(bow: Alignment, line: Alignment) -> str:

@@ -9,7 +9,7 @@ from ...core import PatchfemError, frozen_array
 from ...formatting import format_length
 from ..areal import Areal
 from ..files.read import read_surface
-from ..profile import Profile, remove_spikes, resample_evenly
+from ..profile import Profile, level, remove_spikes, resample_evenly
 from ..quantity import SIDE, Quantity, make_quantity, make_unknown
 from ..roughness.spectrum import BAND
 from ..scans.change import Change, compare_scans
@@ -68,6 +68,8 @@ SLOPE = (
 # Smallest relative length difference that a note reports; smaller ones are
 # not reported even if significant.
 MIN_STRETCH = 1e-4
+# Smallest distance of a height from the mean line / largest height; smaller ones are rounding.
+MIN_HEIGHT = 1e-9
 # Largest ratio of the mean squares of noise and surface; above it, a
 # measured ratio is that of the noise.
 MAX_NOISE_FRACTION = 1.0
@@ -144,6 +146,13 @@ class Comparison:
     ambiguity: str = ""
 
     @property
+    def mean_region(self) -> str:
+        """Part of the surface over which the mean worn depth is computed."""
+        if isinstance(self.before, Areal):
+            return "the region that both scans show"
+        return "the second trace" if self.basis == "flanks" else "the common length"
+
+    @property
     def values(self) -> dict:
         """Every `Quantity` by its name."""
         ratios = {"amplitude_ratio": self.ratios.amplitude, "slope_ratio": self.ratios.slope}
@@ -208,9 +217,11 @@ def compare_traces(
     Raises
     ------
     PatchfemError
-        If a trace is too short for the band.
+        If a trace is too short for the band, or shows no heights but a straight line.
     """
     traces = (before, after) if keep_spikes else (remove_spikes(before), remove_spikes(after))
+    for trace in traces:
+        _refuse_flat(trace)
     place = find_place(*traces, shift, is_straight=is_straight)
     if place.alignment is None:
         return _check_flanks(_compare_separate(place, direction), shift, is_straight)
@@ -218,6 +229,17 @@ def compare_traces(
         place = _remove_specks(place, is_straight)
     heights = after.z[::-1] if place.is_mirrored else after.z
     return _compare_aligned(place, heights, direction)
+
+
+def _refuse_flat(trace: Profile) -> None:
+    """Raise PatchfemError if all heights of a trace lie on a straight line."""
+    known = trace.z[~trace.missing]
+    deviation = level(trace).z[~trace.missing]
+    if known.size and np.abs(deviation).max() <= MIN_HEIGHT * np.abs(known).max():
+        raise PatchfemError(
+            f"{trace.source}: all heights lie on a straight line, so this trace shows no surface to compare; was the "
+            "instrument in contact and within its range?"
+        )
 
 
 def _name_track_sizes(sizes) -> dict:
@@ -312,11 +334,7 @@ def _measure_wear(alignment: Alignment, section: Section, left_out: float) -> _W
     """
     reference = find_reference(alignment, section)
     grew = has_grown(alignment, section)
-    ambiguity = find_ambiguity(
-        alignment,
-        is_referenced=bool(reference.kind),
-        is_changed=bool(reference.kind) or grew,
-    )
+    ambiguity = find_ambiguity(alignment, reference, has_grown=grew)
     if ambiguity.headline:
         reference = reference._replace(kind="")
     tracks = measure_tracks(alignment, section, BAND[1]) if reference.kind else NO_TRACKS

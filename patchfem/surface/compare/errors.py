@@ -22,6 +22,11 @@ N_DRAWS = 200  # number of bootstrap draws, which determine a standard deviation
 TRUNCATED_VARIANCE = 0.911
 MAX_NOISE_ROUNDS = 30  # largest number of fits of the noise; most traces need fewer than ten
 MIN_NOISE_HEIGHTS = 30  # smallest number of heights that show how the noise varies along a trace
+# Quantile of the ratios of a height to its noise that shows whether a class of curvature has a heavier tail
+# than normal noise, and this quantile of normal noise.
+TAIL_QUANTILE = 0.9
+NORMAL_TAIL = 1.645
+N_AROUND_WALL = 25  # number of samples of which a wall of the surface is a minority
 SEED = 1989
 
 
@@ -79,7 +84,33 @@ def estimate_noise(depth, unworn, slope, curvature, min_noise: float) -> np.ndar
         if (new == used).all():
             break
         used = new
-    return np.sqrt(variance)
+    noise = np.sqrt(variance)
+    tail = side & _has_unworn_neighbours(unworn, N_AROUND_WALL)
+    return noise * _measure_tails(np.abs(depth) / noise, curvature, tail)
+
+
+def _measure_tails(relative, curvature, used) -> np.ndarray:
+    """Return the factor (n,) >= 1 by which errors of interpolation exceed the fitted noise.
+
+    Errors at kinks and walls have a heavy tail, which a trimmed fit does not see. Each class has half of the
+    heights of the class before it, those with the larger curvature.
+
+    Parameters
+    ----------
+    relative, curvature : (n,) array
+        Height / noise, and curvature [m].
+    used : (n,) bool array
+        Heights that differ by noise alone.
+    """
+    factor = np.ones(relative.size)
+    rest = used
+    while rest.sum() > MIN_NOISE_HEIGHTS:
+        limit = float(np.median(curvature[rest]))
+        rest = used & (curvature > limit)
+        if rest.any():
+            tail = float(np.quantile(relative[rest], TAIL_QUANTILE)) / NORMAL_TAIL
+            factor[curvature > limit] = max(tail, 1.0)
+    return factor
 
 
 def _find_quiet_side(depth) -> np.ndarray:
@@ -186,8 +217,12 @@ def draw_errors(depth, noise, unworn, clear, jacobian, degree: int) -> DrawnErro
 
 def _find_high_outliers(relative, unworn) -> np.ndarray:
     """Find single heights (n,) bool far above unworn neighbours: the tail of the noise, which wear cannot make."""
-    n_unworn = np.convolve(unworn.astype(float), np.ones(5), "same")
-    return ~unworn & (relative < 0) & (n_unworn > 2.5)
+    return ~unworn & (relative < 0) & _has_unworn_neighbours(unworn, 5)
+
+
+def _has_unworn_neighbours(unworn, count: int) -> np.ndarray:
+    """Return whether most of a number of neighbouring heights (n,) bool are unworn."""
+    return np.convolve(unworn.astype(float), np.ones(count), "same") > count / 2
 
 
 def _propagate_to_parameters(errors, noise, unworn, jacobian) -> np.ndarray:

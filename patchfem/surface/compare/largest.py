@@ -17,10 +17,9 @@ N_PARTS = 8  # number of parts of a window; the parabola must also fit the mean 
 # Largest misfit in standard deviations, for which the parabola fits
 # 97 % of the windows of pure noise.
 MAX_MISFIT = 2.5
-# Number of standard deviations subtracted from each depth when the largest depth is selected.
-PENALTY = 3.0
-# Number of samples of a window that is long: a quarter of it on either side gives the slopes.
-LONG_WINDOW = 64
+# Number of standard deviations subtracted from each depth when the largest depth is selected; errors of
+# interpolation at walls reach five of them.
+PENALTY = 5.0
 
 
 class _Windows(NamedTuple):
@@ -50,7 +49,8 @@ def measure_largest_depth(section: Section, text: str) -> Quantity:
     depth is read from the parabola through the longest window (5 to 1025 heights) around it that shows no
     misfit beyond the noise; where no window fits, it is the height itself. The remaining excess is that
     of the drawn errors in the same windows about depths whose scatter is that of the surface alone, and
-    is subtracted. The variance is that of the draws, of half of the excess, and of what a corner hides.
+    is subtracted. The variance is that of the draws and of half of the excess. The upper end contains every depth,
+    because a crest to which no parabola fits may be worn as deep as its uncertain height.
 
     Parameters
     ----------
@@ -77,11 +77,9 @@ def measure_largest_depth(section: Section, text: str) -> Quantity:
     peaks = _draw_peaks(section, list(_group_by_window(windows, near)), clean, penalty)
     deepest = near[np.argmax(clean[near] - penalty[near])]
     excess = float(peaks.mean() - clean[deepest])
-    window = slice(int(windows.start[top]), int(windows.start[top] + windows.size[top]))
-    correlated_noise = float(np.median(noise)) * np.sqrt(section.correlation)
-    hidden = _limit_corner(depth, window, correlated_noise)
-    error = float(np.sqrt(peaks.var() + excess**2 / 4 + hidden**2))
-    return make_quantity(float(smooth[top] - excess), error, "m", text, 0.0)
+    error = float(np.sqrt(peaks.var() + excess**2 / 4))
+    largest = make_quantity(float(smooth[top] - excess), error, "m", text, 0.0)
+    return largest._replace(high=max(largest.high, float(smooth.max())))
 
 
 def _draw_peaks(section: Section, groups: list, clean, penalty) -> np.ndarray:
@@ -112,34 +110,6 @@ def _shrink_scatter(smooth, deviation, near) -> np.ndarray:
     weight = 1 / (surface + variance[near])
     mean = float(weight @ smooth[near] / weight.sum())
     return mean + np.sqrt(surface / (surface + variance)) * (smooth - mean)
-
-
-def _limit_corner(depth, window: slice, noise: float) -> float:
-    """Estimate how much deeper [m] a corner is than the fitted parabola, or 0 for a round floor of the track.
-
-    A corner between slopes of +-s is 3/16 s h deeper than the least-squares parabola of half width h. The
-    slopes are fitted beside the window, over its length, or a quarter of it if it is long. Those of a
-    round floor continue the parabola; those of a corner are 1/4 to 2/5 of that. For a long window the
-    difference must exceed three standard deviations of the noise [m].
-    """
-    length = window.stop - window.start
-    count = length if length < LONG_WINDOW else length // 4
-    if length < MIN_WINDOW or window.start < count or window.stop + count > depth.size:
-        return 0.0
-    place = np.arange(count) - (count - 1) / 2
-    before, after = (
-        float(place @ depth[start : start + count]) / float(place @ place)
-        for start in (window.start - count, window.stop)
-    )
-    slope = (before - after) / 2
-    curvature = -2 * float(np.polyfit(np.arange(length), depth[window], 2)[0])
-    expected = curvature * ((length + count) / 2)
-    # For white noise, the variances of both slopes contribute a factor of 27.
-    min_difference = 3 * 27 * noise / length**1.5 if length >= LONG_WINDOW else 0.0
-    if slope <= 0 or expected - slope <= min_difference:
-        return 0.0
-    sharpness = float(np.clip(1.5 * (1 - slope / expected), 0, 1))
-    return 3 / 16 * slope * length / 2 * sharpness
 
 
 def _group_by_window(windows: _Windows, depths) -> Iterator[_Group]:

@@ -86,6 +86,13 @@ class TraceModel:
         from_middle = self.x - self.middle
         return self.middle + from_middle / (1 + state[Parameter.STRETCH]) - state[Parameter.SHIFT]
 
+    def curvature(self, at) -> np.ndarray:
+        """Return the largest distance [m] of heights beside each position (k,) from the cubic through their neighbours."""
+        z = np.pad(self.before.z, 3, "edge")
+        distance = np.abs(z[3:-3] - (9 * (z[2:-4] + z[4:-2]) - z[:-6] - z[6:]) / 16)
+        largest = np.maximum.reduce([np.roll(distance, k) for k in (-1, 0, 1)])
+        return np.interp(at, self.before.x, largest)
+
     def overlap(self, at) -> np.ndarray:
         """Return whether each position (k,) [m] lies on the first trace and not in a gap of it."""
         edge = 1e-9 * self.half

@@ -274,6 +274,5 @@ def _describe_failure(before: Profile, after: Profile, match: Match, valleys: Ma
     return (
         f"the two traces show no common part: the best correlation of their valleys is {valleys.correlation:.2f}, but "
         f"only values above {threshold:.2f} are significant; {USE_SAME_MARK}; if the "
-        "heights of one trace count into the material, change their sign (the search for such traces was removed "
-        "in patchfem 1.0)"
+        "heights of one trace count into the material, change their sign"
     )

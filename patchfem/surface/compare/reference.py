@@ -22,6 +22,9 @@ MIN_WORN_DEPTH = 2 * MAX_UNWORN
 SPECK_SAMPLES = 16
 NARROW_SAMPLES = 5  # smallest number of samples of a scratch at half its depth
 MIN_SCRATCH = 20.0  # smallest depth of a scratch, in standard deviations
+# Smallest depth of a scar in standard deviations of the drift: three times the width of
+# an interval of +-2 deviations.
+MIN_DEPTH_OVER_DRIFT = 12.0
 MIN_TOPS = 8  # smallest number of worn tops for which the valleys between them are a reference
 # Smallest mean fraction of unworn heights that were lower than a worn one before wear; the
 # fraction is 1 if only tops wore off.
@@ -39,19 +42,22 @@ class Reference(NamedTuple):
     - kind: "parts", "valleys", or "" without a reference.
     - parts: (from, to) [m] of each unworn part in x of the second trace.
     - unworn: fraction of the heights that are unworn.
+    - has_wear: whether wear is seen, although there may be no reference for its depth.
     """
 
     kind: str
     parts: tuple
     unworn: float
+    has_wear: bool = False
 
 
 def find_reference(alignment: Alignment, section: Section) -> Reference:
     """Find unworn parts or valleys of aligned traces from which the worn depth can be measured.
 
-    Unworn parts are at least a twentieth of the length (a fiftieth if the datum is straight), straight, and
-    beside worn places; slight wear bends a part. Valleys are a reference if they lie between at least eight
-    worn tops. Without either, the difference may be uniform wear, a wedge or a bow.
+    Unworn parts are at least a twentieth of the length (a fiftieth if the datum is straight) and beside worn
+    places. Slight wear bends a part, so they are straight, or bent by a drift of at most a twelfth of the depth.
+    Valleys are a reference if they lie between at least eight worn tops. Without either, the difference may
+    be uniform wear, a wedge or a bow.
 
     Parameters
     ----------
@@ -63,18 +69,18 @@ def find_reference(alignment: Alignment, section: Section) -> Reference:
     unworn = float(alignment.unworn.mean())
     places = find_deep_runs(relative)
     has_tops = len(places) >= MIN_TOPS and _higher_fraction(alignment, relative) > MIN_HIGHER
-    if not has_tops and not _has_wear(alignment, relative, places):
+    worn = section.worn_heights
+    if not has_tops and not _has_wear(relative, find_runs(worn)):
         return Reference("", (), unworn)
-    is_unworn = relative <= MAX_UNWORN
-    for first, last in _shallow_runs(alignment):
-        is_unworn[first : last + 1] = False
-    runs = [run for run in find_runs(is_unworn) if _is_flank(alignment, *run)]
+    is_unworn = (relative <= MAX_UNWORN) & ~worn
+    deepest = float(median_of_five(section.depth).max())
+    runs = [run for run in find_runs(is_unworn) if _is_flank(alignment, *run, deepest)]
     if runs:
         x = alignment.x
         parts = tuple((float(x[first]), float(x[last])) for first, last in runs)
-        return Reference("parts", parts, unworn)
+        return Reference("parts", parts, unworn, has_wear=True)
     has_valleys = has_tops and unworn > MIN_UNWORN
-    return Reference("valleys" if has_valleys else "", (), unworn)
+    return Reference("valleys" if has_valleys else "", (), unworn, has_wear=True)
 
 
 def find_deep_runs(relative) -> list:
@@ -85,15 +91,9 @@ def find_deep_runs(relative) -> list:
     ]
 
 
-def _shallow_runs(alignment: Alignment) -> list:
-    """Return the runs that the fit found to be worn although no single height shows it."""
-    is_shallow = ~alignment.unworn & (np.abs(alignment.depth) <= MAX_UNWORN * alignment.noise)
-    return [(first, last) for first, last in find_runs(is_shallow) if last - first > MIN_SAMPLES]
-
-
-def _has_wear(alignment: Alignment, relative, places: list) -> bool:
-    """Return whether some deep run is wider than an interpolation error, or as deep as a scratch."""
-    if _shallow_runs(alignment) or _is_wide(relative, places):
+def _has_wear(relative, places: list) -> bool:
+    """Return whether some worn run is wider than an interpolation error, or as deep as a scratch."""
+    if _is_wide(relative, places):
         return True
     for first, last in places:
         deep = relative[first : last + 1]
@@ -103,7 +103,7 @@ def _has_wear(alignment: Alignment, relative, places: list) -> bool:
 
 
 def _is_wide(relative, places: list) -> bool:
-    """Return whether more samples of a deep run exceed half its depth than in an interpolation error."""
+    """Return whether more samples of a worn run exceed half its depth than in an interpolation error."""
     parts = [relative[first : last + 1] for first, last in places]
     return any((deep > deep.max() / 2).sum() >= SPECK_SAMPLES for deep in parts)
 
@@ -116,8 +116,8 @@ def _higher_fraction(alignment: Alignment, relative) -> float:
     return float(n_lower.mean() / max(unworn.size, 1))
 
 
-def _is_flank(alignment: Alignment, first: int, last: int) -> bool:
-    """Return whether a run of heights is long, unworn and straight."""
+def _is_flank(alignment: Alignment, first: int, last: int, deepest: float) -> bool:
+    """Return whether a run of heights is long and unworn, and straight or hardly bent against the deepest wear [m]."""
     x = alignment.x
     min_length = (SHORT_FLANK if alignment.is_straight else LONG_FLANK) * (x[-1] - x[0])
     if x[last] - x[first] < min_length or last - first < MIN_SAMPLES:
@@ -135,13 +135,14 @@ def _is_flank(alignment: Alignment, first: int, last: int) -> bool:
     power = float(((base[:, 1:].T @ depth) ** 2).sum())
     scatter = float(np.std(depth - base @ (base.T @ depth)))
     correlation = correlation_length(np.asarray(alignment.depth), alignment.unworn)
-    return power <= MAX_CHI2 * correlation * scatter**2
+    is_drift_small = MIN_DEPTH_OVER_DRIFT * np.sqrt(power / depth.size) < deepest
+    return is_drift_small or power <= MAX_CHI2 * correlation * scatter**2
 
 
 def has_grown(alignment: Alignment, section: Section) -> bool:
     """Return whether material above the first trace is clearly wider than an interpolation error."""
     relative = median_of_five(-section.depth / section.noise)
-    return _is_wide(relative, find_deep_runs(relative))
+    return _is_wide(relative, find_runs(section.grown_heights))
 
 
 def limit_hidden_wear(alignment: Alignment | None, reference: Reference | None) -> Quantity:

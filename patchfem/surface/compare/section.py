@@ -10,10 +10,17 @@ import numpy as np
 
 from ...formatting import format_length
 from ..profile import find_runs, robust_deviation
-from ..quantity import SIDE, Quantity, make_quantity, make_unknown
+from ..quantity import LEVEL, SIDE, Quantity, make_quantity, make_unknown
+from .boxes import N_PARTS, average_parts, make_boxes, part_edges
 from .errors import block_length, correlation_length, draw_blocks, student_factor
 from .robust import MAX_NOISE, MAX_OUTLIER, MAX_UNWORN
 
+# Number of parts of the trace, out of N_PARTS, that remain on either side of a shallow track.
+FLANK_PARTS = 6
+MIN_PARTS = 3  # smallest number of parts in a shallow track
+DATUM_DEGREE = 3  # degree of the polynomial that a datum may add to shallow depths
+# Smallest depth of a shallow track in standard deviations; 2 % of random walks have a deeper one.
+MIN_STEP = 8.0
 # Fraction of unworn traces in which noise alone is reported as wear.
 FALSE_POSITIVE_RATE = 1e-3
 N_TESTS = 4  # number of tests of each height: the height itself, and means of 4, 16 and 64 samples
@@ -33,12 +40,17 @@ MIN_PILE_UP = 3.0  # smallest height of a pile-up above the first trace, in stan
 OFFSETS = (1 / 3, 2 / 3, 1.0)
 # Smallest decrease of the deviance (-2 log likelihood) by which one kind of flank excludes another.
 MIN_CLEAR_DEVIANCE = 12.0
+# Deviance of the true change point above the smallest one that 95 % of traces do not exceed (Hinkley, Biometrika 57
+# (1970) 1): the square root of 0.95 is the chance that neither side of it exceeds this value.
+MAX_DEVIANCE = -2 * np.log(1 - np.sqrt(LEVEL))
 # Largest number of bootstrap blocks of a mean section; more would not show its long-wave errors.
 MAX_BLOCKS = 8
 N_FIFTHS = 5  # number of parts of a track; the deepest part is the floor
 # Largest number of samples between a track and the end of the section at
 # which the track may be cut off.
 MAX_CUT_SAMPLES = 5
+# Smallest fraction of heights above the first surface in a track whose floor has new roughness.
+MIN_GROWN_FRACTION = 0.02
 # Smallest fraction of worn heights in a track; worn tops between valleys have a smaller one.
 MIN_WORN_FRACTION = 0.85
 # Largest unworn gap relative to the width of the track for which both sides belong to one track.
@@ -84,6 +96,16 @@ class Section(NamedTuple):
     def widths(self) -> np.ndarray:
         """Length (n,) [m] that each sample represents."""
         return sample_lengths(self.x)
+
+    @property
+    def worn_heights(self) -> np.ndarray:
+        """Worn heights (n,) bool."""
+        return find_worn_heights(self.depth, self.noise, self.correlation)
+
+    @property
+    def grown_heights(self) -> np.ndarray:
+        """Heights (n,) bool with material above the first surface, by the same tests as worn ones."""
+        return find_worn_heights(-self.depth, self.noise, self.correlation)
 
     @property
     def gap_errors(self) -> np.ndarray:
@@ -186,9 +208,20 @@ def median_of_five(values) -> np.ndarray:
     return np.median(np.lib.stride_tricks.sliding_window_view(np.pad(values, 2, "edge"), 5), axis=1)
 
 
-def find_worn_heights(section: Section) -> np.ndarray:
-    """Find the worn heights (n,) bool by tests of single heights and of means of 4, 16 and 64."""
-    relative = section.depth / section.noise
+def find_worn_heights(depth, noise, correlation: float) -> np.ndarray:
+    """Find the worn heights (n,) bool.
+
+    Running medians of 5 show deep wear, running means of 4, 16 and 64 wear of a few standard deviations, and a
+    box over parts of the trace a track that is shallower than the noise.
+
+    Parameters
+    ----------
+    depth, noise : (n,) array [m]
+        Depth and its standard deviation.
+    correlation : float
+        Number of neighbouring depths whose errors are fully correlated.
+    """
+    relative = depth / noise
     threshold = noise_threshold(relative.size)
     worn = median_of_five(relative) > threshold
     for window in (4, 16, 64):
@@ -197,9 +230,54 @@ def find_worn_heights(section: Section) -> np.ndarray:
         # Deep heights would raise the means next to them.
         shallow = np.clip(np.where(worn, 0.0, relative), -MAX_OUTLIER, MAX_OUTLIER)
         mean = np.convolve(shallow, np.full(window, 1 / window), "valid")
-        for k in np.flatnonzero(mean > threshold * np.sqrt(section.correlation / window)):
+        for k in np.flatnonzero(mean > threshold * np.sqrt(correlation / window)):
             worn[k + window // 4 : k + window - window // 4] = True
+    track, _ = find_shallow_track(depth, float(np.median(noise)))
+    if track is not None:
+        worn[track[0] : track[1] + 1] = True
     return worn
+
+
+def find_shallow_track(depth, scale: float) -> tuple:
+    """Find a track that is shallower than the noise of single heights, from averages over 60 parts.
+
+    Each box is fitted together with a cubic, which a datum may add. The best box is a track if its depth
+    is eight times its standard deviation, which follows from the residuals and their correlation, so
+    that a slow drift is no track (generalized likelihood ratio test).
+
+    Returns
+    -------
+    run : tuple of first and last sample, or None
+    threshold : float
+        Mean depth [m] from which a track over the middle third would have been found; inf for short
+        traces.
+    """
+    if depth.size < 8 * N_PARTS:
+        return None, np.inf
+    edges = part_edges(depth.size, N_PARTS)
+    clipped = np.clip(depth, -MAX_NOISE * scale, MAX_NOISE * scale)
+    # Depths are measured from a supposed surface, which may be the floor of a wide scar. The flanks of such a scar stand
+    # clearly above the floor and are left out, because the floor between them would look like a shallow track. If most
+    # heights stand above the supposed surface, they are the real surface, and the part at zero depth is a track.
+    is_above = depth < -MAX_NOISE * scale
+    if 2 * np.count_nonzero(is_above) < depth.size:
+        clipped[is_above] = 0.0
+    means = average_parts(clipped, edges)
+    boxes = make_boxes(N_PARTS, FLANK_PARTS, MIN_PARTS, DATUM_DEGREE)
+    means = means - boxes.datum @ (boxes.datum.T @ means)
+    heights = boxes.shapes @ means
+    best = int(np.argmax(heights))
+    residual = means - heights[best] * boxes.shapes[best]
+    freedom = N_PARTS - DATUM_DEGREE - 4
+    correlation = correlation_length(residual, np.ones(N_PARTS, bool))
+    spread = float(np.sqrt(residual @ residual / freedom * correlation))
+    spread = max(spread, 1e-3 * scale)
+    third = boxes.spans.index((N_PARTS // 3, N_PARTS - N_PARTS // 3))
+    threshold = MIN_STEP * spread / float(boxes.sizes[third])
+    if heights[best] <= MIN_STEP * spread:
+        return None, threshold
+    first, last = boxes.spans[best]
+    return (int(edges[first]), int(edges[last]) - 1), threshold
 
 
 def find_end(depth, noise, correlation: float, worn: int) -> FlankEnd:
@@ -280,7 +358,7 @@ def _select_end(deviances, candidates) -> FlankEnd:
         chosen = step
         kinds = [step]
     else:
-        is_straight = deviances[straight_or_flat].min() <= best + SIDE**2
+        is_straight = deviances[straight_or_flat].min() <= best + MAX_DEVIANCE
         chosen = straight if is_straight else rounded
         kinds = [straight_or_flat, rounded]
         kinds = [kind for kind in kinds if deviances[kind].min() <= best + MIN_CLEAR_DEVIANCE]
@@ -289,7 +367,7 @@ def _select_end(deviances, candidates) -> FlankEnd:
     tried = [candidates[0] - 1.0, candidates[-1] + 1.0]
     likely = [place]
     for kind in kinds:
-        is_likely = deviances[kind] <= deviances[kind].min() + SIDE**2
+        is_likely = deviances[kind] <= deviances[kind].min() + MAX_DEVIANCE
         likely.extend(places[kind][is_likely])
         tried.extend(places[kind].ravel())
     # The likelihood falls below the bound between a likely place and the next one that was tried.
@@ -393,15 +471,15 @@ def _fit_smooth_flank(weighted, noise, samples, shape: FlankShape) -> float:
     return float(residual @ residual)
 
 
-def find_tracks(section: Section, worn, longest: float) -> list:
-    """Find the tracks: runs of worn heights that are longer than three of the longest waves.
+def find_tracks(section: Section, longest: float) -> list:
+    """Find the tracks: worn parts that are longer than three of the longest waves.
 
-    Gaps of a twentieth of the width are bridged. Worn tops between unworn valleys are no track.
+    Gaps of a twentieth of the width are bridged, and wider ones in which most heights changed: new roughness
+    in a track may stand above the first surface. Worn tops between unworn valleys are no track.
 
     Parameters
     ----------
     section : Section
-    worn : (n,) bool array
     longest : float
         Longest wave [m] of the band.
 
@@ -410,28 +488,32 @@ def find_tracks(section: Section, worn, longest: float) -> list:
     list
         First and last sample of each track.
     """
+    worn = section.worn_heights
+    changed = worn | (np.abs(median_of_five(section.depth / section.noise)) > MAX_UNWORN)
     runs = find_runs(worn)
     tracks = []
     while runs:
         at = max(range(len(runs)), key=lambda k: runs[k][1] - runs[k][0])
         first, last = runs[at]
         low = high = at
-        while low > 0 and first - runs[low - 1][1] <= _max_gap(first, last):
+        while low > 0 and _is_bridged(changed, runs[low - 1][1], first, last - first):
             low -= 1
             first = runs[low][0]
-        while high < len(runs) - 1 and runs[high + 1][0] - last <= _max_gap(first, last):
+        while high < len(runs) - 1 and _is_bridged(changed, last, runs[high + 1][0], last - first):
             high += 1
             last = runs[high][1]
         runs = runs[:low] + runs[high + 1 :]
         is_long = section.x[last] - section.x[first] > MIN_WAVES_PER_TRACK * longest
-        if is_long and worn[first : last + 1].mean() > MIN_WORN_FRACTION:
+        if is_long and changed[first : last + 1].mean() > MIN_WORN_FRACTION:
             tracks.append((first, last))
     return sorted(tracks)
 
 
-def _max_gap(first: int, last: int) -> float:
-    """Return the longest unworn gap [samples] that is bridged next to a track."""
-    return max(MAX_GAP_FRACTION * (last - first), MAX_CUT_SAMPLES)
+def _is_bridged(changed, first: int, last: int, width: int) -> bool:
+    """Return whether a gap between two worn samples belongs to a track of a width [samples]."""
+    gap = last - first
+    is_short = gap <= max(MAX_GAP_FRACTION * width, MAX_CUT_SAMPLES)
+    return is_short or (gap <= width and changed[first : last + 1].mean() > MIN_WORN_FRACTION)
 
 
 class TrackEnds(NamedTuple):
@@ -465,6 +547,7 @@ def find_ends(section: Section, span: tuple, free: tuple) -> TrackEnds:
         last,
         draws=section.draws[:, part],
     )
+    flanks = _reach_over_growth(section.depth[part] / section.noise[part], flanks, first, last)
     x = section.x[part]
     is_at_border = (low == 0, high == section.x.size)
     return TrackEnds(
@@ -507,6 +590,32 @@ def find_flank_ends(depth, noise, correlation: float, first: int, last: int, dra
             )
         flanks.append(flank)
     return tuple(flanks)
+
+
+def _reach_over_growth(relative, flanks: tuple, first: int, last: int) -> tuple:
+    """Lower the outer bounds of both ends to where the surface beside them begins to differ.
+
+    This is done if the surface inside the track crosses the first one, as new roughness does: what stands
+    above the first surface beside the track may then belong to it.
+
+    Parameters
+    ----------
+    relative : (n,) array
+        Depth in standard deviations.
+    flanks : tuple of FlankEnd
+        Both ends, each counted from outside.
+    first, last : int
+        Samples between which the track is known as worn.
+    """
+    smooth = median_of_five(relative)
+    if not (smooth[first : last + 1] < -MAX_UNWORN).mean() > MIN_GROWN_FRACTION:
+        return flanks
+    agrees = np.abs(smooth) <= MAX_UNWORN
+    out = []
+    for flank, outside in zip(flanks, (agrees[:first], agrees[:last:-1])):
+        runs = [end for start, end in find_runs(outside) if end - start >= MAX_CUT_SAMPLES]
+        out.append(flank._replace(low=min(flank.low, runs[-1] if runs else 0)))
+    return tuple(out)
 
 
 def _locate_end(x, flank: FlankEnd, name: str) -> Quantity:

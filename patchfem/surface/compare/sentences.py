@@ -120,9 +120,9 @@ def _describe_wear(part: Comparison, name: str) -> str:
         return f"Worn depth{name}: not available; {mean.reason}."
     if not is_significant(mean):
         return f"Worn depth{name}: no wear detected; at most {format_length(mean.high)} on average.{above}"
-    over = "over the common length"
+    over = f"over {part.mean_region}"
     if part.basis == "flanks":
-        over = "over the track, measured from its unworn flanks"
+        over += ", measured from the unworn flanks of the track"
     text = (
         f"Worn{name}: {_describe_track(part)}{format_interval(mean)} on average {over}, "
         f"{format_interval(part.worn.largest)} at the deepest place.{above}"
@@ -209,7 +209,7 @@ def _describe_sizes(sizes: dict) -> str:
 
 
 def _describe_remarks(part: Comparison) -> list:
-    """Describe edges that the ratios exclude, and a valley that only the second trace has."""
+    """Describe what the intervals of a track and the ratios leave out."""
     out = []
     width = part.tracks.sizes.get("width")
     if width is not None and width.high is not None:
@@ -221,13 +221,6 @@ def _describe_remarks(part: Comparison) -> list:
         out.append(
             "Amplitude and slope are computed without the edges of the track; their ratios are those of the track and its "
             "surroundings together, and slopes contain the noise of the instrument."
-        )
-    if part.tracks.valley is not None:
-        place, depth = part.tracks.valley
-        out.append(
-            f"A valley {format_length(depth, 3)} deep at x = {format_length(place, 4)} is only in "
-            "the second trace (after wear), "
-            "such as a scratch or a pit; the worn depths include this valley."
         )
     return out
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...core import frozen_array
 from ...formatting import format_length
-from ..profile import MAD_TO_DEVIATION, Profile, find_runs, robust_deviation
+from ..profile import MAD_TO_DEVIATION, Profile, find_runs
 from .alignment import Alignment
 from .section import Section, noise_threshold
 
@@ -18,8 +18,11 @@ N_AROUND = 101  # number of samples whose height differences give the roughness 
 N_MEDIAN = 41  # number of samples in the running median from which specks deviate
 # Largest width of a speck at half its height, in samples; wider ones are features of the surface.
 MAX_WIDTH = 12
-# Smallest jump at both edges of a speck relative to the robust deviation
-# of the jumps along the surface.
+# Quantile of the jumps between neighbouring heights that gives their deviation, and this quantile of
+# normal values of deviation 1.
+WALL_QUANTILE = 0.99
+NORMAL_WALL = 2.576
+# Smallest jump at both edges of a speck relative to the deviation of the jumps along the surface.
 MIN_WALL = 5.0
 # Smallest such ratio at heights that wear cannot explain, where smaller edges suffice.
 MIN_OUTSIDE_WALL = 1.5
@@ -53,7 +56,9 @@ def remove_specks(alignment: Alignment, before: Profile, after: Profile) -> tupl
     deviation = depth - _running_median(depth)
     # Each height may be above or below, so there are two tests per height.
     threshold = noise_threshold(2 * depth.size, 1)
-    step = robust_deviation(np.diff(first)) + 1.5 * alignment.noise
+    # The steepest hundredth of the steps counts, because walls of pits and crests are rare but no specks.
+    step = float(np.quantile(np.abs(np.diff(first)), WALL_QUANTILE)) / NORMAL_WALL
+    step += 1.5 * alignment.noise
     # A jump is roughness if most of its neighbours jump too, as on a rough floor.
     jumps = np.abs(np.diff(depth, append=depth[-1]))
     steps = np.maximum(step, MAD_TO_DEVIATION * median_filter(jumps, N_AROUND, mode="nearest"))

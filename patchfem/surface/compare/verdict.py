@@ -1,7 +1,8 @@
-"""Headline of a comparison: wear or none, and smaller waves or not, by a table of rules."""
+"""Headline of a comparison: worn depth, wear or none, and smaller waves or not, by a table of rules."""
 
 from typing import NamedTuple
 
+from ..quantity import format_interval
 from ..scans import change as scans
 from .compare import Comparison, compare_directions, compare_files
 from .sentences import (
@@ -126,7 +127,7 @@ PLACE_RULES = (
 
 
 def _find_headline(parts: list) -> str:
-    """Return the headline: surfaces exchanged or from different parts, wear, waves, gain, mirrored traces."""
+    """Return the headline: worn depth, surfaces exchanged or from different parts, wear, waves, gain, mirrored traces."""
     facts = _collect_facts(parts)
     headline = facts.change
     for condition, words in PLACE_RULES:
@@ -144,13 +145,31 @@ def _find_headline(parts: list) -> str:
         headline += (
             ", all heights by the same factor, as an error in the instrument's gain would do"
         )
-    variant = _describe_variant(parts)
-    return f"{headline}; {variant}" if variant else headline
+    depths = []
+    for part in parts:
+        depths += _state_depth(part)
+    return "; ".join([*depths, headline, *_describe_variant(parts)])
 
 
-def _describe_variant(parts: list[Comparison]) -> str:
-    """Describe what was mirrored or inverted, or return "" if nothing was."""
-    if parts[0].change is not None:
-        return scans.describe_variant(parts[0].change)
-    is_mirrored = any(part.is_mirrored for part in parts)
-    return "one trace is mirrored relative to the other" if is_mirrored else ""
+def _state_depth(part: Comparison) -> list:
+    """State the mean worn depth and its interval; an empty list if no wear is shown."""
+    change = part.change
+    if change is not None and change.volumes is not None:
+        mean = change.volumes.values["worn_depth_mean"]
+        is_worn = scans.find_headline(change) == scans.WORN_HEADLINE
+    else:
+        mean = part.worn.mean
+        is_worn = is_significant(mean)
+    if not is_worn:
+        return []
+    along = f" along {part.direction}" if part.direction and change is None else ""
+    return [f"worn depth{along} {format_interval(mean)}, mean over {part.mean_region}"]
+
+
+def _describe_variant(parts: list[Comparison]) -> list:
+    """Describe what was mirrored or inverted; an empty list if nothing was."""
+    change = parts[0].change
+    variant = "" if change is None else scans.describe_variant(change)
+    if any(part.is_mirrored for part in parts):
+        variant = "one trace is mirrored relative to the other"
+    return [variant] if variant else []

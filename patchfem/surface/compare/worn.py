@@ -25,8 +25,9 @@ from .section import (
     Section,
     find_ends,
     find_tracks,
-    find_worn_heights,
     measure_track,
+    median_of_five,
+    sample_lengths,
 )
 
 # Definitions of the quantities, as the user reads them.
@@ -42,8 +43,6 @@ END_TEXTS = ("x of the first worn place", "x of the last worn place")
 # Cut-off relative to the longest wave of the band; longer waves of the
 # depth are the form of a track.
 FORM_WAVES = 2.5
-MIN_VALLEY = 10.0  # smallest depth of a new valley below the first trace, in standard deviations
-N_BESIDE = 5  # number of samples next to a track where the running median may still show the track
 
 
 class Extent(NamedTuple):
@@ -89,25 +88,16 @@ class Worn:
     within: Quantity | None = None
 
 
-class Valley(NamedTuple):
-    """Valley that only the second trace has: position [m] and depth [m] below the first trace."""
-
-    place: float
-    depth: float
-
-
 class Tracks(NamedTuple):
     """Wear tracks of a trace.
 
     - spans: first and last sample of each track.
     - sizes: sizes of the longest track by name (`section.TEXTS`).
-    - valley: deepest valley outside of the tracks, or None.
     - others: sizes of each other track.
     """
 
     spans: tuple
     sizes: Mapping = MappingProxyType({})
-    valley: Valley | None = None
     others: tuple = ()
 
 
@@ -139,7 +129,8 @@ def measure_worn(
     left_out : float
         Area [m2] of the dips of the second trace that were left out.
     """
-    is_deposit = section.depth < -MAX_NOISE * section.noise
+    # A single height far above the first trace is an error of interpolation at a wall; those below it count too.
+    is_deposit = median_of_five(section.depth / section.noise) < -MAX_NOISE
     area, error = section.integrate(~is_deposit)
     width = section.widths
     length = float(width.sum())
@@ -210,7 +201,7 @@ def find_extent(alignment: Alignment, section: Section, tracks: Tracks) -> Exten
         limits = [Quantity(edge, edge, edge, "m", "") for edge in edges]
         ends = [edge if cut else end for end, edge, cut in zip(ends, limits, is_cut)]
     else:
-        runs = find_runs(find_worn_heights(section))
+        runs = find_runs(section.worn_heights)
         if not runs:
             return None
         whole = (0, section.x.size)
@@ -244,10 +235,9 @@ def measure_tracks(alignment: Alignment, section: Section, longest: float) -> Tr
     longest : float
         Longest wave [m] of the band; a track is wider.
     """
-    spans = tuple(find_tracks(section, find_worn_heights(section), longest))
-    valley = _find_valley(alignment, section, spans, longest)
+    spans = tuple(find_tracks(section, longest))
     if not spans:
-        return Tracks((), valley=valley)
+        return NO_TRACKS
     starts = [0, *(last + 1 for _, last in spans[:-1])]
     stops = [*(first for first, _ in spans[1:]), section.x.size]
     floor_error = limit_slight_wear(alignment, section)
@@ -256,7 +246,7 @@ def measure_tracks(alignment: Alignment, section: Section, longest: float) -> Tr
         sizes.append(_raise_upper_ends(measure_track(section, span, free), floor_error))
     widest = max(range(len(spans)), key=lambda at: sizes[at]["width"].value)
     others = tuple(_name_other(track) for at, track in enumerate(sizes) if at != widest)
-    return Tracks(spans, sizes[widest], valley, others)
+    return Tracks(spans, sizes[widest], others)
 
 
 def _raise_upper_ends(sizes: dict, floor_error: float) -> dict:
@@ -277,26 +267,6 @@ def _name_other(track: dict) -> dict:
         name: size._replace(text=size.text.replace(" the longest track", " this track"))
         for name, size in track.items()
     }
-
-
-def _find_valley(
-    alignment: Alignment, section: Section, spans: tuple, longest: float
-) -> Valley | None:
-    """Find the deepest valley outside the tracks that the first trace does not have."""
-    depth = np.array(section.depth)
-    noise = alignment.noise
-    for first, last in spans:
-        depth[max(first - N_BESIDE, 0) : last + N_BESIDE + 1] = 0.0
-    at = int(np.argmax(depth))
-    n_deep = (depth[max(at - 1, 0) : at + 2] > 2.5 * noise).sum()
-    if not depth[at] > MIN_VALLEY * noise or n_deep < 2:
-        return None
-    step = max(float(np.diff(alignment.x).mean()), 1e-300)
-    n_near = max(N_BESIDE, int(np.ceil(longest / step)))
-    floor = alignment.first[max(at - n_near, 0) : at + n_near + 1].min()
-    if not alignment.first[at] - depth[at] < floor - 3 * noise:
-        return None
-    return Valley(float(alignment.x[at]), float(depth[at]))
 
 
 def split_at_tracks(
@@ -390,11 +360,12 @@ def _split_at_cuts(x, cuts: list, reach: float, longest: float) -> list:
 
 
 def measure_flank_wear(flanks: Flanks) -> Worn:
-    """Measure the worn depth below the unworn flanks of a trace, over the width of the track."""
-    depths = (area / flanks.width for area in flanks.area)
+    """Measure the worn depth below the unworn flanks of a trace; the mean is over the whole trace."""
+    length = float(sample_lengths(flanks.x).sum())
+    depths = (area / length for area in flanks.area)
     return Worn(
         Quantity(*flanks.largest, "m", LARGEST_TEXT),
-        Quantity(*depths, "m", "mean worn depth over the track"),
+        Quantity(*depths, "m", "mean worn depth over the second trace (after wear)"),
         Quantity(*flanks.area, "m2", AREA_TEXT),
     )
 

@@ -267,7 +267,8 @@ def test_always_track_edges_do_not_count_as_roughness(count):
         assert "slopes contain the noise of the instrument" in sentences
         assert "its mean width needs traces at several places" in sentences
     assert (
-        headlines.count("worn, no change detected in the amplitude of the waves") > 0.7 * count
+        sum("; worn, no change detected in the amplitude" in text for text in headlines)
+        > 0.7 * count
     ), headlines
 
 
@@ -279,9 +280,11 @@ def test_always_walls_between_flanks_do_not_count_as_roughness(count):
             make_milled_pair(seed, waves=0.0)[0], make_milled_pair(seed + 1000, waves=0.0)[1]
         )
         assert found.basis == "flanks"
-        assert (
-            compose_verdict([found])[0] == "not comparable point by point; worn, "
-            "no change detected in the amplitude of the waves"
+        headline = compose_verdict([found])[0]
+        assert headline.startswith("worn depth ")
+        assert headline.endswith(
+            "), mean over the second trace; not comparable point by point; worn, no change detected in the "
+            "amplitude of the waves"
         )
         assert compose_verdict([found])[1][0].startswith("Worn: a track from about x = ")
 
@@ -291,27 +294,4 @@ def test_always_rougher_floor_gives_increased_waves():
     before, after, worn, _ = make_milled_pair(HELD_OUT + 210)
     rough = np.where(worn > 0, 0.5 * UM * np.sin(2 * np.pi * after.x / (85 * UM)), 0.0)
     found = compare_traces(before, Profile(after.x, frozen_array(after.z + rough), "after"))
-    assert found.tracks.spans and compose_verdict([found])[0] == "worn, waves increased"
-
-
-def test_exact_valley_in_second_trace_is_reported():
-    """A valley that is only in the second trace is reported with its place and depth."""
-    before, after, worn, _ = make_milled_pair(HELD_OUT + 220)
-    first, last = worn_range(worn)
-    index = (last + COUNT) // 2 if COUNT - last > first else first // 2
-    valley = 6 * UM * np.exp(-0.5 * ((after.x - after.x[index]) / 50e-6) ** 2)
-    assert compare_traces(before, after).tracks.valley is None
-    found = compare_traces(before, Profile(after.x, frozen_array(after.z - valley), "after"))
-    assert found.tracks.valley.place == pytest.approx(after.x[index], abs=25e-6)
-    assert found.tracks.valley.depth == pytest.approx(6 * UM, abs=0.5 * UM)
-    assert any(
-        " is only in the second trace (after wear)" in sentence
-        for sentence in compose_verdict([found])[1]
-    )
-    before_with_valley = Profile(before.x, frozen_array(before.z - valley), "before")
-    assert (
-        compare_traces(
-            before_with_valley, Profile(after.x, frozen_array(after.z - valley), "after")
-        ).tracks.valley
-        is None
-    )
+    assert found.tracks.spans and compose_verdict([found])[0].endswith("; worn, waves increased")

@@ -189,7 +189,9 @@ def test_always_area_of_groove_between_flanks(depth, roughness, max_rms_error, c
         covers.append(found.worn.area.low <= area <= found.worn.area.high)
         errors.append(found.worn.area.value / area - 1)
         assert found.worn.largest.low <= depth <= found.worn.largest.high
-        assert found.worn.mean.value == pytest.approx(found.worn.area.value / found.flanks.width)
+        assert found.worn.mean.value == pytest.approx(
+            found.worn.area.value / (after.length + after.step)
+        )
     assert sum(covers) >= 0.8 * count and np.sqrt(np.mean(np.square(errors))) < max_rms_error
 
 

@@ -48,6 +48,17 @@ def test_exact_shallow_track_is_measured(seed):
     assert found.worn.mean.value == pytest.approx(10e-9, abs=1e-9) and found.hidden.value is None
 
 
+@pytest.mark.share(0, 3, 5)
+@pytest.mark.parametrize("deviations", [0.6, 1.0, 1.5, 2.2, 3.0, 4.0, 5.0, 8.0])
+def test_always_track_of_few_deviations_is_worn(deviations):
+    """Tracks of 0.6 to 8 standard deviations of the depth noise are worn, and their mean depth holds."""
+    depth = deviations * np.sqrt(2) * NOISE
+    found = compare_traces(*make_track_pair(2200, depth))
+    headline, sentences = compose_verdict([found])
+    assert headline.startswith("worn depth ") and "no wear detected" not in " ".join(sentences)
+    assert found.worn.mean.low < depth / 3 < found.worn.mean.high
+
+
 @pytest.mark.parametrize("count", [2, pytest.param(20, marks=pytest.mark.slow)])
 def test_always_depth_above_detection_limit_is_detected(count):
     """A track of 1.5 times the stated detection limit is detected in at least 19 of 20 pairs.
