@@ -176,14 +176,12 @@ def _find_stick_stiffness(model: Model, patches: Sequence) -> StickStiffness | N
         value = 1 / (1 / measure.value + holder_compliance)
         return StickStiffness(value, measure.error * (value / measure.value) ** 2, 0.0)
 
-    values = [
-        _sum_nodal_forces(patch, 1.0, length / model.friction.static)
-        for patch in solved[:3]
-        if patch.pressure.load > 0
-    ]
+    touching = [patch for patch in solved[:3] if patch.pressure.load > 0]
+    bond_length = length / model.friction.static
+    values = [_sum_nodal_forces(patch, 1.0, bond_length) for patch in touching]
     changes = np.abs(np.diff(values))
     error = float(convergence_error(*changes)) if changes.size else 0.0
-    return StickStiffness(values[0], error, length / model.friction.static)
+    return StickStiffness(values[0], error, bond_length)
 
 
 def _sum_nodal_forces(patch, factor: float, bond_length: float) -> float:
