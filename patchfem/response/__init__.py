@@ -122,6 +122,7 @@ PUBLIC = {
         "select_strongest",
     ),
     "rows": (
+        "INTERNAL_VALUES",
         "LastCycles",
         "ROWS_NEEDING_RUN",
         "TABLE",

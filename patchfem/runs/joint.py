@@ -228,7 +228,7 @@ def _match_compliance(patch, stiffness: float, bond_length: float) -> np.ndarray
     """Return the tangential compliance (m, m) [m/N] of a patch with a given stiffness [N/m] in full stick.
 
     Nodes at the edges of a contact have soft bonds, and strips do not share their edges; the whole compliance of
-    such patches is scaled.
+    such patches is scaled. It is returned unchanged if the bonds alone determine the stiffness.
     """
     if patch.strips is None and not bond_length:
         return add_edge_springs(patch.slip_compliance, patch.pressure.sigma_n > 0, stiffness)
@@ -237,6 +237,8 @@ def _match_compliance(patch, stiffness: float, bond_length: float) -> np.ndarray
         """Return the relative excess of the stiffness for a scaled compliance."""
         return _sum_nodal_forces(patch, np.exp(log_factor), bond_length) / stiffness - 1
 
+    if not excess(-MAX_LOG_FACTOR) > 0 > excess(MAX_LOG_FACTOR):
+        return patch.slip_compliance
     factor = np.exp(brentq(excess, -MAX_LOG_FACTOR, MAX_LOG_FACTOR, xtol=1e-14))
     return frozen_array(factor * patch.slip_compliance)
 

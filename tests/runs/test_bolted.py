@@ -128,6 +128,22 @@ def test_exact_comparison_runs_stick_at_the_measured_frequency():
         assert np.sqrt(square) == pytest.approx(2 * np.pi * 14300.0, rel=1e-9)
 
 
+@pytest.mark.parametrize("bond_length", ["1 um", "1 m"])
+def test_exact_bonds_behind_elastic_pieces_stick_at_the_measured_frequency(bond_length):
+    """Bonds in series with elastic pieces stick at the measured frequency, also if the pieces are rigid beside them."""
+    text = SHEARED.replace("coulomb", "elastic-plastic") + f'bond_length = "{bond_length}"\n'
+    measured = pf.build(text + MODES % (STUCK, 14300.0, 1.0, 1.0) + DRIVE.replace("143", "9000"))
+    model, patches, stiffer = joint.solve_without_joint(measured)
+    for free, patch in (
+        (model, patches[0]),
+        (model, patches[1]),
+        (stiffer.model, stiffer.patches[0]),
+    ):
+        stiffness = joint.compute_full_stick_stiffness(free, patch)
+        square = free.rig.modes.omega[0] ** 2 + stiffness / 0.884
+        assert np.sqrt(square) == pytest.approx(2 * np.pi * 14300.0, rel=1e-9)
+
+
 @pytest.mark.parametrize(
     "text, message",
     [
