@@ -11,6 +11,7 @@ this stiffness, in the modes and in the patch, so that this error enters the err
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -78,10 +79,7 @@ def solve_patch(model: Model) -> tuple:
 
     The patch of a bolted joint is solved once for the plan, the run and all cases of a study.
     """
-
-    def solve() -> tuple:
-        return patch_result.solve_with_coarser(model.patch, model.accuracy.tolerance)
-
+    solve = partial(patch_result.solve_with_coarser, model.patch, model.accuracy.tolerance)
     if not model.has_bolted_patch:
         return solve()
     return store.get_or_compute(("bolted patch", model.patch, model.accuracy.tolerance), solve)
