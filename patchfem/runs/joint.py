@@ -113,7 +113,7 @@ def remove_joint(model: Model, patches: Sequence) -> FreeRig:
         def subtract(n_errors: float) -> FreeRig:
             """Subtract the joint with a stiffness that is larger by a number of its errors."""
             own_patches = _match_stiffness(patches, own, n_errors)
-            written_patch, *_ = _match_stiffness(written_patches, taken_off, n_errors)
+            (written_patch,) = _match_stiffness(written_patches[:1], taken_off, n_errors)
             stiffness = compute_full_stick_stiffness(written, written_patch)
             rig = bolted.build_rig(stiffness)
             removed = bolted._replace(

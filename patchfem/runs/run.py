@@ -243,18 +243,24 @@ def _wear_patch(inputs: RunInputs, state_file: StateFile | None):
 
 def _make_worn_inputs(inputs: RunInputs, worn_patch) -> RunInputs:
     """Return the inputs of a run with worn surfaces."""
-    run_plan = inputs.plan
-    if worn_patch.state is not None:
-        worn_model = evolve.make_worn_model(
-            run_plan.model, worn_patch.patch, worn_patch.state.depth
-        )
-        run_plan = replace(run_plan, model=worn_model)
+
+    def wear_model(model: Model) -> Model:
+        """Return a model after wear; unchanged if the last state of the wear is not known."""
+        if worn_patch.state is None:
+            return model
+        return evolve.make_worn_model(model, worn_patch.patch, worn_patch.state.depth)
+
+    stiffer = inputs.stiffer
+    if stiffer is not None:
+        # The comparison run differs only in the joint that was subtracted from its modes.
+        stiffer = stiffer._replace(model=wear_model(stiffer.model), patches=[worn_patch.patch])
     return replace(
         inputs,
-        plan=run_plan,
+        plan=replace(inputs.plan, model=wear_model(inputs.plan.model)),
         patch=worn_patch.patch,
         coarse=tuple(worn_patch.coarse),
         progress=None,
+        stiffer=stiffer,
     )
 
 

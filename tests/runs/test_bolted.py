@@ -144,6 +144,19 @@ def test_exact_bonds_behind_elastic_pieces_stick_at_the_measured_frequency(bond_
         assert np.sqrt(square) == pytest.approx(2 * np.pi * 14300.0, rel=1e-9)
 
 
+def test_joint_error_of_a_worn_patch_does_not_contain_its_wear():
+    """The comparison run with a stiffer joint has the worn patch, so that the change by wear is no error."""
+    contact = (
+        SHEARED.replace("12.7 mm", "18 mm").replace("6.35 mm", "5 mm").replace("26 lbf", "240 N")
+    )
+    contact = contact.replace('element_size = "0.5 mm"\n', "").replace('"1 m"', '"60 m"')
+    text = contact + MODES % (STUCK, 880.0, 0.12, 0.12)
+    text += DRIVE.replace("143", "860").replace("5 g", "40 g")
+    wear = '[wear]\ncoefficient = "%s 1/Pa"\ncycles = 1e6\n'
+    unworn, worn = (pf.run(text + wear % k).measures["loop_area"] for k in ("1e-18", "3e-14"))
+    assert worn.error < 0.1 * abs(worn.value - unworn.value)
+
+
 @pytest.mark.parametrize(
     "text, message",
     [
