@@ -1,9 +1,9 @@
 """Many cases of one mode and one contact point in a compiled loop.
 
 A step moves the mode exactly under a parabola of the drive and a friction force that is constant or linear
-in time, with the mean of the law (`return_maps_kernels`); errors are of order 2 to 3. A Coulomb point stops, reverses or is released inside a step: the
-step is halved up to LEVELS times, and the event is then located by linear interpolation. A motion that repeats is not
-computed again.
+in time, with the mean of the law (`return_maps_kernels`); errors are of order 2 to 3. A step in which the velocity
+changes its sign, or a rigid point is released, is halved up to LEVELS times, because a law takes the net increment as
+its path; events of a rigid point are then located by linear interpolation. A motion that repeats is not computed again.
 """
 
 from math import cos, inf, nan, sin
@@ -19,7 +19,7 @@ LEVELS = 4  # halvings of a step that contains an event
 TICKS = 1 << LEVELS  # shortest steps in a step
 TAYLOR_TERMS = 12  # of the exponential of a shortest step, whose product with any rate is below 0.1
 MAX_ITERATIONS = 60  # Newton steps and bisections for the increment of a step
-RESIDUAL = 1e-13  # residual of a step relative to its increments
+RESIDUAL = 1e-11  # residual of a step relative to its increments
 SAME_CYCLE = 1e-8  # change between two cycles relative to the range of the motion, below which it repeats
 MAX_BEND = 0.5  # relative change of the second difference of the acceleration, above which it has a corner
 N_READ = 2  # measured cycles of a motion that repeats
@@ -84,19 +84,24 @@ def solve_step(free, response, h, case, now, numbers, memory, j):
     load = case[Number.LOAD]
     start = now[Now.VELOCITY]
     follows_path = numbers[0, j] != Law.TANH and numbers[0, j] != Law.LUGRE
-    dq = free[0] - beta * now[Now.MEAN]
-    end = free[1] - gamma * now[Now.MEAN]
+    # The mean force is extrapolated from that of the last step and the force at its end.
+    force = 2 * now[Now.FORCE] - now[Now.MEAN]
+    dq = free[0] - beta * force
+    end = free[1] - gamma * force
     low = -inf
     high = inf
-    force = 0.0
     change = 0.0
     for _ in range(MAX_ITERATIONS):
         mean = mean_force(numbers, memory, j, load, Step(dq, h, start, end, gamma))
         force = mean.force
         time_mean = force
         change = mean.end - now[Now.FORCE] if numbers[0, j] != Law.LUGRE else 0.0
-        if follows_path and start * end > 0:
-            time_mean += change / dq * h * (start - end) / 12
+        if follows_path and dq != 0 and start != end:
+            bend = h / 12 * (start - end)
+            if start * end < 0:
+                # The part of the path that is not retraced, as the secant loses its meaning at a reversal.
+                bend *= abs((start + end) / (start - end))
+            time_mean += change / dq * bend
         residual = dq - free[0] + beta * time_mean + tilt * change
         if abs(residual) <= RESIDUAL * (abs(free[0]) + abs(dq)):
             break
@@ -183,6 +188,9 @@ def try_step(waves, h, response, is_shortest, case, now, numbers, memory, j):
     else:
         prepare(numbers, memory, j, Step(0.0, h, v, v, 0.0))
         dq, end, force = solve_step((free, free_velocity), response, h, case, now, numbers, memory, j)
+        if v * end < 0 and not is_shortest:
+            # A law takes the net increment of a reversal inside the step as its path.
+            return False
     if is_rigid and memory[0, j] * end < 0:
         if is_shortest:
             hold = (drive * waves[2] - case[Number.STIFFNESS] * (q + dq)) / mobility

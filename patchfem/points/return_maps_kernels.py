@@ -85,7 +85,10 @@ class Step(NamedTuple):
 
 
 class MeanForce(NamedTuple):
-    """Path-mean force [N], its derivatives by increment [N/m] and end velocity [N s/m], and the force at the end [N]."""
+    """Path-mean force [N], its derivatives by increment [N/m] and end velocity [N s/m], and the force at the end [N].
+
+    For a step that is long for the law the force at the end is that at the start, as if it did not change.
+    """
 
     force: float
     by_increment: float
@@ -202,7 +205,7 @@ def _mean_tanh(limit, speed, step):
     if abs(change) > 1e-9 * speed:
         by_x = 1 / (x * x) - decay / ((1 - decay) * (1 - decay))
         tangent += limit * (last - first) * by_x * step.mobility * (slope - secant) / change
-    return MeanForce(limit * (first + theta * (last - first)), 0.0, tangent, limit * last)
+    return MeanForce(limit * (first + theta * (last - first)), 0.0, tangent, limit * first)
 
 
 @njit(**NJIT_KERNEL)
