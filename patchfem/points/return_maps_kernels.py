@@ -32,7 +32,16 @@ from math import exp, inf, sin, tanh
 from typing import NamedTuple
 
 from ..compiled.jit import njit
-from ..friction.bonds.point_kernels import bond_mean, bond_step, grow, press_point, shape_functions
+from ..friction.bonds.point_kernels import (
+    MAX_SHORT_PATH,
+    bond_mean,
+    bond_step,
+    grow,
+    press_point,
+    shape_functions,
+    short_bond_mean,
+    short_bond_step,
+)
 from ..friction.flags_kernels import NJIT_KERNEL
 
 SMALL_RATE = 1e-4  # rate times step below which series replace exponentials
@@ -390,6 +399,9 @@ def _walk(numbers, memory, j, dq, commits):
 def prepare(numbers, memory, j, step):
     """Set the bond length in the middle of a step from the velocity at its start (Strang splitting)."""
     if numbers[0, j] == Law.BONDS:
+        memory[4, j] = memory[0, j]
+        if numbers[3, j] < 0:
+            return
         half = 0.5 * step.duration
         v = step.start_velocity
         memory[4, j] = grow(memory[0, j], v, v, abs(v) * half, half, numbers[3:9, j])[0]
@@ -414,9 +426,10 @@ def advance(numbers, memory, j, load, step):
         memory[1, j] = bonds.m
         memory[2, j] = bonds.z
         memory[3, j] = bonds.s2
-        v0 = step.start_velocity
-        v1 = step.end_velocity
-        memory[0, j] = grow(memory[0, j], v0, v1, abs(dq), step.duration, numbers[3:9, j])[0]
+        if numbers[3, j] >= 0:
+            v0 = step.start_velocity
+            v1 = step.end_velocity
+            memory[0, j] = grow(memory[0, j], v0, v1, abs(dq), step.duration, numbers[3:9, j])[0]
     elif law == Law.TANH:
         memory[0, j] = numbers[1, j] * load * tanh(step.end_velocity / numbers[2, j])
     elif law == Law.LUGRE:
@@ -483,6 +496,32 @@ def press(numbers, memory, j, before, after):
         )
     elif law == Law.TANH:
         memory[0, j] *= after / before if before > 0 else 0.0
+
+
+@njit(**NJIT_KERNEL)
+def write_bond_means(numbers, memory, loads, slides, forces, slopes):
+    """Write mean forces (m,) and slopes of points with bonds, in a loop that vectorises; return False for long slides."""
+    for j in range(slides.size):
+        if abs(slides[j]) > MAX_SHORT_PATH * memory[4, j]:
+            return False
+    for j in range(slides.size):
+        mean, slope = short_bond_mean(memory[1, j], memory[2, j], slides[j], loads[j], memory[4, j])
+        stiffness = numbers[1, j] / numbers[2, j]
+        forces[j] = stiffness * mean
+        slopes[j] = stiffness * slope
+    return True
+
+
+@njit(**NJIT_KERNEL)
+def advance_bonds(memory, loads, slides):
+    """Advance points with bonds of constant length after short slides (m,)."""
+    for j in range(slides.size):
+        bonds = short_bond_step(
+            memory[1, j], memory[2, j], memory[3, j], slides[j], loads[j], memory[4, j]
+        )
+        memory[1, j] = bonds.m
+        memory[2, j] = bonds.z
+        memory[3, j] = bonds.s2
 
 
 @njit(**NJIT_KERNEL)
