@@ -1,6 +1,7 @@
 """March of a rig with contact points over the cycles of its drive, and the record of its motion."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import expm
@@ -23,11 +24,32 @@ from .march_rows import (
     Total,
 )
 
-LEVELS = 5  # lengths of the steps: whole steps and four halvings
+LEVELS = 8  # lengths of the steps: whole steps and seven halvings
 SAME_CYCLE = 1e-11  # change of the state between two cycles, relative to its size, below which they repeat
 N_KEPT = 128  # samples per cycle of the histories before the window
 REPEATED = [Total.WORK_IN, Total.POWER, Total.VISCOUS, Total.FRICTION]  # sums that a repeated cycle continues
 MAX_UNSOLVED = 0  # steps without convergence of a run that is used
+
+
+class Snapshot(NamedTuple):
+    """State of the interface at an instant.
+
+    - time [s], slide [m], rate [m/s], force [N], slip [m] of the first port; heave [m] and pitch [rad]
+    - memory (l, m), load (m,), shear (r,): of the points and pieces
+    - nodal (k,): forces of the nodes [N]
+    """
+
+    time: float
+    slide: float
+    rate: float
+    force: float
+    slip: float
+    heave: float
+    pitch: float
+    memory: np.ndarray
+    load: np.ndarray
+    shear: np.ndarray
+    nodal: np.ndarray
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -42,7 +64,7 @@ class Motion:
     - ledger: energies [J] and counters by name
     - outcome, message: how the run ended, None and "" at its last step
     - cycles_done: number of cycles
-    - snapshots: memory of the points in the last cycle
+    - snapshots: states at the ends of equal parts of the last cycle
     - state: arrays of the engine at the end
     """
 
@@ -128,6 +150,9 @@ def make_system(modes: ModalBasis, contact: Contact, step: float, travel: float,
     )
     sets = _make_no_sets() if contact.sets is None else contact.sets.make_arrays()
     system = System(structure, ports, points, sets, state, np.zeros(len(Total)))
+    # Energy that is released at the start counts as work of the drive.
+    energy = 0.5 * modes.mass * float(state[0, n:] @ state[0, n:] + (modes.omega * state[0, :n]) @ (modes.omega * state[0, :n]))
+    system.totals[[Total.WORK_IN, Total.POWER, Total.STORED]] = energy
     if contact.sets is not None:
         _press_first(system, contact)
     return system
@@ -195,7 +220,7 @@ def sample_drive(drive, step: float, first: int, count: int) -> np.ndarray:
 
 def march(
     modes: ModalBasis, drive, contact: Contact, cycles: float, steps_per_cycle: int, *,
-    window: int = 10, travel: float = np.inf, start=None, repeats: bool = True,
+    window: int = 10, travel: float = np.inf, start=None, frames: int = 0, repeats: bool = True,
 ) -> Motion:  # fmt: skip
     """March a rig over the cycles of its drive.
 
@@ -211,6 +236,8 @@ def march(
     travel : float
         Largest output [m].
     start : core.InitialState, optional
+    frames : int
+        Number of snapshots in the last cycle.
     repeats : bool
         Whether a periodic motion is not computed again.
     """
@@ -226,17 +253,23 @@ def march(
     done = 0
     status = DONE
     chunks: list = []
+    snapshots: list = []
     last_state = None
     last_totals = system.totals.copy()
     can_repeat = repeats and not drive.segments == () and hasattr(drive, "omega") and contact.load is None
     while done < n_steps and status == DONE:
         count = (n_steps - done) % steps_per_cycle or steps_per_cycle
+        is_last = done + count == n_steps
         samples = np.zeros((count + 1, width))
         structure = system.structure._replace(drive=sample_drive(drive, step, done, count + 1))
         if contact.load is not None:
             structure = structure._replace(loads=contact.load(step * (done + np.arange(count + 1.0))))
         stride = 1 if done + count > n_steps - n_window else max(1, steps_per_cycle // N_KEPT)
-        n_done, status = kernels.march(system._replace(structure=structure), count, stride, samples)
+        system = system._replace(structure=structure)
+        if frames and is_last:
+            n_done, status = _march_frames(kernels, system, done, samples, frames, snapshots)
+        else:
+            n_done, status = kernels.march(system, count, stride, samples)
         chunks.append((done, samples[: n_done + 1]))
         done += n_done
         state = np.concatenate([system.state[0], system.points.memory.ravel(), system.points.shear[0]])
@@ -250,10 +283,48 @@ def march(
                 system.totals[REPEATED] += n_left * (system.totals - last_totals)[REPEATED]
         last_state = state
         last_totals = system.totals.copy()
-    return _make_motion(modes, drive, contact, system, chunks, (status, done, n_window, steps_per_cycle, step))
+    return _make_motion(
+        modes, drive, contact, system, chunks, snapshots, (status, done, n_window, steps_per_cycle, step)
+    )
 
 
-def _make_motion(modes, drive, contact, system, chunks, run) -> Motion:
+def _march_frames(kernels, system: System, done: int, samples, frames: int, snapshots: list) -> tuple[int, int]:
+    """March in parts, with a snapshot after each; return the number of steps done and the status."""
+    structure = system.structure
+    count = len(samples) - 1
+    ends = np.linspace(0, count, min(frames, count) + 1).round().astype(int)
+    size = system.state.shape[1]
+    for first, last in zip(ends[:-1], ends[1:]):
+        part = structure._replace(drive=structure.drive[first:])
+        if structure.loads.size:
+            part = part._replace(loads=structure.loads[first:])
+        n_done, status = kernels.march(
+            system._replace(structure=part), last - first, 1, samples[first : last + 1]
+        )
+        row = samples[first + n_done]
+        ports = row[size + Sample.PORTS :]
+        points = system.points
+        snapshots.append(
+            Snapshot(
+                (done + first + n_done) * structure.numbers[1],
+                float(system.ports.rows[0] @ row[: size // 2]),
+                float(system.ports.rows[0] @ row[size // 2 : size]),
+                ports[0],
+                ports[1],
+                row[size + Sample.HEAVE],
+                row[size + Sample.PITCH],
+                points.memory.copy(),
+                points.values[Point.END_LOAD, : points.port.size].copy(),
+                points.shear[0].copy(),
+                points.values[Point.NODE_FORCE].copy(),
+            )
+        )
+        if status != DONE:
+            return first + n_done, status
+    return count, DONE
+
+
+def _make_motion(modes, drive, contact, system, chunks, snapshots, run) -> Motion:
     """Return the record of a finished march."""
     status, done, n_window, steps, step = run
     extremes, phasors, kept, numbers, works = [], [], [], [], []
@@ -292,7 +363,7 @@ def _make_motion(modes, drive, contact, system, chunks, run) -> Motion:
         outcome,
         message,
         done / steps,
-        [],
+        snapshots,
         system,
     )
 

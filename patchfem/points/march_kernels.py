@@ -497,6 +497,12 @@ def commit(system, h):
         if values[Point.START_LOAD, j] != values[Point.END_LOAD, j]:
             press(points.numbers, points.trial, j, values[Point.LOAD, j], values[Point.END_LOAD, j])
             values[Point.START_LOAD, j] = values[Point.END_LOAD, j]
+    for j in range(count):
+        p = points.port[j]
+        if points.numbers[0, j] == Law.COULOMB:
+            # A port that was at rest before stays at its place.
+            was_held = points.memory[0, j] == 0 and points.trial[0, j] == 0
+            ports.values[Port.FREE, p] = ports.values[Port.INCREMENT, p] if was_held else 0.0
     for k in range(points.memory.shape[0]):
         for j in range(count):
             points.memory[k, j] = points.trial[k, j]
@@ -516,30 +522,38 @@ def commit(system, h):
 
 @njit(**NJIT_KERNEL)
 def rest_ports(system):
-    """Bring the ports of rigid points at rest to rest, by the smallest change of the velocities."""
+    """Bring the ports of rigid points at rest back to their places and to rest, by the smallest change of the modes.
+
+    A constant force over the step only makes their velocity vanish at its end. `Port.FREE` has their displacements.
+    """
     ports = system.ports
     points = system.points
     state = system.state[0]
     n = state.size // 2
     n_ports = ports.rows.shape[0]
     is_held = False
-    for p in range(n_ports):
-        ports.matrix[p, :] = 0.0
-        ports.matrix[p, p] = 1.0
-        ports.vector[p] = 0.0
     for j in range(points.port.size):
-        if find_rest_limit(points.numbers, points.memory, j, 1.0) < np.inf:
-            p = points.port[j]
-            is_held = True
-            ports.vector[p] = project(ports.rows[p], state[n:])
-            for k in range(n_ports):
-                ports.matrix[p, k] = ports.grip[p, k]
+        is_held = is_held or find_rest_limit(points.numbers, points.memory, j, 1.0) < np.inf
     if not is_held:
         return
-    solve_linear(ports.matrix, ports.vector, n_ports)
-    for p in range(n_ports):
-        for i in range(n):
-            state[n + i] -= ports.rows[p, i] * ports.vector[p] / system.structure.numbers[0]
+    for first in (0, n):
+        for p in range(n_ports):
+            ports.matrix[p, :] = 0.0
+            ports.matrix[p, p] = 1.0
+            ports.vector[p] = 0.0
+        for j in range(points.port.size):
+            if find_rest_limit(points.numbers, points.memory, j, 1.0) < np.inf:
+                p = points.port[j]
+                ports.vector[p] = ports.values[Port.FREE, p]
+                if first > 0:
+                    ports.vector[p] = project(ports.rows[p], state[n:])
+                for k in range(n_ports):
+                    ports.matrix[p, k] = ports.grip[p, k]
+        solve_linear(ports.matrix, ports.vector, n_ports)
+        for p in range(n_ports):
+            for i in range(n):
+                change = ports.rows[p, i] * ports.vector[p] / system.structure.numbers[0]
+                state[first + i] -= change
 
 
 @njit(**NJIT_KERNEL)
@@ -572,18 +586,21 @@ def try_step(system, level, row, fraction, drive):
         return False
     if not is_solved:
         system.totals[Total.UNSOLVED] += 1
-    add_energies(system, h, drive)
+    for i in range(system.state.shape[1]):
+        system.state[1, i] = system.state[0, i]
     commit(system, h)
+    add_energies(system, h, drive)
     return True
 
 
 @njit(**NJIT_KERNEL)
 def add_energies(system, h, drive):
-    """Add the energies of a step; integrals of the velocities by Simpson's rule."""
+    """Add the energies of a step from the state before it, in `state[1]`; integrals of velocities by Simpson's rule."""
     structure = system.structure
     totals = system.totals
-    state = system.state
-    n = state.shape[1] // 2
+    before = system.state[1]
+    after = system.state[0]
+    n = after.size // 2
     mass = structure.numbers[0]
     middle_drive = drive[0] + 0.5 * h * (drive[1] + 0.25 * h * drive[2])
     end_drive = drive[0] + h * (drive[1] + 0.5 * h * drive[2])
@@ -591,16 +608,16 @@ def add_energies(system, h, drive):
     loss = 0.0
     stored = 0.0
     for i in range(n):
-        start = state[0, n + i]
-        end = state[2, n + i]
-        middle = 1.5 * (state[2, i] - state[0, i]) / h - 0.25 * (start + end)
+        start = before[n + i]
+        end = after[n + i]
+        middle = 1.5 * (after[i] - before[i]) / h - 0.25 * (start + end)
         work -= structure.modes[1, i] * (drive[0] * start + 4 * middle_drive * middle + end_drive * end)
         for k in range(n):
             if structure.damping[i, k] != 0.0:
-                other = 1.5 * (state[2, k] - state[0, k]) / h - 0.25 * (state[0, n + k] + state[2, n + k])
-                squares = start * state[0, n + k] + 4 * middle * other + end * state[2, n + k]
+                other = 1.5 * (after[k] - before[k]) / h - 0.25 * (before[n + k] + after[n + k])
+                squares = start * before[n + k] + 4 * middle * other + end * after[n + k]
                 loss += structure.damping[i, k] * squares
-        stored += end * end + structure.modes[0, i] * state[2, i] * state[2, i]
+        stored += end * end + structure.modes[0, i] * after[i] * after[i]
     work *= mass * h / 6
     totals[Total.WORK_IN] += work
     totals[Total.POWER] += abs(work)
@@ -633,7 +650,8 @@ def write_sample(system, drive, sample):
         energy += state.energy
         force = state.force
         if find_rest_limit(points.numbers, points.memory, j, 1.0) < np.inf:
-            force = ports.values[Port.HOLD, p]
+            limit = find_rest_limit(points.numbers, points.memory, j, load)
+            force = min(max(ports.values[Port.HOLD, p], -limit), limit)
         if points.is_spring[j]:
             continue
         slide = ports.values[Port.SLIDE, p]
@@ -728,9 +746,11 @@ def march(system, steps, stride, samples):
                 if not points.is_spring[j]:
                     p = points.port[j]
                     force = points.values[Point.FORCE, j]
+                    slide = ports.values[Port.INCREMENT, p]
                     if points.numbers[0, j] == Law.COULOMB:
                         force = ports.values[Port.FORCE, p]
-                    work += force * ports.values[Port.INCREMENT, p]
+                        slide -= ports.values[Port.FREE, p]
+                    work += force * slide
                     samples[i, first_column + N_PORT_COLUMNS * p] += force * part / ticks
             tick += part
             if level > 0 and tick % (2 * part) == 0:

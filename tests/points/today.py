@@ -4,6 +4,7 @@ The contact models of `dynamics.march` are converted to `points.contacts`; the e
 """
 
 from contextlib import contextmanager
+from dataclasses import replace
 
 import numpy as np
 
@@ -96,6 +97,22 @@ def convert_varying(model) -> Contact:
     )  # fmt: skip
 
 
+def convert_snapshot(one, model) -> dict:
+    """Return a snapshot in the form of today's march."""
+    memory = one.memory
+    out = {"time": one.time, "slide": one.slide, "rate": one.rate, "force": one.force, "slip": one.slip}
+    if not isinstance(model, VaryingLoadModel):
+        stretch = memory[0] * 0
+        return out | {"stretch": stretch, "b": one.shear, "bonds": np.stack([memory[1], memory[2], memory[3], stretch, stretch])}
+    # Elastic-plastic points have the rows force and springs, bonds m, z and s2.
+    rows = memory[[0, 1, 1]] if model.law.kind == LawKind.PLASTIC else memory[1:4]
+    nodal = one.nodal if model.sets is not None else one.load
+    bend = 0.0 if model.shear is None else one.shear @ np.array(model.shear.shape.T)
+    if not model.has_point_loads:
+        rows, bend = np.zeros((3, nodal.size)), 0.0
+    return out | {"heave": one.heave, "turn": one.pitch, "nodal": nodal, "b": one.shear, "memory": rows, "bend": bend}
+
+
 @contextmanager
 def marched_by_points():
     """Replace today's march by `points.march` as long as the context is open."""
@@ -106,8 +123,10 @@ def marched_by_points():
             start=None, marks=(), **options):  # fmt: skip
         contact = convert(model, modes)
         count.append(steps)
-        return march.march(modes, drive, contact, cycles, steps, window=max(window, 2) if window < 2 else window,
-                           travel=travel, start=start)  # fmt: skip
+        done = march.march(
+            modes, drive, contact, cycles, steps, window=window, travel=travel, start=start, frames=frames
+        )
+        return replace(done, snapshots=[convert_snapshot(one, model) for one in done.snapshots])
 
     engine.march, engine.warm_up = run, lambda *arguments: None
     try:
