@@ -68,6 +68,8 @@ TUPLE_MODULES = (
     "dynamics/smooth/arrays.py",
     "dynamics/events/modal_system.py",
     "dynamics/events/elements.py",
+    "points/case_rows.py",
+    "points/march_rows.py",
 )
 # State of the environment variable that makes numba run all kernels as Python.
 IS_JIT_DISABLED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")

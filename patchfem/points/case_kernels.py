@@ -20,8 +20,12 @@ TICKS = 1 << LEVELS  # shortest steps in a step
 TAYLOR_TERMS = 12  # of the exponential of a shortest step, whose product with any rate is below 0.1
 MAX_ITERATIONS = 60  # Newton steps and bisections for the increment of a step
 RESIDUAL = 1e-11  # residual of a step relative to its increments
-SAME_CYCLE = 1e-8  # change between two cycles relative to the range of the motion, below which it repeats
-MAX_BEND = 0.5  # relative change of the second difference of the acceleration, above which it has a corner
+SAME_CYCLE = (
+    1e-8  # change between two cycles relative to the range of the motion, below which it repeats
+)
+MAX_BEND = (
+    0.5  # relative change of the second difference of the acceleration, above which it has a corner
+)
 N_READ = 2  # measured cycles of a motion that repeats
 
 
@@ -167,7 +171,9 @@ def try_step(waves, h, response, is_shortest, case, now, numbers, memory, j):
     row = response[0]
     free = row[0] * q + row[1] * v + row[2] * constant + row[3] * slope + row[4] * curvature - q
     row = response[1]
-    free_velocity = row[0] * q + row[1] * v + row[2] * constant + row[3] * slope + row[4] * curvature
+    free_velocity = (
+        row[0] * q + row[1] * v + row[2] * constant + row[3] * slope + row[4] * curvature
+    )
     is_rigid = numbers[0, j] == Law.COULOMB
     mobility = case[Number.MOBILITY]
     load = case[Number.LOAD]
@@ -187,7 +193,9 @@ def try_step(waves, h, response, is_shortest, case, now, numbers, memory, j):
         end = free_velocity - response[1, 2] * mobility * force
     else:
         prepare(numbers, memory, j, Step(0.0, h, v, v, 0.0))
-        dq, end, force = solve_step((free, free_velocity), response, h, case, now, numbers, memory, j)
+        dq, end, force = solve_step(
+            (free, free_velocity), response, h, case, now, numbers, memory, j
+        )
         if v * end < 0 and not is_shortest:
             # A law takes the net increment of a reversal inside the step as its path.
             return False
@@ -446,13 +454,17 @@ def march_cases(steps, waves, parameters, numbers, memory, nows, seens, historie
         omega = case[Number.OMEGA]
         n_cycles = int(case[Number.CYCLES])
         first = n_cycles - int(case[Number.WINDOW])
-        write_responses(case[Number.DAMPING], case[Number.STIFFNESS], 2 * np.pi / omega / steps, table)
+        write_responses(
+            case[Number.DAMPING], case[Number.STIFFNESS], 2 * np.pi / omega / steps, table
+        )
         now[Now.SLIDE] = case[Number.SLIDE]
         now[Now.VELOCITY] = case[Number.VELOCITY]
         if numbers[0, j] == Law.COULOMB and now[Now.VELOCITY] != 0:
             memory[0, j] = 1.0 if now[Now.VELOCITY] > 0 else -1.0
         find_force(0.0, case, now, numbers, memory, j)
-        now[Now.STORED] = 0.5 * (now[Now.VELOCITY] ** 2 + case[Number.STIFFNESS] * now[Now.SLIDE] ** 2)
+        now[Now.STORED] = 0.5 * (
+            now[Now.VELOCITY] ** 2 + case[Number.STIFFNESS] * now[Now.SLIDE] ** 2
+        )
         cycle = 0
         while cycle < n_cycles:
             observes = cycle >= first

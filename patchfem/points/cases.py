@@ -16,15 +16,21 @@ from .laws import PointLaw
 from .return_maps_kernels import Law
 
 STEPS = (64, 128, 256, 512, 1024)  # steps per cycle
-SAFETY = 3 / (2**1.5 - 1)  # error / change from half of the steps: grid convergence index of orders 1 to 2
-FLOOR_FRACTION = 0.01  # fraction of the tolerance that two runs do not show, such as an event that both place alike
+SAFETY = 3.0  # error / change from half of the steps: grid convergence index 3/(2 - 1) of order 1
+# Fraction of the tolerance that two runs do not show, because both place a reversal or a corner of the law alike
+FLOOR_FRACTION = 0.1
 # Error in steps of measures that are resolved only to a sample
-SAMPLE_ERRORS = {"stick_fraction": 0.5, "slip_start_phase": 2 * np.pi, "slip_amplitude": 0.0}
+SAMPLE_ERRORS = {"stick_fraction": 0.5, "slip_start_phase": 2 * np.pi}
 FULL_STICK = 1e-12  # fraction of the time below which slip is round-off
 MIN_ALIGNMENT = 0.95  # resultant of the phases of slip starts below which they have no common phase
 MIN_ACCELERATION = 1e-9  # first harmonic [m s-2] below which it has no distortion
 PHASE = "slip_start_phase"
-MAIN = ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area", "friction_force_peak")
+MAIN = (
+    "relative_displacement_amplitude",
+    "absolute_acceleration_peak",
+    "loop_area",
+    "friction_force_peak",
+)
 
 
 class CaseRuns(NamedTuple):
@@ -106,12 +112,13 @@ def run_cases(cases: Cases, tolerance: float, steps=STEPS) -> CaseRuns:
     n = len(cases.parameters)
     left = np.arange(n)
     coarse = _march(cases, steps[0] // 2)
+    coarser = _march(cases, steps[0] // 4).values
     used = np.zeros(n, int)
     results: dict = {}
     for count in steps:
         part = cases.select(left)
         fine = _march(part, count)
-        errors = estimate_errors(fine.values, coarse.values, count, tolerance)
+        errors = estimate_errors((fine.values, coarse.values, coarser), count, tolerance)
         is_met = np.ones(left.size, bool)
         size = fine.values["friction_force_peak"] * fine.values["relative_displacement_amplitude"]
         for name in MAIN:
@@ -120,14 +127,19 @@ def run_cases(cases: Cases, tolerance: float, steps=STEPS) -> CaseRuns:
             with np.errstate(invalid="ignore"):
                 is_met &= errors[name] <= tolerance * larger
         rows = {f"value {name}": value for name, value in fine.values.items()}
-        rows |= {f"error {name}": error for name, error in errors.items()} | {"history": fine.history}
+        rows |= {f"error {name}": error for name, error in errors.items()} | {
+            "history": fine.history
+        }
         for name, row in rows.items():
             results.setdefault(name, np.full((n, *row.shape[1:]), np.nan))[left] = row
         used[left] = count
         left = left[~is_met]
         if not left.size:
             break
-        coarse = _March({name: value[~is_met] for name, value in fine.values.items()}, fine.history[:0])
+        coarser = {name: value[~is_met] for name, value in coarse.values.items()}
+        coarse = _March(
+            {name: value[~is_met] for name, value in fine.values.items()}, fine.history[:0]
+        )
     output = cases.parameters[:, Number.OUTPUT, None, None]
     extremes = np.sort(results["history"][..., :2] * output, axis=-1)
     phasors = (results["history"][..., 2] - 1j * results["history"][..., 3]) * output[..., 0]
@@ -141,14 +153,28 @@ def run_cases(cases: Cases, tolerance: float, steps=STEPS) -> CaseRuns:
     )
 
 
-def estimate_errors(values: dict, coarse: dict, steps: int, tolerance: float) -> dict:
-    """Return the errors (c,) of measures by name, from those `coarse` with half of the steps per cycle."""
+def estimate_errors(runs, steps: int, tolerance: float) -> dict:
+    """Return the errors (c,) of measures by name.
+
+    Parameters
+    ----------
+    runs : sequence of dict
+        Measures (c,) by name with `steps` steps per cycle, with half and with a quarter of them. The last change counts
+        as at least a quarter of the one before, so that a change that is small by accident gives no small error.
+    steps : int
+    tolerance : float
+        Relative tolerance.
+    """
+    values = runs[0]
     errors = {}
     for name, value in values.items():
-        change = value - coarse[name]
+        changes = np.array([value - runs[1][name], runs[1][name] - runs[2][name]])
         if name == PHASE:
-            change = (change + np.pi / 2) % np.pi - np.pi / 2
-        errors[name] = SAFETY * np.abs(change) + FLOOR_FRACTION * tolerance * np.abs(value)
+            changes = (changes + np.pi / 2) % np.pi - np.pi / 2
+        change = np.fmax(np.abs(changes[0]), np.abs(changes[1]) / 4)
+        # A measure that only one of the two finest runs has shows an event that the other missed.
+        change = np.where(np.isnan(changes[0]), np.nan, change)
+        errors[name] = SAFETY * change + FLOOR_FRACTION * tolerance * np.abs(value)
         errors[name] += SAMPLE_ERRORS.get(name, 0.0) / steps
     # These measures are errors themselves.
     for name in ("energy_balance", "work_check"):
@@ -159,7 +185,9 @@ def estimate_errors(values: dict, coarse: dict, steps: int, tolerance: float) ->
 def _march(cases: Cases, steps: int) -> _March:
     """Run cases with a number of steps per cycle, and compute their measures."""
     n = len(cases.parameters)
-    phase = np.pi / steps * np.concatenate([np.arange(2 * steps + 1), np.arange(2 * TICKS + 1) / TICKS])
+    phase = (
+        np.pi / steps * np.concatenate([np.arange(2 * steps + 1), np.arange(2 * TICKS + 1) / TICKS])
+    )
     now = np.zeros((n, len(Now)))
     seen = np.zeros((n, len(Seen)))
     history = np.zeros((n, int(cases.parameters[:, Number.CYCLES].max(initial=0)), 4))
@@ -212,7 +240,9 @@ def _compute_energies(cases: Cases, now, mass) -> dict:
     """Return the energies [J] of the whole run and the relative error of their balance."""
     columns = cases.parameters.T
     stored = 0.5 * (now[:, Now.VELOCITY] ** 2 + columns[Number.STIFFNESS] * now[:, Now.SLIDE] ** 2)
-    first = 0.5 * (columns[Number.VELOCITY] ** 2 + columns[Number.STIFFNESS] * columns[Number.SLIDE] ** 2)
+    first = 0.5 * (
+        columns[Number.VELOCITY] ** 2 + columns[Number.STIFFNESS] * columns[Number.SLIDE] ** 2
+    )
     gap = now[:, Now.WORK_IN] + first - stored - now[:, Now.VISCOUS] - now[:, Now.FRICTION]
     size = now[:, Now.POWER] + now[:, Now.STORED]
     elastic = _stored_in_law(cases, now)
@@ -258,7 +288,7 @@ def _compute_harmonics(cases: Cases, now, seen, area, slide_range) -> dict:
     slide, velocity, first = derivatives(1, Seen.COS_1, Seen.SIN_1)
     third = derivatives(3, Seen.COS_3, Seen.SIN_3)[2]
     force = -1j * drive * columns[Number.DRIVE] - first
-    force = (force - columns[Number.DAMPING] * velocity - columns[Number.STIFFNESS] * slide)
+    force = force - columns[Number.DAMPING] * velocity - columns[Number.STIFFNESS] * slide
     force = force / columns[Number.MOBILITY]
     ratio = columns[Number.OUTPUT]
     fundamental = np.abs(ratio * first - 1j * drive * columns[Number.BASE]) * 2 / span
@@ -275,5 +305,7 @@ def _compute_harmonics(cases: Cases, now, seen, area, slide_range) -> dict:
         ),
         "equivalent_stiffness": np.where(moves, (force / slide).real, np.nan),
         "equivalent_damping": np.where(is_known, damping, np.nan),
-        "secant_stiffness": np.where(moves & (n_secants > 0), seen[:, Seen.SECANT] / n_secants, np.nan),
+        "secant_stiffness": np.where(
+            moves & (n_secants > 0), seen[:, Seen.SECANT] / n_secants, np.nan
+        ),
     }

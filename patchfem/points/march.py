@@ -1,6 +1,7 @@
 """March of a rig with contact points over the cycles of its drive, and the record of its motion."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -25,9 +26,16 @@ from .march_rows import (
 )
 
 LEVELS = 8  # lengths of the steps: whole steps and seven halvings
-SAME_CYCLE = 1e-11  # change of the state between two cycles, relative to its size, below which they repeat
+SAME_CYCLE = (
+    1e-11  # change of the state between two cycles, relative to its size, below which they repeat
+)
 N_KEPT = 128  # samples per cycle of the histories before the window
-REPEATED = [Total.WORK_IN, Total.POWER, Total.VISCOUS, Total.FRICTION]  # sums that a repeated cycle continues
+REPEATED = [
+    Total.WORK_IN,
+    Total.POWER,
+    Total.VISCOUS,
+    Total.FRICTION,
+]  # sums that a repeated cycle continues
 MAX_UNSOLVED = 0  # steps without convergence of a run that is used
 
 
@@ -100,7 +108,9 @@ def make_responses(modes: ModalBasis, step: float) -> np.ndarray:
     return np.array([expm(matrix * (step / 2**level))[: 2 * n] for level in range(LEVELS)])
 
 
-def make_system(modes: ModalBasis, contact: Contact, step: float, travel: float, start=None) -> System:
+def make_system(
+    modes: ModalBasis, contact: Contact, step: float, travel: float, start=None
+) -> System:
     """Return the arrays of a rig at the start of a march, without its drive.
 
     Parameters
@@ -151,7 +161,8 @@ def make_system(modes: ModalBasis, contact: Contact, step: float, travel: float,
     sets = _make_no_sets() if contact.sets is None else contact.sets.make_arrays()
     system = System(structure, ports, points, sets, state, np.zeros(len(Total)))
     # Energy that is released at the start counts as work of the drive.
-    energy = 0.5 * modes.mass * float(state[0, n:] @ state[0, n:] + (modes.omega * state[0, :n]) @ (modes.omega * state[0, :n]))
+    squares = state[0, n:] @ state[0, n:] + np.sum((modes.omega * state[0, :n]) ** 2)
+    energy = 0.5 * modes.mass * float(squares)
     system.totals[[Total.WORK_IN, Total.POWER, Total.STORED]] = energy
     if contact.sets is not None:
         _press_first(system, contact)
@@ -165,7 +176,9 @@ def _make_points(contact: Contact, n_nodes: int) -> Points:
     shapes = np.zeros((sum(one.stiffness.size for one in contact.point_sets), len(laws)))
     column = row = 0
     for one, count in zip(contact.point_sets, counts):
-        shapes[row : row + one.stiffness.size, column : column + count] = one.shapes.reshape(-1, count)
+        shapes[row : row + one.stiffness.size, column : column + count] = one.shapes.reshape(
+            -1, count
+        )
         row, column = row + one.stiffness.size, column + count
     size = max([N_MEMORY, *(law.memory.size for law in laws)])
     memory = np.zeros((size, len(laws)))
@@ -176,7 +189,10 @@ def _make_points(contact: Contact, n_nodes: int) -> Points:
         memory[: law.memory.size, j] = law.memory
         values[[Point.START_LOAD, Point.LOAD, Point.END_LOAD], j] = law.load
     varies = contact.sets is not None or contact.load is not None
-    nodes = [np.full(n, RESULTANT) if one.nodes is None else one.nodes for one, n in zip(contact.point_sets, counts)]
+    nodes = [
+        np.full(n, RESULTANT) if one.nodes is None else one.nodes
+        for one, n in zip(contact.point_sets, counts)
+    ]
     share = [law.load / contact.preload if varies else law.load for law in laws]
     return Points(
         np.repeat(np.arange(len(counts)), counts),
@@ -196,7 +212,9 @@ def _make_points(contact: Contact, n_nodes: int) -> Points:
 def _make_no_sets():
     """Return contact sets of a point that is not used."""
     point = np.zeros(1)
-    return make_set_arrays(np.ones((1, 1)), point, point, (1.0, 0.0, 0.0, 1.0, 1.0), np.zeros(1, bool), n_slots=1)
+    return make_set_arrays(
+        np.ones((1, 1)), point, point, (1.0, 0.0, 0.0, 1.0, 1.0), np.zeros(1, bool), n_slots=1
+    )
 
 
 def _press_first(system: System, contact: Contact) -> None:
@@ -204,7 +222,9 @@ def _press_first(system: System, contact: Contact) -> None:
     press = compiled.load("contact.press_kernels")
     name = hash_set(system.sets, contact.sets.reference.in_contact)
     n = system.state.shape[1] // 2
-    heave, pitch = (float(np.dot(row, system.state[0, :n])) for row in (contact.heave, contact.pitch))
+    heave, pitch = (
+        float(np.dot(row, system.state[0, :n])) for row in (contact.heave, contact.pitch)
+    )
     slot = press.find_set(system.sets, press.build_first_set(system.sets, name), -heave, pitch)
     system.totals[Total.SLOT] = slot
 
@@ -256,14 +276,18 @@ def march(
     snapshots: list = []
     last_state = None
     last_totals = system.totals.copy()
-    can_repeat = repeats and not drive.segments == () and hasattr(drive, "omega") and contact.load is None
+    can_repeat = (
+        repeats and not drive.segments == () and hasattr(drive, "omega") and contact.load is None
+    )
     while done < n_steps and status == DONE:
         count = (n_steps - done) % steps_per_cycle or steps_per_cycle
         is_last = done + count == n_steps
         samples = np.zeros((count + 1, width))
         structure = system.structure._replace(drive=sample_drive(drive, step, done, count + 1))
         if contact.load is not None:
-            structure = structure._replace(loads=contact.load(step * (done + np.arange(count + 1.0))))
+            structure = structure._replace(
+                loads=contact.load(step * (done + np.arange(count + 1.0)))
+            )
         stride = 1 if done + count > n_steps - n_window else max(1, steps_per_cycle // N_KEPT)
         system = system._replace(structure=structure)
         if frames and is_last:
@@ -272,10 +296,19 @@ def march(
             n_done, status = kernels.march(system, count, stride, samples)
         chunks.append((done, samples[: n_done + 1]))
         done += n_done
-        state = np.concatenate([system.state[0], system.points.memory.ravel(), system.points.shear[0]])
+        state = np.concatenate(
+            [system.state[0], system.points.memory.ravel(), system.points.shear[0]]
+        )
         n_left = (n_steps - n_window - done) // steps_per_cycle
         if can_repeat and n_left > 0 and last_state is not None and state.size == last_state.size:
-            size = np.abs(np.concatenate([samples[:, : system.state.shape[1]].max(axis=0), state[system.state.shape[1] :]]))
+            size = np.abs(
+                np.concatenate(
+                    [
+                        samples[:, : system.state.shape[1]].max(axis=0),
+                        state[system.state.shape[1] :],
+                    ]
+                )
+            )
             if (np.abs(state - last_state) <= SAME_CYCLE * size).all():
                 first, samples = chunks[-1]
                 chunks += [(first + k * steps_per_cycle, samples) for k in range(1, n_left + 1)]
@@ -284,17 +317,25 @@ def march(
         last_state = state
         last_totals = system.totals.copy()
     return _make_motion(
-        modes, drive, contact, system, chunks, snapshots, (status, done, n_window, steps_per_cycle, step)
+        modes,
+        drive,
+        contact,
+        system,
+        chunks,
+        snapshots,
+        (status, done, n_window, steps_per_cycle, step),
     )
 
 
-def _march_frames(kernels, system: System, done: int, samples, frames: int, snapshots: list) -> tuple[int, int]:
+def _march_frames(
+    kernels, system: System, done: int, samples, frames: int, snapshots: list
+) -> tuple[int, int]:
     """March in parts, with a snapshot after each; return the number of steps done and the status."""
     structure = system.structure
     count = len(samples) - 1
     ends = np.linspace(0, count, min(frames, count) + 1).round().astype(int)
     size = system.state.shape[1]
-    for first, last in zip(ends[:-1], ends[1:]):
+    for first, last in pairwise(ends):
         part = structure._replace(drive=structure.drive[first:])
         if structure.loads.size:
             part = part._replace(loads=structure.loads[first:])
@@ -338,7 +379,9 @@ def _make_motion(modes, drive, contact, system, chunks, snapshots, run) -> Motio
         output = samples[:, : modes.omega.size] @ modes.output
         wave = np.exp(-2j * np.pi * time / drive.period)
         phasors.append(2 / drive.period * np.trapezoid(output * wave, dx=step))
-        picked = np.arange(0, len(samples) - 1, 1 if first + len(samples) - 1 > first_window else stride)
+        picked = np.arange(
+            0, len(samples) - 1, 1 if first + len(samples) - 1 > first_window else stride
+        )
         kept.append(samples[picked])
         sums = friction + np.append(0.0, np.cumsum(samples[:-1, size + Sample.WORK]))
         friction = sums[-1]
@@ -373,12 +416,21 @@ def _judge(system: System, status: int, done: int) -> tuple[Outcome | None, str]
     if status == EXCEEDS_TRAVEL:
         return Outcome.EXCEEDS_TRAVEL, ""
     if status == NO_CONTACT_SET:
-        return Outcome.NOT_CONVERGED, f"at step {done} no set of points in contact was found; raise accuracy.steps_per_cycle"
+        return (
+            Outcome.NOT_CONVERGED,
+            f"at step {done} no set of points in contact was found; raise accuracy.steps_per_cycle",
+        )
     if status != DONE:
-        return Outcome.NOT_CONVERGED, f"at step {done} the motion is not a finite number; raise accuracy.steps_per_cycle"
+        return (
+            Outcome.NOT_CONVERGED,
+            f"at step {done} the motion is not a finite number; raise accuracy.steps_per_cycle",
+        )
     unsolved = int(system.totals[Total.UNSOLVED])
     if unsolved > MAX_UNSOLVED:
-        return Outcome.NOT_CONVERGED, f"{unsolved} of {done} time steps did not converge; raise accuracy.steps_per_cycle"
+        return (
+            Outcome.NOT_CONVERGED,
+            f"{unsolved} of {done} time steps did not converge; raise accuracy.steps_per_cycle",
+        )
     return None, ""
 
 
@@ -389,7 +441,9 @@ def _make_ledger(modes: ModalBasis, system: System, last) -> dict:
     z, v = last[:n], last[n : 2 * n]
     interface = last[2 * n + Sample.ENERGY] + last[2 * n + Sample.CONTACT_ENERGY]
     friction = float(totals[Total.FRICTION])
-    stored = 0.5 * modes.mass * float(v @ v + (modes.omega * z) @ (modes.omega * z)) + float(interface)
+    stored = 0.5 * modes.mass * float(v @ v + (modes.omega * z) @ (modes.omega * z)) + float(
+        interface
+    )
     lost = friction - float(last[2 * n + Sample.ENERGY])
     return {
         "work_in": float(totals[Total.WORK_IN]), "viscous": float(totals[Total.VISCOUS]),
@@ -419,14 +473,16 @@ def find_extremes(samples, modes: ModalBasis, step: float) -> tuple[float, float
 def make_response(modes: ModalBasis, drive, contact: Contact, rows, time, work) -> Response:
     """Return samples as histories.
 
-    `work` (k,) is the friction work [J] up to each sample. Slides, slide rates, forces and slips of several interfaces are columns in `extra`, which also has the load, moment,
-    energy, heave and pitch of a contact that moves.
+    `work` (k,) is the friction work [J] up to each sample. Slides, slide rates, forces and slips of several interfaces
+    are columns in `extra`, which also has the load, moment, energy, heave and pitch of a contact that moves.
     """
     n = modes.omega.size
     z, rate = rows[:, :n], rows[:, n : 2 * n]
     first = 2 * n + Sample.PORTS
     n_ports = len(contact.point_sets)
-    columns = rows[:, first : first + N_PORT_COLUMNS * n_ports].reshape(len(rows), n_ports, N_PORT_COLUMNS)
+    columns = rows[:, first : first + N_PORT_COLUMNS * n_ports].reshape(
+        len(rows), n_ports, N_PORT_COLUMNS
+    )
     port_rows = np.array([one.row for one in contact.point_sets])
     forces = columns[..., 0]
     push = drive.values(time)
@@ -438,7 +494,9 @@ def make_response(modes: ModalBasis, drive, contact: Contact, rows, time, work) 
         names = ("normal_load", "normal_moment", "normal_energy", "heave", "turn")
         extra = dict(zip(names, rows[:, 2 * n + Sample.LOAD : 2 * n + Sample.PORTS].T))
     if contact.sets is not None:
-        press = np.stack([extra["normal_load"] - contact.sets.load, extra["normal_moment"] - contact.sets.moment])
+        press = np.stack(
+            [extra["normal_load"] - contact.sets.load, extra["normal_moment"] - contact.sets.moment]
+        )
         # Less load accelerates the holder towards the contact.
         acceleration += press.T @ np.array([contact.heave, contact.pitch]) / modes.mass
     energy = rows[:, 2 * n + Sample.ENERGY]

@@ -38,7 +38,9 @@ MAX_ITERATIONS = 80  # Newton iterations of a step
 MAX_LOADS = 40  # repetitions of a step for the loads that follow from its motion
 RESIDUAL = 1e-11  # residual of forces relative to the largest one
 LOAD_RESIDUAL = 1e-10  # change of the loads relative to the resultant
-SHEAR_DAMPING = 0.25  # weight of the change of a shear increment, which damps oscillations of the pieces
+SHEAR_DAMPING = (
+    0.25  # weight of the change of a shear increment, which damps oscillations of the pieces
+)
 DONE = 0
 EXCEEDS_TRAVEL = 1
 NOT_FINITE = 2
@@ -116,7 +118,9 @@ def prepare_points(system, h):
         values[Point.LOAD, j] = 0.5 * (values[Point.START_LOAD, j] + values[Point.END_LOAD, j])
     for j in range(points.port.size):
         if values[Point.START_LOAD, j] != values[Point.END_LOAD, j]:
-            press(points.numbers, points.trial, j, values[Point.START_LOAD, j], values[Point.LOAD, j])
+            press(
+                points.numbers, points.trial, j, values[Point.START_LOAD, j], values[Point.LOAD, j]
+            )
         v = system.ports.values[Port.VELOCITY, points.port[j]]
         prepare(points.numbers, points.trial, j, Step(0.0, h, v, v, 0.0))
 
@@ -228,7 +232,9 @@ def add_contact(system, level):
     increments = ports.values[Port.INCREMENT]
     slides = ports.values[Port.SLIDE]
     slot = int(system.totals[Total.SLOT])
-    path_mean(system.sets, slot, slides[heave], slides[pitch], increments[heave], increments[pitch], out)
+    path_mean(
+        system.sets, slot, slides[heave], slides[pitch], increments[heave], increments[pitch], out
+    )
     for i in range(2):
         p = heave if i == 0 else pitch
         ports.vector[p] += out[i]
@@ -333,7 +339,9 @@ def find_loads(system, row, fraction):
         if slot < 0:
             return -1.0
         press_state(system.sets, slot, -h, t, values[Point.NODE_FORCE, : system.sets.x.size])
-        resultant = max(system.sets.reference[REFERENCE_LOAD] - compute_energy(system.sets, slot, h, t)[1], 0.0)
+        resultant = max(
+            system.sets.reference[REFERENCE_LOAD] - compute_energy(system.sets, slot, h, t)[1], 0.0
+        )
     else:
         resultant = loads[row] + fraction * (loads[row + 1] - loads[row])
     change = 0.0
@@ -460,7 +468,9 @@ def find_event(system, drive, is_shortest):
     if holds_needed:
         find_holds(system, system.state[2], drive)
         for j in range(points.port.size):
-            limit = find_rest_limit(points.numbers, points.memory, j, points.values[Point.END_LOAD, j])
+            limit = find_rest_limit(
+                points.numbers, points.memory, j, points.values[Point.END_LOAD, j]
+            )
             hold = ports.values[Port.HOLD, points.port[j]]
             if limit < np.inf and abs(hold) > limit:
                 found = True
@@ -480,7 +490,9 @@ def commit(system, h):
     has_bonds = has_bonds and points.numbers[3, 0] < 0
     if has_bonds:
         for j in range(count):
-            has_bonds = has_bonds and abs(values[Point.SLIDE, j]) <= MAX_SHORT_PATH * points.trial[4, j]
+            has_bonds = (
+                has_bonds and abs(values[Point.SLIDE, j]) <= MAX_SHORT_PATH * points.trial[4, j]
+            )
     if has_bonds:
         advance_bonds(points.trial, values[Point.LOAD, :count], values[Point.SLIDE, :count])
     for j in range(count):
@@ -558,11 +570,10 @@ def rest_ports(system):
 
 @njit(**NJIT_KERNEL)
 def try_step(system, level, row, fraction, drive):
-    """Advance by a step of a level; return False if it contains an event, -1 as status in SLOT without a set.
+    """Advance by a step of a level; return False if it contains an event; without a contact set SLOT becomes -1.
 
     `row` and `fraction` are the time at the end of the step in whole steps; `drive` is its parabola at the start.
     """
-    ports = system.ports
     points = system.points
     levels = system.structure.responses.shape[0]
     h = system.structure.numbers[1] / (1 << level)
@@ -611,7 +622,9 @@ def add_energies(system, h, drive):
         start = before[n + i]
         end = after[n + i]
         middle = 1.5 * (after[i] - before[i]) / h - 0.25 * (start + end)
-        work -= structure.modes[1, i] * (drive[0] * start + 4 * middle_drive * middle + end_drive * end)
+        work -= structure.modes[1, i] * (
+            drive[0] * start + 4 * middle_drive * middle + end_drive * end
+        )
         for k in range(n):
             if structure.damping[i, k] != 0.0:
                 other = 1.5 * (after[k] - before[k]) / h - 0.25 * (before[n + k] + after[n + k])

@@ -9,7 +9,10 @@ from ..contact.set_arrays import SetArrays
 
 
 class Point(IntEnum):
-    """Rows of `Points.values`: load at start, middle and end of a step [N], slide, mean force and its slopes, nodal force."""
+    """Rows of `Points.values`.
+
+    Load at start, middle and end of a step [N], slide, mean force and its slopes, forces of the nodes.
+    """
 
     START_LOAD = 0
     LOAD = 1
@@ -89,7 +92,7 @@ class Points(NamedTuple):
     - node (m,): node whose force is the load of the point; -1 for a fraction `share` of the resultant
     - share (m,): fraction of the resultant, or the load [N] where it is constant
     - numbers (k, m), memory, trial (l, m): see `return_maps_kernels`
-    - values (8, m): see `Point`
+    - values (8, m or number of nodes): see `Point`
     - shapes (r, m), stiffness (r,): slide of the points per coordinate, and stiffness [N/m] of the coordinates
     - shear (3, r): coordinates, their last increment per time, and trial increment
     - is_spring (m,): whether the point is a spring, whose work is not friction

@@ -46,7 +46,9 @@ from ..friction.flags_kernels import NJIT_KERNEL
 
 SMALL_RATE = 1e-4  # rate times step below which series replace exponentials
 LIMIT_FRACTION = 1e-9  # smallest Stribeck limit relative to the static one, because z divides by it
-PIECE = 0.25  # longest piece of a path in relaxation lengths that the Bouc-Wen law integrates at once
+PIECE = (
+    0.25  # longest piece of a path in relaxation lengths that the Bouc-Wen law integrates at once
+)
 MAX_PIECES = 400  # pieces of a path; z has saturated long before
 SATURATED = 1e-14  # distance of |z| from 1 below which the Bouc-Wen law slips freely
 DIFFERENCE = 1e-6  # relative increment of the numerical tangent of the LuGre law
@@ -467,7 +469,9 @@ def read(numbers, memory, j, load):
     if law == Law.TANH:
         return PointState(state, 0.0, 0.0)
     if law == Law.MASING:
-        return PointState(memory[Masing.FORCE, j], memory[Masing.ENERGY, j], memory[Masing.STRETCH, j])
+        return PointState(
+            memory[Masing.FORCE, j], memory[Masing.ENERGY, j], memory[Masing.STRETCH, j]
+        )
     if law == Law.BOUC_WEN:
         stretch = numbers[2, j] * state
         return PointState(mu * load * state, 0.5 * mu * load * state * stretch, stretch)

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from patchfem.core import Outcome
+from patchfem.dynamics.interfaces.arrays import PointRow
 from patchfem.dynamics.march import march as engine
 from patchfem.dynamics.march.joints import JointsModel
 from patchfem.dynamics.march.varying_load import LawKind, VaryingLoadModel
@@ -30,9 +30,6 @@ def convert_sheared(model, row) -> PointSet:
     """Return the points of a sheared contact of bonds of order 1."""
     count = model.reduction.points.size
     weight = model.fields["weight"][:count]
-    load, density = model.fields["points"][-1, :count], None
-    from patchfem.dynamics.interfaces.arrays import PointRow
-
     load = model.fields["points"][PointRow.LOAD, :count]
     density = model.fields["points"][PointRow.DENSITY, :count]
     force = weight * load * model.length
@@ -75,7 +72,9 @@ def convert_single(model, row) -> PointSet:
 def convert_varying(model) -> Contact:
     """Return the contact of a VaryingLoadModel."""
     law = model.law
-    force = np.array([model.preload]) if model.sets is None else model.sets.reference.forces(0.0, 0.0)
+    force = (
+        np.array([model.preload]) if model.sets is None else model.sets.reference.forces(0.0, 0.0)
+    )
     nodes = None if model.sets is None else np.arange(force.size)
     if law.kind == LawKind.COULOMB:
         points, nodes = [laws.make_coulomb(law.static, law.force[1], model.preload)], None
@@ -90,7 +89,10 @@ def convert_varying(model) -> Contact:
         raise NotImplementedError("lists")
     shear = {}
     if model.shear is not None:
-        shear = {"shapes": np.array(model.shear.shape.T), "stiffness": np.asarray(model.shear.stiffness, float)}
+        shear = {
+            "shapes": np.array(model.shear.shape.T),
+            "stiffness": np.asarray(model.shear.stiffness, float),
+        }
     return Contact(
         [PointSet(points, model.rows[0], nodes, **shear)], model.sets, model.rows[1], model.rows[2], model.load,
         model.preload,
@@ -100,17 +102,31 @@ def convert_varying(model) -> Contact:
 def convert_snapshot(one, model) -> dict:
     """Return a snapshot in the form of today's march."""
     memory = one.memory
-    out = {"time": one.time, "slide": one.slide, "rate": one.rate, "force": one.force, "slip": one.slip}
+    out = {
+        "time": one.time,
+        "slide": one.slide,
+        "rate": one.rate,
+        "force": one.force,
+        "slip": one.slip,
+    }
     if not isinstance(model, VaryingLoadModel):
         stretch = memory[0] * 0
-        return out | {"stretch": stretch, "b": one.shear, "bonds": np.stack([memory[1], memory[2], memory[3], stretch, stretch])}
+        bonds = np.stack([memory[1], memory[2], memory[3], stretch, stretch])
+        return out | {"stretch": stretch, "b": one.shear, "bonds": bonds}
     # Elastic-plastic points have the rows force and springs, bonds m, z and s2.
     rows = memory[[0, 1, 1]] if model.law.kind == LawKind.PLASTIC else memory[1:4]
     nodal = one.nodal if model.sets is not None else one.load
     bend = 0.0 if model.shear is None else one.shear @ np.array(model.shear.shape.T)
     if not model.has_point_loads:
         rows, bend = np.zeros((3, nodal.size)), 0.0
-    return out | {"heave": one.heave, "turn": one.pitch, "nodal": nodal, "b": one.shear, "memory": rows, "bend": bend}
+    return out | {
+        "heave": one.heave,
+        "turn": one.pitch,
+        "nodal": nodal,
+        "b": one.shear,
+        "memory": rows,
+        "bend": bend,
+    }
 
 
 @contextmanager
@@ -124,7 +140,15 @@ def marched_by_points():
         contact = convert(model, modes)
         count.append(steps)
         done = march.march(
-            modes, drive, contact, cycles, steps, window=window, travel=travel, start=start, frames=frames
+            modes,
+            drive,
+            contact,
+            cycles,
+            steps,
+            window=window,
+            travel=travel,
+            start=start,
+            frames=frames,
         )
         return replace(done, snapshots=[convert_snapshot(one, model) for one in done.snapshots])
 
@@ -133,6 +157,3 @@ def marched_by_points():
         yield count
     finally:
         engine.march, engine.warm_up = old
-
-
-__all__ = ["Outcome", "convert", "marched_by_points"]

@@ -148,7 +148,9 @@ class Quadrature:
         dq = np.atleast_1d(np.asarray(dq, float))
         after = self.advance(state, dq, s0, s1, dt)
         # Bonds that were lost have no pressure any more, so that all of a point act, or none.
-        after = replace(after, pressure=_active_pressure(after), first_active=0 * after.first_active)
+        after = replace(
+            after, pressure=_active_pressure(after), first_active=0 * after.first_active
+        )
         stored = self.stored_energy(state)
         energy_gain = self.stored_energy(after) - stored
         if not dq.any():
