@@ -50,7 +50,7 @@ class CaseRuns(NamedTuple):
     missed: np.ndarray
 
 
-class _March(NamedTuple):
+class CaseMarch(NamedTuple):
     """Values by name, and history (c, n, 4) of the cycles of some cases."""
 
     values: dict
@@ -111,13 +111,13 @@ def run_cases(cases: Cases, tolerance: float, steps=STEPS) -> CaseRuns:
     """
     n = len(cases.parameters)
     left = np.arange(n)
-    coarse = _march(cases, steps[0] // 2)
-    coarser = _march(cases, steps[0] // 4).values
+    coarse = march_with(cases, steps[0] // 2)
+    coarser = march_with(cases, steps[0] // 4).values
     used = np.zeros(n, int)
     results: dict = {}
     for count in steps:
         part = cases.select(left)
-        fine = _march(part, count)
+        fine = march_with(part, count)
         errors = estimate_errors((fine.values, coarse.values, coarser), count, tolerance)
         is_met = np.ones(left.size, bool)
         size = fine.values["friction_force_peak"] * fine.values["relative_displacement_amplitude"]
@@ -137,7 +137,7 @@ def run_cases(cases: Cases, tolerance: float, steps=STEPS) -> CaseRuns:
         if not left.size:
             break
         coarser = {name: value[~is_met] for name, value in coarse.values.items()}
-        coarse = _March(
+        coarse = CaseMarch(
             {name: value[~is_met] for name, value in fine.values.items()}, fine.history[:0]
         )
     output = cases.parameters[:, Number.OUTPUT, None, None]
@@ -182,7 +182,7 @@ def estimate_errors(runs, steps: int, tolerance: float) -> dict:
     return errors
 
 
-def _march(cases: Cases, steps: int) -> _March:
+def march_with(cases: Cases, steps: int) -> CaseMarch:
     """Run cases with a number of steps per cycle, and compute their measures."""
     n = len(cases.parameters)
     phase = (
@@ -196,7 +196,7 @@ def _march(cases: Cases, steps: int) -> _March:
         cases.memory.copy(), now, seen, history, np.zeros((LEVELS + 1, 2, 5)),
     )  # fmt: skip
     with np.errstate(all="ignore"):
-        return _March(compute_measures(cases, now, seen, history), history)
+        return CaseMarch(compute_measures(cases, now, seen, history), history)
 
 
 def compute_measures(cases: Cases, now, seen, history) -> dict:

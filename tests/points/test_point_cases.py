@@ -28,7 +28,7 @@ def make(law, drive=DRIVE, cycles=200):
 def test_coulomb_block_at_resonance():
     """Amplitude, stick fraction and energies of the two-stop motion with 64 steps per cycle."""
     law = laws.make_coulomb(1.0, 1.0, LIMIT)
-    values = cases._march(make(law), 64).values
+    values = cases.march_with(make(law), 64).values
     amplitude = values["relative_displacement_amplitude"][0] * OMEGA**2 / DRIVE.acceleration
     assert amplitude == pytest.approx(EXACT_AMPLITUDE, rel=3e-5)
     assert values["stick_fraction"][0] == pytest.approx(EXACT_STICK, abs=2e-3)
@@ -63,8 +63,8 @@ def test_errors_hold_and_steps_converge(name):
     drives = [SineDrive(LIMIT * ratio, 0.9 * OMEGA) for ratio in np.linspace(0.9, 3.0, 20)]
     batch = cases.stack_cases([make(make_laws()[name], drive, 60) for drive in drives])
     run = cases.run_cases(batch, 1e-3)
-    truth = cases._march(batch, 4096).values
-    rough = cases._march(batch, 32).values
+    truth = cases.march_with(batch, 4096).values
+    rough = cases.march_with(batch, 32).values
     for measure in ("relative_displacement_amplitude", "loop_area"):
         error = np.abs(run.values[measure] - truth[measure])
         assert np.mean(error <= run.errors[measure]) >= 0.85
@@ -77,7 +77,7 @@ def test_cases_agree_with_the_march_of_points():
     law = make_laws()["elastic-plastic"]
     contact = Contact([PointSet([law], np.ones(1))])
     motion = march.march(MODES, DRIVE, contact, 60, 800)
-    values = cases._march(make(law, cycles=60), 512).values
+    values = cases.march_with(make(law, cycles=60), 512).values
     low, high = motion.extremes[-1]
     # Both are the last of 60 cycles; the window of the cases has six.
     window = motion.extremes[-6:]
