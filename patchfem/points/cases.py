@@ -16,7 +16,7 @@ from .laws import PointLaw
 from .return_maps_kernels import Law
 
 STEPS = (64, 128, 256, 512, 1024)  # steps per cycle
-SAFETY = 1.64  # error / change from half of the steps: grid convergence index 3/(2**1.5 - 1) between orders 1 and 2
+SAFETY = 3.0  # error / change from half of the steps: grid convergence index 3/(2 - 1) of order 1
 # Fraction of the tolerance that two runs do not show, because both place a reversal or a corner of the law alike
 FLOOR_FRACTION = 0.1
 # Error in steps of measures that are resolved only to a sample
