@@ -255,14 +255,17 @@ def _format_cell(row: dict, column: Column) -> str:
 
 
 def _draw_films(folder: Path) -> list[dict]:
-    """Return the figure of the stress in both pieces, if the folder has the fields."""
+    """Return the figure of the stress in both pieces with a slider over the frames, if the folder has the fields."""
     path = folder / store.FIELDS
     if not path.is_file():
         return []
-    from .fields.film import stress_panel
+    from .fields.film import stress_frames
 
-    panel = stress_panel(path)
-    return [] if panel is None else [plotly.draw(panel) | {"wide": True, "tall": True}]
+    frames = stress_frames(path)
+    if not np.nanmax(frames["values"], initial=0.0) > 0:
+        return []
+    panel = panels.make_film(frames, "von Mises stress in both pieces", "Pa")
+    return [plotly.draw(panel) | {"wide": True, "tall": True}]
 
 
 def _list_files(folder: Path) -> list[tuple[str, str]]:

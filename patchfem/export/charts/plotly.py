@@ -220,7 +220,7 @@ def _add_film(figure: dict, panel: Panel) -> dict:
                 | {"x": 0, "xanchor": "left", "y": 1.02, "yanchor": "bottom"}
             ],
         }
-    figure["layout"]["yaxis"]["scaleanchor"] = "x" if panel.y.label.startswith("y") else None
+    figure["layout"]["yaxis"]["scaleanchor"] = "x"  # equal scales of both axes
     figure["layout"]["showlegend"] = False
     return figure
 
