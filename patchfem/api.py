@@ -20,27 +20,25 @@ from functools import wraps
 from numbers import Integral
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 from .campaigns import cost as cost_curves
 from .campaigns.backbone import curves as backbones
 from .campaigns.backbone import given_modes
+from .campaigns.fits.request import FitOptions, Listener
 from .campaigns.sweeps import case_models as case_models
 from .campaigns.sweeps import executors, parse_request
 from .core import Measure, Missing, NotConverged, Outcome, PatchfemError
-from .export import backbone as backbone_files
+from .export import backbones as backbone_answers
 from .export import convert, histories
-from .export import cost as cost_files
+from .export import costs, fits, store
+from .export import page as pages
 from .export import folder as results_folder
 from .export import report as run_page
-from .export import reports as comparison_page
 from .export import summary as summaries
 from .export.drawing import pictures
 from .export.drawing import swept as sweep_charts
 from .export.fields import multiblock
-from .export.fits import request as fits
-from .export.fits.options import FitOptions
 from .export.pages import headline, released, sentences
 from .export.surfaces import compare as compared_data
 from .export.surfaces import pairs as pairs_data
@@ -463,15 +461,16 @@ def cost(
     True
     """
     model = build(scene, **sets)
-    tolerance = model.accuracy.tolerance
     setting = _require_string(over, "cost: over") or cost_curves.TOLERANCE
     curve = cost_curves.compute_setting_costs(
         model, setting, _print_to_stderr if say is None else say
     )
+    answer = costs.make_answer({setting: curve}, model)
     if out is not None:
-        cost_files.write(Path(out), {setting: curve})
-        cost_files.write_picture(Path(out), setting, curve, tolerance)
-    return {setting: cost_files.cost_data(setting, curve, tolerance)}
+        with results_folder.Folder(Path(out)) as target:
+            store.write(answer, target.path)
+            pages.write_page(target.path)
+    return answer.details
 
 
 def backbone(
@@ -553,7 +552,7 @@ def backbone(
         model, _require_string(mode, "backbone: mode"), lengths, methods
     )
     curves = curves.add_notes(notes)
-    return backbone_files.backbone_contents(curves, model.source.title).to_xarray()
+    return backbone_answers.make_answer(curves, model.source).to_xarray()
 
 
 @_strip_file_and_line_from_errors
@@ -707,7 +706,7 @@ class SweepPlots:
     def backbone(dataset: Dataset, ax: Axes | None = None) -> Axes:
         """Plot frequency and damping ratio of a mode against its amplitude, for each method.
 
-        The recommended curve is bold, on top, and lies in its band. Without a band all curves have error bars.
+        The recommended curve is the first one, with its band.
 
         Parameters
         ----------
@@ -732,30 +731,7 @@ class SweepPlots:
         >>> curves = pf.backbone(pf.new("rig"), amplitudes="0.1 um..10 um:5", method="quasi-static", **law)
         >>> pf.plot.backbone(curves).figure.savefig("backbone.png")
         """
-        coordinates = getattr(dataset, "coords", ())
-        curves = {}
-        for method in backbones.METHODS:
-            prefix = method.replace("-", "_")
-            if f"{prefix}_amplitude" in coordinates:
-                names = backbone_files.COLUMNS
-                columns = {name: dataset[f"{prefix}_{name}"].values for name in names}
-                curves[method] = SimpleNamespace(**columns)
-        if not curves:
-            reason = getattr(dataset, "attrs", {}).get("missing")
-            raise PatchfemError(
-                "plot.backbone: a Dataset returned by pf.backbone is needed, with at least one curve"
-                + (f"; {reason}" if reason else "")
-            )
-        band = None
-        if "band_amplitude" in coordinates:
-            band = SimpleNamespace(
-                method=dataset.attrs["method"], amplitude=dataset["band_amplitude"].values
-            )
-            for name in backbone_files.BAND_VARIABLES:
-                setattr(band, name, dataset[f"band_{name}"].values)
-        drawn_charts = backbone_files.backbone_charts(curves, band)
-        figure = pictures.draw_charts.figure(drawn_charts, axes_to_use=ax)
-        return figure.axes[0] if ax is None else ax
+        return backbone_answers.draw_curves(dataset, ax)
 
 
 plot = SweepPlots()
@@ -821,12 +797,11 @@ def fit(
         As for `load`.
     data : path
         File of the measurements: a friction loop for a bench; a table of responses, or frequency and damping against
-        amplitude, for a rig; a worn depth for a scene with [wear]. Not used with ``options.from_patch``.
+        amplitude, for a rig; a worn depth for a scene with [wear].
     options : FitOptions, optional
         Validation rows, offsets of a loop, and settings of the search.
     free : dict
-        Range of each free parameter by its key: (low, high), or a string such as "0.1..0.6". Not used with
-        ``options.from_patch``.
+        Range of each free parameter by its key: (low, high), or a string such as "0.1..0.6".
     out : path, optional
         Output folder, as for `patchfem fit -o`. Default: no files are written.
     say : callable, optional
@@ -873,8 +848,8 @@ def fit(
     data_path = "" if isinstance(data, str) and not data else str(_require_path(data, "fit: to"))
     with TemporaryDirectory() as temporary_folder:
         output_folder = Path(temporary_folder) / "fit" if out is None else Path(out)
-        listener = fits.Listener(_print_to_stderr if say is None else say)
-        return fits.fit_into(loaded, data_path, ranges, options, output_folder, listener).answer
+        listener = Listener(_print_to_stderr if say is None else say)
+        return fits.fit_into(loaded, data_path, ranges, options, output_folder, listener).details
 
 
 def _check_fit_options(options: Any, changes: dict) -> FitOptions:
@@ -885,13 +860,10 @@ def _check_fit_options(options: Any, changes: dict) -> FitOptions:
     if not isinstance(options, FitOptions):
         raise PatchfemError(f"fit: options: FitOptions are needed, not {options!r:.60}")
     options = replace(options, **changes)
-    amplitudes = options.amplitudes
     return replace(
         options,
         hold=_require_strings(options.hold, "fit: hold"),
         offset=_require_strings(options.offset, "fit: offset"),
-        placebo=_require_strings(options.placebo, "fit: placebo"),
-        amplitudes="" if amplitudes is None else _format_lengths(amplitudes),
     )
 
 
@@ -1009,7 +981,7 @@ def report(folders: str | Path | Iterable[str | Path], /, out: str | Path | None
     'both.html'
     """
     target = None if out is None else _require_path(out, "report: out")
-    return Path(comparison_page.write_report(_require_paths(folders, "report"), target))
+    return pages.write_report(_require_paths(folders, "report"), target)
 
 
 def export(

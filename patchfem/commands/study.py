@@ -11,11 +11,10 @@ from ..campaigns import cost as cost_curves
 from ..campaigns import numerical_settings
 from ..campaigns.backbone import curves as backbones
 from ..campaigns.backbone import given_modes
-from ..export import backbone as backbone_files
-from ..export import cost as cost_files
-from ..export import results
-from ..export.fits import request as fits
-from ..export.fits.options import FitOptions
+from ..campaigns.fits.request import FitOptions, Listener, choose_kind
+from ..export import backbones as backbone_answers
+from ..export import costs, fits, page, show, store
+from ..export.folder import Folder
 from ..model import model
 from ..scene import axes
 from ..scene.scene import remember_written
@@ -67,22 +66,17 @@ def cost(
     if verbose and not over:
         knobs += numerical_settings.find_applicable_settings(scene_model)
     target = choose_folder(out, f"{scene_model.source.path.stem}-cost")
-    curves = {}
-    data = {}
-    for knob in knobs:
-        runs = curves[knob] = cost_curves.compute_setting_costs(
-            scene_model, knob, None if quiet else print_message
-        )
-        table = cost_files.write(target, curves)
-        picture = cost_files.write_picture(target, knob, runs, scene_model.accuracy.tolerance)
-        data[knob] = cost_files.cost_data(knob, runs, scene_model.accuracy.tolerance)
-        if not json_:
-            tabled = verbose and knob != cost_curves.TOLERANCE
-            lines = cost_files.format_details if tabled else cost_files.format_cost
-            print("\n".join(lines(knob, runs, scene_model.accuracy.tolerance)))
-            print(f"results: {table} {picture}")
-    if json_:
-        print(json.dumps(data))
+    with Folder(target) as folder:
+        curves = {
+            knob: cost_curves.compute_setting_costs(
+                scene_model, knob, None if quiet else print_message
+            )
+            for knob in knobs
+        }
+        answer = costs.make_answer(curves, scene_model)
+        store.write(answer, folder.path)
+        page.write_page(folder.path)
+    _print_answer(answer, target, json_)
 
 
 def backbone(
@@ -128,7 +122,7 @@ def backbone(
     methods = backbones.choose_methods(method)
     lengths = axes.read_lengths(amplitudes, "--amplitudes") if amplitudes else None
     target = choose_folder(out, f"{free_model.source.path.stem}-backbone")
-    with results.Folder(target) as folder:
+    with Folder(target) as folder:
         backbone_result = backbones.compute_backbone(
             free_model,
             mode,
@@ -137,22 +131,26 @@ def backbone(
             None if quiet or json_ else lambda method_name: print_message(f"{method_name} ..."),
         )
         backbone_result = backbone_result.add_notes(notes)
-        data = backbone_files.write_backbone(
-            backbone_result,
-            free_model.source.title,
-            free_model.source.resolved,
-            folder,
-            not no_page,
-        )
-    if json_:
-        print(json.dumps(data, ensure_ascii=False))
-    else:
-        print("\n".join(backbone_files.format_backbone(backbone_result)))
-        for text in backbone_result.notes:
-            print(f"note: {text}")
-        print(f"results: {target}")
+        answer = backbone_answers.make_answer(backbone_result, free_model.source)
+        store.write(answer, folder.path)
+        if not no_page:
+            page.write_page(folder.path)
+    _print_answer(answer, target, json_)
     if not backbone_result.curves:
         raise NotConvergedExit
+
+
+def _print_answer(answer, target: Path, is_json: bool) -> None:
+    """Print an answer as JSON or as lines with its warnings, notes and files."""
+    if is_json:
+        print(json.dumps(answer.details, ensure_ascii=False))
+        return
+    print("\n".join(show.make_lines(answer)))
+    for text in answer.remarks.warnings:
+        print_message(f"warning: {text}")
+    for text in answer.remarks.notes:
+        print(f"note: {text}")
+    print("\n".join(show.list_files(target)))
 
 
 @dataclass(frozen=True)
@@ -179,10 +177,6 @@ class RowFitOptions:
             "rows)"
         ),
     ] = "bound"
-    placebo: repeated_option(
-        'repeat the fit with each of these values, such as "structure.mode.yaw.frequency=110 Hz,138 Hz", to '
-        "check whether the value in the scene fits the measured rows best"
-    ) = ()
     resume: flag_option("continue an interrupted fit; starts already finished are not repeated") = (
         False
     )
@@ -202,14 +196,6 @@ def fit(
     free: repeated_option(
         'key to fit and its range, such as "friction.static=0.1..0.6"; may be repeated'
     ) = (),
-    from_patch: flag_option(
-        "in place of --to and --free: fit lumped Iwan, Bouc-Wen and elastic-plastic laws to the loops "
-        "of the scene's own patch; each law is written as a scene, with the error of the law"
-    ) = False,
-    amplitudes: text_option(
-        'with --from-patch: amplitudes of the slide (half peak-to-peak), such as "0.1 um..10 um:25"; '
-        "default: amplitudes from the onset of slip upwards"
-    ) = "",
     hold: repeated_option(
         'rows to hold out: the fit predicts them but does not use them, such as "frequency=135 Hz,150 '
         'Hz"'
@@ -230,30 +216,20 @@ def fit(
 ):
     """Fit values of keys of SCENE to measurements. A bench is fitted to a friction loop. A rig is fitted to rows of
     frequency, input, acceleration and displacement, or to frequency and damping against amplitude. For a scene with
-    [wear], the wear coefficient is fitted to a measured wear depth. With --from-patch, lumped laws are fitted to the
-    loops of the scene's own patch.
+    [wear], the wear coefficient is fitted to a measured wear depth.
 
     Example: patchfem fit bench.toml --to loop.csv --free "friction.static=0.1..0.6"
     """
     loaded_scene = remember_written(load_scene(scene, set_))
     target = choose_folder(out, f"{scene.stem}-fit")
-    options = FitOptions(
-        hold, offset, warm_up, from_patch=from_patch, amplitudes=amplitudes, **vars(rows)
-    )
+    options = FitOptions(hold, offset, warm_up, **vars(rows))
     with progress_bar(
-        quiet or json_ or from_patch or fits.choose_kind(loaded_scene, to) in ("loop", "curve")
+        quiet or json_ or choose_kind(loaded_scene, to) in ("loop", "curve")
     ) as progress:
-        listener = fits.Listener(
+        listener = Listener(
             None if quiet else print_message, progress, lambda name: f"--{name.replace('_', '-')}"
         )
-        files = fits.fit_into(loaded_scene, to, free, options, target, listener)
-    if json_:
-        print(json.dumps(files.answer, ensure_ascii=False))
-    else:
-        print("\n".join(files.lines))
-        for text in files.answer["warnings"]:
-            print_message(f"warning: {text}")
-        print(f"page: {target / 'report.html'}")
-        print(f"results: {target}")
-    if files.answer["outcome"] == "not_converged":
+        answer = fits.fit_into(loaded_scene, to, free, options, target, listener)
+    _print_answer(answer, target, json_)
+    if answer.details["outcome"] == "not_converged":
         raise NotConvergedExit

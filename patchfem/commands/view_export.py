@@ -5,7 +5,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from ..export import convert, reports
+from ..export import convert, page
 from ..export.lab import structures
 from .shared import Sets, UsageError, flag_option, load_model_without_sweep, out_option, text_option
 
@@ -88,4 +88,4 @@ def report(
 
     Example: patchfem report out/rig out/six -o both.html
     """
-    print(reports.write_report(list(folders), out))
+    print(page.write_report(list(folders), out))
