@@ -30,10 +30,9 @@ from .campaigns.sweeps import case_models as case_models
 from .campaigns.sweeps import executors, parse_request
 from .core import Measure, Missing, NotConverged, Outcome, PatchfemError
 from .export import backbones as backbone_answers
-from .export import convert, histories
-from .export import costs, fits, store
-from .export import page as pages
+from .export import convert, costs, fits, histories, store
 from .export import folder as results_folder
+from .export import page as pages
 from .export import report as run_page
 from .export import summary as summaries
 from .export.drawing import pictures

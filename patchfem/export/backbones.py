@@ -46,11 +46,18 @@ def make_answer(backbone: Backbone, source, command: str = "") -> Answer:
         verdict=_make_verdict(backbone, measures),
         quantities=measures,
         data=_make_data(backbone),
-        remarks=Remarks(notes=(*backbone.notes, *backbone.answer.sentences[1:])),
+        remarks=Remarks(
+            notes=(*map(_make_sentence, backbone.notes), *backbone.answer.sentences[1:])
+        ),
         details=_make_details(backbone, measures),
         # the drive of the scene is ignored
         origin=origin | {"driven": "", "command": command or origin["command"]},
     )
+
+
+def _make_sentence(text: str) -> str:
+    """Return a clause as a sentence."""
+    return f"{text[0].upper()}{text[1:].rstrip('.')}."
 
 
 def find_curve(backbone: Backbone) -> Curve | None:

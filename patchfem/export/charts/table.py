@@ -34,7 +34,7 @@ class Chart:
     lines : tuple of str
         Further variables of the vertical axis, drawn as lines beside points.
     labels : tuple of str
-        Names of the horizontal and the vertical axis; "" for the name of the variable.
+        Names of the horizontal and the vertical axis; "" for the name of the variable, "*" for its description.
     caption : str
     """
 
@@ -294,7 +294,7 @@ BACKBONE = (
         _METHOD_CURVES["damping"],
         log="x auto",
         labels=("amplitude at the output", "damping ratio"),
-        caption="Damping ratio of structure and friction together. Use the first curve; its band contains what other kinds of test read.",
+        caption="Structure and friction together. Use the first curve; its band contains what other kinds of test read.",
     ),
 )
 COMPARE: tuple[Chart, ...] = ()
@@ -388,7 +388,7 @@ FIT = (
         "points",
         lines=("curve_depth@curve_coefficient",),
         labels=("wear coefficient", "worn depth"),
-        caption="Measured depth with its interval at the fitted coefficient, and the computed depth up to the upper bound.",
+        caption="Measured depth at the fitted coefficient, and the computed depth up to the upper bound.",
     ),
 )
 COST = (
@@ -399,9 +399,9 @@ COST = (
         "points",
         by="outcome",
         log="xy",
-        lines=("allowed_error",),
+        lines=("allowed_error@allowed_seconds",),
         labels=("CPU time", "error of the worst measure"),
-        caption="Largest relative error of any measure in each run. The line is the tolerance of the run.",
+        caption="Largest relative error of any measure in each run. The line is the tolerance of the scene.",
     ),
     Chart(
         "Value against time",
@@ -410,8 +410,8 @@ COST = (
         "points",
         by="outcome",
         log="x",
-        labels=("CPU time", ""),
-        caption="Main measure of each run with its numerical error.",
+        labels=("CPU time", "*"),
+        caption="The least accurate of the key measures in each run, with its numerical error.",
     ),
 )
 
@@ -500,8 +500,8 @@ TABLES["cost"] = (
             Column("cpu_seconds", "CPU s", "rounded"),
             Column("largest_error", "largest error", "rounded"),
             Column("worst_measure", "of"),
-            Column("value", "main measure"),
-            Column("outcome", "result"),
+            Column("value", "value"),
+            Column("result", "result"),
         ),
     ),
 )
