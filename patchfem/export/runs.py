@@ -27,7 +27,7 @@ def make_answer(result: Result) -> Answer:
     """Return the answer of a run."""
     run_plan = result.plan
     source = run_plan.model.source
-    measures = {name: make_quantity(measure) for name, measure in result.measures.items()}
+    measures = make_quantities(result.measures)
     details = make_details(result)
     changed = list_changed_keys(source.sets)
     title = f"{source.title}; changed: {changed}" if source.title and changed else source.title
