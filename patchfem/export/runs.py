@@ -43,15 +43,12 @@ def make_answer(result: Result) -> Answer:
     )
 
 
-def make_quantity(measure: Measure) -> Quantity:
-    """Return a measure of a run as a quantity."""
-    return Quantity(
-        measure.value,
-        measure.unit,
-        measure.error,
-        floor=float(measure.floor),
-        reason=measure.reason,
-    )
+def make_quantities(measures: dict[str, Measure]) -> dict[str, Quantity]:
+    """Return the measures of a run as quantities."""
+    return {
+        name: Quantity(one.value, one.unit, one.error, floor=float(one.floor), reason=one.reason)
+        for name, one in measures.items()
+    }
 
 
 def make_origin(source, verb: str) -> dict:
