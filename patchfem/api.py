@@ -38,7 +38,7 @@ from .export import reports as comparison_page
 from .export import summary as summaries
 from .export.drawing import pictures
 from .export.drawing import swept as sweep_charts
-from .export.fields import multiblock
+from .export.fields import grids
 from .export.fits import request as fits
 from .export.fits.options import FitOptions
 from .export.pages import headline, released, sentences
@@ -1019,7 +1019,6 @@ def export(
     *,
     frame: int | None = None,
     histories: bool = False,
-    of: str = "",
 ) -> Path:
     """Convert a results folder, or the structure of a scene (.toml), to another file format.
 
@@ -1029,15 +1028,12 @@ def export(
         Results folder, or a scene file.
     out : path
         Output file, whose extension determines the format. Fields: .pvd, .vtu, .vtkhdf or .csv (interface only). Time
-        histories and loops: .uff, .mat, or .csv with `histories` or if the folder has no fields. ParaView script that
-        animates the last cycle (the whole slide of a bench): .py. Matrices and friction elements of a scene: .mat for
-        NLvib, .npz for TMDSimPy and pyHarm.
+        histories and loops: .uff, .mat, or .csv with `histories` or if the folder has no fields. Matrices and friction
+        elements of a scene: .mat for NLvib, .npz for TMDSimPy and pyHarm.
     frame : int, optional
         Index of the frame of a .vtu or .csv file. Default: the last frame.
     histories : bool
         Whether to write time histories to a .csv file even if the folder has fields.
-    of : str
-        Stress that a ParaView script shows, such as "sigma_yy".
 
     Returns
     -------
@@ -1059,10 +1055,10 @@ def export(
     folder = _require_path(folder, "export")
     out = _require_path(out, "export: out")
     if folder.suffix != ".toml":
-        convert.export_results(folder, out, frame, histories, of)
-    elif frame is not None or histories or of:
+        convert.export_results(folder, out, frame, histories)
+    elif frame is not None or histories:
         raise PatchfemError(
-            "the options `frame`, `histories` and `of` can be used only with a results folder; from a "
+            "the options `frame` and `histories` can be used only with a results folder; from a "
             "scene only the structure is exported"
         )
     else:
@@ -1458,6 +1454,12 @@ class Measures(Mapping):
         return "\n".join(sentences.format_measures(objects))
 
 
+def _check_axes(ax, name: str) -> None:
+    """Raise PatchfemError if a plot is to be drawn on something that is not matplotlib Axes."""
+    if ax is not None and not hasattr(ax, "errorbar"):
+        raise PatchfemError(f"plot.{name}: matplotlib Axes are needed as ax, not {ax!r:.60}")
+
+
 class Plots:
     """Plots of a run as matplotlib Axes.
 
@@ -1518,17 +1520,14 @@ class Plots:
     def stress(self, ax: Axes | None = None) -> Axes:
         """Plot the von Mises stress in both loaded pieces, and an enlarged view of the contact.
 
-        With `ax`, the enlarged view is omitted.
+        The stress along the interface is shown too. With `ax`, only the picture of both pieces is drawn.
         """
         if self._result.patch is None:
             raise PatchfemError("plot.stress: nothing to draw: the scene has no [contact]")
-        from .export.fields import bodies
+        from .export import pieces
 
-        with TemporaryDirectory() as temporary_folder:
-            path = Path(temporary_folder) / "fields.vtkhdf"
-            fields_of_bodies = bodies.write_fields(self._result, path)
-        reason = "the pieces do not touch, or their mesh is not a grid"
-        return self._draw_first_chart(ax, ("bodies",), reason, fields_of_bodies)
+        _check_axes(ax, "stress")
+        return pieces.draw_result(self._result, ax)
 
     def _explain_missing_motion(self) -> str:
         """Return why a run has no motion; "" if it has motion."""
@@ -1538,19 +1537,13 @@ class Plots:
             return "a static patch does not move; add [friction] with [slide], or with [structure] and [drive]"
         return "no motion was computed"
 
-    def _draw_first_chart(
-        self, ax: Axes | None, chart_names: tuple, reason: str, bodies: dict | None = None
-    ) -> Axes:
+    def _draw_first_chart(self, ax: Axes | None, chart_names: tuple, reason: str) -> Axes:
         """Plot the first of several named charts for which the run has data.
 
-        Raises PatchfemError with `reason` if the run has no data for any of them. `bodies` contains the fields of the
-        pieces.
+        Raises PatchfemError with `reason` if the run has no data for any of them.
         """
-        if ax is not None and not hasattr(ax, "errorbar"):
-            raise PatchfemError(
-                f"plot.{chart_names[0]}: matplotlib Axes are needed as ax, not {ax!r:.60}"
-            )
-        axes_of_chart = run_page.draw_axes(self._result, chart_names, ax, bodies)
+        _check_axes(ax, chart_names[0])
+        axes_of_chart = run_page.draw_axes(self._result, chart_names, ax)
         if axes_of_chart is None:
             raise PatchfemError(f"plot.{chart_names[0]}: nothing to draw: {reason}")
         return axes_of_chart
@@ -1651,12 +1644,12 @@ class Result(run_result.Result):
             raise PatchfemError(f"to_pyvista: {self._explain_missing_pieces()}")
         count = len(self.fields["time"])
         if frame is None:
-            return multiblock.read_multiblocks(self, range(count))
+            return grids.make_result_grids(self, range(count))
         if not isinstance(frame, Integral) or not -count <= frame < count:
             raise PatchfemError(
                 f"to_pyvista: there is no frame {frame}; the run has frames 0 to {count - 1}"
             )
-        return multiblock.read_multiblocks(self, [frame])[0]
+        return grids.make_result_grids(self, [frame])[0]
 
     def _explain_missing_pieces(self) -> str:
         """Return why a run has no single pair of pieces, and what to use instead."""

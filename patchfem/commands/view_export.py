@@ -7,7 +7,7 @@ from cyclopts import Parameter
 
 from ..export import convert, reports
 from ..export.lab import structures
-from .shared import Sets, UsageError, flag_option, load_model_without_sweep, out_option, text_option
+from .shared import Sets, UsageError, flag_option, load_model_without_sweep, out_option
 
 Frame = Annotated[
     int | None,
@@ -24,7 +24,7 @@ def export(
         Parameter(
             name=["-o", "--out"],
             help="file to write; fields: fields.pvd (all frames, for any version of ParaView), "
-            ".vtu, .csv or .vtkhdf; script that plays the last cycle (of a bench: the whole slide) in ParaView: cycle.py; "
+            ".vtu, .csv or .vtkhdf; "
             "histories: histories.uff, .mat or .csv; matrices and friction elements of a "
             "scene: .mat (NLvib) or .npz (TMDSimPy, pyHarm)",
         ),
@@ -34,11 +34,6 @@ def export(
     histories: flag_option(
         "write histories and loops as .csv, instead of the fields along the interface"
     ) = False,
-    of: text_option(
-        "stress that the script for ParaView shows in colour, such as sigma_yy or tau_xy (default: "
-        "von_mises); 'status' shows where the interface sticks and slips",
-        "--of",
-    ) = "",
 ):
     """Write the fields, or the histories and loops, of a results folder in another format. From the folder of a fit,
     write the measured and the fitted loop. From a scene, write the structure for other programs.
@@ -48,11 +43,11 @@ def export(
     if folder.suffix != ".toml":
         if sets:
             raise UsageError("--set can be used only with a scene, not with a results folder")
-        print(convert.export_results(folder, out, frame, histories, of))
+        print(convert.export_results(folder, out, frame, histories))
         return
-    if frame is not None or histories or of:
+    if frame is not None or histories:
         raise UsageError(
-            "--frame, --histories and --of can be used only with a results folder; from a scene only the "
+            "--frame and --histories can be used only with a results folder; from a scene only the "
             "structure is exported"
         )
     print(structures.export_structure(load_model_without_sweep(folder, sets), out))

@@ -12,9 +12,8 @@ from ..disk.atomic_write import write_text
 from ..runs.results.result import Result, shorten_file_names
 from ..runs.run import StateFile, is_march, run
 from . import netcdf, report
-from .fields import bodies as body_fields
+from .fields import vtkhdf
 from .histories import result_contents
-from .pages import player
 from .results import INTERFACES_FOLDER, MAX_INTERFACES, PAGE, STATE, Folder, is_state
 from .summary import read_summary, summarise_run, write_json
 
@@ -24,13 +23,12 @@ SCENE = "scene.resolved.toml"
 class WrittenRun(NamedTuple):
     """Finished run whose results are on disk.
 
-    summary: content of summary.json; result: the run; bodies: the pressed pieces for a picture, or
-    {}; folder_id: device and inode of the folder, which identify it after it has been renamed.
+    summary: content of summary.json; result: the run; folder_id: device and inode of the folder,
+    which identify it after it has been renamed.
     """
 
     summary: dict
     result: Result
-    bodies: dict
     folder_id: tuple
 
 
@@ -129,12 +127,11 @@ def is_complete(run_plan, target: Path) -> bool:
 def write_results(result: Result, path: Path) -> WrittenRun:
     """Write all files of a run, except its page, into a folder."""
     start_time = perf_counter()
-    bodies = {}
     text = result.plan.model.source.resolved
     write_text(path / SCENE, text)
     netcdf.write_netcdf(result_contents(result), path / "result.nc")
     if result.patch is not None:
-        bodies = body_fields.write_fields(result, path / "fields.vtkhdf")
+        vtkhdf.write_fields(result, path / vtkhdf.NAME)
     for face in result.extra.get("faces", ())[:MAX_INTERFACES]:
         face_folder = path / INTERFACES_FOLDER / face.folder
         face_folder.mkdir(parents=True, exist_ok=True)
@@ -145,14 +142,14 @@ def write_results(result: Result, path: Path) -> WrittenRun:
             fields=face.fields,
             extra={},
         )
-        body_fields.write_fields(face_result, face_folder / "fields.vtkhdf")
+        vtkhdf.write_fields(face_result, face_folder / vtkhdf.NAME)
         result.extra["notes"] += [
             f"interface {face.name}: {text}" for text in face_result.extra["notes"]
         ]
     result.seconds["files"] = perf_counter() - start_time
     summary = summarise_run(result)
     write_json(summary, path / "summary.json")
-    return WrittenRun(summary, result, bodies, _folder_identity(path))
+    return WrittenRun(summary, result, _folder_identity(path))
 
 
 def write_run_page(stored_run: WrittenRun, folder: Path) -> Path:
@@ -160,7 +157,7 @@ def write_run_page(stored_run: WrittenRun, folder: Path) -> Path:
 
     Missing if another run has replaced the folder in the meantime.
     """
-    text = report.run_page(stored_run.result, stored_run.bodies, player.player_data(folder))
+    text = report.run_page(stored_run.result)
     path = Path(folder) / PAGE
     if not path.parent.is_dir() or _folder_identity(path.parent) != stored_run.folder_id:
         raise Missing(f"{folder}: replaced by another run while the page was drawn")

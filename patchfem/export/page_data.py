@@ -79,18 +79,12 @@ class PressedPatch:
         {name: (f, m)} over the frames at `time` (f,).
     faces : list
         (x, fields, name) of each interface that has a patch of its own.
-    bodies : dict or None
-        The pressed pieces, from `fields.bodies.write_fields`.
-    film : dict or None
-        From `pages.player.player_data`.
     """
 
     x: np.ndarray | None = None
     width: float | None = None
     fields: dict = field(default_factory=dict)
     faces: list = field(default_factory=list)
-    bodies: dict | None = None
-    film: dict | None = None
 
     def touches(self) -> bool:
         """Return whether the two pieces touch anywhere."""

@@ -1,7 +1,6 @@
 """report.html: a self-contained page on a run, which begins with the verdict."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from html import escape
 from typing import NamedTuple
 
@@ -12,7 +11,6 @@ from ..effects import list_displayed_absent_effects
 from ..runs.results.result import Result
 from .drawing import accuracy, charts, pictures
 from .page_data import RunData, collect_run_data
-from .pages import player
 from .pages.document import Section, document_html, sentence_html, table_html, warning_box
 from .pages.driven import list_changed_keys
 from .pages.sentences import (
@@ -31,8 +29,8 @@ from .results import MAX_INTERFACES
 
 SETTLED_OUTCOMES = ("steady", "stuck", "done")
 EN_DASH = "&ndash;"
-# Largest number of characters for the numbers of all charts; with library and
-# player, the page stays below 3 MB.
+# Largest number of characters for the numbers of all charts; with the library, the page stays below
+# 3 MB.
 MAX_CHART_CHARACTERS = 700_000
 RESULT_FILES = (
     (
@@ -79,26 +77,13 @@ def page_html(data: RunData) -> str:
     chart_data, figures = draw_figures(data)
     chart_data = charts.limit_characters(chart_data, MAX_CHART_CHARACTERS)
     sections = [Section("pictures", "Pictures", figures)] if chart_data else []
-    film = data.patch.film if data.patch.touches() else None
-    if film is not None:
-        sections.append(player.player_section(film))
     if data.measured is not None:
         sections += _measured_section(data)
     if data.evaluations.levels is not None:
         sections.append(_levels_section(data.evaluations.levels))
     sections += [_measures_section(data), _cost_section(data), _origin_section(data)]
-    scripts = (
-        "figures.js",
-        *(("curves.js",) if chart_data else ()),
-        *(("stage.js", "player.js") if film else ()),
-    )
-    return document_html(
-        title,
-        "".join(lead),
-        sections,
-        {"charts": chart_data} | ({"player": film} if film else {}),
-        scripts if chart_data or film else (),
-    )
+    scripts = ("figures.js", "curves.js") if chart_data else ()
+    return document_html(title, "".join(lead), sections, {"charts": chart_data}, scripts)
 
 
 def draw_figures(data: RunData) -> tuple:
@@ -327,67 +312,6 @@ def _omitted_charts_sentence(drawn_interfaces: list) -> str:
     )
 
 
-def _stress_picture(data: RunData) -> Picture | None:
-    """Return the picture of the von Mises stress in both pieces."""
-    if data.patch.bodies is None or not data.patch.touches():
-        return None
-    effects = [e["effect"] for e in data.verdict.summary["effects"]]
-    coated = "with their coatings " if "contact.coating" in effects else ""
-    cause = "at the prescribed approach" if "contact.approach" in effects else "under the load"
-    alone = "" if data.verdict.summary["kind"] == "patch" else " alone, before any slide"
-    bodies = data.patch.bodies
-    mises = bodies["mises"]
-    largest = max(float(np.max(part)) for part in mises)
-    unit, scale = formatting.choose_axis_unit([largest], "Pa")
-    values = (bodies["x"], bodies["depth"], mises, bodies["pressure"])
-    return Picture(
-        charts.stress_charts,
-        values,
-        f"Both pieces {coated}{cause}{alone}. The largest stress in a cell is {largest * scale:.3g} "
-        f"{unit}{_corner_sentence(bodies)}.{_mesh_sentence(data)}",
-    )
-
-
-def _mesh_sentence(data: RunData) -> str:
-    """State that the plotted stress misses pressure peaks at the surface, or return "" if it does not."""
-    sigma = data.patch.fields["normal_stress"][0]
-    mesh_pressure = data.patch.bodies["pressure"]
-    if sigma.size == mesh_pressure.size:
-        return ""
-    unit, scale = formatting.choose_axis_unit([sigma.max()], "Pa")
-    return (
-        f" The stress is computed on a mesh, on which the largest pressure is "
-        f"{mesh_pressure.max() * scale:.3g} {unit}; near the narrow pressure peaks of up to "
-        f"{sigma.max() * scale:.3g} {unit} it is larger."
-    )
-
-
-def _corner_sentence(bodies: dict) -> str:
-    """Describe the corner at which the largest stress of both pieces is unbounded; "" if there is none."""
-    parts = zip(bodies["depth"], bodies["coating"], bodies["mises"])
-    depth, coating, stress = max(parts, key=lambda fields: fields[2].max())
-    column, row = np.unravel_index(np.argmax(stress), stress.shape)
-    if column not in (0, stress.shape[0] - 1):
-        return ""
-    faces = {
-        "the face of the coating meets the end of the piece": coating,
-        "the held far face ends": depth[-1],
-    }
-    corner_texts = [
-        text
-        for text, face in faces.items()
-        if face > 0 and np.isclose(depth[row : row + 2], face).any()
-    ]
-    return (
-        (
-            f", where {corner_texts[0]}: the stress "
-            "is unbounded in this corner, and a finer mesh shows a larger value"
-        )
-        if corner_texts
-        else ""
-    )
-
-
 def _loop_picture(data: RunData) -> Picture | None:
     """Return the picture of the friction loop."""
     motion = data.motion
@@ -526,7 +450,6 @@ PICTURES = {
     "levels": _levels_picture,
     "pressure": _interface_picture,
     "faces": _faces_picture,
-    "bodies": _stress_picture,
     "loop": _loop_picture,
     "history": _histories_picture,
     "measured": _measured_picture,
@@ -761,21 +684,12 @@ def _origin_section(data: RunData) -> Section:
     )
 
 
-def run_page(result: Result, bodies: dict | None = None, film: dict | None = None) -> str:
-    """Return the HTML page of a run.
-
-    Parameters
-    ----------
-    result : Result
-    bodies : dict or None
-        The pressed pieces, from `fields.bodies.write_fields`.
-    film : dict or None
-        From `pages.player.player_data`.
-    """
-    return page_html(_add_pieces(collect_run_data(result), bodies, film))
+def run_page(result: Result) -> str:
+    """Return the HTML page of a run."""
+    return page_html(collect_run_data(result))
 
 
-def draw_axes(result: Result, names: tuple, onto=None, bodies: dict | None = None):
+def draw_axes(result: Result, names: tuple, onto=None):
     """Draw the first of the named pictures for which the run has data, as matplotlib Axes.
 
     Parameters
@@ -785,15 +699,13 @@ def draw_axes(result: Result, names: tuple, onto=None, bodies: dict | None = Non
         Keys of PICTURES.
     onto : Axes or None
         Where to draw the first panel; by default a new figure with all panels.
-    bodies : dict or None
-        The pressed pieces, from `fields.bodies.write_fields`.
 
     Returns
     -------
     Axes or None
         None if the run has nothing to show.
     """
-    data = _add_pieces(collect_run_data(result), bodies)
+    data = collect_run_data(result)
     picture = next(
         (one for one in (find_picture(name, data) for name in names) if one is not None), None
     )
@@ -803,8 +715,3 @@ def draw_axes(result: Result, names: tuple, onto=None, bodies: dict | None = Non
         return pictures.draw_charts.figure(picture.charts(*picture.values)).axes[0]
     pictures.draw_charts.figure(picture.charts(*picture.values), axes_to_use=onto)
     return onto
-
-
-def _add_pieces(data: RunData, bodies: dict | None, film: dict | None = None) -> RunData:
-    """Add the solved pieces and their animation to the data of a page."""
-    return replace(data, patch=replace(data.patch, bodies=bodies or None, film=film or None))
