@@ -31,9 +31,9 @@ from .campaigns.fits.request import FitOptions
 from .campaigns.sweeps import case_models as case_models
 from .campaigns.sweeps import executors, parse_request
 from .core import Measure, Missing, NotConverged, Outcome, PatchfemError
-from .export import backbones, convert, costs, fits, page, run_folder, runs, show, store
+from .export import backbones, convert, costs, fits, page, pieces, run_folder, runs, show, store
 from .export.charts import axes as chart_axes
-from .export.fields import grids, vtkhdf
+from .export.fields import grids
 from .export.folder import Folder
 from .export.surfaces import compare as compared
 from .export.surfaces import pairs as compared_pairs
@@ -1445,16 +1445,14 @@ class Plots:
         return self._draw(ax, "accuracy", ("Accuracy against time",), reason)
 
     def stress(self, ax: Axes | None = None) -> Axes:
-        """Plot the von Mises stress in both pieces around the contact at the end of the run."""
+        """Plot the von Mises stress in both loaded pieces, and an enlarged view of the contact.
+
+        The stress along the interface is shown too. With `ax`, only the picture of both pieces is drawn.
+        """
         if self._result.patch is None:
             raise PatchfemError("plot.stress: nothing to draw: the scene has no [contact]")
-        with TemporaryDirectory() as temporary_folder:
-            path = Path(temporary_folder) / store.FIELDS
-            vtkhdf.write_fields(self._result, path)
-            panel = page.make_stress_panel(path)
-        if panel is None:
-            raise PatchfemError("plot.stress: nothing to draw: the pieces do not touch")
-        return chart_axes.draw_on(panel, ax, "plot.stress")
+        chart_axes.check_axes(ax, "plot.stress")
+        return pieces.draw_result(self._result, ax)
 
     def _explain_missing_motion(self) -> str:
         """Return why a run has no motion; "" if it has motion."""
@@ -1573,12 +1571,12 @@ class Result(run_result.Result):
             raise PatchfemError(f"to_pyvista: {self._explain_missing_pieces()}")
         count = len(self.fields["time"])
         if frame is None:
-            return grids.read_multiblocks(self, range(count))
+            return grids.make_result_grids(self, range(count))
         if not isinstance(frame, Integral) or not -count <= frame < count:
             raise PatchfemError(
                 f"to_pyvista: there is no frame {frame}; the run has frames 0 to {count - 1}"
             )
-        return grids.read_multiblocks(self, [frame])[0]
+        return grids.make_result_grids(self, [frame])[0]
 
     def _explain_missing_pieces(self) -> str:
         """Return why a run has no single pair of pieces, and what to use instead."""

@@ -137,16 +137,11 @@ def draw_charts(answer: Answer, titles: tuple[str, ...], axes=None, verb: str = 
     panels = make_panels({"": answer}, charts)
     if not panels:
         return None
-    return draw_on(panels[0], axes, verb) if axes is not None else make_figure(panels).axes[0]
+    check_axes(axes, verb)
+    return draw(panels[0], axes) if axes is not None else make_figure(panels).axes[0]
 
 
-def draw_on(panel: Panel, axes, verb: str):
-    """Draw a panel on given Axes, or in a new figure for None, and return the Axes.
-
-    PatchfemError if `axes` are not those of matplotlib.
-    """
-    if axes is None:
-        return make_figure([panel]).axes[0]
-    if not hasattr(axes, "errorbar"):
+def check_axes(axes, verb: str) -> None:
+    """Raise PatchfemError if the Axes for a picture are given but are not those of matplotlib."""
+    if axes is not None and not hasattr(axes, "errorbar"):
         raise PatchfemError(f"{verb}: matplotlib Axes are needed as ax, not {axes!r:.60}")
-    return draw(panel, axes)
