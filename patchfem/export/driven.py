@@ -4,9 +4,9 @@ import shlex
 from pathlib import Path
 from textwrap import shorten
 
-from ...core import G_N
-from ...effects import SINE_WAVEFORM, WAVEFORMS
-from ...formatting import UNIT_LADDERS, choose_axis_unit
+from ..core import G_N
+from ..effects import SINE_WAVEFORM, WAVEFORMS
+from ..formatting import UNIT_LADDERS, choose_axis_unit
 
 DRIVE_UNITS = {
     "m/s^2": ("g", 1 / G_N),

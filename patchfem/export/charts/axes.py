@@ -1,0 +1,117 @@
+"""Panels as matplotlib Axes, for pictures and for `plot` in Python."""
+
+import numpy as np
+
+from .panels import Panel
+from .plotly import BAND_OPACITY, CODE_COLOURS, COLOURS
+
+PANEL_SIZE = (6.4, 4.2)  # width and height of a panel [inch]
+
+
+def draw(panel: Panel, axes):
+    """Draw a panel on matplotlib Axes and return them; of a menu, the first choice."""
+    if panel.choices:
+        return draw(panel.choices[0], axes)
+    if panel.style in ("map", "film"):
+        _draw_map(panel, axes)
+    elif panel.style == "bars":
+        _draw_bars(panel, axes)
+    else:
+        _draw_curves(panel, axes)
+    for position in panel.marks:
+        axes.axvline(position, color="0.5", lw=1, ls=":")
+    axes.set(title=panel.title, xlabel=panel.x.label, ylabel=panel.y.label)
+    if panel.x.is_log:
+        axes.set_xscale("log")
+    if panel.y.is_log:
+        axes.set_yscale("log")
+    if sum(bool(curve.name) for curve in panel.curves) > 1 and panel.style != "map":
+        axes.legend()
+    return axes
+
+
+def _draw_curves(panel: Panel, axes) -> None:
+    """Draw curves with error bars (points) or bands (lines)."""
+    second = axes.twinx() if panel.y2 is not None else axes
+    if panel.y2 is not None:
+        second.set_ylabel(panel.y2.label)
+    for number, curve in enumerate(panel.curves):
+        target = second if curve.on_second_axis else axes
+        colour = COLOURS[number % len(COLOURS)]
+        if panel.style != "points":
+            target.plot(
+                curve.x,
+                curve.y,
+                color=colour,
+                label=curve.name,
+                ls=":" if curve.on_second_axis else "-",
+            )
+            if curve.low is not None:
+                target.fill_between(
+                    curve.x, curve.low, curve.high, color=colour, alpha=BAND_OPACITY, lw=0
+                )
+            if panel.style == "area":
+                target.fill_between(curve.x, curve.y, color=colour, alpha=BAND_OPACITY, lw=0)
+            continue
+        bars = None
+        if curve.low is not None:
+            bars = np.nan_to_num([curve.y - curve.low, curve.high - curve.y])
+        target.errorbar(curve.x, curve.y, bars, fmt="none", ecolor=colour)
+        hollow = np.zeros(curve.x.size, bool)
+        if curve.symbols is not None:
+            hollow = np.char.endswith(np.asarray(curve.symbols, str), "open")
+        target.plot(curve.x[~hollow], curve.y[~hollow], "o", color=colour, label=curve.name)
+        target.plot(curve.x[hollow], curve.y[hollow], "o", color=colour, mfc="none")
+
+
+def _draw_bars(panel: Panel, axes) -> None:
+    """Draw horizontal bars with their intervals."""
+    for number, curve in enumerate(panel.curves):
+        bars = None if curve.low is None else [curve.y - curve.low, curve.high - curve.y]
+        axes.barh(
+            [str(name) for name in curve.x],
+            curve.y,
+            xerr=bars,
+            color=COLOURS[number],
+            label=curve.name,
+        )
+
+
+def _draw_map(panel: Panel, axes) -> None:
+    """Draw a map with its colour bar; of a film, the last frame."""
+    from matplotlib.colors import BoundaryNorm, ListedColormap
+
+    curve = panel.curves[-1]
+    options = {"cmap": "viridis"}
+    if curve.meanings:
+        count = len(curve.meanings)
+        edges = np.arange(count + 1) - 0.5
+        options = {"cmap": ListedColormap(CODE_COLOURS[:count]), "norm": BoundaryNorm(edges, count)}
+    elif np.nanmin(curve.y) < 0 < np.nanmax(curve.y):
+        limit = np.nanmax(np.abs(curve.y))
+        options = {"cmap": "RdBu", "vmin": -limit, "vmax": limit}
+    mesh = axes.pcolormesh(curve.x, curve.rows, curve.y, shading="nearest", **options)
+    bar = axes.figure.colorbar(mesh, label="" if curve.meanings else panel.colour_label)
+    if curve.meanings:
+        bar.set_ticks(range(len(curve.meanings)), labels=curve.meanings)
+
+
+def make_figure(panels: list[Panel]):
+    """Return a matplotlib figure with the panels beside and below each other, at most two in a row."""
+    from matplotlib.figure import Figure
+
+    columns = min(len(panels), 2)
+    rows = -(-len(panels) // columns)
+    size = (PANEL_SIZE[0] * columns, PANEL_SIZE[1] * rows)
+    figure = Figure(figsize=size, layout="constrained")
+    grid = figure.subplots(rows, columns, squeeze=False).ravel()
+    for panel, axes in zip(panels, grid, strict=False):
+        draw(panel, axes)
+    for axes in grid[len(panels) :]:
+        axes.remove()
+    return figure
+
+
+def write_picture(panels: list[Panel], path) -> None:
+    """Write panels as .png, .svg or .pdf."""
+    make_figure(panels).savefig(path, dpi=150)

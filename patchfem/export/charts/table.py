@@ -1,0 +1,289 @@
+"""Table of the charts, of the CSV files of curves and of the tables of each kind of answer.
+
+A chart is a row: it names variables of the answer, and it is shown if the answer has them. A new chart is a new row.
+"""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Chart:
+    """Chart of an answer.
+
+    Attributes
+    ----------
+    title : str
+    x : str
+        Variable of the horizontal axis. Several names, separated by spaces: the first one that the answer has.
+    y : tuple of str
+        Variables of the vertical axis. "NAME@X" is drawn against its own variable X.
+    style : str
+        "line", "points", "area", "map" (colours over x and the first dimension), "overlay" (a line for each element of the
+        first dimension), "bars" (horizontal bars of the values of a dimension), "relative" (change of each variable from its
+        first value), "menu" (one variable at a time) or "film" (a map with a slider).
+    span : str
+        "all", "cycles" (last three cycles) or "contact" (part of x that carries load).
+    log : str
+        Logarithmic axes: "", "x", "y" or "xy"; "auto" decides by the values.
+    by : str
+        Variable of codes that colour the points.
+    marks : tuple of str
+        Variables whose values are vertical lines.
+    y2 : tuple of str
+        Variables of a second vertical axis.
+    labels : tuple of str
+        Names of the horizontal and the vertical axis; "" for the name of the variable.
+    caption : str
+    """
+
+    title: str
+    x: str
+    y: tuple[str, ...]
+    style: str = "line"
+    span: str = "all"
+    log: str = ""
+    by: str = ""
+    marks: tuple[str, ...] = ()
+    y2: tuple[str, ...] = ()
+    labels: tuple[str, str] = ("", "")
+    caption: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """Column of a table.
+
+    key: key in each row of the details, or name of a variable; title: heading; style: "text", or "quantity" for a number
+    with the unit and the error of its row.
+    """
+
+    key: str
+    title: str
+    style: str = "text"
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Table of an answer.
+
+    title: heading; source: path of a list of objects in `details`, such as "limits" or "cases/failed", or the name of a
+    dimension of `data`; columns: what it shows.
+    """
+
+    title: str
+    source: str
+    columns: tuple[Column, ...]
+
+
+RUN = (
+    Chart(
+        "Friction loop",
+        "loop_slide",
+        ("loop_friction_force", "measured_force@measured_slide"),
+        labels=("slide", "friction force"),
+        caption="Friction force against the slide of the interface in the last cycle, or over the whole run without cycles.",
+    ),
+    Chart(
+        "Displacement in the last cycles",
+        "time",
+        ("relative_displacement", "output_displacement"),
+        span="cycles",
+        caption="Displacement of the output relative to the base; of each interface in a rig of masses.",
+    ),
+    Chart(
+        "Acceleration in the last cycles",
+        "time",
+        ("absolute_acceleration", "base_acceleration"),
+        span="cycles",
+        labels=("", "acceleration"),
+        caption="Acceleration of the output, base motion included, and of the base.",
+    ),
+    Chart(
+        "Friction force in the last cycles",
+        "time",
+        ("friction_force",),
+        span="cycles",
+        caption="Resultant of the frictional shear stress.",
+    ),
+    Chart(
+        "Steady motions",
+        "curve_frequency",
+        ("curve_amplitude",),
+        by="curve_regime",
+        marks=("curve_fold",),
+        caption="Half the peak-to-peak motion at the output over the drive frequency; vertical lines: the curve turns back.",
+    ),
+    Chart(
+        "Steady motions",
+        "curve_drive",
+        ("curve_amplitude",),
+        by="curve_regime",
+        marks=("curve_fold",),
+        log="auto",
+        caption="Half the peak-to-peak motion at the output over the drive; vertical lines: the curve turns back.",
+    ),
+    Chart(
+        "Frequency of the decay",
+        "decay_amplitude",
+        ("decay_frequency",),
+        log="x",
+        caption="Frequency of the released output against its amplitude.",
+    ),
+    Chart(
+        "Damping of the decay",
+        "decay_amplitude",
+        ("decay_damping",),
+        log="x",
+        caption="Damping ratio, structure and friction together, against the amplitude.",
+    ),
+    Chart(
+        "Frequency response H1",
+        "frequency",
+        ("gain",),
+        log="xy",
+        marks=("gain_peak",),
+        caption="Displacement of the output divided by the acceleration of the base; the vertical line is the peak.",
+    ),
+    Chart(
+        "Coherence", "frequency", ("coherence",), log="x", caption="Coherence of drive and output."
+    ),
+    Chart(
+        "Spectral density",
+        "frequency",
+        ("absolute_acceleration_spectrum", "base_acceleration_spectrum"),
+        log="xy",
+        labels=("", "spectral density"),
+        caption="One-sided spectral densities of the accelerations of output and base.",
+    ),
+    Chart(
+        "Levels of the drive",
+        "level_drive",
+        ("level_relative_displacement_amplitude",),
+        "points",
+        log="auto",
+        by="level_stuck",
+        labels=("drive", "amplitude"),
+        caption="Amplitude at the end of each level; each level starts from the final state of the one before.",
+    ),
+    Chart(
+        "Against the measurement: acceleration",
+        "measured_input",
+        ("measured_acceleration", "computed_acceleration@computed_input"),
+        "points",
+        labels=("base acceleration", "indicated acceleration"),
+        caption="Readings at the drive frequency, and what the sensors would indicate in the computed motion.",
+    ),
+    Chart(
+        "Against the measurement: displacement",
+        "measured_input",
+        ("measured_displacement", "computed_displacement@computed_input"),
+        "points",
+        labels=("base acceleration", "indicated displacement"),
+        caption="Readings at the drive frequency, and what the sensors would indicate in the computed motion.",
+    ),
+    Chart(
+        "Pressure on the interface",
+        "x",
+        ("normal_stress",),
+        "area",
+        "contact",
+        caption="Normal stress at the end of the run, compression positive; only the part in contact.",
+    ),
+    Chart(
+        "Shear stress on the interface",
+        "x",
+        ("shear_stress",),
+        "map",
+        "contact",
+        caption="Frictional shear stress over x and the frames of the last cycle.",
+    ),
+    Chart(
+        "Where it sticks and slips",
+        "x",
+        ("status",),
+        "map",
+        "contact",
+        caption="State of each node in the frames of the last cycle.",
+    ),
+    Chart("Gap", "x", ("gap",), caption="Gap between the loaded surfaces at the end of the run."),
+    Chart(
+        "Wear over the cycles",
+        "wear_cycle",
+        ("wear_worn_depth_max",),
+        caption="Largest worn depth, both pieces together.",
+    ),
+    Chart(
+        "Pressure while it wears",
+        "x",
+        ("wear_normal_stress",),
+        "overlay",
+        "contact",
+        caption="Normal stress after the cycles that the colours name.",
+    ),
+    Chart(
+        "Worn depth",
+        "x",
+        ("wear_worn_depth",),
+        "overlay",
+        caption="Worn depth of both pieces together after the cycles that the colours name.",
+    ),
+    Chart(
+        "Whole run",
+        "time",
+        ("relative_displacement", "output_displacement"),
+        caption="Before the last cycles only reversals are stored.",
+    ),
+    Chart(
+        "Energy",
+        "time",
+        ("energy_dissipated", "energy_stored"),
+        labels=("", "energy"),
+        caption="Energy dissipated by friction since the start, and elastic energy of the interface.",
+    ),
+    Chart(
+        "Accuracy against time",
+        "accuracy_seconds",
+        ("accuracy_error",),
+        "points",
+        log="xy",
+        labels=("CPU time", "largest error / allowed error"),
+        caption="Estimated error of this run and of the coarser runs from which it is estimated.",
+    ),
+)
+
+SWEEP: tuple[Chart, ...] = ()
+BACKBONE: tuple[Chart, ...] = ()
+COMPARE: tuple[Chart, ...] = ()
+PROFILE: tuple[Chart, ...] = ()
+FIT: tuple[Chart, ...] = ()
+COST: tuple[Chart, ...] = ()
+
+CHARTS: dict[str, tuple[Chart, ...]] = {
+    **dict.fromkeys(("patch", "bench", "rig", "linear"), RUN),
+    "sweep": SWEEP,
+    "backbone": BACKBONE,
+    "compare": COMPARE,
+    "profile": PROFILE,
+    "fit": FIT,
+    "cost": COST,
+}
+
+# CSV files: kind of answer -> file -> {heading of a column: variable}
+CURVES: dict[str, dict[str, dict[str, str]]] = {}
+
+# tables that stand below the charts
+TABLES: dict[str, tuple[Table, ...]] = {
+    kind: (
+        Table(
+            "Against the measurement",
+            "measured",
+            (
+                Column("reading", "reading"),
+                Column("measured", "measured", "quantity"),
+                Column("computed", "computed", "quantity"),
+                Column("ratio", "computed / measured", "quantity"),
+            ),
+        ),
+    )
+    for kind in ("patch", "bench", "rig", "linear")
+}

@@ -1,0 +1,312 @@
+"""report.html: a self-contained page, made from the files of one or several answers alone.
+
+Every page has the same template: verdict, tiles with the key numbers, charts, tables, all measures, notes and origin.
+"""
+
+import base64
+import gzip
+import json
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+
+from ..core import PatchfemError
+from ..disk.atomic_write import write_text
+from ..formatting import format_number
+from . import quantities, store
+from .answer import Answer, Quantity
+from .charts import panels, plotly
+from .charts.table import CHARTS, TABLES, Column
+
+FILE_TEXTS = {
+    "fields.vtkhdf": "fields of both pieces and their interface, frame by frame (ParaView 5.13 or newer)",
+    "interfaces": "fields of every interface that has a patch of its own, in the same format",
+    "result.nc": "histories, curves and fields along the interface (xarray, MATLAB, ncdump)",
+    "backbone.nc": "curves (xarray, MATLAB, ncdump)",
+    "sweep.nc": "all cases (xarray, MATLAB, ncdump)",
+    "summary.json": "verdict, measures with their errors, warnings and notes, in SI units",
+    "scene.resolved.toml": "the scene in SI units, with all default values",
+}
+WIDE_STYLES = ("relative", "menu", "film")  # styles of charts that take the whole width
+TALL_STYLES = ("menu", "film", "bars")
+COMPRESSION = 6  # of the figures in a page
+
+
+def write_page(folder: Path) -> Path:
+    """Write report.html into a folder from the other files of the folder, and return its path.
+
+    Raises
+    ------
+    PatchfemError
+        If the folder has no complete result.
+    """
+    path = Path(folder) / store.PAGE
+    write_text(path, make_page([Path(folder)]))
+    return path
+
+
+def make_page(folders: list[Path]) -> str:
+    """Return the page of an answer, or of several answers of the same kind side by side.
+
+    Parameters
+    ----------
+    folders : list of Path
+
+    Raises
+    ------
+    PatchfemError
+        If a folder has no complete result, or if the answers are of different kinds.
+    """
+    answers = _read_all(folders)
+    first = next(iter(answers.values()))
+    figures = [
+        plotly.draw(panel)
+        | {"wide": panel.style in WIDE_STYLES, "tall": panel.style in TALL_STYLES}
+        for panel in panels.make_panels(answers, CHARTS[first.kind])
+    ]
+    if len(folders) == 1:
+        figures += _draw_films(folders[0])
+    for number, figure in enumerate(figures):
+        figure["anchor"] = f"chart{number}"
+    content = _describe(answers)
+    content |= {
+        "tables": make_tables(first) if len(answers) == 1 else [],
+        "files": _list_files(folders[0]) if len(folders) == 1 else [],
+        "figures": figures,
+        "data": _pack([_strip(figure) for figure in figures]),
+        "library": _library() if figures else "",
+    }
+    return _template().render(content)
+
+
+def _read_all(folders: list[Path]) -> dict[str, Answer]:
+    """Return the answers in folders by their names in legends; "" for a single answer."""
+    if not folders:
+        raise PatchfemError("report: name one or more results folders")
+    if len(folders) == 1:
+        return {"": store.read(folders[0])}
+    answers = {}
+    for folder in folders:
+        name = folder.resolve().name
+        answers[f"{name} ({len(answers) + 1})" if name in answers else name] = store.read(folder)
+    if len({CHARTS[answer.kind] for answer in answers.values()}) > 1:
+        kinds = ", ".join(f"{name}: {answer.kind}" for name, answer in answers.items())
+        raise PatchfemError(f"report: the folders have results of different kinds ({kinds})")
+    return answers
+
+
+def _describe(answers: dict[str, Answer]) -> dict:
+    """Return the parts of a page that are text: title, verdict, tiles, measures, notes and origin."""
+    several = len(answers) > 1
+    first = next(iter(answers.values()))
+    names = dict.fromkeys(name for answer in answers.values() for name in answer.quantities)
+    zeros = [
+        name
+        for name in names
+        if all(
+            name in answer.quantities and quantities.is_zero(name, answer.quantities[name])
+            for answer in answers.values()
+        )
+    ]
+    measures = [
+        {
+            "name": f"measure-{name}",
+            "label": name.replace("_", " "),
+            "texts": [_format_entry(name, answer) for answer in answers.values()],
+            "meaning": quantities.describe(name),
+        }
+        for name in names
+        if name not in zeros
+    ]
+    if several and measures:
+        heading = {"name": "", "label": "", "texts": list(answers), "meaning": ""}
+        measures.insert(0, heading)
+    origin = first.origin
+    texts = [
+        ("Scene", origin.get("scene", "")),
+        ("Scene in SI with all defaults", origin.get("resolved", "")),
+    ]
+    versions = ", ".join(f"{name} {text}" for name, text in origin.get("versions", {}).items())
+    return {
+        "title": " and ".join(answers) if several else first.title or f"patchfem {first.kind}",
+        "subtitle": _subtitle(first),
+        "verdict": _label_all(answers, lambda answer: answer.verdict[: 1 if several else None]),
+        "warnings": _label_all(answers, lambda answer: answer.remarks.warnings),
+        "notes": _label_all(answers, lambda answer: answer.remarks.notes),
+        "tiles": [] if several else make_tiles(first),
+        "measures": measures,
+        "open_measures": several,
+        "zeros": [name.replace("_", " ") for name in zeros],
+        "command": "" if several else origin.get("command", ""),
+        "effects": [] if several else first.details.get("effects", []),
+        "texts": [] if several else [part for part in (*texts, ("Versions", versions)) if part[1]],
+    }
+
+
+def _label_all(answers: dict[str, Answer], get_sentences) -> list[str]:
+    """Return the sentences of all answers, each with the name of its answer if there are several."""
+    return [
+        f"{name}: {sentence}" if name else sentence
+        for name, answer in answers.items()
+        for sentence in get_sentences(answer)
+    ]
+
+
+def _subtitle(answer: Answer) -> str:
+    """Return the line below the title: version, kind, drive, engine and time."""
+    details = answer.details
+    engine = (details.get("numerics") or {}).get("engine", "") if answer.is_run else ""
+    seconds = (details.get("seconds") or {}).get("total") if answer.is_run else None
+    parts = (
+        f"patchfem {answer.origin.get('patchfem', '')}".strip(),
+        answer.kind,
+        answer.origin.get("driven", ""),
+        f"engine {engine}" if engine else "",
+        f"computed in {seconds:.2f} s" if seconds is not None else "",
+    )
+    return " · ".join(part for part in parts if part)
+
+
+def make_tiles(answer: Answer) -> list[dict[str, str]]:
+    """Return the tiles of the key quantities: `label`, `text` and `meaning` of each."""
+    return [
+        {
+            "label": name.replace("_", " "),
+            "text": quantities.format_quantity(name, quantity),
+            "meaning": quantities.describe(name),
+        }
+        for name, quantity in quantities.choose_key(answer.quantities).items()
+    ]
+
+
+def _format_entry(name: str, answer: Answer) -> str:
+    """Return a measure as text, or why it has no value."""
+    quantity = answer.quantities.get(name)
+    if quantity is None:
+        return ""
+    text = quantities.format_quantity(name, quantity)
+    return f"{text} ({quantity.reason})" if quantity.value is None and quantity.reason else text
+
+
+def make_tables(answer: Answer) -> list[dict]:
+    """Return the tables of an answer that have rows: `title`, `headings` and `rows` of strings."""
+    tables = []
+    for table in TABLES.get(answer.kind, ()):
+        rows = _find_rows(answer, table.source)
+        if not rows:
+            continue
+        columns = [column for column in table.columns if any(column.key in row for row in rows)]
+        tables.append(
+            {
+                "title": table.title,
+                "headings": [column.title for column in columns],
+                "rows": [[_format_cell(row, column) for column in columns] for row in rows],
+            }
+        )
+    return tables
+
+
+def _find_rows(answer: Answer, source: str) -> list[dict]:
+    """Return the rows of a table from a list in the details, or from the variables of a dimension."""
+    content = answer.details
+    for key in source.split("/"):
+        content = content.get(key) if isinstance(content, dict) else None
+    if isinstance(content, list):
+        return content
+    variables = {
+        name: variable for name, variable in answer.data.items() if variable.dims == (source,)
+    }
+    size = len(next(iter(variables.values())).values) if variables else 0
+    return [
+        {name: _make_cell(variable, k) for name, variable in variables.items()} for k in range(size)
+    ]
+
+
+def _make_cell(variable, index: int):
+    """Return one value of a variable: a string, or a quantity as an object."""
+    value = variable.values[index]
+    if variable.meanings:
+        return variable.meanings[int(value)]
+    if isinstance(value, str):
+        return value
+    number = float(value)
+    return {"value": number if np.isfinite(number) else None, "unit": variable.unit}
+
+
+def _format_cell(row: dict, column: Column) -> str:
+    """Return a cell of a table as text; a missing value is a dash."""
+    value = row.get(column.key)
+    if value is None:
+        return "-"
+    if isinstance(value, dict):
+        known = {key: value.get(key) for key in ("value", "error", "low", "high")}
+        return quantities.format_quantity(
+            column.key, Quantity(unit=value.get("unit", "1"), **known)
+        )
+    if isinstance(value, float):
+        if column.style == "quantity":
+            return quantities.format_quantity(
+                column.key, Quantity(value, row.get("unit", "1"), row.get("error"))
+            )
+        return format_number(value, 6)
+    return str(value)
+
+
+def _draw_films(folder: Path) -> list[dict]:
+    """Return the figure of the stress in both pieces with a slider over the frames, if the folder has the fields."""
+    path = folder / store.FIELDS
+    if not path.is_file():
+        return []
+    from .fields.film import stress_frames
+
+    frames = stress_frames(path)
+    if not np.nanmax(frames["values"], initial=0.0) > 0:
+        return []
+    panel = panels.make_film(frames, "von Mises stress in both pieces", "Pa")
+    return [plotly.draw(panel) | {"wide": True, "tall": True}]
+
+
+def _list_files(folder: Path) -> list[tuple[str, str]]:
+    """Return name and description of the files beside the page."""
+    names = sorted(path.name for path in folder.iterdir() if not path.name.startswith("."))
+    csv_text = "columns of this curve (spreadsheet)"
+    known = [
+        (name, FILE_TEXTS.get(name, csv_text))
+        for name in names
+        if name in FILE_TEXTS or name.endswith(".csv")
+    ]
+    details = [
+        (name, "all numbers of this answer, in SI units")
+        for name in names
+        if name in store.DETAIL_FILES.values()
+    ]
+    return known + details
+
+
+def _strip(figure: dict) -> dict:
+    """Return the entries of a figure that the script of the page reads."""
+    return {key: figure[key] for key in ("anchor", "data", "layout", "frames") if key in figure}
+
+
+def _pack(content: list) -> str:
+    """Return an object as compressed JSON in base64; equal objects give equal strings."""
+    text = json.dumps(content, separators=(",", ":"), allow_nan=False)
+    return base64.b64encode(gzip.compress(text.encode(), COMPRESSION, mtime=0)).decode()
+
+
+@cache
+def _library() -> str:
+    """Return the compressed bundle of plotly.js in base64."""
+    path = files(__package__) / "plotly" / "plotly-cartesian.min.js.gz"
+    return base64.b64encode(path.read_bytes()).decode()
+
+
+@cache
+def _template():
+    """Return the template of all pages."""
+    from jinja2 import Environment
+
+    text = (files(__package__) / "page.html").read_text("utf-8")
+    return Environment(autoescape=True, trim_blocks=True).from_string(text)

@@ -1,0 +1,173 @@
+"""Definitions of all quantities, and how their numbers are displayed.
+
+The measures of runs are defined in `response.rows` and `runs.results.patch_rows`; QUANTITIES defines those of the other
+verbs. KEY lists the quantities that come first: in the tiles of a page, on the screen and in the first columns of a table.
+"""
+
+from typing import NamedTuple
+
+from ..formatting import (
+    UNIT_LADDERS,
+    choose_unit,
+    format_number,
+    format_with_error,
+    round_to_error,
+)
+from ..response import rows
+from ..runs.results import patch_rows
+from .answer import Quantity
+
+MAX_TILES = 10  # largest number of key quantities on a page and on the screen
+# words at the end of a name that mark a fraction (in percent) or a phase (in degrees)
+PERCENT_WORDS = ("fraction", "share")
+DEGREES = ("deg", 57.29577951308232)
+
+KEY = (
+    "worn_depth_mean",
+    "worn_depth_max",
+    "worn_area",
+    "worn_volume",
+    "relative_displacement_amplitude",
+    "relative_displacement_rms",
+    "absolute_acceleration_peak",
+    "absolute_acceleration_rms",
+    "response_frequency",
+    "response_damping",
+    "slip_amplitude",
+    "equivalent_stiffness",
+    "equivalent_damping",
+    "loop_area",
+    "friction_power",
+    "friction_force_peak",
+    "friction_ratio_peak",
+    "flutter_amplitude",
+    "onset_level",
+    "jump_level",
+    "contact_fraction",
+    "pressure_peak",
+    "contact_half_width",
+    "normal_load",
+    "approach",
+    "normal_stiffness",
+    "tangential_stiffness",
+)
+
+
+class Definition(NamedTuple):
+    """Unit and meaning of a quantity."""
+
+    unit: str
+    text: str
+
+
+QUANTITIES: dict[str, Definition] = {
+    # compare, profile: see the builders of these answers
+    # backbone
+    # fit
+    # cost
+}
+
+
+def find_definition(name: str) -> Definition | None:
+    """Return the definition of a quantity, whose name may end in the number of an interface; None if there is none."""
+    base_name = rows.remove_interface_number(name)
+    for table in (QUANTITIES, patch_rows.TABLE, rows.TABLE):
+        for candidate in (name, base_name):
+            if candidate in table:
+                return Definition(table[candidate].unit, table[candidate].text)
+    return None
+
+
+def describe(name: str) -> str:
+    """Return what a quantity is in one sentence, or "" if no table defines it."""
+    definition = find_definition(name)
+    if definition is None:
+        return ""
+    base_name = rows.remove_interface_number(name)
+    number = name.removeprefix(base_name).removeprefix("_")
+    text = f"{definition.text}; of interface {number}" if number else definition.text
+    return f"{text[0].upper()}{text[1:].rstrip('.')}."
+
+
+def choose_scale(name: str, unit: str, size: float) -> tuple[str, float]:
+    """Return the display unit of a quantity and the number of it in one SI unit.
+
+    Parameters
+    ----------
+    name : str
+        A name that ends in `fraction` or `share` is displayed in percent, one that ends in `phase` in degrees.
+    unit : str
+        SI unit.
+    size : float
+        Magnitude of the number [SI].
+    """
+    last_word = rows.remove_interface_number(name).rpartition("_")[2]
+    if unit == "1" and last_word in PERCENT_WORDS:
+        return "%", 100.0
+    if unit == "rad" and last_word == "phase":
+        return DEGREES
+    if unit not in UNIT_LADDERS:
+        return ("" if unit == "1" else unit.replace(" s-1", "/s")), 1.0
+    return choose_unit(UNIT_LADDERS[unit], size)
+
+
+def format_quantity(name: str, quantity: Quantity) -> str:
+    """Return a quantity as text, such as "14.808 ± 0.041 um" or "2.1 um (1.8 to 2.6)".
+
+    An interval that is not centred on the value stands in brackets. A missing value is a dash.
+    """
+    value = quantity.value
+    if value is None:
+        return "-"
+    error = quantity.error
+    ends = [abs(end) for end in (quantity.low, quantity.high) if end is not None]
+    unit, scale = choose_scale(name, quantity.unit, max([abs(value), *ends]))
+    if error is not None or not ends:
+        texts = round_to_error(
+            value * scale,
+            None if error is None else error * scale,
+            _zero_limit(name, quantity) * scale,
+        )
+        return format_with_error(*texts, unit)
+    return _format_interval(value * scale, quantity, unit, scale)
+
+
+def _format_interval(value: float, quantity: Quantity, unit: str, scale: float) -> str:
+    """Return a value, in its display unit, with the ends of its interval in brackets."""
+    ends = [None if end is None else end * scale for end in (quantity.low, quantity.high)]
+    if None in ends:
+        limit = f"at least {ends[0]:.3g}" if ends[1] is None else f"at most {ends[1]:.3g}"
+        return f"{format_number(value, 3)} {unit} ({limit})".replace("  ", " ")
+
+    # both ends and the value have two digits of the width of the interval
+    half_width = (ends[1] - ends[0]) / 2
+    texts = [round_to_error(number, half_width)[0] for number in (value, *ends)]
+    return f"{texts[0]} {unit} ({texts[1]} to {texts[2]})".replace("  ", " ")
+
+
+def _zero_limit(name: str, quantity: Quantity) -> float:
+    """Return the magnitude [SI] below which a quantity is displayed as 0.
+
+    It is the floor of its definition where that is smaller than the floor of the run, which a run raises to its tolerance.
+    """
+    table = patch_rows.TABLE if name in patch_rows.TABLE else rows.TABLE
+    row = table.get(rows.remove_interface_number(name))
+    return quantity.floor if row is None else min(row.floor, quantity.floor)
+
+
+def is_zero(name: str, quantity: Quantity) -> bool:
+    """Return whether a quantity is displayed as 0."""
+    return format_quantity(name, quantity).partition(" ")[0] == "0"
+
+
+def choose_key(quantities: dict[str, Quantity]) -> dict[str, Quantity]:
+    """Return the quantities for the tiles: those of KEY that are present, at most MAX_TILES; none that is missing or 0."""
+    names = [name for name in KEY if name in quantities]
+    # the quantities of a verb without key names are shown in their own order
+    names = names or list(quantities)
+    shown = {
+        name: quantities[name]
+        for name in names
+        if quantities[name].value is not None and not is_zero(name, quantities[name])
+    }
+    return dict(list(shown.items())[:MAX_TILES])

@@ -1,0 +1,219 @@
+"""Files of an answer: `write` puts them into a folder, `read` returns the answer from them.
+
+A folder contains summary.json (verdict, quantities, remarks, origin), the JSON file of the verb with the keys that scripts
+read, the arrays as netCDF, a CSV file for each curve, and report.html, which is made from the other files.
+"""
+
+import csv
+import io
+import json
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from .. import __version__
+from ..core import PatchfemError
+from ..disk.atomic_write import write_text
+from .answer import RUN_KINDS, Answer, Quantity, Remarks
+from .charts.table import CURVES
+from .netcdf import read_netcdf, write_netcdf
+
+SUMMARY = "summary.json"
+SCENE = "scene.resolved.toml"
+PAGE = "report.html"
+FIELDS = "fields.vtkhdf"
+# netCDF file of each kind of answer; result.nc for all others
+DATA_FILES = {"sweep": "sweep.nc", "backbone": "backbone.nc"}
+# JSON file with the `details` of each kind of answer; those of a run are in summary.json
+DETAIL_FILES = {
+    kind: f"{kind}.json" for kind in ("sweep", "backbone", "compare", "profile", "fit", "cost")
+}
+
+
+def data_file(kind: str) -> str:
+    """Return the name of the netCDF file of a kind of answer."""
+    return DATA_FILES.get(kind, "result.nc")
+
+
+def write(answer: Answer, folder: Path) -> None:
+    """Write all files of an answer except its page into an existing folder.
+
+    Parameters
+    ----------
+    answer : Answer
+    folder : Path
+
+    Raises
+    ------
+    OSError or WriteError
+        If a file cannot be written.
+    """
+    if answer.origin.get("resolved"):
+        write_text(folder / SCENE, answer.origin["resolved"])
+    if answer.data:
+        write_netcdf(answer, folder / data_file(answer.kind))
+    for name, text in format_curves(answer).items():
+        write_text(folder / name, text)
+    if not answer.is_run:
+        write_json(answer.details, folder / DETAIL_FILES[answer.kind])
+    write_json(make_summary(answer), folder / SUMMARY)
+
+
+def write_json(content: dict, path: Path) -> None:
+    """Write an object as strict JSON; ValueError for a number that is not finite."""
+    text = json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False)
+    write_text(path, text + "\n")
+
+
+def make_summary(answer: Answer) -> dict:
+    """Return the contents of summary.json, which are those of `run --json` for a run."""
+    details = dict(answer.details) if answer.is_run else {}
+    summary = {
+        "patchfem": answer.origin.get("patchfem", __version__),
+        "title": answer.title,
+        "kind": answer.kind,
+    }
+    if "outcome" in details:
+        summary["outcome"] = details.pop("outcome")
+    summary |= {
+        "verdict": list(answer.verdict),
+        "measures": {name: quantity.as_json() for name, quantity in answer.quantities.items()},
+        "warnings": list(answer.remarks.warnings),
+        "notes": list(answer.remarks.notes),
+    }
+    # the resolved scene has a file of its own
+    origin = {key: value for key, value in answer.origin.items() if key != "resolved"}
+    return summary | details | {"origin": origin}
+
+
+def read(folder: Path) -> Answer:
+    """Read an answer from the files in a folder.
+
+    Parameters
+    ----------
+    folder : Path
+
+    Returns
+    -------
+    Answer
+
+    Raises
+    ------
+    PatchfemError
+        If the folder has no complete result, or if one of its files is damaged.
+    """
+    folder = Path(folder)
+    summary = read_summary(folder)
+    kind = summary["kind"]
+    origin = summary["origin"]
+    known_keys = {"patchfem", "title", "kind", "verdict", "measures", "warnings", "notes", "origin"}
+    details = {key: value for key, value in summary.items() if key not in known_keys}
+    try:
+        if kind in DETAIL_FILES:
+            details = json.loads((folder / DETAIL_FILES[kind]).read_text("utf-8"))
+        if (folder / SCENE).is_file():
+            origin = origin | {"resolved": (folder / SCENE).read_text("utf-8")}
+        path = folder / data_file(kind)
+        data = read_netcdf(path) if path.is_file() else {}
+    except (OSError, ValueError, KeyError, RuntimeError) as error:
+        raise PatchfemError(f"{folder}: a file of this folder is damaged: {error}") from None
+    return Answer(
+        kind=kind,
+        title=summary["title"],
+        verdict=tuple(summary["verdict"]),
+        quantities={name: Quantity(**entry) for name, entry in summary["measures"].items()},
+        data=data,
+        remarks=Remarks(tuple(summary["warnings"]), tuple(summary["notes"])),
+        details=details,
+        origin=origin,
+    )
+
+
+def read_summary(folder: Path) -> dict:
+    """Read and check the summary.json of a folder.
+
+    Raises
+    ------
+    PatchfemError
+        If there is none, if it is damaged, or if a version before 2.0 wrote it.
+    """
+    path = Path(folder) / SUMMARY
+    if not path.is_file():
+        raise PatchfemError(f"{folder}: this is not a results folder: it has no {SUMMARY}")
+    try:
+        text = path.read_text("utf-8")
+        _summary_model().model_validate_json(text)
+        return json.loads(text)
+    except (OSError, ValueError, RecursionError) as error:
+        reason = _first_mistake(error)
+        if '"verdict"' not in path.read_text("utf-8", errors="replace"):
+            reason = "patchfem before 2.0 wrote it; run the scene again"
+        raise PatchfemError(f"{path}: this summary cannot be read: {reason}") from None
+
+
+def _first_mistake(error: Exception) -> str:
+    """Return the first mistake that pydantic reports, or the text of another error."""
+    if not hasattr(error, "errors"):
+        return str(error) or type(error).__name__
+    mistake = error.errors(include_url=False)[0]
+    place = ".".join(map(str, mistake["loc"]))
+    return f"{place}: {mistake['msg']}" if place else mistake["msg"]
+
+
+@cache
+def _summary_model() -> type:
+    """Return the pydantic model of the entries of summary.json that `read` needs."""
+    from typing import Literal
+
+    from pydantic import BaseModel, ConfigDict
+
+    class Number(BaseModel):
+        """Entry of a measure."""
+
+        model_config = ConfigDict(extra="forbid", strict=True)
+        value: float | None
+        unit: str
+        error: float | None
+        low: float | None
+        high: float | None
+        floor: float
+        reason: str = ""
+
+    class Summary(BaseModel):
+        """Entries of all kinds of answers."""
+
+        model_config = ConfigDict(strict=True)
+        title: str
+        kind: Literal[(*RUN_KINDS, *DETAIL_FILES)]
+        verdict: list[str]
+        measures: dict[str, Number]
+        warnings: list[str]
+        notes: list[str]
+        origin: dict
+
+    return Summary
+
+
+def format_curves(answer: Answer) -> dict[str, str]:
+    """Return the CSV files of the curves of an answer: name -> text.
+
+    A column is headed by its name and its unit in brackets, in SI units. The rows are those of the first variable.
+    """
+    files = {}
+    for name, columns in CURVES.get(answer.kind, {}).items():
+        variables = {
+            title: answer.data[source] for title, source in columns.items() if source in answer.data
+        }
+        if not variables:
+            continue
+        output = io.StringIO()
+        writer = csv.writer(output, lineterminator="\n")
+        writer.writerow(
+            f"{title} [{variable.unit}]" if variable.unit not in ("", "1") else title
+            for title, variable in variables.items()
+        )
+        lists = [np.asarray(variable.values).tolist() for variable in variables.values()]
+        writer.writerows(zip(*lists, strict=True))
+        files[name] = output.getvalue()
+    return files
