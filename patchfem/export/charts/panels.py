@@ -224,6 +224,8 @@ def _select(data: dict[str, Variable], chart: Chart) -> dict[str, Variable]:
     keep = _find_span(data, chart, x_name)
     if keep is None:
         return data
+    if not keep.size:
+        return {}
     dimension = "time" if chart.span == "cycles" else x_name
     return {name: _take(variable, dimension, keep) for name, variable in data.items()}
 
@@ -235,6 +237,10 @@ def _find_span(data: dict[str, Variable], chart: Chart, x_name: str) -> np.ndarr
         time = data["time"].values
         start = time[-1] - N_SHOWN_CYCLES * float(data["period"].values) * (1 + 1e-6)
         return np.flatnonzero(time >= start)
+    if chart.span == "run" and "period" in data:
+        time = data["time"].values
+        is_longer = time[-1] - time[0] > (N_SHOWN_CYCLES + 0.5) * float(data["period"].values)
+        return None if is_longer else np.arange(0)
     if chart.span == "contact" and pressure_name in data:
         pressure = data[pressure_name].values
         loaded = np.flatnonzero((pressure > 0).any(axis=tuple(range(pressure.ndim - 1))))
