@@ -219,8 +219,10 @@ def _select(data: dict[str, Variable], chart: Chart) -> dict[str, Variable]:
     x_name = _find_x(data, chart)
     names = [_split(name)[0] for name in chart.y]
     shown = [name for name in names if name in data and np.any(data[name].values)]
-    if not x_name or not shown or (data[x_name].values.size < 2 and chart.style == "line"):
+    if not x_name or not shown:
         return {}
+    if chart.style == "line" and np.ptp(np.asarray(data[x_name].values, float)) == 0:
+        return {}  # a single point, or a curve over another variable
     keep = _find_span(data, chart, x_name)
     if keep is None:
         return data
@@ -237,9 +239,10 @@ def _find_span(data: dict[str, Variable], chart: Chart, x_name: str) -> np.ndarr
         time = data["time"].values
         start = time[-1] - N_SHOWN_CYCLES * float(data["period"].values) * (1 + 1e-6)
         return np.flatnonzero(time >= start)
-    if chart.span == "run" and "period" in data:
-        time = data["time"].values
-        is_longer = time[-1] - time[0] > (N_SHOWN_CYCLES + 0.5) * float(data["period"].values)
+    if chart.span == "run":
+        # without more cycles the chart of the last cycles shows the whole run
+        period = float(data["period"].values) if "period" in data else np.inf
+        is_longer = np.ptp(data["time"].values) > (N_SHOWN_CYCLES + 0.5) * period
         return None if is_longer else np.arange(0)
     if chart.span == "contact" and pressure_name in data:
         pressure = data[pressure_name].values

@@ -22,7 +22,7 @@ class Chart:
         first dimension), "bars" (horizontal bars of the values of a dimension), "relative" (change of each variable from its
         first value), "menu" (one variable at a time) or "film" (a map with a slider).
     span : str
-        "all", "cycles" (last three cycles), "run" (all cycles, if there are more) or "contact" (part of x that carries load).
+        "all", "cycles" (last three cycles), "run" (all cycles, if there are more) or "contact" (the loaded part of x).
     log : str
         Logarithmic axes: "", "x", "y" or "xy"; "auto" decides by the values.
     by : str
