@@ -68,8 +68,10 @@ def make_page(folders: list[Path]) -> str:
     ]
     if len(folders) == 1:
         figures += _draw_films(folders[0])
+    captions = first.details.get("captions", {}) if len(folders) == 1 else {}
     for number, figure in enumerate(figures):
         figure["anchor"] = f"chart{number}"
+        figure["caption"] += f" {captions[figure['title']]}" if figure["title"] in captions else ""
     content = _describe(answers)
     content |= {
         "tables": make_tables(first) if len(answers) == 1 else [],

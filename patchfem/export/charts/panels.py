@@ -348,6 +348,8 @@ def _find_band(data: dict[str, Variable], name: str) -> tuple[np.ndarray | None,
     values = np.asarray(data[name].values, float)
     if f"{name}_error" in data:
         error = np.asarray(data[f"{name}_error"].values, float)
+        # an error as large as the value, as at a fold, would only hide the curve
+        error = np.where(error <= np.abs(values), error, np.nan)
         return values - error, values + error
     if f"{name}_low" in data and f"{name}_high" in data:
         return tuple(np.asarray(data[f"{name}_{end}"].values, float) for end in ("low", "high"))
