@@ -13,7 +13,7 @@ MAX_CURVE_POINTS = 3000  # a longer curve keeps the extremes of as many interval
 MAX_MAP_COLUMNS = 400  # a finer map keeps every n-th column
 N_SHOWN_CYCLES = 3  # number of cycles of the span "cycles"
 MARGIN_NODES = 3  # unloaded nodes beside the contact that the span "contact" shows
-STATUS_NAMES = ("open", "stick", "slip")
+MAX_INTERFACES = 6  # largest number of interfaces with charts of their own
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,8 +110,26 @@ def make_panels(answers: dict[str, Answer], charts: tuple[Chart, ...]) -> list[P
         Answers by their name in the legend; one answer may have the name "".
     charts : tuple of Chart
     """
-    panels = [make_panel(answers, chart) for chart in charts]
+    first_data = next(iter(answers.values())).data
+    all_charts = [part for chart in charts for part in _repeat_for_interfaces(chart, first_data)]
+    panels = [make_panel(answers, chart) for chart in all_charts]
     return [panel for panel in panels if panel is not None]
+
+
+def _repeat_for_interfaces(chart: Chart, data: dict[str, Variable]) -> list[Chart]:
+    """Return a chart over x for each interface that has a patch of its own, with the variables x_1, x_2, ..."""
+    numbers = [number for number in range(1, MAX_INTERFACES + 1) if f"x_{number}" in data]
+    if chart.x != "x" or "x" in data or not numbers:
+        return [chart]
+    return [
+        replace(
+            chart,
+            title=f"{chart.title} {number}" if len(numbers) > 1 else chart.title,
+            x=f"x_{number}",
+            y=tuple(f"{name}_{number}" for name in chart.y),
+        )
+        for number in numbers
+    ]
 
 
 def make_panel(answers: dict[str, Answer], chart: Chart) -> Panel | None:
@@ -176,8 +194,7 @@ def _finish(chart: Chart, panel: Panel, data: dict, second_axis: Axis | None) ->
     ]
     panel = replace(panel, marks=marks, caption=chart.caption, y2=second_axis)
     if chart.style == "map":
-        rows_label = "frame" if panel.curves[0].meanings or True else ""
-        return replace(panel, y=Axis(rows_label), colour_label=panel.y.label)
+        return replace(panel, y=Axis("frame"), colour_label=panel.y.label)
     return panel
 
 
@@ -202,23 +219,33 @@ def _select(data: dict[str, Variable], chart: Chart) -> dict[str, Variable]:
     x_name = _find_x(data, chart)
     names = [_split(name)[0] for name in chart.y]
     shown = [name for name in names if name in data and np.any(data[name].values)]
-    if not x_name or not shown or (data[x_name].values.size < 2 and chart.style == "line"):
+    if not x_name or not shown:
         return {}
-    keep = _find_span(data, chart.span)
+    if chart.style == "line" and np.ptp(np.asarray(data[x_name].values, float)) == 0:
+        return {}  # a single point, or a curve over another variable
+    keep = _find_span(data, chart, x_name)
     if keep is None:
         return data
-    dimension = "time" if chart.span == "cycles" else "x"
+    if not keep.size:
+        return {}
+    dimension = "time" if chart.span == "cycles" else x_name
     return {name: _take(variable, dimension, keep) for name, variable in data.items()}
 
 
-def _find_span(data: dict[str, Variable], span: str) -> np.ndarray | None:
-    """Return the indices of a span along `time` or `x`; None for the whole."""
-    if span == "cycles" and "period" in data:
+def _find_span(data: dict[str, Variable], chart: Chart, x_name: str) -> np.ndarray | None:
+    """Return the indices of the span of a chart along `time` or `x`; None for the whole."""
+    pressure_name = "normal_stress" + x_name.removeprefix("x")
+    if chart.span == "cycles" and "period" in data:
         time = data["time"].values
         start = time[-1] - N_SHOWN_CYCLES * float(data["period"].values) * (1 + 1e-6)
         return np.flatnonzero(time >= start)
-    if span == "contact" and "normal_stress" in data:
-        pressure = data["normal_stress"].values
+    if chart.span == "run":
+        # without more cycles the chart of the last cycles shows the whole run
+        period = float(data["period"].values) if "period" in data else np.inf
+        is_longer = np.ptp(data["time"].values) > (N_SHOWN_CYCLES + 0.5) * period
+        return None if is_longer else np.arange(0)
+    if chart.span == "contact" and pressure_name in data:
+        pressure = data[pressure_name].values
         loaded = np.flatnonzero((pressure > 0).any(axis=tuple(range(pressure.ndim - 1))))
         if loaded.size:
             first = max(loaded[0] - MARGIN_NODES, 0)
@@ -321,6 +348,8 @@ def _find_band(data: dict[str, Variable], name: str) -> tuple[np.ndarray | None,
     values = np.asarray(data[name].values, float)
     if f"{name}_error" in data:
         error = np.asarray(data[f"{name}_error"].values, float)
+        # an error as large as the value, as at a fold, would only hide the curve
+        error = np.where(error <= np.abs(values), error, np.nan)
         return values - error, values + error
     if f"{name}_low" in data and f"{name}_high" in data:
         return tuple(np.asarray(data[f"{name}_{end}"].values, float) for end in ("low", "high"))
@@ -362,6 +391,37 @@ def _make_map(variable: Variable, x_values: np.ndarray, axis: Axis) -> Curve:
     if not meanings:
         values = values * axis.scale
     return Curve("", x_values[::step], values, rows=np.arange(len(values)), meanings=meanings)
+
+
+def make_film(frames: dict[str, np.ndarray], title: str, unit: str) -> Panel:
+    """Return the panel of a map that changes over time.
+
+    Parameters
+    ----------
+    frames : dict
+        `x` (k,) and `y` (j,) [m], `times` (f,) [s], `values` (f, j, k).
+    title : str
+    unit : str
+        SI unit of the values.
+    """
+    positions = np.concatenate([frames["x"], frames["y"]])
+    x_axis = _make_axis("x", "m", [positions], "", "x")
+    y_axis = _make_axis("y", "m", [positions], "", "y")
+    colours = _make_axis(title, unit, [frames["values"]], "", "z")
+    times = _make_axis("time", "s", [frames["times"]], "", "z")
+    time_unit = times.label.partition("[")[2].rstrip("]")
+    curves = [
+        Curve(
+            name=f"{format_number(float(time) * times.scale, 5)} {time_unit}",
+            x=frames["x"] * x_axis.scale,
+            y=values * colours.scale,
+            rows=frames["y"] * y_axis.scale,
+        )
+        for time, values in zip(frames["times"], frames["values"], strict=True)
+    ]
+    caption = "The colours are the same in all frames; the interface is at y = 0."
+    label = colours.label.partition("[")[2].rstrip("]")
+    return Panel(title, "film", x_axis, y_axis, curves, caption, colour_label=label)
 
 
 # styles whose data are not one curve per variable: (answers, chart) -> Panel or None
