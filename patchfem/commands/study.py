@@ -1,6 +1,5 @@
 """Commands that run a scene many times: error against time, backbone of a mode, fits."""
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -9,30 +8,34 @@ from cyclopts import Parameter
 
 from ..campaigns import cost as cost_curves
 from ..campaigns import numerical_settings
-from ..campaigns.backbone import curves as backbones
+from ..campaigns.backbone import curves as backbone_curves
 from ..campaigns.backbone import given_modes
-from ..campaigns.fits.request import FitOptions, Listener, choose_kind
-from ..export import backbones as backbone_answers
-from ..export import costs, fits, page, show, store
-from ..export.folder import Folder
+from ..campaigns.fits import request as fit_requests
+from ..export import backbones, costs, fits
 from ..model import model
 from ..scene import axes
 from ..scene.scene import remember_written
 from .shared import (
+    NOT_CONVERGED,
+    CommandExit,
     Json,
     NoPage,
-    NotConvergedExit,
     Out,
+    Output,
+    Plot,
+    Progress,
     Quiet,
     Sets,
     UsageError,
+    Verbose,
     choose_folder,
     flag_option,
     load_model,
     load_scene,
+    present,
     print_message,
-    progress_bar,
     repeated_option,
+    save,
     text_option,
 )
 
@@ -45,10 +48,12 @@ def cost(
         "vary only one setting, where the scene uses it: element_size, steps_per_cycle, shear_modes or jumps"
     ) = "",
     verbose: flag_option(
-        "vary also each setting alone, and print the errors of several measures", "-v", "--verbose"
+        "vary also each setting alone, and print all numbers", "-v", "--verbose"
     ) = False,
     out: Out = None,
     set_: Sets = (),
+    no_page: NoPage = False,
+    plot: Plot = None,
     json_: Json = False,
     quiet: Quiet = False,
 ):
@@ -58,25 +63,24 @@ def cost(
     Example: patchfem cost rig.toml --over steps_per_cycle
     """
     scene_model = load_model(scene, set_)
-    if over and over not in numerical_settings.NUMERICAL_SETTINGS:
-        raise UsageError(
-            f"cost --over {over}: unknown key; use one of {', '.join(numerical_settings.NUMERICAL_SETTINGS)}"
-        )
-    knobs = [over or cost_curves.TOLERANCE]
+    settings = numerical_settings.NUMERICAL_SETTINGS
+    if over and over not in settings:
+        raise UsageError(f"cost --over {over}: unknown key; use one of {', '.join(settings)}")
+    names = [over or cost_curves.TOLERANCE]
     if verbose and not over:
-        knobs += numerical_settings.find_applicable_settings(scene_model)
+        names += numerical_settings.find_applicable_settings(scene_model)
     target = choose_folder(out, f"{scene_model.source.path.stem}-cost")
-    with Folder(target) as folder:
+    output = Output(target, json_, quiet, not no_page, plot, verbose)
+
+    def measure_costs(_):
+        """Run the scene with all settings."""
+        report = None if quiet else print_message
         curves = {
-            knob: cost_curves.compute_setting_costs(
-                scene_model, knob, None if quiet else print_message
-            )
-            for knob in knobs
+            name: cost_curves.compute_setting_costs(scene_model, name, report) for name in names
         }
-        answer = costs.make_answer(curves, scene_model)
-        store.write(answer, folder.path)
-        page.write_page(folder.path)
-    _print_answer(answer, target, json_)
+        return costs.make_answer(curves, scene_model)
+
+    save(measure_costs, output)
 
 
 def backbone(
@@ -104,8 +108,10 @@ def backbone(
     out: Out = None,
     set_: Sets = (),
     no_page: NoPage = False,
+    plot: Plot = None,
     json_: Json = False,
     quiet: Quiet = False,
+    verbose: Verbose = False,
 ):
     """Compute frequency and damping ratio of a mode of SCENE against its amplitude: a curve with a band of what tests
     measure, and which method holds where. The contact is included; [drive] and [slide] are ignored.
@@ -119,38 +125,22 @@ def backbone(
         return model.build(remember_written(loaded_scene, prepare=tables))
 
     free_model, notes = given_modes.prepare_model(build_model, modes)
-    methods = backbones.choose_methods(method)
+    methods = backbone_curves.choose_methods(method)
     lengths = axes.read_lengths(amplitudes, "--amplitudes") if amplitudes else None
     target = choose_folder(out, f"{free_model.source.path.stem}-backbone")
-    with Folder(target) as folder:
-        backbone_result = backbones.compute_backbone(
-            free_model,
-            mode,
-            lengths,
-            methods,
-            None if quiet or json_ else lambda method_name: print_message(f"{method_name} ..."),
-        )
-        backbone_result = backbone_result.add_notes(notes)
-        answer = backbone_answers.make_answer(backbone_result, free_model.source)
-        store.write(answer, folder.path)
-        if not no_page:
-            page.write_page(folder.path)
-    _print_answer(answer, target, json_)
-    if not backbone_result.curves:
-        raise NotConvergedExit
+    output = Output(target, json_, quiet, not no_page, plot, verbose)
 
+    def compute_curves(_):
+        """Compute the curves of all methods."""
+        report = None
+        if output.report is not None:
+            report = lambda name: print_message(f"{name} ...")  # noqa: E731
+        curves = backbone_curves.compute_backbone(free_model, mode, lengths, methods, report)
+        return backbones.make_answer(curves.add_notes(notes), free_model.source)
 
-def _print_answer(answer, target: Path, is_json: bool) -> None:
-    """Print an answer as JSON or as lines with its warnings, notes and files."""
-    if is_json:
-        print(json.dumps(answer.details, ensure_ascii=False))
-        return
-    print("\n".join(show.make_lines(answer)))
-    for text in answer.remarks.warnings:
-        print_message(f"warning: {text}")
-    for text in answer.remarks.notes:
-        print(f"note: {text}")
-    print("\n".join(show.list_files(target)))
+    answer = save(compute_curves, output)
+    if not answer.details["curves"]:
+        raise CommandExit(NOT_CONVERGED)
 
 
 @dataclass(frozen=True)
@@ -211,8 +201,11 @@ def fit(
     rows: Annotated[RowFitOptions, Parameter(name="*")] = RowFitOptions(),
     out: Out = None,
     set_: Sets = (),
+    no_page: NoPage = False,
+    plot: Plot = None,
     json_: Json = False,
     quiet: Quiet = False,
+    verbose: Verbose = False,
 ):
     """Fit values of keys of SCENE to measurements. A bench is fitted to a friction loop. A rig is fitted to rows of
     frequency, input, acceleration and displacement, or to frequency and damping against amplitude. For a scene with
@@ -222,14 +215,18 @@ def fit(
     """
     loaded_scene = remember_written(load_scene(scene, set_))
     target = choose_folder(out, f"{scene.stem}-fit")
-    options = FitOptions(hold, offset, warm_up, **vars(rows))
-    with progress_bar(
-        quiet or json_ or choose_kind(loaded_scene, to) in ("loop", "curve")
-    ) as progress:
-        listener = Listener(
-            None if quiet else print_message, progress, lambda name: f"--{name.replace('_', '-')}"
+    output = Output(target, json_, quiet, not no_page, plot, verbose)
+    options = fit_requests.FitOptions(hold, offset, warm_up, **vars(rows))
+    # the fits to a loop and to a curve are too short for a progress line
+    is_short = fit_requests.choose_kind(loaded_scene, to) in ("loop", "curve")
+    with Progress(quiet or json_ or is_short) as progress:
+        report = None if quiet else print_message
+        listener = fit_requests.Listener(
+            report, progress, lambda name: f"--{name.replace('_', '-')}"
         )
-        answer = fits.fit_into(loaded_scene, to, free, options, target, listener)
-    _print_answer(answer, target, json_)
+        answer = fits.fit_into(
+            loaded_scene, to, free, options, target, listener, with_page=not no_page
+        )
+    present(answer, output)
     if answer.details["outcome"] == "not_converged":
-        raise NotConvergedExit
+        raise CommandExit(NOT_CONVERGED)

@@ -95,8 +95,10 @@ def make_page(folders: list[Path]) -> str:
     ]
     if len(folders) == 1:
         figures += _draw_films(folders[0])
+    captions = first.details.get("captions", {}) if len(folders) == 1 else {}
     for number, figure in enumerate(figures):
         figure["anchor"] = f"chart{number}"
+        figure["caption"] += f" {captions[figure['title']]}" if figure["title"] in captions else ""
     content = _describe(answers)
     content |= {
         "tables": make_tables(first)
@@ -253,15 +255,13 @@ def _find_rows(answer: Answer, source: str) -> list[dict]:
         content = content.get(key) if isinstance(content, dict) else None
     if isinstance(content, list):
         return content
-    variables = {
-        name: variable for name, variable in answer.data.items() if variable.dims == (source,)
-    }
+    variables = {name: one for name, one in answer.data.items() if one.dims == (source,)}
     size = len(next(iter(variables.values())).values) if variables else 0
     return [{name: _make_cell(variables, name, k) for name in variables} for k in range(size)]
 
 
 def _make_cell(variables: dict, name: str, index: int) -> str | dict:
-    """Return one value of a variable: a string, or a quantity as an object."""
+    """Return one value of a variable: a string, or a quantity as an object with its error."""
     variable = variables[name]
     value = variable.values[index]
     if variable.meanings:
@@ -302,13 +302,18 @@ def _draw_films(folder: Path) -> list[dict]:
     path = folder / store.FIELDS
     if not path.is_file():
         return []
+    panel = make_stress_panel(path)
+    return [] if panel is None else [plotly.draw(panel) | {"wide": True, "tall": True}]
+
+
+def make_stress_panel(path: Path) -> panels.Panel | None:
+    """Return the panel of the stress in both pieces from a file of fields; None if the pieces do not touch."""
     from .fields.film import stress_frames
 
     frames = stress_frames(path)
     if not np.nanmax(frames["values"], initial=0.0) > 0:
-        return []
-    panel = panels.make_film(frames, "von Mises stress in both pieces", "Pa")
-    return [plotly.draw(panel) | {"wide": True, "tall": True}]
+        return None
+    return panels.make_film(frames, "von Mises stress in both pieces", "Pa")
 
 
 def _list_files(folder: Path) -> list[tuple[str, str]]:

@@ -15,6 +15,7 @@ import numpy as np
 from ...scene.axes import Axis
 from .case_models import SweepScene
 
+MAX_CACHED_VALUES = 4096  # values of keys whose text is kept while the cases are named
 # Prefixes of the keys that change the pieces or their mesh.
 PIECE_KEYS = (
     "contact.length",
@@ -191,7 +192,7 @@ class _CaseHasher:
         self.keys = keys
         # The order of the keys is the same for all cases.
         self.order = sorted(range(len(keys)), key=keys.__getitem__)
-        self.cached_json = lru_cache(0 if cases.is_random else None)(self._value_json)
+        self.cached_json = lru_cache(0 if cases.is_random else MAX_CACHED_VALUES)(self._value_json)
 
     def hash_cases(self, common_text: str, numbers: Sequence[int]) -> np.ndarray:
         """Return a hash (n,) uint64 of each case.

@@ -30,7 +30,7 @@ MAX_DEATHS = 3
 # Target time of a chunk [s], which is long compared with its transfer to a worker and short compared
 # with a sweep.
 CHUNK_SECONDS = 1.0
-MAX_CASES_PER_CHUNK = 4096  # Largest number of cases in a chunk.
+MAX_CASES_PER_CHUNK = 1024  # Largest number of cases in a chunk.
 MAX_MESH_CASES = 256  # Largest number of cases that determine the shared meshes of a sweep.
 
 

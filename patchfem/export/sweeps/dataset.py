@@ -1,0 +1,58 @@
+"""The answer of a sweep as xarray.Dataset, and the plot of one of its measures."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...core import PatchfemError
+from ..answer import Answer, Variable
+from ..charts import axes as drawing
+from .charts import SweepView, make_measure_panel
+
+
+def to_dataset(answer: Answer):
+    """Return the xarray.Dataset of a sweep: keys, measures with errors, outcome and messages.
+
+    Its attributes are those of sweep.nc, the `answer` in one sentence and the `tolerance`.
+    """
+    dataset = answer.to_xarray()
+    names = [SweepView.make(answer).keys][0]
+    dataset = dataset.set_coords(names)
+    dataset.attrs["answer"] = answer.details["answer"]
+    if answer.details["tolerance"] is not None:
+        dataset.attrs["tolerance"] = answer.details["tolerance"]
+    return dataset
+
+
+def draw_dataset(dataset, measure: str, axes):
+    """Draw a measure of a sweep on matplotlib Axes and return them; hollow points miss the tolerance.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        From `to_dataset`, or the content of sweep.nc.
+    measure : str
+    axes : matplotlib.axes.Axes
+
+    Raises
+    ------
+    PatchfemError
+        If the sweep does not have this measure.
+    """
+    names = sorted(str(name) for name in dataset if f"{name}_error" in dataset)
+    if measure not in names:
+        listed = ", ".join(names)
+        raise PatchfemError(f"plot.sweep: no measure {measure!r}; there are {listed}", "")
+    data = {
+        str(name): Variable(
+            tuple(map(str, variable.dims)),
+            np.asarray(variable.values),
+            variable.attrs.get("units", ""),
+            variable.attrs.get("long_name", ""),
+        )
+        for name, variable in dataset.variables.items()
+    }
+    keys = [str(name) for name in dataset.coords if name != "case"]
+    details = {"of": {"keys": keys}, "tolerance": dataset.attrs.get("tolerance")}
+    answer = Answer("sweep", "", (), data=data, details=details)
+    return drawing.draw(make_measure_panel({"": SweepView.make(answer)}, measure), axes)
