@@ -312,8 +312,8 @@ def _make_curves(data: dict[str, Variable], chart: Chart, name: str, axes: tuple
     name, own_x = _split(name)
     if (
         name not in data
-        or own_x
-        and own_x not in data
+        or (own_x
+        and own_x not in data)
         or not np.any(np.isfinite(np.asarray(data[name].values, float)))
     ):
         return []
