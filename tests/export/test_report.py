@@ -47,7 +47,6 @@ def make_run_data(kind, outcome, effects, measures, title="a title") -> RunData:
 def make_patch_data(load=1.0, frames=1, effects=("contact",)) -> RunData:
     """Return the data of a patch with a Hertzian pressure over a tenth of 10 mm and a stress that decays with depth."""
     x = np.linspace(-5e-3, 5e-3, 201)
-    depth = np.linspace(0, 5e-3, 21)
     sigma = load * 5e7 * np.sqrt(np.maximum(0, 1 - (x / 0.5e-3) ** 2))
     data = make_run_data(
         "patch",
@@ -63,15 +62,7 @@ def make_patch_data(load=1.0, frames=1, effects=("contact",)) -> RunData:
     fields = {"time": np.arange(frames) * 1e-3, "normal_stress": np.tile(sigma, (frames, 1))}
     if frames > 1:
         fields["shear_stress"] = 0.3 * sigma * np.sin(np.arange(frames))[:, None]
-    mises = np.tile((sigma[1:] + sigma[:-1])[:, None] / 2 * np.exp(-depth[1:] / 1e-3), (2, 1, 1))
-    bodies = {
-        "x": x,
-        "depth": (depth, depth),
-        "coating": (0.0, 0.25e-3),
-        "mises": mises,
-        "pressure": sigma,
-    }
-    return replace(data, patch=PressedPatch(x, fields=fields, bodies=bodies))
+    return replace(data, patch=PressedPatch(x, fields=fields))
 
 
 def make_rig_data(
@@ -346,28 +337,6 @@ def test_exact_envelope_joins_reversals_of_cycles():
     present = np.array([0, 1, 2, 5, 6, 7, 8, 9])
     assert np.array_equal(top[present], present + 1) and np.array_equal(
         low[present], -present - 1.0
-    )
-
-
-@pytest.mark.parametrize(
-    "cell, place",
-    [
-        ((0, 0), "where the face of the coating meets the end"),
-        ((5, 0), ""),
-        ((0, 7), ""),
-        ((-1, -1), "where the held far face ends"),
-    ],
-)
-def test_exact_caption_names_stress_singularity(cell, place):
-    """The caption states that the largest stress lies at a corner where the exact stress is unbounded.
-
-    At the corner of a coating, finer meshes of one pressed pair gave 6.7 to 8.3 MPa.
-    """
-    data = make_patch_data()
-    data.patch.bodies["mises"][1][cell] = 1e9
-    caption = report.find_picture("bodies", data).caption
-    assert "largest stress in a cell is 1 GPa" in caption and (
-        place in caption if place else "bound" not in caption
     )
 
 
