@@ -23,9 +23,10 @@ from ...scene.keys import types
 from ...scene.keys.lookup import find_key
 from ..answer import Answer, Quantity, Remarks, Variable
 from ..quantities import choose_scale, format_quantity
-from ..summary import package_versions
+from ..runs import list_versions
 from .tables import sort_measures
 
+MAX_RANGES = 3  # measures whose largest and smallest values are quantities
 MAX_MESSAGES = 5  # messages of failed cases among the warnings
 MAX_COMMAND_LENGTH = 2000  # characters of a list of values in a command; a longer list is a file
 MAX_CASES_TRIED = 3  # cases that are tried until one is valid, for the tolerance of all
@@ -62,7 +63,7 @@ def make_answer(
             "patchfem": __version__,
             "scene": sweep_scene.text,
             "command": make_command(sweep_scene, cases),
-            "versions": package_versions(),
+            "versions": list_versions(),
         },
     )
 
@@ -126,11 +127,8 @@ def _make_details(table: SweepTable, analysis: SweepAnalysis, verdict: tuple[str
             for name, indices in analysis.ranking.items()
         },
         "limits": [_limit_row(limit) for limit in analysis.limits if np.isfinite(limit.value)],
-        "peaks": [_peak_row(entry) for entry in analysis.peaks],
-        "quantiles": {
-            name: {"unit": table.measures[name].unit, "values": values.tolist()}
-            for name, values in analysis.quantiles.items()
-        },
+        "peaks": [_peak_row(table, entry) for entry in analysis.peaks],
+        "quantiles": [_quantile_row(table, *entry) for entry in analysis.quantiles.items()],
         "tolerance": None if np.isnan(tolerance) else float(tolerance),
     }
 
@@ -148,21 +146,50 @@ def _limit_row(limit: KeyLimit) -> dict:
     }
 
 
-def _peak_row(entry: PeakOnLine) -> dict:
-    """Return a peak as a row of sweep.json; null for an unknown number."""
-    numbers = {
-        name: value if np.isfinite(value) else None for name, value in entry.peak._asdict().items()
+def _peak_row(table: SweepTable, entry: PeakOnLine) -> dict:
+    """Return a peak as a row of sweep.json."""
+    peak = entry.peak
+    quantities = {
+        "frequency": Quantity(peak.frequency, "Hz", peak.frequency_error),
+        "height": Quantity(peak.height, table.measures[entry.measure].unit, peak.height_error),
+        "width": Quantity(
+            peak.width,
+            "Hz",
+            peak.width_error,
+            reason="" if np.isfinite(peak.width) else "the cases do not show it",
+        ),
     }
-    others = {
-        key: value if isinstance(value, str) else float(value)
-        for key, value in entry.other_values.items()
-    }
-    return {"measure": entry.measure, "keys": others} | numbers
+    row = {"measure": entry.measure}
+    if entry.other_values:
+        row["case"] = _describe_place(table, entry)
+    return row | {name: quantity.as_json() for name, quantity in quantities.items()}
+
+
+def _describe_place(table: SweepTable, entry: PeakOnLine) -> str:
+    """Return the values of the keys besides the frequency at which a peak was found."""
+    keys = {key.key: key for key in table.keys}
+    values = entry.other_values.items()
+    return ", ".join(f"{key} {format_key(keys[key], value)}" for key, value in values)
+
+
+def _quantile_row(table: SweepTable, name: str, values: np.ndarray) -> dict:
+    """Return the quantiles of a measure as a row of sweep.json."""
+    unit = table.measures[name].unit
+    numbers = zip(("low", "median", "high"), values.tolist())
+    return {"measure": name} | {part: Quantity(value, unit).as_json() for part, value in numbers}
 
 
 def _make_quantities(table: SweepTable, analysis: SweepAnalysis) -> dict[str, Quantity]:
-    """Return the limits of the key, and the peak if there is only one."""
+    """Return the peak if there is only one, the limits of the key, and the ends of the largest ranges."""
     quantities = {}
+    if len(analysis.peaks) == 1:
+        row = _peak_row(table, analysis.peaks[0])
+        names = {
+            "frequency": "peak_frequency",
+            "height": "peak_height",
+            "width": "half_power_width",
+        }
+        quantities |= {name: Quantity(**row[part]) for part, name in names.items()}
     for limit in analysis.limits:
         reason = "" if np.isfinite(limit.value) else "the cases do not show where it lies"
         if limit.is_never_reached:
@@ -174,15 +201,12 @@ def _make_quantities(table: SweepTable, analysis: SweepAnalysis) -> dict[str, Qu
             high=limit.high,
             reason=reason,
         )
-    if len(analysis.peaks) == 1:
-        name, _, peak = analysis.peaks[0]
-        unit = table.measures[name].unit
-        width_reason = "" if np.isfinite(peak.width) else "the cases do not show it"
-        quantities |= {
-            "peak_frequency": Quantity(peak.frequency, "Hz", peak.frequency_error),
-            "peak_height": Quantity(peak.height, unit, peak.height_error),
-            "half_power_width": Quantity(peak.width, "Hz", peak.width_error, reason=width_reason),
-        }
+    for name, low, high, _ in analysis.ranges[:MAX_RANGES]:
+        column = table.measures[name]
+        for word, case in (("smallest", low), ("largest", high)):
+            numbers = (float(part[case]) for part in (column.values, column.errors, column.floors))
+            value, error, floor = numbers
+            quantities[f"{word}_{name}"] = Quantity(value, column.unit, error, floor=floor)
     return quantities
 
 
@@ -281,9 +305,10 @@ def _describe_change(table: SweepTable, analysis: SweepAnalysis) -> str:
             f"to {texts[1]} at {places[1]}."
         )
     indices = analysis.ranking.get(name, ())
-    keys = indices[0].key if indices else " and ".join(key.key for key in varied[:2])
-    share = f", {100 * indices[0].total:.0f} % of its variance" if indices else ""
-    return f"{label.capitalize()} changes most: {texts[0]} to {texts[1]}, mainly with {keys}{share}."
+    share = ""
+    if indices:
+        share = f", mainly with {indices[0].key} ({100 * indices[0].total:.0f} % of its variance)"
+    return f"{label.capitalize()} changes most: {texts[0]} to {texts[1]}{share}."
 
 
 def _format_pair(name: str, unit: str, values: list[float]) -> list[str]:
@@ -317,7 +342,9 @@ def _describe_limit(limits: list[KeyLimit]) -> list[str]:
         return []
     key = small[0].key
     reached = [limit for limit in small if np.isfinite(limit.value)]
-    unknown = [limit for limit in small if not np.isfinite(limit.high) and not limit.is_never_reached]
+    unknown = [
+        limit for limit in small if not np.isfinite(limit.high) and not limit.is_never_reached
+    ]
     if not reached and not unknown:
         names = _join_names([limit.measure for limit in small])
         return [f"{names} change by less than 5 % over all cases."]
@@ -344,14 +371,12 @@ def _join_names(names: list[str]) -> str:
 def _describe_peaks(table: SweepTable, peaks: list[PeakOnLine]) -> list[str]:
     """Return where the first and the last of the peaks over frequency lie."""
     clauses = []
-    keys = {key.key: key for key in table.keys}
-    for name, others, peak in peaks if len(peaks) < 3 else (peaks[0], peaks[-1]):
+    for entry in peaks if len(peaks) < 3 else (peaks[0], peaks[-1]):
+        name, others, peak = entry
         unit = table.measures[name].unit
         frequency = format_quantity("", Quantity(peak.frequency, "Hz", peak.frequency_error))
         height = format_quantity(name, Quantity(peak.height, unit, peak.height_error))
-        place = "".join(
-            f" with {key} {format_key(keys[key], value)}" for key, value in others.items()
-        )
+        place = f" with {_describe_place(table, entry)}" if others else ""
         width = ""
         if np.isfinite(peak.width):
             width_text = format_quantity("", Quantity(peak.width, "Hz", peak.width_error))
@@ -397,6 +422,10 @@ def _describe_cases(table: SweepTable) -> str:
         "did not settle": changing,
     }
     clauses = [f"{count} {text}" for text, count in parts.items() if count]
+    clauses = [
+        f"{clause}{_describe_unsettled(table)}" if "settle" in clause else clause
+        for clause in clauses
+    ]
     if missed:
         main = [name for name in MAIN_MEASURES if name in missed] or list(missed)
         name = max(main, key=lambda name: missed[name]["count"])
@@ -407,3 +436,17 @@ def _describe_cases(table: SweepTable) -> str:
     if not clauses:
         return f"All {len(table)} cases settled and meet the tolerance."
     return f"Of {len(table)} cases, {', '.join(clauses)}."
+
+
+def _describe_unsettled(table: SweepTable) -> str:
+    """Return the largest amplitude of unsettled cases in brackets if it is above that of all others."""
+    name = MAIN_MEASURES[0]
+    if name not in table.measures:
+        return ""
+    values = table.measures[name].values
+    settled = table.settled
+    unsettled = values[~settled & np.isfinite(values)]
+    if not unsettled.size or unsettled.max() <= np.nanmax(values[settled], initial=0.0):
+        return ""
+    text = _format_value(name, table.measures[name].unit, float(unsettled.max()))
+    return f" (their {_join_names([name])} is up to {text} at the end)"

@@ -24,7 +24,10 @@ from ..quantities import choose_scale
 MAX_DRAWN_CASES = 1000  # cases of a measure, so that a page stays below 1.5 MB
 MAX_LINES = 8  # lines of a chart, one for each combination of the other keys
 MAX_MAP_VALUES = 40  # values of each key in a map
-MIN_LOG_RATIO = 10.0  # ratio of the ends of an axis at which it is logarithmic
+# Ratio of the largest to the smallest value of a key and of a measure at which an axis is logarithmic.
+MIN_KEY_RATIO = 10.0
+MIN_MEASURE_RATIO = 100.0
+SHOWN_CHANGE = 0.2  # largest change in the close view of relative changes
 SYMBOLS = np.array(["circle", "circle-open", "x"])  # settled, over the tolerance, not settled
 
 
@@ -54,7 +57,8 @@ class SweepView:
         keys = [re.sub(r"\W", "_", key) for key in answer.details["of"]["keys"]]
         data = answer.data
         by_count = sorted(
-            keys, key=lambda key: (data[key].values.dtype.kind == "f", np.unique(data[key].values).size)
+            keys,
+            key=lambda key: (data[key].values.dtype.kind == "f", np.unique(data[key].values).size),
         )
         axis = axis or by_count[-1]
         is_grid = data[axis].dims == (axis,)
@@ -119,7 +123,9 @@ def format_value(variable: Variable, value: float | str) -> str:
     return f"{format_number(value * scale, 4)} {unit}".strip()
 
 
-def make_axis(name: str, variable: Variable) -> tuple[Axis, np.ndarray]:
+def make_axis(
+    name: str, variable: Variable, min_ratio: float = MIN_KEY_RATIO
+) -> tuple[Axis, np.ndarray]:
     """Return the axis of a variable, and its values in the unit of the axis; words stay words."""
     label = name.replace("_", " ")
     values = variable.values
@@ -127,7 +133,7 @@ def make_axis(name: str, variable: Variable) -> tuple[Axis, np.ndarray]:
         return Axis(label), values.astype(str)
     finite = values[np.isfinite(values)]
     unit, scale = choose_scale(name, variable.unit or "1", np.abs(finite).max(initial=0.0))
-    is_log = bool(finite.size and finite.min() > 0 and finite.max() >= MIN_LOG_RATIO * finite.min())
+    is_log = bool(finite.size and finite.min() > 0 and finite.max() >= min_ratio * finite.min())
     return Axis(f"{label} [{unit}]" if unit else label, scale, is_log), values * scale
 
 
@@ -142,34 +148,44 @@ def select_cases(values: np.ndarray, count: int) -> np.ndarray:
 
 
 def make_relative(answers: dict[str, Answer], chart: Chart) -> Panel | None:
-    """Return the main measures relative to their first case along a key, with the band of 5 %."""
+    """Return the main measures relative to their first case along the only key, with the band of 5 %."""
     curves = []
     x_axis = None
     for title, answer in answers.items():
         view = SweepView.make(answer)
-        if answer.data[view.axis].dims != (view.axis,):
-            continue  # rows in any order have no first case
+        if answer.data[view.axis].dims != (view.axis,) or view.others:
+            continue
         x_axis, x = make_axis(view.axis, answer.data[view.axis])
-        order = np.argsort(x, kind="stable")
         for name in view.measures:
-            values = view.split(name)[0][order]
+            values = view.split(name)[0]
             if name not in chart.y or not np.isfinite(values[0]) or values[0] == 0:
                 continue
             keep = select_cases(values, MAX_DRAWN_CASES)
             label = ", ".join(part for part in (title, name.replace("_", " ")) if part)
-            curves.append(Curve(label, x[order][keep], (values / values[0])[keep]))
+            curves.append(Curve(label, x[keep], (values / values[0])[keep]))
     if not curves or curves[0].x.size < 2:
         return None
 
     ends = curves[0].x[[0, -1]]
     one = np.ones(2)
-    low, high = one - NEGLIGIBLE_CHANGE, one + NEGLIGIBLE_CHANGE
-    curves.insert(0, Curve("± 5 %", ends, one, low, high))
-    ratios = np.concatenate([curve.y for curve in curves])
-    ratios = ratios[np.isfinite(ratios)]
-    is_log = bool(ratios.min() > 0 and ratios.max() >= MIN_LOG_RATIO * ratios.min())
+    band = Curve("± 5 %", ends, one, one - NEGLIGIBLE_CHANGE, one + NEGLIGIBLE_CHANGE)
+    ratios = np.concatenate([curve.y[np.isfinite(curve.y)] for curve in curves])
+    positive = ratios[ratios > 0]
+    is_log = bool((ratios >= 0).all() and positive.max() >= MIN_KEY_RATIO * positive.min())
     y_axis = Axis("value / value of the first case", is_log=is_log)
-    return Panel(chart.title, chart.style, x_axis, y_axis, curves, caption=chart.caption)
+    if is_log:  # 0 has no place on a logarithmic axis
+        curves = [replace(curve, y=np.where(curve.y > 0, curve.y, np.nan)) for curve in curves]
+    panels = [Panel("all changes", chart.style, x_axis, y_axis, [band, *curves])]
+    if np.abs(ratios - 1).max() > SHOWN_CHANGE:
+        close = [
+            replace(curve, y=np.where(np.abs(curve.y - 1) <= SHOWN_CHANGE, curve.y, np.nan))
+            for curve in curves
+        ]
+        y_axis = Axis(y_axis.label)
+        panels.append(Panel("changes up to 20 %", chart.style, x_axis, y_axis, [band, *close]))
+    if len(panels) == 1:
+        return replace(panels[0], title=chart.title, caption=chart.caption)
+    return _make_choices(chart, panels)
 
 
 def make_menu(answers: dict[str, Answer], chart: Chart) -> Panel | None:
@@ -204,7 +220,7 @@ def make_measure_panel(views: dict[str, SweepView], name: str) -> Panel:
             view = SweepView.make(answer, re.sub(r"\W", "_", shares[0]["key"]))
         x_axis, x = make_axis(view.axis, answer.data[view.axis])
         # all sweeps have the unit of the first one
-        first_axis, _ = make_axis(name, answer.data[name])
+        first_axis, _ = make_axis(name, answer.data[name], MIN_MEASURE_RATIO)
         y_axis = y_axis or first_axis
         values = view.split(name) * y_axis.scale
         errors = view.get_column(f"{name}_error", np.nan) * y_axis.scale

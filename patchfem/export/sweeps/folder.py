@@ -27,7 +27,7 @@ from ...model.model import Model
 from ...runs.batch.case_results import FAILED_OUTCOME, CaseResults
 from .. import store as answers
 from ..answer import Answer, Quantity, Remarks
-from ..results import LOCK, refuse_others
+from ..folder import LOCK, refuse_others
 from .store import CHUNKS, Chunks, case_folder_name, write_chunk
 
 KEEP = ("none", "summaries", "results", "pages")  # what is stored of each case besides its numbers
@@ -95,10 +95,14 @@ class ResultsWriter:
 
     def __call__(self, number: int, result) -> None:
         """Write the folder of a case after its run."""
-        # Only these sweeps need the modules that write the results of a run.
-        from ..folder import save_run
+        # Only these sweeps need the modules that write the fields of a run.
+        from ..folder import Folder as ResultsFolder
+        from ..run_folder import write_results, write_run_page
 
-        save_run(result, self.folder / CASES / case_folder_name(self.names[number]), self.page)
+        with ResultsFolder(self.folder / CASES / case_folder_name(self.names[number])) as folder:
+            written = write_results(result, folder.path)
+        if self.page:
+            write_run_page(written, folder.target)
 
 
 @dataclass(frozen=True, slots=True)
