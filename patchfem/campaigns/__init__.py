@@ -36,18 +36,15 @@ PUBLIC = {
         "fit_hysteresis_loop",
     ),
     "fits.loop_path": ("LoopOptions",),
-    "fits.patch": (
-        "FittedPatch",
-        "fit_patch",
-        "check_amplitudes",
-    ),
-    "fits.patch_laws": (
-        "FITTED_LAWS",
-        "FittedLaw",
-    ),
     "fits.problem": (
         "FittedKeys",
         "parse_ranges",
+    ),
+    "fits.request": (
+        "FitOptions",
+        "Listener",
+        "choose_kind",
+        "fit_measurement",
     ),
     "fits.wear": (
         "FittedCoefficient",
@@ -69,7 +66,6 @@ PUBLIC = {
         "SAME_SCORE",
         "fit_rows",
     ),
-    "rows.null_models": ("NULL_MODELS",),
     "rows.search": (
         "SearchSettings",
         "UNSTABLE",

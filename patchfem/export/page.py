@@ -262,13 +262,18 @@ def _draw_films(folder: Path) -> list[dict]:
     path = folder / store.FIELDS
     if not path.is_file():
         return []
+    panel = make_stress_panel(path)
+    return [] if panel is None else [plotly.draw(panel) | {"wide": True, "tall": True}]
+
+
+def make_stress_panel(path: Path) -> panels.Panel | None:
+    """Return the panel of the stress in both pieces from a file of fields; None if the pieces do not touch."""
     from .fields.film import stress_frames
 
     frames = stress_frames(path)
     if not np.nanmax(frames["values"], initial=0.0) > 0:
-        return []
-    panel = panels.make_film(frames, "von Mises stress in both pieces", "Pa")
-    return [plotly.draw(panel) | {"wide": True, "tall": True}]
+        return None
+    return panels.make_film(frames, "von Mises stress in both pieces", "Pa")
 
 
 def _list_files(folder: Path) -> list[tuple[str, str]]:

@@ -23,7 +23,7 @@ INTERFACES_FOLDER = "interfaces"
 class WrittenRun(NamedTuple):
     """Finished run whose results are on disk.
 
-    answer: its answer; result: its result; folder_id: device and inode of the folder, which identify it after it was renamed.
+    answer, result: of the run; folder_id: device and inode of the folder, which identify it after it has been renamed.
     """
 
     answer: Answer

@@ -98,7 +98,7 @@ def _headline(result: Result, measures: dict[str, Quantity], details: dict) -> s
         if name == "loop_area":
             parts += _interface_parts(result, measures, text)
         elif _is_known(measures, name) and not quantities.is_zero(name, measures[name]):
-            part = text.format(quantities.format_quantity(name, measures[name]))
+            part = text.format(_format(name, measures))
             if (kind, name) == ("patch", "contact_fraction"):
                 part += _describe_place(details.get("contact"), " ({})")
             parts.append(part)
@@ -137,7 +137,7 @@ def _interface_parts(result: Result, measures: dict[str, Quantity], text: str) -
     if len(names) == 1 or has_strips or len(names) > MAX_LISTED:
         where = "" if len(names) == 1 or has_strips else f" at interface 1 of {len(names)}"
         return [text.format(quantities.format_quantity(names[0], measures[names[0]])) + where]
-    values = [quantities.format_quantity(name, measures[name]) for name in names]
+    values = [_format(name, measures) for name in names]
     return [text.format(f"{', '.join(values[:-1])} and {values[-1]}") + " at the interfaces"]
 
 
@@ -309,12 +309,21 @@ def describe_accuracy(result: Result, measures: dict[str, Quantity]) -> str:
     }
     if not ratios or max(ratios.values()) > 1:
         return ""
-    name = max(ratios, key=lambda one: (ratios[one], one))
-    largest = format_number(100 * ratios[name], 2)
+    # errors that are too small to be displayed say nothing
+    visible = {name: ratio for name, ratio in ratios.items() if "±" in _format(name, measures)}
+    if not visible:
+        return f"All errors are within the tolerance {tolerance:g}."
+    name = max(visible, key=lambda one: (visible[one], one))
+    largest = format_number(100 * visible[name], 2)
     return (
         f"All errors are within the tolerance {tolerance:g}; the largest is {largest} % of what it allows "
-        f"({name}: {quantities.format_quantity(name, measures[name])})."
+        f"({name}: {_format(name, measures)})."
     )
+
+
+def _format(name: str, measures: dict[str, Quantity]) -> str:
+    """Return a measure as text with its error."""
+    return quantities.format_quantity(name, measures[name])
 
 
 def _is_release(result: Result) -> bool:

@@ -27,7 +27,7 @@ def make_answer(result: Result) -> Answer:
     """Return the answer of a run."""
     run_plan = result.plan
     source = run_plan.model.source
-    measures = {name: make_quantity(measure) for name, measure in result.measures.items()}
+    measures = make_quantities(result.measures)
     details = make_details(result)
     changed = list_changed_keys(source.sets)
     title = f"{source.title}; changed: {changed}" if source.title and changed else source.title
@@ -43,15 +43,12 @@ def make_answer(result: Result) -> Answer:
     )
 
 
-def make_quantity(measure: Measure) -> Quantity:
-    """Return a measure of a run as a quantity."""
-    return Quantity(
-        measure.value,
-        measure.unit,
-        measure.error,
-        floor=float(measure.floor),
-        reason=measure.reason,
-    )
+def make_quantities(measures: dict[str, Measure]) -> dict[str, Quantity]:
+    """Return the measures of a run as quantities."""
+    return {
+        name: Quantity(one.value, one.unit, one.error, floor=float(one.floor), reason=one.reason)
+        for name, one in measures.items()
+    }
 
 
 def make_origin(source, verb: str) -> dict:

@@ -4,7 +4,7 @@ import shlex
 from pathlib import Path
 
 from . import quantities, store
-from .answer import Answer
+from .answer import Answer, Quantity
 
 
 def make_lines(answer: Answer, is_verbose: bool = False) -> list[str]:
@@ -19,17 +19,30 @@ def make_lines(answer: Answer, is_verbose: bool = False) -> list[str]:
     lines = [answer.title] if answer.title else []
     lines += answer.verdict
     shown = answer.quantities if is_verbose else quantities.choose_key(answer.quantities)
-    width = max(map(len, shown), default=0)
+    return lines + format_quantities(shown)
+
+
+def list_quantities(shown: dict[str, Quantity]) -> list[tuple[str, str]]:
+    """Return name and text of each quantity; the text of a missing one has the reason."""
+    texts = []
     for name, quantity in shown.items():
         text = quantities.format_quantity(name, quantity)
-        reason = f" ({quantity.reason})" if quantity.value is None and quantity.reason else ""
-        lines.append(f"  {name:<{width}}  {text}{reason}")
-    return lines
+        if quantity.value is None and quantity.reason:
+            text += f" ({quantity.reason})"
+        texts.append((name, text))
+    return texts
 
 
-def list_files(folder: Path) -> list[str]:
+def format_quantities(shown: dict[str, Quantity]) -> list[str]:
+    """Return an aligned line for each quantity."""
+    rows = list_quantities(shown)
+    width = max((len(name) for name, _ in rows), default=0)
+    return [f"  {name:<{width}}  {text}" for name, text in rows]
+
+
+def list_files(folder: Path, has_page: bool = True) -> list[str]:
     """Return a line for the results folder, and for its page, its fields and its main table if it has them."""
-    lines = [f"results: {folder}"]
+    lines = [f"results: {folder}{'' if has_page else ' (without report.html: --no-page)'}"]
     for label, name in (("page", store.PAGE), ("fields", store.FIELDS), ("table", "sweep.csv")):
         if (folder / name).is_file():
             lines.append(f"{label}: {folder / name}")

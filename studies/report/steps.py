@@ -222,7 +222,7 @@ def main(path: Path | None = FOLDER / "steps.svg", fits: bool = True) -> tuple:
             )
         )
         best = int((one.search.rms < 1.01 * np.nanmin(one.search.rms)).sum())
-        scored = one.compute_scores(one.logs, one.left_out_logs)
+        scored = one.compute_scores()
         print(
             f"{values}; fitted {format_score(scored['fitted'])}, predicted {format_score(scored['held_out'])}; "
             f"{best} of {STARTS} starts end there"

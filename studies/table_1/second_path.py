@@ -16,6 +16,9 @@ from pathlib import Path
 
 import numpy as np
 
+sys.path.insert(0, str(Path(__file__).parent))
+from null_models import fit_null_model
+
 from patchfem.campaigns import FitRequest, RowsOptions, compute_rms_scores, fit_rows
 from patchfem.campaigns.rows.cells import read_response_table
 from patchfem.campaigns.rows.fit import SearchSettings
@@ -86,9 +89,14 @@ def main(starts: int = 8) -> dict:
         begin = time.process_time()
         found = fit_path(name == "point", starts)
         seconds = time.process_time() - begin
+        cells = found.cells
+        constant = fit_null_model(cells, "constant", ~found.held_out)[0]
         each = {
-            "model": found.compute_scores(found.logs, found.left_out_logs),
-            "constant": found.compute_scores(*found.nulls["constant"][:2]),
+            "model": found.compute_scores(),
+            "constant": {
+                "fitted": compute_rms_scores(cells, constant, ~found.held_out),
+                "held_out": compute_rms_scores(cells, constant, found.held_out),
+            },
         }
         for what, scored in each.items():
             for part in ("fitted", "held_out"):

@@ -141,7 +141,7 @@ def test_steps_give_stated_gain_and_scores(tmp_path, capsys):
         ("held_out", "other frequencies ({:.3f} instead of {:.3f})"),
     ):
         scores = [
-            fits[free].compute_scores(fits[free].logs, fits[free].left_out_logs)[part]["all"]
+            fits[free].compute_scores()[part]["all"]
             for free in (True, False)
         ]
         assert_contains(steps.ANSWER, words.format(*scores))

@@ -2,8 +2,11 @@
 
 import numpy as np
 
-from .panels import Panel
+from ...core import PatchfemError
+from ..answer import Answer
+from .panels import Panel, make_panels
 from .plotly import BAND_OPACITY, CODE_COLOURS, COLOURS
+from .table import CHARTS
 
 PANEL_SIZE = (6.4, 4.2)  # width and height of a panel [inch]
 
@@ -117,3 +120,30 @@ def make_figure(panels: list[Panel]):
 def write_picture(panels: list[Panel], path) -> None:
     """Write panels as .png, .svg or .pdf."""
     make_figure(panels).savefig(path, dpi=150)
+
+
+def draw_charts(answer: Answer, titles: tuple[str, ...], axes=None, verb: str = "plot"):
+    """Draw the charts of an answer with some titles, and return the first Axes; None if it has none of them.
+
+    Parameters
+    ----------
+    answer : Answer
+    titles : tuple of str
+        Titles in the table of charts.
+    axes : matplotlib Axes, optional
+        Where to draw the first chart alone; by default a new figure has all of them.
+    verb : str
+        Function that the message about a wrong `axes` names.
+    """
+    charts = tuple(chart for chart in CHARTS[answer.kind] if chart.title in titles)
+    panels = make_panels({"": answer}, charts)
+    if not panels:
+        return None
+    check_axes(axes, verb)
+    return draw(panels[0], axes) if axes is not None else make_figure(panels).axes[0]
+
+
+def check_axes(axes, verb: str) -> None:
+    """Raise PatchfemError if the Axes for a picture are given but are not those of matplotlib."""
+    if axes is not None and not hasattr(axes, "errorbar"):
+        raise PatchfemError(f"{verb}: matplotlib Axes are needed as ax, not {axes!r:.60}")

@@ -138,7 +138,7 @@ def test_exact_linear_rig_is_recovered_from_closed_form(tmp_path):
         "acceleration_gain": found.keys.fit.values[2],
         "displacement_gain": found.keys.fit.values[3],
     }
-    assert found.compute_scores(found.logs, found.left_out_logs)["fitted"]["all"] < 1e-6
+    assert found.compute_scores()["fitted"]["all"] < 1e-6
 
 
 RUBS_FREE = ("friction.static=0.3..0.6,structure.bonded.stiffness=1e6 N/m..6e6 N/m",)
@@ -210,9 +210,9 @@ def test_always_held_out_rows_do_not_affect_fit(tmp_path, friction_rows):
     assert np.array_equal(one.folds[2].search.fit.values, two.folds[2].search.fit.values)
     assert not np.array_equal(one.folds[0].search.fit.values, two.folds[0].search.fit.values)
     assert (
-        one.compute_scores(one.logs, one.left_out_logs)["left_out"]["all"]
+        one.compute_scores()["left_out"]["all"]
         < 1e-3
-        < two.compute_scores(two.logs, two.left_out_logs)["left_out"]["all"]
+        < two.compute_scores()["left_out"]["all"]
     )
 
 
@@ -257,7 +257,7 @@ def test_exact_rows_flagged_u_are_lower_bounds(tmp_path):
         assert np.array_equal(found["bound"], np.where(cells.unstable, np.minimum(logs, 0), logs))
     stable = fit_to_rows(scene, path, read_free_keys(*LINEAR_FREE), starts=1)
     whole, without = (
-        stable.compute_scores(stable.logs, stable.left_out_logs, only_stable=part)["fitted"]
+        stable.compute_scores(only_stable=part)["fitted"]
         for part in (False, True)
     )
     assert without["all"] == pytest.approx(np.sqrt(np.mean(stable.logs[~cells.unstable] ** 2)))

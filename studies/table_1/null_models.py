@@ -7,7 +7,7 @@ Readings flagged U are used without correction, which can only favour these mode
 
 import numpy as np
 
-from .cells import MIN_DISPLACEMENT, Readings
+from patchfem.campaigns.rows.cells import MIN_DISPLACEMENT, Readings
 
 NULL_MODELS = ("constant", "power_input", "power_input_frequency")
 

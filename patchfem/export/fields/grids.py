@@ -1,0 +1,153 @@
+"""Fields as grids of PyVista, and from them as .vtu, .pvd and .csv."""
+
+from pathlib import Path
+
+import numpy as np
+
+from ...core import PatchfemError
+from ...disk.atomic_write import write_atomically, write_text
+from ...runs.pieces import compute_pieces
+from .blocks import FIELDS, PARTS, Block, make_blocks
+from .vtkhdf import Frames, write_blocks
+
+# Field of each part that PyVista colours by default.
+ACTIVE_FIELDS = {"lower": "von_mises", "upper": "von_mises", "interface": "normal_stress"}
+
+
+def make_grids(blocks: dict[str, Block], number: int, time: float, in_mpa: bool = True):
+    """Return one frame of blocks as a pyvista.MultiBlock of named grids.
+
+    Parameters
+    ----------
+    blocks : dict of Block
+    number : int
+        Number of the frame.
+    time : float
+        [s]; the field array `TimeValue` of every grid.
+    in_mpa : bool
+        Whether stresses are in MPa and a field array `units` lists the unit of each array, which
+        meshio cannot read. Each array has its unit as the key UNITS_LABEL of VTK too.
+    """
+    import pyvista as pv
+    from vtkmodules.vtkCommonCore import vtkDataArray
+
+    grids = pv.MultiBlock()
+    for part, block in blocks.items():
+        connectivity, starts, types = block.vtk_cells()
+        cells = np.insert(connectivity, starts[:-1], np.diff(starts))
+        grid = pv.UnstructuredGrid(cells, types, block.points)
+        units = []
+        for target, data in (
+            (grid.point_data, block.point_data),
+            (grid.cell_data, block.cell_data),
+        ):
+            for name, values in data.items():
+                values = values[number % len(values)]  # a constant field has one frame
+                unit = FIELDS[name].unit
+                if in_mpa and unit == "Pa":
+                    unit = "MPa"
+                    values = values / np.float32(1e6)
+                target[name] = values
+                target.VTKObject.GetAbstractArray(name).GetInformation().Set(
+                    vtkDataArray.UNITS_LABEL(), unit
+                )
+                units.append(f"{name} [{unit}]")
+        if in_mpa:
+            grid.field_data["units"] = units
+        grid.field_data["TimeValue"] = [time]
+        if part in ACTIVE_FIELDS:
+            grid.set_active_scalars(ACTIVE_FIELDS[part])
+        grids.append(grid, part)
+    return grids
+
+
+def make_result_grids(result, numbers) -> list:
+    """Return frames of a run with a patch as pyvista.MultiBlock objects with stresses in MPa."""
+    pieces = compute_pieces(result)
+    blocks = make_blocks(pieces)
+    return [make_grids(blocks, number, float(pieces.time[number])) for number in numbers]
+
+
+def export_frames(frames: Frames, out: Path, number: int) -> None:
+    """Write fields as .vtu or .csv of one frame, or as .pvd or .vtkhdf of all frames.
+
+    Parameters
+    ----------
+    frames : Frames
+    out : Path
+    number : int
+        Number of the frame of a .vtu or .csv.
+    """
+    if out.suffix == ".vtkhdf":
+        write_blocks(out, frames.blocks, frames.times)
+    elif out.suffix == ".pvd":
+        _write_pvd(frames, out)
+    elif out.suffix == ".vtu":
+        _write_vtu(frames, out, number)
+    else:
+        _write_csv(frames, out, number)
+
+
+def _write_vtu(frames: Frames, out: Path, number: int) -> None:
+    """Write a frame as one mesh with the array `part`; fields that a part lacks are NaN or -1 there."""
+    grids = make_grids(frames.blocks, number, float(frames.times[number]), in_mpa=False)
+    for code, name in enumerate(PARTS):
+        if name in grids.keys():
+            grids[name].cell_data["part"] = np.full(grids[name].n_cells, code, np.int8)
+    for kind in ("point_data", "cell_data"):
+        samples = {name: values for grid in grids for name, values in getattr(grid, kind).items()}
+        for grid in grids:
+            data = getattr(grid, kind)
+            count = grid.n_points if kind == "point_data" else grid.n_cells
+            for name in samples.keys() - set(data.keys()):
+                hole = np.nan if samples[name].dtype.kind == "f" else -1
+                data[name] = np.full((count, *samples[name].shape[1:]), hole, samples[name].dtype)
+    merged = grids.combine()
+    merged.field_data["TimeValue"] = [frames.times[number]]
+    with write_atomically(out) as partial:
+        merged.save(partial)
+
+
+def _write_pvd(frames: Frames, out: Path) -> None:
+    """Write all frames as .vtm files of named blocks in a folder beside a .pvd that lists them."""
+    folder = out.with_name(f"{out.stem}_frames")
+    folder.mkdir(exist_ok=True)
+    lines = []
+    for number, time in enumerate(frames.times):
+        name = f"frame_{number:04d}.vtm"
+        make_grids(frames.blocks, number, float(time), in_mpa=False).save(folder / name)
+        lines.append(f'<DataSet timestep="{float(time)!r}" part="0" file="{folder.name}/{name}"/>')
+    collection = "".join(lines)
+    write_text(
+        out,
+        f'<VTKFile type="Collection" version="0.1"><Collection>{collection}</Collection></VTKFile>\n',
+    )
+
+
+def _write_csv(frames: Frames, out: Path, number: int) -> None:
+    """Write the interface of a frame as a table in SI, one row per point."""
+    line = frames.blocks["interface"]
+    columns = {"x [m]": line.points[:, 0]}
+    for name, series in line.point_data.items():
+        values = series[number % len(series)]
+        unit = FIELDS[name].unit
+        if values.ndim == 1:
+            columns[f"{name} [{unit}]"] = values
+        else:
+            columns |= {f"{name}_{axis} [{unit}]": values[:, k] for k, axis in enumerate("xy")}
+    rows = zip(*(map(str, values) for values in columns.values()))
+    write_text(out, "\n".join([",".join(columns), *map(",".join, rows), ""]))
+
+
+def find_frame(frames: Frames, number: int | None) -> int:
+    """Return the number of a frame from 0, for one that may count from the end; None is the last one.
+
+    PatchfemError if there is no such frame.
+    """
+    count = len(frames.times)
+    number = -1 if number is None else number
+    if not -count <= number < count:
+        raise PatchfemError(
+            f"--frame: there is no frame {number}; {frames.path} has frames 0 to {count - 1}"
+        )
+    return number % count
