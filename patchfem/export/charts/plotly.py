@@ -182,6 +182,8 @@ def _add_menu(figure: dict, panel: Panel) -> dict:
         "xaxis": _axis_layout(first.x),
         "yaxis": _axis_layout(first.y),
         "showlegend": sum(bool(curve.name) for curve in first.curves) > 1,
+        # the legend is below, because the menu is above
+        "legend": {"orientation": "h", "x": 0, "y": -0.2, "yanchor": "top"},
         "updatemenus": [
             {"buttons": buttons, "x": 0, "xanchor": "left", "y": 1.02, "yanchor": "bottom"}
         ],
