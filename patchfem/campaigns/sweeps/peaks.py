@@ -46,10 +46,10 @@ class SweptPeak(NamedTuple):
 
 
 class PeakOnLine(NamedTuple):
-    """Peak of a measure, and the values of the other keys in its cases, by key."""
+    """Peak of a measure, and the first case of its curve, which has the values of the other keys."""
 
     measure: str
-    other_values: dict[str, float | str]
+    case: int
     peak: SweptPeak
 
 
@@ -71,9 +71,7 @@ def find_peaks(table: SweepTable) -> list[PeakOnLine]:
         line = line[np.argsort(frequency)]
         peak = locate_peak(np.sort(frequency), heights[line], errors[line])
         if peak is not None:
-            others = [key for key in table.keys if key.key != FREQUENCY_KEY]
-            values = {key.key: key.values[line[0]] for key in others}
-            peaks.append(PeakOnLine(names[0], values, peak))
+            peaks.append(PeakOnLine(names[0], int(line[0]), peak))
     return peaks
 
 

@@ -327,9 +327,9 @@ TABLES: dict[str, tuple[Table, ...]] = {
             (
                 Column("measure", "measure", "name"),
                 Column("case", "at"),
-                Column("frequency", "frequency"),
-                Column("height", "height"),
-                Column("width", "half-power width"),
+                Column("peak_frequency", "frequency"),
+                Column("peak_height", "height"),
+                Column("half_power_width", "half-power width"),
             ),
         ),
         Table(

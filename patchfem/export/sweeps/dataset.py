@@ -7,7 +7,7 @@ import numpy as np
 from ...core import PatchfemError
 from ..answer import Answer, Variable
 from ..charts import axes as drawing
-from .charts import SweepView, make_measure_panel
+from .charts import list_keys, make_measure_panel
 
 
 def to_dataset(answer: Answer):
@@ -16,7 +16,7 @@ def to_dataset(answer: Answer):
     Its attributes are those of sweep.nc, the `answer` in one sentence and the `tolerance`.
     """
     dataset = answer.to_xarray()
-    dataset = dataset.set_coords(SweepView.make(answer).keys)
+    dataset = dataset.set_coords(list_keys(answer))
     dataset.attrs["answer"] = answer.details["answer"]
     if answer.details["tolerance"] is not None:
         dataset.attrs["tolerance"] = answer.details["tolerance"]
@@ -42,7 +42,8 @@ def sweep_axes(dataset, measure: str, axes=None):
     names = [str(name) for name in getattr(dataset, "data_vars", ()) if f"{name}_error" in dataset]
     if not names:
         raise PatchfemError(
-            "plot.sweep: a Dataset returned by pf.sweep is needed, with measures and their errors", ""
+            "plot.sweep: a Dataset returned by pf.sweep is needed, with measures and their errors",
+            "",
         )
     if measure not in names:
         listed = ", ".join(sorted(names))
@@ -63,4 +64,4 @@ def sweep_axes(dataset, measure: str, axes=None):
     keys = [str(name) for name in dataset.coords if name != "case"]
     details = {"of": {"keys": keys}, "tolerance": dataset.attrs.get("tolerance")}
     answer = Answer("sweep", "", (), data=data, details=details)
-    return drawing.draw(make_measure_panel({"": SweepView.make(answer)}, measure), axes)
+    return drawing.draw(make_measure_panel({"": answer}, measure), axes)
