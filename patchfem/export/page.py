@@ -68,8 +68,10 @@ def make_page(folders: list[Path]) -> str:
     ]
     if len(folders) == 1:
         figures += _draw_films(folders[0])
+    captions = first.details.get("captions", {}) if len(folders) == 1 else {}
     for number, figure in enumerate(figures):
         figure["anchor"] = f"chart{number}"
+        figure["caption"] += f" {captions[figure['title']]}" if figure["title"] in captions else ""
     content = _describe(answers)
     content |= {
         "tables": make_tables(first) if len(answers) == 1 else [],
@@ -215,24 +217,23 @@ def _find_rows(answer: Answer, source: str) -> list[dict]:
         content = content.get(key) if isinstance(content, dict) else None
     if isinstance(content, list):
         return content
-    variables = {
-        name: variable for name, variable in answer.data.items() if variable.dims == (source,)
-    }
+    variables = {name: one for name, one in answer.data.items() if one.dims == (source,)}
     size = len(next(iter(variables.values())).values) if variables else 0
-    return [
-        {name: _make_cell(variable, k) for name, variable in variables.items()} for k in range(size)
-    ]
+    return [{name: _make_cell(variables, name, k) for name in variables} for k in range(size)]
 
 
-def _make_cell(variable, index: int):
-    """Return one value of a variable: a string, or a quantity as an object."""
+def _make_cell(variables: dict, name: str, index: int):
+    """Return one value of a variable: a string, or a quantity as an object with its error."""
+    variable = variables[name]
     value = variable.values[index]
     if variable.meanings:
         return variable.meanings[int(value)]
     if isinstance(value, str):
         return value
-    number = float(value)
-    return {"value": number if np.isfinite(number) else None, "unit": variable.unit}
+    cell = {"value": float(value), "unit": variable.unit}
+    if f"{name}_error" in variables:
+        cell["error"] = float(variables[f"{name}_error"].values[index])
+    return cell
 
 
 def _format_cell(row: dict, column: Column) -> str:

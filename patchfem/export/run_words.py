@@ -131,6 +131,8 @@ def _interface_parts(result: Result, measures: dict[str, Quantity], text: str) -
     names = [name for name in names if _is_known(measures, name)]
     if not names:
         return []
+    if result.outcome in (Outcome.TRANSIENT, Outcome.GROWS):
+        text += " (mean of the last cycles)"
     if any(warning.startswith(OPEN_LOOP) for warning in result.warnings):
         text = "friction work of the last cycle {}"
     has_strips = any(name == "contact.strips" for name in result.plan.effects)
@@ -294,6 +296,65 @@ def list_readings(result: Result) -> list[dict]:
                 }
             )
     return listed
+
+
+def make_captions(result: Result) -> dict[str, str]:
+    """Return sentences that are added to the captions of charts: {title of the chart: sentence}."""
+    captions = {
+        "Pressure on the interface": _explain_drawn_peak(result),
+        "Pressure while it wears": _describe_edge_peaks(result),
+        "Frequency response H1": _describe_gain_peak(result),
+    }
+    return {title: sentence for title, sentence in captions.items() if sentence}
+
+
+def _explain_drawn_peak(result: Result) -> str:
+    """Return why the largest pressure drawn for a static patch is not `pressure_peak`; "" if both are equal."""
+    peak = result.measures.get("pressure_peak")
+    if result.plan.kind != "patch" or peak is None or peak.value is None:
+        return ""
+    largest = format_quantity(float(np.max(result.fields["normal_stress"])), "Pa", 4)
+    estimate = format_quantity(peak.value, "Pa", 4)
+    if largest == estimate:
+        return ""
+    strips = " and over the strips" if result.patch.strips is not None else ""
+    return (
+        f"The drawn pressures are means over the elements beside a node{strips}, at most {largest}; the measure "
+        f"pressure_peak, {estimate}, is the estimated maximum of the continuous pressure."
+    )
+
+
+def _describe_edge_peaks(result: Result) -> str:
+    """Return after which cycles of wear the peak pressure lies at the edge of the contact."""
+    history = result.extra.get("wear", {})
+    above = np.asarray(history.get("pressure_peak_at_edge", ()))
+    if not (above > 0).any():
+        return ""
+    cycles = np.asarray(history["cycle"])[above > 0]
+    listed = ", ".join(format_number(float(cycle), 4) for cycle in cycles)
+    largest = format_quantity(float(above.max()), "Pa", 2)
+    return (
+        f"After {listed} cycles the peak pressure is that of a node at the edge of the contact, up to {largest} above "
+        "all pressures farther inside; it has an error of this size."
+    )
+
+
+def _describe_gain_peak(result: Result) -> str:
+    """Return the 95 % intervals of frequency and damping at the peak of H1 under a random drive."""
+    parts = []
+    for name, text in (
+        ("response_frequency", "the peak is at {}"),
+        ("response_damping", "its damping ratio is {}"),
+    ):
+        value = result.measures.get(name)
+        scatter = result.measures.get(name + SCATTER)
+        if value is None or scatter is None or None in (value.value, scatter.value):
+            return ""
+        low, high = max(value.value - scatter.value, 0.0), value.value + scatter.value
+        interval = Quantity(value.value, value.unit, None, low, high)
+        parts.append(text.format(quantities.format_quantity(name, interval)))
+    sentence = "; ".join(parts)
+    return f"{sentence[0].upper()}{sentence[1:]} (95 % interval over records of the random drive)."
 
 
 def describe_accuracy(result: Result, measures: dict[str, Quantity]) -> str:

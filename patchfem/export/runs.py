@@ -16,7 +16,7 @@ from ..runs.rig import plan as rig_plan
 from .answer import Answer, Quantity, Remarks
 from .driven import describe_drive, list_changed_keys
 from .run_data import collect_data
-from .run_words import list_readings, make_verdict
+from .run_words import list_readings, make_captions, make_verdict
 
 # ratio of a stiffness to its error above which the loss factor is computed
 MIN_STIFFNESS_ERRORS = 10.0
@@ -108,6 +108,7 @@ def make_details(result: Result) -> dict:
         "run_away": _find_run_away(result),
         "loop": _find_loss_factor(result),
         "measured": list_readings(result),
+        "captions": make_captions(result),
     }
     return details | {name: value for name, value in optional.items() if value}
 

@@ -223,11 +223,15 @@ def _select(data: dict[str, Variable], chart: Chart) -> dict[str, Variable]:
     x_name = _find_x(data, chart)
     names = [_split(name)[0] for name in chart.y]
     shown = [name for name in names if name in data and np.any(data[name].values)]
-    if not x_name or not shown or (data[x_name].values.size < 2 and chart.style == "line"):
+    if not x_name or not shown:
         return {}
+    if chart.style == "line" and np.ptp(np.asarray(data[x_name].values, float)) == 0:
+        return {}  # a single point, or a curve over another variable
     keep = _find_span(data, chart, x_name)
     if keep is None:
         return data
+    if not keep.size:
+        return {}
     dimension = "time" if chart.span == "cycles" else x_name
     return {name: _take(variable, dimension, keep) for name, variable in data.items()}
 
@@ -239,6 +243,11 @@ def _find_span(data: dict[str, Variable], chart: Chart, x_name: str) -> np.ndarr
         time = data["time"].values
         start = time[-1] - N_SHOWN_CYCLES * float(data["period"].values) * (1 + 1e-6)
         return np.flatnonzero(time >= start)
+    if chart.span == "run":
+        # without more cycles the chart of the last cycles shows the whole run
+        period = float(data["period"].values) if "period" in data else np.inf
+        is_longer = np.ptp(data["time"].values) > (N_SHOWN_CYCLES + 0.5) * period
+        return None if is_longer else np.arange(0)
     if chart.span == "contact" and pressure_name in data:
         pressure = data[pressure_name].values
         loaded = np.flatnonzero((pressure > 0).any(axis=tuple(range(pressure.ndim - 1))))
@@ -343,6 +352,8 @@ def _find_band(data: dict[str, Variable], name: str) -> tuple[np.ndarray | None,
     values = np.asarray(data[name].values, float)
     if f"{name}_error" in data:
         error = np.asarray(data[f"{name}_error"].values, float)
+        # an error as large as the value, as at a fold, would only hide the curve
+        error = np.where(error <= np.abs(values), error, np.nan)
         return values - error, values + error
     if f"{name}_low" in data and f"{name}_high" in data:
         return tuple(np.asarray(data[f"{name}_{end}"].values, float) for end in ("low", "high"))

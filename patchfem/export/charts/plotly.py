@@ -222,7 +222,9 @@ def _add_film(figure: dict, panel: Panel) -> dict:
                 | {"x": 0, "xanchor": "left", "y": 1.02, "yanchor": "bottom"}
             ],
         }
-    figure["layout"]["yaxis"]["scaleanchor"] = "x"  # equal scales of both axes
+    # equal scales of both axes, which end at the edges of the map
+    figure["layout"]["yaxis"] |= {"scaleanchor": "x", "constrain": "domain"}
+    figure["layout"]["xaxis"]["constrain"] = "domain"
     figure["layout"]["showlegend"] = False
     return figure
 

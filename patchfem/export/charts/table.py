@@ -19,9 +19,11 @@ class Chart:
         Variables of the vertical axis. "NAME@X" is drawn against its own variable X.
     style : str
         "line", "points", "area", "map" (colours over x and the first dimension), "overlay" (a line for each element of the
-        first dimension), "bars" (horizontal bars of the values of a dimension) or "film" (a map with a slider).
+        first dimension), "bars" (horizontal bars of the values of a dimension) or "film" (a map with a slider). Of a sweep:
+        "relative" (measures divided by their first value), "menu" (one measure at a time), "maps" (the same over two keys) or
+        "shares" (of the variance).
     span : str
-        "all", "cycles" (last three cycles) or "contact" (part of x that carries load).
+        "all", "cycles" (last three cycles), "run" (all cycles, if there are more) or "contact" (the loaded part of x).
     log : str
         Logarithmic axes: "", "x", "y" or "xy"; "auto" decides by the values.
     by : str
@@ -76,6 +78,27 @@ class Table:
 
 RUN = (
     Chart(
+        "Wear over the cycles",
+        "wear_cycle",
+        ("wear_worn_depth_max",),
+        caption="Largest worn depth, both pieces together.",
+    ),
+    Chart(
+        "Pressure while it wears",
+        "x",
+        ("wear_normal_stress",),
+        "overlay",
+        "contact",
+        caption="Normal stress after the cycles that the colours name.",
+    ),
+    Chart(
+        "Worn depth",
+        "x",
+        ("wear_worn_depth",),
+        "overlay",
+        caption="Worn depth of both pieces together after the cycles that the colours name.",
+    ),
+    Chart(
         "Friction loop",
         "loop_slide",
         ("loop_friction_force", "measured_force@measured_slide"),
@@ -83,26 +106,26 @@ RUN = (
         caption="Friction force against the slide of the interface in the last cycle, or over the whole run without cycles.",
     ),
     Chart(
-        "Displacement in the last cycles",
+        "Displacement",
         "time",
-        ("relative_displacement", "output_displacement"),
+        ("relative_displacement",),
         span="cycles",
-        caption="Displacement of the output relative to the base; of each interface in a rig of masses.",
+        caption="Last cycles: displacement of the output relative to the base; on a bench that of the upper piece.",
     ),
     Chart(
-        "Acceleration in the last cycles",
+        "Acceleration",
         "time",
         ("absolute_acceleration", "base_acceleration"),
         span="cycles",
         labels=("", "acceleration"),
-        caption="Acceleration of the output, base motion included, and of the base.",
+        caption="Last cycles: acceleration of the output, base motion included, and of the base.",
     ),
     Chart(
-        "Friction force in the last cycles",
+        "Friction force",
         "time",
         ("friction_force",),
         span="cycles",
-        caption="Resultant of the frictional shear stress.",
+        caption="Last cycles: resultant of the frictional shear stress.",
     ),
     Chart(
         "Steady motions",
@@ -114,7 +137,7 @@ RUN = (
     ),
     Chart(
         "Steady motions",
-        "curve_drive",
+        "curve_level",
         ("curve_amplitude",),
         by="curve_regime",
         marks=("curve_fold",),
@@ -159,7 +182,6 @@ RUN = (
         "level_drive",
         ("level_relative_displacement_amplitude",),
         "points",
-        log="auto",
         by="level_stuck",
         labels=("drive", "amplitude"),
         caption="Amplitude at the end of each level; each level starts from the final state of the one before.",
@@ -206,30 +228,10 @@ RUN = (
     ),
     Chart("Gap", "x", ("gap",), caption="Gap between the loaded surfaces at the end of the run."),
     Chart(
-        "Wear over the cycles",
-        "wear_cycle",
-        ("wear_worn_depth_max",),
-        caption="Largest worn depth, both pieces together.",
-    ),
-    Chart(
-        "Pressure while it wears",
-        "x",
-        ("wear_normal_stress",),
-        "overlay",
-        "contact",
-        caption="Normal stress after the cycles that the colours name.",
-    ),
-    Chart(
-        "Worn depth",
-        "x",
-        ("wear_worn_depth",),
-        "overlay",
-        caption="Worn depth of both pieces together after the cycles that the colours name.",
-    ),
-    Chart(
         "Whole run",
         "time",
-        ("relative_displacement", "output_displacement"),
+        ("relative_displacement",),
+        span="run",
         caption="Before the last cycles only reversals are stored.",
     ),
     Chart(
@@ -245,8 +247,8 @@ RUN = (
         ("accuracy_error",),
         "points",
         log="xy",
-        labels=("CPU time", "largest error / allowed error"),
-        caption="Estimated error of this run and of the coarser runs from which it is estimated.",
+        labels=("CPU time", "error of the worst main measure"),
+        caption="Estimated error of this run (right) and of the coarser runs, as the tolerance that it would meet.",
     ),
 )
 
@@ -309,52 +311,64 @@ CHARTS: dict[str, tuple[Chart, ...]] = {
 CURVES: dict[str, dict[str, dict[str, str]]] = {}
 
 # tables that stand below the charts
-TABLES: dict[str, tuple[Table, ...]] = {
-    "sweep": (
-        Table(
-            "How far the key may go",
-            "limits",
-            (
-                Column("measure", "measure", "name"),
-                Column("change", "changes by", "percent"),
-                Column("key", "key"),
-                Column("value", "at (between the cases)", "quantity"),
-            ),
-        ),
-        Table(
-            "Peaks over the frequency",
-            "peaks",
-            (
-                Column("measure", "measure", "name"),
-                Column("case", "at"),
-                Column("peak_frequency", "frequency"),
-                Column("peak_height", "height"),
-                Column("half_power_width", "half-power width"),
-            ),
-        ),
-        Table(
-            "Where 90 % of the cases lie",
-            "quantiles",
-            (
-                Column("measure", "measure", "name"),
-                Column("low", "5 % are below"),
-                Column("median", "half are below"),
-                Column("high", "95 % are below"),
-            ),
+RUN_TABLES = (
+    Table(
+        "Against the measurement",
+        "measured",
+        (
+            Column("reading", "reading"),
+            Column("measured", "measured"),
+            Column("computed", "computed"),
+            Column("ratio", "computed / measured"),
         ),
     ),
-} | {
-    kind: (
-        Table(
-            "Against the measurement",
-            "measured",
-            (
-                Column("reading", "reading"),
-                Column("measured", "measured", "quantity"),
-                Column("computed", "computed", "quantity"),
-                Column("ratio", "computed / measured", "quantity"),
-            ),
+    Table(
+        "Levels of the drive",
+        "level",
+        (
+            Column("level_drive", "drive"),
+            Column("level_relative_displacement_amplitude", "amplitude"),
+            Column("level_absolute_acceleration_peak", "peak acceleration"),
+            Column("level_acceleration_distortion", "distortion"),
+            Column("level_outcome", "outcome"),
+            Column("level_stuck", "interface"),
         ),
-    )
-    for kind in ("patch", "bench", "rig", "linear")
+    ),
+)
+SWEEP_TABLES = (
+    Table(
+        "How far the key may go",
+        "limits",
+        (
+            Column("measure", "measure", "name"),
+            Column("change", "changes by", "percent"),
+            Column("key", "key"),
+            Column("value", "at (between the cases)", "quantity"),
+        ),
+    ),
+    Table(
+        "Peaks over the frequency",
+        "peaks",
+        (
+            Column("measure", "measure", "name"),
+            Column("case", "at"),
+            Column("peak_frequency", "frequency"),
+            Column("peak_height", "height"),
+            Column("half_power_width", "half-power width"),
+        ),
+    ),
+    Table(
+        "Where 90 % of the cases lie",
+        "quantiles",
+        (
+            Column("measure", "measure", "name"),
+            Column("low", "5 % are below"),
+            Column("median", "half are below"),
+            Column("high", "95 % are below"),
+        ),
+    ),
+)
+TABLES: dict[str, tuple[Table, ...]] = {
+    **dict.fromkeys(("patch", "bench", "rig", "linear"), RUN_TABLES),
+    "sweep": SWEEP_TABLES,
 }

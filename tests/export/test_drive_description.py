@@ -7,7 +7,7 @@ import pytest
 from page_data import read_charts
 
 import patchfem as pf
-from patchfem.export.pages.driven import describe_drive
+from patchfem.export.driven import describe_drive
 
 MODES = (
     '[structure]\nmoving_mass = "2 kg"\n[[structure.mode]]\nname = "a"\nfrequency = "100 Hz"\ndamping = 0.01\n'
