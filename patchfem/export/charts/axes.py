@@ -47,7 +47,7 @@ def _draw_curves(panel: Panel, axes) -> None:
     for number, curve in enumerate(panel.curves):
         target = second if curve.on_second_axis else axes
         colour = choose_colour(curve, number)
-        if panel.style != "points" or curve.is_line:
+        if panel.style not in ("points", "dots") or curve.is_line:
             target.plot(
                 curve.x,
                 curve.y,
@@ -62,6 +62,8 @@ def _draw_curves(panel: Panel, axes) -> None:
             if panel.style == "area":
                 target.fill_between(curve.x, curve.y, color=colour, alpha=BAND_OPACITY, lw=0)
             continue
+        if panel.style == "dots":
+            target.plot(curve.x, curve.y, color=colour, lw=1)
         bars = None
         if curve.low is not None:
             bars = np.nan_to_num([curve.y - curve.low, curve.high - curve.y])

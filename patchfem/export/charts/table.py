@@ -19,8 +19,9 @@ class Chart:
         Variables of the vertical axis. "NAME@X" is drawn against its own variable X.
     style : str
         "line", "points", "area", "map" (colours over x and the first dimension), "overlay" (a line for each element of the
-        first dimension), "bars" (horizontal bars of the values of a dimension), "relative" (change of each variable from its
-        first value), "menu" (one variable at a time) or "film" (a map with a slider).
+        first dimension), "bars" (horizontal bars of the values of a dimension) or "film" (a map with a slider). Of a sweep:
+        "relative" (measures divided by their first value), "menu" (one measure at a time), "maps" (the same over two keys) or
+        "shares" (of the variance).
     span : str
         "all", "cycles" (last three cycles), "run" (all cycles, if there are more) or "contact" (the loaded part of x).
     log : str
@@ -68,8 +69,9 @@ class Stack:
 class Column:
     """Column of a table.
 
-    key: key in each row of the details, or name of a variable; title: heading; style: "text", "quantity" for a number
-    with the unit and the error of its row, or "rounded" for three digits.
+    key: key in each row of the details, or name of a variable; title: heading; style: "text", "name" for words with
+    underscores, "quantity" with the unit, the error and the interval of its row, "rounded" for three digits, or "percent"
+    for a relative change.
     """
 
     key: str
@@ -266,7 +268,45 @@ RUN = (
     ),
 )
 
-SWEEP: tuple[Chart, ...] = ()
+SWEEP = (
+    Chart(
+        "Main measures relative to the first case",
+        "",
+        (
+            "relative_displacement_amplitude",
+            "absolute_acceleration_peak",
+            "slip_amplitude",
+            "loop_area",
+            "friction_force_peak",
+            "friction_ratio_peak",
+            "onset_level",
+            "normal_stiffness",
+            "tangential_stiffness",
+            "contact_fraction",
+            "pressure_peak",
+            "equivalent_damping",
+        ),
+        "relative",
+        caption="Values of settled and unsettled cases divided by that of the first case; the band is a change of 5 %. "
+        "Click on a name to hide its line.",
+    ),
+    Chart(
+        "One measure",
+        "",
+        (),
+        "menu",
+        caption="Bars show the numerical error. Hollow points miss the tolerance, crosses mark cases that did not settle.",
+    ),
+    Chart("One measure over two keys", "", (), "maps", caption="White cells have no value."),
+    Chart(
+        "Shares of the variance",
+        "",
+        (),
+        "shares",
+        caption="Fraction of the variance over the cases that a key contributes: alone (first-order Sobol index), and with "
+        "its interactions (total index), with the interval of the latter.",
+    ),
+)
 BACKBONE_METHODS = (
     "balance",
     "quasi-static",
@@ -490,8 +530,42 @@ RUN_TABLES = (
         ),
     ),
 )
+SWEEP_TABLES = (
+    Table(
+        "How far the key may go",
+        "limits",
+        (
+            Column("measure", "measure", "name"),
+            Column("change", "changes by", "percent"),
+            Column("key", "key"),
+            Column("value", "at (between the cases)", "quantity"),
+        ),
+    ),
+    Table(
+        "Peaks over the frequency",
+        "peaks",
+        (
+            Column("measure", "measure", "name"),
+            Column("case", "at"),
+            Column("peak_frequency", "frequency"),
+            Column("peak_height", "height"),
+            Column("half_power_width", "half-power width"),
+        ),
+    ),
+    Table(
+        "Where 90 % of the cases lie",
+        "quantiles",
+        (
+            Column("measure", "measure", "name"),
+            Column("low", "5 % are below"),
+            Column("median", "half are below"),
+            Column("high", "95 % are below"),
+        ),
+    ),
+)
 TABLES: dict[str, tuple[Table, ...]] = {
     **dict.fromkeys(("patch", "bench", "rig", "linear"), RUN_TABLES),
+    "sweep": SWEEP_TABLES,
 }
 TABLES["fit"] = (
     Table(

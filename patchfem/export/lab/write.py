@@ -100,7 +100,9 @@ def list_columns(answer: Answer) -> tuple[Column | None, list[Column]]:
     dimension = "row" if answer.kind == "fit" else "time"
     columns = []
     for name, variable in answer.data.items():
-        is_history = dimension in variable.dims and name != "time" and variable.values.dtype.kind == "f"
+        is_history = (
+            dimension in variable.dims and name != "time" and variable.values.dtype.kind == "f"
+        )
         if not is_history or (answer.kind == "fit" and name not in FIT_COLUMNS):
             continue
         values = np.moveaxis(variable.values, variable.dims.index(dimension), -1)
