@@ -16,6 +16,7 @@ from ..formatting import (
 from ..response import rows
 from ..runs.results import patch_rows
 from .answer import Quantity
+from .surfaces import definitions
 
 MAX_TILES = 10  # largest number of key quantities on a page and on the screen
 # words at the end of a name that mark a fraction (in percent) or a phase (in degrees)
@@ -27,6 +28,26 @@ KEY = (
     "worn_depth_max",
     "worn_area",
     "worn_volume",
+    "track_width",
+    "track_depth",
+    "wear_coefficient",
+    "amplitude_ratio",
+    "slope_ratio",
+    "Ra",
+    "Rq",
+    "Rz",
+    "RSm",
+    "Rsk",
+    "Rk",
+    "Pa",
+    "Pq",
+    "Pt",
+    "Sa",
+    "Sq",
+    "Sz",
+    "Ssk",
+    "Sdr",
+    "Sal",
     "relative_displacement_amplitude",
     "relative_displacement_rms",
     "absolute_acceleration_peak",
@@ -60,17 +81,23 @@ class Definition(NamedTuple):
     text: str
 
 
+# kinds of answers whose quantities are defined in `surfaces.definitions`
+SURFACE_KINDS = ("compare", "pairs", "profile")
 QUANTITIES: dict[str, Definition] = {
-    # compare, profile: see the builders of these answers
     # backbone
     # fit
     # cost
 }
 
 
-def find_definition(name: str) -> Definition | None:
-    """Return the definition of a quantity, whose name may end in the number of an interface; None if there is none."""
+def find_definition(name: str, kind: str = "") -> Definition | None:
+    """Return the definition of a quantity, whose name may end in the number of an interface; None if there is none.
+
+    kind: of the answer; a comparison of surfaces has names of runs with a meaning of their own.
+    """
     base_name = rows.remove_interface_number(name)
+    if kind in SURFACE_KINDS:
+        return definitions.find(name) or definitions.find(base_name)
     for table in (QUANTITIES, patch_rows.TABLE, rows.TABLE):
         for candidate in (name, base_name):
             if candidate in table:
@@ -78,14 +105,15 @@ def find_definition(name: str) -> Definition | None:
     return None
 
 
-def describe(name: str) -> str:
-    """Return what a quantity is in one sentence, or "" if no table defines it."""
-    definition = find_definition(name)
+def describe(name: str, kind: str = "") -> str:
+    """Return what a quantity of a kind of answer is in one sentence, or "" if no table defines it."""
+    definition = find_definition(name, kind)
     if definition is None:
         return ""
     base_name = rows.remove_interface_number(name)
     number = name.removeprefix(base_name).removeprefix("_")
-    text = f"{definition.text}; of interface {number}" if number else definition.text
+    part = "group" if kind in SURFACE_KINDS else "interface"
+    text = f"{definition.text}; of {part} {number}" if number else definition.text
     return f"{text[0].upper()}{text[1:].rstrip('.')}."
 
 

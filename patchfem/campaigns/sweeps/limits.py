@@ -139,9 +139,7 @@ def _find_limit_on_line(
     inside = int(not_surely_within[0]) if not_surely_within.size else valid.size - 1
     covers_line = not not_surely_within.size and valid[-1] == values.size - 1
     low = float(sizes[valid[inside]])
-    limit = KeyLimit(
-        name, key, largest, float(change[-1]), np.nan, low, np.nan, bool(covers_line)
-    )
+    limit = KeyLimit(name, key, largest, float(change[-1]), np.nan, low, np.nan, bool(covers_line))
     surely_beyond = np.flatnonzero(size - error > largest)
     if not surely_beyond.size:
         return limit

@@ -283,7 +283,9 @@ def _describe_change(table: SweepTable, analysis: SweepAnalysis) -> str:
     indices = analysis.ranking.get(name, ())
     keys = indices[0].key if indices else " and ".join(key.key for key in varied[:2])
     share = f", {100 * indices[0].total:.0f} % of its variance" if indices else ""
-    return f"{label.capitalize()} changes most: {texts[0]} to {texts[1]}, mainly with {keys}{share}."
+    return (
+        f"{label.capitalize()} changes most: {texts[0]} to {texts[1]}, mainly with {keys}{share}."
+    )
 
 
 def _format_pair(name: str, unit: str, values: list[float]) -> list[str]:
@@ -317,7 +319,9 @@ def _describe_limit(limits: list[KeyLimit]) -> list[str]:
         return []
     key = small[0].key
     reached = [limit for limit in small if np.isfinite(limit.value)]
-    unknown = [limit for limit in small if not np.isfinite(limit.high) and not limit.is_never_reached]
+    unknown = [
+        limit for limit in small if not np.isfinite(limit.high) and not limit.is_never_reached
+    ]
     if not reached and not unknown:
         names = _join_names([limit.measure for limit in small])
         return [f"{names} change by less than 5 % over all cases."]

@@ -54,7 +54,8 @@ class SweepView:
         keys = [re.sub(r"\W", "_", key) for key in answer.details["of"]["keys"]]
         data = answer.data
         by_count = sorted(
-            keys, key=lambda key: (data[key].values.dtype.kind == "f", np.unique(data[key].values).size)
+            keys,
+            key=lambda key: (data[key].values.dtype.kind == "f", np.unique(data[key].values).size),
         )
         axis = axis or by_count[-1]
         is_grid = data[axis].dims == (axis,)

@@ -286,6 +286,8 @@ def collect_shards(
         If cases have no result yet.
     """
     with Folder(target, cases.compute_hashes(sweep_scene)) as folder:
-        answer = TableWriter(sweep_scene, cases, folder, page, at_any_size=True).write(is_complete=True)
+        answer = TableWriter(sweep_scene, cases, folder, page, at_any_size=True).write(
+            is_complete=True
+        )
         folder.clean(removes_others=False)
     return answer
