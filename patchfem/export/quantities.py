@@ -21,6 +21,8 @@ from .surfaces import definitions
 MAX_TILES = 10  # largest number of key quantities on a page and on the screen
 # words at the end of a name that mark a fraction (in percent) or a phase (in degrees)
 PERCENT_WORDS = ("fraction", "share")
+# display units of areas of sections and of wear coefficients
+LADDERS = UNIT_LADDERS | {"m2": (("um^2", 1e12),), "m2 N-1": (("m^2/N", 1.0),)}
 DEGREES = ("deg", 57.29577951308232)
 
 KEY = (
@@ -134,9 +136,9 @@ def choose_scale(name: str, unit: str, size: float) -> tuple[str, float]:
         return "%", 100.0
     if unit == "rad" and last_word == "phase":
         return DEGREES
-    if unit not in UNIT_LADDERS:
+    if unit not in LADDERS:
         return ("" if unit == "1" else unit.replace(" s-1", "/s")), 1.0
-    return choose_unit(UNIT_LADDERS[unit], size)
+    return choose_unit(LADDERS[unit], size)
 
 
 def format_quantity(name: str, quantity: Quantity) -> str:

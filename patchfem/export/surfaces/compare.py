@@ -10,7 +10,7 @@ from ... import __version__
 from ...campaigns import compare as pressing
 from ...campaigns.compare import SurfaceRuns
 from ...surface.compare import compare
-from ...surface.compare.compare import Options
+from ...surface.compare.compare import DEFAULTS, Options
 from ...surface.compare.records import Comparison, ScanMaps, Track
 from ...surface.profile import level, resample_evenly
 from ...surface.quantity import LEVEL, SIDE
@@ -30,7 +30,7 @@ MATERIAL_RATIOS = np.linspace(0.0, 1.0, 201)
 def answer_files(
     before: Path,
     after: Path,
-    options: Options = Options(),
+    options: Options = DEFAULTS,
     predicted: Path | None = None,
     piece: str = "",
 ) -> Answer:
