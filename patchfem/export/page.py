@@ -212,7 +212,7 @@ def make_tiles(answer: Answer) -> list[dict[str, str]]:
         {
             "label": name.replace("_", " "),
             "text": quantities.format_quantity(name, quantity),
-            "meaning": quantities.describe(name),
+            "meaning": quantities.describe(name, answer.kind),
         }
         for name, quantity in quantities.choose_key(answer.quantities).items()
     ]
@@ -226,8 +226,11 @@ def _format_entry(name: str, answer: Answer, first: Answer) -> str:
 def _explain(name: str, answers: dict[str, Answer]) -> str:
     """Return the definition of a measure, and why it has no value in an answer."""
     found = [answer.quantities[name] for answer in answers.values() if name in answer.quantities]
+    kind = next(iter(answers.values())).kind
     reasons = dict.fromkeys(one.reason for one in found if one.value is None and one.reason)
-    return " ".join([quantities.describe(name), *(f"No value: {reason}." for reason in reasons)])
+    return " ".join(
+        [quantities.describe(name, kind), *(f"No value: {reason}." for reason in reasons)]
+    )
 
 
 def make_tables(answer: Answer) -> list[dict]:
@@ -249,12 +252,14 @@ def make_tables(answer: Answer) -> list[dict]:
 
 
 def _find_rows(answer: Answer, source: str) -> list[dict]:
-    """Return the rows of a table from a list in the details, or from the variables of a dimension."""
+    """Return the rows of a table from a list or an object of objects in the details, or from the variables of a dimension."""
     content = answer.details
     for key in source.split("/"):
         content = content.get(key) if isinstance(content, dict) else None
     if isinstance(content, list):
         return content
+    if isinstance(content, dict):
+        return [{"name": name.replace("_", " "), **row} for name, row in content.items()]
     variables = {name: one for name, one in answer.data.items() if one.dims == (source,)}
     size = len(next(iter(variables.values())).values) if variables else 0
     return [{name: _make_cell(variables, name, k) for name in variables} for k in range(size)]
@@ -269,8 +274,9 @@ def _make_cell(variables: dict, name: str, index: int) -> str | dict:
     if isinstance(value, str):
         return value
     numbers = {"value": float(value)}
-    if f"{name}_error" in variables:
-        numbers["error"] = float(variables[f"{name}_error"].values[index])
+    for end in ("error", "low", "high"):
+        if f"{name}_{end}" in variables:
+            numbers[end] = float(variables[f"{name}_{end}"].values[index])
     finite = {key: number if np.isfinite(number) else None for key, number in numbers.items()}
     return finite | {"unit": variable.unit}
 

@@ -16,10 +16,13 @@ from ..formatting import (
 from ..response import rows
 from ..runs.results import patch_rows
 from .answer import Quantity
+from .surfaces import definitions
 
 MAX_TILES = 10  # largest number of key quantities on a page and on the screen
 # words at the end of a name that mark a fraction (in percent) or a phase (in degrees)
 PERCENT_WORDS = ("fraction", "share")
+# display units of areas of sections and of wear coefficients
+LADDERS = UNIT_LADDERS | {"m2": (("um^2", 1e12),), "m2 N-1": (("m^2/N", 1.0),)}
 DEGREES = ("deg", 57.29577951308232)
 
 KEY = (
@@ -37,6 +40,26 @@ KEY = (
     "worn_depth_max",
     "worn_area",
     "worn_volume",
+    "track_width",
+    "track_depth",
+    "wear_coefficient",
+    "amplitude_ratio",
+    "slope_ratio",
+    "Ra",
+    "Rq",
+    "Rz",
+    "RSm",
+    "Rsk",
+    "Rk",
+    "Pa",
+    "Pq",
+    "Pt",
+    "Sa",
+    "Sq",
+    "Sz",
+    "Ssk",
+    "Sdr",
+    "Sal",
     "relative_displacement_amplitude",
     "relative_displacement_rms",
     "absolute_acceleration_peak",
@@ -71,6 +94,8 @@ class Definition(NamedTuple):
     digits: int = 4
 
 
+# kinds of answers whose quantities are defined in `surfaces.definitions`
+SURFACE_KINDS = ("compare", "pairs", "profile")
 QUANTITIES: dict[str, Definition] = {
     # sweep
     "peak_height": Definition("1", "largest response over the swept frequency"),
@@ -82,7 +107,6 @@ QUANTITIES: dict[str, Definition] = {
         "value of the swept key at which a measure has changed by 5 % (the peak pressure: by 100 %) from the first case, "
         "with the cases between which it lies",
     ),
-    # compare, profile: see the builders of these answers
     # backbone
     "frequency_at_smallest_amplitude": Definition(
         "Hz", "frequency of the mode at the smallest amplitude of the recommended curve"
@@ -155,10 +179,15 @@ QUANTITIES: dict[str, Definition] = {
 FITTED_KEY = "value of this key of the scene that fits the measurement best, with its 95 % interval"
 
 
-def find_definition(name: str) -> Definition | None:
-    """Return the definition of a quantity, whose name may end in the number of an interface; None if there is none."""
+def find_definition(name: str, kind: str = "") -> Definition | None:
+    """Return the definition of a quantity, whose name may end in the number of an interface; None if there is none.
+
+    kind: of the answer; a comparison of surfaces has names of runs with a meaning of their own.
+    """
     if "." in name:
         return Definition("1", FITTED_KEY)
+    if kind in SURFACE_KINDS:
+        return definitions.find(name) or definitions.find(rows.remove_interface_number(name))
     # quantities of a sweep: limits of its key, and extremes of measures
     name = name.removeprefix("largest_").removeprefix("smallest_")
     base_name = "limit" if name.startswith("limit_") else rows.remove_interface_number(name)
@@ -169,14 +198,15 @@ def find_definition(name: str) -> Definition | None:
     return None
 
 
-def describe(name: str) -> str:
-    """Return what a quantity is in one sentence, or "" if no table defines it."""
-    definition = find_definition(name)
+def describe(name: str, kind: str = "") -> str:
+    """Return what a quantity of a kind of answer is in one sentence, or "" if no table defines it."""
+    definition = find_definition(name, kind)
     if definition is None:
         return ""
     base_name = rows.remove_interface_number(name)
     number = name.removeprefix(base_name).removeprefix("_")
-    text = f"{definition.text}; of interface {number}" if number else definition.text
+    part = "group" if kind in SURFACE_KINDS else "interface"
+    text = f"{definition.text}; of {part} {number}" if number else definition.text
     return f"{text[0].upper()}{text[1:].rstrip('.')}."
 
 
@@ -197,9 +227,9 @@ def choose_scale(name: str, unit: str, size: float) -> tuple[str, float]:
         return "%", 100.0
     if unit == "rad" and last_word == "phase":
         return DEGREES
-    if unit not in UNIT_LADDERS:
+    if unit not in LADDERS:
         return ("" if unit == "1" else unit.replace(" s-1", "/s")), 1.0
-    return choose_unit(UNIT_LADDERS[unit], size)
+    return choose_unit(LADDERS[unit], size)
 
 
 def format_quantity(name: str, quantity: Quantity) -> str:

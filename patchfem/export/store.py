@@ -16,7 +16,7 @@ from .. import __version__
 from ..core import PatchfemError
 from ..disk.atomic_write import write_text
 from .answer import RUN_KINDS, Answer, Quantity, Remarks, Variable
-from .charts.table import CSV_UNITS, CURVES, Stack
+from .charts.table import CSV_UNITS, CURVES, Rows, Stack
 from .netcdf import read_netcdf, write_netcdf
 
 SUMMARY = "summary.json"
@@ -27,7 +27,8 @@ FIELDS = "fields.vtkhdf"
 DATA_FILES = {"sweep": "sweep.nc", "backbone": "backbone.nc"}
 # JSON file with the `details` of each kind of answer; those of a run are in summary.json
 DETAIL_FILES = {
-    kind: f"{kind}.json" for kind in ("sweep", "backbone", "compare", "profile", "fit", "cost")
+    kind: f"{kind}.json"
+    for kind in ("sweep", "backbone", "compare", "pairs", "profile", "fit", "cost")
 }
 
 
@@ -213,10 +214,16 @@ def format_curves(answer: Answer) -> dict[str, str]:
     return files
 
 
-def _list_columns(data: dict[str, Variable], columns: dict | Stack | str) -> dict[str, list]:
+def _list_columns(data: dict[str, Variable], columns: dict | Stack | Rows | str) -> dict[str, list]:
     """Return the columns of a CSV file: heading with unit -> cells."""
     if isinstance(columns, Stack):
         return _stack_columns(data, columns)
+    if isinstance(columns, Rows):
+        return {
+            _head(name, variable): _list_cells(variable)
+            for name, variable in data.items()
+            if variable.dims == (columns.dimension,)
+        }
     if isinstance(columns, str):
         return {
             name: _list_cells(variable)
@@ -234,7 +241,7 @@ def _list_columns(data: dict[str, Variable], columns: dict | Stack | str) -> dic
             lists[title] = _list_cells(Variable(variable.dims, scaled))
         else:
             lists[_head(title, variable)] = _list_cells(variable)
-    return lists
+    return lists if len(lists) > 1 else {}
 
 
 def _stack_columns(data: dict[str, Variable], stack: Stack) -> dict[str, list]:

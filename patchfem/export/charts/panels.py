@@ -231,8 +231,19 @@ def _finish(chart: Chart, panel: Panel, data: dict, second_axis: Axis | None) ->
     ]
     panel = replace(panel, marks=marks, caption=chart.caption, y2=second_axis)
     if chart.style == "map":
-        return replace(panel, y=Axis("frame"), colour_label=panel.y.label)
+        axis, _ = _find_map_rows(data, _reduce_strips(data[chart.y[0]]), panel.x)
+        return replace(panel, y=axis, colour_label=panel.y.label)
     return panel
+
+
+def _find_map_rows(
+    data: dict[str, Variable], variable: Variable, x_axis: Axis
+) -> tuple[Axis, np.ndarray]:
+    """Return the vertical axis of a map and its positions: those of a coordinate y in the units of x, or frames."""
+    if variable.dims[0] == "y" and "y" in data:
+        label = x_axis.label.replace("x [", "y [")
+        return Axis(label, x_axis.scale), data["y"].values * x_axis.scale
+    return Axis("frame"), np.arange(len(variable.values))
 
 
 def _split(name: str) -> tuple[str, str]:
@@ -325,7 +336,8 @@ def _make_curves(data: dict[str, Variable], chart: Chart, name: str, axes: tuple
     x_values = np.asarray(x_variable.values, float) * x_axis.scale
     variable = _reduce_strips(data[name])
     if chart.style == "map":
-        return [_make_map(variable, x_values, y_axis)]
+        rows = _find_map_rows(data, variable, x_axis)[1]
+        return [_make_map(variable, x_values, y_axis, rows)]
 
     label = name.replace("_", " ")
     rows = [(label, x_values, np.asarray(variable.values, float))]
@@ -426,14 +438,14 @@ def _split_by_code(curve: Curve, codes: Variable, keep: np.ndarray, is_joined: b
     return curves
 
 
-def _make_map(variable: Variable, x_values: np.ndarray, axis: Axis) -> Curve:
-    """Return the colours of a map; codes keep their numbers."""
+def _make_map(variable: Variable, x_values: np.ndarray, axis: Axis, rows: np.ndarray) -> Curve:
+    """Return the colours of a map at vertical positions `rows`; codes keep their numbers."""
     step = -(-x_values.size // MAX_MAP_COLUMNS)
     values = np.atleast_2d(variable.values)[:, ::step]
     meanings = variable.meanings
     if not meanings:
         values = values * axis.scale
-    return Curve("", x_values[::step], values, rows=np.arange(len(values)), meanings=meanings)
+    return Curve("", x_values[::step], values, rows=rows, meanings=meanings)
 
 
 def make_film(frames: dict[str, np.ndarray], title: str, unit: str) -> Panel:

@@ -38,6 +38,9 @@ def draw(panel: Panel) -> dict:
     if panel.style == "film":
         return _add_film(figure, panel)
     figure["data"] = _make_traces(panel)
+    if panel.style == "map" and panel.y.label.startswith("y"):
+        layout["yaxis"] |= {"scaleanchor": "x", "constrain": "domain"}
+        layout["xaxis"]["constrain"] = "domain"
     return figure
 
 

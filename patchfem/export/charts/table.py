@@ -20,8 +20,8 @@ class Chart:
     style : str
         "line", "points", "area", "map" (colours over x and the first dimension), "overlay" (a line for each element of the
         first dimension), "bars" (horizontal bars of the values of a dimension) or "film" (a map with a slider). Of a sweep:
-        "relative" (measures divided by their first value), "menu" (one measure at a time), "maps" (the same over two keys) or
-        "shares" (of the variance).
+        "relative" (measures divided by their first value), "menu" (one measure at a time), "maps" (the same over two keys)
+        or "shares" (of the variance).
     span : str
         "all", "cycles" (last three cycles), "run" (all cycles, if there are more) or "contact" (the loaded part of x).
     log : str
@@ -63,6 +63,13 @@ class Stack:
     heading: str
     groups: tuple[str, ...]
     names: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Rows:
+    """Columns of a CSV file for all variables of a dimension, with units in their headings."""
+
+    dimension: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -337,8 +344,6 @@ BACKBONE = (
         caption="Structure and friction together. Use the first curve; its band contains what other kinds of test read.",
     ),
 )
-COMPARE: tuple[Chart, ...] = ()
-PROFILE: tuple[Chart, ...] = ()
 FIT = (
     Chart(
         "Measured and fitted loop",
@@ -454,20 +459,203 @@ COST = (
         caption="The least accurate of the key measures in each run, with its numerical error.",
     ),
 )
+COMPARE = (
+    Chart(
+        "Both traces",
+        "x",
+        ("before", "after"),
+        marks=("track_end",),
+        labels=("x of the second trace", "height"),
+        caption="The trace measured after wear, moved by shift, tilt and offset onto the one measured before. Vertical lines: "
+        "ends of the tracks.",
+    ),
+    Chart(
+        "Worn depth",
+        "x",
+        ("depth", "hidden_depth"),
+        marks=("track_end",),
+        labels=("", "worn depth"),
+        caption="Depth of the surface after wear below the one before. Band: 95 % noise of a single depth. Vertical lines: ends "
+        "of the worn parts.",
+    ),
+    Chart(
+        "Both traces, each about its own line",
+        "x_before",
+        ("trace_before", "trace_after@x_after"),
+        labels=("x", "height"),
+        caption="No common place was found in the two traces.",
+    ),
+    Chart(
+        "Worn depth",
+        "x",
+        ("depth_map",),
+        "map",
+        caption="Depth of the second surface below the first, once both are aligned; white: not measured.",
+    ),
+    Chart("Surface before", "x", ("before_map",), "map", caption="Before wear."),
+    Chart(
+        "Surface after",
+        "x",
+        ("after_map",),
+        "map",
+        caption="After wear, aligned with the first surface.",
+    ),
+    Chart(
+        "Mean section of the track",
+        "section_place",
+        ("section_depth",),
+        labels=("place across the track", "worn depth"),
+        caption="Mean of all sections across the track. Band: one standard deviation of the sections.",
+    ),
+    Chart(
+        "Computed and measured wear",
+        "x_patch",
+        ("measured_depth", "computed_depth"),
+        labels=("x of the patch", "worn depth"),
+        caption="Measured depth with its 95 % noise, and that of the run with the fitted wear coefficient.",
+    ),
+    Chart(
+        "Measured less computed wear",
+        "x_patch",
+        ("depth_difference",),
+        "area",
+        labels=("x of the patch", "measured less computed"),
+        caption="Above zero more wore off than computed.",
+    ),
+    Chart(
+        "Gap of the unloaded surfaces",
+        "x",
+        ("gap_before", "gap_after"),
+        labels=("", "gap"),
+        caption="Gap between the pieces without load, wear included.",
+    ),
+    Chart(
+        "Pressure",
+        "x_pressed_before x_pressed_after",
+        ("pressure_before@x_pressed_before", "pressure_after@x_pressed_after"),
+        labels=("x of the patch", "normal stress"),
+        caption="Normal stress of the pressed patch with each of the two surfaces; the mean over strips.",
+    ),
+    Chart(
+        "Friction loops",
+        "slide_before slide_after",
+        ("force_before@slide_before", "force_after@slide_after"),
+        labels=("slide", "friction force"),
+        caption="Friction force against the slide of the interface in the last cycle.",
+    ),
+    Chart(
+        "Abbott curves",
+        "material_ratio",
+        ("abbott_before", "abbott_after"),
+        labels=("", "height"),
+        caption="Height that a given fraction of the surface exceeds.",
+    ),
+)
+PAIRS = (
+    Chart(
+        "Worn depth of the pairs",
+        "line",
+        ("worn_depth_mean",),
+        "points",
+        labels=("line in the table", "mean worn depth"),
+        caption="Mean worn depth of each pair with its 95 % interval.",
+    ),
+    Chart(
+        "Amplitude of the waves",
+        "line",
+        ("amplitude_ratio",),
+        "points",
+        labels=("line in the table", "after / before"),
+        caption="Amplitude of the waves from 60 to 110 um after wear divided by before, with 95 % intervals.",
+    ),
+)
+PROFILE = (
+    Chart(
+        "Primary profile",
+        "x",
+        ("primary", "waviness@x_rough"),
+        labels=("", "height"),
+        caption="Heights about the subtracted form, and the waviness beyond the cut-off.",
+    ),
+    Chart(
+        "Roughness profile",
+        "x_rough",
+        ("roughness",),
+        labels=("x", "height"),
+        caption="Primary profile less waviness; half a cut-off is trimmed at each end.",
+    ),
+    Chart(
+        "Surface",
+        "x",
+        ("height_map",),
+        "map",
+        caption="Heights from which the parameters are computed.",
+    ),
+    Chart(
+        "Abbott curve",
+        "material_ratio",
+        ("abbott",),
+        "overlay",
+        labels=("", "height"),
+        caption="Height that a given fraction of the surface exceeds; of the roughness profile if there is a cut-off.",
+    ),
+    Chart(
+        "Power spectral density",
+        "wavelength",
+        ("density",),
+        log="xy",
+        caption="One-sided spectral density of the primary profile over the wavelength.",
+    ),
+)
 
 CHARTS: dict[str, tuple[Chart, ...]] = {
     **dict.fromkeys(("patch", "bench", "rig", "linear"), RUN),
     "sweep": SWEEP,
     "backbone": BACKBONE,
     "compare": COMPARE,
+    "pairs": PAIRS,
     "profile": PROFILE,
     "fit": FIT,
     "cost": COST,
 }
 
+# columns of the tables of pairs, and of several measured surfaces
+PAIR_COLUMNS = ("worn_depth_mean", "worn_volume", "track_width", "track_depth", "amplitude_ratio")
+FILE_COLUMNS = ("Ra", "Rq", "Rz", "RSm", "Pa", "Pq", "Pt", "Sa", "Sq", "Sz")
+
 # CSV files: kind of answer -> file -> {heading of a column: variable}, groups of variables below each other, or a
 # dimension, all variables of which are columns without units in their headings. A heading may end in a unit of CSV_UNITS.
-CURVES: dict[str, dict[str, dict[str, str] | Stack | str]] = {
+CURVES: dict[str, dict[str, dict[str, str] | Stack | Rows | str]] = {
+    "compare": {
+        "depth.csv": {
+            "x": "x",
+            "before": "before",
+            "after": "after",
+            "gap_before": "gap_before",
+            "gap_after": "gap_after",
+            "depth": "depth",
+        },
+        "section.csv": {
+            "place": "section_place",
+            "depth": "section_depth",
+            "low": "section_depth_low",
+            "high": "section_depth_high",
+        },
+        "predicted.csv": {
+            "x_patch": "x_patch",
+            "measured": "measured_depth",
+            "measured_low": "measured_depth_low",
+            "measured_high": "measured_depth_high",
+            "computed": "computed_depth",
+            "difference": "depth_difference",
+        },
+    },
+    "pairs": {"pairs.csv": Rows("pair")},
+    "profile": {
+        "profile.csv": Rows("file"),
+        "primary.csv": {"x": "x", "z": "primary"},
+        "roughness.csv": {"x": "x_rough", "z": "roughness"},
+    },
     "backbone": {
         "backbone.csv": Stack(
             "method",
@@ -566,6 +754,49 @@ SWEEP_TABLES = (
 TABLES: dict[str, tuple[Table, ...]] = {
     **dict.fromkeys(("patch", "bench", "rig", "linear"), RUN_TABLES),
     "sweep": SWEEP_TABLES,
+    "compare": tuple(
+        Table(
+            title,
+            source,
+            (Column("name", ""), Column("before", "before"), Column("after", "after")),
+        )
+        for title, source in (
+            ("Roughness inside and outside of the track", "track_roughness"),
+            ("Both runs", "measures"),
+            ("Scene pressed with each of the two surfaces", "pressed/measures"),
+        )
+    ),
+    "pairs": (
+        Table(
+            "Means",
+            "means",
+            (
+                Column("group", "group"),
+                Column("kind", "kind"),
+                Column("direction", "direction"),
+                Column("pairs", "pairs"),
+                *(Column(name, name.replace("_", " ")) for name in PAIR_COLUMNS),
+            ),
+        ),
+        Table(
+            "Each pair",
+            "pair",
+            (
+                Column("before", "before"),
+                Column("after", "after"),
+                Column("verdict", "verdict"),
+                Column("message", "message"),
+                *(Column(name, name.replace("_", " ")) for name in PAIR_COLUMNS),
+            ),
+        ),
+    ),
+    "profile": (
+        Table(
+            "Each file",
+            "file",
+            (Column("file", "file"), *(Column(name, name) for name in FILE_COLUMNS)),
+        ),
+    ),
 }
 TABLES["fit"] = (
     Table(

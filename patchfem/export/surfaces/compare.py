@@ -1,14 +1,16 @@
 """Answer of the comparison of two measured surfaces: sentences, quantities, curves or maps, and compare.json."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from ... import __version__
-from ...campaigns.compare import SurfaceRuns, surface_runs_to_dict
+from ...campaigns import compare as pressing
+from ...campaigns.compare import SurfaceRuns
 from ...surface.compare import compare
-from ...surface.compare.compare import Options
+from ...surface.compare.compare import DEFAULTS, Options
 from ...surface.compare.records import Comparison, ScanMaps, Track
 from ...surface.profile import level, resample_evenly
 from ...surface.quantity import LEVEL, SIDE
@@ -18,7 +20,7 @@ from . import predicted as predicted_wear
 from . import sentences
 from .definitions import name_in_track
 from .sentences import to_json
-from .variables import along, maps
+from .variables import along, band, maps
 
 SIDES = ("before", "after")
 STATES = ("not used", "unworn", "worn", "grown")  # meanings of the codes of the variable `state`
@@ -28,7 +30,7 @@ MATERIAL_RATIOS = np.linspace(0.0, 1.0, 201)
 def answer_files(
     before: Path,
     after: Path,
-    options: Options = Options(),
+    options: Options = DEFAULTS,
     predicted: Path | None = None,
     piece: str = "",
 ) -> Answer:
@@ -60,6 +62,38 @@ def answer_files(
     return predicted_wear.add_predicted(answer, comparison, predicted, piece)
 
 
+def compare_with_scene(
+    before: Path,
+    after: Path,
+    options: Options,
+    run_surfaces: Callable[[Path, Path], SurfaceRuns],
+    folder: Path,
+) -> Answer:
+    """Compare two traces, and run a scene with each of them.
+
+    Parameters
+    ----------
+    before, after : Path
+    options : Options
+    run_surfaces : callable
+        Receives the paths of both traces, limited to their common part, and runs the scene with each.
+    folder : Path
+        Receives surface_before.csv and surface_after.csv.
+
+    Returns
+    -------
+    Answer
+
+    Raises
+    ------
+    PatchfemError
+        If the files are scans or cannot be compared.
+    """
+    comparison = compare.compare_files(before, after, options)
+    paths = pressing.write_common_traces(comparison, folder)
+    return _add_pressed(make_answer(comparison), run_surfaces(*paths))
+
+
 def make_answer(comparison: Comparison) -> Answer:
     """Return the answer of a comparison of two surfaces."""
     words = sentences.describe(comparison)
@@ -83,7 +117,7 @@ def make_answer(comparison: Comparison) -> Answer:
         "track": _track_to_json(comparison.track),
         "other_tracks": [_track_to_json(track) for track in comparison.tracks[1:]],
         "removed": dict(zip(SIDES, comparison.evidence.removed, strict=True)),
-        "roughness": _roughness_to_json(comparison),
+        **_compare_roughness(comparison),
         "notes": file_notes,
     }
     if sentences.is_known(values.get("worn_depth_mean")):
@@ -121,14 +155,18 @@ def _track_to_json(track: Track | None) -> dict | None:
     return {"sections": track.n_sections} | to_json(track.values)
 
 
-def _roughness_to_json(comparison: Comparison) -> dict:
-    """Return the roughness inside and outside of the track as an object of compare.json."""
-    content = {"cutoff": comparison.evidence.cutoff, "inside": None, "outside": None}
-    for region, sides in comparison.evidence.roughness.items():
+def _compare_roughness(comparison: Comparison) -> dict:
+    """Return the roughness inside and outside of the track: `roughness` of compare.json, and the rows of a table."""
+    evidence = comparison.evidence
+    content = {"cutoff": evidence.cutoff, "inside": None, "outside": None}
+    rows = {}
+    for region, sides in evidence.roughness.items():
         content[region] = {side: to_json(values) for side, values in sides.items()}
-    if not comparison.evidence.roughness:
+        for name in content[region]["before"]:
+            rows[f"{name} {region}"] = {side: content[region][side][name] for side in SIDES}
+    if not rows:
         content["reason"] = sentences.REASONS["no_track"]
-    return content
+    return {"roughness": content, "track_roughness": rows}
 
 
 def _make_data(comparison: Comparison) -> dict[str, Variable]:
@@ -142,9 +180,8 @@ def _make_data(comparison: Comparison) -> dict[str, Variable]:
             curves.x, curves.y, before_map=heights[0], after_map=heights[1], depth_map=curves.depth
         )
     else:
-        noise = SIDE * curves.noise
         data = along("x", x=curves.x, before=heights[0], after=heights[1])
-        data |= along("x", depth=curves.depth, depth_error=noise)
+        data |= band("x", "depth", curves.depth, SIDE * curves.noise)
         state = np.select((curves.unworn, curves.worn, curves.grown), (1, 2, 3)).astype(np.int8)
         data["state"] = Variable(("x",), state, "", "state of each height", STATES)
     return data | _make_tracks(comparison.tracks) | _make_abbott(heights)
@@ -158,12 +195,8 @@ def _make_tracks(tracks: tuple[Track, ...]) -> dict[str, Variable]:
     data = along("track_end", track_end=np.array(ends, float))
     if tracks[0].section is not None:
         places, depth, scatter = tracks[0].section
-        data |= along(
-            "section_place",
-            section_place=places,
-            section_depth=depth,
-            section_depth_error=scatter,
-        )
+        data |= along("section_place", section_place=places)
+        data |= band("section_place", "section_depth", depth, scatter)
     return data
 
 
@@ -188,20 +221,9 @@ def _make_abbott(heights) -> dict[str, Variable]:
     return data | along("material_ratio", abbott_before=curves[0], abbott_after=curves[1])
 
 
-def add_pressed(answer: Answer, runs: SurfaceRuns) -> Answer:
-    """Add the measures and pressures of a scene that was run with the surface before and after wear.
-
-    Parameters
-    ----------
-    answer : Answer
-        Of the comparison of both surfaces.
-    runs : SurfaceRuns
-
-    Returns
-    -------
-    Answer
-    """
-    pressed = surface_runs_to_dict(runs)
+def _add_pressed(answer: Answer, runs: SurfaceRuns) -> Answer:
+    """Add the measures and pressures of a scene that was run with the surface before and after wear."""
+    pressed = pressing.surface_runs_to_dict(runs)
     data = dict(answer.data)
     for side in SIDES:
         run = getattr(runs, side)

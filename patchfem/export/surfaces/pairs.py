@@ -9,7 +9,7 @@ from ... import __version__
 from ...campaigns import surface_pairs
 from ...campaigns.surface_pairs import Group, GroupMeans, TableLine
 from ...core import PatchfemError
-from ...surface.compare.compare import Options
+from ...surface.compare.compare import DEFAULTS, Options
 from ..answer import Answer, Remarks, Variable
 from . import compare, sentences, variables, worn
 
@@ -32,7 +32,7 @@ SHARED_NOTE = (
 
 
 def answer_pairs(
-    table: Path, options: Options = Options(), report_progress: Callable | None = None
+    table: Path, options: Options = DEFAULTS, report_progress: Callable | None = None
 ) -> Answer:
     """Compare the two files or results folders of each line of a table.
 

@@ -24,8 +24,8 @@ class PatchRun(NamedTuple):
     @property
     def cycles(self) -> float:
         """Number of cycles of wear."""
-        cycle = self.answer.data.get("wear_cycle")
-        return 0.0 if cycle is None else float(cycle.values[-1])
+        cycles = self.answer.data.get("wear_frame")
+        return 0.0 if cycles is None else float(cycles.values[-1])
 
 
 def read_patch(folder: Path) -> PatchRun:
@@ -72,8 +72,7 @@ def read_patch(folder: Path) -> PatchRun:
 
 
 def worn_depths(answer: Answer) -> np.ndarray:
-    """Return the worn depth (f, m), or (f, s, m) with strips, of both pieces together [m] in the frames of a run."""
-    for name in ("wear_worn_depth", "worn_depth"):
-        if name in answer.data:
-            return np.asarray(answer.data[name].values, float)
-    raise PatchfemError("result.nc contains no worn_depth; run the scene again")
+    """Return the worn depth (f, m), or (f, s, m) with strips, of both pieces together [m] after the cycles of `wear_frame`."""
+    if "wear_worn_depth" not in answer.data:
+        raise PatchfemError("result.nc contains no wear_worn_depth; run the scene again")
+    return answer.data["wear_worn_depth"].values

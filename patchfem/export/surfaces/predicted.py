@@ -15,7 +15,7 @@ from ...wear.predicted import MeasuredDepth, PredictedWear, WearHistory
 from ..answer import Answer, Quantity, Remarks
 from . import sentences
 from .patches import read_patch, worn_depths
-from .variables import along
+from .variables import along, band
 
 MIN_DEPARTURE = (
     0.01  # smallest relative difference of the proportional coefficient that is reported
@@ -73,11 +73,10 @@ def add_predicted(answer: Answer, comparison: Comparison, folder: Path, piece: s
     data = along(
         "x_patch",
         x_patch=fitted.x,
-        measured_depth=fitted.measured,
-        measured_depth_error=SIDE * fitted.noise,
         computed_depth=fitted.computed,
         depth_difference=fitted.measured - fitted.computed,
     )
+    data |= band("x_patch", "measured_depth", fitted.measured, SIDE * fitted.noise)
     return replace(
         answer,
         verdict=(*answer.verdict[:kept], sentence),
@@ -144,15 +143,11 @@ def read_history(folder: Path, piece: str = "") -> WearHistory:
         if applies:
             raise PatchfemError(f"compare --predicted {folder}: {text}")
 
-    # the frames of the depth have the cycles at which the run had their volumes
-    data = run.answer.data
     depth = worn_depths(run.answer)
-    volume = depth @ run.state.area
-    total = data["wear_worn_volume"].values
-    if not volume[-1] > 0:
+    if not depth[-1].max() > 0:
         raise PatchfemError(f"compare --predicted {folder}: nothing wore off in this run")
-    cycle = np.interp(volume / volume[-1], total / total[-1], data["wear_cycle"].values)
-    work, first = np.unique(cycle / cycle[-1], return_index=True)
+    cycles = run.answer.data["wear_frame"].values
+    work, first = np.unique(cycles / cycles[-1], return_index=True)
     errors = [(error or 0.0) / value for value, error in run.state.measures.values() if value]
     return WearHistory(
         x=run.state.x,

@@ -13,6 +13,7 @@ from .. import answer, quantities
 
 ROUNDING = 1e-6  # largest difference of a ratio from 1 that is round-off
 MAX_SENTENCES = 4  # of a verdict
+INTERVALS = "Numbers in brackets are 95 % intervals, which hold for the place that was measured."
 
 # Headline for each code of the verdict. {mean}: worn depth with its interval; {region}: what it is the mean of.
 VERDICTS = {
@@ -160,7 +161,7 @@ def describe(comparison: Comparison) -> Words:
             notes.append(NOTES[code].format_map(fields))
         else:
             verdict.append(IN_VERDICT[code].format_map(fields))
-    notes = [*verdict[MAX_SENTENCES:], *notes]
+    notes = [*verdict[MAX_SENTENCES:], *notes, INTERVALS]
     return Words(tuple(verdict[:MAX_SENTENCES]), tuple(warnings), tuple(notes))
 
 
@@ -182,8 +183,8 @@ def _describe_track(track: Track) -> str:
     for side, name in enumerate(("from", "to")):
         end = track.values[name]
         if is_known(end) and not track.cut[side]:
-            places[side] = f"x = {format_rounded(end.value, 'm', digits=5)}"
-    where = "in the second trace" if track.section is None else "across it"
+            places[side] = format_rounded(end.value, "m", digits=5)
+    where = "of the second trace" if track.section is None else "across it"
     width, depth = (format_value(name, track.values[name]) for name in ("width", "depth_mean"))
     return f"a track from {places[0]} to {places[1]} {where} is {width} wide and {depth} deep on average"
 

@@ -11,21 +11,18 @@ TEXTS = {
     "before": "height before wear",
     "after": "height after wear, aligned",
     "depth": "worn depth: before less after",
-    "depth_error": "95 % noise of the depth",
     "state": "state of each height",
     "track_end": "ends of the tracks",
     "before_map": "height before wear, or gap of the unloaded surfaces",
     "after_map": "height after wear, or gap of the unloaded surfaces",
     "depth_map": "worn depth: before less after",
     "section_depth": "mean worn depth across the track",
-    "section_depth_error": "standard deviation of the sections",
     "material_ratio": "material ratio",
     "gap_before": "gap of the unloaded surfaces before wear",
     "gap_after": "gap of the unloaded surfaces, wear included",
     "hidden_depth": "even and wedge-shaped part of the wear, which a trace cannot show",
     "x_patch": "position along the patch",
     "measured_depth": "measured worn depth",
-    "measured_depth_error": "95 % noise of the measured depth",
     "computed_depth": "worn depth of the run with the fitted coefficient",
     "depth_difference": "measured less computed depth",
     "file": "measured surface",
@@ -43,6 +40,12 @@ def along(dimension: str, unit: str = "m", **arrays: np.ndarray) -> dict[str, Va
         name: Variable((dimension,), values, unit, TEXTS.get(name, name.replace("_", " ")))
         for name, values in arrays.items()
     }
+
+
+def band(dimension: str, name: str, values: np.ndarray, half: np.ndarray) -> dict[str, Variable]:
+    """Return lengths (n,) [m] with the ends of their band as the variables NAME, NAME_low and NAME_high."""
+    ends = {f"{name}_low": values - half, f"{name}_high": values + half}
+    return along(dimension, **{name: values}, **ends)
 
 
 def maps(x: np.ndarray, y: np.ndarray, **heights: np.ndarray) -> dict[str, Variable]:

@@ -60,7 +60,7 @@ class Finding(NamedTuple):
     """Code of something that was found, and the numbers (SI) that a sentence about it needs."""
 
     code: str
-    numbers: dict[str, float | int | str | None] = {}
+    numbers: dict[str, float | int | str | None]
 
 
 @dataclass(frozen=True, eq=False)
