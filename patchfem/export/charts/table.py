@@ -67,9 +67,10 @@ class Stack:
 
 @dataclass(frozen=True, slots=True)
 class Rows:
-    """Columns of a CSV file for all variables of a dimension, with units in their headings."""
+    """Columns of a CSV file for all variables of a dimension, with or without units in their headings."""
 
     dimension: str
+    has_units: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -623,9 +624,9 @@ CHARTS: dict[str, tuple[Chart, ...]] = {
 PAIR_COLUMNS = ("worn_depth_mean", "worn_volume", "track_width", "track_depth", "amplitude_ratio")
 FILE_COLUMNS = ("Ra", "Rq", "Rz", "RSm", "Pa", "Pq", "Pt", "Sa", "Sq", "Sz")
 
-# CSV files: kind of answer -> file -> {heading of a column: variable}, groups of variables below each other, or a
-# dimension, all variables of which are columns without units in their headings. A heading may end in a unit of CSV_UNITS.
-CURVES: dict[str, dict[str, dict[str, str] | Stack | Rows | str]] = {
+# CSV files: kind of answer -> file -> {heading of a column: variable}, groups of variables below each other, or all
+# variables of a dimension. A heading may end in a unit of CSV_UNITS.
+CURVES: dict[str, dict[str, dict[str, str] | Stack | Rows]] = {
     "compare": {
         "depth.csv": {
             "x": "x",
@@ -689,7 +690,7 @@ CURVES: dict[str, dict[str, dict[str, str] | Stack | Rows | str]] = {
             "held": "held",
         }
     },
-    "cost": {"cost.csv": "run"},
+    "cost": {"cost.csv": Rows("run", has_units=False)},
 }
 CSV_UNITS = {"g": 1 / 9.80665, "mil": 1 / 25.4e-6}  # number of these units in one SI unit
 
