@@ -161,7 +161,7 @@ def _make_verdict(backbone: Backbone, measures: dict[str, Quantity]) -> tuple[st
             changes.append(f"{label} {verb} from {texts[0]} to {texts[1]}")
     ends = [format_quantity(float(curve.amplitude[k]), "m", 3) for k in (0, -1)]
     span = f"from {ends[0]} to {ends[1]}" if curve.amplitude.size > 1 else f"at {ends[0]}"
-    headline = f"The {changes[0]} and the {changes[1]}, {span} at the output."
+    headline = f"{changes[0][0].upper()}{changes[0][1:]}, {changes[1]}, {span}."
 
     if backbone.flutter is None:
         amplitude = show("amplitude_of_largest_damping")

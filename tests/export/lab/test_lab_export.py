@@ -8,10 +8,10 @@ import pytest
 import pyuff
 from command_line import run_cli
 from lab_files import BOND, MU, SCENE, SI, elastic_plastic_loop, make_record, write_universal
+from patchfem.export.lab.series import Column, Histories
 from scipy.io import loadmat
 
 from patchfem.core import PatchfemError
-from patchfem.export.lab.series import Column, Histories
 from patchfem.export.lab.universal import write_histories
 from patchfem.inputs import read_loop
 
