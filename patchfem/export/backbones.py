@@ -175,21 +175,25 @@ def _make_verdict(backbone: Backbone, measures: dict[str, Quantity]) -> tuple[st
 
 
 def _make_data(backbone: Backbone) -> dict[str, Variable]:
-    """Return the curves of all methods, the recommended one first, with the band of tests around it."""
-    data = {}
+    """Return the curves of all methods, the recommended one first, and the band of tests around it.
+
+    The band has variables of its own and, for the charts, is the interval of the recommended curve.
+    """
+    records = [
+        (method.replace("-", "_"), backbone.curves[method], COLUMNS, f", by {method}")
+        for method in PREFERRED_METHODS
+        if method in backbone.curves
+    ]
     band = backbone.answer.band
-    for method in PREFERRED_METHODS:
-        if method not in backbone.curves:
-            continue
-        prefix = method.replace("-", "_")
-        names = [(backbone.curves[method], name) for name in COLUMNS]
-        if band is not None and band.method == method:
-            names += [(band, name) for name in BAND_COLUMNS[1:]]
-        for record, name in names:
+    if band is not None:
+        records.insert(1, (records[0][0], band, BAND_COLUMNS[1:], ""))
+        records.append(("band", band, BAND_COLUMNS, ""))
+    data = {}
+    for prefix, record, names, end in records:
+        for name in names:
             unit, text = TEXTS[name]
             values = np.asarray(getattr(record, name), float)
-            dims = (f"{prefix}_amplitude",)
-            data[f"{prefix}_{name}"] = Variable(dims, values, unit, f"{text}, by {method}")
+            data[f"{prefix}_{name}"] = Variable((f"{prefix}_amplitude",), values, unit, text + end)
     return data
 
 
