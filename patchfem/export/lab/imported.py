@@ -18,8 +18,8 @@ from ...structure import universal as universal_modes
 from . import universal
 from .write import Column, write_columns
 
-# columns of an exported file that can be its displacement, in order of preference
-EXPORTED_NAMES = {"displacement": ("relative_displacement", "slide")}
+# columns of an exported file that can be its displacement, in order of preference; 1.x wrote the first one
+EXPORTED_NAMES = {"displacement": ("output_displacement", "relative_displacement", "slide")}
 DECAY_UNITS = {"time": "s", "amplitude": "m", "frequency": "Hz", "damping": "1"}
 
 
