@@ -48,16 +48,16 @@ def test_exact_rms_reading_of_sine(tmp_path):
     assert data.reading_factor == pytest.approx(np.sqrt(0.5), rel=1e-5)
     assert collect_run_data(peak_run).measured.reading_factor == 1
     peak = peak_run.measures["absolute_acceleration_peak"].value / 9.80665
-    assert f"{1.5 * np.sqrt(0.5) * peak:.3g} g" in run_page(rms_run, {})
-    assert f"{1.5 * peak:.3g} g" in run_page(peak_run, {})
+    assert f"{1.5 * np.sqrt(0.5) * peak:.3g} g" in run_page(rms_run)
+    assert f"{1.5 * peak:.3g} g" in run_page(peak_run)
 
 
 def test_exact_displacement_gauge_has_own_factor(tmp_path):
     """The displacement in the measured row is multiplied by its own factor, as the page states."""
     result = run(load_scene(tmp_path, "measured.displacement_gain=0.8"))
     displacement = result.measures["relative_displacement_amplitude"].value / 25.4e-6
-    assert f"<td>{0.8 * displacement:.3g} mil</td>" in run_page(result, {}).replace(" class=n", "")
-    assert "(computed displacement multiplied by the reading factor 0.8)" in run_page(result, {})
+    assert f"<td>{0.8 * displacement:.3g} mil</td>" in run_page(result).replace(" class=n", "")
+    assert "(computed displacement multiplied by the reading factor 0.8)" in run_page(result)
 
 
 @pytest.mark.parametrize(
