@@ -16,7 +16,7 @@ from .answer import Answer, Variable
 MIN_COMPRESSED_VALUES = 100  # arrays with fewer values are stored without compression
 
 
-def make_attributes(answer: Answer) -> dict[str, str]:
+def make_attributes(answer: Answer) -> dict[str, str | float | list[str]]:
     """Return the attributes of the file: program, scene and result, without host and path."""
     origin = answer.origin
     attributes = {
@@ -30,6 +30,9 @@ def make_attributes(answer: Answer) -> dict[str, str]:
         attributes["outcome"] = answer.details["outcome"]
     if "resolved" in origin:
         attributes["scene"] = origin["resolved"]
+    if not answer.is_run:  # those of a run are in summary.json
+        numbers = {key: one for key, one in answer.details.items() if isinstance(one, str | float)}
+        attributes |= numbers | {"notes": list(answer.remarks.notes)}
     measures = {name: quantity.as_json() for name, quantity in answer.quantities.items()}
     attributes["measures"] = json.dumps(measures, ensure_ascii=False)
     return attributes

@@ -214,21 +214,15 @@ def format_curves(answer: Answer) -> dict[str, str]:
     return files
 
 
-def _list_columns(data: dict[str, Variable], columns: dict | Stack | Rows | str) -> dict[str, list]:
+def _list_columns(data: dict[str, Variable], columns: dict | Stack | Rows) -> dict[str, list]:
     """Return the columns of a CSV file: heading with unit -> cells."""
     if isinstance(columns, Stack):
         return _stack_columns(data, columns)
     if isinstance(columns, Rows):
         return {
-            _head(name, variable): _list_cells(variable)
+            _head(name, variable) if columns.has_units else name: _list_cells(variable)
             for name, variable in data.items()
             if variable.dims == (columns.dimension,)
-        }
-    if isinstance(columns, str):
-        return {
-            name: _list_cells(variable)
-            for name, variable in data.items()
-            if variable.dims == (columns,)
         }
     lists = {}
     for title, source in columns.items():
