@@ -10,7 +10,7 @@ import h5netcdf
 import h5py
 import numpy as np
 
-from ..disk.atomic_write import write_atomically
+from ..disk.atomic_write import open_lossy, write_atomically
 from .answer import Answer, Variable
 
 MIN_COMPRESSED_VALUES = 100  # arrays with fewer values are stored without compression
@@ -51,9 +51,15 @@ def variable_attributes(variable: Variable) -> dict:
 def write_netcdf(answer: Answer, path: Path) -> None:
     """Write the arrays of an answer as a netCDF4 file.
 
-    The file replaces an older one when it is complete.
+    The file replaces an older one when it is complete. HDF5 writes through `open_lossy`, because it would crash on a full
+    disk; the error is raised when the file is closed.
     """
-    with write_atomically(path) as partial, h5netcdf.File(partial, "w") as file:
+    with (
+        write_atomically(path) as partial,
+        open_lossy(partial) as opened,
+        h5py.File(opened, "w", track_order=True) as store,
+        h5netcdf.File(store, "w") as file,
+    ):
         file.attrs.update(make_attributes(answer))
         for name, variable in answer.data.items():
             _write_variable(file, name, variable)

@@ -467,8 +467,8 @@ COMPARE = (
         ("before", "after"),
         marks=("track_end",),
         labels=("x of the second trace", "height"),
-        caption="The trace measured after wear, moved by shift, tilt and offset onto the one measured before. Vertical lines: "
-        "ends of the tracks.",
+        caption="The trace measured after wear, moved by shift, tilt and offset onto the one measured before. Vertical "
+        "lines: ends of the tracks.",
     ),
     Chart(
         "Worn depth",
