@@ -128,6 +128,9 @@ class Answer:
         """Whether the answer is that of a single run."""
         return self.kind in RUN_KINDS
 
+
+RUN_KINDS
+
     def to_xarray(self):
         """Return the arrays as an xarray.Dataset with the attributes of the netCDF file."""
         from .netcdf import to_dataset
