@@ -129,13 +129,4 @@ class Answer:
         return self.kind in RUN_KINDS
 
 
-RUN_KINDS
-
-    def to_xarray(self):
-        """Return the arrays as an xarray.Dataset with the attributes of the netCDF file."""
-        from .netcdf import to_dataset
-
-        return to_dataset(self)
-
-
 RUN_KINDS = ("patch", "bench", "rig", "linear")
