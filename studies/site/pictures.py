@@ -98,7 +98,7 @@ def read_stress(frames: Frames, name: str) -> np.ndarray:
 
 def draw_pieces(frames: Frames) -> Figure:
     """Draw normal and shear stress inside both pieces at the largest shear stress."""
-    figure, axes = new_figure(4.9, 2, sharex=True)
+    figure, axes = new_figure(5.2, 2, sharex=True)
     drawn = magnify_pieces(frames, last_frames(frames.times), contact_window(frames))
     stress = read_stress(frames, "stress")
     index = int(np.argmax(np.abs(stress[..., 3]).max(axis=1)))
@@ -118,7 +118,7 @@ def draw_pieces(frames: Frames) -> Figure:
 
 def draw_film(frames: Frames) -> Figure:
     """Draw two frames of the film of a cycle: upper piece farthest to the left and to the right."""
-    figure, axes = new_figure(4.9, 2, sharex=True)
+    figure, axes = new_figure(5.2, 2, sharex=True)
     numbers = last_frames(frames.times)
     drawn = magnify_pieces(frames, numbers, contact_window(frames))
     stress = read_stress(frames, "von_mises")
