@@ -17,11 +17,11 @@ In: a `Result`. Out: files. A module imports only entries of this list that come
 13. `report`: report.html of a run, and its pictures
 14. `folder`: a finished run on disk
 15. `sweeps`: a sweep on disk
-16. `reports`: one page over runs or sweeps
+16. `several`: comparison of several answers of the same kind, for `page`
 17. `surfaces`: pages on measured surfaces
-18. `cost`: error against time of the numerical settings of a scene
-19. `fits`: fits of any kind, from their options to their folder
-20. `backbone`: frequency and damping over the amplitude on disk
+18. `costs`: the answer of `cost`, error against time
+19. `fits`: the answer of a fit, and its folder
+20. `backbones`: the answer of `backbone`, frequency and damping over the amplitude
 21. `pieces`: pictures and films of the pieces
 22. `convert`: a results folder in another format, chosen by the suffix of a file
 
@@ -30,32 +30,17 @@ Read `folder` first.
 
 # Names that other folders use, by module.
 PUBLIC = {
-    "backbone": (
-        "COLUMNS",
-        "backbone_charts",
-        "backbone_contents",
-        "format_backbone",
-        "write_backbone",
+    "backbones": (
+        "backbone_axes",
+        "make_answer",
     ),
     "convert": (
         "export_results",
         "view_results",
     ),
-    "cost": (
-        "cost_data",
-        "format_cost",
-        "format_details",
-        "write",
-        "write_picture",
-    ),
     "drawing.pictures": ("draw_charts",),
     "drawing.swept": ("sweep_chart",),
-    "fits.options": ("FitOptions",),
-    "fits.request": (
-        "Listener",
-        "choose_kind",
-        "fit_into",
-    ),
+    "fits": ("fit_into",),
     "folder": (
         "is_complete",
         "run_into",
@@ -80,7 +65,6 @@ PUBLIC = {
         "verdict_sentence",
     ),
     "report": ("draw_axes",),
-    "reports": ("write_report",),
     "results": ("Folder",),
     "summary": (
         "count_cycles",
