@@ -324,6 +324,7 @@ def _make_axis(name: str, unit: str, arrays: list, log: str, letter: str) -> Axi
 
 def _make_curves(data: dict[str, Variable], chart: Chart, name: str, axes: tuple) -> list[Curve]:
     """Return the curves of one variable: one for each interface, code, or element of the first dimension."""
+    is_line = name in chart.lines
     name, own_x = _split(name)
     if (
         name not in data
@@ -368,7 +369,7 @@ def _make_curves(data: dict[str, Variable], chart: Chart, name: str, axes: tuple
             for end in (low, high)
         ]
         curves.append(Curve(text, x_row[keep], (values * y_axis.scale)[keep], *band))
-    if chart.by in data and len(curves) == 1 and name not in chart.lines:
+    if chart.by in data and len(curves) == 1 and not is_line:
         is_joined = chart.style != "points"
         return _split_by_code(curves[0], data[chart.by], _thin(rows[0][2]), is_joined)
     return curves
