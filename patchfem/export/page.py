@@ -115,7 +115,7 @@ def make_page(folders: list[Path]) -> str:
 def _read_all(folders: list[Path]) -> dict[str, Answer]:
     """Return the answers in folders by their names in legends; "" for a single answer."""
     if not folders:
-        raise PatchfemError("report: name one or more results folders")
+        raise PatchfemError("report: at least one results folder is needed")
     if len(folders) == 1:
         return {"": store.read(folders[0])}
     answers = {}
