@@ -146,22 +146,22 @@ def _describe_cases(table: SweepTable) -> str:
     """Return how many cases there are, and how many are missing, failed, unsettled or over the tolerance."""
     outcomes = table.count_outcomes()
     counts = {
-        "have no result yet": outcomes.pop("", 0),
+        "unfinished": outcomes.pop("", 0),
         "failed": outcomes.pop("failed", 0),
-        "did not converge": outcomes.pop(Outcome.NOT_CONVERGED, 0),
+        "not converged": outcomes.pop(Outcome.NOT_CONVERGED, 0),
     }
     unsettled = sum(count for name, count in outcomes.items() if name not in FINAL_OUTCOMES)
-    counts[f"did not settle{_describe_unsettled(table)}"] = unsettled
+    counts[f"unsettled{_describe_unsettled(table)}"] = unsettled
     missed = table.count_misses()
     main = [name for name in MAIN_MEASURES if name in missed] or list(missed)
     if main:
         name = max(main, key=lambda name: missed[name]["count"])
-        others = f" and {len(missed) - 1} other measures" if len(missed) > 1 else ""
-        counts[f"miss the tolerance in {_label(name)}{others}"] = missed[name]["count"]
+        others = f" and {len(missed) - 1} more" if len(missed) > 1 else ""
+        counts[f"over the tolerance in {_label(name)}{others}"] = missed[name]["count"]
     clauses = [f"{count} {text}" for text, count in counts.items() if count]
     if not clauses:
         return f"All {len(table)} cases settled and meet the tolerance."
-    return f"Of {len(table)} cases, {', '.join(clauses)}."
+    return f"{len(table)} cases: {', '.join(clauses)}."
 
 
 def _describe_unsettled(table: SweepTable) -> str:
