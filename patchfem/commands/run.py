@@ -71,7 +71,7 @@ def run(
         present(written.answer, output, lambda: no_page or _draw_page(written, target))
     except KeyboardInterrupt:
         print_message(
-            f"interrupted; the results in {target} are complete, report.html may be missing"
+            f"interrupted while the page was drawn; the results in {target} are complete except for report.html"
         )
         raise CommandExit(130) from None
     if verbose:

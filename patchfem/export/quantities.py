@@ -16,17 +16,50 @@ from ..formatting import (
 from ..response import rows
 from ..runs.results import patch_rows
 from .answer import Quantity
+from .surfaces import definitions
 
 MAX_TILES = 10  # largest number of key quantities on a page and on the screen
 # words at the end of a name that mark a fraction (in percent) or a phase (in degrees)
 PERCENT_WORDS = ("fraction", "share")
+# display units of areas of sections and of wear coefficients
+LADDERS = UNIT_LADDERS | {"m2": (("um^2", 1e12),), "m2 N-1": (("m^2/N", 1.0),)}
 DEGREES = ("deg", 57.29577951308232)
 
 KEY = (
+    "frequency_at_smallest_amplitude",
+    "frequency_at_largest_amplitude",
+    "damping_at_smallest_amplitude",
+    "damping_at_largest_amplitude",
+    "largest_damping",
+    "amplitude_of_largest_damping",
+    "free_frequency",
+    "stuck_frequency",
+    "cpu_time",
+    "largest_error",
     "worn_depth_mean",
     "worn_depth_max",
     "worn_area",
     "worn_volume",
+    "track_width",
+    "track_depth",
+    "wear_coefficient",
+    "amplitude_ratio",
+    "slope_ratio",
+    "Ra",
+    "Rq",
+    "Rz",
+    "RSm",
+    "Rsk",
+    "Rk",
+    "Pa",
+    "Pq",
+    "Pt",
+    "Sa",
+    "Sq",
+    "Sz",
+    "Ssk",
+    "Sdr",
+    "Sal",
     "relative_displacement_amplitude",
     "relative_displacement_rms",
     "absolute_acceleration_peak",
@@ -54,12 +87,15 @@ KEY = (
 
 
 class Definition(NamedTuple):
-    """Unit and meaning of a quantity."""
+    """Unit and meaning of a quantity, and the number of digits that are displayed without an error."""
 
     unit: str
     text: str
+    digits: int = 4
 
 
+# kinds of answers whose quantities are defined in `surfaces.definitions`
+SURFACE_KINDS = ("compare", "pairs", "profile")
 QUANTITIES: dict[str, Definition] = {
     # sweep
     "peak_height": Definition("1", "largest response over the swept frequency"),
@@ -71,15 +107,87 @@ QUANTITIES: dict[str, Definition] = {
         "value of the swept key at which a measure has changed by 5 % (the peak pressure: by 100 %) from the first case, "
         "with the cases between which it lies",
     ),
-    # compare, profile: see the builders of these answers
     # backbone
-    # fit
+    "frequency_at_smallest_amplitude": Definition(
+        "Hz", "frequency of the mode at the smallest amplitude of the recommended curve"
+    ),
+    "frequency_at_largest_amplitude": Definition(
+        "Hz", "frequency of the mode at the largest amplitude of the recommended curve"
+    ),
+    "damping_at_smallest_amplitude": Definition(
+        "1", "damping ratio of structure and friction at the smallest amplitude"
+    ),
+    "damping_at_largest_amplitude": Definition(
+        "1", "damping ratio of structure and friction at the largest amplitude"
+    ),
+    "largest_damping": Definition(
+        "1", "largest damping ratio among the amplitudes of the recommended curve"
+    ),
+    "amplitude_of_largest_damping": Definition(
+        "m", "amplitude at the output with the largest damping ratio"
+    ),
+    "free_frequency": Definition(
+        "Hz", "frequency of the mode without its contact; a bonded spring is included"
+    ),
+    "stuck_frequency": Definition(
+        "Hz", "frequency of the mode while the contact sticks with its own stiffness"
+    ),
+    "exponent_micro": Definition(
+        "1", "exponent of the energy loss per cycle over the amplitude in micro-slip"
+    ),
+    "exponent_gross": Definition(
+        "1", "exponent of the energy loss per cycle over the amplitude in gross slip; 1 in theory"
+    ),
+    # fit; of keys of a scene, see FITTED_KEY
+    "offset_force": Definition("N", "constant force that is fitted to the whole record"),
+    "offset_displacement": Definition(
+        "m", "fitted distance of the first row from the position without stress"
+    ),
+    "residual_rms": Definition("1", "root mean square of fitted minus measured values", 3),
+    "residual_fraction": Definition(
+        "1", "root mean square of fitted minus measured values, over the largest measured value"
+    ),
+    "held_out_rms": Definition(
+        "1", "root mean square of predicted minus measured values of the rows that are held out"
+    ),
+    "work_measured": Definition("J", "work of the measured force over the record"),
+    "work_fitted": Definition("J", "work of the fitted force over the record"),
+    "frequency_residual_rms": Definition(
+        "1", "root mean square of the relative deviation of the fitted frequency"
+    ),
+    "damping_residual_rms": Definition(
+        "1", "root mean square of the relative deviation of the fitted damping ratio"
+    ),
+    "score_fitted": Definition(
+        "1", "root mean square of ln(computed/measured) of the readings that were fitted"
+    ),
+    "score_held_out": Definition(
+        "1", "root mean square of ln(computed/measured) of the readings that were held out"
+    ),
+    "score_left_out": Definition(
+        "1", "root mean square of ln(computed/measured) of each reading in the fit without it"
+    ),
+    "fitted_depth": Definition("m", "worn depth computed with the fitted coefficient"),
     # cost
+    "cpu_time": Definition("s", "CPU time of the scene as it is, with its error estimates"),
+    "elapsed_time": Definition("s", "elapsed time of the same run"),
+    "largest_error": Definition(
+        "1", "largest numerical error of a measure in this run, relative to its value and floor"
+    ),
+    "tolerance": Definition("1", "tolerance of the scene, its key accuracy.tolerance"),
 }
+FITTED_KEY = "value of this key of the scene that fits the measurement best, with its 95 % interval"
 
 
-def find_definition(name: str) -> Definition | None:
-    """Return the definition of a quantity, whose name may end in the number of an interface; None if there is none."""
+def find_definition(name: str, kind: str = "") -> Definition | None:
+    """Return the definition of a quantity, whose name may end in the number of an interface; None if there is none.
+
+    kind: of the answer; a comparison of surfaces has names of runs with a meaning of their own.
+    """
+    if "." in name:
+        return Definition("1", FITTED_KEY)
+    if kind in SURFACE_KINDS:
+        return definitions.find(name) or definitions.find(rows.remove_interface_number(name))
     # quantities of a sweep: limits of its key, and extremes of measures
     name = name.removeprefix("largest_").removeprefix("smallest_")
     base_name = "limit" if name.startswith("limit_") else rows.remove_interface_number(name)
@@ -90,14 +198,15 @@ def find_definition(name: str) -> Definition | None:
     return None
 
 
-def describe(name: str) -> str:
-    """Return what a quantity is in one sentence, or "" if no table defines it."""
-    definition = find_definition(name)
+def describe(name: str, kind: str = "") -> str:
+    """Return what a quantity of a kind of answer is in one sentence, or "" if no table defines it."""
+    definition = find_definition(name, kind)
     if definition is None:
         return ""
     base_name = rows.remove_interface_number(name)
     number = name.removeprefix(base_name).removeprefix("_")
-    text = f"{definition.text}; of interface {number}" if number else definition.text
+    part = "group" if kind in SURFACE_KINDS else "interface"
+    text = f"{definition.text}; of {part} {number}" if number else definition.text
     return f"{text[0].upper()}{text[1:].rstrip('.')}."
 
 
@@ -118,9 +227,9 @@ def choose_scale(name: str, unit: str, size: float) -> tuple[str, float]:
         return "%", 100.0
     if unit == "rad" and last_word == "phase":
         return DEGREES
-    if unit not in UNIT_LADDERS:
+    if unit not in LADDERS:
         return ("" if unit == "1" else unit.replace(" s-1", "/s")), 1.0
-    return choose_unit(UNIT_LADDERS[unit], size)
+    return choose_unit(LADDERS[unit], size)
 
 
 def format_quantity(name: str, quantity: Quantity) -> str:
@@ -134,6 +243,8 @@ def format_quantity(name: str, quantity: Quantity) -> str:
     error = quantity.error
     ends = [abs(end) for end in (quantity.low, quantity.high) if end is not None]
     unit, scale = choose_scale(name, quantity.unit, max([abs(value), *ends]))
+    if error is None and not ends and name in QUANTITIES:
+        return f"{format_number(value * scale, QUANTITIES[name].digits)} {unit}".strip()
     if error is not None or not ends:
         texts = round_to_error(
             value * scale,

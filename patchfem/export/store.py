@@ -15,8 +15,8 @@ import numpy as np
 from .. import __version__
 from ..core import PatchfemError
 from ..disk.atomic_write import write_text
-from .answer import RUN_KINDS, Answer, Quantity, Remarks
-from .charts.table import CURVES
+from .answer import RUN_KINDS, Answer, Quantity, Remarks, Variable
+from .charts.table import CSV_UNITS, CURVES, Rows, Stack
 from .netcdf import read_netcdf, write_netcdf
 
 SUMMARY = "summary.json"
@@ -27,7 +27,8 @@ FIELDS = "fields.vtkhdf"
 DATA_FILES = {"sweep": "sweep.nc", "backbone": "backbone.nc"}
 # JSON file with the `details` of each kind of answer; those of a run are in summary.json
 DETAIL_FILES = {
-    kind: f"{kind}.json" for kind in ("sweep", "backbone", "compare", "profile", "fit", "cost")
+    kind: f"{kind}.json"
+    for kind in ("sweep", "backbone", "compare", "pairs", "profile", "fit", "cost")
 }
 
 
@@ -198,22 +199,70 @@ def _summary_model() -> type:
 def format_curves(answer: Answer) -> dict[str, str]:
     """Return the CSV files of the curves of an answer: name -> text.
 
-    A column is headed by its name and its unit in brackets, in SI units. The rows are those of the first variable.
+    A column is headed by its name and its unit in brackets, in SI units if the table names no other unit. A missing number
+    is an empty cell.
     """
     files = {}
     for name, columns in CURVES.get(answer.kind, {}).items():
-        variables = {
-            title: answer.data[source] for title, source in columns.items() if source in answer.data
-        }
-        if not variables:
-            continue
-        output = io.StringIO()
-        writer = csv.writer(output, lineterminator="\n")
-        writer.writerow(
-            f"{title} [{variable.unit}]" if variable.unit not in ("", "1") else title
-            for title, variable in variables.items()
-        )
-        lists = [np.asarray(variable.values).tolist() for variable in variables.values()]
-        writer.writerows(zip(*lists, strict=True))
-        files[name] = output.getvalue()
+        lists = _list_columns(answer.data, columns)
+        if lists:
+            output = io.StringIO()
+            writer = csv.writer(output, lineterminator="\n")
+            writer.writerow(lists)
+            writer.writerows(zip(*lists.values(), strict=True))
+            files[name] = output.getvalue()
     return files
+
+
+def _list_columns(data: dict[str, Variable], columns: dict | Stack | Rows) -> dict[str, list]:
+    """Return the columns of a CSV file: heading with unit -> cells."""
+    if isinstance(columns, Stack):
+        return _stack_columns(data, columns)
+    if isinstance(columns, Rows):
+        return {
+            _head(name, variable) if columns.has_units else name: _list_cells(variable)
+            for name, variable in data.items()
+            if variable.dims == (columns.dimension,)
+        }
+    lists = {}
+    for title, source in columns.items():
+        if source not in data:
+            continue
+        variable = data[source]
+        named_unit = title.partition("[")[2].rstrip("]")
+        if named_unit:
+            scaled = variable.values * CSV_UNITS[named_unit]
+            lists[title] = _list_cells(Variable(variable.dims, scaled))
+        else:
+            lists[_head(title, variable)] = _list_cells(variable)
+    return lists if len(lists) > 1 else {}
+
+
+def _stack_columns(data: dict[str, Variable], stack: Stack) -> dict[str, list]:
+    """Return columns with the values of several groups of variables below each other."""
+    prefixes = {group: group.replace("-", "_") + "_" for group in stack.groups}
+    prefixes = {
+        group: prefix for group, prefix in prefixes.items() if prefix + stack.names[0] in data
+    }
+    lists = {stack.heading: []} if prefixes else {}
+    for group, prefix in prefixes.items():
+        count = data[prefix + stack.names[0]].values.size
+        lists[stack.heading] += count * [group]
+        for name in stack.names:
+            if prefix + name in data:
+                variable = data[prefix + name]
+                lists.setdefault(_head(name, variable), []).extend(_list_cells(variable))
+    return lists
+
+
+def _head(title: str, variable: Variable) -> str:
+    """Return the heading of a column: its name and its unit in brackets."""
+    return f"{title} [{variable.unit}]" if variable.unit not in ("", "1") else title
+
+
+def _list_cells(variable: Variable) -> list:
+    """Return the cells of a column; "" for a missing number."""
+    cells = np.asarray(variable.values).tolist()
+    if variable.meanings:
+        return [variable.meanings[code] for code in cells]
+    return ["" if cell != cell else cell for cell in cells]  # only NaN differs from itself

@@ -10,7 +10,7 @@ from command_line import ALWAYS, FROM_SHELL, modules_after, run_cli
 
 import patchfem as pf
 from patchfem.closed_forms import contact as closed_forms
-from patchfem.export.results import FILES
+from patchfem.export.folder import FILES
 from patchfem.surface import make_report, read_surface
 
 UM = 1e-6

@@ -38,7 +38,7 @@ def _unpack(content):
 
 def read_charts(text: str) -> dict[str, dict]:
     """Return the figures of a page by title."""
-    titles = re.findall(r'<figure id="(\w+)"[^>]*><h3>(.*?)</h3>', text)
+    titles = re.findall(r'<figure id="(\w+)"[^>]*><h2>(.*?)</h2>', text)
     figures = {figure["anchor"]: figure for figure in read_figures(text)}
     return {unescape(title): figures[anchor] for anchor, title in titles}
 

@@ -43,6 +43,10 @@ class Curve:
     meanings : tuple of str
         Names of the codes of a map.
     on_second_axis : bool
+    is_line : bool
+        Whether the curve is a line in a chart of points.
+    colour, dash : int
+        Numbers of the colour and of the dash pattern; -1 for the colour of its place among the curves.
     symbols : (k,) ndarray of str or None
         Symbols of the points: "circle", "circle-open" or "x".
     """
@@ -55,6 +59,9 @@ class Curve:
     rows: np.ndarray | None = None
     meanings: tuple[str, ...] = ()
     on_second_axis: bool = False
+    is_line: bool = False
+    colour: int = -1
+    dash: int = 0
     symbols: np.ndarray | None = None
 
 
@@ -113,8 +120,24 @@ def make_panels(answers: dict[str, Answer], charts: tuple[Chart, ...]) -> list[P
     """
     first_data = next(iter(answers.values())).data
     all_charts = [part for chart in charts for part in _repeat_for_interfaces(chart, first_data)]
-    panels = [make_panel(answers, chart) for chart in all_charts]
+    panels = [
+        make_panel(group, chart)
+        for chart in all_charts
+        for group in _group_by_units(answers, chart)
+    ]
     return [panel for panel in panels if panel is not None]
+
+
+def _group_by_units(answers: dict[str, Answer], chart: Chart) -> list[dict[str, Answer]]:
+    """Return groups of answers whose variables have the same units, so that they can share the axes of a chart."""
+    groups = {}
+    for name, answer in answers.items():
+        data = answer.data
+        y_units = {data[part].unit for part in (_split(y)[0] for y in chart.y) if part in data}
+        x_name = _find_x(data, chart)
+        x_unit = data[x_name].unit if x_name else ""
+        groups.setdefault((x_unit, frozenset(y_units)), {})[name] = answer
+    return list(groups.values())
 
 
 def _repeat_for_interfaces(chart: Chart, data: dict[str, Variable]) -> list[Chart]:
@@ -135,6 +158,8 @@ def _repeat_for_interfaces(chart: Chart, data: dict[str, Variable]) -> list[Char
 
 def make_panel(answers: dict[str, Answer], chart: Chart) -> Panel | None:
     """Return the panel of a chart, or None if no answer has data for it."""
+    if len(answers) > 1:
+        chart = replace(chart, by="")
     if chart.style in SWEEP_STYLES:
         # only the page of a sweep loads this module
         from ..sweeps.charts import STYLES
@@ -158,9 +183,10 @@ def make_panel(answers: dict[str, Answer], chart: Chart) -> Panel | None:
     )
     main = [_split(name)[0] for name in chart.y if _split(name)[0] in first_data]
     y_values = [data[name].values for data in selections.values() for name in main if name in data]
-    y_axis = _make_axis(
-        chart.labels[1] or main[0], first_data[main[0]].unit, y_values, chart.log, "y"
-    )
+    y_label = chart.labels[1] or main[0]
+    if y_label == "*":
+        y_label = first_data[main[0]].text
+    y_axis = _make_axis(y_label, first_data[main[0]].unit, y_values, chart.log, "y")
     second_axis = None
     second = [name for name in chart.y2 if name in first_data]
     if second:
@@ -169,19 +195,26 @@ def make_panel(answers: dict[str, Answer], chart: Chart) -> Panel | None:
         )
 
     curves = []
-    for label, data in selections.items():
-        for name in (*chart.y, *second):
+    for number, (label, data) in enumerate(selections.items()):
+        own_curves = []
+        for name in (*chart.y, *chart.lines, *second):
             axis = second_axis if name in second else y_axis
-            new_curves = _make_curves(data, chart, name, (x_axis, axis))
-            curves += [
-                replace(curve, name=_join_names(label, curve.name), on_second_axis=name in second)
-                for curve in new_curves
+            roles = {"on_second_axis": name in second, "is_line": name in chart.lines}
+            own_curves += [
+                replace(curve, **roles)
+                for curve in _make_curves(data, chart, name, (x_axis, axis))
+                if curve.x.size
             ]
-    curves = [curve for curve in curves if curve.x.size]
+        if len(own_curves) == 1 and not second:
+            own_curves = [replace(own_curves[0], name="")]
+        if len(answers) > 1:  # a colour for each answer, and a dash for each of its curves
+            own_curves = [
+                replace(curve, name=_join_names(label, curve.name), colour=number, dash=dash)
+                for dash, curve in enumerate(own_curves)
+            ]
+        curves += own_curves
     if not curves:
         return None
-    if len(curves) == 1 and not second:
-        curves = [replace(curves[0], name=next(iter(selections)) if len(answers) > 1 else "")]
     return _finish(
         chart, Panel(chart.title, chart.style, x_axis, y_axis, curves), first_data, second_axis
     )
@@ -198,8 +231,19 @@ def _finish(chart: Chart, panel: Panel, data: dict, second_axis: Axis | None) ->
     ]
     panel = replace(panel, marks=marks, caption=chart.caption, y2=second_axis)
     if chart.style == "map":
-        return replace(panel, y=Axis("frame"), colour_label=panel.y.label)
+        axis, _ = _find_map_rows(data, _reduce_strips(data[chart.y[0]]), panel.x)
+        return replace(panel, y=axis, colour_label=panel.y.label)
     return panel
+
+
+def _find_map_rows(
+    data: dict[str, Variable], variable: Variable, x_axis: Axis
+) -> tuple[Axis, np.ndarray]:
+    """Return the vertical axis of a map and its positions: those of a coordinate y in the units of x, or frames."""
+    if variable.dims[0] == "y" and "y" in data:
+        label = x_axis.label.replace("x [", "y [")
+        return Axis(label, x_axis.scale), data["y"].values * x_axis.scale
+    return Axis("frame"), np.arange(len(variable.values))
 
 
 def _split(name: str) -> tuple[str, str]:
@@ -271,7 +315,7 @@ def _make_axis(name: str, unit: str, arrays: list, log: str, letter: str) -> Axi
     values = np.concatenate(numbers)
     finite = np.abs(values[np.isfinite(values)])
     label = name.replace("_", " ")
-    is_log = letter in log or (log == "auto" and needs_log_scale(values))
+    is_log = letter in log or ("auto" in log and needs_log_scale(values))
     if unit in UNIT_LADDERS:
         unit, scale = choose_unit(UNIT_LADDERS[unit], finite.max(initial=0.0))
         return Axis(f"{label} [{unit}]", scale, is_log)
@@ -281,14 +325,19 @@ def _make_axis(name: str, unit: str, arrays: list, log: str, letter: str) -> Axi
 def _make_curves(data: dict[str, Variable], chart: Chart, name: str, axes: tuple) -> list[Curve]:
     """Return the curves of one variable: one for each interface, code, or element of the first dimension."""
     name, own_x = _split(name)
-    if name not in data or not np.any(np.isfinite(np.asarray(data[name].values, float))):
+    if (
+        name not in data
+        or (own_x and own_x not in data)
+        or not np.any(np.isfinite(np.asarray(data[name].values, float)))
+    ):
         return []
     x_axis, y_axis = axes
     x_variable = data[own_x or _find_x(data, chart)]
     x_values = np.asarray(x_variable.values, float) * x_axis.scale
     variable = _reduce_strips(data[name])
     if chart.style == "map":
-        return [_make_map(variable, x_values, y_axis)]
+        rows = _find_map_rows(data, variable, x_axis)[1]
+        return [_make_map(variable, x_values, y_axis, rows)]
 
     label = name.replace("_", " ")
     rows = [(label, x_values, np.asarray(variable.values, float))]
@@ -319,8 +368,9 @@ def _make_curves(data: dict[str, Variable], chart: Chart, name: str, axes: tuple
             for end in (low, high)
         ]
         curves.append(Curve(text, x_row[keep], (values * y_axis.scale)[keep], *band))
-    if chart.by in data and len(curves) == 1:
-        return _split_by_code(curves[0], data[chart.by], _thin(rows[0][2]))
+    if chart.by in data and len(curves) == 1 and name not in chart.lines:
+        is_joined = chart.style != "points"
+        return _split_by_code(curves[0], data[chart.by], _thin(rows[0][2]), is_joined)
     return curves
 
 
@@ -350,13 +400,13 @@ def _name_elements(data: dict[str, Variable], dimension: str) -> list[str]:
 def _find_band(data: dict[str, Variable], name: str) -> tuple[np.ndarray | None, np.ndarray | None]:
     """Return the ends [SI] of the error band of a variable, None without one."""
     values = np.asarray(data[name].values, float)
+    if f"{name}_low" in data and f"{name}_high" in data:
+        return tuple(np.asarray(data[f"{name}_{end}"].values, float) for end in ("low", "high"))
     if f"{name}_error" in data:
         error = np.asarray(data[f"{name}_error"].values, float)
         # an error as large as the value, as at a fold, would only hide the curve
         error = np.where(error <= np.abs(values), error, np.nan)
         return values - error, values + error
-    if f"{name}_low" in data and f"{name}_high" in data:
-        return tuple(np.asarray(data[f"{name}_{end}"].values, float) for end in ("low", "high"))
     return None, None
 
 
@@ -370,14 +420,15 @@ def _thin(values: np.ndarray) -> np.ndarray:
     return np.unique([0, *extremes, values.size - 1])
 
 
-def _split_by_code(curve: Curve, codes: Variable, keep: np.ndarray) -> list[Curve]:
+def _split_by_code(curve: Curve, codes: Variable, keep: np.ndarray, is_joined: bool) -> list[Curve]:
     """Return a curve for each code; points of other codes are missing in it, so that its line is interrupted."""
     numbers = np.asarray(codes.values)[keep]
     curves = []
     for code in np.unique(numbers):
         is_code = numbers == code
-        # the line to the next point belongs to the code of its start
-        is_shown = is_code | np.concatenate([[False], is_code[:-1]])
+        is_shown = is_code
+        if is_joined:  # the line to the next point belongs to the code of its start
+            is_shown = is_code | np.concatenate([[False], is_code[:-1]])
         parts = [
             None if values is None else np.where(is_shown, values, np.nan)
             for values in (curve.y, curve.low, curve.high)
@@ -387,14 +438,14 @@ def _split_by_code(curve: Curve, codes: Variable, keep: np.ndarray) -> list[Curv
     return curves
 
 
-def _make_map(variable: Variable, x_values: np.ndarray, axis: Axis) -> Curve:
-    """Return the colours of a map; codes keep their numbers."""
+def _make_map(variable: Variable, x_values: np.ndarray, axis: Axis, rows: np.ndarray) -> Curve:
+    """Return the colours of a map at vertical positions `rows`; codes keep their numbers."""
     step = -(-x_values.size // MAX_MAP_COLUMNS)
     values = np.atleast_2d(variable.values)[:, ::step]
     meanings = variable.meanings
     if not meanings:
         values = values * axis.scale
-    return Curve("", x_values[::step], values, rows=np.arange(len(values)), meanings=meanings)
+    return Curve("", x_values[::step], values, rows=rows, meanings=meanings)
 
 
 def make_film(frames: dict[str, np.ndarray], title: str, unit: str) -> Panel:

@@ -1,0 +1,59 @@
+"""Definitions of the quantities of compare, profile and wear between two runs, by name."""
+
+from ...surface.compare.records import DEFINITIONS
+from ...surface.roughness import rows
+from ..quantities import Definition
+
+# names in a track -> names in compare.json and in the answer
+TRACK_NAMES = {"depth_mean": "track_depth"}
+
+# quantities that have the same meaning between two scans, two traces and two runs
+_OWN = {
+    "worn_volume": ("m3", "volume lost in the common part of two scans, or on the patch of a run"),
+    "worn_depth_mean": (
+        "m",
+        "mean depth of the lost material: lost area divided by the common length, or lost volume divided by the common area "
+        "or by the area of the patch",
+    ),
+    "worn_depth_max": ("m", "largest depth of the lost material"),
+    "worn_area": ("m2", "lost area of the section, which is the lost volume per width"),
+    "worn_share": ("1", "fraction of the common area, or of the area of the patch, that is worn"),
+    "hidden_wear": (
+        "m",
+        "largest mean of an even or wedge-shaped wear that measured surfaces cannot show, because it is a shift of the datum",
+    ),
+    "track_hidden_wear": (
+        "m",
+        "mean of the even or wedge-shaped part of the wear within the worn part, which a trace of this part alone cannot show",
+    ),
+    "wear_coefficient": (
+        "m2 N-1",
+        "coefficient of Archard's law with which the computed depth of a run fits the measured depth",
+    ),
+    "patch_centre": ("m", "middle of the patch, in x of the second trace"),
+    "difference_rms": (
+        "m",
+        "root mean square of measured less computed depth over the patch, with the fitted coefficient",
+    ),
+}
+
+
+def name_in_track(name: str) -> str:
+    """Return the name in an answer of a quantity of a track."""
+    return TRACK_NAMES.get(name, f"track_{name}")
+
+
+def find(name: str) -> Definition | None:
+    """Return the definition of a quantity of compare or profile; None if there is none."""
+    if name in _OWN:
+        return Definition(*_OWN[name])
+    if name in DEFINITIONS:
+        return Definition(*DEFINITIONS[name])
+    if name in rows.TABLE:
+        row = rows.TABLE[name]
+        return Definition(row.unit, row.text)
+    for part in DEFINITIONS:
+        if name == name_in_track(part):
+            unit, text = DEFINITIONS[part]
+            return Definition(unit, f"{text}; of the longest track")
+    return None
