@@ -62,53 +62,32 @@ def stress_frames(path: Path) -> dict[str, np.ndarray]:
     -------
     dict
         `x` (61,) and `y` (60,) [m], y > 0 in the upper piece; `times` (f,) [s] of at most 30 frames;
-        `values` (f, 60, 61) [Pa], constant in each cell of a piece, and NaN outside.
+        `values` (f, 60, 61) [Pa] of the cell at each point, NaN outside the pieces.
 
     Raises
     ------
     PatchfemError
         If the file is damaged.
     """
-    frames = read_frames(path, ("von_mises", "normal_stress"))
+    frames = read_frames(path)
     cycle = last_frames(frames.times)
     numbers = cycle[np.linspace(0, cycle.size - 1, min(MAX_FRAMES, cycle.size)).round().astype(int)]
     left, right, bottom, top = contact_window(frames)
     columns, rows = GRID_POINTS
     x = np.linspace(left, right, columns)
-    row_height = (top - bottom) / rows
-    y = bottom + row_height * (np.arange(rows) + 0.5)  # no row lies on the interface
+    y = bottom + (top - bottom) * (np.arange(rows) + 0.5) / rows  # no row is on the interface
 
     values = np.full((numbers.size, rows, columns), np.nan)
-    for side, is_inside in (("lower", y < 0), ("upper", y > 0)):
+    for side in ("lower", "upper"):
         block = frames.blocks[side]
+        stress = block.cell_data["von_mises"][numbers]
         corners = block.points[block.cells, :2]
-        low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
-        is_inside &= (y >= low[1]) & (y <= high[1])
-        cells = find_cells(corners, x, y[is_inside])
-        values[:, is_inside] = block.cell_data["von_mises"][numbers][:, cells]
+        # A cell gives its stress to the points of the grid in the rectangle around it.
+        first, last = (
+            np.stack([np.searchsorted(x, ends[:, 0], how), np.searchsorted(y, ends[:, 1], how)], 1)
+            for ends, how in ((corners.min(axis=1), "left"), (corners.max(axis=1), "right"))
+        )
+        for cell in np.flatnonzero((last > first).all(axis=1)):
+            across, down = map(slice, first[cell], last[cell])
+            values[:, down, across] = stress[:, cell, None, None]
     return {"x": x, "y": y, "times": frames.times[numbers], "values": values}
-
-
-def find_cells(corners: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return the numbers of the cells (j, k) that contain the points of a grid.
-
-    A point belongs to the cell whose sides it is closest to, measured in the half-widths of the cell; within a cell of a
-    rectangular mesh this distance is at most 1.
-
-    Parameters
-    ----------
-    corners : (c, n, 2) ndarray
-        Corners of the cells [m].
-    x, y : (k,), (j,) ndarray
-        Positions of the columns and rows of the grid [m].
-    """
-    low = corners.min(axis=1)
-    high = corners.max(axis=1)
-    centres = (low + high) / 2
-    half_widths = (high - low) / 2
-    in_x = np.abs(x[:, None] - centres[:, 0]) / half_widths[:, 0]
-    cells = np.empty((y.size, x.size), int)
-    for row, place in enumerate(y):
-        in_y = np.abs(place - centres[:, 1]) / half_widths[:, 1]
-        cells[row] = np.argmin(np.maximum(in_x, in_y), axis=1)
-    return cells

@@ -27,10 +27,10 @@ from .records import (
     name_quantity,
     name_unknown,
 )
-from .section import Section, make_section, measure_hidden_area, measure_largest
+from .section import make_section, measure_hidden_area, measure_largest
 from .statistics import UNWORN_LIMIT, find_mode
-from .track import cover_spans, find_spans, measure_track
 from .traces import MIN_SIGNIFICANCE, TraceModel, find_places, mirror
+from .track import cover_spans, find_spans, measure_track
 
 MIN_SAMPLES = 40  # smallest number of heights of a trace that is compared
 MIN_AGREEMENT = 3.0  # heights that agree, relative to those of unrelated traces
