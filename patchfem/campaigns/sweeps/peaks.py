@@ -169,7 +169,9 @@ def _find_minimum(
     slope = polynomial.deriv()
     roots = slope.roots()
     roots = roots[np.isreal(roots)].real
-    for _ in range(N_NEWTON_STEPS):  # eigenvalues are inexact where the highest coefficient is small
+    for _ in range(
+        N_NEWTON_STEPS
+    ):  # eigenvalues are inexact where the highest coefficient is small
         roots = roots - slope(roots) / slope.deriv()(roots)
     roots = roots[(roots > square[top - 1]) & (roots < square[top + 1])]
     values = polynomial(roots)

@@ -48,20 +48,23 @@ def _describe_change(table: SweepTable, analysis: SweepAnalysis) -> str:
             else f"No main measure of {n_known} cases changes by more than its error."
         )
 
-    name, *cases, _ = analysis.ranges[0]
+    name, *cases, relative = analysis.ranges[0]
+    # a requested measure comes first even if others change more
+    is_most = relative == max(entry.relative for entry in analysis.ranges)
+    changes = "changes most:" if is_most else "changes"
     column = table.measures[name]
     low, high = _format_pair(name, column.unit, column.values[cases].tolist())
     varied = [key for key in table.keys if key.count > 1]
     if len(varied) == 1:
         places = [format_key(varied[0].values[case], varied[0].unit) for case in cases]
         return (
-            f"With {varied[0].key}, {_label(name)} changes most: from {low} at {places[0]} "
+            f"With {varied[0].key}, {_label(name)} {changes} from {low} at {places[0]} "
             f"to {high} at {places[1]}."
         )
     share = ""
     for index in analysis.ranking.get(name, ())[:1]:
         share = f", mainly with {index.key} ({100 * index.total:.0f} % of its variance)"
-    return f"{_label(name).capitalize()} changes most: {low} to {high}{share}."
+    return f"{_label(name).capitalize()} {changes} from {low} to {high}{share}."
 
 
 def _label(name: str) -> str:

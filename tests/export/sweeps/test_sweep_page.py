@@ -154,7 +154,7 @@ def test_exact_words_of_given_tables():
         "All 3 cases settled and meet the tolerance.",
     )
     assert make_verdict(table, analyse(table, "pressure_peak"))[0].startswith(
-        "With contact.tilt.angle, pressure peak changes most: from 1 at 1 to 1.15 at 3"
+        "With contact.tilt.angle, pressure peak changes from 1 at 1 to 1.15 at 3"
     )
     outcome = np.array(["steady", "transient", ""], object)
     broken = make_table({"normal.load": tilt}, measures, errors=0.1, outcome=outcome)
