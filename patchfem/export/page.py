@@ -200,6 +200,7 @@ def _subtitle(answer: Answer) -> str:
         f"patchfem {answer.origin.get('patchfem', '')}".strip(),
         answer.kind,
         answer.origin.get("driven", ""),
+        answer.details.get("outcome", "") if answer.is_run else "",
         f"engine {engine}" if engine else "",
         f"computed in {seconds:.2f} s" if seconds is not None else "",
     )
