@@ -185,8 +185,8 @@ def _find_crossing(
 ) -> tuple[float, float]:
     """Return the frequency [Hz] at which 1/y^2 first reaches a level, and its error; NaN if it does not.
 
-    It is the mean of the crossings of two parabolas, each through both ends of the interval and a
-    third case; their difference gives the error.
+    It is the crossing of a parabola through both ends of the interval and a third case; the error comes
+    from a second parabola, or from the straight line.
 
     Parameters
     ----------
@@ -216,4 +216,4 @@ def _find_crossing(
     if len(crossings) < 2:
         crossings.append(float(linear))
     frequencies = np.sqrt(np.array(crossings) + peak_frequency**2)
-    return float(frequencies.mean()), DIFFERENCE_FACTOR * float(np.ptp(frequencies))
+    return float(frequencies[0]), DIFFERENCE_FACTOR * float(np.ptp(frequencies))

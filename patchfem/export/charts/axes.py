@@ -16,6 +16,8 @@ from .table import CHARTS
 LINE_STYLES = ("-", "--", ":", "-.")
 PICTURE_ENDINGS = (".png", ".svg", ".pdf")
 
+# Marker and face of each symbol of a point; "" is the colour of the curve.
+MARKERS = {"circle": ("o", ""), "circle-open": ("o", "none"), "x": ("x", "")}
 # style of the pictures; two drawings of the same answer are equal files
 STYLE = {
     "svg.hashsalt": "patchfem",
@@ -88,11 +90,13 @@ def _draw_curves(panel: Panel, axes) -> None:
         if curve.low is not None:
             bars = np.nan_to_num([curve.y - curve.low, curve.high - curve.y])
         target.errorbar(curve.x, curve.y, bars, fmt="none", ecolor=colour)
-        hollow = np.zeros(curve.x.size, bool)
-        if curve.symbols is not None:
-            hollow = np.char.endswith(np.asarray(curve.symbols, str), "open")
-        target.plot(curve.x[~hollow], curve.y[~hollow], "o", color=colour, label=curve.name)
-        target.plot(curve.x[hollow], curve.y[hollow], "o", color=colour, mfc="none")
+        symbols = np.full(curve.x.size, "circle") if curve.symbols is None else curve.symbols
+        # the first symbol has the entry of the legend, and is drawn above the others
+        for zorder, (symbol, (marker, face)) in zip((4, 3, 3), MARKERS.items()):
+            is_drawn = symbols == symbol
+            label = curve.name if symbol == "circle" else None
+            options = {"color": colour, "mfc": face or colour, "label": label, "zorder": zorder}
+            target.plot(curve.x[is_drawn], curve.y[is_drawn], marker, **options)
 
 
 def _draw_bars(panel: Panel, axes) -> None:
