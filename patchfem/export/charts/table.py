@@ -434,7 +434,7 @@ FIT = (
         "points",
         lines=("curve_depth@curve_coefficient",),
         labels=("wear coefficient", "worn depth"),
-        caption="Measured depth at the fitted coefficient, and the computed depth up to the upper bound.",
+        caption="Measured depth at the fitted coefficient, and the computed depth beyond it.",
     ),
 )
 COST = (
