@@ -31,7 +31,7 @@ FILE_TEXTS = {
     "scene.fitted.toml": "the scene with the fitted values, ready to run",
 }
 WIDE_STYLES = ("relative", "menu", "maps", "film")  # styles of charts that take the whole width
-TALL_STYLES = ("menu", "maps", "film", "bars")
+TALL_STYLES = ("relative", "menu", "maps", "film", "bars")
 COMPRESSION = 6  # of the figures in a page
 
 
@@ -367,4 +367,7 @@ def _template():
     from jinja2 import Environment
 
     text = (files(__package__) / "page.html").read_text("utf-8")
-    return Environment(autoescape=True, trim_blocks=True).from_string(text)
+    environment = Environment(autoescape=True, trim_blocks=True)
+    # sentences mark keys and measures by backquotes, which a page does not show
+    environment.filters["plain"] = lambda sentence: sentence.replace("`", "")
+    return environment.from_string(text)
