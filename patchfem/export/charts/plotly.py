@@ -193,7 +193,7 @@ def _add_menu(figure: dict, panel: Panel) -> dict:
         "yaxis": _axis_layout(first.y),
         "showlegend": sum(bool(curve.name) for curve in first.curves) > 1,
         # the legend is below, because the menu is above
-        "legend": {"orientation": "h", "x": 0, "y": -0.2, "yanchor": "top"},
+        "legend": {"orientation": "h", "x": 0, "y": -0.25, "yanchor": "top"},
         "updatemenus": [
             {"buttons": buttons, "x": 0, "xanchor": "left", "y": 1.02, "yanchor": "bottom"}
         ],
