@@ -115,7 +115,7 @@ def make_page(folders: list[Path]) -> str:
 def _read_all(folders: list[Path]) -> dict[str, Answer]:
     """Return the answers in folders by their names in legends; "" for a single answer."""
     if not folders:
-        raise PatchfemError("report: name one or more results folders")
+        raise PatchfemError("report: at least one results folder is needed")
     if len(folders) == 1:
         return {"": store.read(folders[0])}
     answers = {}
@@ -367,4 +367,7 @@ def _template():
     from jinja2 import Environment
 
     text = (files(__package__) / "page.html").read_text("utf-8")
-    return Environment(autoescape=True, trim_blocks=True).from_string(text)
+    environment = Environment(autoescape=True, trim_blocks=True)
+    # sentences mark keys and measures by backquotes, which a page does not show
+    environment.filters["plain"] = lambda sentence: sentence.replace("`", "")
+    return environment.from_string(text)
