@@ -17,8 +17,8 @@ from patchfem.campaigns.sweeps.changes import analyse
 from patchfem.export import page, store
 from patchfem.export.answer import Answer, Variable
 from patchfem.export.charts import panels, plotly
-from patchfem.export.charts.table import CHARTS
 from patchfem.export.charts.sweeps import MAX_DRAWN_CASES, make_measure_panel
+from patchfem.export.charts.table import CHARTS
 from patchfem.export.sweeps.words import make_verdict
 
 MAX_PAGE_BYTES = 1_500_000
