@@ -726,7 +726,6 @@ SWEEP_TABLES = (
         (
             Column("measure", "measure", "name"),
             Column("change", "changes by", "percent"),
-            Column("key", "key"),
             Column("value", "at (between the cases)", "quantity"),
         ),
     ),
