@@ -684,7 +684,7 @@ class SweepPlots:
     def backbone(dataset: Dataset, ax: Axes | None = None) -> Axes:
         """Plot frequency and damping ratio of a mode against its amplitude, for each method.
 
-        The recommended curve is bold, on top, and lies in its band. Without a band all curves have error bars.
+        The recommended curve is the first one, with its band.
 
         Parameters
         ----------

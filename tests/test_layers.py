@@ -43,7 +43,7 @@ SCENE_ALSO = (
 )
 OUTSIDE = {
     "numba": ("*kernels", "compiled", "compiled.*"),
-    "pyvista": ("export.drawing.view", "export.fields.multiblock"),
+    "pyvista": ("export.convert", "export.fields.grids"),
     "meshio": ("mesh.files", "export.*"),
 }
 # folders of the physics in their reading order
@@ -210,7 +210,7 @@ SMALL = {  # a small package without a fault, into which each test inserts one
     "dynamics.events": "def f():\n    compiled.load('dynamics.event_kernels')\n    from .drives import Sine",
     "model.build": "from ..scene.reader import Scene\ndef build(scene: Scene): pass",
     "runs": "from . import run", "runs.run": "from ..model.build import build\nfrom ..dynamics import events",
-    "export.drawing.view": "import pyvista", "export.vtk": "import meshio", "export.page": "from ..runs import run",
+    "export.convert": "import pyvista", "export.vtk": "import meshio", "export.page": "from ..runs import run",
 }  # fmt: skip
 
 

@@ -68,12 +68,10 @@ def run(
         )
     try:
         # the page comes after the results, so that an error in the page does not lose them
-        if not no_page:
-            _draw_page(written, target)
-        present(written.answer, output)
+        present(written.answer, output, lambda: no_page or _draw_page(written, target))
     except KeyboardInterrupt:
         print_message(
-            f"interrupted; the results in {target} are complete, report.html may be missing"
+            f"interrupted while the page was drawn; the results in {target} are complete except for report.html"
         )
         raise CommandExit(130) from None
     if verbose:

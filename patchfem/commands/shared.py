@@ -110,8 +110,11 @@ def save(make_answer: Callable, output: Output):
     return answer
 
 
-def present(answer, output: Output) -> None:
-    """Print an answer, and draw its picture if the option --plot asks for it."""
+def present(answer, output: Output, draw_page: Callable[[], None] = lambda: None) -> None:
+    """Print an answer, draw its page and its picture, and print the names of its files.
+
+    draw_page: function that is called after the numbers are printed, because they do not need the page.
+    """
     if output.as_json:
         content = store.make_summary(answer) if answer.is_run else answer.details
         print(json.dumps(content, ensure_ascii=False, allow_nan=False), flush=True)
@@ -121,6 +124,7 @@ def present(answer, output: Output) -> None:
         sys.stdout.flush()
     if not output.is_quiet:
         print_remarks(answer)
+    draw_page()
     if output.plot is not None:
         axes.write_plot(answer, output.plot)
     if output.target is not None and not (output.as_json or output.is_quiet):

@@ -9,9 +9,9 @@ In: a `Result`. Out: files. A module imports only entries of this list that come
 5. `netcdf`: result.nc
 6. `histories`: content of result.nc from a run
 7. `tolerance_misses`: cases of a sweep that miss their tolerance
-8. `fields`: fields of the pieces as VTKHDF, VTU and PVD, and as objects of PyVista
+8. `fields`: fields of the pieces as VTKHDF, VTU and PVD, as grids of PyVista, and on a grid for a page
 9. `lab`: histories and loops in the formats of laboratories
-10. `drawing`: drawings as SVG, films, a script for ParaView
+10. `drawing`: charts as SVG
 11. `pages`: pages whose figures the browser draws
 12. `page_data`: data of the page and the pictures of a run
 13. `report`: report.html of a run, and its pictures
@@ -22,7 +22,8 @@ In: a `Result`. Out: files. A module imports only entries of this list that come
 18. `cost`: error against time of the numerical settings of a scene
 19. `fits`: fits of any kind, from their options to their folder
 20. `backbone`: frequency and damping over the amplitude on disk
-21. `convert`: a results folder in another format, chosen by the suffix of a file
+21. `pieces`: pictures and films of the pieces
+22. `convert`: a results folder in another format, chosen by the suffix of a file
 
 Read `folder` first.
 """
@@ -49,7 +50,6 @@ PUBLIC = {
     ),
     "drawing.pictures": ("draw_charts",),
     "drawing.swept": ("sweep_chart",),
-    "fields.bodies": ("write_fields",),
     "fits.options": ("FitOptions",),
     "fits.request": (
         "Listener",

@@ -155,7 +155,7 @@ def _open_window(frames: Frames, number: int, title: str) -> None:
     parts = grids.make_grids(frames.blocks, number, float(frames.times[number]))
     plotter = pv.Plotter(title=f"patchfem: {title}")
     for side in ("lower", "upper"):
-        bar = {"title": "von Mises stress [MPa]"}
+        bar = {"title": "von Mises stress [Pa]"}
         plotter.add_mesh(parts[side], scalars="von_mises", scalar_bar_args=bar)
     plotter.view_xy()
     plotter.show()

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from ..core import PatchfemError
-from ..disk.atomic_write import write_text
+from ..disk.atomic_write import explain_write_error, write_text
 from ..formatting import format_number
 from . import quantities, store
 from .answer import Answer, Quantity
@@ -28,6 +28,7 @@ FILE_TEXTS = {
     "sweep.nc": "all cases (xarray, MATLAB, ncdump)",
     "summary.json": "verdict, measures with their errors, warnings and notes, in SI units",
     "scene.resolved.toml": "the scene in SI units, with all default values",
+    "scene.fitted.toml": "the scene with the fitted values, ready to run",
 }
 WIDE_STYLES = ("relative", "menu", "film")  # styles of charts that take the whole width
 TALL_STYLES = ("menu", "film", "bars")
@@ -44,6 +45,32 @@ def write_page(folder: Path) -> Path:
     """
     path = Path(folder) / store.PAGE
     write_text(path, make_page([Path(folder)]))
+    return path
+
+
+def write_report(folders: list[Path], out: Path | None = None) -> Path:
+    """Write the page of one folder again, or of several folders side by side, and return its path.
+
+    Parameters
+    ----------
+    folders : list of Path
+    out : Path, optional
+        The page; by default report.html in a single folder, else in the current folder.
+
+    Raises
+    ------
+    PatchfemError
+        If a folder has no complete result, or if the results are of different kinds.
+    Missing
+        If the page cannot be written.
+    """
+    text = make_page([Path(folder) for folder in folders])
+    path = Path(out or (Path(folders[0]) / store.PAGE if len(folders) == 1 else store.PAGE))
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise explain_write_error(error, path, path) from None
+    write_text(path, text)
     return path
 
 
@@ -224,7 +251,7 @@ def _find_rows(answer: Answer, source: str) -> list[dict]:
     return [{name: _make_cell(variables, name, k) for name in variables} for k in range(size)]
 
 
-def _make_cell(variables: dict, name: str, index: int):
+def _make_cell(variables: dict, name: str, index: int) -> str | dict:
     """Return one value of a variable: a string, or a quantity as an object with its error."""
     variable = variables[name]
     value = variable.values[index]
@@ -232,11 +259,12 @@ def _make_cell(variables: dict, name: str, index: int):
         return variable.meanings[int(value)]
     if isinstance(value, str):
         return value
-    cell = {"value": float(value), "unit": variable.unit}
+    numbers = {"value": float(value)}
     for end in ("error", "low", "high"):
         if f"{name}_{end}" in variables:
-            cell[end] = float(variables[f"{name}_{end}"].values[index])
-    return cell
+            numbers[end] = float(variables[f"{name}_{end}"].values[index])
+    finite = {key: number if np.isfinite(number) else None for key, number in numbers.items()}
+    return finite | {"unit": variable.unit}
 
 
 def _format_cell(row: dict, column: Column) -> str:
@@ -244,6 +272,9 @@ def _format_cell(row: dict, column: Column) -> str:
     value = row.get(column.key)
     if value is None:
         return "-"
+    if column.style == "rounded":
+        number = value["value"] if isinstance(value, dict) else value
+        return "-" if number is None else format_number(number, 3)
     if isinstance(value, dict):
         known = {key: value.get(key) for key in ("value", "error", "low", "high")}
         return quantities.format_quantity(

@@ -1,7 +1,10 @@
 """Pictures and films of both pieces with their stress and magnified motion, by matplotlib."""
 
 import re
+import shutil
+import subprocess
 from html import escape
+from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
@@ -106,9 +109,12 @@ def magnify_pieces(
     slide_factor = min(magnify, 1.0) * _visible_factor(DRAWN_SLIDE_FRACTION * width, slide)
     places = points + magnify * all_motion
     places[:, len(lower.points) :, 0] += slide_factor * slide[:, None]
-    captions = [
-        f"motion × {magnify:g}, slide of {1e6 * moved:.3g} um × {slide_factor:g}" for moved in slide
-    ]
+    captions = [f"motion × {magnify:g}" for _ in slide]
+    if slide.any():
+        captions = [
+            f"motion × {magnify:g}, slide of {1e6 * moved:.3g} um × {slide_factor:g}"
+            for moved in slide
+        ]
     return DrawnPieces(window, MM * places, cells, is_inside, captions)
 
 
@@ -242,7 +248,7 @@ def write_film(frames: Frames, title: str, magnify: float | None, out: Path) -> 
     Missing
         If ffmpeg, which writes .mp4, is not installed or fails.
     """
-    from matplotlib import animation
+    from matplotlib import animation, rcParams
 
     numbers = last_frames(frames.times)
     if len(numbers) < 2 and out.suffix != ".html":
@@ -250,8 +256,8 @@ def write_film(frames: Frames, title: str, magnify: float | None, out: Path) -> 
             f"{frames.path}: contains only one frame, so there is no motion to show; write a "
             "picture with -o FILE.png"
         )
-    if out.suffix == ".mp4" and not animation.FFMpegWriter.isAvailable():
-        raise Missing(f"{out}: .mp4 needs ffmpeg, which is not installed; write .gif or .html")
+    if out.suffix == ".mp4":
+        rcParams["animation.ffmpeg_path"] = _find_ffmpeg(out)
     figure, show = draw_pieces(frames, numbers, title, magnify)
     figure.draw_without_rendering()
     figure.set_layout_engine("none")  # so that the panels stay at their places
@@ -262,6 +268,26 @@ def write_film(frames: Frames, title: str, magnify: float | None, out: Path) -> 
             partial.write_text(_make_page(film.to_jshtml(rate), title), "utf-8")
         else:
             writer = animation.PillowWriter if out.suffix == ".gif" else animation.FFMpegWriter
-            film.save(partial, writer=writer(fps=rate))
+            try:
+                film.save(partial, writer=writer(fps=rate))
+            except (BrokenPipeError, subprocess.CalledProcessError):
+                raise Missing(
+                    f"{out}: ffmpeg could not write this file; write .gif or .html"
+                ) from None
     first, last = frames.times[numbers[[0, -1]]]
     return f"{out}: {len(numbers)} frames, {first:.6g} s to {last:.6g} s"
+
+
+def _find_ffmpeg(out: Path) -> str:
+    """Return the path of the program ffmpeg, or else of that in imageio-ffmpeg; Missing without both."""
+    program = shutil.which("ffmpeg")
+    if program is None and find_spec("imageio_ffmpeg"):
+        from imageio_ffmpeg import get_ffmpeg_exe
+
+        program = get_ffmpeg_exe()
+    if program is None:
+        raise Missing(
+            f"{out}: writing .mp4 needs ffmpeg, which is not installed; run pip install "
+            "imageio-ffmpeg, or write .gif or .html"
+        )
+    return program

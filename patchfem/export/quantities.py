@@ -26,6 +26,16 @@ LADDERS = UNIT_LADDERS | {"m2": (("um^2", 1e12),), "m2 N-1": (("m^2/N", 1.0),)}
 DEGREES = ("deg", 57.29577951308232)
 
 KEY = (
+    "frequency_at_smallest_amplitude",
+    "frequency_at_largest_amplitude",
+    "damping_at_smallest_amplitude",
+    "damping_at_largest_amplitude",
+    "largest_damping",
+    "amplitude_of_largest_damping",
+    "free_frequency",
+    "stuck_frequency",
+    "cpu_time",
+    "largest_error",
     "worn_depth_mean",
     "worn_depth_max",
     "worn_area",
@@ -87,9 +97,75 @@ class Definition(NamedTuple):
 SURFACE_KINDS = ("compare", "pairs", "profile")
 QUANTITIES: dict[str, Definition] = {
     # backbone
-    # fit
+    "frequency_at_smallest_amplitude": Definition(
+        "Hz", "frequency of the mode at the smallest amplitude of the recommended curve"
+    ),
+    "frequency_at_largest_amplitude": Definition(
+        "Hz", "frequency of the mode at the largest amplitude of the recommended curve"
+    ),
+    "damping_at_smallest_amplitude": Definition(
+        "1", "damping ratio of structure and friction at the smallest amplitude"
+    ),
+    "damping_at_largest_amplitude": Definition(
+        "1", "damping ratio of structure and friction at the largest amplitude"
+    ),
+    "largest_damping": Definition(
+        "1", "largest damping ratio among the amplitudes of the recommended curve"
+    ),
+    "amplitude_of_largest_damping": Definition(
+        "m", "amplitude at the output with the largest damping ratio"
+    ),
+    "free_frequency": Definition(
+        "Hz", "frequency of the mode without its contact; a bonded spring is included"
+    ),
+    "stuck_frequency": Definition(
+        "Hz", "frequency of the mode while the contact sticks with its own stiffness"
+    ),
+    "exponent_micro": Definition(
+        "1", "exponent of the energy loss per cycle over the amplitude in micro-slip"
+    ),
+    "exponent_gross": Definition(
+        "1", "exponent of the energy loss per cycle over the amplitude in gross slip; 1 in theory"
+    ),
+    # fit; of keys of a scene, see FITTED_KEY
+    "offset_force": Definition("N", "constant force that is fitted to the whole record"),
+    "offset_displacement": Definition(
+        "m", "fitted distance of the first row from the position without stress"
+    ),
+    "residual_rms": Definition("1", "root mean square of fitted minus measured values"),
+    "residual_fraction": Definition(
+        "1", "root mean square of fitted minus measured values, over the largest measured value"
+    ),
+    "held_out_rms": Definition(
+        "1", "root mean square of predicted minus measured values of the rows that are held out"
+    ),
+    "work_measured": Definition("J", "work of the measured force over the record"),
+    "work_fitted": Definition("J", "work of the fitted force over the record"),
+    "frequency_residual_rms": Definition(
+        "1", "root mean square of the relative deviation of the fitted frequency"
+    ),
+    "damping_residual_rms": Definition(
+        "1", "root mean square of the relative deviation of the fitted damping ratio"
+    ),
+    "score_fitted": Definition(
+        "1", "root mean square of ln(computed/measured) of the readings that were fitted"
+    ),
+    "score_held_out": Definition(
+        "1", "root mean square of ln(computed/measured) of the readings that were held out"
+    ),
+    "score_left_out": Definition(
+        "1", "root mean square of ln(computed/measured) of each reading in the fit without it"
+    ),
+    "fitted_depth": Definition("m", "worn depth computed with the fitted coefficient"),
     # cost
+    "cpu_time": Definition("s", "CPU time of the scene as it is, with its error estimates"),
+    "elapsed_time": Definition("s", "elapsed time of the same run"),
+    "largest_error": Definition(
+        "1", "largest numerical error of a measure in this run, relative to its value and floor"
+    ),
+    "tolerance": Definition("1", "accuracy.tolerance of the scene"),
 }
+FITTED_KEY = "value of this key of the scene that fits the measurement best, with its 95 % interval"
 
 
 def find_definition(name: str, kind: str = "") -> Definition | None:
@@ -97,6 +173,8 @@ def find_definition(name: str, kind: str = "") -> Definition | None:
 
     kind: of the answer; a comparison of surfaces has names of runs with a meaning of their own.
     """
+    if "." in name:
+        return Definition("1", FITTED_KEY)
     base_name = rows.remove_interface_number(name)
     if kind in SURFACE_KINDS:
         return definitions.find(name) or definitions.find(base_name)

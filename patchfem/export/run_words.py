@@ -78,12 +78,12 @@ def make_verdict(result: Result, measures: dict[str, Quantity], details: dict) -
     details : dict
         Further keys of summary.json: `cycles`, `contact`, `loop` and `run_away`, as far as they exist.
     """
-    release = describe_release(result)
+    release, decay = describe_release(result)
     outcome = describe_outcome(result, measures, details)
     headline = release or _headline(result, measures, details)
     if result.outcome in (Outcome.NO_CONTACT, Outcome.NOT_CONVERGED) or not headline:
         return (outcome,)
-    sentences = [headline, outcome, _compare_with_readings(result)]
+    sentences = [headline, decay, outcome, _compare_with_readings(result)]
     if result.plan.kind != "patch":
         sentences.append(_describe_place(details.get("contact")))
     sentences.append(describe_accuracy(result, measures))
@@ -128,7 +128,11 @@ def _is_known(measures: dict[str, Quantity], name: str) -> bool:
 def _interface_parts(result: Result, measures: dict[str, Quantity], text: str) -> list[str]:
     """Return the dissipated energy of the interface, or of each of a few interfaces."""
     names = [name for name in measures if remove_interface_number(name) == "loop_area"]
-    names = [name for name in names if _is_known(measures, name)]
+    names = [
+        name
+        for name in names
+        if _is_known(measures, name) and not quantities.is_zero(name, measures[name])
+    ]
     if not names:
         return []
     if result.outcome in (Outcome.TRANSIENT, Outcome.GROWS):
@@ -393,22 +397,20 @@ def _is_release(result: Result) -> bool:
     return rig is not None and rig.drive.kind == "free"
 
 
-def describe_release(result: Result) -> str:
-    """Return the headline of a released output: its first swing, its decay and where it comes to rest; "" for other runs."""
+def describe_release(result: Result) -> tuple[str, str]:
+    """Return two sentences on a released output: first swing and rest, and its decay; "" for what does not exist."""
     response = result.response
     if not _is_release(result) or response is None or response.time.size < 2:
-        return ""
+        return "", ""
     amplitude = result.measures.get("relative_displacement_amplitude")
     error = getattr(amplitude, "error", None) or 0.0
     last = getattr(amplitude, "value", None)
     motion = describe_swing(response.time, response.output, error, last)
-    decay = result.extra.get("decay")
-    text = f"{motion[0].upper()}{motion[1:]}"
-    return f"{text}{_describe_decay(decay)}."
+    return f"{motion[0].upper()}{motion[1:]}.", _describe_decay(result.extra.get("decay"))
 
 
 def _describe_decay(decay) -> str:
-    """Return a clause on frequency and damping ratio at the start and at the end of a decay."""
+    """Return a sentence on frequency and damping ratio at the start and at the end of a decay; "" without them."""
     if decay is None:
         return ""
     known = np.flatnonzero(np.isfinite(decay.damping_error + decay.frequency_error))
@@ -419,7 +421,7 @@ def _describe_decay(decay) -> str:
         f"{format_value(decay.damping[k], decay.damping_error[k])} at {format_quantity(float(decay.amplitude[k]), 'm', 3)}"
         for k in (known[1], known[-1])
     ]
-    return f": {', '.join(parts)}"
+    return f"It decays with {', with '.join(parts)}."
 
 
 def describe_swing(time, output, error: float = 0.0, amplitude: float | None = None) -> str:

@@ -18,7 +18,8 @@ it:
 12. `plan`  what would run: engine, sizes, cost
 13. `self_checks`  comparison of results with a second computation
 14. `run`  from a plan to its result
-15. `batch`  many models in one batch
+15. `pieces`  displacement and stress inside both pieces, and where they yield
+16. `batch`  many models in one batch
 """
 
 # names that other folders use, by module
@@ -61,14 +62,15 @@ PUBLIC = {
     "patch.sweep_meshes": ("geometry_key",),
     "patch.press": ("nodal_areas",),
     "patch.result": ("make_piece_meshes_of_run",),
-    "patch.strength": (
-        "Strength",
-        "YIELDING_NEGLECTED",
-        "yield_strength",
-    ),
     "patch.values": (
         "contact_ends",
         "contact_intervals",
+    ),
+    "pieces": (
+        "PieceFields",
+        "Pieces",
+        "add_yielding_notes",
+        "compute_pieces",
     ),
     "plan": (
         "GROUPS",

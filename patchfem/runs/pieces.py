@@ -64,14 +64,22 @@ class Pieces(NamedTuple):
 
 
 class _LoadedPiece(NamedTuple):
-    """A piece with the displacements u (1 + f, n, 2) [m] that its loads cause, along x and inward.
+    """A piece with the displacement and stress that its loads cause, with y towards its inside.
 
-    The first displacements are those of the pressed state, the others add to them in each frame.
+    - sign: -1 for the lower piece, whose y is then reversed, and 1 for the upper piece.
+    - cells: its cells.
+    - interface: node numbers of its face in order of x.
+    - u (1 + f, n, 2): displacement [m] in the pressed state, and what each frame adds to it.
+    - stress (f, t, 4): stress at the centres of the cells in each frame [Pa].
+    - error: estimated error of this stress.
     """
 
+    sign: float
     cells: recovery.Cells
     interface: np.ndarray
     u: np.ndarray
+    stress: np.ndarray
+    error: recovery.StressError
 
 
 def compute_pieces(result) -> Pieces:
@@ -88,58 +96,26 @@ def compute_pieces(result) -> Pieces:
     """
     patch = result.patch
     fields = result.fields
+    pair = patch.pair
+    upper_grid = pair.grid if pair.upper is pair.piece else pair.upper_grid
+    low_forces, high_forces = _nodal_forces(patch, fields)
+    low = _load_piece(-1.0, pair.piece, pair.grid, *low_forces)
+    high = _load_piece(1.0, pair.upper, upper_grid, *high_forces)
+    held = _holder_motion(patch, fields, high.cells.points)
+    lower = _make_piece(low, high.error, 0.0)
+    upper = _make_piece(high, low.error, held)
+
+    # The fields of the interface are those of the run, its motion is that of the lower piece, and
+    # below a coating act other stresses than on its face.
     surface = patch_surface(patch, fields)
-    load_pair = zip(("lower", "upper"), _nodal_forces(patch, fields))
-    loaded = {side: _load_piece(patch.pair, side, *forces) for side, forces in load_pair}
-    interface = {
-        name: values
-        for name, values in fields.items()
-        if name != "time" and not name.startswith("holder_")
-    }
-
-    pieces = {}
-    errors = {}
-    for side, piece in loaded.items():
-        # y points away from the interface in the lower piece too until here
-        flip = np.array([1.0, -1.0 if side == "lower" else 1.0])
-        motion = piece.u[:1] + piece.u[1:]
-        stress = recovery.centre_stress(piece.cells, motion)
-        errors[side] = _estimate_stress_error(piece.cells, motion, stress)
-        mises = von_mises(stress)
-        stress[..., 3] *= flip[1]
-        moved = motion * flip
-        if side == "upper":
-            moved += _holder_motion(patch, fields, piece.cells.points)
-        blocks = tuple(block[:, :: int(flip[1])] for block in piece.cells.blocks)
-        points = piece.cells.points * flip
-        pieces[side] = PieceFields(
-            points, blocks, piece.cells.is_coating, moved, stress, mises, errors[side].error
-        )
-        # The shear stress acts along +x on the lower piece, as that of the interface.
-        traction = coating_traction.compute_coating_traction(piece.cells, piece.u)
-        bonds = coating_traction.interpolate_coating_traction(piece.cells, traction, surface.x)
-        for name, rows in bonds.items():
-            sign = -flip[1] if name == "shear_bond" else 1.0
-            interface[f"{name}_{side}"] = sign * (rows[:1] + rows[1:])
-
-    for side, other in (("lower", "upper"), ("upper", "lower")):
-        relative_error = errors[side].relative_error(errors[other])[0]
-        pieces[side] = pieces[side]._replace(stress_error=relative_error)
-    interface["holder_slide"] = np.repeat(
-        _holder_field(fields, "slide", 0.0), surface.x.size, axis=1
-    )
-    interface["displacement"] = _interpolate_displacement(
-        pieces["lower"], loaded["lower"].interface, surface.x
-    )
+    names = [name for name in fields if name != "time" and not name.startswith("holder_")]
+    interface = {name: fields[name] for name in names}
+    interface |= _bond_stress(low, "lower", surface.x) | _bond_stress(high, "upper", surface.x)
+    interface["displacement"] = _interpolate_displacement(lower, low.interface, surface.x)
+    slide = _holder_field(fields, "slide", 0.0)
+    interface["holder_slide"] = np.repeat(slide, surface.x.size, axis=1)
     width = result.plan.model.patch.pieces.width
-    return Pieces(
-        fields["time"],
-        **pieces,
-        x=surface.x,
-        weight=surface.weight,
-        interface=interface,
-        width=width,
-    )
+    return Pieces(fields["time"], lower, upper, surface.x, surface.weight, interface, width)
 
 
 def _nodal_forces(patch, fields: dict) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -148,36 +124,54 @@ def _nodal_forces(patch, fields: dict) -> list[tuple[np.ndarray, np.ndarray]]:
     The first row is the pressed state, the others add to it in each frame. A frame of a worn patch
     has its own pressure.
     """
-    pair = patch.pair
     length = patch.pieces.interface.weight / patch.pieces.interface.width
     pressed = patch.pressure.sigma_n
-    frames = (len(fields["time"]), length.size)
-    shear = np.concatenate(
-        [np.zeros((1, length.size)), fields.get("shear_stress", np.zeros(frames))]
-    )
-    change = fields["normal_stress"] - pressed if "holder_closing" in fields else np.zeros(frames)
+    none = np.zeros((len(fields["time"]), length.size))
+    shear = np.concatenate([none[:1], fields.get("shear_stress", none)])
+    change = fields["normal_stress"] - pressed if "holder_closing" in fields else none
     normal = np.concatenate([pressed[None], change])
-    return [
-        (sign * pair.forces(shear * length)[side], pair.forces(normal * length)[side])
-        for side, sign in ((0, 1.0), (1, -1.0))
-    ]
+    low_shear, high_shear = patch.pair.forces(shear * length)
+    low_normal, high_normal = patch.pair.forces(normal * length)
+    return [(low_shear, low_normal), (-high_shear, high_normal)]
 
 
-def _load_piece(pair, side: str, shear: np.ndarray, normal: np.ndarray) -> _LoadedPiece:
-    """Return a piece of a condensed pair with its displacements under nodal forces [N/m]."""
-    is_lower = side == "lower"
-    piece = pair.piece if is_lower else pair.upper
-    grid = pair.grid if is_lower or pair.upper is pair.piece else pair.upper_grid
+def _load_piece(sign: float, piece, grid, shear, normal) -> _LoadedPiece:
+    """Return a condensed piece with its displacement and stress under nodal forces [N/m]."""
     cells = recovery.get_cells(piece)
     is_grid = isinstance(piece, Piece)  # its nodes are numbered column by column
     interface = np.arange(0, len(cells.points), grid.depth.size) if is_grid else grid.interface
-    return _LoadedPiece(cells, interface, compute_displacement(piece, shear, normal))
-
-
-def _estimate_stress_error(cells, motion, stress) -> recovery.StressError:
-    """Return the estimated error of the stress (f, t, 4) [Pa] in the energy norm."""
+    u = compute_displacement(piece, shear, normal)
+    motion = u[:1] + u[1:]
+    stress = recovery.centre_stress(cells, motion)
     gauss_points = recovery.make_points(cells, "gauss")
-    return recovery.estimate_error(recovery.fit_recovery(cells), motion, stress, gauss_points)
+    fit = recovery.fit_recovery(cells)
+    error = recovery.estimate_error(fit, motion, stress, gauss_points)
+    return _LoadedPiece(sign, cells, interface, u, stress, error)
+
+
+def _make_piece(piece: _LoadedPiece, other_error, held) -> PieceFields:
+    """Return the fields of a piece whose holder moves by `held` (f, n, 2) [m]."""
+    flip = np.array([1.0, piece.sign])
+    return PieceFields(
+        points=piece.cells.points * flip,
+        blocks=tuple(block[:, :: int(piece.sign)] for block in piece.cells.blocks),
+        is_coating=piece.cells.is_coating,
+        displacement=(piece.u[:1] + piece.u[1:]) * flip + held,
+        stress=piece.stress * [1.0, 1.0, 1.0, piece.sign],
+        von_mises=von_mises(piece.stress),
+        stress_error=piece.error.relative_error(other_error)[0],
+    )
+
+
+def _bond_stress(piece: _LoadedPiece, side: str, x) -> dict[str, np.ndarray]:
+    """Return the stresses (f, k) [Pa] between coating and substrate at x (k,) [m], none without a coating.
+
+    Compression is positive; the shear stress is that on the lower one of both along +x.
+    """
+    traction = coating_traction.compute_coating_traction(piece.cells, piece.u)
+    bonds = coating_traction.interpolate_coating_traction(piece.cells, traction, x)
+    signs = {"normal_bond": 1.0, "shear_bond": -piece.sign}
+    return {f"{name}_{side}": signs[name] * (u[:1] + u[1:]) for name, u in bonds.items()}
 
 
 def _holder_motion(patch, fields: dict, points) -> np.ndarray:
@@ -255,10 +249,8 @@ def find_yielding(patch_model, pieces: Pieces, min_peak: float = 0.0) -> dict:
             if stress.max() > limit:
                 place = centres[cells[np.argmax(stress)]]
                 highest.setdefault(strength, {})[side] = (float(stress.max()), side, place)
-    return {
-        strength: _describe_yielding(strength, list(sides.values()))
-        for strength, sides in highest.items()
-    }
+    places = {strength: list(sides.values()) for strength, sides in highest.items()}
+    return {strength: _describe_yielding(strength, places[strength]) for strength in places}
 
 
 def _describe_yielding(strength, places: list) -> str:

@@ -104,8 +104,8 @@ def fit_measurement(
     scene: Scene,
     to: str,
     free: Sequence[str],
-    options: FitOptions = FitOptions(),
-    listener: Listener = Listener(),
+    options: FitOptions,
+    listener: Listener,
     checkpoint: Path | None = None,
 ) -> FittedLoop | FittedCurve | FittedRows | FittedCoefficient:
     """Fit keys of a scene to a measurement.

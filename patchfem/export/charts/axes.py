@@ -1,12 +1,17 @@
 """Panels as matplotlib Axes, for pictures and for `plot` in Python."""
 
+from pathlib import Path
+
 import numpy as np
 
 from ...core import PatchfemError
+from ...disk.atomic_write import write_atomically
 from ..answer import Answer
 from .panels import Panel, make_panels
 from .plotly import BAND_OPACITY, CODE_COLOURS, COLOURS
 from .table import CHARTS
+
+PICTURE_ENDINGS = (".png", ".svg", ".pdf")
 
 PANEL_SIZE = (6.4, 4.2)  # width and height of a panel [inch]
 
@@ -41,7 +46,7 @@ def _draw_curves(panel: Panel, axes) -> None:
     for number, curve in enumerate(panel.curves):
         target = second if curve.on_second_axis else axes
         colour = COLOURS[number % len(COLOURS)]
-        if panel.style != "points":
+        if panel.style != "points" or curve.is_line:
             target.plot(
                 curve.x,
                 curve.y,
@@ -117,7 +122,26 @@ def make_figure(panels: list[Panel]):
 
 def write_picture(panels: list[Panel], path) -> None:
     """Write panels as .png, .svg or .pdf."""
-    make_figure(panels).savefig(path, dpi=150)
+    with write_atomically(path) as partial:
+        make_figure(panels).savefig(partial, dpi=150, format=Path(path).suffix[1:])
+
+
+def write_plot(answer: Answer, path) -> None:
+    """Write the first chart of an answer as .png, .svg or .pdf.
+
+    Raises
+    ------
+    PatchfemError
+        For another ending, or if the answer has no chart.
+    Missing
+        If the file cannot be written.
+    """
+    if Path(path).suffix.lower() not in PICTURE_ENDINGS:
+        raise PatchfemError(f"{path}: a picture is written as {', '.join(PICTURE_ENDINGS)}")
+    panels = make_panels({"": answer}, CHARTS[answer.kind])
+    if not panels:
+        raise PatchfemError(f"{path}: this answer has no chart")
+    write_picture(panels[:1], path)
 
 
 def draw_charts(answer: Answer, titles: tuple[str, ...], axes=None, verb: str = "plot"):

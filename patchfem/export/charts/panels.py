@@ -42,6 +42,8 @@ class Curve:
     meanings : tuple of str
         Names of the codes of a map.
     on_second_axis : bool
+    is_line : bool
+        Whether the curve is a line in a chart of points.
     symbols : (k,) ndarray of str or None
         Symbols of the points: "circle", "circle-open" or "x".
     """
@@ -54,6 +56,7 @@ class Curve:
     rows: np.ndarray | None = None
     meanings: tuple[str, ...] = ()
     on_second_axis: bool = False
+    is_line: bool = False
     symbols: np.ndarray | None = None
 
 
@@ -112,8 +115,24 @@ def make_panels(answers: dict[str, Answer], charts: tuple[Chart, ...]) -> list[P
     """
     first_data = next(iter(answers.values())).data
     all_charts = [part for chart in charts for part in _repeat_for_interfaces(chart, first_data)]
-    panels = [make_panel(answers, chart) for chart in all_charts]
+    panels = [
+        make_panel(group, chart)
+        for chart in all_charts
+        for group in _group_by_units(answers, chart)
+    ]
     return [panel for panel in panels if panel is not None]
+
+
+def _group_by_units(answers: dict[str, Answer], chart: Chart) -> list[dict[str, Answer]]:
+    """Return groups of answers whose variables have the same units, so that they can share the axes of a chart."""
+    groups = {}
+    for name, answer in answers.items():
+        data = answer.data
+        y_units = {data[part].unit for part in (_split(y)[0] for y in chart.y) if part in data}
+        x_name = _find_x(data, chart)
+        x_unit = data[x_name].unit if x_name else ""
+        groups.setdefault((x_unit, frozenset(y_units)), {})[name] = answer
+    return list(groups.values())
 
 
 def _repeat_for_interfaces(chart: Chart, data: dict[str, Variable]) -> list[Chart]:
@@ -166,12 +185,12 @@ def make_panel(answers: dict[str, Answer], chart: Chart) -> Panel | None:
 
     curves = []
     for label, data in selections.items():
-        for name in (*chart.y, *second):
+        for name in (*chart.y, *chart.lines, *second):
             axis = second_axis if name in second else y_axis
-            new_curves = _make_curves(data, chart, name, (x_axis, axis))
+            roles = {"on_second_axis": name in second, "is_line": name in chart.lines}
             curves += [
-                replace(curve, name=_join_names(label, curve.name), on_second_axis=name in second)
-                for curve in new_curves
+                replace(curve, name=_join_names(label, curve.name), **roles)
+                for curve in _make_curves(data, chart, name, (x_axis, axis))
             ]
     curves = [curve for curve in curves if curve.x.size]
     if not curves:
@@ -278,7 +297,7 @@ def _make_axis(name: str, unit: str, arrays: list, log: str, letter: str) -> Axi
     values = np.concatenate(numbers)
     finite = np.abs(values[np.isfinite(values)])
     label = name.replace("_", " ")
-    is_log = letter in log or (log == "auto" and needs_log_scale(values))
+    is_log = letter in log or ("auto" in log and needs_log_scale(values))
     if unit in UNIT_LADDERS:
         unit, scale = choose_unit(UNIT_LADDERS[unit], finite.max(initial=0.0))
         return Axis(f"{label} [{unit}]", scale, is_log)
@@ -327,8 +346,9 @@ def _make_curves(data: dict[str, Variable], chart: Chart, name: str, axes: tuple
             for end in (low, high)
         ]
         curves.append(Curve(text, x_row[keep], (values * y_axis.scale)[keep], *band))
-    if chart.by in data and len(curves) == 1:
-        return _split_by_code(curves[0], data[chart.by], _thin(rows[0][2]))
+    if chart.by in data and len(curves) == 1 and name not in chart.lines:
+        is_joined = chart.style != "points"
+        return _split_by_code(curves[0], data[chart.by], _thin(rows[0][2]), is_joined)
     return curves
 
 
@@ -358,13 +378,13 @@ def _name_elements(data: dict[str, Variable], dimension: str) -> list[str]:
 def _find_band(data: dict[str, Variable], name: str) -> tuple[np.ndarray | None, np.ndarray | None]:
     """Return the ends [SI] of the error band of a variable, None without one."""
     values = np.asarray(data[name].values, float)
+    if f"{name}_low" in data and f"{name}_high" in data:
+        return tuple(np.asarray(data[f"{name}_{end}"].values, float) for end in ("low", "high"))
     if f"{name}_error" in data:
         error = np.asarray(data[f"{name}_error"].values, float)
         # an error as large as the value, as at a fold, would only hide the curve
         error = np.where(error <= np.abs(values), error, np.nan)
         return values - error, values + error
-    if f"{name}_low" in data and f"{name}_high" in data:
-        return tuple(np.asarray(data[f"{name}_{end}"].values, float) for end in ("low", "high"))
     return None, None
 
 
@@ -378,14 +398,15 @@ def _thin(values: np.ndarray) -> np.ndarray:
     return np.unique([0, *extremes, values.size - 1])
 
 
-def _split_by_code(curve: Curve, codes: Variable, keep: np.ndarray) -> list[Curve]:
+def _split_by_code(curve: Curve, codes: Variable, keep: np.ndarray, is_joined: bool) -> list[Curve]:
     """Return a curve for each code; points of other codes are missing in it, so that its line is interrupted."""
     numbers = np.asarray(codes.values)[keep]
     curves = []
     for code in np.unique(numbers):
         is_code = numbers == code
-        # the line to the next point belongs to the code of its start
-        is_shown = is_code | np.concatenate([[False], is_code[:-1]])
+        is_shown = is_code
+        if is_joined:  # the line to the next point belongs to the code of its start
+            is_shown = is_code | np.concatenate([[False], is_code[:-1]])
         parts = [
             None if values is None else np.where(is_shown, values, np.nan)
             for values in (curve.y, curve.low, curve.high)

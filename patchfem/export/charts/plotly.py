@@ -73,7 +73,7 @@ def _make_traces(panel: Panel) -> list[dict]:
         elif panel.style == "bars":
             traces.append(_bar_trace(curve, colour))
         else:
-            traces += _curve_traces(curve, panel.style, colour)
+            traces += _curve_traces(curve, "line" if curve.is_line else panel.style, colour)
     return traces
 
 

@@ -24,13 +24,15 @@ class Chart:
     span : str
         "all", "cycles" (last three cycles), "run" (all cycles, if there are more) or "contact" (the loaded part of x).
     log : str
-        Logarithmic axes: "", "x", "y" or "xy"; "auto" decides by the values.
+        Logarithmic axes: "", "x", "y" or "xy"; "auto" decides by the values, also for the other axis of "x auto".
     by : str
         Variable of codes that colour the points.
     marks : tuple of str
         Variables whose values are vertical lines.
     y2 : tuple of str
         Variables of a second vertical axis.
+    lines : tuple of str
+        Further variables of the vertical axis, drawn as lines beside points.
     labels : tuple of str
         Names of the horizontal and the vertical axis; "" for the name of the variable.
     caption : str
@@ -45,6 +47,7 @@ class Chart:
     by: str = ""
     marks: tuple[str, ...] = ()
     y2: tuple[str, ...] = ()
+    lines: tuple[str, ...] = ()
     labels: tuple[str, str] = ("", "")
     caption: str = ""
 
@@ -72,8 +75,8 @@ class Rows:
 class Column:
     """Column of a table.
 
-    key: key in each row of the details, or name of a variable; title: heading; style: "text", or "quantity" for a number
-    with the unit and the error of its row.
+    key: key in each row of the details, or name of a variable; title: heading; style: "text", "quantity" for a number
+    with the unit and the error of its row, or "rounded" for three digits.
     """
 
     key: str
@@ -271,7 +274,36 @@ RUN = (
 )
 
 SWEEP: tuple[Chart, ...] = ()
-BACKBONE: tuple[Chart, ...] = ()
+BACKBONE_METHODS = (
+    "balance",
+    "quasi-static",
+    "decay",
+)  # of a backbone; the first one with a curve is recommended
+_METHOD_CURVES = {
+    name: tuple(
+        f"{method}_{name}@{method}_amplitude".replace("-", "_") for method in BACKBONE_METHODS
+    )
+    for name in ("frequency", "damping")
+}
+BACKBONE = (
+    Chart(
+        "Frequency",
+        "balance_amplitude quasi_static_amplitude decay_amplitude",
+        _METHOD_CURVES["frequency"],
+        log="x",
+        y2=("balance_force",),
+        labels=("amplitude at the output", "frequency"),
+        caption="Use the first curve. Its band contains the numerical error and what the other kinds of test read.",
+    ),
+    Chart(
+        "Damping ratio",
+        "balance_amplitude quasi_static_amplitude decay_amplitude",
+        _METHOD_CURVES["damping"],
+        log="x auto",
+        labels=("amplitude at the output", "damping ratio"),
+        caption="Damping ratio of structure and friction together. Use the first curve; its band contains what other kinds of test read.",
+    ),
+)
 COMPARE = (
     Chart(
         "Both traces",
@@ -420,8 +452,121 @@ PROFILE = (
         caption="One-sided spectral density of the primary profile over the wavelength.",
     ),
 )
-FIT: tuple[Chart, ...] = ()
-COST: tuple[Chart, ...] = ()
+FIT = (
+    Chart(
+        "Measured and fitted loop",
+        "slide",
+        ("force", "friction_ratio", "held_out"),
+        "points",
+        lines=("fitted",),
+        labels=("slide", "friction force"),
+        caption="Rows of the record, and the fitted loop; rows that are held out are predicted.",
+    ),
+    Chart(
+        "Residuals",
+        "row",
+        ("residual",),
+        "points",
+        labels=("row", "fitted - measured"),
+        caption="A pattern along the rows is an error of the model; scatter around zero is noise of the record.",
+    ),
+    Chart(
+        "Frequency",
+        "amplitude",
+        ("frequency",),
+        "points",
+        log="x",
+        lines=("curve_frequency@curve_amplitude",),
+        caption="Measured values with 95 % intervals, and the fitted curve beyond them.",
+    ),
+    Chart(
+        "Damping ratio",
+        "amplitude",
+        ("damping",),
+        "points",
+        log="x auto",
+        lines=("curve_damping@curve_amplitude",),
+        labels=("", "damping ratio"),
+        caption="Measured values with 95 % intervals, and the fitted curve beyond them.",
+    ),
+    Chart(
+        "Residuals of the frequency",
+        "amplitude",
+        ("frequency_residual",),
+        "points",
+        log="x",
+        labels=("", "(fitted - measured) / interval"),
+        caption="Distances in half-widths of the 95 % intervals.",
+    ),
+    Chart(
+        "Residuals of the damping ratio",
+        "amplitude",
+        ("damping_residual",),
+        "points",
+        log="x",
+        labels=("", "(fitted - measured) / interval"),
+        caption="Distances in half-widths of the 95 % intervals.",
+    ),
+    *(
+        Chart(
+            f"Computed against measured {name}",
+            name,
+            (f"computed_{name}",),
+            "points",
+            log="xy",
+            by="use",
+            lines=(f"equal_{name}@equal_{name}",),
+            labels=(f"measured {name}", f"computed {name}"),
+            caption="On the line both are equal. Rows that are held out are predicted.",
+        )
+        for name in ("acceleration", "displacement")
+    ),
+    *(
+        Chart(
+            f"Ratio of the {name} against the input",
+            "input",
+            (f"{name}_ratio",),
+            "points",
+            by="drive",
+            log="auto",
+            labels=("", f"computed / measured {name}"),
+            caption="A trend with the input or the frequency is an error of the model.",
+        )
+        for name in ("acceleration", "displacement")
+    ),
+    Chart(
+        "Worn depth against the coefficient",
+        "coefficient",
+        ("depth",),
+        "points",
+        lines=("curve_depth@curve_coefficient",),
+        labels=("wear coefficient", "worn depth"),
+        caption="Measured depth with its interval at the fitted coefficient, and the computed depth up to the upper bound.",
+    ),
+)
+COST = (
+    Chart(
+        "Error against time",
+        "cpu_seconds",
+        ("largest_error",),
+        "points",
+        by="outcome",
+        log="xy",
+        lines=("allowed_error",),
+        labels=("CPU time", "error of the worst measure"),
+        caption="Largest relative error of any measure in each run. The line is the tolerance of the run.",
+    ),
+    Chart(
+        "Value against time",
+        "cpu_seconds",
+        ("value",),
+        "points",
+        by="outcome",
+        log="x",
+        labels=("CPU time", ""),
+        caption="Main measure of each run with its numerical error.",
+    ),
+)
 
 CHARTS: dict[str, tuple[Chart, ...]] = {
     **dict.fromkeys(("patch", "bench", "rig", "linear"), RUN),
@@ -471,6 +616,40 @@ CURVES: dict[str, dict[str, dict[str, str] | Stack | Rows | str]] = {
         "primary.csv": {"x": "x", "z": "primary"},
         "roughness.csv": {"x": "x_rough", "z": "roughness"},
     },
+    "backbone": {
+        "backbone.csv": Stack(
+            "method",
+            BACKBONE_METHODS,
+            ("amplitude", "frequency", "frequency_error", "damping", "damping_error", "force"),
+        )
+    },
+    "fit": {
+        "fit.csv": {
+            # of a loop
+            "time": "time",
+            "displacement": "slide",
+            "force": "force",
+            "friction_ratio": "friction_ratio",
+            "fitted": "fitted",
+            # of a curve
+            "amplitude": "amplitude",
+            "frequency": "frequency",
+            "frequency_error": "frequency_error",
+            "damping": "damping",
+            "damping_error": "damping_error",
+            "frequency_fitted": "frequency_fitted",
+            "damping_fitted": "damping_fitted",
+            # of rows
+            "input [g]": "input",
+            "acceleration [g]": "acceleration",
+            "displacement [mil]": "displacement",
+            "flag": "flag",
+            "computed acceleration [g]": "computed_acceleration",
+            "computed displacement [mil]": "computed_displacement",
+            "held": "held",
+        }
+    },
+    "cost": {"cost.csv": "run"},
 }
 CSV_UNITS = {"g": 1 / 9.80665, "mil": 1 / 25.4e-6}  # number of these units in one SI unit
 
@@ -545,3 +724,27 @@ TABLES: dict[str, tuple[Table, ...]] = {
         ),
     ),
 }
+TABLES["fit"] = (
+    Table(
+        "Correlation of the fitted values",
+        "pair",
+        (Column("pair", "values"), Column("correlation", "correlation", "rounded")),
+    ),
+)
+TABLES["cost"] = (
+    Table(
+        "Runs",
+        "point",
+        (
+            Column("varied", "varied"),
+            Column("label", "setting"),
+            Column("nodes", "interface nodes"),
+            Column("steps", "steps per cycle"),
+            Column("cpu_seconds", "CPU s", "rounded"),
+            Column("largest_error", "largest error", "rounded"),
+            Column("worst_measure", "of"),
+            Column("value", "main measure"),
+            Column("outcome", "result"),
+        ),
+    ),
+)

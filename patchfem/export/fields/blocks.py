@@ -18,29 +18,31 @@ class Field(NamedTuple):
     """How a field is stored.
 
     - unit: SI unit.
+    - shape: shape of one value.
     - codes: meaning of each of its codes, in their order.
     - bits: bits of the mantissa that are kept; 19 are a relative error below 1e-6.
     """
 
     unit: str
+    shape: tuple[int, ...] = ()
     codes: tuple[str, ...] = ()
     bits: int = 19
 
 
 FIELDS = {
-    "displacement": Field("m"),
-    "stress": Field("Pa"),
+    "displacement": Field("m", (3,)),
+    "stress": Field("Pa", (6,)),  # xx, yy, zz, xy, yz, xz; tension is positive
     "von_mises": Field("Pa"),
     "stress_error": Field("1", bits=6),  # the estimate itself is accurate to about 10 %
-    "material": Field("1", ("substrate", "coating")),
-    "part": Field("1", PARTS),
+    "material": Field("1", codes=("substrate", "coating")),
+    "part": Field("1", codes=PARTS),
     "weight": Field("m2"),
     "normal_stress": Field("Pa"),
     "shear_stress": Field("Pa"),
     "gap": Field("m"),
     "slip": Field("m"),
     "holder_slide": Field("m"),
-    "status": Field("1", ("open", "stick", "slip")),
+    "status": Field("1", codes=("open", "stick", "slip")),
     "worn_depth": Field("m"),
     "normal_bond_lower": Field("Pa"),
     "normal_bond_upper": Field("Pa"),
@@ -80,73 +82,68 @@ def make_blocks(pieces: Pieces) -> dict[str, Block]:
     strips = {
         name: values
         for name, values in pieces.interface.items()
-        if name != "displacement" and values.ndim == 3
+        if values.ndim == 3 and not FIELDS[name].shape
     }
     means = {name: values.mean(axis=1) for name, values in strips.items()}
+    fields = pieces.interface | means | {"weight": pieces.weight[None]}
     segments = np.stack([np.arange(x.size - 1), np.arange(1, x.size)], axis=1)
     blocks = {
         "lower": _piece_block(pieces.lower),
         "upper": _piece_block(pieces.upper),
-        "interface": Block(
-            _add_axes(x[:, None], 3),
-            segments,
-            _compact(pieces.interface | means) | {"weight": pieces.weight[None]},
-            {},
-        ),
+        "interface": Block(_pad(x[:, None], 3), segments, _store(fields), {}),
     }
-    return blocks | ({"strips": _strips_block(x, pieces.width, strips)} if strips else {})
+    if strips:
+        blocks["strips"] = _strips_block(x, pieces.width, strips)
+    return blocks
 
 
 def _piece_block(piece: PieceFields) -> Block:
     """Return the block of one piece."""
-    quads = [block[:, [0, 1, 2, -1]] for block in piece.blocks]
+    cells = np.concatenate([block[:, [0, 1, 2, -1]] for block in piece.blocks])
     cell_data = {
-        "stress": _add_axes(piece.stress, 6),
+        "stress": piece.stress,
         "von_mises": piece.von_mises,
         "stress_error": piece.stress_error,
         "material": piece.is_coating[None],
     }
-    return Block(
-        _add_axes(piece.points, 3),
-        np.concatenate(quads),
-        _compact({"displacement": piece.displacement}),
-        _compact(cell_data),
-    )
+    point_data = {"displacement": piece.displacement}
+    return Block(_pad(piece.points, 3), cells, _store(point_data), _store(cell_data))
 
 
 def _strips_block(x, width: float, strips: dict) -> Block:
     """Return strips side by side along z, each with values (f, s, k) that are constant across it."""
     count = next(iter(strips.values())).shape[1]
     edges = np.linspace(-width / 2, width / 2, count + 1)
-    sides = np.stack([edges[:-1], edges[1:]], axis=1).ravel()
-    points = np.column_stack(
-        [np.tile(x, 2 * count), np.zeros(2 * count * x.size), np.repeat(sides, x.size)]
-    )
-    node = np.arange(2 * count * x.size).reshape(count, 2, x.size)
+    z = np.repeat(np.stack([edges[:-1], edges[1:]], axis=1).ravel(), x.size)
+    points = np.column_stack([np.tile(x, 2 * count), 0 * z, z])
+    node = np.arange(z.size).reshape(count, 2, x.size)
     low, high = node[:, 0], node[:, 1]
     corners = (low[:, :-1], low[:, 1:], high[:, 1:], high[:, :-1])
     cells = np.stack([corner.ravel() for corner in corners], axis=1)
-    doubled = {
+    both_edges = {
         name: np.repeat(values, 2, axis=1).reshape(len(values), -1)
         for name, values in strips.items()
     }
-    return Block(points, cells, _compact(doubled), {})
+    return Block(points, cells, _store(both_edges), {})
 
 
-def _add_axes(values, count: int) -> np.ndarray:
+def _pad(values: np.ndarray, count: int) -> np.ndarray:
     """Return values (..., k) with zeros for the other components (..., count)."""
-    missing = count - values.shape[-1]
-    return np.pad(values, [(0, 0)] * (values.ndim - 1) + [(0, missing)])
+    missing = (0, count - values.shape[-1])
+    return np.pad(values, [*[(0, 0)] * (values.ndim - 1), missing])
 
 
-def _compact(data: dict) -> dict[str, np.ndarray]:
-    """Return fields as codes or in single precision; the pressure, whose sum is the load, in double."""
+def _store(data: dict) -> dict[str, np.ndarray]:
+    """Return fields as they are stored: codes, or numbers in single precision.
+
+    The pressure and the areas of the points stay as they are, so that their sum is the load.
+    """
     out = {}
     for name, values in data.items():
-        if name == "displacement":
-            values = _add_axes(values, 3)
-        is_exact = name == "normal_stress"
-        out[name] = (
-            values if is_exact else values.astype(np.int8 if FIELDS[name].codes else np.float32)
-        )
+        field = FIELDS[name]
+        if field.shape:
+            values = _pad(values, *field.shape)
+        if name not in ("normal_stress", "weight"):
+            values = values.astype(np.int8 if field.codes else np.float32)
+        out[name] = values
     return out

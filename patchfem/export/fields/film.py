@@ -72,7 +72,7 @@ def stress_frames(path: Path) -> dict[str, np.ndarray]:
     """
     from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 
-    frames = read_frames(path, ("von_mises", "normal_stress"))
+    frames = read_frames(path)
     cycle = last_frames(frames.times)
     numbers = cycle[np.linspace(0, cycle.size - 1, min(MAX_FRAMES, cycle.size)).round().astype(int)]
     left, right, bottom, top = contact_window(frames)

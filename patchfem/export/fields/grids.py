@@ -14,8 +14,8 @@ from .vtkhdf import Frames, write_blocks
 ACTIVE_FIELDS = {"lower": "von_mises", "upper": "von_mises", "interface": "normal_stress"}
 
 
-def make_grids(blocks: dict[str, Block], number: int, time: float, in_mpa: bool = True):
-    """Return one frame of blocks as a pyvista.MultiBlock of named grids.
+def make_grids(blocks: dict[str, Block], number: int, time: float):
+    """Return one frame of blocks as a pyvista.MultiBlock of named grids, in SI.
 
     Parameters
     ----------
@@ -24,48 +24,59 @@ def make_grids(blocks: dict[str, Block], number: int, time: float, in_mpa: bool 
         Number of the frame.
     time : float
         [s]; the field array `TimeValue` of every grid.
-    in_mpa : bool
-        Whether stresses are in MPa and a field array `units` lists the unit of each array, which
-        meshio cannot read. Each array has its unit as the key UNITS_LABEL of VTK too.
     """
     import pyvista as pv
-    from vtkmodules.vtkCommonCore import vtkDataArray
 
     grids = pv.MultiBlock()
     for part, block in blocks.items():
         connectivity, starts, types = block.vtk_cells()
         cells = np.insert(connectivity, starts[:-1], np.diff(starts))
         grid = pv.UnstructuredGrid(cells, types, block.points)
-        units = []
-        for target, data in (
+        for data, fields in (
             (grid.point_data, block.point_data),
             (grid.cell_data, block.cell_data),
         ):
-            for name, values in data.items():
-                values = values[number % len(values)]  # a constant field has one frame
-                unit = FIELDS[name].unit
-                if in_mpa and unit == "Pa":
-                    unit = "MPa"
-                    values = values / np.float32(1e6)
-                target[name] = values
-                target.VTKObject.GetAbstractArray(name).GetInformation().Set(
-                    vtkDataArray.UNITS_LABEL(), unit
-                )
-                units.append(f"{name} [{unit}]")
-        if in_mpa:
-            grid.field_data["units"] = units
+            for name, values in fields.items():
+                data[name] = values[number % len(values)]  # a constant field has one frame
         grid.field_data["TimeValue"] = [time]
-        if part in ACTIVE_FIELDS:
-            grid.set_active_scalars(ACTIVE_FIELDS[part])
+        _label_units(grid)
         grids.append(grid, part)
     return grids
 
 
+def _label_units(grid) -> None:
+    """Give each array of a grid its unit as the key UNITS_LABEL of VTK, which .vtu files keep."""
+    from vtkmodules.vtkCommonCore import vtkDataArray
+
+    for data in (grid.point_data, grid.cell_data):
+        for name in data.keys():
+            information = data.VTKObject.GetAbstractArray(name).GetInformation()
+            information.Set(vtkDataArray.UNITS_LABEL(), FIELDS[name].unit)
+
+
 def make_result_grids(result, numbers) -> list:
-    """Return frames of a run with a patch as pyvista.MultiBlock objects with stresses in MPa."""
+    """Return frames of a run with a patch as pyvista.MultiBlock objects with stresses in MPa.
+
+    The field array `units` of every grid lists the unit of each array.
+    """
     pieces = compute_pieces(result)
     blocks = make_blocks(pieces)
-    return [make_grids(blocks, number, float(pieces.time[number])) for number in numbers]
+    frames = []
+    for number in numbers:
+        grids = make_grids(blocks, number, float(pieces.time[number]))
+        for part, grid in zip(grids.keys(), grids):
+            units = []
+            for data in (grid.point_data, grid.cell_data):
+                for name in data.keys():
+                    unit = FIELDS[name].unit
+                    if unit == "Pa":
+                        unit = "MPa"
+                        data[name] = data[name] / 1e6
+                    units.append(f"{name} [{unit}]")
+            grid.field_data["units"] = units
+            grid.set_active_scalars(ACTIVE_FIELDS.get(part))
+        frames.append(grids)
+    return frames
 
 
 def export_frames(frames: Frames, out: Path, number: int) -> None:
@@ -90,7 +101,7 @@ def export_frames(frames: Frames, out: Path, number: int) -> None:
 
 def _write_vtu(frames: Frames, out: Path, number: int) -> None:
     """Write a frame as one mesh with the array `part`; fields that a part lacks are NaN or -1 there."""
-    grids = make_grids(frames.blocks, number, float(frames.times[number]), in_mpa=False)
+    grids = make_grids(frames.blocks, number, float(frames.times[number]))
     for code, name in enumerate(PARTS):
         if name in grids.keys():
             grids[name].cell_data["part"] = np.full(grids[name].n_cells, code, np.int8)
@@ -104,6 +115,7 @@ def _write_vtu(frames: Frames, out: Path, number: int) -> None:
                 data[name] = np.full((count, *samples[name].shape[1:]), hole, samples[name].dtype)
     merged = grids.combine()
     merged.field_data["TimeValue"] = [frames.times[number]]
+    _label_units(merged)
     with write_atomically(out) as partial:
         merged.save(partial)
 
@@ -115,7 +127,7 @@ def _write_pvd(frames: Frames, out: Path) -> None:
     lines = []
     for number, time in enumerate(frames.times):
         name = f"frame_{number:04d}.vtm"
-        make_grids(frames.blocks, number, float(time), in_mpa=False).save(folder / name)
+        make_grids(frames.blocks, number, float(time)).save(folder / name)
         lines.append(f'<DataSet timestep="{float(time)!r}" part="0" file="{folder.name}/{name}"/>')
     collection = "".join(lines)
     write_text(

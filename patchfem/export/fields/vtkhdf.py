@@ -4,7 +4,6 @@ The file is a vtkMultiBlockDataSet of the format VTKHDF 2.2, which VTK 9.4 and P
 Units are attributes of the arrays.
 """
 
-import os
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,6 +17,13 @@ from .blocks import FIELDS, PARTS, Block, make_blocks
 
 NAME = "fields.vtkhdf"
 VERSION = np.array([2, 2])
+# Fields that every file has, by part.
+REQUIRED_FIELDS = {
+    "lower": {"displacement", "von_mises"},
+    "upper": {"displacement", "von_mises"},
+    "interface": {"displacement", "gap", "holder_slide", "normal_stress"},
+}
+MAX_LENGTH = 1e6  # [m]; a position beyond it belongs to a damaged file
 
 
 class Frames(NamedTuple):
@@ -128,7 +134,7 @@ def _write_field(group, name: str, values: np.ndarray) -> None:
     well.
     """
     field = FIELDS[name]
-    flat = _round(values, field.bits).reshape(-1, *values.shape[2:])
+    flat = _round_mantissa(values, field.bits).reshape(-1, *values.shape[2:])
     chunks = (values.shape[1], *(1 for _ in values.shape[2:]))
     dataset = _write_array(group, name, flat, chunks)
     dataset.attrs["units"] = field.unit
@@ -137,7 +143,7 @@ def _write_field(group, name: str, values: np.ndarray) -> None:
         dataset.attrs["flag_meanings"] = " ".join(field.codes)
 
 
-def _round(values: np.ndarray, bits: int) -> np.ndarray:
+def _round_mantissa(values: np.ndarray, bits: int) -> np.ndarray:
     """Return single-precision values with some bits of their mantissa, and others as they are.
 
     The other bits are zeros, which compress well.
@@ -170,14 +176,12 @@ def find_fields(folder: Path) -> Path:
     raise Missing(f"{folder}: it has no {NAME}; {advice}")
 
 
-def read_frames(path: Path, names: tuple[str, ...] = tuple(FIELDS)) -> Frames:
+def read_frames(path: Path) -> Frames:
     """Read a file of fields.
 
     Parameters
     ----------
     path : Path
-    names : tuple of str
-        Fields that are read; by default all.
 
     Returns
     -------
@@ -186,49 +190,46 @@ def read_frames(path: Path, names: tuple[str, ...] = tuple(FIELDS)) -> Frames:
     Raises
     ------
     PatchfemError
-        If the file is damaged, or was not written by `write_blocks`.
+        If the file is damaged, or was written by an older version.
     """
     try:
         with h5py.File(path, "r") as file:
             root = file["VTKHDF"]
             times = root["Steps/Values"][:]
-            blocks = {
-                part: _read_block(root[part], len(times), names) for part in PARTS if part in root
-            }
-        if not np.isfinite(times).all() or not {"lower", "upper", "interface"} <= blocks.keys():
-            raise ValueError("a time or a piece is missing")
+            blocks = {part: _read_block(root[part], len(times)) for part in PARTS if part in root}
+        for part, names in REQUIRED_FIELDS.items():
+            present = blocks[part].point_data.keys() | blocks[part].cell_data.keys()
+            if not names <= present:
+                raise ValueError(f"{part} has no {', '.join(sorted(names - present))}")
+        if not np.isfinite(times).all():
+            raise ValueError("a time is not a number")
     except Exception as fault:  # a damaged file can raise exceptions of many classes
         reason = " ".join(str(fault).split())[:200] or type(fault).__name__
         raise PatchfemError(
-            f"{os.fspath(path)}: not the fields of a patchfem run ({reason})"
+            f"{path}: not the fields of a run of this version of patchfem ({reason}); run the scene again"
         ) from None
     return Frames(Path(path), times, blocks)
 
 
-def _read_block(group, count: int, names) -> Block:
-    """Read the mesh of a block and some of its fields in `count` frames."""
-    points = group["Points"][:]
+def _read_block(group, count: int) -> Block:
+    """Read the mesh of a block and its fields in `count` frames."""
+    points = group["Points"][:].reshape(-1, 3)
     first, last = group["Offsets"][:-1], group["Offsets"][1:] - 1
     n_corners = 2 if (last - first).max() == 1 else 4
-    cells = group["Connectivity"][:][
-        np.minimum(first[:, None] + np.arange(n_corners), last[:, None])
-    ]
-    if not np.isfinite(points).all() or not 0 <= cells.min() <= cells.max() < len(points):
-        raise ValueError("a cell has a node that does not exist")
+    corners = np.minimum(first[:, None] + np.arange(n_corners), last[:, None])
+    cells = group["Connectivity"][:][corners]
+    if not np.abs(points).max() < MAX_LENGTH or not 0 <= cells.min() <= cells.max() < len(points):
+        raise ValueError("a node is not at a valid place")
     data = [
-        {
-            name: _read_field(rows, size, count)
-            for name, rows in group[kind].items()
-            if name in names
-        }
+        {name: _read_field(rows, name, size, count) for name, rows in group[kind].items()}
         for kind, size in (("PointData", len(points)), ("CellData", len(cells)))
     ]
     return Block(points, cells, *data)
 
 
-def _read_field(rows, size: int, count: int) -> np.ndarray:
+def _read_field(rows, name: str, size: int, count: int) -> np.ndarray:
     """Read a field (f, size, ...), where f is `count`, or 1 if it does not change."""
     values = rows[:]
     if len(values) not in (size, count * size) or values.dtype.kind not in "if":
-        raise ValueError(f"{rows.name} has {len(values)} values of type {values.dtype}")
-    return values.reshape(-1, size, *values.shape[1:])
+        raise ValueError(f"{name} has {len(values)} values of type {values.dtype}")
+    return values.reshape(-1, size, *FIELDS[name].shape)

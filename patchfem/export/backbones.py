@@ -1,0 +1,213 @@
+"""The answer of `backbone`: frequency and damping ratio of a mode against its amplitude."""
+
+import numpy as np
+
+from ..campaigns.backbone.band import PREFERRED_METHODS
+from ..campaigns.backbone.records import Backbone, Curve
+from ..core import PatchfemError
+from ..formatting import format_quantity
+from . import quantities
+from .answer import Answer, Quantity, Remarks, Variable
+from .charts import axes, panels
+from .charts.table import CHARTS
+from .runs import make_origin
+
+COLUMNS = ("amplitude", "frequency", "frequency_error", "damping", "damping_error")
+BAND_COLUMNS = ("amplitude", "frequency_low", "frequency_high", "damping_low", "damping_high")
+TEXTS = {  # unit and description of each variable
+    "amplitude": ("m", "half the peak-to-peak motion at the output"),
+    "frequency": ("Hz", "frequency"),
+    "frequency_error": ("Hz", "numerical error of the frequency"),
+    "frequency_low": ("Hz", "lower limit of the frequency that tests measure"),
+    "frequency_high": ("Hz", "upper limit of the frequency that tests measure"),
+    "damping": ("1", "damping ratio, structure and friction together"),
+    "damping_error": ("1", "numerical error of the damping ratio"),
+    "damping_low": ("1", "lower limit of the damping ratio that tests measure"),
+    "damping_high": ("1", "upper limit of the damping ratio that tests measure"),
+}
+
+
+def make_answer(backbone: Backbone, source, command: str = "") -> Answer:
+    """Return the answer of `backbone`.
+
+    Parameters
+    ----------
+    backbone : Backbone
+    source : model.Source
+        Scene of the mode.
+    command : str
+        Command line that repeats it; by default that without options.
+    """
+    measures = _make_quantities(backbone)
+    origin = make_origin(source, "backbone")
+    return Answer(
+        kind="backbone",
+        title=source.title,
+        verdict=_make_verdict(backbone, measures),
+        quantities=measures,
+        data=_make_data(backbone),
+        remarks=Remarks(notes=(*backbone.notes, *backbone.answer.sentences[1:])),
+        details=_make_details(backbone, measures),
+        # the drive of the scene is ignored
+        origin=origin | {"driven": "", "command": command or origin["command"]},
+    )
+
+
+def find_curve(backbone: Backbone) -> Curve | None:
+    """Return the recommended curve of a backbone, or None if no method has one."""
+    return next(
+        (backbone.curves[name] for name in PREFERRED_METHODS if name in backbone.curves), None
+    )
+
+
+def draw_curves(dataset, ax=None):
+    """Draw the Dataset of a backbone on matplotlib Axes.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Result of `Answer.to_xarray`.
+    ax : matplotlib.axes.Axes, optional
+        Axes for the frequency alone; by default a new figure with frequency and damping ratio.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        Axes of the frequency.
+
+    Raises
+    ------
+    PatchfemError
+        If the Dataset has no curve of a backbone.
+    """
+    data = {}
+    for name, array in getattr(dataset, "variables", {}).items():
+        data[name] = Variable(array.dims, array.values, array.attrs.get("units", "1"))
+    drawn = panels.make_panels({"": Answer("backbone", "", (), data=data)}, CHARTS["backbone"])
+    if not drawn:
+        raise PatchfemError(
+            "plot.backbone: a Dataset returned by pf.backbone is needed, with at least one curve"
+        )
+    return axes.make_figure(drawn).axes[0] if ax is None else axes.draw(drawn[0], ax)
+
+
+def _make_quantities(backbone: Backbone) -> dict[str, Quantity]:
+    """Return frequencies, ends of the recommended curve, exponents and the amplitude of flutter."""
+    frequencies = backbone.frequencies
+    out = {}
+    curve = find_curve(backbone)
+    if curve is not None:
+        largest = int(np.argmax(curve.damping))
+        points = {"at_smallest_amplitude": 0, "at_largest_amplitude": -1}
+        for name in ("frequency", "damping"):
+            for place, k in points.items():
+                out[f"{name}_{place}"] = _take_point(curve, name, k)
+        out["largest_damping"] = _take_point(curve, "damping", largest)
+        out["amplitude_of_largest_damping"] = Quantity(curve.amplitude[largest], "m")
+    out["free_frequency"] = Quantity(frequencies.free, "Hz", frequencies.free_error or None)
+    no_frequency = "" if frequencies.stuck is not None else "a rigid contact leaves no motion"
+    out["stuck_frequency"] = Quantity(
+        frequencies.stuck, "Hz", frequencies.stuck_error, reason=no_frequency
+    )
+    optional = {
+        "exponent_micro": Quantity(backbone.exponents.micro),
+        "exponent_gross": Quantity(backbone.exponents.gross),
+        "flutter_amplitude": Quantity(backbone.flutter, "m"),
+    }
+    return out | {name: one for name, one in optional.items() if one.value is not None}
+
+
+def _take_point(curve: Curve, name: str, k: int) -> Quantity:
+    """Return frequency or damping ratio of point k of a curve."""
+    return Quantity(getattr(curve, name)[k], TEXTS[name][0], getattr(curve, f"{name}_error")[k])
+
+
+def _make_verdict(backbone: Backbone, measures: dict[str, Quantity]) -> tuple[str, ...]:
+    """Return the ends of the recommended curve, natural frequencies, largest damping, and which curve to use."""
+
+    def show(name: str) -> str:
+        """Return a quantity with its error, or with five digits."""
+        quantity = measures[name]
+        if quantity.error and "±" in (text := quantities.format_quantity(name, quantity)):
+            return text
+        return format_quantity(quantity.value, quantity.unit, 5)
+
+    curve = find_curve(backbone)
+    free = f"without the contact {show('free_frequency')}"
+    stuck = ""
+    if backbone.frequencies.stuck is not None:
+        stuck = f", with a sticking contact {show('stuck_frequency')}"
+    natural = f"Natural frequencies of mode {backbone.mode}: {free}{stuck}."
+    if curve is None:
+        headline = f"No method found frequency and damping of mode {backbone.mode}."
+        return (headline, natural, *backbone.answer.sentences[:1])
+
+    # first and last point of the recommended curve
+    changes = []
+    for name, label in (("frequency", "frequency"), ("damping", "damping ratio")):
+        first, last = (measures[f"{name}_at_{size}_amplitude"] for size in ("smallest", "largest"))
+        texts = [show(f"{name}_at_{size}_amplitude") for size in ("smallest", "largest")]
+        if abs(last.value - first.value) <= (first.error or 0.0) + (last.error or 0.0):
+            changes.append(f"{label} stays at {texts[0]}")
+        else:
+            verb = "rises" if last.value > first.value else "falls"
+            changes.append(f"{label} {verb} from {texts[0]} to {texts[1]}")
+    ends = [format_quantity(float(curve.amplitude[k]), "m", 3) for k in (0, -1)]
+    span = f"from {ends[0]} to {ends[1]}" if curve.amplitude.size > 1 else f"at {ends[0]}"
+    headline = f"The {changes[0]} and the {changes[1]}, {span} at the output."
+
+    if backbone.flutter is None:
+        amplitude = show("amplitude_of_largest_damping")
+        extreme = f"The damping ratio is largest, {show('largest_damping')}, at {amplitude}."
+    else:
+        extreme = (
+            f"Above {show('flutter_amplitude')} the mode gains energy: friction dissipates less than the "
+            "negative damping supplies."
+        )
+    return (headline, natural, extreme, *backbone.answer.sentences[:1])
+
+
+def _make_data(backbone: Backbone) -> dict[str, Variable]:
+    """Return the curves of all methods, the recommended one first, with the band of tests around it."""
+    data = {}
+    band = backbone.answer.band
+    for method in PREFERRED_METHODS:
+        if method not in backbone.curves:
+            continue
+        prefix = method.replace("-", "_")
+        names = [(backbone.curves[method], name) for name in COLUMNS]
+        if band is not None and band.method == method:
+            names += [(band, name) for name in BAND_COLUMNS[1:]]
+        for record, name in names:
+            unit, text = TEXTS[name]
+            values = np.asarray(getattr(record, name), float)
+            dims = (f"{prefix}_amplitude",)
+            data[f"{prefix}_{name}"] = Variable(dims, values, unit, f"{text}, by {method}")
+    return data
+
+
+def _make_details(backbone: Backbone, measures: dict) -> dict:
+    """Return the content of backbone.json in SI units."""
+    frequencies = backbone.frequencies
+    band = backbone.answer.band
+    return {
+        "mode": backbone.mode,
+        "free_frequency": frequencies.free,
+        "free_frequency_error": frequencies.free_error,
+        "stuck_frequency": frequencies.stuck,
+        "stuck_frequency_error": frequencies.stuck_error,
+        "curves": {
+            method: {name: getattr(curve, name).tolist() for name in COLUMNS}
+            for method, curve in backbone.curves.items()
+        },
+        "missing": backbone.missing,
+        "exponent": {
+            name: getattr(backbone.exponents, name) for name in ("micro", "gross", "micro_theory")
+        },
+        "flutter_amplitude": backbone.flutter,
+        "notes": list(backbone.notes),
+        "method": band and band.method,
+        "band": band and {name: getattr(band, name).tolist() for name in BAND_COLUMNS},
+        "advice": backbone.answer.advice,
+        "measures": {name: quantity.as_json() for name, quantity in measures.items()},
+    }
