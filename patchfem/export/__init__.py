@@ -89,31 +89,6 @@ PUBLIC = {
         "summarise_run",
         "write_json",
     ),
-    "surfaces.compare": (
-        "comparison_data",
-        "format_comparison",
-        "pressed_traces",
-        "write_difference",
-        "write_trace",
-    ),
-    "surfaces.pairs": (
-        "compare_pairs",
-        "format_pairs",
-        "pairs_data",
-    ),
-    "surfaces.roughness": (
-        "format_roughness",
-        "means_data",
-        "means_lines",
-        "roughness_data",
-        "write_surfaces",
-    ),
-    "surfaces.worn": (
-        "format_wear",
-        "wear_data",
-        "wear_verdict",
-    ),
-    "surfaces.worn_runs": ("compare_runs",),
     "sweeps.folder": ("case_folder_name",),
     "sweeps.manifest": (
         "hash_request",

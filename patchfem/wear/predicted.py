@@ -369,12 +369,15 @@ def _make_result(
         is_linear=True,
     )
     proportional = _refine(bins, in_proportion, best, is_fixed=True).ratio
-    other = proportional
+    other = best._replace(ratio=proportional)
     if best.ratio <= 1:
-        other = _refine(bins, replace(history, is_linear=True), best, is_fixed=True).ratio
+        other = _refine(bins, replace(history, is_linear=True), best)
     half = np.sqrt(
-        (SIDE * spread[0]) ** 2 + (history.error * best.ratio) ** 2 + (other - best.ratio) ** 2
+        (SIDE * spread[0]) ** 2
+        + (history.error * best.ratio) ** 2
+        + (other.ratio - best.ratio) ** 2
     )
+    half_centre = np.hypot(SIDE * spread[1], other.centre - best.centre)
 
     # places whose sum of squares is larger by less than some variances of an independent block
     limit = best.squares * (1 + ACCEPTED_DEVIANCE / n_blocks)
@@ -396,7 +399,7 @@ def _make_result(
             "",
         ),
         centre=Quantity(
-            best.centre, min(centres) - SIDE * spread[1], max(centres) + SIDE * spread[1], "m", ""
+            best.centre, min(centres) - half_centre, max(centres) + half_centre, "m", ""
         ),
         is_mirrored=None if is_unknown else best.is_mirrored,
         x=x[order],

@@ -210,7 +210,8 @@ def _format_numbers(numbers: dict, is_areal: bool) -> dict[str, str]:
         if name in AMOUNTS:
             unit = "m3" if is_areal else "m2"
         if isinstance(number, float):
-            fields[name] = format_rounded(number, unit)
+            # a ratio of lengths differs from 1 in its last digits
+            fields[name] = format_rounded(number, unit, digits=6 if unit == "1" else 4)
         elif number is not None:
             fields[name] = str(number)
     fields["amount"] = fields.get("volume", fields["area"])
