@@ -10,7 +10,7 @@ import h5netcdf
 import h5py
 import numpy as np
 
-from ..disk.atomic_write import write_bytes
+from ..disk.atomic_write import write_atomically
 from .answer import Answer, Variable
 
 MIN_COMPRESSED_VALUES = 100  # arrays with fewer values are stored without compression
@@ -48,17 +48,12 @@ def variable_attributes(variable: Variable) -> dict:
 def write_netcdf(answer: Answer, path: Path) -> None:
     """Write the arrays of an answer as a netCDF4 file.
 
-    The file is created in memory and then written at once, so that a full disk gives one OSError and leaves nothing open.
+    The file replaces an older one when it is complete.
     """
-    options = {"driver": "core", "backing_store": False, "track_order": True}
-    with h5py.File(Path(path).name, "w", **options) as memory:
-        with h5netcdf.File(memory, "w") as file:
-            file.attrs.update(make_attributes(answer))
-            for name, variable in answer.data.items():
-                _write_variable(file, name, variable)
-        memory.flush()
-        image = memory.id.get_file_image()
-    write_bytes(path, image)
+    with write_atomically(path) as partial, h5netcdf.File(partial, "w") as file:
+        file.attrs.update(make_attributes(answer))
+        for name, variable in answer.data.items():
+            _write_variable(file, name, variable)
 
 
 def _write_variable(file: h5netcdf.File, name: str, variable: Variable) -> None:

@@ -30,8 +30,8 @@ FILE_TEXTS = {
     "scene.resolved.toml": "the scene in SI units, with all default values",
     "scene.fitted.toml": "the scene with the fitted values, ready to run",
 }
-WIDE_STYLES = ("relative", "menu", "film")  # styles of charts that take the whole width
-TALL_STYLES = ("menu", "film", "bars")
+WIDE_STYLES = ("relative", "menu", "maps", "film")  # styles of charts that take the whole width
+TALL_STYLES = ("menu", "maps", "film", "bars")
 COMPRESSION = 6  # of the figures in a page
 
 
@@ -282,11 +282,14 @@ def _format_cell(row: dict, column: Column) -> str:
         )
     if isinstance(value, float):
         if column.style == "quantity":
+            ends = (row.get(key) for key in ("error", "low", "high"))
             return quantities.format_quantity(
-                column.key, Quantity(value, row.get("unit", "1"), row.get("error"))
+                column.key, Quantity(value, row.get("unit", "1"), *ends)
             )
+        if column.style == "percent":
+            return f"{100 * value:+.3g} %"
         return format_number(value, 6)
-    return str(value)
+    return str(value).replace("_", " ") if column.style == "name" else str(value)
 
 
 def _draw_films(folder: Path) -> list[dict]:

@@ -96,6 +96,16 @@ class Definition(NamedTuple):
 # kinds of answers whose quantities are defined in `surfaces.definitions`
 SURFACE_KINDS = ("compare", "pairs", "profile")
 QUANTITIES: dict[str, Definition] = {
+    # sweep
+    "peak_height": Definition("1", "largest response over the swept frequency"),
+    "half_power_width": Definition(
+        "Hz", "width of the peak between the frequencies at which it falls to 1/sqrt(2)"
+    ),
+    "limit": Definition(
+        "1",
+        "value of the swept key at which a measure has changed by 5 % (the peak pressure: by 100 %) from the first case, "
+        "with the cases between which it lies",
+    ),
     # backbone
     "frequency_at_smallest_amplitude": Definition(
         "Hz", "frequency of the mode at the smallest amplitude of the recommended curve"
@@ -175,9 +185,11 @@ def find_definition(name: str, kind: str = "") -> Definition | None:
     """
     if "." in name:
         return Definition("1", FITTED_KEY)
-    base_name = rows.remove_interface_number(name)
     if kind in SURFACE_KINDS:
-        return definitions.find(name) or definitions.find(base_name)
+        return definitions.find(name) or definitions.find(rows.remove_interface_number(name))
+    # quantities of a sweep: limits of its key, and extremes of measures
+    name = name.removeprefix("largest_").removeprefix("smallest_")
+    base_name = "limit" if name.startswith("limit_") else rows.remove_interface_number(name)
     for table in (QUANTITIES, patch_rows.TABLE, rows.TABLE):
         for candidate in (name, base_name):
             if candidate in table:

@@ -8,7 +8,7 @@ from patchfem.wear import MeasuredDepth, WearHistory, fit_wear
 
 HALF = 1.5e-3  # half of the patch [m]
 COEFFICIENT = 1e-14  # of the run [m2/N]
-CENTRE = 2.2e-3  # middle of the patch in the trace [m]
+CENTRE = 2.2005e-3  # middle of the patch in the trace [m]; its ends lie between two samples
 NOISE = 5e-9  # of a measured depth [m]
 
 

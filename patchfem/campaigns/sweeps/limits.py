@@ -41,8 +41,8 @@ class KeyLimit(NamedTuple):
 
     Attributes
     ----------
-    measure : str
-    key : SweptKey
+    measure, key, unit : str
+        Names of measure and key, and unit of the key.
     change : float
         Relative change at the limit; negative if the measure decreases.
     total_change : float
@@ -58,7 +58,8 @@ class KeyLimit(NamedTuple):
     """
 
     measure: str
-    key: SweptKey
+    key: str
+    unit: str
     change: float
     total_change: float
     value: float
@@ -139,7 +140,17 @@ def _find_limit_on_line(
     inside = int(not_surely_within[0]) if not_surely_within.size else valid.size - 1
     covers_line = not not_surely_within.size and valid[-1] == values.size - 1
     low = float(sizes[valid[inside]])
-    limit = KeyLimit(name, key, largest, float(change[-1]), np.nan, low, np.nan, bool(covers_line))
+    limit = KeyLimit(
+        measure=name,
+        key=key.key,
+        unit=key.unit,
+        change=largest,
+        total_change=float(change[-1]),
+        value=np.nan,
+        low=low,
+        high=np.nan,
+        is_never_reached=bool(covers_line),
+    )
     surely_beyond = np.flatnonzero(size - error > largest)
     if not surely_beyond.size:
         return limit

@@ -18,6 +18,7 @@ FREQUENCY_KEY = "drive.frequency"
 HEIGHT_MEASURES = ("relative_displacement_amplitude", "absolute_acceleration_peak")
 MIN_FREQUENCIES = 5  # smallest number of frequencies in which a peak is sought
 DIFFERENCE_FACTOR = 3.0  # safety factor of the differences between interpolating polynomials
+N_NEWTON_STEPS = 3  # from a root that eigenvalues give to round-off
 MAX_STEADY_ERROR = 0.01  # largest relative error of a steady estimate that counts as a height
 
 
@@ -46,10 +47,10 @@ class SweptPeak(NamedTuple):
 
 
 class PeakOnLine(NamedTuple):
-    """Peak of a measure, and the values of the other keys in its cases, by key."""
+    """Peak of a measure, and the first case of its curve, which has the values of the other keys."""
 
     measure: str
-    other_values: dict[str, float | str]
+    case: int
     peak: SweptPeak
 
 
@@ -71,9 +72,7 @@ def find_peaks(table: SweepTable) -> list[PeakOnLine]:
         line = line[np.argsort(frequency)]
         peak = locate_peak(np.sort(frequency), heights[line], errors[line])
         if peak is not None:
-            others = [key for key in table.keys if key.key != FREQUENCY_KEY]
-            values = {key.key: key.values[line[0]] for key in others}
-            peaks.append(PeakOnLine(names[0], values, peak))
+            peaks.append(PeakOnLine(names[0], int(line[0]), peak))
     return peaks
 
 
@@ -167,8 +166,11 @@ def _find_minimum(
     if low < 0 or top + n_above > square.size or np.isnan(inverse[window]).any():
         return None
     polynomial = Polynomial.fit(square[window], inverse[window], n_below + n_above - 1)
-    roots = polynomial.deriv().roots()
+    slope = polynomial.deriv()
+    roots = slope.roots()
     roots = roots[np.isreal(roots)].real
+    for _ in range(N_NEWTON_STEPS):  # eigenvalues are inexact where the highest coefficient is small
+        roots = roots - slope(roots) / slope.deriv()(roots)
     roots = roots[(roots > square[top - 1]) & (roots < square[top + 1])]
     values = polynomial(roots)
     if not values.size or values.min() <= 0:

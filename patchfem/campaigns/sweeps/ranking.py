@@ -21,6 +21,7 @@ RANKED_MEASURES = (
     "loop_area",
     "equivalent_damping",
     "absolute_acceleration_peak",
+    "friction_force_peak",
     "friction_ratio_peak",
     "onset_level",
     "pressure_peak",

@@ -46,7 +46,7 @@ def _draw_curves(panel: Panel, axes) -> None:
     for number, curve in enumerate(panel.curves):
         target = second if curve.on_second_axis else axes
         colour = COLOURS[number % len(COLOURS)]
-        if panel.style != "points" or curve.is_line:
+        if panel.style not in ("points", "dots") or curve.is_line:
             target.plot(
                 curve.x,
                 curve.y,
@@ -61,6 +61,8 @@ def _draw_curves(panel: Panel, axes) -> None:
             if panel.style == "area":
                 target.fill_between(curve.x, curve.y, color=colour, alpha=BAND_OPACITY, lw=0)
             continue
+        if panel.style == "dots":
+            target.plot(curve.x, curve.y, color=colour, lw=1)
         bars = None
         if curve.low is not None:
             bars = np.nan_to_num([curve.y - curve.low, curve.high - curve.y])

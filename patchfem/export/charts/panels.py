@@ -12,6 +12,7 @@ from .table import Chart
 MAX_CURVE_POINTS = 3000  # a longer curve keeps the extremes of as many intervals
 MAX_MAP_COLUMNS = 400  # a finer map keeps every n-th column
 N_SHOWN_CYCLES = 3  # number of cycles of the span "cycles"
+SWEEP_STYLES = ("relative", "menu", "maps", "shares")
 MARGIN_NODES = 3  # unloaded nodes beside the contact that the span "contact" shows
 MAX_INTERFACES = 6  # largest number of interfaces with charts of their own
 
@@ -153,8 +154,11 @@ def _repeat_for_interfaces(chart: Chart, data: dict[str, Variable]) -> list[Char
 
 def make_panel(answers: dict[str, Answer], chart: Chart) -> Panel | None:
     """Return the panel of a chart, or None if no answer has data for it."""
-    if chart.style in SPECIAL_STYLES:
-        return SPECIAL_STYLES[chart.style](answers, chart)
+    if chart.style in SWEEP_STYLES:
+        # only the page of a sweep loads this module
+        from ..sweeps.charts import STYLES
+
+        return STYLES[chart.style](answers, chart)
     selections = {name: _select(answer.data, chart) for name, answer in answers.items()}
     selections = {name: data for name, data in selections.items() if data}
     if not selections:
@@ -455,7 +459,3 @@ def make_film(frames: dict[str, np.ndarray], title: str, unit: str) -> Panel:
     caption = "The colours are the same in all frames; the interface is at y = 0."
     label = colours.label.partition("[")[2].rstrip("]")
     return Panel(title, "film", x_axis, y_axis, curves, caption, colour_label=label)
-
-
-# styles whose data are not one curve per variable: (answers, chart) -> Panel or None
-SPECIAL_STYLES = {}

@@ -44,7 +44,7 @@ def draw(panel: Panel) -> dict:
 
 def _axis_layout(axis) -> dict:
     """Return the layout of an axis."""
-    return {"title": {"text": axis.label}, "type": "log" if axis.is_log else "linear"}
+    return {"title": {"text": axis.label}, "type": "log" if axis.is_log else "-"}
 
 
 def _mark(position: float) -> dict:
@@ -94,7 +94,7 @@ def _curve_traces(curve: Curve, style: str, colour: str) -> list[dict]:
         "x": pack(curve.x),
         "y": pack(curve.y),
         "name": curve.name,
-        "mode": "markers" if style == "points" else "lines",
+        "mode": {"points": "markers", "dots": "lines+markers"}.get(style, "lines"),
         "line": {"color": colour, "width": 1.7},
         "marker": {"color": colour, "size": 7},
     }
@@ -106,7 +106,7 @@ def _curve_traces(curve: Curve, style: str, colour: str) -> list[dict]:
         trace["fill"] = "tozeroy"
     if curve.low is None:
         return [trace]
-    if style == "points":
+    if style in ("points", "dots"):
         distances = {"array": pack(curve.high - curve.y), "arrayminus": pack(curve.y - curve.low)}
         trace["error_y"] = distances | {"symmetric": False, "thickness": 1.2, "color": colour}
         return [trace]
@@ -169,8 +169,8 @@ def _add_menu(figure: dict, panel: Panel) -> dict:
         axes = {
             "xaxis.title.text": choice.x.label,
             "yaxis.title.text": choice.y.label,
-            "xaxis.type": "log" if choice.x.is_log else "linear",
-            "yaxis.type": "log" if choice.y.is_log else "linear",
+            "xaxis.type": "log" if choice.x.is_log else "-",
+            "yaxis.type": "log" if choice.y.is_log else "-",
             "shapes": [_mark(position) for position in choice.marks],
         }
         buttons.append(
@@ -185,6 +185,8 @@ def _add_menu(figure: dict, panel: Panel) -> dict:
         "xaxis": _axis_layout(first.x),
         "yaxis": _axis_layout(first.y),
         "showlegend": sum(bool(curve.name) for curve in first.curves) > 1,
+        # the legend is below, because the menu is above
+        "legend": {"orientation": "h", "x": 0, "y": -0.2, "yanchor": "top"},
         "updatemenus": [
             {"buttons": buttons, "x": 0, "xanchor": "left", "y": 1.02, "yanchor": "bottom"}
         ],

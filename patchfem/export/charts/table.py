@@ -19,8 +19,9 @@ class Chart:
         Variables of the vertical axis. "NAME@X" is drawn against its own variable X.
     style : str
         "line", "points", "area", "map" (colours over x and the first dimension), "overlay" (a line for each element of the
-        first dimension), "bars" (horizontal bars of the values of a dimension), "relative" (change of each variable from its
-        first value), "menu" (one variable at a time) or "film" (a map with a slider).
+        first dimension), "bars" (horizontal bars of the values of a dimension) or "film" (a map with a slider). Of a sweep:
+        "relative" (measures divided by their first value), "menu" (one measure at a time), "maps" (the same over two keys)
+        or "shares" (of the variance).
     span : str
         "all", "cycles" (last three cycles), "run" (all cycles, if there are more) or "contact" (the loaded part of x).
     log : str
@@ -75,8 +76,9 @@ class Rows:
 class Column:
     """Column of a table.
 
-    key: key in each row of the details, or name of a variable; title: heading; style: "text", "quantity" for a number
-    with the unit and the error of its row, or "rounded" for three digits.
+    key: key in each row of the details, or name of a variable; title: heading; style: "text", "name" for words with
+    underscores, "quantity" with the unit, the error and the interval of its row, "rounded" for three digits, or "percent"
+    for a relative change.
     """
 
     key: str
@@ -273,7 +275,45 @@ RUN = (
     ),
 )
 
-SWEEP: tuple[Chart, ...] = ()
+SWEEP = (
+    Chart(
+        "Main measures relative to the first case",
+        "",
+        (
+            "relative_displacement_amplitude",
+            "absolute_acceleration_peak",
+            "slip_amplitude",
+            "loop_area",
+            "friction_force_peak",
+            "friction_ratio_peak",
+            "onset_level",
+            "normal_stiffness",
+            "tangential_stiffness",
+            "contact_fraction",
+            "pressure_peak",
+            "equivalent_damping",
+        ),
+        "relative",
+        caption="Values of settled and unsettled cases divided by that of the first case; the band is a change of 5 %. "
+        "Click on a name to hide its line.",
+    ),
+    Chart(
+        "One measure",
+        "",
+        (),
+        "menu",
+        caption="Bars show the numerical error. Hollow points miss the tolerance, crosses mark cases that did not settle.",
+    ),
+    Chart("One measure over two keys", "", (), "maps", caption="White cells have no value."),
+    Chart(
+        "Shares of the variance",
+        "",
+        (),
+        "shares",
+        caption="Fraction of the variance over the cases that a key contributes: alone (first-order Sobol index), and with "
+        "its interactions (total index), with the interval of the latter.",
+    ),
+)
 BACKBONE_METHODS = (
     "balance",
     "quasi-static",
@@ -301,7 +341,123 @@ BACKBONE = (
         _METHOD_CURVES["damping"],
         log="x auto",
         labels=("amplitude at the output", "damping ratio"),
-        caption="Damping ratio of structure and friction together. Use the first curve; its band contains what other kinds of test read.",
+        caption="Damping ratio of structure and friction together. Use the first curve; its band contains what other "
+        "kinds of test read.",
+    ),
+)
+FIT = (
+    Chart(
+        "Measured and fitted loop",
+        "slide",
+        ("force", "friction_ratio", "held_out"),
+        "points",
+        lines=("fitted",),
+        labels=("slide", "friction force"),
+        caption="Rows of the record, and the fitted loop; rows that are held out are predicted.",
+    ),
+    Chart(
+        "Residuals",
+        "row",
+        ("residual",),
+        "points",
+        labels=("row", "fitted - measured"),
+        caption="A pattern along the rows is an error of the model; scatter around zero is noise of the record.",
+    ),
+    Chart(
+        "Frequency",
+        "amplitude",
+        ("frequency",),
+        "points",
+        log="x",
+        lines=("curve_frequency@curve_amplitude",),
+        caption="Measured values with 95 % intervals, and the fitted curve beyond them.",
+    ),
+    Chart(
+        "Damping ratio",
+        "amplitude",
+        ("damping",),
+        "points",
+        log="x auto",
+        lines=("curve_damping@curve_amplitude",),
+        labels=("", "damping ratio"),
+        caption="Measured values with 95 % intervals, and the fitted curve beyond them.",
+    ),
+    Chart(
+        "Residuals of the frequency",
+        "amplitude",
+        ("frequency_residual",),
+        "points",
+        log="x",
+        labels=("", "(fitted - measured) / interval"),
+        caption="Distances in half-widths of the 95 % intervals.",
+    ),
+    Chart(
+        "Residuals of the damping ratio",
+        "amplitude",
+        ("damping_residual",),
+        "points",
+        log="x",
+        labels=("", "(fitted - measured) / interval"),
+        caption="Distances in half-widths of the 95 % intervals.",
+    ),
+    *(
+        Chart(
+            f"Computed against measured {name}",
+            name,
+            (f"computed_{name}",),
+            "points",
+            log="xy",
+            by="use",
+            lines=(f"equal_{name}@equal_{name}",),
+            labels=(f"measured {name}", f"computed {name}"),
+            caption="On the line both are equal. Rows that are held out are predicted.",
+        )
+        for name in ("acceleration", "displacement")
+    ),
+    *(
+        Chart(
+            f"Ratio of the {name} against the input",
+            "input",
+            (f"{name}_ratio",),
+            "points",
+            by="drive",
+            log="auto",
+            labels=("", f"computed / measured {name}"),
+            caption="A trend with the input or the frequency is an error of the model.",
+        )
+        for name in ("acceleration", "displacement")
+    ),
+    Chart(
+        "Worn depth against the coefficient",
+        "coefficient",
+        ("depth",),
+        "points",
+        lines=("curve_depth@curve_coefficient",),
+        labels=("wear coefficient", "worn depth"),
+        caption="Measured depth with its interval at the fitted coefficient, and the computed depth up to the upper bound.",
+    ),
+)
+COST = (
+    Chart(
+        "Error against time",
+        "cpu_seconds",
+        ("largest_error",),
+        "points",
+        by="outcome",
+        log="xy",
+        lines=("allowed_error",),
+        labels=("CPU time", "error of the worst measure"),
+        caption="Largest relative error of any measure in each run. The line is the tolerance of the run.",
+    ),
+    Chart(
+        "Value against time",
+        "cpu_seconds",
+        ("value",),
+        "points",
+        by="outcome",
+        log="x",
+        labels=("CPU time", ""),
+        caption="Main measure of each run with its numerical error.",
     ),
 )
 COMPARE = (
@@ -452,121 +608,6 @@ PROFILE = (
         caption="One-sided spectral density of the primary profile over the wavelength.",
     ),
 )
-FIT = (
-    Chart(
-        "Measured and fitted loop",
-        "slide",
-        ("force", "friction_ratio", "held_out"),
-        "points",
-        lines=("fitted",),
-        labels=("slide", "friction force"),
-        caption="Rows of the record, and the fitted loop; rows that are held out are predicted.",
-    ),
-    Chart(
-        "Residuals",
-        "row",
-        ("residual",),
-        "points",
-        labels=("row", "fitted - measured"),
-        caption="A pattern along the rows is an error of the model; scatter around zero is noise of the record.",
-    ),
-    Chart(
-        "Frequency",
-        "amplitude",
-        ("frequency",),
-        "points",
-        log="x",
-        lines=("curve_frequency@curve_amplitude",),
-        caption="Measured values with 95 % intervals, and the fitted curve beyond them.",
-    ),
-    Chart(
-        "Damping ratio",
-        "amplitude",
-        ("damping",),
-        "points",
-        log="x auto",
-        lines=("curve_damping@curve_amplitude",),
-        labels=("", "damping ratio"),
-        caption="Measured values with 95 % intervals, and the fitted curve beyond them.",
-    ),
-    Chart(
-        "Residuals of the frequency",
-        "amplitude",
-        ("frequency_residual",),
-        "points",
-        log="x",
-        labels=("", "(fitted - measured) / interval"),
-        caption="Distances in half-widths of the 95 % intervals.",
-    ),
-    Chart(
-        "Residuals of the damping ratio",
-        "amplitude",
-        ("damping_residual",),
-        "points",
-        log="x",
-        labels=("", "(fitted - measured) / interval"),
-        caption="Distances in half-widths of the 95 % intervals.",
-    ),
-    *(
-        Chart(
-            f"Computed against measured {name}",
-            name,
-            (f"computed_{name}",),
-            "points",
-            log="xy",
-            by="use",
-            lines=(f"equal_{name}@equal_{name}",),
-            labels=(f"measured {name}", f"computed {name}"),
-            caption="On the line both are equal. Rows that are held out are predicted.",
-        )
-        for name in ("acceleration", "displacement")
-    ),
-    *(
-        Chart(
-            f"Ratio of the {name} against the input",
-            "input",
-            (f"{name}_ratio",),
-            "points",
-            by="drive",
-            log="auto",
-            labels=("", f"computed / measured {name}"),
-            caption="A trend with the input or the frequency is an error of the model.",
-        )
-        for name in ("acceleration", "displacement")
-    ),
-    Chart(
-        "Worn depth against the coefficient",
-        "coefficient",
-        ("depth",),
-        "points",
-        lines=("curve_depth@curve_coefficient",),
-        labels=("wear coefficient", "worn depth"),
-        caption="Measured depth with its interval at the fitted coefficient, and the computed depth up to the upper bound.",
-    ),
-)
-COST = (
-    Chart(
-        "Error against time",
-        "cpu_seconds",
-        ("largest_error",),
-        "points",
-        by="outcome",
-        log="xy",
-        lines=("allowed_error",),
-        labels=("CPU time", "error of the worst measure"),
-        caption="Largest relative error of any measure in each run. The line is the tolerance of the run.",
-    ),
-    Chart(
-        "Value against time",
-        "cpu_seconds",
-        ("value",),
-        "points",
-        by="outcome",
-        log="x",
-        labels=("CPU time", ""),
-        caption="Main measure of each run with its numerical error.",
-    ),
-)
 
 CHARTS: dict[str, tuple[Chart, ...]] = {
     **dict.fromkeys(("patch", "bench", "rig", "linear"), RUN),
@@ -678,8 +719,42 @@ RUN_TABLES = (
         ),
     ),
 )
+SWEEP_TABLES = (
+    Table(
+        "How far the key may go",
+        "limits",
+        (
+            Column("measure", "measure", "name"),
+            Column("change", "changes by", "percent"),
+            Column("key", "key"),
+            Column("value", "at (between the cases)", "quantity"),
+        ),
+    ),
+    Table(
+        "Peaks over the frequency",
+        "peaks",
+        (
+            Column("measure", "measure", "name"),
+            Column("case", "at"),
+            Column("peak_frequency", "frequency"),
+            Column("peak_height", "height"),
+            Column("half_power_width", "half-power width"),
+        ),
+    ),
+    Table(
+        "Where 90 % of the cases lie",
+        "quantiles",
+        (
+            Column("measure", "measure", "name"),
+            Column("low", "5 % are below"),
+            Column("median", "half are below"),
+            Column("high", "95 % are below"),
+        ),
+    ),
+)
 TABLES: dict[str, tuple[Table, ...]] = {
     **dict.fromkeys(("patch", "bench", "rig", "linear"), RUN_TABLES),
+    "sweep": SWEEP_TABLES,
     "compare": tuple(
         Table(
             title,

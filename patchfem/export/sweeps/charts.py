@@ -1,249 +1,253 @@
 """Charts of a sweep: panels of the styles `relative`, `menu`, `maps` and `shares`.
 
-They take an answer of kind "sweep", from memory or from its folder. A page of more than
-MAX_DRAWN_CASES cases draws evenly spaced cases, and those in which a measure is largest or smallest.
+They take answers of kind "sweep", from memory or from their folders. Of more than MAX_DRAWN_CASES
+cases, evenly spaced ones and those in which a measure is largest or smallest are drawn.
 """
 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 
 from ...campaigns.sweeps.changes import MAIN_MEASURES
 from ...campaigns.sweeps.limits import NEGLIGIBLE_CHANGE
-from ...campaigns.sweeps.sweep_table import FINAL_OUTCOMES
-from ...core import compute_allowed_error
-from ...formatting import format_number
+from ...campaigns.sweeps.sweep_table import FINAL_OUTCOMES, MeasureColumn
 from ..answer import Answer, Variable
 from ..charts.panels import Axis, Curve, Panel
 from ..charts.table import Chart
 from ..quantities import choose_scale
+from .words import format_key
 
 MAX_DRAWN_CASES = 1000  # cases of a measure, so that a page stays below 1.5 MB
 MAX_LINES = 8  # lines of a chart, one for each combination of the other keys
 MAX_MAP_VALUES = 40  # values of each key in a map
-MIN_LOG_RATIO = 10.0  # ratio of the ends of an axis at which it is logarithmic
+# Ratio of the largest to the smallest value of a key and of a measure at which an axis is logarithmic.
+MIN_KEY_RATIO = 10.0
+MIN_MEASURE_RATIO = 100.0
+SHOWN_CHANGE = 0.2  # largest change in the close view of relative changes
 SYMBOLS = np.array(["circle", "circle-open", "x"])  # settled, over the tolerance, not settled
 
 
-@dataclass(frozen=True)
-class SweepView:
-    """Arrays of a sweep over (lines, values of the key on the axis).
+class SweepView(NamedTuple):
+    """Sweep along one of its keys.
 
     Attributes
     ----------
-    answer : Answer
-    keys : list of str
-        Names of the variables of the swept keys.
+    data : dict of str to Variable
+    details : dict
     axis : str
-        Name of the key on the axis.
+        Variable of the key on the axis.
     others : list of str
-        Names of the other keys of a grid; [] for rows.
+        Variables of the other keys of a grid; [] if the cases are rows.
     """
 
-    answer: Answer
-    keys: list[str]
+    data: dict[str, Variable]
+    details: dict
     axis: str
     others: list[str]
 
-    @classmethod
-    def make(cls, answer: Answer, axis: str = "") -> SweepView:
-        """Return the view along a key; by default the numerical key with the most values."""
-        keys = [re.sub(r"\W", "_", key) for key in answer.details["of"]["keys"]]
-        data = answer.data
-        by_count = sorted(
-            keys,
-            key=lambda key: (data[key].values.dtype.kind == "f", np.unique(data[key].values).size),
+    def split(self, name: str, default: float = np.nan) -> np.ndarray:
+        """Return a variable as (lines, values of the key on the axis); the default if it is missing."""
+        if name not in self.data:
+            return np.array(default)
+        variable = self.data[name]
+        moved = np.moveaxis(
+            variable.values, variable.dims.index(self.axis) if self.others else 0, -1
         )
-        axis = axis or by_count[-1]
-        is_grid = data[axis].dims == (axis,)
-        return cls(answer, keys, axis, [key for key in keys if key != axis] if is_grid else [])
-
-    @property
-    def measures(self) -> list[str]:
-        """Measures that have a value in at least one case, the main ones first."""
-        data = self.answer.data
-        names = [name for name in data if f"{name}_error" in data]
-        names.sort(key=lambda name: name not in MAIN_MEASURES)
-        return [name for name in names if np.isfinite(data[name].values).any()]
-
-    def split(self, name: str) -> np.ndarray:
-        """Return a variable of all cases as (lines, values of the key on the axis)."""
-        variable = self.answer.data[name]
-        place = variable.dims.index(self.axis) if self.others else 0
-        moved = np.moveaxis(variable.values, place, -1)
         return moved.reshape(-1, moved.shape[-1])
 
-    def get_column(self, name: str, default: float) -> np.ndarray:
-        """Return a variable as `split`, or an array of a default value."""
-        if name in self.answer.data:
-            return self.split(name)
-        return np.full(self.split("outcome").shape, default)
-
     def find_symbols(self, name: str) -> np.ndarray:
-        """Return the places in SYMBOLS of each case: over the tolerance 1, not settled 2, else 0."""
-        tolerance = self.answer.details.get("tolerance")
-        tolerance = np.nan if tolerance is None else tolerance
-        allowed = compute_allowed_error(
-            tolerance, self.split(name), self.get_column(f"{name}_floor", 0.0)
-        )
-        with np.errstate(invalid="ignore"):
-            is_over = self.get_column(f"{name}_error", np.nan) > allowed
-        if "outcome" not in self.answer.data:
-            return is_over.astype(int)
-        has_settled = np.isin(self.split("outcome"), FINAL_OUTCOMES)
-        return np.where(has_settled, is_over.astype(int), 2)
+        """Return the symbol of each case (lines, values): settled, over the tolerance or not settled."""
+        tolerance = self.details.get("tolerance")
+        parts = (self.split(name), self.split(f"{name}_error"), self.split(f"{name}_floor", 0.0))
+        is_over = MeasureColumn("", *parts).misses(np.nan if tolerance is None else tolerance)
+        has_settled = np.isin(self.split("outcome", FINAL_OUTCOMES[0]), FINAL_OUTCOMES)
+        return SYMBOLS[np.where(has_settled, is_over.astype(int), 2)]
 
     def name_lines(self) -> list[str]:
         """Return the values of the other keys of each line as text; [""] for a single line."""
-        if not self.others:
-            return [""]
-        coordinates = [self.answer.data[key].values for key in self.others]
-        grids = np.meshgrid(*coordinates, indexing="ij")
-        rows = zip(*(grid.ravel().tolist() for grid in grids), strict=True)
-        return [
-            ", ".join(
-                f"{key.replace('_', ' ')} {format_value(self.answer.data[key], value)}"
-                for key, value in zip(self.others, row)
-            )
-            for row in rows
+        texts = [
+            [
+                f"{name.replace('_', ' ')} {format_key(value, self.data[name].unit)}"
+                for value in self.data[name].values.tolist()
+            ]
+            for name in self.others
         ]
+        return [", ".join(line) for line in product(*texts)]
 
 
-def format_value(variable: Variable, value: float | str) -> str:
-    """Return a value of a key with its unit."""
-    if isinstance(value, str):
-        return value
-    unit, scale = choose_scale("", variable.unit or "1", abs(value))
-    return f"{format_number(value * scale, 4)} {unit}".strip()
+def view_sweep(answer: Answer, axis: str = "") -> SweepView:
+    """Return the view of a sweep along a key; by default the numerical key with the most values."""
+    data = answer.data
+    keys = list_keys(answer)
+    counts = {
+        key: (data[key].values.dtype.kind == "f", np.unique(data[key].values).size) for key in keys
+    }
+    axis = axis or max(keys, key=counts.__getitem__)
+    is_grid = data[axis].dims == (axis,)
+    return SweepView(data, answer.details, axis, [key for key in keys if key != axis] * is_grid)
 
 
-def make_axis(name: str, variable: Variable) -> tuple[Axis, np.ndarray]:
-    """Return the axis of a variable, and its values in the unit of the axis; words stay words."""
+def list_keys(answer: Answer) -> list[str]:
+    """Return the names of the variables of the swept keys."""
+    return [re.sub(r"\W", "_", key) for key in answer.details["of"]["keys"]]
+
+
+def list_measures(answers: dict[str, Answer]) -> list[str]:
+    """Return the measures that have a value in at least one case, the main ones first."""
+    names = {
+        name: None
+        for answer in answers.values()
+        for name in answer.data
+        if f"{name}_error" in answer.data and np.isfinite(answer.data[name].values).any()
+    }
+    return sorted(names, key=lambda name: name not in MAIN_MEASURES)
+
+
+def make_axis(name: str, variable: Variable, min_ratio: float) -> tuple[Axis, np.ndarray]:
+    """Return the axis of a variable and its values in the unit of the axis; words stay words.
+
+    `min_ratio` is the ratio of its values at which it is logarithmic.
+    """
     label = name.replace("_", " ")
     values = variable.values
     if values.dtype.kind != "f":
         return Axis(label), values.astype(str)
     finite = values[np.isfinite(values)]
     unit, scale = choose_scale(name, variable.unit or "1", np.abs(finite).max(initial=0.0))
-    is_log = bool(finite.size and finite.min() > 0 and finite.max() >= MIN_LOG_RATIO * finite.min())
+    is_log = bool(finite.size and finite.min() > 0 and finite.max() >= min_ratio * finite.min())
     return Axis(f"{label} [{unit}]" if unit else label, scale, is_log), values * scale
 
 
+def spread_indices(size: int, count: int) -> np.ndarray:
+    """Return at most `count` evenly spaced indices of `size` elements, both ends included."""
+    return np.unique(np.linspace(0, size - 1, min(size, count)).astype(int))
+
+
 def select_cases(values: np.ndarray, count: int) -> np.ndarray:
-    """Return the indices of at most `count` of the values (n,): evenly spaced ones and the extremes."""
-    if values.size <= count:
-        return np.arange(values.size)
+    """Return the indices of about `count` of the values (n,): evenly spaced ones and the extremes."""
     finite = np.flatnonzero(np.isfinite(values))
     extremes = [finite[pick(values[finite])] for pick in (np.argmin, np.argmax) if finite.size]
-    spaced = np.linspace(0, values.size - 1, count - len(extremes)).astype(int)
-    return np.unique([*spaced, *extremes]).astype(int)
+    return np.unique([*spread_indices(values.size, count), *extremes]).astype(int)
+
+
+def join_texts(*texts: str) -> str:
+    """Return the texts that are not empty, separated by commas."""
+    return ", ".join(text for text in texts if text)
 
 
 def make_relative(answers: dict[str, Answer], chart: Chart) -> Panel | None:
-    """Return the main measures relative to their first case along a key, with the band of 5 %."""
+    """Return the main measures relative to their first case along the only key, with the band of 5 %."""
     curves = []
     x_axis = None
     for title, answer in answers.items():
-        view = SweepView.make(answer)
-        if answer.data[view.axis].dims != (view.axis,):
-            continue  # rows in any order have no first case
-        x_axis, x = make_axis(view.axis, answer.data[view.axis])
-        order = np.argsort(x, kind="stable")
-        for name in view.measures:
-            values = view.split(name)[0][order]
-            if name not in chart.y or not np.isfinite(values[0]) or values[0] == 0:
-                continue
-            keep = select_cases(values, MAX_DRAWN_CASES)
-            label = ", ".join(part for part in (title, name.replace("_", " ")) if part)
-            curves.append(Curve(label, x[order][keep], (values / values[0])[keep]))
-    if not curves or curves[0].x.size < 2:
+        view = view_sweep(answer)
+        if view.others or answer.data[view.axis].dims != (view.axis,):
+            continue
+        x_axis, x = make_axis(view.axis, answer.data[view.axis], MIN_KEY_RATIO)
+        for name in chart.y:
+            values = view.split(name).ravel()
+            if values.size > 1 and abs(values[0]) > 0:  # False for NaN
+                keep = select_cases(values, MAX_DRAWN_CASES)
+                label = join_texts(title, name.replace("_", " "))
+                curves.append(Curve(label, x[keep], values[keep] / values[0]))
+    if not curves:
         return None
 
+    # A logarithmic axis has no place for 0.
+    ratios = np.concatenate([curve.y[np.isfinite(curve.y)] for curve in curves])
+    positive = ratios[ratios > 0]
+    is_log = bool(ratios.min() >= 0 and ratios.max() >= MIN_KEY_RATIO * positive.min())
+    limits = {"all changes": np.inf}
+    if np.abs(ratios - 1).max() > SHOWN_CHANGE:
+        limits["changes up to 20 %"] = SHOWN_CHANGE
+    panels = []
     ends = curves[0].x[[0, -1]]
     one = np.ones(2)
-    low, high = one - NEGLIGIBLE_CHANGE, one + NEGLIGIBLE_CHANGE
-    curves.insert(0, Curve("± 5 %", ends, one, low, high))
-    ratios = np.concatenate([curve.y for curve in curves])
-    ratios = ratios[np.isfinite(ratios)]
-    is_log = bool(ratios.min() > 0 and ratios.max() >= MIN_LOG_RATIO * ratios.min())
-    y_axis = Axis("value / value of the first case", is_log=is_log)
-    return Panel(chart.title, chart.style, x_axis, y_axis, curves, caption=chart.caption)
+    for title, limit in limits.items():
+        is_log &= limit > SHOWN_CHANGE
+        axis = Axis("value / value of the first case", is_log=is_log)
+        shown = [Curve("± 5 %", ends, one, one - NEGLIGIBLE_CHANGE, one + NEGLIGIBLE_CHANGE)]
+        for curve in curves:
+            is_shown = (np.abs(curve.y - 1) <= limit) & (not is_log or curve.y > 0)
+            shown.append(replace(curve, y=np.where(is_shown, curve.y, np.nan)))
+        panels.append(Panel(title, chart.style, x_axis, axis, shown))
+    return _add_choices(chart, panels)
 
 
 def make_menu(answers: dict[str, Answer], chart: Chart) -> Panel | None:
     """Return a panel for each measure against a key, between which a menu chooses."""
-    views = {title: SweepView.make(answer) for title, answer in answers.items()}
-    names = dict.fromkeys(name for view in views.values() for name in view.measures)
-    panels = [make_measure_panel(views, name) for name in names]
-    return _make_choices(chart, panels)
+    names = list_measures(answers)
+    return _add_choices(chart, [make_measure_panel(answers, name) for name in names])
 
 
-def _make_choices(chart: Chart, panels: list[Panel]) -> Panel | None:
+def _add_choices(chart: Chart, panels: list[Panel]) -> Panel | None:
     """Return a panel with a menu of panels; None without panels."""
     if not panels:
         return None
-    title, caption = chart.title, chart.caption
-    return replace(panels[0], title=title, style=chart.style, caption=caption, choices=panels)
+    choices = panels if len(panels) > 1 else []
+    labels = {"title": chart.title, "style": chart.style, "caption": chart.caption}
+    return replace(
+        panels[0], choices=choices, **(labels if choices else labels | {"style": panels[0].style})
+    )
 
 
-def make_measure_panel(views: dict[str, SweepView], name: str) -> Panel:
+def make_measure_panel(answers: dict[str, Answer], name: str) -> Panel:
     """Return a measure against a swept key, a line for each combination of the other keys.
 
     Random cases are points against the key with the largest share of the variance of the measure.
+    All sweeps have the units of the first one.
     """
     curves = []
-    x_axis = y_axis = None
-    for title, view in views.items():
-        answer = view.answer
-        if name not in view.measures:
+    axes = None
+    for title, answer in answers.items():
+        if name not in answer.data:
             continue
         shares = answer.details.get("ranking", {}).get(name)
-        if shares and not view.others and len(view.keys) > 1:
-            view = SweepView.make(answer, re.sub(r"\W", "_", shares[0]["key"]))
-        x_axis, x = make_axis(view.axis, answer.data[view.axis])
-        # all sweeps have the unit of the first one
-        first_axis, _ = make_axis(name, answer.data[name])
-        y_axis = y_axis or first_axis
-        values = view.split(name) * y_axis.scale
-        errors = view.get_column(f"{name}_error", np.nan) * y_axis.scale
-        symbols = view.find_symbols(name)
-        lines = np.unique(np.linspace(0, len(values) - 1, MAX_LINES).astype(int))
+        view = view_sweep(answer)
+        if shares and not view.others:
+            view = view_sweep(answer, re.sub(r"\W", "_", shares[0]["key"]))
+        x_axis, x = make_axis(view.axis, answer.data[view.axis], MIN_KEY_RATIO)
+        y_axis, _ = make_axis(name, answer.data[name], MIN_MEASURE_RATIO)
+        axes = axes or (x_axis, y_axis)
+        values = view.split(name) * axes[1].scale
+        errors = np.broadcast_to(view.split(f"{name}_error") * axes[1].scale, values.shape)
+        symbols = np.broadcast_to(view.find_symbols(name), values.shape)
         texts = view.name_lines()
-        for line in lines.tolist():
+        lines = spread_indices(len(values), MAX_LINES)
+        for line in lines:
             keep = select_cases(values[line], MAX_DRAWN_CASES // len(lines))
-            y, error, codes = (array[line][keep] for array in (values, errors, symbols))
-            label = ", ".join(part for part in (title, texts[line]) if part)
-            marks = SYMBOLS[codes] if codes.any() else None
+            y, error, marks = (array[line][keep] for array in (values, errors, symbols))
             band = (None, None) if np.isnan(error).all() else (y - error, y + error)
-            curves.append(Curve(label, x[keep], y, *band, symbols=marks))
-    title = name.replace("_", " ")
-    is_line = all(view.answer.data[view.axis].dims == (view.axis,) for view in views.values())
-    return Panel(title, "dots" if is_line else "points", x_axis, y_axis, curves)
+            is_plain = (marks == SYMBOLS[0]).all()
+            label = join_texts(title, texts[line])
+            curves.append(Curve(label, x[keep], y, *band, symbols=None if is_plain else marks))
+    is_line = view.data[view.axis].dims == (view.axis,)
+    return Panel(name.replace("_", " "), "dots" if is_line else "points", *axes, curves)
 
 
 def make_map_menu(answers: dict[str, Answer], chart: Chart) -> Panel | None:
     """Return a map of each measure over two keys, between which a menu chooses."""
-    view = SweepView.make(next(iter(answers.values())))
+    view = view_sweep(next(iter(answers.values())))
     if len(answers) > 1 or len(view.others) != 1:
         return None
-    data = view.answer.data
-    x_axis, x = make_axis(view.axis, data[view.axis])
-    y_axis, y = make_axis(view.others[0], data[view.others[0]])
-    columns = np.unique(np.linspace(0, x.size - 1, MAX_MAP_VALUES).astype(int))
-    rows = np.unique(np.linspace(0, y.size - 1, MAX_MAP_VALUES).astype(int))
+    x_axis, x = make_axis(view.axis, view.data[view.axis], MIN_KEY_RATIO)
+    y_axis, y = make_axis(view.others[0], view.data[view.others[0]], MIN_KEY_RATIO)
+    columns = spread_indices(x.size, MAX_MAP_VALUES)
+    rows = spread_indices(y.size, MAX_MAP_VALUES)
     panels = []
-    for name in view.measures:
-        axis, _ = make_axis(name, data[name])
+    for name in list_measures(answers):
+        axis, _ = make_axis(name, view.data[name], MIN_MEASURE_RATIO)
         values = view.split(name)[np.ix_(rows, columns)] * axis.scale
-        if not np.isfinite(values).any():
-            continue
-        curve = Curve("", x[columns], values, rows=y[rows])
-        title = name.replace("_", " ")
-        panels.append(Panel(title, "map", x_axis, y_axis, [curve], colour_label=axis.label))
-    return _make_choices(chart, panels)
+        if np.isfinite(values).any():
+            curve = Curve("", x[columns], values, rows=y[rows])
+            title = name.replace("_", " ")
+            panels.append(Panel(title, "map", x_axis, y_axis, [curve], colour_label=axis.label))
+    return _add_choices(chart, panels)
 
 
 def make_shares(answers: dict[str, Answer], chart: Chart) -> Panel | None:
@@ -251,21 +255,17 @@ def make_shares(answers: dict[str, Answer], chart: Chart) -> Panel | None:
     panels = []
     ranking = next(iter(answers.values())).details.get("ranking", {})
     for name, indices in ranking.items() if len(answers) == 1 else ():
-        indices = indices[::-1]  # the first bar of plotly is at the bottom
-        keys = np.array([index["key"] for index in indices])
-        numbers = {
-            part: np.array([100 * index[part] for index in indices])
-            for part in ("first", "total", "low", "high")
-        }
-        has_interval = np.any(numbers["low"] != numbers["high"])
-        ends = (numbers["low"], numbers["high"]) if has_interval else (None, None)
-        curves = [
-            Curve("with interactions", keys, numbers["total"], *ends),
-            Curve("alone", keys, numbers["first"]),
+        # The first bar is at the bottom.
+        rows = [
+            [index[part] for index in indices[::-1]] for part in ("first", "total", "low", "high")
         ]
-        title = name.replace("_", " ")
-        panels.append(Panel(title, "bars", Axis("share of the variance [%]"), Axis(""), curves))
-    return _make_choices(chart, panels)
+        first, total, low, high = 100 * np.array(rows)
+        keys = np.array([index["key"] for index in indices[::-1]])
+        ends = (None, None) if (low == high).all() else (low, high)
+        curves = [Curve("with interactions", keys, total, *ends), Curve("alone", keys, first)]
+        axes = (Axis("share of the variance [%]"), Axis(""))
+        panels.append(Panel(name.replace("_", " "), "bars", *axes, curves))
+    return _add_choices(chart, panels)
 
 
 STYLES = {

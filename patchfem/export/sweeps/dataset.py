@@ -7,7 +7,7 @@ import numpy as np
 from ...core import PatchfemError
 from ..answer import Answer, Variable
 from ..charts import axes as drawing
-from .charts import SweepView, make_measure_panel
+from .charts import list_keys, make_measure_panel
 
 
 def to_dataset(answer: Answer):
@@ -16,15 +16,14 @@ def to_dataset(answer: Answer):
     Its attributes are those of sweep.nc, the `answer` in one sentence and the `tolerance`.
     """
     dataset = answer.to_xarray()
-    names = [SweepView.make(answer).keys][0]
-    dataset = dataset.set_coords(names)
+    dataset = dataset.set_coords(list_keys(answer))
     dataset.attrs["answer"] = answer.details["answer"]
     if answer.details["tolerance"] is not None:
         dataset.attrs["tolerance"] = answer.details["tolerance"]
     return dataset
 
 
-def draw_dataset(dataset, measure: str, axes):
+def sweep_axes(dataset, measure: str, axes=None):
     """Draw a measure of a sweep on matplotlib Axes and return them; hollow points miss the tolerance.
 
     Parameters
@@ -32,17 +31,27 @@ def draw_dataset(dataset, measure: str, axes):
     dataset : xarray.Dataset
         From `to_dataset`, or the content of sweep.nc.
     measure : str
-    axes : matplotlib.axes.Axes
+    axes : matplotlib.axes.Axes, optional
+        By default those of a new figure.
 
     Raises
     ------
     PatchfemError
-        If the sweep does not have this measure.
+        If the dataset is not that of a sweep, or does not have this measure.
     """
-    names = sorted(str(name) for name in dataset if f"{name}_error" in dataset)
+    names = [str(name) for name in getattr(dataset, "data_vars", ()) if f"{name}_error" in dataset]
+    if not names:
+        raise PatchfemError(
+            "plot.sweep: a Dataset returned by pf.sweep is needed, with measures and their errors",
+            "",
+        )
     if measure not in names:
-        listed = ", ".join(names)
+        listed = ", ".join(sorted(names))
         raise PatchfemError(f"plot.sweep: no measure {measure!r}; there are {listed}", "")
+    if axes is None:
+        from matplotlib.figure import Figure
+
+        axes = Figure(figsize=drawing.PANEL_SIZE, layout="constrained").subplots()
     data = {
         str(name): Variable(
             tuple(map(str, variable.dims)),
@@ -55,4 +64,4 @@ def draw_dataset(dataset, measure: str, axes):
     keys = [str(name) for name in dataset.coords if name != "case"]
     details = {"of": {"keys": keys}, "tolerance": dataset.attrs.get("tolerance")}
     answer = Answer("sweep", "", (), data=data, details=details)
-    return drawing.draw(make_measure_panel({"": SweepView.make(answer)}, measure), axes)
+    return drawing.draw(make_measure_panel({"": answer}, measure), axes)

@@ -10,7 +10,7 @@ import json
 import os
 import secrets
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,13 +24,12 @@ from ...disk.atomic_write import WriteError, explain_mkdir_error, write_bytes, w
 from ...disk.lock import FolderLock
 from ...effects import EFFECTS
 from ...model.model import Model
-from ...runs.batch.case_results import FAILED_OUTCOME, CaseResults
+from ...runs.batch.case_results import CaseResults
 from .. import store as answers
 from ..answer import Answer, Quantity, Remarks
-from ..results import LOCK, refuse_others
+from ..folder import LOCK, refuse_others
 from .store import CHUNKS, Chunks, case_folder_name, write_chunk
 
-KEEP = ("none", "summaries", "results", "pages")  # what is stored of each case besides its numbers
 CASES = "cases"
 TABLES = ("sweep.csv", "sweep.nc", "sweep.json", "summary.json", "report.html")
 
@@ -95,17 +94,21 @@ class ResultsWriter:
 
     def __call__(self, number: int, result) -> None:
         """Write the folder of a case after its run."""
-        # Only these sweeps need the modules that write the results of a run.
-        from ..folder import save_run
+        # Only these sweeps need the modules that write the fields of a run.
+        from ..folder import Folder as ResultsFolder
+        from ..run_folder import write_results, write_run_page
 
-        save_run(result, self.folder / CASES / case_folder_name(self.names[number]), self.page)
+        with ResultsFolder(self.folder / CASES / case_folder_name(self.names[number])) as folder:
+            written = write_results(result, folder.path)
+        if self.page:
+            write_run_page(written, folder.target)
 
 
 @dataclass(frozen=True, slots=True)
 class Writer:
     """Function that stores results in the folder of a sweep, from any machine that has access to it.
 
-    `token` is the name of a file by which the folder is identified; keep: one of KEEP.
+    `token` is the name of a file by which the folder is identified; keep: as in `run.SweepTarget`.
     """
 
     target: Path
@@ -219,8 +222,8 @@ class Folder:
         """Return the contents of sweep.json, or {} if it cannot be read."""
         try:
             details = json.loads((self.target / "sweep.json").read_bytes())
-            return details if isinstance(details["cases"], dict) else {}
-        except (OSError, ValueError, LookupError, TypeError):
+            return details if {"cases", "of"} <= details.keys() else {}
+        except (OSError, ValueError, AttributeError):
             return {}
 
     def refuse_other_sweep(self, identity: dict) -> None:
@@ -229,45 +232,23 @@ class Folder:
         identity: `of` in sweep.json, from `answer.identify_sweep`.
         """
         stored = self.read_details().get("of", identity)
-        if stored == identity:
-            return
-        keys = stored.get("keys", []) if isinstance(stored, dict) else []
-        difference = "another scene or of another version of patchfem"
-        if keys != identity["keys"]:
-            difference = f"other keys ({', '.join(map(str, keys))})"
-        raise PatchfemError(
-            f"{self.shown}: this folder contains a sweep of {difference}; name another folder with -o, or "
-            "run without --resume to replace that sweep"
-        )
+        if stored != identity:
+            raise PatchfemError(
+                f"{self.shown}: this folder contains a sweep of another scene or version, or of other keys (it "
+                f"has {', '.join(map(str, stored['keys']))}); name another folder with -o, or run without "
+                "--resume to replace that sweep"
+            )
 
-    def load(self, table: SweepTable) -> int:
-        """Insert all stored results into a table, and return the number of cases of other sweeps."""
-        n_others = 0
-        for numbers, results, n_more in self.chunks.iterate_results():
+    def load(self, table: SweepTable) -> None:
+        """Insert all stored results into a table."""
+        for numbers, results in self.chunks.iterate_results():
             table.insert(numbers, results)
-            n_others += n_more
-        return n_others
 
-    def find_complete_cases(self, keep: str) -> tuple[np.ndarray, int]:
-        """Find the cases (n,) that have a result and the files that `keep` requires.
-
-        Returns this mask and the number of stored cases of other sweeps.
-        """
-        is_complete = np.zeros(len(self.chunks.names), bool)
-        n_others = 0
-        for numbers, results, n_more in self.chunks.iterate_results():
-            n_others += n_more
-            failed = results.outcome == FAILED_OUTCOME
-            for number, has_failed in zip(numbers.tolist(), failed.tolist()):
-                is_complete[number] = keep == "none" or self._has_files(number, keep, has_failed)
-        return is_complete, n_others
-
-    def _has_files(self, number: int, keep: str, has_failed: bool) -> bool:
+    def has_files(self, number: int, keep: str, has_failed: bool) -> bool:
         """Return whether the folder of a case has the files that `keep` requires."""
+        count = {"summaries": 1, "results": 2, "pages": 3}[keep]
+        required = (answers.SUMMARY, answers.SCENE, answers.PAGE)[: 1 if has_failed else count]
         folder = self.target / CASES / case_folder_name(self.chunks.names[number])
-        required = [answers.SUMMARY]
-        if not has_failed and keep != "summaries":
-            required += (answers.SCENE, answers.PAGE)[: KEEP.index(keep) - 1]
         return all((folder / name).is_file() for name in required)
 
     def case_folder_names(self) -> list[str]:
@@ -276,19 +257,13 @@ class Folder:
             return []
         return [case_folder_name(name) for name in self.chunks.names]
 
-    def mark_tables_outdated(self) -> None:
-        """Rename the tables of an older sweep, which are outdated once cases are computed."""
+    def remove_tables(self) -> None:
+        """Remove the tables."""
         for name in TABLES:
-            with suppress(FileNotFoundError):  # there is no table, or another shard has renamed it
-                os.replace(self.target / name, self.target / f"{name}.partial")
-
-    def remove_outdated_tables(self) -> None:
-        """Remove the tables of an older sweep, which the new tables replace."""
-        for name in TABLES:
-            (self.target / f"{name}.partial").unlink(missing_ok=True)
+            (self.target / name).unlink(missing_ok=True)
 
     def clean(self, *, removes_others: bool, keep: str = "") -> None:
-        """Merge small chunks, and remove outdated tables and files that were never complete.
+        """Merge small chunks, and remove files that were never complete.
 
         Parameters
         ----------
@@ -298,21 +273,16 @@ class Folder:
             The folders of cases are removed if it is "none".
         """
         self.chunks.merge_files(removes_others=removes_others)
-        self.remove_outdated_tables()
-        for path in (self.target / CHUNKS).glob(".*"):
-            if path.name != self.token and not self.is_shared:
-                path.unlink(missing_ok=True)
         own = set() if keep == "none" else set(self.case_folder_names())
+        incomplete = [path for path in (self.target / CHUNKS).glob(".*") if path.name != self.token]
         for path in (self.target / CASES).glob("*"):
             is_incomplete = path.name.startswith(".") or path.name.endswith(".partial")
             if is_incomplete or (removes_others and path.name not in own):
-                _remove(path)
+                incomplete.append(path)
+        for path in incomplete:
+            if path.is_dir():
+                shutil.rmtree(path, ignore_errors=True)
+            else:
+                path.unlink(missing_ok=True)
         with suppress(OSError):  # the folder does not exist, or still contains cases
             (self.target / CASES).rmdir()
-
-
-def _remove(path: Path) -> None:
-    """Remove a folder or a file."""
-    remove: Callable = shutil.rmtree if path.is_dir() and not path.is_symlink() else os.remove
-    with suppress(OSError):
-        remove(path)

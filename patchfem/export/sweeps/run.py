@@ -93,9 +93,16 @@ def sweep_into(
         if place.resume:
             folder.refuse_other_sweep(identify_sweep(sweep_scene, cases))
         requested = _find_shard_cases(len(cases), place.shard)
-        remaining = _find_remaining_cases(folder, requested, place, keep, say)
-        if remaining.size:
-            folder.mark_tables_outdated()
+        is_stored = _find_stored_cases(folder, cases, keep)[requested]
+        is_interrupted = folder.read_details().get("cases", {}).get("unfinished") != 0
+        if not (place.resume or is_shard):
+            if is_stored.any() and is_interrupted:
+                say(
+                    f"note: {is_stored.sum()} of {len(cases)} cases already have an answer from an interrupted "
+                    "sweep but are run again; use --resume to keep such answers"
+                )
+            is_stored[:] = False
+        remaining = requested[~is_stored]
 
         tables = TableWriter(sweep_scene, cases, folder, place.page)
         n_done = len(requested) - len(remaining)
@@ -103,6 +110,7 @@ def sweep_into(
         clock = RemainingTime(remaining.size, executor.workers)
         try:
             for count, seconds in _compute_cases(tables, remaining, executor, say, keep):
+                folder.remove_tables()  # they are outdated once a case is computed
                 n_done += count
                 report_progress(n_done, requested.size, clock(count, seconds))
         except (KeyboardInterrupt, PatchfemError):
@@ -123,25 +131,14 @@ def _find_shard_cases(count: int, shard: tuple[int, int] | None) -> np.ndarray:
     return np.arange((i - 1) * count // n, i * count // n)
 
 
-def _find_remaining_cases(
-    folder: Folder, requested: np.ndarray, place: SweepTarget, keep: str, say: Callable
-) -> np.ndarray:
-    """Return the numbers of the requested cases that must be computed."""
-    is_complete, n_others = folder.find_complete_cases(keep)
-    if place.resume or place.shard is not None:
-        if n_others and folder.read_details().get("cases", {}).get("unfinished") == 0:
-            say(
-                f"note: {n_others} stored cases of this folder are not among the values of this sweep and will "
-                "not be in its tables; to include them, run again with --resume and name all values"
-            )
-        return requested[~is_complete[requested]]
-    n_complete = int(is_complete[requested].sum())
-    if n_complete and folder.read_details().get("cases", {}).get("unfinished") != 0:
-        say(
-            f"note: {n_complete} of {len(requested)} cases already have an answer from an interrupted sweep but "
-            "are run again; use --resume to keep such answers"
-        )
-    return requested
+def _find_stored_cases(folder: Folder, cases: Cases, keep: str) -> np.ndarray:
+    """Return whether each case (n,) has a result and the files that `keep` requires."""
+    table = SweepTable.blank(cases)
+    folder.load(table)
+    is_stored = table.outcome != ""
+    for number in np.flatnonzero(is_stored).tolist() if keep != "none" else ():
+        is_stored[number] = folder.has_files(number, keep, number in table.messages)
+    return is_stored
 
 
 def _compute_cases(
@@ -213,7 +210,6 @@ class TableWriter:
         (target / answers.PAGE).unlink(missing_ok=True)
         if self.page:
             pages.write_page(target)
-        self.folder.remove_outdated_tables()
         return answers.read(target)
 
     def _write_tables(self, is_complete: bool) -> bool:

@@ -107,18 +107,16 @@ class Chunks:
         entries.sort(key=lambda entry: (entry.stat().st_mtime_ns, entry.name))
         return [Path(entry.path) for entry in entries]
 
-    def iterate_results(self) -> Iterator[tuple[np.ndarray, CaseResults, int]]:
-        """Yield (numbers, results, number of other cases) of each file.
+    def iterate_results(self) -> Iterator[tuple[np.ndarray, CaseResults]]:
+        """Yield the numbers of the requested cases that a file contains, and their results.
 
-        `numbers` are those of the requested cases, whose `results` the file contains; of two
-        results of a case the newer one comes later.
+        Of two results of a case the newer one comes later.
         """
         for path in self.list_files():
             names, results = read_chunk(path)
             rows = self._find_rows(names)
             numbers = np.flatnonzero(rows >= 0)
-            n_others = len(names) - np.unique(rows[numbers]).size
-            yield numbers, results.select(rows[numbers]), n_others
+            yield numbers, results.select(rows[numbers])
 
     def _find_rows(self, names: np.ndarray) -> np.ndarray:
         """Return the row (n,) of each requested case among the names (m,) of a file; -1 without one."""

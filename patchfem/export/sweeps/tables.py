@@ -60,8 +60,9 @@ def _make_rows(
             texts.append(_format_numbers(column.values[block], "{!r}"))
             texts.append(_format_numbers(column.errors[block], "{:.6g}"))
         for number, *cells in zip(range(len(table))[block], *texts, strict=bool(texts)):
-            end = [table.messages.get(number, "")] + list(case_folders[number : number + 1])
-            yield [*cases.texts(number), str(table.outcome[number]), *cells, *end]
+            folder = case_folders[number : number + 1]
+            message = table.messages.get(number, "")
+            yield [*cases.texts(number), str(table.outcome[number]), *cells, message, *folder]
 
 
 def _format_numbers(numbers, template: str) -> list[str]:
