@@ -17,6 +17,7 @@ from ..profile import Profile, remove_spikes
 from ..quantity import SIDE, Quantity
 from . import changes
 from .fit import Fit, fit_unworn
+from .flanks import find_flanked_track
 from .records import (
     Comparison,
     Datum,
@@ -24,19 +25,24 @@ from .records import (
     Finding,
     Placement,
     TraceCurves,
+    Track,
     name_quantity,
     name_unknown,
 )
 from .section import Section, make_section, measure_hidden_area, measure_largest
-from .statistics import UNWORN_LIMIT, find_mode
+from .statistics import UNWORN_LIMIT, estimate_correlation, find_mode
+from .traces import MIN_SIGNIFICANCE, WAVES_PER_TRACE, TraceModel, find_places, mirror
 from .track import cover_spans, find_spans, measure_track
-from .traces import MIN_SIGNIFICANCE, TraceModel, find_places, mirror
 
 MIN_SAMPLES = 40  # smallest number of heights of a trace that is compared
+SURE_SIGNIFICANCE = 12.0  # the same if other places are nearly as significant
+LIKELY_SIGNIFICANCE = 6.0  # significance of a clear place that suffices if enough heights agree
+MIN_EXCESS = 0.2  # fraction of the heights, beyond those by chance, that agree at such a place
 MIN_AGREEMENT = 3.0  # heights that agree, relative to those of unrelated traces
 MIN_AGREEING = 0.05  # fraction of heights that agree, in addition to that
+MAX_STRETCH = 0.015  # largest error of length of a place
+KINK_SAMPLES = 7  # number of samples over which an error of interpolation at a kink spreads
 N_OTHER_PLACES = 15  # number of other places that show how many heights agree by chance
-MIN_UNWORN_FRACTION = 0.05  # fraction of heights below which there is no datum
 CLEAR_MISFIT = 0.9  # misfit of a place relative to that of a more significant one that it replaces
 BEND_GAIN = (
     0.8  # noise about a parabola relative to that about a line, from which on it is subtracted
@@ -96,11 +102,14 @@ def _compare_traces(before: Profile, after: Profile, options: Options) -> Compar
     if first.x.size == second.x.size and (first.z == second.z).all():
         return Comparison(before, after, Finding("identical", {}), {})
     aligned = _align_traces(first, second, options)
-    if aligned.reason:
+    if not aligned.reason:
+        return _measure_traces(before, after, aligned, removed)
+    section = find_flanked_track(first, second)
+    if section is None:
         return Comparison(
             before, after, Finding(aligned.reason, {}), _name_unknowns(aligned.reason)
         )
-    return _measure_traces(before, after, aligned, removed)
+    return _measure_flanked(before, after, section, removed)
 
 
 def _clean(trace: Profile, keep_spikes: bool) -> Profile:
@@ -147,23 +156,33 @@ class _TraceModel(TraceModel):
     def compute_noise_terms(self, jacobian) -> np.ndarray:
         """Return terms (n, 3) of the variance: of the instrument, of positions on slopes, at kinks."""
         slope = jacobian[:, 0]
-        kink = ndimage.maximum_filter1d(np.abs(np.gradient(slope)), 3)
+        kink = ndimage.maximum_filter1d(np.abs(np.gradient(slope)), KINK_SAMPLES)
         return np.column_stack((np.ones(slope.size), slope**2, kink**2))
 
     def find_changed(self, depth, noise) -> np.ndarray:
         """Return the samples (n,) bool that noise does not explain."""
-        return changes.find_changed(depth, noise)
+        changed = changes.find_changed(depth, noise)
+        heights = self.second + self.last_depth / 2
+        heights = heights - ndimage.gaussian_filter1d(heights, heights.size / WAVES_PER_TRACE)
+        relative = depth / noise
+        quiet = relative[np.abs(relative) < UNWORN_LIMIT]
+        if changed.any() or quiet.size < MIN_SAMPLES:
+            return changed
+        return changes.find_changed_tops(heights, relative, estimate_correlation(quiet))
 
 
 def _align_traces(first: Profile, second: Profile, options: Options) -> _Aligned:
     """Place the second trace on the first, and fit place and datum to the unworn heights."""
     best = None
-    for place in find_places(first, second):
+    places = find_places(first, second)
+    for place in places:
         trace = mirror(second) if place.is_mirrored else second
         model = _TraceModel(first, trace, place)
         if model.x.size < MIN_SAMPLES:
             continue
         state, misfit = model.refine_place()
+        if abs(state[1]) > MAX_STRETCH:
+            continue
         if best is None or misfit < CLEAR_MISFIT * best[3]:
             best = place, model, state, misfit, trace
     if best is None:
@@ -176,11 +195,11 @@ def _align_traces(first: Profile, second: Profile, options: Options) -> _Aligned
         start = model.find_datum(state, degree)
         fits.append(fit_unworn(model, start, slice(0, 3 + degree), digit))
     fit = fits[0]
-    if len(fits) > 1 and np.median(fits[1].noise) < BEND_GAIN * np.median(fit.noise):
+    if len(fits) > 1 and _is_bent(*fits):
         fit = fits[1]
     if not options.keep_spikes:
         is_speck = changes.find_specks(
-            model.x, model.second + fit.depth, model.second, fit.worn | fit.grown
+            model.x, model.second + fit.depth, model.second, fit.worn, fit.grown
         )
         if is_speck.any():
             model.keep(~is_speck)
@@ -188,10 +207,20 @@ def _align_traces(first: Profile, second: Profile, options: Options) -> _Aligned
 
     chance = _estimate_chance(model.second + fit.depth, model.second, np.median(fit.noise))
     agreeing = fit.unworn.mean()
-    is_known = place.significance > MIN_SIGNIFICANCE and agreeing > MIN_UNWORN_FRACTION
+    is_clear = len(places) == 1
+    is_known = place.significance > (MIN_SIGNIFICANCE if is_clear else SURE_SIGNIFICANCE)
+    is_likely = is_clear and place.significance > LIKELY_SIGNIFICANCE
+    is_known |= is_likely and agreeing - chance > MIN_EXCESS * (1 - chance)
     if not is_known and agreeing < MIN_AGREEMENT * chance + MIN_AGREEING:
         return _Aligned(trace, place.is_mirrored, model, fit, "elsewhere")
     return _Aligned(trace, place.is_mirrored, model, fit)
+
+
+def _is_bent(straight: Fit, bent: Fit) -> bool:
+    """Return whether a parabolic datum explains the depths better than a straight one."""
+    n_changed = [(fit.worn | fit.grown).sum() for fit in (straight, bent)]
+    is_quieter = np.median(bent.noise) < BEND_GAIN * np.median(straight.noise)
+    return bool(is_quieter or n_changed[1] < n_changed[0] / 2)
 
 
 def _estimate_chance(first, second, noise: float) -> float:
@@ -220,74 +249,115 @@ def _name_unknowns(reason: str) -> dict[str, Quantity]:
     return {name: name_unknown(name, reason) for name in names}
 
 
-def _measure_traces(before, after, aligned: _Aligned, removed) -> Comparison:
-    """Measure the worn depth of aligned traces, and find the verdict."""
+def _measure_traces(
+    before: Profile, after: Profile, aligned: _Aligned, removed: tuple[int, int]
+) -> Comparison:
+    """Measure the worn depth of traces at the same place."""
     fit = aligned.fit
     model = aligned.model
     section = make_section(model.x, fit)
+    errors = section.changes.std(axis=0)
+    placed = {
+        "shift": (fit.state[0], errors[0]),
+        "scale": (1 + fit.state[1], errors[1]),
+        "tilt": (-fit.state[3] / model.half, errors[3] / model.half),
+    }
+    placement = {}
+    for name, (value, error) in placed.items():
+        placement[name] = name_quantity(name, value, value - SIDE * error, value + SIDE * error)
+    limit = changes.find_shallow_track(fit.depth).limit
+    datum = Datum(
+        unworn=float(fit.unworn.mean()),
+        noise=float(np.median(fit.noise)),
+        bend=float(fit.state[4]),
+        correlation=section.correlation,
+        detection_limit=limit,
+    )
+    evidence = Evidence(
+        Placement(placement, "x" if aligned.is_mirrored else ""),
+        datum,
+        _draw_curves(section, model.second + fit.depth),
+        removed=removed,
+    )
+    return _compose(before, after, section, evidence)
+
+
+def _measure_flanked(
+    before: Profile, after: Profile, section: Section, removed: tuple[int, int]
+) -> Comparison:
+    """Measure the worn depth below the flanks of the second trace."""
+    line = np.interp(section.x, after.x[~after.missing], after.z[~after.missing]) + section.depth
+    placement = {name: name_unknown(name, "elsewhere") for name in ("shift", "scale", "tilt")}
+    datum = Datum(
+        float(section.unworn.mean()), float(section.noise[0]), 0.0, section.correlation, None
+    )
+    evidence = Evidence(
+        Placement(placement, basis="flanks"), datum, _draw_curves(section, line), removed=removed
+    )
+    return _compose(before, after, section, evidence)
+
+
+def _draw_curves(section: Section, first) -> TraceCurves:
+    """Return the curves of aligned traces; first: heights (n,) [m] of the first one."""
+    heights = first - np.polyval(np.polyfit(section.x, first, 1), section.x)
+    return TraceCurves(
+        x=section.x,
+        before=heights,
+        after=heights - section.depth,
+        depth=section.depth,
+        noise=section.noise,
+        unworn=section.unworn,
+        worn=section.worn,
+        grown=section.grown,
+    )
+
+
+def _compose(before: Profile, after: Profile, section: Section, evidence: Evidence) -> Comparison:
+    """Measure a section, and find the verdict."""
+    placement = evidence.placement
     length = float(section.widths.sum())
     spans = find_spans(section)
-    inside = cover_spans(section, spans) & ~fit.grown
-    area, error = section.integrate(inside)
+    area, error = section.integrate(cover_spans(section, spans) & ~section.grown)
     hidden = measure_hidden_area(section)
     bounds = (area, max(area - SIDE * error, 0.0), area + SIDE * error + hidden)
-    lost = section.integrate(fit.worn)[0]
-    grown, grown_error = section.integrate(fit.grown, -1.0)
+    lost = section.integrate(section.worn)[0]
+    grown, grown_error = section.integrate(section.grown, -1.0)
     verdict = judge_areas(bounds, lost, error, grown, grown_error)
-    limit = changes.find_shallow_track(fit.depth).limit
+    if placement.basis == "flanks" and verdict != "worn":
+        verdict = "elsewhere"
 
-    values = _name_unknowns("no_wear")
-    errors = section.changes.std(axis=0)
-    placed = {"shift": (fit.state[0], errors[0]), "scale": (1 + fit.state[1], errors[1])}
-    placed["tilt"] = (-fit.state[3] / model.half, errors[3] / model.half)
-    placement = {}
-    for name, (value, deviation) in placed.items():
-        placement[name] = name_quantity(
-            name, value, value - SIDE * deviation, value + SIDE * deviation
-        )
-    values |= placement
-    values["grown_area"] = name_quantity(
-        "grown_area", grown, max(grown - SIDE * grown_error, 0.0), grown + SIDE * grown_error
-    )
+    values = _name_unknowns("no_wear") | placement.values
+    low = max(grown - SIDE * grown_error, 0.0)
+    values["grown_area"] = name_quantity("grown_area", grown, low, grown + SIDE * grown_error)
     tracks = ()
     if verdict.startswith("worn"):
         values["worn_area"] = name_quantity("worn_area", *bounds)
-        values["worn_depth_mean"] = name_quantity(
-            "worn_depth_mean", *(bound / length for bound in bounds)
-        )
+        means = (bound / length for bound in bounds)
+        values["worn_depth_mean"] = name_quantity("worn_depth_mean", *means)
         values["worn_depth_max"] = measure_largest(section, "worn_depth_max")
         tracks = tuple(measure_track(section, span) for span in spans)
-        if tracks:
-            values["worn_depth_within"] = replace_name(
-                tracks[0].values["depth_mean"], "worn_depth_within"
-            )
-            for end in ("from", "to"):
-                place = tracks[0].values[end]
-                for side in ("before", "after"):
-                    name = f"worn_{end}_{side}"
-                    if place.value is None:
-                        values[name] = name_unknown(name, "cut_off")
-                    else:
-                        offset = 0.0 if side == "after" else fit.state[0]
-                        values[name] = name_quantity(name, *(v - offset for v in place[:3]))
-    line = np.polyval(np.polyfit(model.x, model.second + fit.depth, 1), model.x)
-    heights = model.second + fit.depth - line
-    curves = TraceCurves(
-        model.x, heights, heights - fit.depth, fit.depth, fit.noise, fit.unworn, fit.worn, fit.grown
-    )
-    bend = float(fit.state[4])
-    datum = Datum(
-        float(fit.unworn.mean()), float(np.median(fit.noise)), bend, section.correlation, limit
-    )
-    evidence = Evidence(
-        Placement(placement, "x" if aligned.is_mirrored else ""), datum, curves, removed=removed
-    )
-    numbers = {"detection_limit": limit}
+        values |= _name_ends(tracks, placement.values["shift"].value)
+    numbers = {"detection_limit": evidence.datum.detection_limit}
     return Comparison(before, after, Finding(verdict, numbers), values, tracks, (), evidence)
 
 
-def replace_name(quantity: Quantity, name: str) -> Quantity:
-    return name_quantity(name, *quantity[:3])
+def _name_ends(tracks: tuple[Track, ...], shift: float | None) -> dict[str, Quantity]:
+    """Return the mean depth within the longest track, and its ends in both traces."""
+    if not tracks:
+        names = ["worn_depth_within"]
+        names += [f"worn_{end}_{side}" for end in ("from", "to") for side in ("before", "after")]
+        return {name: name_unknown(name, "no_track") for name in names}
+    track = tracks[0].values
+    values = {"worn_depth_within": name_quantity("worn_depth_within", *track["depth_mean"][:3])}
+    for end in ("from", "to"):
+        for side, offset in (("before", shift), ("after", 0.0)):
+            name = f"worn_{end}_{side}"
+            if track[end].value is None or offset is None:
+                reason = "cut_off" if offset is not None else "elsewhere"
+                values[name] = name_unknown(name, reason)
+            else:
+                values[name] = name_quantity(name, *(x - offset for x in track[end][:3]))
+    return values
 
 
 def judge_areas(bounds, lost: float, error: float, grown: float, grown_error: float) -> str:

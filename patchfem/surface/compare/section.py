@@ -128,7 +128,7 @@ def measure_largest(section: Section, name: str) -> Quantity:
     is_sure = section.noise < MAX_NOISE_RATIO * np.median(section.noise)
     top = int(np.argmax(np.where(is_sure, smooth, -np.inf)))
     sigma = float(np.hypot(section.draws[:, top].std(), PARABOLA_ERROR * section.noise[top]))
-    near = max(int((smooth > smooth[top] - 2 * sigma).sum()), 1)
+    near = max((smooth > smooth[top] - 2 * sigma).sum() / section.correlation, 1.0)
     bias = float(np.sqrt(2 * np.log(near)) / 2 * sigma)
     value = smooth[top] - bias
     raw = depth[max(top - 2, 0) : top + 3].max()

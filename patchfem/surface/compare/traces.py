@@ -190,7 +190,8 @@ class TraceModel:
     def compute_depth(self, state) -> np.ndarray:
         """Return the depth (n,) [m]."""
         datum = np.polynomial.polynomial.polyval(self.u, state[2:])
-        return self.spline(self.map_places(state)) + datum - self.second
+        self.last_depth = self.spline(self.map_places(state)) + datum - self.second
+        return self.last_depth
 
     def compute_jacobian(self, state) -> np.ndarray:
         """Return the derivative (n, 5) of the depth by the state."""

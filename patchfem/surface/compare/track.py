@@ -3,6 +3,7 @@
 An end is a change point from the unworn surface to a flank, by profile likelihood.
 """
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -52,7 +53,7 @@ def find_spans(section: Section) -> list[tuple[int, int]]:
     changed = np.abs(section.depth) > UNWORN_LIMIT * section.noise
     changed |= section.worn
     spans = find_runs(section.worn)
-    gaps = [later[0] - earlier[1] for earlier, later in zip(spans, spans[1:])]
+    gaps = [later[0] - earlier[1] for earlier, later in pairwise(spans)]
     max_gap = MAX_CUT_SAMPLES
     gap_fraction = MAX_GAP_FRACTION
     if len(spans) >= MIN_FRAGMENTS:
@@ -93,7 +94,7 @@ def find_ends(section: Section, span: tuple[int, int]) -> tuple[End, End]:
 
     # Worn tops do not show where between the last one and the next unworn one the track ends.
     runs = find_runs(section.worn[first : last + 1])
-    gaps = [section.x[first + b[0]] - section.x[first + a[1]] for a, b in zip(runs, runs[1:])]
+    gaps = [section.x[first + b[0]] - section.x[first + a[1]] for a, b in pairwise(runs)]
     if len(runs) >= MIN_FRAGMENTS:
         start = start._replace(low=start.low - max(gaps[:N_END_GAPS]))
         stop = stop._replace(low=stop.low - max(gaps[-N_END_GAPS:]))
@@ -229,7 +230,7 @@ def _average(section: Section, name: str, first: float, last: float) -> Quantity
 def _measure_floor(section: Section, start: float, width: float) -> Quantity:
     """Return the mean depth of the deepest fifth of the width."""
     edges = start + width * np.arange(N_FIFTHS + 1) / N_FIFTHS
-    parts = [_average(section, "depth_floor", *ends) for ends in zip(edges, edges[1:])]
+    parts = [_average(section, "depth_floor", *ends) for ends in pairwise(edges)]
     return max(parts, key=lambda part: part.value)
 
 
