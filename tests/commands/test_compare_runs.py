@@ -72,9 +72,8 @@ def test_exact_wear_measures_agree_with_archard(result_folders, before):
         quantity = found[name]
         assert quantity["value"] == pytest.approx(truth, rel=1e-11)
         assert quantity["low"] <= truth <= quantity["high"]
-    assert set(NAMES) | {"hidden_wear", "worn_share", "track", "registration", "removed"} <= set(
-        found
-    )
+    names = {name for name in NAMES if "ratio" not in name}
+    assert names | {"hidden_wear", "worn_share", "track", "registration", "removed"} <= set(found)
     track = found["track"]
     deepest = found["worn_depth_max"]["value"]
     width = track["to"]["value"] - track["from"]["value"]
@@ -107,7 +106,7 @@ def test_exact_hidden_wear_of_tilted_patch(result_folders):
     mean = found["worn_depth_mean"]["value"]
     hidden = found["hidden_wear"]["value"]
     assert 0.8 * mean < hidden < mean
-    assert "which a trace of the whole patch alone cannot show" in found["sentences"][1]
+    assert "which a trace alone cannot show" in found["sentences"][1]
     found = pf.compare(result_folders / "new", result_folders / "half")
     assert found["hidden_wear"]["value"] == 0
     track = found["track"]
@@ -118,7 +117,7 @@ def test_exact_hidden_wear_of_tilted_patch(result_folders):
         < track["depth_mean"]["value"]
     )
     assert end < 0
-    assert "which a trace within this part alone cannot show" in found["sentences"][1]
+    assert not any("cannot show" in text for text in found["sentences"])
 
 
 def test_exact_hidden_line_is_highest_line_below_depth():
@@ -308,7 +307,7 @@ def test_exact_strips_are_compared_over_area(result_folders):
     assert depth.max() == found["worn_depth_max"]["value"]
     assert found["track"] is None and "y = -3.75 mm" in found["sentences"][0]
     hidden = found["hidden_wear"]["value"]
-    assert "which a scan of the whole patch alone cannot show" in found["sentences"][1]
+    assert "which a scan alone cannot show" in found["sentences"][1]
     assert 0 < hidden < found["worn_depth_mean"]["value"]
 
 

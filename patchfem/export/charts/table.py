@@ -467,8 +467,8 @@ COMPARE = (
         ("before", "after"),
         marks=("track_end",),
         labels=("x of the second trace", "height"),
-        caption="The trace measured after wear, moved by shift, tilt and offset onto the one measured before. Vertical lines: "
-        "ends of the tracks.",
+        caption="The trace measured after wear, moved by shift, tilt and offset onto the one measured before. "
+        "Vertical lines: ends of the tracks.",
     ),
     Chart(
         "Worn depth",
@@ -476,8 +476,8 @@ COMPARE = (
         ("depth", "hidden_depth"),
         marks=("track_end",),
         labels=("", "worn depth"),
-        caption="Depth of the surface after wear below the one before. Band: 95 % noise of a single depth. Vertical lines: ends "
-        "of the worn parts.",
+        caption="Depth of the surface after wear below the one before. Band: 95 % noise of a single depth. Vertical "
+        "lines: ends of the worn parts.",
     ),
     Chart(
         "Both traces, each about its own line",

@@ -20,11 +20,11 @@ _OWN = {
     "worn_share": ("1", "fraction of the common area, or of the area of the patch, that is worn"),
     "hidden_wear": (
         "m",
-        "largest mean of an even or wedge-shaped wear that measured surfaces cannot show, because it is a shift of the datum",
+        "largest mean of an even or wedge-shaped wear, which measured surfaces show as a shift of the datum",
     ),
     "track_hidden_wear": (
         "m",
-        "mean of the even or wedge-shaped part of the wear within the worn part, which a trace of this part alone cannot show",
+        "mean of the even or wedge-shaped wear of the worn part, which a trace of this part alone cannot show",
     ),
     "wear_coefficient": (
         "m2 N-1",

@@ -22,12 +22,12 @@ KINDS = {
     "nothing": "traces that cannot be registered to each other",
 }
 MEANS_NOTE = (
-    "Means have equal weights; their interval is the 95 % interval by Student's t from the scatter of the pairs, or from the "
-    "intervals of the pairs if these give a wider one. It does not include an error that all pairs share, such as calibration."
+    "Means have equal weights; their 95 % interval follows by Student's t from the scatter of the pairs, or from the "
+    "intervals of the pairs if it is wider. An error that all pairs share, such as calibration, is not included."
 )
 SHARED_NOTE = (
-    "Some pairs share the surface measured before wear; its errors are common to these pairs, and the intervals of the means "
-    "do not include them."
+    "Some pairs share the surface measured before wear; the intervals of the means do not include its errors, which are "
+    "common to these pairs."
 )
 
 

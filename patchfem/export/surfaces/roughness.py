@@ -29,10 +29,10 @@ INTERVAL_NOTE = (
     "heights with the spectrum of this trace."
 )
 MEANS_NOTE = (
-    "Means have equal weights, and 95 % intervals by Student's t from the scatter of the files, without errors that all files "
-    "share, such as calibration."
+    "Means have equal weights, and 95 % intervals by Student's t from the scatter of the files; an error that all files "
+    "share, such as calibration, is not included."
 )
-SIZES_NOTE = "The files differ in length or step, so that the means of extremes and slopes mix quantities that are defined differently."
+SIZES_NOTE = "The files differ in length or step, so that the means of extremes and slopes mix different quantities."
 TWICE_NOTE = "One file is given twice, so that it counts twice in the means."
 
 

@@ -18,8 +18,8 @@ from patchfem.export.surfaces import compare, definitions, sentences
 STATED = {
     "worn": "Worn depth 600.0 nm (596.0 to 604.0), the mean over the common length.",
     "no_wear": "No wear is shown: the mean worn depth over the common length is at most 12 nm.",
-    "grown": "40 um^2 stand above the first surface and 0 um^2 are lost",
-    "worn_and_grown": "Worn depth 600.0 nm (596.0 to 604.0), the mean over the common length, and material grew: 35 um^2 lost",
+    "grown": "40 um^2 stand above the first surface, 0 um^2 are lost",
+    "worn_and_grown": "(596.0 to 604.0), the mean over the common length, and material grew: 35 um^2 lost",
     "growth_at_ends": "a scar of 2 um over nearly all of the surface, or 2.1 um of material that grew at the ends: both are",
     "elsewhere": "Not comparable: the two surfaces have no part in common",
     "no_datum": "too few heights agree (0.12 of all)",
