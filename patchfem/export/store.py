@@ -204,7 +204,10 @@ def format_curves(answer: Answer) -> dict[str, str]:
     """
     files = {}
     for name, columns in CURVES.get(answer.kind, {}).items():
-        lists = _list_columns(answer.data, columns)
+        if isinstance(columns, Rows):
+            lists = _tabulate(answer.details[columns.source], columns)
+        else:
+            lists = _list_columns(answer.data, columns)
         if lists:
             output = io.StringIO()
             writer = csv.writer(output, lineterminator="\n")
@@ -214,16 +217,10 @@ def format_curves(answer: Answer) -> dict[str, str]:
     return files
 
 
-def _list_columns(data: dict[str, Variable], columns: dict | Stack | Rows | str) -> dict[str, list]:
+def _list_columns(data: dict[str, Variable], columns: dict | Stack | str) -> dict[str, list]:
     """Return the columns of a CSV file: heading with unit -> cells."""
     if isinstance(columns, Stack):
         return _stack_columns(data, columns)
-    if isinstance(columns, Rows):
-        return {
-            _head(name, variable): _list_cells(variable)
-            for name, variable in data.items()
-            if variable.dims == (columns.dimension,)
-        }
     if isinstance(columns, str):
         return {
             name: _list_cells(variable)
@@ -242,6 +239,31 @@ def _list_columns(data: dict[str, Variable], columns: dict | Stack | Rows | str)
         else:
             lists[_head(title, variable)] = _list_cells(variable)
     return lists if len(lists) > 1 else {}
+
+
+def _tabulate(rows: list[dict], columns: Rows) -> dict[str, list]:
+    """Return the columns of a list of objects: texts, and the value and the interval of each quantity."""
+    lists = {}
+    for name in columns.texts:
+        if name == "labels":
+            labels = dict.fromkeys(label for row in rows for label in row["labels"])
+            lists |= {label: [row["labels"].get(label, "") for row in rows] for label in labels}
+        else:
+            lists[name] = [row.get(name) or "" for row in rows]
+
+    cells = [row[columns.nested] if columns.nested else row for row in rows]
+    units = {
+        name: cell["unit"]
+        for row in cells
+        for name, cell in row.items()
+        if isinstance(cell, dict) and "value" in cell
+    }
+    for name, unit in units.items():
+        for key, suffix in (("value", ""), ("low", "_low"), ("high", "_high")):
+            numbers = [row.get(name, {}).get(key) for row in cells]
+            head = f"{name}{suffix}" if unit == "1" else f"{name}{suffix} [{unit}]"
+            lists[head] = ["" if number is None else number for number in numbers]
+    return lists
 
 
 def _stack_columns(data: dict[str, Variable], stack: Stack) -> dict[str, list]:

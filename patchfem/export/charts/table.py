@@ -67,9 +67,16 @@ class Stack:
 
 @dataclass(frozen=True, slots=True)
 class Rows:
-    """Columns of a CSV file for all variables of a dimension, with units in their headings."""
+    """Columns of a CSV file for a list of objects in the details of an answer.
 
-    dimension: str
+    source: key of the list; texts: keys of texts in each object, where an object `labels` gives a column for each of its
+    keys; nested: key of the quantities in each object, "" if they are its own keys. A quantity has three columns, NAME,
+    NAME_low and NAME_high.
+    """
+
+    source: str
+    texts: tuple[str, ...]
+    nested: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -491,15 +498,24 @@ COMPARE = (
         "x",
         ("depth_map",),
         "map",
+        labels=("", "worn depth"),
         caption="Depth of the second surface below the first, once both are aligned; white: not measured.",
     ),
-    Chart("Surface before", "x", ("before_map",), "map", caption="Before wear."),
+    Chart(
+        "Surface before",
+        "x",
+        ("before_map",),
+        "map",
+        labels=("", "height"),
+        caption="Height, or gap between the pieces of a run, before wear.",
+    ),
     Chart(
         "Surface after",
         "x",
         ("after_map",),
         "map",
-        caption="After wear, aligned with the first surface.",
+        labels=("", "height"),
+        caption="Height, aligned with the first surface, or gap between the pieces of a run, after wear.",
     ),
     Chart(
         "Mean section of the track",
@@ -590,6 +606,7 @@ PROFILE = (
         "x",
         ("height_map",),
         "map",
+        labels=("", "height"),
         caption="Heights from which the parameters are computed.",
     ),
     Chart(
@@ -651,9 +668,14 @@ CURVES: dict[str, dict[str, dict[str, str] | Stack | Rows | str]] = {
             "difference": "depth_difference",
         },
     },
-    "pairs": {"pairs.csv": Rows("pair")},
+    "pairs": {
+        "pairs.csv": Rows(
+            "pairs",
+            ("before", "after", "direction", "labels", "outcome", "verdict", "message"),
+        )
+    },
     "profile": {
-        "profile.csv": Rows("file"),
+        "profile.csv": Rows("profiles", ("file",), "measures"),
         "primary.csv": {"x": "x", "z": "primary"},
         "roughness.csv": {"x": "x_rough", "z": "roughness"},
     },
@@ -781,7 +803,7 @@ TABLES: dict[str, tuple[Table, ...]] = {
         ),
         Table(
             "Each pair",
-            "pair",
+            "pairs",
             (
                 Column("before", "before"),
                 Column("after", "after"),

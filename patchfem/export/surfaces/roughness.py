@@ -15,7 +15,7 @@ from ...surface.roughness.report import RoughnessReport
 from ...surface.roughness.spectrum import BAND
 from ..answer import Answer, Remarks, Variable
 from . import sentences
-from .variables import along, maps, table
+from .variables import along, maps
 
 KINDS = {"profile": "traces", "areal": "scans"}
 CONFIDENCE = 0.9  # of the interval of a parameter of a single trace, from 5 to 95 %
@@ -88,7 +88,7 @@ def make_answer(reports: list[RoughnessReport]) -> Answer:
         title="Roughness of " + ", ".join(Path(each.source).name for each in reports),
         verdict=(*headlines, *treatments)[: sentences.MAX_SENTENCES],
         quantities=quantities,
-        data=_make_data(reports, profiles),
+        data=_make_data(reports),
         remarks=Remarks(tuple(cautions), (*notes, *([MEANS_NOTE] if means else []))),
         details={"patchfem": __version__, "profiles": profiles, "means": means},
         origin={"patchfem": __version__},
@@ -191,10 +191,9 @@ def _find_moments(each: RoughnessReport) -> dict | None:
     return {"cutoff": cutoff, **values, "notes": notes}
 
 
-def _make_data(reports: list[RoughnessReport], profiles: list[dict]) -> dict[str, Variable]:
-    """Return the table of all files, their Abbott curves, and the profiles, map and spectrum of a single file."""
+def _make_data(reports: list[RoughnessReport]) -> dict[str, Variable]:
+    """Return the Abbott curves of all files, and the profiles, map and spectrum of a single file."""
     data = along("file", "", file=np.array([each.source for each in reports]))
-    data |= table("file", [profile["measures"] for profile in profiles])
     curves = [abbott_curve(each.heights) for each in reports]
     data |= along("material_ratio", "1", material_ratio=curves[0][0])
     heights = np.array([height for _, height in curves])
