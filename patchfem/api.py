@@ -31,7 +31,19 @@ from .campaigns.fits.request import FitOptions
 from .campaigns.sweeps import case_models as case_models
 from .campaigns.sweeps import executors, parse_request
 from .core import Measure, Missing, NotConverged, Outcome, PatchfemError
-from .export import backbones, convert, costs, fits, page, pieces, run_folder, runs, show, store
+from .export import (
+    backbones,
+    convert,
+    costs,
+    fits,
+    netcdf,
+    page,
+    pieces,
+    run_folder,
+    runs,
+    show,
+    store,
+)
 from .export.charts import axes as chart_axes
 from .export.fields import grids
 from .export.folder import Folder
@@ -545,7 +557,7 @@ def backbone(
         lengths = axes.read_lengths(_format_lengths(amplitudes), "amplitudes")
     name = _require_string(mode, "backbone: mode")
     curves = backbone_curves.compute_backbone(model, name, lengths, methods)
-    return backbones.make_answer(curves.add_notes(notes), model.source).to_xarray()
+    return netcdf.to_dataset(backbones.make_answer(curves.add_notes(notes), model.source))
 
 
 @_strip_file_and_line_from_errors
@@ -1533,7 +1545,7 @@ class Result(run_result.Result):
 
     def to_xarray(self) -> Dataset:
         """Return the time histories and fields of the run with units and scene, as in result.nc."""
-        return runs.make_answer(self).to_xarray()
+        return netcdf.to_dataset(runs.make_answer(self))
 
     def to_pyvista(self, frame: int | None = -1) -> Any:
         """Return both pieces and their interface as PyVista grids, with the fields of fields.vtkhdf.

@@ -23,7 +23,7 @@ from command_line import (
 from scene_texts import BENCH, COATED, COULOMB, PLASTIC, POINT, SHEAR, STRUCTURE, TRIANGLE
 
 import patchfem as pf
-from patchfem.export.summary import PACKAGES, package_versions
+from patchfem.export.runs import PACKAGES, list_versions
 
 RIG = Path(__file__).parents[1] / "studies" / "rig" / "rig.toml"
 PATCH = COATED + '[contact.tilt]\nangle = "0.1 mrad"\n'
@@ -294,7 +294,7 @@ def test_always_help_and_check_are_fast(write_scene, words):
 
 def test_exact_versions_of_installed_packages():
     """The listed versions are those of the installed packages, also with importlib.metadata loaded lazily."""
-    found = package_versions()
+    found = list_versions()
     assert set(found) == {"python", *PACKAGES}
     assert all(found[name] == version(name) for name in PACKAGES)
     for use in (

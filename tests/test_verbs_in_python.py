@@ -83,7 +83,7 @@ def test_exact_functions_are_not_hidden_by_subpackages(tmp_path):
     """`pf.mesh` and `pf.export` stay functions after the subpackages of the same names are imported."""
     for _ in range(2):
         assert pf.mesh(PIECES, tmp_path / "pieces.vtu").is_file()
-        import patchfem.export.results
+        import patchfem.export.folder
         import patchfem.mesh.files  # noqa: F401
     with pytest.raises(pf.PatchfemError, match="only a scene with"):
         pf.mesh(TEXT, tmp_path / "none.vtu")

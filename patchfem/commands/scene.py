@@ -9,7 +9,6 @@ from cyclopts import Parameter
 from .. import cost_model
 from ..campaigns.sweeps import estimate, parse_request
 from ..effects import law_has_trait, list_displayed_absent_effects
-from ..export.written import shorten_number
 from ..formatting import format_quantity, rewrite_powers_of_ten
 from ..mesh import files as mesh_files
 from ..model import files as model_files
@@ -128,7 +127,7 @@ def _plan_sweep(scene: Path, sets, what: CaseOptions, json_: bool, verbose: bool
         return
     print(
         "case     "
-        + ", ".join(f"{key} {shorten_number(text)}" for key, text in plan_data["case"].items())
+        + ", ".join(f"{key} {text}" for key, text in plan_data["case"].items())
         + " (the first case); the lines below describe this case, except that `cost` and `sweep` are for the whole "
         "sweep"
     )

@@ -128,11 +128,5 @@ class Answer:
         """Whether the answer is that of a single run."""
         return self.kind in RUN_KINDS
 
-    def to_xarray(self):
-        """Return the arrays as an xarray.Dataset with the attributes of the netCDF file."""
-        from .netcdf import to_dataset
-
-        return to_dataset(self)
-
 
 RUN_KINDS = ("patch", "bench", "rig", "linear")

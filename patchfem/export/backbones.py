@@ -46,11 +46,18 @@ def make_answer(backbone: Backbone, source, command: str = "") -> Answer:
         verdict=_make_verdict(backbone, measures),
         quantities=measures,
         data=_make_data(backbone),
-        remarks=Remarks(notes=(*backbone.notes, *backbone.answer.sentences[1:])),
+        remarks=Remarks(
+            notes=(*map(_make_sentence, backbone.notes), *backbone.answer.sentences[1:])
+        ),
         details=_make_details(backbone, measures),
         # the drive of the scene is ignored
         origin=origin | {"driven": "", "command": command or origin["command"]},
     )
+
+
+def _make_sentence(text: str) -> str:
+    """Return a clause as a sentence."""
+    return f"{text[0].upper()}{text[1:].rstrip('.')}."
 
 
 def find_curve(backbone: Backbone) -> Curve | None:
@@ -154,7 +161,7 @@ def _make_verdict(backbone: Backbone, measures: dict[str, Quantity]) -> tuple[st
             changes.append(f"{label} {verb} from {texts[0]} to {texts[1]}")
     ends = [format_quantity(float(curve.amplitude[k]), "m", 3) for k in (0, -1)]
     span = f"from {ends[0]} to {ends[1]}" if curve.amplitude.size > 1 else f"at {ends[0]}"
-    headline = f"The {changes[0]} and the {changes[1]}, {span} at the output."
+    headline = f"{changes[0][0].upper()}{changes[0][1:]}, {changes[1]}, {span}."
 
     if backbone.flutter is None:
         amplitude = show("amplitude_of_largest_damping")
@@ -168,21 +175,25 @@ def _make_verdict(backbone: Backbone, measures: dict[str, Quantity]) -> tuple[st
 
 
 def _make_data(backbone: Backbone) -> dict[str, Variable]:
-    """Return the curves of all methods, the recommended one first, with the band of tests around it."""
-    data = {}
+    """Return the curves of all methods, the recommended one first, and the band of tests around it.
+
+    The band has variables of its own and, for the charts, is the interval of the recommended curve.
+    """
+    records = [
+        (method.replace("-", "_"), backbone.curves[method], COLUMNS, f", by {method}")
+        for method in PREFERRED_METHODS
+        if method in backbone.curves
+    ]
     band = backbone.answer.band
-    for method in PREFERRED_METHODS:
-        if method not in backbone.curves:
-            continue
-        prefix = method.replace("-", "_")
-        names = [(backbone.curves[method], name) for name in COLUMNS]
-        if band is not None and band.method == method:
-            names += [(band, name) for name in BAND_COLUMNS[1:]]
-        for record, name in names:
+    if band is not None:
+        records.insert(1, (records[0][0], band, BAND_COLUMNS[1:], ""))
+        records.append(("band", band, BAND_COLUMNS, ""))
+    data = {}
+    for prefix, record, names, end in records:
+        for name in names:
             unit, text = TEXTS[name]
             values = np.asarray(getattr(record, name), float)
-            dims = (f"{prefix}_amplitude",)
-            data[f"{prefix}_{name}"] = Variable(dims, values, unit, f"{text}, by {method}")
+            data[f"{prefix}_{name}"] = Variable((f"{prefix}_amplitude",), values, unit, text + end)
     return data
 
 

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 
 from ..core import Missing, PatchfemError
-from ..disk.atomic_write import explain_mkdir_error
 from . import lab, pieces
 from .fields import grids
 from .fields.vtkhdf import NAME, Frames, find_fields, read_frames
@@ -52,7 +51,7 @@ def export_results(
                 "--frame can be used only with fields (.vtu, .csv); a file of histories contains "
                 "all times"
             )
-        _create_parent_folder(out)
+        grids.create_folder(out.parent)
         return write.export_histories(folder, out)
     if histories:
         raise PatchfemError(
@@ -75,7 +74,7 @@ def export_results(
         )
     frames = read_frames(find_fields(folder))
     number = grids.find_frame(frames, frame)
-    _create_parent_folder(out)
+    grids.create_folder(out.parent)
     grids.export_frames(frames, out, number)
     if out.suffix in SERIES_FORMATS:
         return f"{out}: {len(frames.times)} frames"
@@ -127,7 +126,7 @@ def view_results(
     if out is None:
         _open_window(frames, number, title)
         return ""
-    _create_parent_folder(out)
+    grids.create_folder(out.parent)
     if is_film:
         return pieces.write_film(frames, title, magnify, out)
     return pieces.write_picture(frames, number, title, magnify, out)
@@ -159,13 +158,3 @@ def _open_window(frames: Frames, number: int, title: str) -> None:
         plotter.add_mesh(parts[side], scalars="von_mises", scalar_bar_args=bar)
     plotter.view_xy()
     plotter.show()
-
-
-def _create_parent_folder(out: Path) -> None:
-    """Create the folder of an output file; Missing if it cannot be created."""
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise Missing(
-            f"{out}: the folder of this file cannot be made ({explain_mkdir_error(error)})"
-        ) from None

@@ -55,9 +55,9 @@ def make_answer(curves: dict[str, list[Cost]], model: Model, command: str = "") 
         verdict=_make_verdict(curves, tolerance),
         quantities=_make_quantities(knob, runs, tolerance),
         data=_collect_table(curves) | _collect_points(curves, tolerance),
-        remarks=Remarks(notes=tuple(dict.fromkeys(r for run in runs for r in run.remedies))),
+        remarks=Remarks(notes=tuple(dict.fromkeys(text for run in runs for text in run.remedies))),
         details={knob: describe_runs(knob, runs, tolerance) for knob, runs in curves.items()},
-        origin=origin | {"command": command or origin["command"]},
+        origin=origin | {"driven": "", "command": command or origin["command"]},
     )
 
 
@@ -111,7 +111,7 @@ def _make_verdict(curves: dict[str, list[Cost]], tolerance: float) -> tuple[str,
         run = _find_scene_run(knob, runs, tolerance)
         worst = find_worst_run_error(run)
         meets = "meets" if run.meets_tolerance() else "misses"
-        error = f", with a largest error of {format_number(worst.fraction, 2)} in {worst.name}"
+        error = f", with a largest error of {format_number(worst.fraction, 2)} in {worst.name.replace('_', ' ')}"
         sentences.append(
             f"At its tolerance {tolerance:g} the scene takes {format_number(run.seconds, 2)} CPU s and {meets} the "
             f"tolerance{error if worst.name else ''}."
@@ -151,9 +151,10 @@ def _make_quantities(knob: str, runs: list[Cost], tolerance: float) -> dict[str,
 
 
 def _find_main_measure(runs: list[Cost]) -> str:
-    """Return the first of the key quantities that the runs have, else the first measure with an error."""
+    """Return the least accurate of the key quantities in the first and coarsest run, else of all measures."""
     names = find_measures_with_error(runs)
-    return next((name for name in quantities.KEY if name in names), names[0])
+    names = [name for name in quantities.KEY if name in names] or names
+    return find_worst_error(runs[0], names, runs[0].tolerance or 1.0).name or names[0]
 
 
 def _find_unit(name: str) -> str:
@@ -195,14 +196,19 @@ def _collect_points(curves: dict[str, list[Cost]], tolerance: float) -> dict[str
     rows = [(knob, runs, run) for knob, runs in curves.items() for run in runs]
     worst = [_find_worst(knob, runs, run, tolerance) for knob, runs, run in rows]
     allowed = np.array([run.tolerance or tolerance for *_, run in rows])
+    seconds = [run.seconds for *_, run in rows]
     name = _find_main_measure(rows[0][1])
 
     # one colour for each varied setting and for runs that miss the tolerance
     errors = np.array([one.fraction for one in worst])
-    texts = []
-    for (knob, *_), error, limit in zip(rows, errors, allowed, strict=True):
-        prefix = f"{KNOB_TEXTS.get(knob, knob.replace('_', ' '))}: " if len(curves) > 1 else ""
-        texts.append(f"{prefix}{'meets' if error <= limit else 'misses'} its tolerance")
+    results = [
+        f"{'meets' if error <= limit else 'misses'} its tolerance"
+        for error, limit in zip(errors, allowed, strict=True)
+    ]
+    varied = [KNOB_TEXTS.get(knob, knob.replace("_", " ")) for knob, *_ in rows]
+    texts = results
+    if len(curves) > 1:
+        texts = [": ".join(pair) for pair in zip(varied, results, strict=True)]
     meanings = tuple(dict.fromkeys(texts))
     codes = np.array([meanings.index(text) for text in texts], np.int8)
 
@@ -212,21 +218,23 @@ def _collect_points(curves: dict[str, list[Cost]], tolerance: float) -> dict[str
 
     points = {
         "label": column([run.label for *_, run in rows], ""),
-        "cpu_seconds": column([run.seconds for *_, run in rows], "s", "CPU time of the run"),
+        "cpu_seconds": column(seconds, "s", "CPU time of the run"),
         # an exact run has no place on a logarithmic axis
         "largest_error": column(np.where(errors > 0, errors, np.nan)),
         "worst_measure": column([one.name.replace("_", " ") for one in worst], ""),
-        "allowed_error": column(allowed, text="tolerance of the run"),
+        "allowed_seconds": Variable(("end",), np.array([min(seconds), max(seconds)]), "s"),
+        "allowed_error": Variable(("end",), np.full(2, tolerance), text="tolerance of the scene"),
         "value": column(
             [run.values.get(name, math.nan) for *_, run in rows],
             _find_unit(name),
             name.replace("_", " "),
         ),
         "value_error": column([run.errors.get(name, math.nan) for *_, run in rows]),
+        "result": column(results, ""),
         "outcome": Variable(("point",), codes, "", meanings=meanings),
     }
     if len(curves) > 1:
-        points["varied"] = column([knob.replace("_", " ") for knob, *_ in rows], "")
+        points["varied"] = column(varied, "")
     for key, text in (("nodes", "nodes of the interface"), ("steps", "time steps per cycle")):
         counts = [getattr(run, key) or math.nan for *_, run in rows]
         if np.isfinite(counts).any():

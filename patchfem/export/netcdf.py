@@ -10,13 +10,13 @@ import h5netcdf
 import h5py
 import numpy as np
 
-from ..disk.atomic_write import write_atomically
+from ..disk.atomic_write import open_lossy, write_atomically
 from .answer import Answer, Variable
 
 MIN_COMPRESSED_VALUES = 100  # arrays with fewer values are stored without compression
 
 
-def make_attributes(answer: Answer) -> dict[str, str]:
+def make_attributes(answer: Answer) -> dict[str, str | float | list[str]]:
     """Return the attributes of the file: program, scene and result, without host and path."""
     origin = answer.origin
     attributes = {
@@ -30,6 +30,9 @@ def make_attributes(answer: Answer) -> dict[str, str]:
         attributes["outcome"] = answer.details["outcome"]
     if "resolved" in origin:
         attributes["scene"] = origin["resolved"]
+    if not answer.is_run:  # those of a run are in summary.json
+        numbers = {key: one for key, one in answer.details.items() if isinstance(one, str | float)}
+        attributes |= numbers | {"notes": list(answer.remarks.notes)}
     measures = {name: quantity.as_json() for name, quantity in answer.quantities.items()}
     attributes["measures"] = json.dumps(measures, ensure_ascii=False)
     return attributes
@@ -48,9 +51,15 @@ def variable_attributes(variable: Variable) -> dict:
 def write_netcdf(answer: Answer, path: Path) -> None:
     """Write the arrays of an answer as a netCDF4 file.
 
-    The file replaces an older one when it is complete.
+    The file replaces an older one when it is complete. HDF5 writes through `open_lossy`, because it would crash on a full
+    disk; the error is raised when the file is closed.
     """
-    with write_atomically(path) as partial, h5netcdf.File(partial, "w") as file:
+    with (
+        write_atomically(path) as partial,
+        open_lossy(partial) as opened,
+        h5py.File(opened, "w", track_order=True) as store,
+        h5netcdf.File(store, "w") as file,
+    ):
         file.attrs.update(make_attributes(answer))
         for name, variable in answer.data.items():
             _write_variable(file, name, variable)

@@ -15,7 +15,7 @@ import numpy as np
 from ..core import PatchfemError
 from ..disk.atomic_write import explain_write_error, write_text
 from ..formatting import format_number
-from . import quantities, store
+from . import quantities, several, store
 from .answer import Answer, Quantity
 from .charts import panels, plotly
 from .charts.table import CHARTS, TABLES, Column
@@ -101,7 +101,9 @@ def make_page(folders: list[Path]) -> str:
         figure["caption"] += f" {captions[figure['title']]}" if figure["title"] in captions else ""
     content = _describe(answers)
     content |= {
-        "tables": make_tables(first) if len(answers) == 1 else [],
+        "tables": make_tables(first)
+        if len(answers) == 1
+        else several.list_scene_differences(answers),
         "files": _list_files(folders[0]) if len(folders) == 1 else [],
         "figures": figures,
         "data": _pack([_strip(figure) for figure in figures]),
@@ -120,7 +122,7 @@ def _read_all(folders: list[Path]) -> dict[str, Answer]:
     for folder in folders:
         name = folder.resolve().name
         answers[f"{name} ({len(answers) + 1})" if name in answers else name] = store.read(folder)
-    if len({CHARTS[answer.kind] for answer in answers.values()}) > 1:
+    if len({"run" if answer.is_run else answer.kind for answer in answers.values()}) > 1:
         kinds = ", ".join(f"{name}: {answer.kind}" for name, answer in answers.items())
         raise PatchfemError(f"report: the folders have results of different kinds ({kinds})")
     return answers
@@ -128,7 +130,7 @@ def _read_all(folders: list[Path]) -> dict[str, Answer]:
 
 def _describe(answers: dict[str, Answer]) -> dict:
     """Return the parts of a page that are text: title, verdict, tiles, measures, notes and origin."""
-    several = len(answers) > 1
+    is_single = len(answers) == 1
     first = next(iter(answers.values()))
     names = dict.fromkeys(name for answer in answers.values() for name in answer.quantities)
     zeros = [
@@ -143,34 +145,40 @@ def _describe(answers: dict[str, Answer]) -> dict:
         {
             "name": f"measure-{name}",
             "label": name.replace("_", " "),
-            "texts": [_format_entry(name, answer) for answer in answers.values()],
-            "meaning": quantities.describe(name, first.kind),
+            "texts": [_format_entry(name, answer, first) for answer in answers.values()],
+            "meaning": _explain(name, answers),
         }
         for name in names
         if name not in zeros
     ]
-    if several and measures:
-        heading = {"name": "", "label": "", "texts": list(answers), "meaning": ""}
-        measures.insert(0, heading)
+    verdict = list(first.verdict)
+    if not is_single:
+        headlines = _label_all(answers, lambda answer: answer.verdict[:1])
+        verdict = headlines + several.compare_measures(answers)
+    content = {
+        "title": first.title or f"patchfem {first.kind}" if is_single else ", ".join(answers),
+        "subtitle": _subtitle(first) if is_single else f"{first.kind} · {len(answers)} results",
+        "verdict": verdict,
+        "warnings": _label_all(answers, lambda answer: answer.remarks.warnings),
+        "measures": measures,
+        "zeros": [name.replace("_", " ") for name in zeros],
+    }
+    if not is_single:
+        return content | {"heading": list(answers)}
+
     origin = first.origin
+    versions = ", ".join(f"{name} {text}" for name, text in origin.get("versions", {}).items())
     texts = [
         ("Scene", origin.get("scene", "")),
         ("Scene in SI with all defaults", origin.get("resolved", "")),
+        ("Versions", versions),
     ]
-    versions = ", ".join(f"{name} {text}" for name, text in origin.get("versions", {}).items())
-    return {
-        "title": " and ".join(answers) if several else first.title or f"patchfem {first.kind}",
-        "subtitle": _subtitle(first),
-        "verdict": _label_all(answers, lambda answer: answer.verdict[: 1 if several else None]),
-        "warnings": _label_all(answers, lambda answer: answer.remarks.warnings),
-        "notes": _label_all(answers, lambda answer: answer.remarks.notes),
-        "tiles": [] if several else make_tiles(first),
-        "measures": measures,
-        "open_measures": several,
-        "zeros": [name.replace("_", " ") for name in zeros],
-        "command": "" if several else origin.get("command", ""),
-        "effects": [] if several else first.details.get("effects", []),
-        "texts": [] if several else [part for part in (*texts, ("Versions", versions)) if part[1]],
+    return content | {
+        "notes": first.remarks.notes,
+        "tiles": make_tiles(first),
+        "command": origin.get("command", ""),
+        "effects": first.details.get("effects", []),
+        "texts": [part for part in texts if part[1]],
     }
 
 
@@ -210,13 +218,19 @@ def make_tiles(answer: Answer) -> list[dict[str, str]]:
     ]
 
 
-def _format_entry(name: str, answer: Answer) -> str:
-    """Return a measure as text, or why it has no value."""
-    quantity = answer.quantities.get(name)
-    if quantity is None:
-        return ""
-    text = quantities.format_quantity(name, quantity)
-    return f"{text} ({quantity.reason})" if quantity.value is None and quantity.reason else text
+def _format_entry(name: str, answer: Answer, first: Answer) -> str:
+    """Return a measure as text with its change from the first answer; "" if it is absent."""
+    return several.format_entry(name, answer.quantities.get(name), first.quantities.get(name))
+
+
+def _explain(name: str, answers: dict[str, Answer]) -> str:
+    """Return the definition of a measure, and why it has no value in an answer."""
+    found = [answer.quantities[name] for answer in answers.values() if name in answer.quantities]
+    kind = next(iter(answers.values())).kind
+    reasons = dict.fromkeys(one.reason for one in found if one.value is None and one.reason)
+    return " ".join(
+        [quantities.describe(name, kind), *(f"No value: {reason}." for reason in reasons)]
+    )
 
 
 def make_tables(answer: Answer) -> list[dict]:
@@ -243,7 +257,8 @@ def _find_rows(answer: Answer, source: str) -> list[dict]:
     for key in source.split("/"):
         content = content.get(key) if isinstance(content, dict) else None
     if isinstance(content, list):
-        return content
+        # the quantities of an object may be in an object of their own
+        return [row | row.get("measures", {}) for row in content]
     if isinstance(content, dict):
         return [{"name": name.replace("_", " "), **row} for name, row in content.items()]
     variables = {name: one for name, one in answer.data.items() if one.dims == (source,)}

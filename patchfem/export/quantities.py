@@ -87,10 +87,11 @@ KEY = (
 
 
 class Definition(NamedTuple):
-    """Unit and meaning of a quantity."""
+    """Unit and meaning of a quantity, and the number of digits that are displayed without an error."""
 
     unit: str
     text: str
+    digits: int = 4
 
 
 # kinds of answers whose quantities are defined in `surfaces.definitions`
@@ -142,7 +143,7 @@ QUANTITIES: dict[str, Definition] = {
     "offset_displacement": Definition(
         "m", "fitted distance of the first row from the position without stress"
     ),
-    "residual_rms": Definition("1", "root mean square of fitted minus measured values"),
+    "residual_rms": Definition("1", "root mean square of fitted minus measured values", 3),
     "residual_fraction": Definition(
         "1", "root mean square of fitted minus measured values, over the largest measured value"
     ),
@@ -173,7 +174,7 @@ QUANTITIES: dict[str, Definition] = {
     "largest_error": Definition(
         "1", "largest numerical error of a measure in this run, relative to its value and floor"
     ),
-    "tolerance": Definition("1", "accuracy.tolerance of the scene"),
+    "tolerance": Definition("1", "tolerance of the scene, its key accuracy.tolerance"),
 }
 FITTED_KEY = "value of this key of the scene that fits the measurement best, with its 95 % interval"
 
@@ -242,6 +243,8 @@ def format_quantity(name: str, quantity: Quantity) -> str:
     error = quantity.error
     ends = [abs(end) for end in (quantity.low, quantity.high) if end is not None]
     unit, scale = choose_scale(name, quantity.unit, max([abs(value), *ends]))
+    if error is None and not ends and name in QUANTITIES:
+        return f"{format_number(value * scale, QUANTITIES[name].digits)} {unit}".strip()
     if error is not None or not ends:
         texts = round_to_error(
             value * scale,

@@ -1,10 +1,11 @@
 """Arrays of a run as variables with dimensions, units and descriptions: the content of result.nc.
 
-In: a `Result` of `runs`. Out: {name: Variable}. VARIABLES lists the names of the histories and fields; the other parts of a
-run (levels, events, curve, decay, spectra, wear, measured readings, accuracy) have one function each.
+In: a `Result` of `runs`. Out: {name: Variable}. A row of VARIABLES says where a Result has an array; a new variable is a
+new row. What has to be computed or selected first has a function of its own.
 """
 
 import tomllib
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,154 +21,311 @@ from ..runs.results.result import Result, patch_surface
 from ..structure import drive_sizes
 from .answer import Variable
 
-STATUS_NAMES = ("open", "stick", "slip")
-ENERGIES = ("friction_work", "energy_stored", "energy_dissipated", "energy_created")
 # a measured row belongs to a run if its frequency differs by no more than this [Hz]
 SAME_FREQUENCY = 0.5
-HOLDER_PREFIX = "holder_"  # fields of the holders, which only fields.vtkhdf contains
+MEANINGS = {"status": ("open", "stick", "slip"), "event_kind": tuple(EVENT_KIND_NAMES)}
+FRICTIONLESS = ("slide", "slide_velocity", "friction_force")  # histories that a linear run has not
 
-# unit and description of the histories and of the fields along the interface
+
+class Row(NamedTuple):
+    """Variable of a run.
+
+    dims: its dimensions; the last ones of them for an array with fewer. unit: SI unit, "" for codes and names. text:
+    description. places: where a Result has it, as dotted names of attributes, keys and indices; the first that exists.
+    """
+
+    dims: str
+    unit: str
+    text: str
+    places: str
+
+
 VARIABLES = {
-    "time": ("s", "time"),
-    "relative_displacement": ("m", "displacement of the output relative to the base"),
-    "relative_velocity": ("m s-1", "velocity of the output relative to the base"),
-    "absolute_acceleration": ("m s-2", "acceleration at the output, base motion included"),
-    "base_acceleration": ("m s-2", "acceleration of the base"),
-    "slide": ("m", "relative displacement of the two surfaces of the interface"),
-    "slide_velocity": ("m s-1", "relative velocity of the two surfaces of the interface"),
-    "friction_force": ("N", "resultant friction force, positive when it opposes positive slip"),
-    "normal_load": ("N", "normal load on the interface"),
-    "lateral_displacement": ("m", "slide of the interface across the sliding direction"),
-    "lateral_velocity": ("m s-1", "velocity of the slide across the sliding direction"),
-    "lateral_force": ("N", "friction force across the sliding direction"),
-    "yaw_moment": (
+    "time": Row("time", "s", "time", "response.time"),
+    "relative_displacement": Row(
+        "time",
+        "m",
+        "displacement of the output relative to the base",
+        "response.output response.slide",
+    ),
+    "relative_velocity": Row(
+        "time",
+        "m s-1",
+        "velocity of the output relative to the base",
+        "response.output_rate response.rate",
+    ),
+    "absolute_acceleration": Row(
+        "time", "m s-2", "acceleration at the output, base motion included", "response.acceleration"
+    ),
+    "base_acceleration": Row(
+        "time", "m s-2", "acceleration of the base", "response.base_acceleration"
+    ),
+    "interface": Row(
+        "interface",
+        "",
+        "the two masses of the interface; 0 is the base",
+        "plan.model.rig.friction.names",
+    ),
+    "slide": Row(
+        "interface time",
+        "m",
+        "relative displacement of the two surfaces of the interface",
+        "response.extra.slides.T response.slide",
+    ),
+    "slide_velocity": Row(
+        "interface time",
+        "m s-1",
+        "relative velocity of the two surfaces",
+        "response.extra.slide_rates.T",
+    ),
+    "friction_force": Row(
+        "interface time",
+        "N",
+        "resultant friction force, positive when it opposes positive slip",
+        "response.extra.forces.T response.force",
+    ),
+    "lateral_displacement": Row(
+        "interface time",
+        "m",
+        "slide of the interface across the sliding direction",
+        "response.lateral response.extra.lateral_slides.T",
+    ),
+    "lateral_velocity": Row(
+        "interface time",
+        "m s-1",
+        "velocity of the slide across the sliding direction",
+        "response.extra.lateral_slide_rates.T",
+    ),
+    "lateral_force": Row(
+        "interface time",
+        "N",
+        "friction force across the sliding direction",
+        "response.lateral_force response.extra.lateral_forces.T",
+    ),
+    "yaw_moment": Row(
+        "time",
         "N m",
         "moment about +z of the friction on the upper piece, sum of y f_x - x f_y",
+        "response.yaw_moment",
     ),
-    "friction_work": ("J", "work done against friction since the start of the run"),
-    "energy_stored": ("J", "elastic energy of the interface"),
-    "energy_dissipated": ("J", "energy dissipated by friction since the start of the run"),
-    "energy_created": ("J", "energy created since the start by a friction law that is not passive"),
-    "modal_coordinate": ("m", "modal coordinate"),
-    "x": ("m", "position along the sliding direction"),
-    "weight": (
-        "m2",
-        "area of the interface that belongs to a node, summed over all pairs of pieces",
+    "friction_work": Row(
+        "time",
+        "J",
+        "work done against friction since the start",
+        "response.ledger.0 response.extra.ledger.0",
     ),
-    "frame_time": ("s", "time of the frame"),
+    "energy_stored": Row(
+        "time", "J", "elastic energy of the interface", "response.ledger.1 response.extra.ledger.1"
+    ),
+    "energy_dissipated": Row(
+        "time",
+        "J",
+        "energy dissipated by friction since the start",
+        "response.ledger.2 response.extra.ledger.2",
+    ),
+    "energy_created": Row(
+        "time",
+        "J",
+        "energy created since the start by a friction law that is not passive",
+        "response.ledger.3 response.extra.ledger.3",
+    ),
+    "mode": Row("mode", "", "mode or coordinate of the structure", "plan.model.rig.modes.names"),
+    "period": Row("", "s", "period of the drive", "extra.period"),
+    "strip_offset": Row(
+        "strip", "m", "position of the strip across the width", "patch.strips.offsets"
+    ),
+    "strip_normal_stress": Row(
+        "strip x",
+        "Pa",
+        "normal stress of each strip, compression positive",
+        "patch.strips.pressure",
+    ),
+    "event_time": Row("event", "s", "time of the event", "extra.events.time"),
+    "event_interface": Row(
+        "event",
+        "1",
+        "number of the interface or strip from 1; 0 for a change of the drive",
+        "extra.events.interface",
+    ),
+    "event_kind": Row(
+        "event", "", "kind of event; `up` means towards positive slip", "extra.events.kind"
+    ),
+    "event_slide": Row("event", "m", "relative displacement at the event", "extra.events.slide"),
+    "curve_frequency": Row("curve_point", "Hz", "drive frequency", "extra.curve.frequency"),
+    "curve_level": Row(
+        "curve_point",
+        "m s-2",
+        "drive: acceleration of the base, or force divided by the modal mass",
+        "extra.curve.level",
+    ),
+    "curve_amplitude": Row(
+        "curve_point", "m", "half the peak-to-peak motion at the output", "extra.curve.amplitude"
+    ),
+    "curve_amplitude_error": Row(
+        "curve_point", "m", "error of curve_amplitude", "extra.curve.amplitude_error"
+    ),
+    "curve_acceleration_peak": Row(
+        "curve_point", "m s-2", "largest absolute acceleration", "extra.curve.acceleration_peak"
+    ),
+    "curve_acceleration_peak_error": Row(
+        "curve_point",
+        "m s-2",
+        "error of curve_acceleration_peak",
+        "extra.curve.acceleration_peak_error",
+    ),
+    "curve_acceleration_fundamental": Row(
+        "curve_point",
+        "m s-2",
+        "first harmonic of the absolute acceleration",
+        "extra.curve.acceleration_fundamental",
+    ),
+    "curve_acceleration_fundamental_error": Row(
+        "curve_point",
+        "m s-2",
+        "error of curve_acceleration_fundamental",
+        "extra.curve.acceleration_fundamental_error",
+    ),
+    "curve_acceleration_distortion": Row(
+        "curve_point",
+        "1",
+        "third over first harmonic of the absolute acceleration",
+        "extra.curve.acceleration_distortion",
+    ),
+    "curve_acceleration_distortion_error": Row(
+        "curve_point",
+        "1",
+        "error of curve_acceleration_distortion",
+        "extra.curve.acceleration_distortion_error",
+    ),
+    "curve_multiplier": Row(
+        "curve_point", "1", "largest Floquet multiplier", "extra.curve.multiplier"
+    ),
+    "decay_time": Row(
+        "decay_time", "s", "time at the middle of the evaluated cycle", "extra.decay.time"
+    ),
+    "decay_amplitude": Row(
+        "decay_time", "m", "half the peak-to-peak motion of the output", "extra.decay.amplitude"
+    ),
+    "decay_frequency": Row("decay_time", "Hz", "frequency of the decay", "extra.decay.frequency"),
+    "decay_frequency_error": Row(
+        "decay_time", "Hz", "half-width of the interval", "extra.decay.frequency_error"
+    ),
+    "decay_damping": Row("decay_time", "1", "damping ratio of the decay", "extra.decay.damping"),
+    "decay_damping_error": Row(
+        "decay_time", "1", "half-width of the interval", "extra.decay.damping_error"
+    ),
+    "frequency": Row("frequency", "Hz", "frequency", "extra.spectra.frequency"),
+    "base_acceleration_spectrum": Row(
+        "frequency",
+        "m2 s-3",
+        "one-sided spectral density of the base acceleration",
+        "extra.spectra.drive",
+    ),
+    "relative_displacement_spectrum": Row(
+        "frequency",
+        "m2 Hz-1",
+        "one-sided spectral density of the output",
+        "extra.spectra.displacement",
+    ),
+    "absolute_acceleration_spectrum": Row(
+        "frequency",
+        "m2 s-3",
+        "one-sided spectral density of the acceleration at the output",
+        "extra.spectra.acceleration",
+    ),
+    "coherence": Row("frequency", "1", "coherence of drive and output", "extra.spectra.coherence"),
+    "gain_peak": Row("", "Hz", "frequency of the peak of H1", "measures.response_frequency.value"),
+    "wear_cycle": Row("wear_cycle", "1", "cycles of wear so far", "extra.wear.cycle"),
+    "wear_pressure_peak_at_edge": Row(
+        "wear_cycle",
+        "Pa",
+        "excess of a pressure peak at the edge of the contact over all pressures inside; else 0",
+        "extra.wear.pressure_peak_at_edge",
+    ),
+}
+# fields along the interface, by their names in `Result.fields`
+FIELDS = {
     "normal_stress": ("Pa", "normal stress at the nodes, compression positive"),
     "shear_stress": ("Pa", "frictional shear stress, positive when it opposes positive slip"),
     "gap": ("m", "gap that remains between the loaded surfaces"),
     "slip": ("m", "irreversible local slip"),
     "status": ("", "contact status; FILES.md defines slip"),
     "worn_depth": ("m", "worn depth, sum of both pieces"),
-    "unloaded_gap": ("m", "gap of the unloaded surfaces, wear included"),
-    "strip_offset": ("m", "position of the strip across the width"),
-    "strip_normal_stress": ("Pa", "normal stress at the nodes of each strip, compression positive"),
 }
 
 
 def collect_data(result: Result) -> dict[str, Variable]:
     """Return all arrays of a run, in SI units."""
-    data = _histories(result) | _loop(result)
-    if (period := result.extra.get("period")) is not None:
-        data["period"] = Variable((), np.array(float(period)), "s", "period of the drive")
-    data |= _patch(result)
+    data = {}
+    for name, row in VARIABLES.items():
+        found = (_look_up(result, place) for place in row.places.split())
+        values = next((one for one in found if one is not None), None)
+        if values is not None and np.size(values):
+            data[name] = _make_variable(name, row, values)
+    if result.plan.kind == "linear":
+        data = {name: one for name, one in data.items() if name not in FRICTIONLESS}
+    data |= _motion(result) | _loop(result) | _patch(result)
     for face in result.extra.get("faces", ()):
         data |= _face(face)
-    for key, collect in PARTS.items():
+    for key, collect in {
+        "levels": _levels,
+        "curve": _curve,
+        "spectra": _response,
+        "wear": _wear,
+    }.items():
         if key in result.extra:
             data |= collect(result)
     return data | _measured_readings(result) | _accuracy(result)
 
 
-def _variable(name: str, dims: tuple[str, ...], values) -> Variable:
-    """Return a variable of VARIABLES."""
-    unit, text = VARIABLES[name]
-    meanings = STATUS_NAMES if name == "status" else ()
-    return Variable(dims, np.asarray(values), unit, text, meanings)
+def _look_up(value, place: str):
+    """Return what a dotted place of attributes, keys and indices contains, or None."""
+    for name in place.split("."):
+        if isinstance(value, dict):
+            value = value.get(name)
+        elif name.isdigit():
+            value = value[int(name)]
+        else:
+            value = getattr(value, name, None)
+        if value is None:
+            return None
+    return value
 
 
-def _histories(result: Result) -> dict[str, Variable]:
-    """Return the histories of a run: on `time`, or on (interface, time) for each interface of a rig of masses."""
+def _make_variable(name: str, row: Row, values) -> Variable:
+    """Return the variable of a row; codes become small integers, names become strings."""
+    if name == "event_kind":
+        values = np.asarray(values, np.int8)
+    elif row.unit == "":
+        values = np.array([str(value) for value in values])
+    values = np.asarray(values)
+    dims = row.dims.split()
+    dims = tuple(dims[len(dims) - values.ndim :])
+    return Variable(dims, values, row.unit, row.text, MEANINGS.get(name, ()))
+
+
+def _motion(result: Result) -> dict[str, Variable]:
+    """Return the modal coordinates of a rig, and the normal load over time, which may be constant."""
     response = result.response
     if response is None:
         return {}
+    text = "normal load on the interface"
     if result.plan.kind == "bench":
-        columns = _bench_columns(response)
-    else:
-        columns = _rig_columns(result)
-    data = {"time": _variable("time", ("time",), response.time)}
-    for name, values in columns.items():
-        if values is not None:
-            data[name] = _variable(name, ("interface", "time")[-np.ndim(values) :], values)
+        return {"normal_load": Variable(("time",), np.asarray(response.load), "N", text)}
     rig = result.plan.model.rig
-    if rig is None:
-        return data
-
-    if rig.friction.names:
-        text = "the two masses of the interface; 0 is the base"
-        data["interface"] = Variable(("interface",), np.array(rig.friction.names, str), "", text)
-    names = np.array([str(name) for name in rig.modes.names])
-    data["mode"] = Variable(("mode",), names, "", "mode or coordinate of the structure")
     motions = structure.compute_named_motions(rig.modes, response.modal)
-    data["modal_coordinate"] = _variable("modal_coordinate", ("time", "mode"), motions)
-    return data
-
-
-def _bench_columns(response) -> dict:
-    """Return the histories of a bench by name; None for one that it does not have."""
-    return {
-        "relative_displacement": response.slide,
-        "relative_velocity": response.rate,
-        "slide": response.slide,
-        "friction_force": response.force,
-        "normal_load": response.load,
-        **dict(zip(ENERGIES, response.ledger, strict=False)),
-        "lateral_displacement": response.lateral,
-        "lateral_force": response.lateral_force,
-        "yaw_moment": response.yaw_moment,
-    }
-
-
-def _rig_columns(result: Result) -> dict:
-    """Return the histories of a rig by name, (k,) or (i, k) for i interfaces."""
-    response = result.response
-    extra = response.extra
-    columns = {
-        "relative_displacement": response.output,
-        "relative_velocity": response.output_rate,
-        "absolute_acceleration": response.acceleration,
-        "base_acceleration": response.base_acceleration,
-    }
+    data = {"modal_coordinate": Variable(("time", "mode"), motions, "m", "modal coordinate")}
     if result.plan.kind != "rig":
-        return columns
-    if "ledger" in extra:
-        columns |= dict(zip(ENERGIES, extra["ledger"], strict=False))
-    friction = result.plan.model.rig.friction
+        return data
     count = response.time.size
-    if not friction.names:
-        load = np.full(count, result.measures["normal_load"].value)
-        return columns | {
-            "slide": response.slide,
-            "friction_force": response.force,
-            "normal_load": extra.get("normal_load", load),
-        }
-
-    # an engine stores one row per sample for each interface, or the histories of a single interface
-    loads = np.array([interface.load for interface in friction.interfaces])
-    columns["normal_load"] = np.repeat(loads[:, None], count, axis=1)
-    sources = {
-        "slide": ("slides", response.slide),
-        "slide_velocity": ("slide_rates", response.slide_rate),
-        "friction_force": ("forces", response.force),
-    }
-    for name, (key, single) in sources.items():
-        columns[name] = extra[key].T if key in extra else single[None, :]
-    for name, key in (("displacement", "slides"), ("velocity", "slide_rates"), ("force", "forces")):
-        if f"lateral_{key}" in extra:
-            columns[f"lateral_{name}"] = extra[f"lateral_{key}"].T
-    return columns
+    if rig.friction.names:
+        loads = np.array([interface.load for interface in rig.friction.interfaces])
+        values = np.repeat(loads[:, None], count, axis=1)
+    else:
+        constant = np.full(count, result.measures["normal_load"].value)
+        values = np.asarray(response.extra.get("normal_load", constant))
+    data["normal_load"] = Variable(("interface", "time")[-values.ndim :], values, "N", text)
+    return data
 
 
 def _loop(result: Result) -> dict[str, Variable]:
@@ -232,54 +390,42 @@ def _measured_loop(result: Result) -> dict[str, Variable]:
 
 def _patch(result: Result) -> dict[str, Variable]:
     """Return the fields along the interface of a solved patch; the states of wear have frames of their own."""
-    patch = result.patch
-    surface = patch_surface(patch, result.fields)
+    surface = patch_surface(result.patch, result.fields)
     if surface is None:
         return {}
-    fields = {k: v for k, v in result.fields.items() if not k.startswith(HOLDER_PREFIX)}
+    fields = result.fields
     data = {}
     if "wear" in result.extra:
         shown = result.extra["wear_shown"]
-        data |= _wear_states(fields, shown["states"], shown["period"])
-        fields = {name: values[shown["states"] :] for name, values in fields.items()}
+        count = shown["states"]
+        cycles = fields["time"][: count + 1] / shown["period"]
+        data["wear_frame"] = Variable(("wear_frame",), cycles, "1", "cycles")
+        for name in ("normal_stress", "worn_depth"):
+            data[f"wear_{name}"] = _make_field(name, fields[name][: count + 1], "wear_frame")
+        fields = {name: values[count:] for name, values in fields.items()}
         fields["time"] = fields["time"] - fields["time"][0]
-    data |= _frames(fields, surface)
     gap = np.asarray(surface.unloaded_gap)
-    data["unloaded_gap"] = _variable("unloaded_gap", ("strip", "x")[-gap.ndim :], gap)
-    if patch.strips is not None:
-        data["strip_offset"] = _variable("strip_offset", ("strip",), patch.strips.offsets)
-        data["strip_normal_stress"] = _variable(
-            "strip_normal_stress", ("strip", "x"), patch.strips.pressure
-        )
-    return data
+    text = "gap of the unloaded surfaces, wear included"
+    data["unloaded_gap"] = Variable(("strip", "x")[-gap.ndim :], gap, "m", text)
+    return data | _frames(fields, surface)
 
 
 def _frames(fields: dict, surface) -> dict[str, Variable]:
-    """Return the fields along x in all frames."""
+    """Return positions and areas of the nodes, and the fields along x in all frames."""
+    area = "area of the interface that belongs to a node, summed over all pairs of pieces"
     data = {
-        "x": _variable("x", ("x",), surface.x),
-        "weight": _variable("weight", ("x",), surface.weight),
-        "frame_time": _variable("frame_time", ("frame",), fields["time"]),
+        "x": Variable(("x",), np.asarray(surface.x), "m", "position along the sliding direction"),
+        "weight": Variable(("x",), np.asarray(surface.weight), "m2", area),
+        "frame_time": Variable(("frame",), fields["time"], "s", "time of the frame"),
     }
-    for name, values in fields.items():
-        if np.ndim(values) >= 2:
-            dims = ("frame", "x") if np.ndim(values) == 2 else ("frame", "strip", "x")
-            data[name] = _variable(name, dims, values)
-    return data
+    return data | {name: _make_field(name, fields[name]) for name in FIELDS if name in fields}
 
 
-def _wear_states(fields: dict, count: int, period: float) -> dict[str, Variable]:
-    """Return pressure and worn depth of all states of wear, the last one included."""
-    cycles = fields["time"][: count + 1] / period
-    data = {"wear_frame": Variable(("wear_frame",), cycles, "1", "cycles")}
-    for name in ("normal_stress", "worn_depth"):
-        values = fields[name][: count + 1]
-        dims = ("wear_frame", "x") if values.ndim == 2 else ("wear_frame", "strip", "x")
-        unit, text = VARIABLES[name]
-        data[f"wear_{name}"] = Variable(
-            dims, values, unit, f"{text}, after the cycles of wear_frame"
-        )
-    return data
+def _make_field(name: str, values, frame: str = "frame") -> Variable:
+    """Return a field along x over frames, and over strips if it has three dimensions."""
+    unit, text = FIELDS[name]
+    dims = (frame, "x") if np.ndim(values) == 2 else (frame, "strip", "x")
+    return Variable(dims, np.asarray(values), unit, text, MEANINGS.get(name, ()))
 
 
 def _face(face) -> dict[str, Variable]:
@@ -324,138 +470,42 @@ def _levels(result: Result) -> dict[str, Variable]:
     return data
 
 
-def _events(result: Result) -> dict[str, Variable]:
-    """Return the list of events: stops, releases, reversals of the slip, changes of the drive."""
-    events = result.extra["events"]
-    dims = ("event",)
-    texts = {
-        "time": f"time of the event; {events.source}; {events.count} events in all",
-        "interface": "number of the interface or strip from 1; 0 for a change of the drive",
-        "kind": "kind of event; `up` means towards positive slip",
-        "slide": "relative displacement at the event",
-    }
-    return {
-        "event_time": Variable(dims, np.asarray(events.time, float), "s", texts["time"]),
-        "event_interface": Variable(
-            dims, np.asarray(events.interface, np.int32), "1", texts["interface"]
-        ),
-        "event_kind": Variable(
-            dims, np.asarray(events.kind, np.int8), "", texts["kind"], tuple(EVENT_KIND_NAMES)
-        ),
-        "event_slide": Variable(dims, np.asarray(events.slide, float), "m", texts["slide"]),
-    }
-
-
-CURVE_COLUMNS = {
-    "frequency": ("Hz", "drive frequency"),
-    "level": ("m s-2", "drive: acceleration of the base, or force divided by the modal mass"),
-    "amplitude": ("m", "half the peak-to-peak motion at the output"),
-    "acceleration_peak": ("m s-2", "largest absolute acceleration"),
-    "acceleration_fundamental": ("m s-2", "first harmonic of the absolute acceleration"),
-    "acceleration_distortion": ("1", "third over first harmonic of the absolute acceleration"),
-    "multiplier": ("1", "largest Floquet multiplier"),
-}
-
-
 def _curve(result: Result) -> dict[str, Variable]:
-    """Return a curve of steady motions with its regimes and folds."""
+    """Return the regimes and the folds of a curve of steady motions."""
     curve = result.extra["curve"]
-    dims = ("curve_point",)
-    data = {}
-    for name, (unit, text) in CURVE_COLUMNS.items():
-        for suffix in ("", "_error"):
-            if name + suffix in curve:
-                about = text if not suffix else f"estimated error of curve_{name}"
-                values = np.asarray(curve[name + suffix], float)
-                data[f"curve_{name}{suffix}"] = Variable(dims, values, unit, about)
     names, codes = np.unique(np.asarray(curve["regime"], str), return_inverse=True)
     text = "regime of the steady motion"
-    data["curve_regime"] = Variable(dims, codes.astype(np.int8), "", text, tuple(names.tolist()))
+    meanings = tuple(names.tolist())
+    data = {"curve_regime": Variable(("curve_point",), codes.astype(np.int8), "", text, meanings)}
     if len(curve.get("folds", ())):
-        is_over_frequency = np.ptp(curve["frequency"]) > 0
-        unit = "Hz" if is_over_frequency else "m s-2"
+        unit = "Hz" if np.ptp(curve["frequency"]) > 0 else "m s-2"
         folds = np.asarray(curve["folds"], float)
         data["curve_fold"] = Variable(("fold",), folds, unit, "where the curve turns back")
     return data
 
 
-def _decay(result: Result) -> dict[str, Variable]:
-    """Return frequency and damping ratio of a decay against its amplitude."""
-    decay = result.extra["decay"]
-    dims = ("decay_time",)
-    columns = {
-        "decay_time": ("s", "time at the middle of the evaluated cycle", decay.time),
-        "decay_amplitude": ("m", "half the peak-to-peak motion of the output", decay.amplitude),
-        "decay_frequency": ("Hz", "frequency of the decay", decay.frequency),
-        "decay_frequency_error": ("Hz", "half-width of the interval", decay.frequency_error),
-        "decay_damping": ("1", "damping ratio of the decay", decay.damping),
-        "decay_damping_error": ("1", "half-width of the interval", decay.damping_error),
-    }
+def _response(result: Result) -> dict[str, Variable]:
+    """Return magnitude and phase of the frequency response H1 of a random drive."""
+    gain = np.asarray(result.extra["spectra"].gain)
+    text = "of H1, displacement of the output over base acceleration"
     return {
-        name: Variable(dims, np.asarray(v), unit, text) for name, (unit, text, v) in columns.items()
+        "gain": Variable(("frequency",), np.abs(gain), "s2", f"magnitude {text}"),
+        "phase": Variable(("frequency",), np.angle(gain), "rad", f"phase {text}"),
     }
-
-
-def _spectra(result: Result) -> dict[str, Variable]:
-    """Return the spectra of a random response, and the frequency at which H1 has its peak."""
-    spectra = result.extra["spectra"]
-    dims = ("frequency",)
-    density = "one-sided spectral density of the"
-    columns = {
-        "frequency": ("Hz", "frequency", spectra.frequency),
-        "base_acceleration_spectrum": ("m2 s-3", f"{density} base acceleration", spectra.drive),
-        "relative_displacement_spectrum": ("m2 Hz-1", f"{density} output", spectra.displacement),
-        "absolute_acceleration_spectrum": (
-            "m2 s-3",
-            f"{density} acceleration at the output",
-            spectra.acceleration,
-        ),
-        "gain": (
-            "s2",
-            "magnitude of H1, displacement over base acceleration",
-            np.abs(spectra.gain),
-        ),
-        "phase": ("rad", "phase of H1", np.angle(spectra.gain)),
-        "coherence": ("1", "coherence", spectra.coherence),
-    }
-    data = {
-        name: Variable(dims, np.asarray(v), unit, text) for name, (unit, text, v) in columns.items()
-    }
-    peak = result.measures.get("response_frequency")
-    if peak is not None and peak.value is not None:
-        data["gain_peak"] = Variable((), np.array(peak.value), "Hz", "frequency of the peak of H1")
-    return data
 
 
 def _wear(result: Result) -> dict[str, Variable]:
     """Return the measures over the cycles of wear."""
-    history = result.extra["wear"]
-    dims = ("wear_cycle",)
-    data = {
-        "wear_cycle": Variable(dims, np.asarray(history["cycle"]), "1", "cycles of wear so far")
-    }
-    for name, values in history.items():
-        if name in result.measures:
-            measure = result.measures[name]
-            data[f"wear_{name}"] = Variable(dims, np.asarray(values), measure.unit, measure.text)
-    if "pressure_peak_at_edge" in history:
-        text = (
-            "excess of a pressure peak at the edge of the contact over all pressures inside; else 0"
+    return {
+        f"wear_{name}": Variable(
+            ("wear_cycle",),
+            np.asarray(values),
+            result.measures[name].unit,
+            result.measures[name].text,
         )
-        values = np.asarray(history["pressure_peak_at_edge"])
-        data["wear_pressure_peak_at_edge"] = Variable(dims, values, "Pa", text)
-    return data
-
-
-# parts of a run by their key in `Result.extra`
-PARTS = {
-    "levels": _levels,
-    "events": _events,
-    "curve": _curve,
-    "decay": _decay,
-    "spectra": _spectra,
-    "wear": _wear,
-}
+        for name, values in result.extra["wear"].items()
+        if name in result.measures
+    }
 
 
 def _measured_readings(result: Result) -> dict[str, Variable]:

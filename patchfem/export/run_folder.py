@@ -11,7 +11,7 @@ from ..runs.results.result import Result, shorten_file_names
 from ..runs.run import StateFile, is_march, run
 from . import store
 from .answer import Answer
-from .fields.vtkhdf import write_fields
+from .fields import vtkhdf
 from .folder import STATE, Folder, identify_folder, is_state
 from .page import write_page
 from .runs import make_answer
@@ -116,7 +116,7 @@ def write_results(result: Result, folder: Path) -> WrittenRun:
     start_time = perf_counter()
     notes = result.extra.setdefault("notes", [])
     if result.patch is not None:
-        write_fields(result, folder / store.FIELDS)
+        vtkhdf.write_fields(result, folder / store.FIELDS)
     for face in result.extra.get("faces", ())[:MAX_INTERFACES]:
         face_folder = folder / INTERFACES_FOLDER / face.folder
         face_folder.mkdir(parents=True, exist_ok=True)
@@ -127,7 +127,7 @@ def write_results(result: Result, folder: Path) -> WrittenRun:
             fields=face.fields,
             extra={"notes": []},
         )
-        write_fields(face_result, face_folder / store.FIELDS)
+        vtkhdf.write_fields(face_result, face_folder / store.FIELDS)
         notes += [f"interface {face.name}: {note}" for note in face_result.extra["notes"]]
     result.seconds["files"] = perf_counter() - start_time
     answer = make_answer(result)

@@ -16,7 +16,7 @@ from .. import __version__
 from ..core import PatchfemError
 from ..disk.atomic_write import write_text
 from .answer import RUN_KINDS, Answer, Quantity, Remarks, Variable
-from .charts.table import CSV_UNITS, CURVES, Rows, Stack
+from .charts.table import CSV_UNITS, CURVES, Entries, Rows, Stack
 from .netcdf import read_netcdf, write_netcdf
 
 SUMMARY = "summary.json"
@@ -204,7 +204,7 @@ def format_curves(answer: Answer) -> dict[str, str]:
     """
     files = {}
     for name, columns in CURVES.get(answer.kind, {}).items():
-        if isinstance(columns, Rows):
+        if isinstance(columns, Entries):
             lists = _tabulate(answer.details[columns.source], columns)
         else:
             lists = _list_columns(answer.data, columns)
@@ -217,15 +217,15 @@ def format_curves(answer: Answer) -> dict[str, str]:
     return files
 
 
-def _list_columns(data: dict[str, Variable], columns: dict | Stack | str) -> dict[str, list]:
+def _list_columns(data: dict[str, Variable], columns: dict | Stack | Rows) -> dict[str, list]:
     """Return the columns of a CSV file: heading with unit -> cells."""
     if isinstance(columns, Stack):
         return _stack_columns(data, columns)
-    if isinstance(columns, str):
+    if isinstance(columns, Rows):
         return {
-            name: _list_cells(variable)
+            _head(name, variable) if columns.has_units else name: _list_cells(variable)
             for name, variable in data.items()
-            if variable.dims == (columns,)
+            if variable.dims == (columns.dimension,)
         }
     lists = {}
     for title, source in columns.items():
@@ -241,7 +241,7 @@ def _list_columns(data: dict[str, Variable], columns: dict | Stack | str) -> dic
     return lists if len(lists) > 1 else {}
 
 
-def _tabulate(rows: list[dict], columns: Rows) -> dict[str, list]:
+def _tabulate(rows: list[dict], columns: Entries) -> dict[str, list]:
     """Return the columns of a list of objects: texts, and the value and the interval of each quantity."""
     lists = {}
     for name in columns.texts:

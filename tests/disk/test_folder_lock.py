@@ -51,7 +51,7 @@ KILLED_CODE = """\
 import os, sys
 from pathlib import Path
 from patchfem.disk import exchange
-from patchfem.export.results import Folder
+from patchfem.export.folder import Folder
 exchange.exchange_folders = lambda *both: False  # a system that cannot
 real, moved = os.rename, []
 def rename(*both):

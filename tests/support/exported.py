@@ -42,7 +42,7 @@ def make_piece(sign: float, frames: int, rng) -> PieceFields:
     return PieceFields(
         points=np.stack([x.ravel(), sign * depth.ravel()], axis=1),
         blocks=(triangles, np.delete(quads, 2, 0)),
-        is_coating=np.array([1, 1, 1, 0, 0, 1, 0]) > 0,
+        is_coating=np.arange(7) < 3,
         displacement=rng.normal(size=(frames, 12, 2)) * 1e-6,
         stress=rng.normal(size=(frames, 7, 4)) * 1e7,
         von_mises=rng.random((frames, 7)) * 1e7,
@@ -50,16 +50,16 @@ def make_piece(sign: float, frames: int, rng) -> PieceFields:
     )
 
 
-def write_small_series(folder, frames: int = 3, seed: int = 0, times=None):
+def write_small_series(folder, frames: int = 3, times=None):
     """Write a results folder with fields.vtkhdf alone; return the pieces and blocks that were written."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     times = np.cumsum(rng.random(frames)) if times is None else np.array(times)
     lower, upper = (make_piece(sign, frames, rng) for sign in (-1.0, 1.0))
     interface = {
         "displacement": lower.displacement[:, ::3],
         "normal_stress": rng.random((frames, 4)) * 1e7,
         "gap": rng.random((frames, 4)) * 1e-6,
-        "status": rng.integers(0, 3, (frames, 4)),
+        "status": rng.integers(3, size=(frames, 4)),
         "holder_slide": np.repeat(rng.normal(size=(frames, 1)) * 1e-5, 4, axis=1),
         "normal_bond_lower": rng.normal(size=(frames, 4)) * 1e6,
         "worn_depth": rng.random((frames, 2, 4)) * 1e-7,  # of two strips

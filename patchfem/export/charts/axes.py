@@ -8,9 +8,10 @@ from ...core import PatchfemError
 from ...disk.atomic_write import write_atomically
 from ..answer import Answer
 from .panels import Panel, make_panels
-from .plotly import BAND_OPACITY, CODE_COLOURS, COLOURS
+from .plotly import BAND_OPACITY, CODE_COLOURS, COLOURS, choose_colour
 from .table import CHARTS
 
+LINE_STYLES = ("-", "--", ":", "-.")
 PICTURE_ENDINGS = (".png", ".svg", ".pdf")
 
 PANEL_SIZE = (6.4, 4.2)  # width and height of a panel [inch]
@@ -45,14 +46,14 @@ def _draw_curves(panel: Panel, axes) -> None:
         second.set_ylabel(panel.y2.label)
     for number, curve in enumerate(panel.curves):
         target = second if curve.on_second_axis else axes
-        colour = COLOURS[number % len(COLOURS)]
+        colour = choose_colour(curve, number)
         if panel.style not in ("points", "dots") or curve.is_line:
             target.plot(
                 curve.x,
                 curve.y,
                 color=colour,
                 label=curve.name,
-                ls=":" if curve.on_second_axis else "-",
+                ls=":" if curve.on_second_axis else LINE_STYLES[curve.dash % len(LINE_STYLES)],
             )
             if curve.low is not None:
                 target.fill_between(

@@ -45,6 +45,8 @@ class Curve:
     on_second_axis : bool
     is_line : bool
         Whether the curve is a line in a chart of points.
+    colour, dash : int
+        Numbers of the colour and of the dash pattern; -1 for the colour of its place among the curves.
     symbols : (k,) ndarray of str or None
         Symbols of the points: "circle", "circle-open" or "x".
     """
@@ -58,6 +60,8 @@ class Curve:
     meanings: tuple[str, ...] = ()
     on_second_axis: bool = False
     is_line: bool = False
+    colour: int = -1
+    dash: int = 0
     symbols: np.ndarray | None = None
 
 
@@ -154,6 +158,8 @@ def _repeat_for_interfaces(chart: Chart, data: dict[str, Variable]) -> list[Char
 
 def make_panel(answers: dict[str, Answer], chart: Chart) -> Panel | None:
     """Return the panel of a chart, or None if no answer has data for it."""
+    if len(answers) > 1:
+        chart = replace(chart, by="")
     if chart.style in SWEEP_STYLES:
         # only the page of a sweep loads this module
         from ..sweeps.charts import STYLES
@@ -177,9 +183,10 @@ def make_panel(answers: dict[str, Answer], chart: Chart) -> Panel | None:
     )
     main = [_split(name)[0] for name in chart.y if _split(name)[0] in first_data]
     y_values = [data[name].values for data in selections.values() for name in main if name in data]
-    y_axis = _make_axis(
-        chart.labels[1] or main[0], first_data[main[0]].unit, y_values, chart.log, "y"
-    )
+    y_label = chart.labels[1] or main[0]
+    if y_label == "*":
+        y_label = first_data[main[0]].text
+    y_axis = _make_axis(y_label, first_data[main[0]].unit, y_values, chart.log, "y")
     second_axis = None
     second = [name for name in chart.y2 if name in first_data]
     if second:
@@ -188,19 +195,26 @@ def make_panel(answers: dict[str, Answer], chart: Chart) -> Panel | None:
         )
 
     curves = []
-    for label, data in selections.items():
+    for number, (label, data) in enumerate(selections.items()):
+        own_curves = []
         for name in (*chart.y, *chart.lines, *second):
             axis = second_axis if name in second else y_axis
             roles = {"on_second_axis": name in second, "is_line": name in chart.lines}
-            curves += [
-                replace(curve, name=_join_names(label, curve.name), **roles)
+            own_curves += [
+                replace(curve, **roles)
                 for curve in _make_curves(data, chart, name, (x_axis, axis))
+                if curve.x.size
             ]
-    curves = [curve for curve in curves if curve.x.size]
+        if len(own_curves) == 1 and not second:
+            own_curves = [replace(own_curves[0], name="")]
+        if len(answers) > 1:  # a colour for each answer, and a dash for each of its curves
+            own_curves = [
+                replace(curve, name=_join_names(label, curve.name), colour=number, dash=dash)
+                for dash, curve in enumerate(own_curves)
+            ]
+        curves += own_curves
     if not curves:
         return None
-    if len(curves) == 1 and not second:
-        curves = [replace(curves[0], name=next(iter(selections)) if len(answers) > 1 else "")]
     return _finish(
         chart, Panel(chart.title, chart.style, x_axis, y_axis, curves), first_data, second_axis
     )
@@ -311,7 +325,11 @@ def _make_axis(name: str, unit: str, arrays: list, log: str, letter: str) -> Axi
 def _make_curves(data: dict[str, Variable], chart: Chart, name: str, axes: tuple) -> list[Curve]:
     """Return the curves of one variable: one for each interface, code, or element of the first dimension."""
     name, own_x = _split(name)
-    if name not in data or not np.any(np.isfinite(np.asarray(data[name].values, float))):
+    if (
+        name not in data
+        or (own_x and own_x not in data)
+        or not np.any(np.isfinite(np.asarray(data[name].values, float)))
+    ):
         return []
     x_axis, y_axis = axes
     x_variable = data[own_x or _find_x(data, chart)]

@@ -8,6 +8,8 @@ from .panels import Curve, Panel
 
 COLOURS = ("#2a78c0", "#d1592a", "#2f9e63", "#9166c9", "#8a8f98", "#b08a12", "#c2478f", "#3aa6a6")
 CODE_COLOURS = ("#c9ced6", "#2a78c0", "#d1592a", "#2f9e63", "#9166c9")  # open, stick, slip, ...
+DASHES = ("solid", "dash", "dot", "dashdot")
+SYMBOLS = ("circle", "diamond", "square", "x")
 BAND_OPACITY = 0.18
 FRAME_MILLISECONDS = 120  # duration of a frame of a film
 N_COLOUR_STEPS = 8  # overlaid curves take their colours from the first to the last of these steps
@@ -65,7 +67,7 @@ def _make_traces(panel: Panel) -> list[dict]:
     """Return the traces of a panel."""
     traces = []
     for number, curve in enumerate(panel.curves):
-        colour = COLOURS[number % len(COLOURS)]
+        colour = choose_colour(curve, number)
         if panel.style == "overlay":
             colour = _blend(number / max(len(panel.curves) - 1, 1))
         if panel.style == "map":
@@ -75,6 +77,11 @@ def _make_traces(panel: Panel) -> list[dict]:
         else:
             traces += _curve_traces(curve, "line" if curve.is_line else panel.style, colour)
     return traces
+
+
+def choose_colour(curve: Curve, number: int) -> str:
+    """Return the colour of a curve at a place among the curves of a panel."""
+    return COLOURS[(number if curve.colour < 0 else curve.colour) % len(COLOURS)]
 
 
 def _blend(fraction: float) -> str:
@@ -95,8 +102,8 @@ def _curve_traces(curve: Curve, style: str, colour: str) -> list[dict]:
         "y": pack(curve.y),
         "name": curve.name,
         "mode": {"points": "markers", "dots": "lines+markers"}.get(style, "lines"),
-        "line": {"color": colour, "width": 1.7},
-        "marker": {"color": colour, "size": 7},
+        "line": {"color": colour, "width": 1.7, "dash": DASHES[curve.dash % len(DASHES)]},
+        "marker": {"color": colour, "size": 7, "symbol": SYMBOLS[curve.dash % len(SYMBOLS)]},
     }
     if curve.symbols is not None:
         trace["marker"]["symbol"] = [str(symbol) for symbol in curve.symbols]

@@ -35,7 +35,7 @@ class Chart:
     lines : tuple of str
         Further variables of the vertical axis, drawn as lines beside points.
     labels : tuple of str
-        Names of the horizontal and the vertical axis; "" for the name of the variable.
+        Names of the horizontal and the vertical axis; "" for the name of the variable, "*" for its description.
     caption : str
     """
 
@@ -67,6 +67,14 @@ class Stack:
 
 @dataclass(frozen=True, slots=True)
 class Rows:
+    """Columns of a CSV file for all variables of a dimension, with or without units in their headings."""
+
+    dimension: str
+    has_units: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Entries:
     """Columns of a CSV file for a list of objects in the details of an answer.
 
     source: key of the list; texts: keys of texts in each object, where an object `labels` gives a column for each of its
@@ -348,8 +356,7 @@ BACKBONE = (
         _METHOD_CURVES["damping"],
         log="x auto",
         labels=("amplitude at the output", "damping ratio"),
-        caption="Damping ratio of structure and friction together. Use the first curve; its band contains what other "
-        "kinds of test read.",
+        caption="Structure and friction together. Use the first curve; its band contains what other kinds of test read.",
     ),
 )
 FIT = (
@@ -441,7 +448,7 @@ FIT = (
         "points",
         lines=("curve_depth@curve_coefficient",),
         labels=("wear coefficient", "worn depth"),
-        caption="Measured depth with its interval at the fitted coefficient, and the computed depth up to the upper bound.",
+        caption="Measured depth at the fitted coefficient, and the computed depth up to the upper bound.",
     ),
 )
 COST = (
@@ -452,9 +459,9 @@ COST = (
         "points",
         by="outcome",
         log="xy",
-        lines=("allowed_error",),
+        lines=("allowed_error@allowed_seconds",),
         labels=("CPU time", "error of the worst measure"),
-        caption="Largest relative error of any measure in each run. The line is the tolerance of the run.",
+        caption="Largest relative error of any measure in each run. The line is the tolerance of the scene.",
     ),
     Chart(
         "Value against time",
@@ -463,8 +470,8 @@ COST = (
         "points",
         by="outcome",
         log="x",
-        labels=("CPU time", ""),
-        caption="Main measure of each run with its numerical error.",
+        labels=("CPU time", "*"),
+        caption="The least accurate of the key measures in each run, with its numerical error.",
     ),
 )
 COMPARE = (
@@ -474,8 +481,8 @@ COMPARE = (
         ("before", "after"),
         marks=("track_end",),
         labels=("x of the second trace", "height"),
-        caption="The trace measured after wear, moved by shift, tilt and offset onto the one measured before. "
-        "Vertical lines: ends of the tracks.",
+        caption="The trace measured after wear, moved by shift, tilt and offset onto the one measured before. Vertical "
+        "lines: ends of the tracks.",
     ),
     Chart(
         "Worn depth",
@@ -641,9 +648,9 @@ CHARTS: dict[str, tuple[Chart, ...]] = {
 PAIR_COLUMNS = ("worn_depth_mean", "worn_volume", "track_width", "track_depth", "amplitude_ratio")
 FILE_COLUMNS = ("Ra", "Rq", "Rz", "RSm", "Pa", "Pq", "Pt", "Sa", "Sq", "Sz")
 
-# CSV files: kind of answer -> file -> {heading of a column: variable}, groups of variables below each other, or a
-# dimension, all variables of which are columns without units in their headings. A heading may end in a unit of CSV_UNITS.
-CURVES: dict[str, dict[str, dict[str, str] | Stack | Rows | str]] = {
+# CSV files: kind of answer -> file -> {heading of a column: variable}, groups of variables below each other, or all
+# variables of a dimension. A heading may end in a unit of CSV_UNITS.
+CURVES: dict[str, dict[str, dict[str, str] | Stack | Rows | Entries]] = {
     "compare": {
         "depth.csv": {
             "x": "x",
@@ -669,13 +676,13 @@ CURVES: dict[str, dict[str, dict[str, str] | Stack | Rows | str]] = {
         },
     },
     "pairs": {
-        "pairs.csv": Rows(
+        "pairs.csv": Entries(
             "pairs",
             ("before", "after", "direction", "labels", "outcome", "verdict", "message"),
         )
     },
     "profile": {
-        "profile.csv": Rows("profiles", ("file",), "measures"),
+        "profile.csv": Entries("profiles", ("file",), "measures"),
         "primary.csv": {"x": "x", "z": "primary"},
         "roughness.csv": {"x": "x_rough", "z": "roughness"},
     },
@@ -712,7 +719,7 @@ CURVES: dict[str, dict[str, dict[str, str] | Stack | Rows | str]] = {
             "held": "held",
         }
     },
-    "cost": {"cost.csv": "run"},
+    "cost": {"cost.csv": Rows("run", has_units=False)},
 }
 CSV_UNITS = {"g": 1 / 9.80665, "mil": 1 / 25.4e-6}  # number of these units in one SI unit
 
@@ -816,7 +823,7 @@ TABLES: dict[str, tuple[Table, ...]] = {
     "profile": (
         Table(
             "Each file",
-            "file",
+            "profiles",
             (Column("file", "file"), *(Column(name, name) for name in FILE_COLUMNS)),
         ),
     ),
@@ -840,8 +847,8 @@ TABLES["cost"] = (
             Column("cpu_seconds", "CPU s", "rounded"),
             Column("largest_error", "largest error", "rounded"),
             Column("worst_measure", "of"),
-            Column("value", "main measure"),
-            Column("outcome", "result"),
+            Column("value", "value"),
+            Column("result", "result"),
         ),
     ),
 )

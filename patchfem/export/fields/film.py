@@ -62,16 +62,13 @@ def stress_frames(path: Path) -> dict[str, np.ndarray]:
     -------
     dict
         `x` (61,) and `y` (60,) [m], y > 0 in the upper piece; `times` (f,) [s] of at most 30 frames;
-        `values` (f, 60, 61) [Pa], linear between the centres of the cells of each piece, and NaN
-        outside.
+        `values` (f, 60, 61) [Pa] of the cell at each point, NaN outside the pieces.
 
     Raises
     ------
     PatchfemError
         If the file is damaged.
     """
-    from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
-
     frames = read_frames(path)
     cycle = last_frames(frames.times)
     numbers = cycle[np.linspace(0, cycle.size - 1, min(MAX_FRAMES, cycle.size)).round().astype(int)]
@@ -79,22 +76,18 @@ def stress_frames(path: Path) -> dict[str, np.ndarray]:
     columns, rows = GRID_POINTS
     x = np.linspace(left, right, columns)
     y = bottom + (top - bottom) * (np.arange(rows) + 0.5) / rows  # no row is on the interface
-    grid = np.stack(np.meshgrid(x, y), axis=2)
 
     values = np.full((numbers.size, rows, columns), np.nan)
     for side in ("lower", "upper"):
         block = frames.blocks[side]
-        points = block.points[:, :2]
-        inside = ((grid >= points.min(axis=0)) & (grid <= points.max(axis=0))).all(axis=2)
-        centres = points[block.cells].mean(axis=1)
-        # Cells far from the window, here of twice its size, have no influence.
-        middle = [(left + right) / 2, 0.0]
-        is_near = (np.abs(centres - middle) < [right - left, 2 * top]).all(axis=1)
-        if not is_near.any():
-            continue
-        known = centres[is_near], block.cell_data["von_mises"][numbers][:, is_near].T
-        linear = LinearNDInterpolator(*known)(grid[inside])
-        # Beyond the outermost centres the stress is that of the nearest cell.
-        nearest = NearestNDInterpolator(*known)(grid[inside])
-        values[:, inside] = np.where(np.isnan(linear), nearest, linear).T
+        stress = block.cell_data["von_mises"][numbers]
+        corners = block.points[block.cells, :2]
+        # A cell gives its stress to the points of the grid in the rectangle around it.
+        first, last = (
+            np.stack([np.searchsorted(x, ends[:, 0], how), np.searchsorted(y, ends[:, 1], how)], 1)
+            for ends, how in ((corners.min(axis=1), "left"), (corners.max(axis=1), "right"))
+        )
+        for cell in np.flatnonzero((last > first).all(axis=1)):
+            across, down = map(slice, first[cell], last[cell])
+            values[:, down, across] = stress[:, cell, None, None]
     return {"x": x, "y": y, "times": frames.times[numbers], "values": values}

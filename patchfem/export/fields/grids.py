@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ...core import PatchfemError
-from ...disk.atomic_write import write_atomically, write_text
+from ...core import Missing, PatchfemError
+from ...disk.atomic_write import explain_mkdir_error, write_text
 from ...runs.pieces import compute_pieces
 from .blocks import FIELDS, PARTS, Block, make_blocks
 from .vtkhdf import Frames, write_blocks
@@ -116,24 +116,45 @@ def _write_vtu(frames: Frames, out: Path, number: int) -> None:
     merged = grids.combine()
     merged.field_data["TimeValue"] = [frames.times[number]]
     _label_units(merged)
-    with write_atomically(out) as partial:
-        merged.save(partial)
+    _write_grid(merged, out)
+
+
+def _write_grid(grid, out: Path) -> None:
+    """Write a grid as .vtu.
+
+    VTK makes the text in memory, because it ends the process where it cannot write a file.
+    """
+    from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
+
+    writer = vtkXMLUnstructuredGridWriter()
+    writer.SetInputData(grid)
+    writer.SetDataModeToBinary()
+    writer.SetWriteToOutputString(True)
+    writer.Write()
+    write_text(out, writer.GetOutputString())
 
 
 def _write_pvd(frames: Frames, out: Path) -> None:
-    """Write all frames as .vtm files of named blocks in a folder beside a .pvd that lists them."""
+    """Write all frames as .vtm files, which name the .vtu of each block, in a folder beside a .pvd."""
     folder = out.with_name(f"{out.stem}_frames")
-    folder.mkdir(exist_ok=True)
-    lines = []
+    create_folder(folder)
+    listed = []
     for number, time in enumerate(frames.times):
-        name = f"frame_{number:04d}.vtm"
-        make_grids(frames.blocks, number, float(time)).save(folder / name)
-        lines.append(f'<DataSet timestep="{float(time)!r}" part="0" file="{folder.name}/{name}"/>')
-    collection = "".join(lines)
-    write_text(
-        out,
-        f'<VTKFile type="Collection" version="0.1"><Collection>{collection}</Collection></VTKFile>\n',
-    )
+        grids = make_grids(frames.blocks, number, float(time))
+        name = f"frame_{number:04d}"
+        blocks = []
+        for part, grid in zip(grids.keys(), grids):
+            _write_grid(grid, folder / f"{name}_{part}.vtu")
+            blocks.append(f'<DataSet name="{part}" file="{name}_{part}.vtu"/>')
+        _write_list(folder / f"{name}.vtm", "vtkMultiBlockDataSet", blocks)
+        listed.append(f'<DataSet timestep="{float(time)!r}" file="{folder.name}/{name}.vtm"/>')
+    _write_list(out, "Collection", listed)
+
+
+def _write_list(out: Path, kind: str, entries: list[str]) -> None:
+    """Write a file of VTK that lists other files."""
+    text = "\n".join(entries)
+    write_text(out, f'<VTKFile type="{kind}" version="1.0"><{kind}>\n{text}\n</{kind}></VTKFile>\n')
 
 
 def _write_csv(frames: Frames, out: Path, number: int) -> None:
@@ -149,6 +170,15 @@ def _write_csv(frames: Frames, out: Path, number: int) -> None:
             columns |= {f"{name}_{axis} [{unit}]": values[:, k] for k, axis in enumerate("xy")}
     rows = zip(*(map(str, values) for values in columns.values()))
     write_text(out, "\n".join([",".join(columns), *map(",".join, rows), ""]))
+
+
+def create_folder(folder: Path) -> None:
+    """Create the folder of an output file; Missing if it cannot be created."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        reason = explain_mkdir_error(error)
+        raise Missing(f"{folder}: this folder cannot be made ({reason})") from None
 
 
 def find_frame(frames: Frames, number: int | None) -> int:

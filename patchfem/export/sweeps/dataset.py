@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...core import PatchfemError
+from .. import netcdf
 from ..answer import Answer, Variable
 from ..charts import axes as drawing
 from .charts import list_keys, make_measure_panel
@@ -15,7 +16,7 @@ def to_dataset(answer: Answer):
 
     Its attributes are those of sweep.nc, the `answer` in one sentence and the `tolerance`.
     """
-    dataset = answer.to_xarray()
+    dataset = netcdf.to_dataset(answer)
     dataset = dataset.set_coords(list_keys(answer))
     dataset.attrs["answer"] = answer.details["answer"]
     if answer.details["tolerance"] is not None:

@@ -67,6 +67,8 @@ def test_exact_peaks_of_two_loads_and_missing_peaks():
         [closed_form(damping)[1] for damping in (0.01, 0.02)], rel=1e-9
     )
     assert [table.keys[0].values[entry.case] for entry in peaks] == [10, 20]
-    falling = make_table({"drive.frequency": frequency + 20}, {name: values[0][::-1] * 0 + frequency})
+    falling = make_table(
+        {"drive.frequency": frequency + 20}, {name: values[0][::-1] * 0 + frequency}
+    )
     assert find_peaks(falling) == []
     assert locate_peak(frequency[:4], values[0][:4], np.zeros(4)) is None

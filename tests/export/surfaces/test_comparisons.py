@@ -10,7 +10,7 @@ import pytest
 import xarray
 from comparisons import FINDINGS, VERDICTS, compare_scans, compare_traces
 
-from patchfem.export import page, quantities, store
+from patchfem.export import netcdf, page, quantities, store
 from patchfem.export.answer import Quantity
 from patchfem.export.surfaces import compare, definitions, sentences
 

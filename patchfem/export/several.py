@@ -1,0 +1,110 @@
+"""Comparison of several answers of the same kind: what differs in their scenes and in their measures."""
+
+import tomllib
+from typing import Any
+
+from ..formatting import format_number
+from .answer import Answer, Quantity
+from .quantities import KEY, format_quantity
+
+MAX_SENTENCES = 5  # largest number of measures that are compared in words
+MIN_FACTOR = 10.0  # smallest ratio to the first value that is written as a factor
+MAX_CELL_LENGTH = 80  # largest number of characters of a value of a scene
+
+
+def differs(quantity: Quantity | None, first: Quantity | None) -> bool:
+    """Return whether a quantity differs from that of the first answer by more than both errors."""
+    if quantity is None or first is None or None in (quantity.value, first.value):
+        return False
+    if quantity.unit != first.unit:
+        return False
+    return abs(quantity.value - first.value) > sum(map(_find_uncertainty, (quantity, first)))
+
+
+def _find_uncertainty(quantity: Quantity) -> float:
+    """Return the half-width of the error or of the interval of a quantity; its floor if both are unknown."""
+    if quantity.error is not None:
+        return max(quantity.error, quantity.floor)
+    if None not in (quantity.low, quantity.high):
+        return (quantity.high - quantity.low) / 2
+    return quantity.floor
+
+
+def format_change(quantity: Quantity, first: Quantity) -> str:
+    """Return the change from the first value in percent, or as a factor if it is large; "" if the first value is 0."""
+    if abs(first.value) <= _find_uncertainty(first):
+        return ""
+    factor = quantity.value / first.value
+    if abs(factor) >= MIN_FACTOR:
+        return f"x {format_number(factor, 2)}"
+    change = (quantity.value - first.value) / abs(first.value)
+    return f"{100 * change:+.{1 if abs(change) > 0.01 else 2}f} %"
+
+
+def format_entry(name: str, quantity: Quantity | None, first: Quantity | None) -> str:
+    """Return a quantity as text, with its change from the first answer if it differs by more than both errors."""
+    if quantity is None:
+        return ""
+    text = format_quantity(name, quantity)
+    change = format_change(quantity, first) if differs(quantity, first) else ""
+    return f"{text} ({change})" if change else text
+
+
+def compare_measures(answers: dict[str, Answer]) -> list[str]:
+    """Return a sentence for each of at most five measures that differ by more than their errors, key measures first."""
+    first_name, *others = answers
+    first = answers[first_name].quantities
+    changed = [
+        name
+        for name in first
+        if any(differs(answers[other].quantities.get(name), first[name]) for other in others)
+    ]
+    if not changed:
+        return ["No measure differs by more than its error."]
+    order = {name: number for number, name in enumerate(KEY)}
+    changed.sort(key=lambda name: order.get(name, len(order)))
+    sentences = []
+    for name in changed[:MAX_SENTENCES]:
+        parts = [f"{format_quantity(name, first[name])} in {first_name}"]
+        for other in others:
+            text = format_entry(name, answers[other].quantities.get(name), first[name])
+            if text:
+                parts.append(f"{text} in {other}")
+        sentences.append(f"{name[0].upper()}{name[1:].replace('_', ' ')}: {', '.join(parts)}.")
+    if len(changed) > MAX_SENTENCES:
+        sentences.append(f"{len(changed) - MAX_SENTENCES} more measures differ; see the table.")
+    return sentences
+
+
+def list_scene_differences(answers: dict[str, Answer]) -> list[dict]:
+    """Return a table of the keys in which the resolved scenes differ, as `page.make_tables` does; [] without any."""
+    scenes = {
+        name: _flatten(tomllib.loads(answer.origin.get("resolved", "")))
+        for name, answer in answers.items()
+    }
+    keys = dict.fromkeys(key for scene in scenes.values() for key in scene)
+    rows = [[key, *(_format_value(scene.get(key)) for scene in scenes.values())] for key in keys]
+    rows = [row for row in rows if len(set(row[1:])) > 1]
+    if not rows:
+        return []
+    return [{"title": "Where the scenes differ", "headings": ["key", *answers], "rows": rows}]
+
+
+def _flatten(table: Any, prefix: str = "") -> dict[str, Any]:
+    """Return nested tables of a scene as dotted keys; tables of a list are named by their name or number."""
+    if isinstance(table, dict):
+        pairs = table.items()
+    elif isinstance(table, list) and table and isinstance(table[0], dict):
+        pairs = [(entry.get("name", number), entry) for number, entry in enumerate(table, 1)]
+    else:
+        return {prefix: table}
+    flat = {}
+    for name, entry in pairs:
+        flat |= _flatten(entry, f"{prefix}.{name}" if prefix else str(name))
+    return flat
+
+
+def _format_value(value: Any) -> str:
+    """Return a value of a scene as text, cut if it is long; a dash if there is none."""
+    text = "-" if value is None else str(value)
+    return text if len(text) <= MAX_CELL_LENGTH else f"{text[: MAX_CELL_LENGTH - 3]}..."
