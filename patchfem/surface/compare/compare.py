@@ -155,7 +155,9 @@ def _compare_traces(before: Profile, after: Profile, options: Options) -> Compar
         noise = result.evidence.datum.noise
         step = float(np.median(np.diff(curves.x)))
         lines = [_resample(Profile(curves.x, z, ""), step) for z in (curves.before, curves.after)]
-    values = result.values | waves.compare_waves(lines, noise)
+    count = min(line.z.size for line in lines)
+    heights = [line.z[None, :count] for line in lines]
+    values = result.values | waves.compare_waves(heights, step, noise)
     return replace(
         result,
         before=before,

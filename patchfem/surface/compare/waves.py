@@ -14,6 +14,10 @@ from ..roughness.spectrum import BAND
 from .records import TraceCurves, name_quantity, name_unknown
 
 N_BLOCKS = 12  # number of blocks whose ratios show the scatter of a ratio
+STUDENT = 2.2  # half-width of a 95 % interval from N_BLOCKS values, in standard deviations
+CUTOFF_TO_DEVIATION = (
+    0.187  # deviation of the Gaussian filter of ISO 16610-21 relative to its cut-off
+)
 RATIO_ERROR = 0.004  # standard deviation of a ratio due to tip, interpolation and datum
 MAX_NOISE_FRACTION = 0.5  # noise relative to the size of the surface above which a ratio is unknown
 MIN_CUTOFFS = 2.0  # smallest length of a piece in cut-offs, half of one is trimmed at each end
@@ -21,30 +25,31 @@ MIN_WAVES = 3.0  # smallest length of a trace relative to the longest wave of th
 MIN_STEPS = 4.0  # smallest length of the shortest wave of the band in steps
 
 
-def compare_waves(traces: list[Profile], noise: float) -> dict[str, Quantity]:
+def compare_waves(lines: list[np.ndarray], step: float, noise: float) -> dict[str, Quantity]:
     """Compute the ratios of amplitude and slope, after divided by before, with their intervals.
 
     The band is cut out by two Gaussian filters. The interval of the logarithm follows from the scatter of
-    the ratios of blocks, which aligned traces share.
+    the ratios of blocks, which aligned surfaces share.
 
     Parameters
     ----------
-    traces : list of Profile
-        Evenly sampled lines before and after wear, at one step.
+    lines : list of (k, n) array [m]
+        Levelled lines before and after wear, at one step.
+    step : float
+        Step [m].
     noise : float
-        Standard deviation of the depth [m], of both traces together.
+        Standard deviation of the depth [m], of both surfaces together.
     """
-    step = traces[0].step
-    length = min(trace.length for trace in traces)
+    length = min(line.shape[1] for line in lines) * step
     if length < MIN_WAVES * BAND[1] or step > BAND[0] / MIN_STEPS:
         return {name: name_unknown(name, "band") for name in ("amplitude_ratio", "slope_ratio")}
-    waves = [_pass_band(trace.z, step) for trace in traces]
-    slopes = [np.diff(trace.z) / step for trace in traces]
+    passed = [_pass_band(z, step) for z in lines]
+    slopes = [np.diff(z, axis=1) / step for z in lines]
     # White noise has the slope noise sqrt(2)/step, and the fraction of its band in the amplitude.
     band_noise = noise / np.sqrt(2) * np.sqrt(2 * step * (1 / BAND[0] - 1 / BAND[1]))
     values = {}
     for name, sizes, error in (
-        ("amplitude_ratio", waves, band_noise),
+        ("amplitude_ratio", passed, band_noise),
         ("slope_ratio", slopes, noise / step),
     ):
         blocks = np.array([_mean_squares(size) for size in sizes])
@@ -56,19 +61,21 @@ def compare_waves(traces: list[Profile], noise: float) -> dict[str, Quantity]:
         # Linearised ratio of two means: the scatter of its numerator and denominator together.
         influence = blocks[1] / totals[1] - blocks[0] / totals[0]
         scatter = influence.std(ddof=1) / np.sqrt(N_BLOCKS) / 2
-        width = SIDE * float(np.hypot(scatter, RATIO_ERROR)) * 1.1
+        width = STUDENT * float(np.hypot(scatter, RATIO_ERROR))
         values[name] = name_quantity(name, ratio, ratio * np.exp(-width), ratio * np.exp(width))
     return values
 
 
 def _pass_band(z, step: float) -> np.ndarray:
-    """Return the waves (n,) [m] of the band."""
-    short, long = (0.187 * wave / step for wave in BAND)
+    """Return the waves (k, n) [m] of the band."""
+    short, long = (CUTOFF_TO_DEVIATION * wave / step for wave in BAND)
     return ndimage.gaussian_filter1d(z, short) - ndimage.gaussian_filter1d(z, long)
 
 
 def _mean_squares(values) -> np.ndarray:
-    return np.array([np.mean(part**2) for part in np.array_split(values, N_BLOCKS)])
+    """Return the mean squares of blocks: along a single line, or of groups of lines."""
+    parts = np.array_split(values, N_BLOCKS, axis=0 if len(values) >= N_BLOCKS else 1)
+    return np.array([np.mean(part**2) for part in parts])
 
 
 def measure_roughness(curves: TraceCurves, spans) -> tuple[dict, float | None]:

@@ -7,10 +7,10 @@ import numpy as np
 
 from ...core import PatchfemError, frozen_array
 from ...formatting import format_length
-from ..areal import Areal
+from ..areal import Areal, find_scan_spikes
 from ..profile import Profile, find_spikes, resample_evenly
 from ..quantity import Quantity, make_unknown
-from ..spikes import find_scan_spikes
+
 from . import rows
 from .areal import Surface, missing_reason
 from .filter import filter_scan, filter_trace
