@@ -115,7 +115,10 @@ def score_pair(pair: ScoredScans, judge: Callable = judge) -> dict:
     row["refused"] = refused and not pair.may_refuse
     row["missed"] = bool(pair.is_worn and not says_worn)
     if says_worn and pair.is_worn is not False:
-        for name, bounds, true in (("volume", volume, pair.volume), ("largest", largest, pair.largest)):
+        for name, bounds, true in (
+            ("volume", volume, pair.volume),
+            ("largest", largest, pair.largest),
+        ):
             if bounds is None or true is None:
                 continue
             upper = np.inf if bounds[2] is None else bounds[2]
@@ -126,11 +129,18 @@ def score_pair(pair: ScoredScans, judge: Callable = judge) -> dict:
 
 def format_scores(name: str, rows: list[dict]) -> str:
     """Return the counts as a line of text."""
-    counts = [f"{key} {sum(row.get(key, False) for row in rows)}" for key in ("false", "refused", "missed")]
+    counts = [
+        f"{key} {sum(row.get(key, False) for row in rows)}"
+        for key in ("false", "refused", "missed")
+    ]
     for quantity in ("volume", "largest"):
         held = [row[quantity] for row in rows if row.get(quantity) is not None]
         counts.append(f"{quantity} {sum(held)}/{len(held)}")
-    return f"{name:>8} {len(rows):4} pairs: " + ", ".join(counts) + f", {np.mean([row['seconds'] for row in rows]):.2f} s"
+    return (
+        f"{name:>8} {len(rows):4} pairs: "
+        + ", ".join(counts)
+        + f", {np.mean([row['seconds'] for row in rows]):.2f} s"
+    )
 
 
 def score_all(seed: int, count: int, others: list[str], judge: Callable = judge) -> list[dict]:
@@ -149,7 +159,9 @@ def score_all(seed: int, count: int, others: list[str], judge: Callable = judge)
                 print(f"   {row['name']} | {row['code']} | {' '.join(words)}")
             for fault in faults:
                 value, low, high, true = row[f"{fault}_interval"]
-                print(f"      {fault} {value:.5g} ({low:.5g}..{high or np.inf:.5g}), true {true:.5g}")
+                print(
+                    f"      {fault} {value:.5g} ({low:.5g}..{high or np.inf:.5g}), true {true:.5g}"
+                )
     print(format_scores("all", every))
     return every
 

@@ -175,19 +175,26 @@ def _estimate_chance(first, second, noise: float) -> float:
 
 
 def _measure_gain(model: TraceModel, fit: Fit) -> tuple[float, float]:
-    """Return the ratio of the heights of the second trace to those of the first, and its error."""
+    """Return the ratio of the depths of valleys, second to first trace, and its error.
+
+    Tops may be worn, which an error of the gain resembles, so they do not count.
+    """
     smooth = model.second.size / WAVES_PER_TRACE
     first, second = (
         z - ndimage.gaussian_filter1d(z, smooth) for z in (model.second + fit.depth, model.second)
     )
     noise = float(np.median(fit.noise))
-    use = np.abs(fit.depth) < 4 * UNWORN_LIMIT * noise
+    use = (np.abs(fit.depth) < 4 * UNWORN_LIMIT * noise) & (first + second < 0)
+    if use.sum() < MIN_SAMPLES:
+        return 1.0, np.inf
+    first = first[use] - first[use].mean()
+    second = second[use] - second[use].mean()
     # The noise of the first trace, half of the variance of a depth, lowers a regression on its heights.
-    power = first[use] @ first[use] - use.sum() * noise**2 / 2
+    power = first @ first - first.size * noise**2 / 2
     if not power > 0:
         return 1.0, np.inf
-    gain = float(first[use] @ second[use] / power)
-    blocks = np.array_split(np.flatnonzero(use), 10)
+    gain = float(first @ second / power)
+    blocks = np.array_split(np.arange(first.size), 10)
     influence = [first[b] @ (second[b] - gain * first[b]) for b in blocks]
     return gain, float(np.sqrt(10) * np.std(influence) / power)
 

@@ -38,6 +38,7 @@ END_SAMPLES = 5  # number of samples from an end at which growth includes it
 MAX_TRACK_FRACTION = (
     0.8  # width of a track relative to the common part, beyond which it may be growth at its ends
 )
+MIN_SCAR_FRACTION = 0.9  # fraction of worn heights in such a scar; worn tops have a smaller one
 MIN_DEPOSITS = 0.05  # smallest grown area that is reported, relative to the lost area
 MIN_OTHER_LENGTH = 5e-4  # smallest error of length that is reported
 MAX_STEP_RATIO = 1.01  # ratio of two sampling intervals that counts as equal
@@ -300,7 +301,7 @@ def _compose(
     tracks = ()
     if code.startswith("worn"):
         tracks = tuple(measure_track(section, span) for span in spans)
-        if _may_be_growth(section, tracks):
+        if _may_be_growth(section, spans, tracks):
             code = "growth_at_ends"
             numbers |= {
                 "scar_depth": bounds[0] / length,
@@ -330,9 +331,12 @@ def _compose(
     return Comparison(*traces, Finding(code, numbers), values, tracks, tuple(findings), evidence)
 
 
-def _may_be_growth(section: Section, tracks: tuple[Track, ...]) -> bool:
+def _may_be_growth(section: Section, spans: list, tracks: tuple[Track, ...]) -> bool:
     """Return whether a scar over nearly all of the trace may be growth at its ends."""
     if not tracks or any(tracks[0].cut):
+        return False
+    first, last = spans[0]
+    if section.worn[first : last + 1].mean() < MIN_SCAR_FRACTION:
         return False
     return tracks[0].values["width"].value > MAX_TRACK_FRACTION * float(section.widths.sum())
 

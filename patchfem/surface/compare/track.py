@@ -20,7 +20,8 @@ MIN_FRAGMENTS = (
 )
 MAX_TOP_FRACTION = 0.25  # largest gap between such tops relative to the width of those on one side
 MAX_GAP_RATIO = 4.0  # largest gap between such tops relative to the median gap
-N_END_GAPS = 3  # number of gaps between tops at an end that show how far it may lie outside
+MIN_CUT_SAMPLES = 4  # smallest number of samples of a top that was cut off
+MAX_CUT_SCATTER = 0.7  # scatter of its heights after wear relative to that before
 MIN_FAR_DEPTH = (
     4.0  # standard deviations of a single height outside of a track that may belong to it
 )
@@ -109,12 +110,12 @@ def find_ends(section: Section, span: tuple[int, int]) -> tuple[End, End]:
     back = slice(None, max(middle - 1, 0) - section.x.size - 1, -1)
     stop = _find_change_point(-section.x[back], relative[back], section.x.size - 1 - last, section)
 
-    # Worn tops do not show where between the last one and the next unworn one the track ends.
+    # Tops that were cut off do not show where, up to the next top, the track ends.
     runs = find_runs(section.worn[first : last + 1])
-    gaps = [section.x[first + b[0]] - section.x[first + a[1]] for a, b in pairwise(runs)]
-    if len(runs) >= MIN_FRAGMENTS:
-        start = start._replace(low=start.low - max(gaps[:N_END_GAPS]))
-        stop = stop._replace(low=stop.low - max(gaps[-N_END_GAPS:]))
+    left = _find_next_top(section, first + runs[0][0], first + runs[0][1], -1)
+    right = _find_next_top(section, first + runs[-1][0], first + runs[-1][1], 1)
+    start = start._replace(low=min(start.low, float(section.x[left])))
+    stop = stop._replace(low=min(stop.low, -float(section.x[right])))
     reach = max(int(FLANK_FRACTION * (last - first)), MIN_FLANK_SAMPLES)
     far = np.flatnonzero(relative > MIN_FAR_DEPTH)
     left = far[(far >= first - reach) & (far < first)]
@@ -124,6 +125,26 @@ def find_ends(section: Section, span: tuple[int, int]) -> tuple[End, End]:
     if right.size:
         stop = stop._replace(low=min(stop.low, -float(section.x[right[-1]])))
     return start, End(-stop.value, -stop.high, -stop.low)
+
+
+def _find_next_top(section: Section, first: int, last: int, way: int) -> int:
+    """Return the far side of the next top beyond a worn part whose tops were cut off, else its end.
+
+    The heights of a part that was cut scatter less after wear than before; those of a part that was
+    lowered evenly do not.
+    """
+    end = first if way < 0 else last
+    after = section.after[first : last + 1]
+    before = after + section.depth[first : last + 1]
+    if after.size < MIN_CUT_SAMPLES or np.std(np.diff(after, 2)) + after.std() > (
+        MAX_CUT_SCATTER * (np.std(np.diff(before, 2)) + before.std())
+    ):
+        return end
+    level = np.quantile(after, 0.9) + UNWORN_LIMIT * float(np.median(section.noise))
+    outside = section.after[:first][::-1] if way < 0 else section.after[last + 1 :]
+    above = find_runs(outside > level)
+    distance = above[0][1] + 1 if above else outside.size
+    return end + way * distance
 
 
 def _find_change_point(x, relative, worn: int, section: Section) -> End:
