@@ -108,7 +108,9 @@ def find_specks(x, first, second, worn, grown) -> np.ndarray:
                 continue
             inside = slice(start, last + 1)
             margin = last - start + 3
-            beside = np.r_[max(start - margin, 0) : start, last + 1 : min(last + 1 + margin, x.size)]
+            beside = np.r_[
+                max(start - margin, 0) : start, last + 1 : min(last + 1 + margin, x.size)
+            ]
             level = float(np.median(second[beside])) if beside.size else 0.0
             rise = first[inside].max() - level
             fall = level - second[inside].min()

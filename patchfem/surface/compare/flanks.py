@@ -62,6 +62,7 @@ def find_flanked_track(before: Profile, after: Profile) -> Section | None:
         correlation=estimate_correlation(traces[0]),
         draws=SPECTRUM_ERROR * errors,
         changes=np.zeros((N_SURROGATES, 1)),
+        after=-depth,
     )
 
 
