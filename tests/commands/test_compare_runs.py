@@ -190,7 +190,7 @@ def test_always_guide_example_prints_its_verdict(tmp_path, monkeypatch):
         answer = run_cli(*words[1:], "-q")
         assert words[0] == "patchfem" and answer.code == 0, answer.err
     verdict = " ".join(STORY[2].replace("> ", "").split())
-    assert answer.out.splitlines()[0] == verdict
+    assert answer.out.splitlines()[1] == verdict
 
 
 @pytest.mark.parametrize(

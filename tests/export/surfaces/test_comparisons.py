@@ -12,6 +12,7 @@ from comparisons import FINDINGS, VERDICTS, compare_scans, compare_traces
 
 from patchfem.export import netcdf, page, quantities, store
 from patchfem.export.answer import Quantity
+from patchfem.export.netcdf import to_dataset
 from patchfem.export.surfaces import compare, definitions, sentences
 
 # what the first sentence must state for each code of the verdict
@@ -152,7 +153,7 @@ def test_exact_curves_are_in_csv_and_netcdf():
     ):
         assert (column == truth).all()
     assert table[:, 1] - table[:, 2] == pytest.approx(table[:, 3], abs=1e-15)
-    data = answer.to_xarray()
+    data = to_dataset(answer)
     assert data.track_end.values == pytest.approx([1e-3, 2e-3])
     assert float((data.depth_high - data.depth).mean()) == pytest.approx(1.96e-8, rel=1e-3)
     worn = data.state.values == compare.STATES.index("worn")

@@ -8,6 +8,7 @@ import pytest
 from scipy.stats import t
 
 from patchfem.export import page, quantities, store
+from patchfem.export.netcdf import to_dataset
 from patchfem.export.surfaces import roughness
 from patchfem.surface.areal import Areal
 from patchfem.surface.profile import Profile
@@ -57,7 +58,7 @@ def test_exact_parameters_of_a_sine(sine_folder):
 def test_exact_profiles_are_curves(sine_folder):
     """primary.csv is the sum of waviness and roughness, and is read again as a trace with the same Pq."""
     answer, folder = sine_folder
-    data = answer.to_xarray()
+    data = to_dataset(answer)
     inside = np.isin(np.round(data.x.values / STEP), np.round(data.x_rough.values / STEP))
     assert (data.waviness + data.roughness).values == pytest.approx(
         data.primary.values[inside], abs=1e-15
