@@ -9,6 +9,7 @@ import numpy as np
 from ... import __version__
 from ...campaigns import compare as pressing
 from ...campaigns.compare import SurfaceRuns
+from ...core import PatchfemError
 from ...surface.compare import compare
 from ...surface.compare.compare import DEFAULTS, Options
 from ...surface.compare.records import Comparison, ScanMaps, Track
@@ -55,6 +56,10 @@ def answer_files(
     PatchfemError
         If the files cannot be read or compared, or do not fit to the run.
     """
+    if piece and predicted is None:
+        raise PatchfemError(
+            "compare: piece needs predicted, the results folder of a run with [wear]"
+        )
     comparison = compare.compare_files(before, after, options)
     answer = make_answer(comparison)
     if predicted is None:

@@ -1,7 +1,8 @@
 """Definitions of the quantities of compare, profile and wear between two runs, by name."""
 
 from ...surface.compare.records import DEFINITIONS
-from ...surface.roughness import rows
+from ...surface.roughness.areal import AREAL
+from ...surface.roughness.parameters import PROFILE
 from ..quantities import Definition
 
 # names in a track -> names in compare.json and in the answer
@@ -31,6 +32,14 @@ _OWN = {
         "coefficient of Archard's law with which the computed depth of a run fits the measured depth",
     ),
     "patch_centre": ("m", "middle of the patch, in x of the second trace"),
+    "dominant_wavelength": (
+        "m",
+        "wavelength of the octave with the largest mean square height, of the levelled trace",
+    ),
+    "band_amplitude": (
+        "m",
+        "amplitude of a sine with the mean square of the waves from 60 to 110 um, of the levelled trace",
+    ),
     "difference_rms": (
         "m",
         "root mean square of measured less computed depth over the patch, with the fitted coefficient",
@@ -44,16 +53,15 @@ def name_in_track(name: str) -> str:
 
 
 def find(name: str) -> Definition | None:
-    """Return the definition of a quantity of compare or profile; None if there is none."""
-    if name in _OWN:
-        return Definition(*_OWN[name])
-    if name in DEFINITIONS:
-        return Definition(*DEFINITIONS[name])
-    if name in rows.TABLE:
-        row = rows.TABLE[name]
-        return Definition(row.unit, row.text)
-    for part in DEFINITIONS:
+    """Return the definition of a quantity of compare, pairs or profile; None if there is none."""
+    for table in (_OWN, DEFINITIONS, AREAL):
+        if name in table:
+            return Definition(*table[name])
+    for letter, profile in (("P", "levelled trace"), ("R", "roughness profile"), ("", "profile")):
+        if name.startswith(letter) and name.removeprefix(letter) in PROFILE:
+            unit, text = PROFILE[name.removeprefix(letter)]
+            return Definition(unit, f"{text}, of the {profile}")
+    for part, (unit, text) in DEFINITIONS.items():
         if name == name_in_track(part):
-            unit, text = DEFINITIONS[part]
             return Definition(unit, f"{text}; of the longest track")
     return None

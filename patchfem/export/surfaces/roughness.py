@@ -25,8 +25,8 @@ MAX_SIZE_RATIO = (
 # parameters in the headline: those of a scan, of a trace with a cut-off, and of one without
 MAIN = (("Sa", "Sq", "Sz"), ("Ra", "Rq", "Rz"), ("Pa", "Pq", "Pt"))
 INTERVAL_NOTE = (
-    "Intervals of a single trace are 90 % intervals (5 to 95 %) of the mean over all traces of this length, for Gaussian "
-    "heights with the spectrum of this trace."
+    "Intervals of a single trace are 90 % intervals (5 to 95 %) of the mean over its sections, by Student's t from their "
+    "scatter."
 )
 MEANS_NOTE = (
     "Means have equal weights, and 95 % intervals by Student's t from the scatter of the files; an error that all files "

@@ -42,8 +42,8 @@ ADVICE = {
 IN_VERDICT = {
     "no_old_surface_left": "From {from} to {to} nothing of the first surface is left; the depth is measured below "
     "the unworn flanks.",
-    "hidden_even_wear": "Even or wedge-shaped wear of both surfaces, by up to {limit} on average, looks like a shift of the "
-    "datum and is not in these depths.",
+    "hidden_even_wear": "Even or wedge-shaped wear of both surfaces{limit} looks like a shift of the datum and is not in these "
+    "depths.",
     "worn_tops": "Only the tops are lost; the valleys between them are those of the first surface.",
 }
 WARNINGS = {
@@ -215,4 +215,6 @@ def _format_numbers(numbers: dict, is_areal: bool) -> dict[str, str]:
         elif number is not None:
             fields[name] = str(number)
     fields["amount"] = fields.get("volume", fields["area"])
+    # without a limit there is nothing to state
+    fields["limit"] = f", by up to {fields['limit']} on average," if "limit" in fields else ""
     return fields
