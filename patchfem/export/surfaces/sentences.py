@@ -42,8 +42,8 @@ ADVICE = {
 IN_VERDICT = {
     "no_old_surface_left": "From {from} to {to} nothing of the first surface is left; the depth is measured below "
     "the unworn flanks.",
-    "hidden_even_wear": "Even or wedge-shaped wear of both surfaces{limit} looks like a shift of the datum and is not in these "
-    "depths.",
+    "hidden_even_wear": "Even or wedge-shaped wear of both surfaces{limit} looks like a shift of the datum and is not in "
+    "these depths.",
     "worn_tops": "Only the tops are lost; the valleys between them are those of the first surface.",
 }
 WARNINGS = {
