@@ -1431,11 +1431,7 @@ class Plots:
 
         With `ax`, only the displacement is drawn.
         """
-        titles = (
-            "Whole run",
-            "Displacement in the last cycles",
-            "Friction force in the last cycles",
-        )
+        titles = ("Whole run", "Displacement", "Friction force")
         return self._draw(ax, "history", titles, self._explain_missing_motion())
 
     def levels(self, ax: Axes | None = None) -> Axes:

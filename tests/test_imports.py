@@ -179,7 +179,7 @@ def rig_without_files() -> str:
 
 HEAVY = "numpy scipy skfem numba matplotlib xarray h5py pyvista meshio"
 OUT = ("-o", "OUT", "-q", "--no-page")
-NO_PATCH = "contact mesh skfem export.report export.drawing"
+NO_PATCH = "contact mesh skfem export.page export.charts.panels"
 COMMANDS = {  # command -> scene, arguments, modules of patchfem and packages that are not loaded
     **{
         f"run of a {name}": (
@@ -210,7 +210,7 @@ COMMANDS = {  # command -> scene, arguments, modules of patchfem and packages th
     "sweep": (
         BENCH,
         ("sweep", "SCENE", "--over", "friction.static=0.1,0.2", "-o", "OUT", "-q"),
-        "contact mesh export.report export.drawing export.fields",
+        "contact mesh export.fields",
         "matplotlib pandas xarray dask distributed",
     ),
     "run of the rig with its page": (

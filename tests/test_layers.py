@@ -35,9 +35,7 @@ SCENE = ("", "__main__", "api", "commands.*", "scene", "scene.*", "model", "mode
 # modules that run one scene repeatedly with other values of its keys
 SCENE_ALSO = (
     "campaigns.fits.*",  # a scene with other values of its keys or with another patch
-    "export.fits.request",
-    "export.fits.wear",
-    "export.fits.patch",  # they write the fitted scene
+    "export.fits",  # it writes the fitted scene
     "campaigns.sweeps.case_models",
     "campaigns.rows.condition_models",
 )

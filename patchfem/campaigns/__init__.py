@@ -90,7 +90,6 @@ PUBLIC = {
         "read_cases",
         "read_sweep",
     ),
-    "sweeps.ranking": ("compute_sobol_indices",),
     "sweeps.sweep": (
         "RemainingTime",
         "WorkerData",

@@ -49,7 +49,7 @@ def profile(
         'wavelength that separates roughness from waviness (L-filter), such as "0.25 mm"'
     ) = "",
     form: text_option(
-        "form to subtract first: 1 (a line or a plane), or `circle` for a trace over a cylinder or a ball"
+        "form to subtract first, such as 1 (a line or a plane), or circle for a trace over a cylinder or a ball"
     ) = "1",
     s_filter: text_option(
         'wavelength of the S-filter, such as "2.5 um"; shorter waves are removed first'

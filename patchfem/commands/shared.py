@@ -10,9 +10,9 @@ from typing import Annotated, NamedTuple
 
 from cyclopts import Parameter
 
+from ..export import folder as folders
 from ..export import page, show, store
 from ..export.charts import axes
-from ..export.folder import Folder
 from ..model import model
 from ..scene import scene
 from ..scene.keys import quantities
@@ -101,7 +101,7 @@ def save(make_answer: Callable, output: Output):
         Function that takes the folder, which is locked meanwhile, and returns the Answer.
     output : Output
     """
-    with Folder(output.target) as folder:
+    with folders.Folder(output.target) as folder:
         answer = make_answer(folder.path)
         store.write(answer, folder.path)
         if output.has_page:

@@ -67,7 +67,7 @@ def find_curve(backbone: Backbone) -> Curve | None:
     )
 
 
-def draw_curves(dataset, ax=None):
+def backbone_axes(dataset, ax=None):
     """Draw the Dataset of a backbone on matplotlib Axes.
 
     Parameters

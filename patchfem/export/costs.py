@@ -97,7 +97,7 @@ def _find_scene_run(knob: str, runs: list[Cost], tolerance: float) -> Cost:
     """Return the run of the scene as it is, or, of a setting, the fastest run that meets the tolerance (else the last)."""
     if knob != TOLERANCE:
         return find_fastest_run(runs, tolerance) or runs[-1]
-    return next(run for run in runs if run.tolerance == tolerance)
+    return next((run for run in runs if run.tolerance == tolerance), runs[-1])
 
 
 def _make_verdict(curves: dict[str, list[Cost]], tolerance: float) -> tuple[str, ...]:
@@ -111,7 +111,8 @@ def _make_verdict(curves: dict[str, list[Cost]], tolerance: float) -> tuple[str,
         run = _find_scene_run(knob, runs, tolerance)
         worst = find_worst_run_error(run)
         meets = "meets" if run.meets_tolerance() else "misses"
-        error = f", with a largest error of {format_number(worst.fraction, 2)} in {worst.name.replace('_', ' ')}"
+        name = worst.name.replace("_", " ")
+        error = f", with a largest error of {format_number(worst.fraction, 2)} in {name}"
         sentences.append(
             f"At its tolerance {tolerance:g} the scene takes {format_number(run.seconds, 2)} CPU s and {meets} the "
             f"tolerance{error if worst.name else ''}."
@@ -127,8 +128,7 @@ def _describe_limits(runs: list[Cost]) -> list[str]:
     if met:
         best = min(met, key=lambda run: run.tolerance)
         sentences = [
-            f"The smallest tolerance that is met is {best.tolerance:g} ({best.label}), in {format_number(best.seconds, 2)} "
-            "CPU s."
+            f"The smallest tolerance that is met is {best.label}, in {format_number(best.seconds, 2)} CPU s."
         ]
     advice = [(run.tolerance, text) for run in runs if run not in met for text in run.remedies]
     return sentences + [f"For the tolerance {value:g}: {text}." for value, text in advice[-1:]]

@@ -334,12 +334,13 @@ def describe_curve_fit(fit: FittedCurve) -> Parts:
         curve[f"curve_{name}"] = (fit.beyond[k + 1], unit, f"fitted {name}")
     details = {"method": fit.method, "rows": n_rows, "rms": rms, "notes": list(fit.notes)}
     search = _describe_search(fit.keys, fit.keys.ranges) | {"evaluations": fit.n_computed}
+    assumed = " The errors of the measured values are assumed." if measured.assumed else ""
     percent = {name: f"{100 * value:.2g} %" for name, value in rms.items()}
     return Parts(
         measured=fit.path.name,
         quantity="decay",
         residual=f"At {n_rows} amplitudes the residual is {percent['frequency']} rms of the frequency and "
-        f"{percent['damping']} of the damping ratio, by method {fit.method}.",
+        f"{percent['damping']} of the damping ratio, by method {fit.method}.{assumed}",
         details=details | search,
         scores={f"{name}_residual_rms": Quantity(value) for name, value in rms.items()},
         data=_make_columns("row", columns) | _make_columns("curve_amplitude", curve),

@@ -31,7 +31,7 @@ FILE_TEXTS = {
     "scene.fitted.toml": "the scene with the fitted values, ready to run",
 }
 WIDE_STYLES = ("relative", "menu", "maps", "film")  # styles of charts that take the whole width
-TALL_STYLES = ("menu", "maps", "film", "bars")
+TALL_STYLES = ("relative", "menu", "maps", "film", "bars")
 COMPRESSION = 6  # of the figures in a page
 
 
@@ -115,7 +115,7 @@ def make_page(folders: list[Path]) -> str:
 def _read_all(folders: list[Path]) -> dict[str, Answer]:
     """Return the answers in folders by their names in legends; "" for a single answer."""
     if not folders:
-        raise PatchfemError("report: name one or more results folders")
+        raise PatchfemError("report: at least one results folder is needed")
     if len(folders) == 1:
         return {"": store.read(folders[0])}
     answers = {}
@@ -200,6 +200,7 @@ def _subtitle(answer: Answer) -> str:
         f"patchfem {answer.origin.get('patchfem', '')}".strip(),
         answer.kind,
         answer.origin.get("driven", ""),
+        answer.details.get("outcome", "") if answer.is_run else "",
         f"engine {engine}" if engine else "",
         f"computed in {seconds:.2f} s" if seconds is not None else "",
     )
@@ -367,4 +368,7 @@ def _template():
     from jinja2 import Environment
 
     text = (files(__package__) / "page.html").read_text("utf-8")
-    return Environment(autoescape=True, trim_blocks=True).from_string(text)
+    environment = Environment(autoescape=True, trim_blocks=True)
+    # sentences mark keys and measures by backquotes, which a page does not show
+    environment.filters["plain"] = lambda sentence: sentence.replace("`", "")
+    return environment.from_string(text)

@@ -9,11 +9,10 @@ from .. import __version__
 from ..core import Missing, NotConverged, PatchfemError
 from ..runs.results.result import Result, shorten_file_names
 from ..runs.run import StateFile, is_march, run
-from . import store
+from . import page, store
 from .answer import Answer
 from .fields import vtkhdf
 from .folder import STATE, Folder, identify_folder, is_state
-from .page import write_page
 from .runs import make_answer
 
 MAX_INTERFACES = 6  # largest number of interfaces whose fields are written
@@ -142,7 +141,7 @@ def write_run_page(written: WrittenRun, folder: Path) -> Path:
     """
     if not Path(folder).is_dir() or identify_folder(folder) != written.folder_id:
         raise Missing(f"{folder}: replaced by another run while the page was drawn")
-    return write_page(folder)
+    return page.write_page(folder)
 
 
 def save_run(result: Result, folder: Path) -> Answer:

@@ -45,10 +45,14 @@ def make_answer(result: Result) -> Answer:
 
 def make_quantities(measures: dict[str, Measure]) -> dict[str, Quantity]:
     """Return the measures of a run as quantities."""
-    return {
-        name: Quantity(one.value, one.unit, one.error, floor=float(one.floor), reason=one.reason)
-        for name, one in measures.items()
-    }
+    quantities = {}
+    for name, one in measures.items():
+        is_unknown = one.value is not None and one.error is None
+        reason = "error unknown" if is_unknown else one.reason
+        quantities[name] = Quantity(
+            one.value, one.unit, one.error, floor=float(one.floor), reason=reason
+        )
+    return quantities
 
 
 def make_origin(source, verb: str) -> dict:

@@ -23,14 +23,15 @@ def make_lines(answer: Answer, is_verbose: bool = False) -> list[str]:
 
 
 def list_quantities(shown: dict[str, Quantity]) -> list[tuple[str, str]]:
-    """Return name and text of each quantity; the text of a missing one has the reason."""
-    texts = []
-    for name, quantity in shown.items():
-        text = quantities.format_quantity(name, quantity)
-        if quantity.value is None and quantity.reason:
-            text += f" ({quantity.reason})"
-        texts.append((name, text))
-    return texts
+    """Return name and text of each quantity, with the reason for a missing value or error."""
+    return [
+        (
+            name,
+            quantities.format_quantity(name, quantity)
+            + (f" ({quantity.reason})" if quantity.reason else ""),
+        )
+        for name, quantity in shown.items()
+    ]
 
 
 def format_quantities(shown: dict[str, Quantity]) -> list[str]:

@@ -22,12 +22,15 @@ ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))
 
 import patchfem as pf  # noqa: E402
-from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE, STYLE  # noqa: E402
+from patchfem.export.charts.axes import STYLE  # noqa: E402
 from patchfem.export.fields.film import contact_window, last_frames  # noqa: E402
 from patchfem.export.fields.vtkhdf import NAME, Frames, read_frames  # noqa: E402
 from patchfem.export.pieces import draw_cells, magnify_pieces  # noqa: E402
 
 FOLDER = Path(__file__).parent / "pictures"
+BLUE = "#1f5f99"
+ORANGE = "#c8551b"
+GREY = "#8a8a8a"
 WIDTH = 4.4  # inch; letters of 11 points stay 12 pixels high on a screen 360 pixels wide
 DPI = 190  # dots per inch: 836 pixels, the column of a README on a code host
 MAX_BYTES = 1_000_000  # bytes; with larger pictures a page is slow to load on a telephone

@@ -71,7 +71,7 @@ def analyse(table: SweepTable, requested: str = "") -> SweepAnalysis:
         limits=find_limits(table),
         peaks=find_peaks(table),
         ranking=rank_keys(table, requested),
-        quantiles=compute_quantiles(table),
+        quantiles=compute_quantiles(table, requested),
     )
 
 

@@ -169,7 +169,9 @@ def _find_minimum(
     slope = polynomial.deriv()
     roots = slope.roots()
     roots = roots[np.isreal(roots)].real
-    for _ in range(N_NEWTON_STEPS):  # eigenvalues are inexact where the highest coefficient is small
+    for _ in range(
+        N_NEWTON_STEPS
+    ):  # eigenvalues are inexact where the highest coefficient is small
         roots = roots - slope(roots) / slope.deriv()(roots)
     roots = roots[(roots > square[top - 1]) & (roots < square[top + 1])]
     values = polynomial(roots)
@@ -183,8 +185,8 @@ def _find_crossing(
 ) -> tuple[float, float]:
     """Return the frequency [Hz] at which 1/y^2 first reaches a level, and its error; NaN if it does not.
 
-    It is the mean of the crossings of two parabolas, each through both ends of the interval and a
-    third case; their difference gives the error.
+    It is the crossing of a parabola through both ends of the interval and a third case; the error comes
+    from a second parabola, or from the straight line.
 
     Parameters
     ----------
@@ -214,4 +216,4 @@ def _find_crossing(
     if len(crossings) < 2:
         crossings.append(float(linear))
     frequencies = np.sqrt(np.array(crossings) + peak_frequency**2)
-    return float(frequencies.mean()), DIFFERENCE_FACTOR * float(np.ptp(frequencies))
+    return float(frequencies[0]), DIFFERENCE_FACTOR * float(np.ptp(frequencies))

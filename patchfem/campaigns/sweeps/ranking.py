@@ -196,15 +196,17 @@ def _compute_surface_indices(surface) -> tuple[np.ndarray, np.ndarray]:
     return np.atleast_2d(indices.first_order), np.atleast_2d(indices.total_order)
 
 
-def compute_quantiles(table: SweepTable) -> dict[str, np.ndarray]:
+def compute_quantiles(table: SweepTable, requested: str = "") -> dict[str, np.ndarray]:
     """Return the quantiles of QUANTILE_LEVELS [SI] of each ranked measure over the random cases.
 
-    Measures of which fewer than 90 % of the cases have a settled value have none, because the others
-    may be the extreme ones.
+    `requested` is a measure that comes first. Measures of which fewer than 90 % of the cases have a
+    settled value have none, because the others may be the extreme ones.
     """
     quantiles = {}
     settled = table.settled
-    for name in RANKED_MEASURES if table.is_random and len(table) >= MIN_RANDOM_CASES else ():
+    if not table.is_random or len(table) < MIN_RANDOM_CASES:
+        return {}
+    for name in dict.fromkeys((requested, *RANKED_MEASURES)):
         if _varies(table, name):
             values = table.measures[name].values
             counts = np.isfinite(values) & settled

@@ -1,5 +1,7 @@
 """Panels as matplotlib Axes, for pictures and for `plot` in Python."""
 
+import io
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +16,26 @@ from .table import CHARTS
 LINE_STYLES = ("-", "--", ":", "-.")
 PICTURE_ENDINGS = (".png", ".svg", ".pdf")
 
+# Marker and face of each symbol of a point; "" is the colour of the curve.
+MARKERS = {"circle": ("o", ""), "circle-open": ("o", "none"), "x": ("x", "")}
+# style of the pictures; two drawings of the same answer are equal files
+STYLE = {
+    "svg.hashsalt": "patchfem",
+    "svg.fonttype": "none",
+    "font.size": 10,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#e3e3e3",
+    "axes.axisbelow": True,
+    "axes.titlesize": 11,
+    "legend.frameon": False,
+    "legend.fontsize": 9,
+    "figure.constrained_layout.use": True,
+    "lines.linewidth": 1.4,
+}
+# metadata that leave out the date
+UNDATED = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
 PANEL_SIZE = (6.4, 4.2)  # width and height of a panel [inch]
 
 
@@ -68,11 +90,13 @@ def _draw_curves(panel: Panel, axes) -> None:
         if curve.low is not None:
             bars = np.nan_to_num([curve.y - curve.low, curve.high - curve.y])
         target.errorbar(curve.x, curve.y, bars, fmt="none", ecolor=colour)
-        hollow = np.zeros(curve.x.size, bool)
-        if curve.symbols is not None:
-            hollow = np.char.endswith(np.asarray(curve.symbols, str), "open")
-        target.plot(curve.x[~hollow], curve.y[~hollow], "o", color=colour, label=curve.name)
-        target.plot(curve.x[hollow], curve.y[hollow], "o", color=colour, mfc="none")
+        symbols = np.full(curve.x.size, "circle") if curve.symbols is None else curve.symbols
+        # the first symbol has the entry of the legend, and is drawn above the others
+        for zorder, (symbol, (marker, face)) in zip((4, 3, 3), MARKERS.items()):
+            is_drawn = symbols == symbol
+            label = curve.name if symbol == "circle" else None
+            options = {"color": colour, "mfc": face or colour, "label": label, "zorder": zorder}
+            target.plot(curve.x[is_drawn], curve.y[is_drawn], marker, **options)
 
 
 def _draw_bars(panel: Panel, axes) -> None:
@@ -109,24 +133,42 @@ def _draw_map(panel: Panel, axes) -> None:
 
 def make_figure(panels: list[Panel]):
     """Return a matplotlib figure with the panels beside and below each other, at most two in a row."""
+    from matplotlib import rc_context
     from matplotlib.figure import Figure
 
     columns = min(len(panels), 2)
     rows = -(-len(panels) // columns)
-    size = (PANEL_SIZE[0] * columns, PANEL_SIZE[1] * rows)
-    figure = Figure(figsize=size, layout="constrained")
-    grid = figure.subplots(rows, columns, squeeze=False).ravel()
-    for panel, axes in zip(panels, grid, strict=False):
-        draw(panel, axes)
+    with rc_context(STYLE):
+        figure = Figure(figsize=(PANEL_SIZE[0] * columns, PANEL_SIZE[1] * rows))
+        grid = figure.subplots(rows, columns, squeeze=False).ravel()
+        for panel, axes in zip(panels, grid, strict=False):
+            draw(panel, axes)
     for axes in grid[len(panels) :]:
         axes.remove()
+    for element in (figure, *figure.axes):
+        element._repr_svg_ = partial(_to_svg, figure)
     return figure
 
 
 def write_picture(panels: list[Panel], path) -> None:
     """Write panels as .png, .svg or .pdf."""
     with write_atomically(path) as partial:
-        make_figure(panels).savefig(partial, dpi=150, format=Path(path).suffix[1:])
+        _save(make_figure(panels), partial, Path(path).suffix[1:].lower())
+
+
+def _save(figure, target, ending: str) -> None:
+    """Write a figure into a file or a stream; equal figures give equal files."""
+    from matplotlib import rc_context
+
+    with rc_context(STYLE):
+        figure.savefig(target, dpi=150, format=ending, metadata=UNDATED.get(ending))
+
+
+def _to_svg(figure) -> str:
+    """Return a figure as SVG, the form in which a notebook shows it."""
+    text = io.StringIO()
+    _save(figure, text, "svg")
+    return text.getvalue()[text.getvalue().index("<svg") :]
 
 
 def write_plot(answer: Answer, path) -> None:

@@ -16,10 +16,11 @@ from ...inputs.units import CHANNEL_UNITS, SI_UNITS
 from ...scene.keys import quantities
 from ...structure import universal as universal_modes
 from . import universal
-from .write import Column, write_columns
+from .universal import Column
+from .write import write_columns
 
-# columns of an exported file that can be its displacement, in order of preference
-EXPORTED_NAMES = {"displacement": ("relative_displacement", "slide")}
+# columns of an exported file that can be its displacement, in order of preference; 1.x wrote the first one
+EXPORTED_NAMES = {"displacement": ("output_displacement", "relative_displacement", "slide")}
 DECAY_UNITS = {"time": "s", "amplitude": "m", "frequency": "Hz", "damping": "1"}
 
 
@@ -77,27 +78,26 @@ def convert_file(
         raise PatchfemError(
             f"{out}: records are written as .csv, modes as .toml, a frequency response as .uff"
         )
-    if zero and (ending != ".csv" or settings.decay):
+    is_table = ending == ".csv" and not settings.decay
+    if zero and not is_table:
         raise PatchfemError(
             "--zero can be used only when importing a table of records (-o table.csv), not with --decay"
         )
-    if ending == ".toml":
-        return _write_modes(file, out, requests, settings)
-    if ending != ".csv":
-        return _write_response(file, out, requests, settings)
-    if (
-        settings.segment
-        or settings.window
-        or settings.band
-        or (settings.begin and not settings.decay)
-    ):
+    unused = {
+        ".csv": ("segment", "window", "band") if settings.decay else EstimateOptions._fields,
+        ".toml": (),
+    }
+    unused = unused.get(ending, ("band", "decay", "begin"))
+    if any(getattr(settings, name) for name in unused):
+        options = ", ".join(f"--{name}" for name in unused)
         raise PatchfemError(
-            "--segment, --window, --band and, without --decay, --begin can be used only for modes (-o modes.toml) and "
-            "responses (-o response.uff)"
+            f"{out}: {options} can be used only for modes (-o modes.toml); --segment and --window also for responses "
+            "(-o response.uff)"
         )
-    if settings.decay:
-        return _write_decay(file, out, requests, settings)
-    return _write_table(file, out, requests, zero)
+    if is_table:
+        return _write_table(file, out, requests, zero)
+    convert = {".csv": _write_decay, ".toml": _write_modes}.get(ending, _write_response)
+    return convert(file, out, requests, settings)
 
 
 def _write_table(file: Path, out: Path, requests, zero: bool) -> dict:
@@ -220,10 +220,6 @@ def format_structure(modes: measured_modes.ListedModes, source: str) -> str:
 
 def _write_response(file: Path, out: Path, requests, settings: EstimateOptions) -> dict:
     """Write an estimated frequency response as a universal file."""
-    if settings.decay or settings.begin or settings.band:
-        raise PatchfemError(
-            "--decay, --begin and --band can be used only for modes (-o modes.toml)"
-        )
     values, notes = _read_records(file, requests)
     estimate, step, drive, response = measured_modes.estimate_record(
         values, *_parse_segment(settings)

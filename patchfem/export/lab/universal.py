@@ -17,7 +17,6 @@ PROGRAM = f"patchfem {__version__}"
 # type codes of dataset 58 by the unit of a quantity; 1 (general) for other units
 TYPES = {"m": 8, "m s-1": 11, "m s-2": 12, "N": 13, "s": 17, "Hz": 18}
 LABELS = {"m s-1": "m/s", "m s-2": "m/s^2"}
-AXES = {"s": "Time", "m": "Displacement", "Hz": "Frequency"}
 # function types of dataset 58
 LOOP = 0
 HISTORY = 1
@@ -35,17 +34,27 @@ SI_UNITS = {
 }
 
 
-class Series(NamedTuple):
-    """Values with their unit, over or under the line of a dataset."""
+class Column(NamedTuple):
+    """Values of a quantity along the rows of a file.
 
+    name; unit as in netCDF ("m s-2"); values (k,); number: of the interface or mode from 1, 0 if there is only one.
+    """
+
+    name: str
     unit: str
     values: np.ndarray
+    number: int = 0
+
+    @property
+    def label(self) -> str:
+        """Name of the column, followed by its number."""
+        return f"{self.name}_{self.number}" if self.number else self.name
 
 
 def make_dataset(
-    name: str, function: int, abscissa: Series, ordinate: Series, **entries: str | int
-) -> dict:
-    """Return a dataset 58.
+    name: str, function: int, x: Column, y: Column, **entries: str | int
+) -> dict[str, str | int | np.ndarray]:
+    """Return a dataset 58 of one column against another.
 
     Parameters
     ----------
@@ -53,9 +62,9 @@ def make_dataset(
         First line of identification.
     function : int
         LOOP, HISTORY, RESPONSE or COHERENCE.
-    abscissa, ordinate : Series
+    x, y : Column
     **entries
-        Further entries of the dataset.
+        Further entries of the dataset; pyuff has default values.
     """
     return {
         "type": 58,
@@ -63,21 +72,15 @@ def make_dataset(
         "func_type": function,
         "id1": name[:80],
         "id2": PROGRAM,
-        "rsp_node": 1,
+        "rsp_node": y.number or 1,
         "rsp_dir": 1,
-        "ref_node": 0,
-        "ref_dir": 0,
         "abscissa_spacing": 0,
-        "abscissa_spec_data_type": TYPES[abscissa.unit],
-        "abscissa_axis_lab": AXES[abscissa.unit],
-        "abscissa_axis_units_lab": abscissa.unit,
-        "ordinate_spec_data_type": TYPES.get(ordinate.unit, 1),
-        "ordinate_axis_lab": name[:20],
-        "ordinate_axis_units_lab": LABELS.get(ordinate.unit, ordinate.unit)[:20],
-        "orddenom_spec_data_type": 0,
-        "z_axis_spec_data_type": 0,
-        "data": np.array(ordinate.values),
-        "x": np.array(abscissa.values, float),
+        "abscissa_spec_data_type": TYPES[x.unit],
+        "abscissa_axis_units_lab": x.unit,
+        "ordinate_spec_data_type": TYPES.get(y.unit, 1),
+        "ordinate_axis_units_lab": LABELS.get(y.unit, y.unit),
+        "data": np.array(y.values),
+        "x": np.array(x.values, float),
     } | entries
 
 
@@ -90,9 +93,9 @@ def write_histories(path: Path, time, columns: Sequence, loops: Sequence, title:
     Parameters
     ----------
     path : Path
-    time : write.Column or None
-    columns : sequence of write.Column
-    loops : sequence of (write.Column, write.Column)
+    time : Column or None
+    columns : sequence of Column
+    loops : sequence of (Column, Column)
         Slide and force.
     title : str
 
@@ -106,20 +109,15 @@ def write_histories(path: Path, time, columns: Sequence, loops: Sequence, title:
     for column in columns:
         if not np.isfinite(column.values).all():  # pyuff would write these values as 0
             raise PatchfemError(
-                f"{path}: {column.label} has values that are not finite, which a universal file cannot contain; export "
-                ".mat or .csv instead"
+                f"{column.label} has values that are not finite, which a universal file cannot contain; export .mat or .csv"
             )
     curves = [(column.label, HISTORY, time, column) for column in columns if time is not None]
     curves += [(f"{force.label} over {slide.label}", LOOP, slide, force) for slide, force in loops]
     if not curves:
-        raise PatchfemError(f"{path}: there is neither time nor loop to write")
+        raise PatchfemError("there is neither time nor loop to write")
     line = "".join(letter if " " <= letter <= "~" else "?" for letter in title)[:80].strip()
-    datasets = []
-    for name, function, x, y in curves:
-        ends = Series(x.unit, x.values), Series(y.unit, y.values)
-        entries = {"rsp_node": y.number or 1, "id4": line or "NONE"}
-        datasets.append(make_dataset(name, function, *ends, **entries))
-    write_datasets(path, [SI_UNITS, *datasets])
+    entries = {"id4": line or "NONE"}
+    write_datasets(path, [make_dataset(*curve, **entries) for curve in curves])
 
 
 def write_response(path: Path, estimate, drive: str, response: str) -> None:
@@ -137,25 +135,23 @@ def write_response(path: Path, estimate, drive: str, response: str) -> None:
     """
     units = {"displacement": "m", "velocity": "m s-1", "force": "N"}
     unit, drive_unit = (units.get(name, "m s-2") for name in (response, drive))
-    abscissa = Series("Hz", estimate.frequency)
+    x = Column("frequency", "Hz", estimate.frequency)
+    y = Column(response, unit, estimate.value)
     place = {"ref_node": 1, "ref_dir": 1}
     denominator = {
         "orddenom_spec_data_type": TYPES[drive_unit],
         "orddenom_axis_units_lab": LABELS.get(drive_unit, drive_unit),
     }
-    value = Series(unit, estimate.value)
-    name = f"{response} over {drive}"
-    datasets = [make_dataset(name, RESPONSE, abscissa, value, **place, **denominator)]
+    datasets = [make_dataset(f"{response} over {drive}", RESPONSE, x, y, **place, **denominator)]
     if estimate.coherence is not None:
+        y = Column("coherence", "", estimate.coherence)
         name = f"coherence of {response} and {drive}"
-        coherence = Series("", estimate.coherence)
-        entries = place | {"ordinate_spec_data_type": 0}
-        datasets.append(make_dataset(name, COHERENCE, abscissa, coherence, **entries))
-    write_datasets(path, [SI_UNITS, *datasets])
+        datasets.append(make_dataset(name, COHERENCE, x, y, ordinate_spec_data_type=0, **place))
+    write_datasets(path, datasets)
 
 
 def write_datasets(path: Path, datasets: list[dict]) -> None:
-    """Write universal datasets into a new file by pyuff, with correct byte counts; Missing without pyuff."""
+    """Write the units and datasets 58 into a new file by pyuff, with correct byte counts; Missing without pyuff."""
     try:
         import pyuff
     except ImportError:
@@ -165,11 +161,11 @@ def write_datasets(path: Path, datasets: list[dict]) -> None:
     path = Path(path)
     path.write_bytes(b"")
     file = pyuff.UFF(str(path))
+    file.write_sets(SI_UNITS, "add")
     for dataset in datasets:
         start = path.stat().st_size
         file.write_sets(dataset, "add")
-        if dataset["type"] == 58:
-            _correct_byte_count(path, start, dataset["data"].nbytes + dataset["x"].nbytes)
+        _correct_byte_count(path, start, dataset["data"].nbytes + dataset["x"].nbytes)
 
 
 def _correct_byte_count(path: Path, start: int, size: int) -> None:

@@ -1,17 +1,15 @@
 """Histories and loops of a results folder as a laboratory file, whose ending chooses the format."""
 
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 from ...core import Missing, PatchfemError
 from ...disk.atomic_write import write_atomically
-from ...formatting import format_quantity
-from ...structure.drive_sizes import MAX_STORED_SAMPLES, MIN_SAMPLES_PER_CYCLE
 from .. import store
 from ..answer import Answer
 from . import ENDINGS, universal
+from .universal import Column
 
 # pairs of variables that form a friction loop; of a force, the first pair that a folder contains
 LOOPS = (
@@ -23,26 +21,7 @@ LOOPS = (
 )
 FIT_COLUMNS = ("slide", "force", "friction_ratio", "fitted")
 MAX_NAME_LENGTH = 63  # largest length of a MATLAB variable name, in characters
-MAX_LISTED_COLUMNS = 8  # largest number of columns that the line about a file names
-# Smallest number of rows between two reversals if all samples are stored; fewer rows show that only reversals are stored.
-MIN_ROWS_PER_SWING = 5
-
-
-class Column(NamedTuple):
-    """History of a quantity over time.
-
-    name; unit as in netCDF ("m s-2"); values (k,); number: of the interface or mode from 1, 0 if there is only one.
-    """
-
-    name: str
-    unit: str
-    values: np.ndarray
-    number: int = 0
-
-    @property
-    def label(self) -> str:
-        """Name of the column, followed by its number."""
-        return f"{self.name}_{self.number}" if self.number else self.name
+MAX_STEP_RATIO = 5.0  # largest ratio of a time step to the last one if all samples are stored
 
 
 def export_histories(folder: Path, out: Path) -> str:
@@ -75,21 +54,18 @@ def export_histories(folder: Path, out: Path) -> str:
             f"{folder}: these results have no history; fields are exported as .pvd, .vtu, .vtkhdf, or .csv of the interface"
         )
 
-    loops = find_loops(columns)
+    tail = ""
     with write_atomically(out) as partial:
         if ending == ".mat":
             write_matlab(partial, answer)
         elif ending == ".csv":
             write_columns(partial, [time, *columns] if time else columns)
         else:
+            loops = find_loops(columns)
             universal.write_histories(partial, time, columns, loops, answer.title)
-    labels = [column.label for column in columns]
-    more = len(labels) - MAX_LISTED_COLUMNS
-    others = f" and {more} more" if more > 0 else ""
-    names = ", ".join(labels[:MAX_LISTED_COLUMNS])
-    text = f"{out}: {columns[0].values.size} rows of {names}{others}{_note_thinning(time, columns)}"
-    is_universal = ending not in (".mat", ".csv")
-    return f"{text}; {len(loops)} loops" if is_universal else text
+            tail = f"; {len(loops)} loops"
+    names = list(dict.fromkeys(column.name for column in columns))
+    return f"{out}: {columns[0].values.size} rows of {', '.join(names)}{_note_thinning(time)}{tail}"
 
 
 def list_columns(answer: Answer) -> tuple[Column | None, list[Column]]:
@@ -126,20 +102,15 @@ def find_loops(columns: list[Column]) -> list[tuple[Column, Column]]:
     return list(loops.values())
 
 
-def _note_thinning(time: Column | None, columns: list[Column]) -> str:
-    """Return a note that only the reversals of early histories are stored, or "" if all samples are stored."""
-    moving = [column.values for column in columns if column.name.endswith("displacement")]
-    if time is None or not moving:
+def _note_thinning(time: Column | None) -> str:
+    """Return a note that only the reversals of early histories are stored, or "" if the rows are even all along."""
+    steps = np.zeros(1) if time is None else np.diff(time.values)
+    if steps.max() <= MAX_STEP_RATIO * steps[-1]:
         return ""
-    reversals = np.flatnonzero(np.diff(np.sign(np.diff(moving[0]))) != 0) + 1
-    thinned = np.flatnonzero(np.diff(reversals) < MIN_ROWS_PER_SWING)
-    if thinned.size < MIN_ROWS_PER_SWING or thinned.size < (thinned[-1] + 1) / 2:
-        return ""
-    first_even = format_quantity(float(time.values[reversals[thinned[-1] + 1]]), "s", 3)
+    even_from = time.values[np.flatnonzero(steps > MAX_STEP_RATIO * steps[-1])[-1] + 1]
     return (
-        f"; before {first_even} the rows are turning points, stops and starts of slip alone: a release of up to "
-        f"{MAX_STORED_SAMPLES // MIN_SAMPLES_PER_CYCLE} cycles (drive.cycles) has even rows all along, any other run "
-        "in its last cycles"
+        f"; before {even_from:.4g} s the rows are turning points, stops and starts of slip alone (fewer drive.cycles give "
+        "even rows)"
     )
 
 

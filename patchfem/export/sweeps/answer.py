@@ -44,7 +44,9 @@ def make_answer(
     """
     analysis = analyse(table, sweep_scene.of)
     verdict = make_verdict(table, analysis)
-    note = sweep_scene.note_bolted_joint()
+    notes = [sweep_scene.note_bolted_joint()] if sweep_scene.note_bolted_joint() else []
+    if sweep_scene.of and sweep_scene.of not in table.measures:
+        notes.append(f"no case has a value of {sweep_scene.of.replace('_', ' ')}")
     details = {"answer": verdict[0], "sentences": list(verdict)}
     details |= _make_details(table, analysis) | {"of": identify_sweep(sweep_scene, cases)}
     keys = " × ".join(key.key for key in table.keys)
@@ -54,7 +56,7 @@ def make_answer(
         verdict=verdict,
         quantities=_make_quantities(table, analysis),
         data=_make_data(table, case_folders),
-        remarks=Remarks(_describe_failures(table), (note,) if note else ()),
+        remarks=Remarks(_describe_failures(table), tuple(notes)),
         details=details,
         origin={
             "patchfem": __version__,

@@ -48,20 +48,23 @@ def _describe_change(table: SweepTable, analysis: SweepAnalysis) -> str:
             else f"No main measure of {n_known} cases changes by more than its error."
         )
 
-    name, *cases, _ = analysis.ranges[0]
+    name, *cases, relative = analysis.ranges[0]
+    # a requested measure comes first even if others change more
+    is_most = relative == max(entry.relative for entry in analysis.ranges)
+    changes = "changes most:" if is_most else "changes"
     column = table.measures[name]
     low, high = _format_pair(name, column.unit, column.values[cases].tolist())
     varied = [key for key in table.keys if key.count > 1]
     if len(varied) == 1:
         places = [format_key(varied[0].values[case], varied[0].unit) for case in cases]
         return (
-            f"With {varied[0].key}, {_label(name)} changes most: from {low} at {places[0]} "
+            f"With {varied[0].key}, {_label(name)} {changes} from {low} at {places[0]} "
             f"to {high} at {places[1]}."
         )
     share = ""
     for index in analysis.ranking.get(name, ())[:1]:
         share = f", mainly with {index.key} ({100 * index.total:.0f} % of its variance)"
-    return f"{_label(name).capitalize()} changes most: {low} to {high}{share}."
+    return f"{_label(name).capitalize()} {changes} from {low} to {high}{share}."
 
 
 def _label(name: str) -> str:
@@ -146,22 +149,22 @@ def _describe_cases(table: SweepTable) -> str:
     """Return how many cases there are, and how many are missing, failed, unsettled or over the tolerance."""
     outcomes = table.count_outcomes()
     counts = {
-        "have no result yet": outcomes.pop("", 0),
+        "unfinished": outcomes.pop("", 0),
         "failed": outcomes.pop("failed", 0),
-        "did not converge": outcomes.pop(Outcome.NOT_CONVERGED, 0),
+        "not converged": outcomes.pop(Outcome.NOT_CONVERGED, 0),
     }
     unsettled = sum(count for name, count in outcomes.items() if name not in FINAL_OUTCOMES)
-    counts[f"did not settle{_describe_unsettled(table)}"] = unsettled
+    counts[f"unsettled{_describe_unsettled(table)}"] = unsettled
     missed = table.count_misses()
     main = [name for name in MAIN_MEASURES if name in missed] or list(missed)
     if main:
         name = max(main, key=lambda name: missed[name]["count"])
-        others = f" and {len(missed) - 1} other measures" if len(missed) > 1 else ""
-        counts[f"miss the tolerance in {_label(name)}{others}"] = missed[name]["count"]
+        others = f" and {len(missed) - 1} more" if len(missed) > 1 else ""
+        counts[f"over the tolerance in {_label(name)}{others}"] = missed[name]["count"]
     clauses = [f"{count} {text}" for text, count in counts.items() if count]
     if not clauses:
         return f"All {len(table)} cases settled and meet the tolerance."
-    return f"Of {len(table)} cases, {', '.join(clauses)}."
+    return f"{len(table)} cases: {', '.join(clauses)}."
 
 
 def _describe_unsettled(table: SweepTable) -> str:

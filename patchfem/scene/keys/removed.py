@@ -47,8 +47,14 @@ REMOVED_OPTIONS = {  # advice for each removed (verb, option)
 
 # advice for each (verb, option) that 2.0 removed
 REMOVED_OPTIONS_2 = {
-    ("fit", "--placebo"): "set another value of the key with --set and compare the scores of the fits",
-    ("fit", "--from-patch"): "run the scene with its patch, or fit the law of a point to a loop that `run` and `export` wrote",
+    (
+        "fit",
+        "--placebo",
+    ): "set another value of the key with --set and compare the scores of the fits",
+    (
+        "fit",
+        "--from-patch",
+    ): "run the scene with its patch, or fit the law of a point to a loop that `run` and `export` wrote",
     ("fit", "--amplitudes"): "leave it out: it belonged to --from-patch",
 }
 

@@ -134,8 +134,8 @@ def test_exact_exported_histories_equal_result_file(bench_folder, tmp_path):
         assert np.array_equal(table[column[0]], histories[name]), name
     assert "relative_velocity [m s-1]" in header and mat["units"]["friction_force"] == "N"
     assert np.array_equal(mat["normal_stress"], stress)  # .mat holds arrays of any shape
-    loop = uff["friction_force over relative_displacement"]
-    assert np.array_equal(loop["x"], histories["relative_displacement"])
+    loop = uff["friction_force over slide"]
+    assert np.array_equal(loop["x"], histories["slide"])
     assert np.array_equal(loop["data"], histories["friction_force"]) and loop["func_type"] == 0
     units = next(
         one for one in pyuff.UFF(str(tmp_path / "a.uff")).read_sets() if one["type"] == 164

@@ -8,7 +8,7 @@ import scan_pairs
 from command_line import run_cli
 
 from patchfem.__main__ import main
-from patchfem.export.results import FILES
+from patchfem.export.folder import FILES
 from patchfem.export.surfaces.areal import write_x3p
 from patchfem.surface import read_surface
 from patchfem.surface.areal import Areal
