@@ -34,6 +34,7 @@ MAX_STRETCH = 0.015  # largest error of length of a place
 N_OTHER_PLACES = 15  # number of other places that show how many heights agree by chance
 EVEN_DEVIATION = 1 / np.sqrt(12)  # standard deviation of a uniform error of one digit
 MIN_GAIN_ERROR = 0.003  # smallest error of the gain that is corrected
+MAX_GAIN_ERROR = 0.01  # standard deviation of the gain of two calibrated measurements
 MAX_FINISH = 1.5  # short waves of a trace relative to its noise, below which no place can be found
 
 
@@ -42,6 +43,7 @@ class Aligned:
     """Two traces after alignment, or the code of the reason why they cannot be compared.
 
     - gain: factor by which the heights of the second trace were divided.
+    - gain_error: standard deviation of the gain, as far as the valleys show it.
     """
 
     model: TraceModel | None = None
@@ -49,6 +51,7 @@ class Aligned:
     reason: str = ""
     is_mirrored: bool = False
     gain: float = 1.0
+    gain_error: float = MAX_GAIN_ERROR
 
 
 def clean_trace(trace: Profile, keep_spikes: bool) -> Profile:
@@ -115,7 +118,8 @@ def align_traces(
     if abs(gain - 1) > max(5 * gain_error, MIN_GAIN_ERROR):
         scaled = _fit_scaled(model, fit, gain, digit, is_straight)
         if scaled is not None:
-            return Aligned(model, scaled, is_mirrored=place.is_mirrored, gain=gain)
+            error = min(gain_error, MAX_GAIN_ERROR)
+            return Aligned(model, scaled, "", place.is_mirrored, gain, error)
     is_speck = changes.find_specks(
         model.x, model.second + fit.depth, model.second, fit.worn, fit.grown
     )
@@ -128,7 +132,8 @@ def align_traces(
         reason = "mirror_finish" if _has_mirror_finish(first, second) else "elsewhere"
         return Aligned(model, fit, reason, place.is_mirrored)
     reason = "" if agreeing > MIN_AGREEING else "no_datum"
-    return Aligned(model, fit, reason, place.is_mirrored)
+    error = min(float(np.hypot(gain_error, gain - 1)), MAX_GAIN_ERROR)
+    return Aligned(model, fit, reason, place.is_mirrored, gain_error=error)
 
 
 def _is_same_place(places: list[Place], place: Place, model: TraceModel, fit: Fit) -> bool:
@@ -205,9 +210,9 @@ def _fit_scaled(model: TraceModel, fit: Fit, gain: float, digit: float, is_strai
     mean = second.mean()
     model.second = mean + (second - mean) / gain
     scaled = _fit_datum(model, np.append(fit.state[:2], [0.0, 0.0, 0.0]), digit, is_straight)
-    is_quieter = np.median(scaled.noise) < BEND_GAIN * np.median(fit.noise)
+    is_quieter = np.median(scaled.noise) < np.median(fit.noise)
     changed, before = ((each.worn | each.grown).sum() for each in (scaled, fit))
-    if (is_quieter or changed < before / 2) and changed <= before:
+    if is_quieter and changed <= before:
         return scaled
     model.second = second
     return None

@@ -194,7 +194,7 @@ def _compose_placed(traces: list[Profile], aligned: Aligned) -> Comparison:
     """Measure the worn depth of traces at the same place."""
     fit = aligned.fit
     model = aligned.model
-    section = make_section(model.x, model.second, fit)
+    section = make_section(model.x, model.second, fit, aligned.gain_error)
     errors = section.changes.std(axis=0)
     placed = {
         "shift": (fit.state[0], errors[0]),

@@ -37,6 +37,7 @@ class Section:
     - after: heights (n,) [m] of the second surface about a line.
     - drift: variance of the area per length [m3] due to slow errors of the datum.
     - drift_height: standard deviation [m] of these errors.
+    - model_error: relative standard deviation of all depths and areas due to the gain and the tip.
     """
 
     x: np.ndarray
@@ -86,7 +87,7 @@ class Section:
         return sign * float(weights @ self.depth), float(error)
 
 
-def make_section(x, second, fit: Fit) -> Section:
+def make_section(x, second, fit: Fit, gain_error: float = 0.0) -> Section:
     """Draw errors of the depths of a fit from blocks of its unworn depths (Künsch 1989).
 
     The drawn errors move the fitted parameters too, by the influence of a biweight fit.
@@ -96,6 +97,8 @@ def make_section(x, second, fit: Fit) -> Section:
     x, second : (n,) array [m]
         Places, and heights of the second surface.
     fit : Fit
+    gain_error : float
+        Standard deviation of the gain of the instrument.
     """
     random = np.random.default_rng(0)
     pool = (fit.depth / fit.noise)[~fit.worn & ~fit.grown]
@@ -134,6 +137,7 @@ def make_section(x, second, fit: Fit) -> Section:
         after=second - np.polyval(np.polyfit(x, first, 1), x),
         drift=drift,
         drift_height=drift_height,
+        model_error=float(np.hypot(MODEL_ERROR, gain_error)),
     )
 
 
@@ -180,6 +184,7 @@ def measure_largest(section: Section, name: str) -> Quantity:
     near = max((smooth > smooth[top] - 2 * sigma).sum() / section.correlation, 1.0)
     bias = float(np.sqrt(2 * np.log(near)) / 2 * sigma)
     value = smooth[top] - bias
+    sigma = float(np.hypot(sigma, section.model_error * abs(value)))
     raw = depth[max(top - 2, 0) : top + 3].max()
     low = value - bias - SIDE * sigma
     return name_quantity(name, value, max(low, 0.0), max(raw, value) + SIDE * sigma)
