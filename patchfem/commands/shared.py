@@ -117,6 +117,8 @@ def present(answer, output: Output, draw_page: Callable[[], None] = lambda: None
     """
     if output.as_json:
         content = store.make_summary(answer) if answer.is_run else answer.details
+        if answer.kind == "pairs":
+            content = answer.details["pairs"]
         print(json.dumps(content, ensure_ascii=False, allow_nan=False), flush=True)
     elif not output.is_quiet:
         for line in show.make_lines(answer, output.is_verbose):
