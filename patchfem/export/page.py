@@ -31,7 +31,7 @@ FILE_TEXTS = {
     "scene.fitted.toml": "the scene with the fitted values, ready to run",
 }
 WIDE_STYLES = ("relative", "menu", "maps", "film")  # styles of charts that take the whole width
-TALL_STYLES = ("menu", "maps", "film", "bars")
+TALL_STYLES = ("relative", "menu", "maps", "film", "bars")
 COMPRESSION = 6  # of the figures in a page
 
 

@@ -6,13 +6,15 @@ import numpy as np
 
 from .panels import Curve, Panel
 
-COLOURS = ("#2a78c0", "#d1592a", "#2f9e63", "#9166c9", "#8a8f98", "#b08a12", "#c2478f", "#3aa6a6")
+COLOURS = (
+    *("#2a78c0", "#d1592a", "#2f9e63", "#9166c9", "#8a8f98", "#b08a12", "#c2478f", "#3aa6a6"),
+    *("#7a4b2a", "#5b6fd6", "#97b02e", "#d98cb3"),
+)
 CODE_COLOURS = ("#c9ced6", "#2a78c0", "#d1592a", "#2f9e63", "#9166c9")  # open, stick, slip, ...
 DASHES = ("solid", "dash", "dot", "dashdot")
 SYMBOLS = ("circle", "diamond", "square", "x")
 BAND_OPACITY = 0.18
 FRAME_MILLISECONDS = 120  # duration of a frame of a film
-N_COLOUR_STEPS = 8  # overlaid curves take their colours from the first to the last of these steps
 
 
 def draw(panel: Panel) -> dict:
@@ -193,7 +195,7 @@ def _add_menu(figure: dict, panel: Panel) -> dict:
         "yaxis": _axis_layout(first.y),
         "showlegend": sum(bool(curve.name) for curve in first.curves) > 1,
         # the legend is below, because the menu is above
-        "legend": {"orientation": "h", "x": 0, "y": -0.2, "yanchor": "top"},
+        "legend": {"orientation": "h", "x": 0, "y": -0.3, "yanchor": "top"},
         "updatemenus": [
             {"buttons": buttons, "x": 0, "xanchor": "left", "y": 1.02, "yanchor": "bottom"}
         ],
