@@ -367,4 +367,7 @@ def _template():
     from jinja2 import Environment
 
     text = (files(__package__) / "page.html").read_text("utf-8")
-    return Environment(autoescape=True, trim_blocks=True).from_string(text)
+    environment = Environment(autoescape=True, trim_blocks=True)
+    # sentences mark keys and measures by backquotes, which a page does not show
+    environment.filters["plain"] = lambda sentence: sentence.replace("`", "")
+    return environment.from_string(text)
