@@ -14,6 +14,7 @@ PUBLIC = {
         "SurfaceRuns",
         "run_both_surfaces",
         "surface_runs_to_dict",
+        "write_common_traces",
     ),
     "cost": (
         "Cost",
@@ -69,6 +70,11 @@ PUBLIC = {
     "rows.search": (
         "SearchSettings",
         "UNSTABLE",
+    ),
+    "surface_pairs": (
+        "average_pairs",
+        "find_group",
+        "read_pairs",
     ),
     "sweeps.case_models": ("SweepScene",),
     "sweeps.cases": ("Cases",),

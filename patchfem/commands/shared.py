@@ -1,8 +1,10 @@
 """Common parts of the commands: options, loading of a scene, progress, output of an answer, and exit codes."""
 
 import json
+import shlex
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from threading import Event, Thread
 from time import monotonic
@@ -11,7 +13,7 @@ from typing import Annotated, NamedTuple
 from cyclopts import Parameter
 
 from ..export import folder as folders
-from ..export import page, show, store
+from ..export import page, runs, show, store
 from ..export.charts import axes
 from ..model import model
 from ..scene import scene
@@ -103,11 +105,25 @@ def save(make_answer: Callable, output: Output):
     """
     with folders.Folder(output.target) as folder:
         answer = make_answer(folder.path)
+        known = {"command": describe_command(), "versions": runs.list_versions()}
+        answer = replace(answer, origin=known | answer.origin)
         store.write(answer, folder.path)
         if output.has_page:
             page.write_page(folder.path)
     present(answer, output)
     return answer
+
+
+def describe_command() -> str:
+    """Return the command line of this process without the folder of its results."""
+    words = sys.argv[1:]
+    for option in ("-o", "--out"):
+        if option in words:
+            place = words.index(option)
+            del words[place : place + 2]
+    return shlex.join(
+        ["patchfem", *(Path(word).name if Path(word).is_absolute() else word for word in words)]
+    )
 
 
 def present(answer, output: Output, draw_page: Callable[[], None] = lambda: None) -> None:
@@ -117,6 +133,8 @@ def present(answer, output: Output, draw_page: Callable[[], None] = lambda: None
     """
     if output.as_json:
         content = store.make_summary(answer) if answer.is_run else answer.details
+        if answer.kind == "pairs":
+            content = answer.details["pairs"]
         print(json.dumps(content, ensure_ascii=False, allow_nan=False), flush=True)
     elif not output.is_quiet:
         for line in show.make_lines(answer, output.is_verbose):

@@ -29,6 +29,7 @@ from .shared import (
     UsageError,
     Verbose,
     choose_folder,
+    describe_command,
     flag_option,
     load_model,
     load_scene,
@@ -225,7 +226,14 @@ def fit(
             report, progress, lambda name: f"--{name.replace('_', '-')}"
         )
         answer = fits.fit_into(
-            loaded_scene, to, free, options, target, listener, with_page=not no_page
+            loaded_scene,
+            to,
+            free,
+            options,
+            target,
+            listener,
+            with_page=not no_page,
+            command=describe_command(),
         )
     present(answer, output)
     if answer.details["outcome"] == "not_converged":

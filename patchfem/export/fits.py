@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .. import __version__
-from ..campaigns.fits.curve import FittedCurve
+from ..campaigns.fits.curve import EXTENT, FittedCurve
 from ..campaigns.fits.loop import FittedLoop
 from ..campaigns.fits.problem import FittedKeys
 from ..campaigns.fits.request import FitOptions, Listener, fit_measurement
@@ -152,9 +152,12 @@ def _make_headline(details: dict, measures: dict[str, Quantity]) -> str:
     text = ", ".join(f"{key} = {format_quantity(key, measures[key])}" for key in named)
     if len(keys) > len(named):
         text += f" and {len(keys) - len(named)} more"
+    source = details["measured"]
+    if source == "--to":  # a depth given with the command
+        source = details["quantity"]
     if details["outcome"] != "done":
-        return f"The fit to {details['measured']} did not converge; best values so far: {text}."
-    return f"Fitted to {details['measured']}: {text}."
+        return f"The fit to {source} did not converge; best values so far: {text}."
+    return f"Fitted to {source}: {text}."
 
 
 def _collect_pairs(correlation: list[list[float | None]], names: list[str]) -> dict[str, Variable]:
@@ -475,9 +478,10 @@ def describe_wear_fit(fit: FittedCoefficient) -> Parts:
         "depth_low": ([measured.low], "m", "lower limit of the depth"),
         "depth_high": ([measured.high], "m", "upper limit of the depth"),
     }
+    coefficients, depths = fit.curve[:, fit.curve[0] <= EXTENT * fit.high]
     curve = {
-        "curve_coefficient": (fit.curve[0], WEAR_UNIT, "coefficient"),
-        "curve_depth": (fit.curve[1], "m", f"computed {name}"),
+        "curve_coefficient": (coefficients, WEAR_UNIT, "coefficient"),
+        "curve_depth": (depths, "m", f"computed {name}"),
     }
     return Parts(
         measured=Path(measured.source).name,

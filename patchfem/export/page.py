@@ -31,7 +31,7 @@ FILE_TEXTS = {
     "scene.fitted.toml": "the scene with the fitted values, ready to run",
 }
 WIDE_STYLES = ("relative", "menu", "maps", "film")  # styles of charts that take the whole width
-TALL_STYLES = ("relative", "menu", "maps", "film", "bars")
+TALL_STYLES = ("relative", "menu", "maps", "shares", "film", "bars")
 COMPRESSION = 6  # of the figures in a page
 
 
@@ -253,12 +253,13 @@ def make_tables(answer: Answer) -> list[dict]:
 
 
 def _find_rows(answer: Answer, source: str) -> list[dict]:
-    """Return the rows of a table from a list or an object of objects in the details, or from the variables of a dimension."""
+    """Return the rows of a table: a list or objects by name in the details, or the variables of a dimension."""
     content = answer.details
     for key in source.split("/"):
         content = content.get(key) if isinstance(content, dict) else None
     if isinstance(content, list):
-        return content
+        # the quantities of an object may be in an object of their own
+        return [row | row.get("measures", {}) for row in content]
     if isinstance(content, dict):
         return [{"name": name.replace("_", " "), **row} for name, row in content.items()]
     variables = {name: one for name, one in answer.data.items() if one.dims == (source,)}

@@ -257,6 +257,14 @@ def format_quantity(name: str, quantity: Quantity) -> str:
     return _format_interval(value * scale, quantity, unit, scale)
 
 
+def format_value(value: float | str, unit: str, digits: int = 4) -> str:
+    """Return a number [SI] without an error in a readable unit; a word is unchanged."""
+    if isinstance(value, str):
+        return value
+    label, scale = choose_scale("", unit or "1", abs(value))
+    return f"{format_number(float(value) * scale, digits)} {label}".strip()
+
+
 def _format_interval(value: float, quantity: Quantity, unit: str, scale: float) -> str:
     """Return a value, in its display unit, with the ends of its interval in brackets."""
     ends = [None if end is None else end * scale for end in (quantity.low, quantity.high)]

@@ -16,7 +16,7 @@ from .. import __version__
 from ..core import Missing, PatchfemError
 from ..disk.atomic_write import write_text
 from .answer import RUN_KINDS, Answer, Quantity, Remarks, Variable
-from .charts.table import CSV_UNITS, CURVES, Rows, Stack
+from .charts.table import CSV_UNITS, CURVES, Entries, Rows, Stack
 from .netcdf import read_netcdf, write_netcdf
 
 SUMMARY = "summary.json"
@@ -208,7 +208,10 @@ def format_curves(answer: Answer) -> dict[str, str]:
     """
     files = {}
     for name, columns in CURVES.get(answer.kind, {}).items():
-        lists = _list_columns(answer.data, columns)
+        if isinstance(columns, Entries):
+            lists = _tabulate(answer.details[columns.source], columns)
+        else:
+            lists = _list_columns(answer.data, columns)
         if lists:
             output = io.StringIO()
             writer = csv.writer(output, lineterminator="\n")
@@ -240,6 +243,31 @@ def _list_columns(data: dict[str, Variable], columns: dict | Stack | Rows) -> di
         else:
             lists[_head(title, variable)] = _list_cells(variable)
     return lists if len(lists) > 1 else {}
+
+
+def _tabulate(rows: list[dict], columns: Entries) -> dict[str, list]:
+    """Return the columns of a list of objects: texts, and the value and the interval of each quantity."""
+    lists = {}
+    for name in columns.texts:
+        if name == "labels":
+            labels = dict.fromkeys(label for row in rows for label in row["labels"])
+            lists |= {label: [row["labels"].get(label, "") for row in rows] for label in labels}
+        else:
+            lists[name] = [row.get(name) or "" for row in rows]
+
+    cells = [row[columns.nested] if columns.nested else row for row in rows]
+    units = {
+        name: cell["unit"]
+        for row in cells
+        for name, cell in row.items()
+        if isinstance(cell, dict) and "value" in cell
+    }
+    for name, unit in units.items():
+        for key, suffix in (("value", ""), ("low", "_low"), ("high", "_high")):
+            numbers = [row.get(name, {}).get(key) for row in cells]
+            head = f"{name}{suffix}" if unit == "1" else f"{name}{suffix} [{unit}]"
+            lists[head] = ["" if number is None else number for number in numbers]
+    return lists
 
 
 def _stack_columns(data: dict[str, Variable], stack: Stack) -> dict[str, list]:

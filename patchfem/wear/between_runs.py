@@ -10,9 +10,7 @@ import numpy as np
 from ..core import PatchfemError
 from ..formatting import format_length
 from ..model.earlier_wear import GAP_DIFFERENCE_FRACTION, LOADING_KEYS
-from ..surface.profile import Profile
 from ..surface.quantity import Quantity
-from ..surface.roughness import report
 
 FLOOR_PARTS = 5  # width of the worn part divided by that of its floor, the deepest fifth
 FLOOR_POINTS = (
@@ -64,8 +62,6 @@ class Wear(NamedTuple):
         Quantities of the patch, and of its worn part ({} with strips).
     hidden : tuple of float
         Hidden wear [m] at the ends or corners of the patch.
-    track_hidden : tuple of float
-        The same of the worn part; () without one.
     error : float
         Numerical error of the depth [m].
     """
@@ -75,7 +71,6 @@ class Wear(NamedTuple):
     values: dict[str, Quantity]
     track: dict[str, Quantity]
     hidden: tuple[float, ...]
-    track_hidden: tuple[float, ...]
     error: float
 
 
@@ -120,12 +115,11 @@ def measure_wear(first: PatchState, second: PatchState) -> Wear:
         "hidden_wear": _enclose(float(np.mean(hidden)), depth_error, "m"),
         "worn_share": Quantity(share, share, share, "1", ""),
     }
-    gaps = (second.gap - depth, second.gap)
-    values |= _compare_waves(x, gaps)
-    track, track_hidden = {}, ()
+    track = {}
     if second.y is None and is_worn.any():
-        track, track_hidden = _measure_track(x, depth, is_worn, error, volume / area * length)
-    return Wear(gaps, depth, values, track, hidden, track_hidden, error)
+        track = _measure_track(x, depth, is_worn, error, volume / area * length)
+    gaps = (second.gap - depth, second.gap)
+    return Wear(gaps, depth, values, track, hidden, error)
 
 
 def _require_same_patch(first: PatchState, second: PatchState) -> None:
@@ -225,33 +219,8 @@ def find_plane_below(x, y, depth) -> tuple[float, ...]:
     return tuple(np.maximum(corners @ plane * scale, 0.0).tolist())
 
 
-def _compare_waves(x, gaps: tuple) -> dict[str, Quantity]:
-    """Return the amplitude of the waves of the band, and the rms slope, after wear relative to before."""
-    names = {"amplitude_ratio": "band_amplitude", "slope_ratio": "Pdq"}
-    if gaps[0].ndim == 2:
-        return {name: Quantity(None, None, None, "1", "", "strips") for name in names}
-    if float(np.ptp(gaps[0])) < MIN_ROUGHNESS:
-        return {name: Quantity(None, None, None, "1", "", "flat") for name in names}
-    try:
-        before, after = (
-            report.make_report(Profile(x, gap, name))
-            for gap, name in zip(gaps, ("before", "after"), strict=True)
-        )
-    except PatchfemError as error:
-        return {name: Quantity(None, None, None, "1", "", str(error)) for name in names}
-    ratios = {}
-    for name, parameter in names.items():
-        first, second = before[parameter], after[parameter]
-        if None in (first.value, second.value) or not first.value > 0:
-            reason = first.reason or second.reason or "flat"
-            ratios[name] = Quantity(None, None, None, "1", "", reason)
-        else:
-            ratios[name] = Quantity(second.value / first.value, None, None, "1", "")
-    return ratios
-
-
-def _measure_track(x, depth, is_worn, error: float, area: float) -> tuple[dict, tuple]:
-    """Measure the worn part of a line with worn depths [m] and a lost area [m2]; also its hidden wear."""
+def _measure_track(x, depth, is_worn, error: float, area: float) -> dict[str, Quantity]:
+    """Measure the worn part of a line with worn depths [m] and a lost area [m2]."""
     worn = np.flatnonzero(is_worn)
     first = max(int(worn[0]) - 1, 0)
     last = min(int(worn[-1]) + 1, x.size - 1)
@@ -266,7 +235,7 @@ def _measure_track(x, depth, is_worn, error: float, area: float) -> tuple[dict, 
     )
     hidden = find_plane_below(x[first : last + 1], None, depth[first : last + 1])
     mean_error = error + area / width * sum(cells) / width
-    track = {
+    return {
         "from": Quantity(start, start - cells[0], start + cells[0], "m", ""),
         "to": Quantity(end, end - cells[1], end + cells[1], "m", ""),
         "hidden_wear": _enclose(float(np.mean(hidden)), error, "m"),
@@ -276,4 +245,3 @@ def _measure_track(x, depth, is_worn, error: float, area: float) -> tuple[dict, 
         "area_gross": _enclose(area, error * width, "m2"),
         "pile_up": Quantity(0.0, 0.0, 0.0, "m2", ""),
     }
-    return track, hidden

@@ -19,7 +19,6 @@ from ..surface.quantity import LEVEL, SIDE, Quantity
 
 N_BINS = 100  # number of bins along the patch, in which the noise of single heights averages out
 N_RATIOS = 90  # number of trial coefficients in the search
-N_DRAWS = 200  # number of random errors of the measured depth
 MAX_PLACES = 24  # largest number of positions that are refined in addition to the best one
 MIN_OVERLAP = 0.25  # smallest fraction of the patch on the traces for which its position is known
 END_MARGIN = (
@@ -121,30 +120,27 @@ class Place(NamedTuple):
 
 
 class Bins(NamedTuple):
-    """Measured depth in bins: edges (b + 1,) [m], mean depth (b,) [m] and random errors of it (k, b) [m]."""
+    """Measured depth in bins.
+
+    - edges: (b + 1,) [m].
+    - depth, noise: mean depth and its standard deviation (b,) [m].
+    - datum_error: standard deviation [m] of an error that is common to all depths.
+    """
 
     edges: np.ndarray
     depth: np.ndarray
-    draws: np.ndarray
+    noise: np.ndarray
+    datum_error: float
 
     @property
     def middles(self) -> np.ndarray:
         """Middles (b,) [m] of the bins."""
         return (self.edges[1:] + self.edges[:-1]) / 2
 
-
-class Difference(NamedTuple):
-    """Part of the patch where measured and computed depth differ most.
-
-    - start, end: in x of the patch [m].
-    - value: mean measured less mean computed depth [m].
-    - computed: mean computed depth [m].
-    """
-
-    start: float
-    end: float
-    value: float
-    computed: float
+    @property
+    def width(self) -> float:
+        """Width [m] of a bin."""
+        return float(self.edges[1] - self.edges[0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,7 +150,6 @@ class PredictedWear:
     - coefficient, centre: wear coefficient [m2/N], and middle of the patch in x of the second trace [m].
     - is_mirrored: whether x of the patch runs against x of the trace; None where both fit.
     - x: positions (b,) [m] on the patch; measured, computed, noise: mean depths and standard deviation (b,) [m].
-    - difference: part with the largest difference, or None where noise explains all.
     - proportional: coefficient [m2/N] for which the last depth of the run fits in proportion.
     """
 
@@ -166,7 +161,6 @@ class PredictedWear:
     measured: np.ndarray
     computed: np.ndarray
     noise: np.ndarray
-    difference: Difference | None
     proportional: float
 
     @property
@@ -203,25 +197,20 @@ def fit_wear(measured: MeasuredDepth, history: WearHistory) -> PredictedWear:
         If the run cannot be that of the measured contact.
     """
     bins = _average_measured(measured, history)
-    _require_width(measured.width, 2 * history.half, history, allow_smaller=True)
     start, others = _search(bins, history)
 
     # depths far from the patch tell nothing about its wear
     near = np.abs(bins.middles - start.centre) <= (1 + END_MARGIN) * history.half
     first, last = np.flatnonzero(near)[[0, -1]]
-    bins = Bins(
-        bins.edges[first : last + 2],
-        bins.depth[first : last + 1],
-        bins.draws[:, first : last + 1],
+    bins = bins._replace(
+        edges=bins.edges[first : last + 2],
+        depth=bins.depth[first : last + 1],
+        noise=bins.noise[first : last + 1],
     )
     best = _refine(bins, history, start)
     others = [_refine(bins, history, place, is_fixed=True) for place in others]
     others.append(_refine(bins, history, best._replace(is_mirrored=not best.is_mirrored)))
-
-    computed = history.average(bins.edges, best)
-    worn_width = float(np.diff(bins.edges)[computed > WORN_FRACTION * computed.max()].sum())
-    _require_width(measured.width, worn_width, history, allow_smaller=False, ratio=best.ratio)
-    _require_ratio(best.ratio, history)
+    _require_similar(measured.width, bins, history, best)
     return _make_result(bins, history, best, others)
 
 
@@ -249,9 +238,7 @@ def _average_measured(measured: MeasuredDepth, history: WearHistory) -> Bins:
     count = max(width / (step * max(measured.correlation, 1.0)), 1.0)
     middles = (edges[1:] + edges[:-1]) / 2
     noise = np.interp(middles, measured.x, measured.noise) / np.sqrt(count)
-    rng = np.random.default_rng(0)
-    draws = noise * rng.normal(size=(N_DRAWS, noise.size))
-    return Bins(edges, depth, draws + measured.datum_error * rng.normal(size=(N_DRAWS, 1)))
+    return Bins(edges, depth, noise, measured.datum_error)
 
 
 def _suspect_units(ratio: float, axis: str) -> str:
@@ -261,38 +248,22 @@ def _suspect_units(ratio: float, axis: str) -> str:
     return f"; check the units of {axis} with --units"
 
 
-def _require_width(
-    width: float | None,
-    computed: float,
-    history: WearHistory,
-    *,
-    allow_smaller: bool,
-    ratio: float = 1.0,
-) -> None:
-    """Raise PatchfemError if the measured track is wider, or narrower, than the computed wear [m].
-
-    A track may be wider than the wear of a run that wore far less (`ratio`), because the contact grows.
-    """
-    if width is None:
-        return
-    is_wide = width > MAX_WIDTH_RATIO * computed and ratio <= MAX_RATIO
-    if is_wide or (not allow_smaller and width < computed / MAX_WIDTH_RATIO):
+def _require_similar(width: float | None, bins: Bins, history: WearHistory, best: Place) -> None:
+    """Raise PatchfemError if the measured depth, or the width [m] of its track, is not that of the run."""
+    if not history.work[1] <= best.ratio <= MAX_RATIO:
+        raise PatchfemError(
+            f"compare --predicted: the measured wear needs {best.ratio:.3g} times the wear coefficient of {history.source}, "
+            "for which the run computed no depth; run the scene again with wear.coefficient = "
+            f'"{1.3 * best.ratio * history.coefficient:.2g} m^2/N" and compare again{_suspect_units(best.ratio, "z")}'
+        )
+    computed = history.average(bins.edges, best)
+    worn = bins.width * float((computed > WORN_FRACTION * computed.max()).sum())
+    if width is not None and not worn / MAX_WIDTH_RATIO <= width <= MAX_WIDTH_RATIO * worn:
         raise PatchfemError(
             f"compare --predicted: the measured track is {format_length(width, 3)} wide, and the computed wear of "
-            f"{history.source} {format_length(computed, 3)}; this run is not that of the measured contact"
-            f"{_suspect_units(width / computed, 'x')}"
+            f"{history.source} {format_length(worn, 3)}; this run is not that of the measured contact"
+            f"{_suspect_units(width / worn, 'x')}"
         )
-
-
-def _require_ratio(ratio: float, history: WearHistory) -> None:
-    """Raise PatchfemError if the measured depth is far above that of the run, or below that of its first frame."""
-    if history.work[1] <= ratio <= MAX_RATIO:
-        return
-    raise PatchfemError(
-        f"compare --predicted: the measured wear needs {ratio:.3g} times the wear coefficient of {history.source}, for which "
-        f'the run computed no depth; run the scene again with wear.coefficient = "{1.3 * ratio * history.coefficient:.2g} '
-        f'm^2/N" and compare again{_suspect_units(ratio, "z")}'
-    )
 
 
 def _search(bins: Bins, history: WearHistory) -> tuple[Place, list[Place]]:
@@ -317,17 +288,17 @@ def _search(bins: Bins, history: WearHistory) -> tuple[Place, list[Place]]:
     # enough of the patch must lie within the trace
     shifts = np.arange(squares.shape[1]) - (N_BINS - 1)
     squares[:, (shifts < n_shown - N_BINS) | (shifts > size - n_shown)] = np.inf
-    width = bins.edges[1] - bins.edges[0]
     places = []
     for number in np.argsort(squares, axis=None)[: 4 * MAX_PLACES]:
         side, shift = np.unravel_index(int(number), squares.shape)
-        centre = float(bins.edges[0] + width * shifts[shift] + history.half)
+        centre = float(bins.edges[0] + bins.width * shifts[shift] + history.half)
         places.append(Place(float(ratios[side, shift]), centre, bool(side)))
     best = places[0]
     others = [
         place
         for place in places
-        if place.is_mirrored != best.is_mirrored or abs(place.centre - best.centre) > 1.5 * width
+        if place.is_mirrored != best.is_mirrored
+        or abs(place.centre - best.centre) > 1.5 * bins.width
     ]
     return best, others[:MAX_PLACES]
 
@@ -336,11 +307,10 @@ def _refine(bins: Bins, history: WearHistory, start: Place, *, is_fixed: bool = 
     """Fit coefficient and position by least squares from a start; with `is_fixed` the position stays."""
     from scipy.optimize import least_squares
 
-    width = bins.edges[1] - bins.edges[0]
     scale = float(np.abs(bins.depth).max())
 
     def move(values) -> Place:
-        shift = 0.0 if is_fixed else values[1] * width
+        shift = 0.0 if is_fixed else values[1] * bins.width
         return start._replace(ratio=float(start.ratio * values[0]), centre=start.centre + shift)
 
     def residuals(values) -> np.ndarray:
@@ -369,12 +339,15 @@ def _make_result(
         is_linear=True,
     )
     proportional = _refine(bins, in_proportion, best, is_fixed=True).ratio
-    other = proportional
+    other = best._replace(ratio=proportional)
     if best.ratio <= 1:
-        other = _refine(bins, replace(history, is_linear=True), best, is_fixed=True).ratio
+        other = _refine(bins, replace(history, is_linear=True), best)
     half = np.sqrt(
-        (SIDE * spread[0]) ** 2 + (history.error * best.ratio) ** 2 + (other - best.ratio) ** 2
+        (SIDE * spread[0]) ** 2
+        + (history.error * best.ratio) ** 2
+        + (other.ratio - best.ratio) ** 2
     )
+    half_centre = np.hypot(SIDE * spread[1], other.centre - best.centre)
 
     # places whose sum of squares is larger by less than some variances of an independent block
     limit = best.squares * (1 + ACCEPTED_DEVIANCE / n_blocks)
@@ -385,7 +358,6 @@ def _make_result(
 
     x = (bins.middles - best.centre) * (-1 if best.is_mirrored else 1)
     order = np.argsort(x)
-    draws = bins.draws - bins.draws @ np.linalg.pinv(jacobian).T @ jacobian.T
     return PredictedWear(
         history=history,
         coefficient=Quantity(
@@ -396,16 +368,13 @@ def _make_result(
             "",
         ),
         centre=Quantity(
-            best.centre, min(centres) - SIDE * spread[1], max(centres) + SIDE * spread[1], "m", ""
+            best.centre, min(centres) - half_centre, max(centres) + half_centre, "m", ""
         ),
         is_mirrored=None if is_unknown else best.is_mirrored,
         x=x[order],
         measured=bins.depth[order],
         computed=computed[order],
-        noise=bins.draws.std(axis=0)[order],
-        difference=_find_difference(
-            x[order], residual[order], computed[order], draws[:, order], history.half
-        ),
+        noise=bins.noise[order],
         proportional=proportional * history.coefficient,
     )
 
@@ -413,7 +382,7 @@ def _make_result(
 def _differentiate(bins: Bins, history: WearHistory, best: Place) -> np.ndarray:
     """Return the derivatives (b, 2) of the computed depth by ratio and centre, from central differences."""
     columns = []
-    steps = {"ratio": 0.01 * best.ratio, "centre": (bins.edges[1] - bins.edges[0]) / 2}
+    steps = {"ratio": 0.01 * best.ratio, "centre": bins.width / 2}
     for name, step in steps.items():
         ends = [
             history.average(bins.edges, best._replace(**{name: getattr(best, name) + change}))
@@ -450,35 +419,5 @@ def _measure_spread(
     scatter = residual @ residual / residual.size * n_blocks / freedom * length
     student = float(stdtrit(freedom, (1 + LEVEL) / 2)) / SIDE
     from_scatter = student * np.sqrt(scatter * (gain**2).sum(axis=1))
-    from_noise = (bins.draws @ gain.T).std(axis=0)
-    return np.hypot(from_scatter, from_noise).tolist(), n_blocks
-
-
-def _find_difference(x, residual, computed, draws, half: float) -> Difference | None:
-    """Find the part of the patch where both depths differ most; None if noise explains the difference.
-
-    The largest sum over a part divided by the root of its length is compared with that of the random errors (scan
-    statistic).
-    """
-    inside = np.abs(x) <= half
-    peaks = [_scan(draw[inside])[0] for draw in draws]
-    peak, first, last = _scan(residual[inside])
-    if peak <= np.quantile(peaks, LEVEL):
-        return None
-    bin_half = float(x[1] - x[0]) / 2
-    places = x[inside][first : last + 1]
-    return Difference(
-        max(float(places[0]) - bin_half, -half),
-        min(float(places[-1]) + bin_half, half),
-        float(residual[inside][first : last + 1].mean()),
-        float(computed[inside][first : last + 1].mean()),
-    )
-
-
-def _scan(values: np.ndarray) -> tuple[float, int, int]:
-    """Return the largest |sum| / sqrt(length) over all parts of values, and the first and last index of this part."""
-    sums = np.concatenate([[0.0], np.cumsum(values)])
-    length = np.arange(sums.size) - np.arange(sums.size)[:, None]
-    scores = np.where(length > 0, np.abs(sums - sums[:, None]) / np.sqrt(np.maximum(length, 1)), 0)
-    first, end = np.unravel_index(int(np.argmax(scores)), scores.shape)
-    return float(scores[first, end]), int(first), int(end) - 1
+    variance = gain**2 @ bins.noise**2 + (bins.datum_error * gain.sum(axis=1)) ** 2
+    return np.sqrt(from_scatter**2 + variance).tolist(), n_blocks

@@ -4,7 +4,7 @@
 
 Four generators belong to the tests: `known_pairs`, `worn_kinds`, `track_pairs` (kinds in turn), and tracks of 0.3 to 8
 standard deviations of the depth noise over the middle third. The others are functions `FUNCTION(seed, count)` of
-somebody who had not seen the method; they yield dicts with the keys that `read_dict` reads. Seeds below 900000 may
+somebody who had not seen the method; they yield dicts with the keys that `read_dict` reads, or are named `make(seed)`. Seeds below 900000 may
 have been used in developing it.
 
 What counts:
@@ -193,6 +193,32 @@ def read_dict(pair: dict) -> ScoredPair:
     )
 
 
+def draw_made(make: Callable, seed: int, count: int) -> Iterator[ScoredPair]:
+    """Draw pairs of a generator `make(seed)`, whose truth is the loss of material of the surface itself."""
+    for k in range(count):
+        pair = make(seed + k)
+        truth = pair["truth"]
+        area = truth["removed_area"]
+        is_single = truth["ends"] is not None and len(truth["tracks"]) == 1
+        # A loss below the noise of a single point cannot be decided.
+        is_hidden = truth["worn"] and area < 1.5 * truth["noise"] * max(truth["width"], 1e-12)
+        yield ScoredPair(
+            f"{k} {truth['kind']} {truth['finish']}",
+            _make_profile(*pair["before"], "before"),
+            _make_profile(*pair["after"], "after"),
+            is_worn=None if is_hidden else bool(truth["worn"]),
+            has_grown=truth["built_up_area"] > 0,
+            noise=np.sqrt(2) * truth["noise"],
+            truths={
+                "mean": (area / truth["common_length"],),
+                "area": (area,),
+                "largest": (truth["largest_depth"],),
+            },
+            ends=tuple((end, end) for end in truth["ends"]) if is_single else None,
+            side=0,
+        )
+
+
 def judge(before: Profile, after: Profile) -> Outcome:
     """Compare two traces."""
     from patchfem.surface.compare.compare import compare_surfaces
@@ -296,7 +322,11 @@ def draw_generators(seed: int, count: int, others: list[str]) -> Iterator[tuple[
         yield name, draw(seed, count)
     for text in others:
         name, path = text.split("=", 1)
-        yield name, map(read_dict, load_function(path)(seed, count))
+        function = load_function(path)
+        if path.endswith(":make"):
+            yield name, draw_made(function, seed, count)
+        else:
+            yield name, map(read_dict, function(seed, count))
 
 
 def format_scores(name: str, rows: list) -> str:

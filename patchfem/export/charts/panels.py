@@ -1,12 +1,13 @@
 """Data of a chart: the curves or maps that a row of the table selects from answers, in display units."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 
 from ...formatting import UNIT_LADDERS, choose_unit, format_number, needs_log_scale
 from ..answer import Answer, Variable
+from .panel import Axis, Curve, Panel
 from .table import Chart
 
 MAX_CURVE_POINTS = 3000  # a longer curve keeps the extremes of as many intervals
@@ -15,98 +16,6 @@ N_SHOWN_CYCLES = 3  # number of cycles of the span "cycles"
 SWEEP_STYLES = ("relative", "menu", "maps", "shares")
 MARGIN_NODES = 3  # unloaded nodes beside the contact that the span "contact" shows
 MAX_INTERFACES = 6  # largest number of interfaces with charts of their own
-
-
-@dataclass(frozen=True, slots=True)
-class Axis:
-    """Axis of a chart: label with unit, number of units in one SI unit, and whether it is logarithmic."""
-
-    label: str
-    scale: float = 1.0
-    is_log: bool = False
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Curve:
-    """Curve of a chart, in display units.
-
-    Attributes
-    ----------
-    name : str
-        Entry of the legend; "" for none.
-    x, y : (k,) ndarray
-        For a map, `y` (j, k) contains the colours and `rows` (j,) the vertical positions.
-    low, high : (k,) ndarray or None
-        Ends of the error band.
-    rows : (j,) ndarray or None
-        Vertical positions of a map.
-    meanings : tuple of str
-        Names of the codes of a map.
-    on_second_axis : bool
-    is_line : bool
-        Whether the curve is a line in a chart of points.
-    colour, dash : int
-        Numbers of the colour and of the dash pattern; -1 for the colour of its place among the curves.
-    symbols : (k,) ndarray of str or None
-        Symbols of the points: "circle", "circle-open" or "x".
-    """
-
-    name: str
-    x: np.ndarray
-    y: np.ndarray
-    low: np.ndarray | None = None
-    high: np.ndarray | None = None
-    rows: np.ndarray | None = None
-    meanings: tuple[str, ...] = ()
-    on_second_axis: bool = False
-    is_line: bool = False
-    colour: int = -1
-    dash: int = 0
-    symbols: np.ndarray | None = None
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Panel:
-    """Chart with its data.
-
-    Attributes
-    ----------
-    title, style, caption : str
-    x, y : Axis
-    curves : list of Curve
-    y2 : Axis or None
-        Second vertical axis.
-    marks : list of float
-        Positions of vertical lines.
-    choices : list of Panel
-        Panels between which a menu chooses; empty without a menu.
-    colour_label : str
-        Title of the colours of a map.
-    """
-
-    title: str
-    style: str
-    x: Axis
-    y: Axis
-    curves: list[Curve]
-    caption: str = ""
-    y2: Axis | None = None
-    marks: list[float] = field(default_factory=list)
-    choices: list["Panel"] = field(default_factory=list)
-    colour_label: str = ""
-
-    @property
-    def description(self) -> str:
-        """Text alternative of the chart: its axes, and the range of each curve."""
-        ranges = []
-        for curve in self.curves[:4]:
-            finite = np.asarray(curve.y, float)[np.isfinite(np.asarray(curve.y, float))]
-            if finite.size:
-                low, high = (
-                    format_number(float(value), 4) for value in (finite.min(), finite.max())
-                )
-                ranges.append(f"{curve.name or self.y.label} from {low} to {high}")
-        return f"{self.title}: {self.y.label} against {self.x.label}; {'; '.join(ranges)}."
 
 
 def make_panels(answers: dict[str, Answer], charts: tuple[Chart, ...]) -> list[Panel]:
@@ -162,7 +71,7 @@ def make_panel(answers: dict[str, Answer], chart: Chart) -> Panel | None:
         chart = replace(chart, by="")
     if chart.style in SWEEP_STYLES:
         # only the page of a sweep loads this module
-        from ..sweeps.charts import STYLES
+        from .sweeps import STYLES
 
         return STYLES[chart.style](answers, chart)
     selections = {name: _select(answer.data, chart) for name, answer in answers.items()}
@@ -324,6 +233,7 @@ def _make_axis(name: str, unit: str, arrays: list, log: str, letter: str) -> Axi
 
 def _make_curves(data: dict[str, Variable], chart: Chart, name: str, axes: tuple) -> list[Curve]:
     """Return the curves of one variable: one for each interface, code, or element of the first dimension."""
+    is_line = name in chart.lines
     name, own_x = _split(name)
     if (
         name not in data
@@ -368,7 +278,7 @@ def _make_curves(data: dict[str, Variable], chart: Chart, name: str, axes: tuple
             for end in (low, high)
         ]
         curves.append(Curve(text, x_row[keep], (values * y_axis.scale)[keep], *band))
-    if chart.by in data and len(curves) == 1 and name not in chart.lines:
+    if chart.by in data and len(curves) == 1 and not is_line:
         is_joined = chart.style != "points"
         return _split_by_code(curves[0], data[chart.by], _thin(rows[0][2]), is_joined)
     return curves

@@ -74,6 +74,20 @@ class Rows:
 
 
 @dataclass(frozen=True, slots=True)
+class Entries:
+    """Columns of a CSV file for a list of objects in the details of an answer.
+
+    source: key of the list; texts: keys of texts in each object, where an object `labels` gives a column for each of its
+    keys; nested: key of the quantities in each object, "" if they are its own keys. A quantity has three columns, NAME,
+    NAME_low and NAME_high.
+    """
+
+    source: str
+    texts: tuple[str, ...]
+    nested: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Column:
     """Column of a table.
 
@@ -434,7 +448,7 @@ FIT = (
         "points",
         lines=("curve_depth@curve_coefficient",),
         labels=("wear coefficient", "worn depth"),
-        caption="Measured depth at the fitted coefficient, and the computed depth up to the upper bound.",
+        caption="Measured depth at the fitted coefficient, and the computed depth beyond it.",
     ),
 )
 COST = (
@@ -476,8 +490,8 @@ COMPARE = (
         ("depth", "hidden_depth"),
         marks=("track_end",),
         labels=("", "worn depth"),
-        caption="Depth of the surface after wear below the one before. Band: 95 % noise of a single depth. Vertical lines: ends "
-        "of the worn parts.",
+        caption="Depth of the surface after wear below the one before. Band: 95 % noise of a single depth. Vertical "
+        "lines: ends of the worn parts.",
     ),
     Chart(
         "Both traces, each about its own line",
@@ -491,15 +505,24 @@ COMPARE = (
         "x",
         ("depth_map",),
         "map",
+        labels=("", "worn depth"),
         caption="Depth of the second surface below the first, once both are aligned; white: not measured.",
     ),
-    Chart("Surface before", "x", ("before_map",), "map", caption="Before wear."),
+    Chart(
+        "Surface before",
+        "x",
+        ("before_map",),
+        "map",
+        labels=("", "height"),
+        caption="Height, or gap between the pieces of a run, before wear.",
+    ),
     Chart(
         "Surface after",
         "x",
         ("after_map",),
         "map",
-        caption="After wear, aligned with the first surface.",
+        labels=("", "height"),
+        caption="Height, aligned with the first surface, or gap between the pieces of a run, after wear.",
     ),
     Chart(
         "Mean section of the track",
@@ -590,6 +613,7 @@ PROFILE = (
         "x",
         ("height_map",),
         "map",
+        labels=("", "height"),
         caption="Heights from which the parameters are computed.",
     ),
     Chart(
@@ -626,7 +650,7 @@ FILE_COLUMNS = ("Ra", "Rq", "Rz", "RSm", "Pa", "Pq", "Pt", "Sa", "Sq", "Sz")
 
 # CSV files: kind of answer -> file -> {heading of a column: variable}, groups of variables below each other, or all
 # variables of a dimension. A heading may end in a unit of CSV_UNITS.
-CURVES: dict[str, dict[str, dict[str, str] | Stack | Rows]] = {
+CURVES: dict[str, dict[str, dict[str, str] | Stack | Rows | Entries]] = {
     "compare": {
         "depth.csv": {
             "x": "x",
@@ -651,9 +675,14 @@ CURVES: dict[str, dict[str, dict[str, str] | Stack | Rows]] = {
             "difference": "depth_difference",
         },
     },
-    "pairs": {"pairs.csv": Rows("pair")},
+    "pairs": {
+        "pairs.csv": Entries(
+            "pairs",
+            ("before", "after", "direction", "labels", "outcome", "verdict", "message"),
+        )
+    },
     "profile": {
-        "profile.csv": Rows("file"),
+        "profile.csv": Entries("profiles", ("file",), "measures"),
         "primary.csv": {"x": "x", "z": "primary"},
         "roughness.csv": {"x": "x_rough", "z": "roughness"},
     },
@@ -726,7 +755,6 @@ SWEEP_TABLES = (
         (
             Column("measure", "measure", "name"),
             Column("change", "changes by", "percent"),
-            Column("key", "key"),
             Column("value", "at (between the cases)", "quantity"),
         ),
     ),
@@ -781,7 +809,7 @@ TABLES: dict[str, tuple[Table, ...]] = {
         ),
         Table(
             "Each pair",
-            "pair",
+            "pairs",
             (
                 Column("before", "before"),
                 Column("after", "after"),
@@ -794,7 +822,7 @@ TABLES: dict[str, tuple[Table, ...]] = {
     "profile": (
         Table(
             "Each file",
-            "file",
+            "profiles",
             (Column("file", "file"), *(Column(name, name) for name in FILE_COLUMNS)),
         ),
     ),

@@ -9,11 +9,12 @@ import numpy as np
 from ... import __version__
 from ...campaigns import compare as pressing
 from ...campaigns.compare import SurfaceRuns
+from ...core import PatchfemError
 from ...surface.compare import compare
 from ...surface.compare.compare import DEFAULTS, Options
 from ...surface.compare.records import Comparison, ScanMaps, Track
 from ...surface.profile import level, resample_evenly
-from ...surface.quantity import LEVEL, SIDE
+from ...surface.quantity import LEVEL, SIDE, Quantity
 from ...surface.roughness.spectrum import BAND
 from ..answer import Answer, Remarks, Variable
 from . import predicted as predicted_wear
@@ -55,6 +56,10 @@ def answer_files(
     PatchfemError
         If the files cannot be read or compared, or do not fit to the run.
     """
+    if piece and predicted is None:
+        raise PatchfemError(
+            "compare: piece needs predicted, the results folder of a run with [wear]"
+        )
     comparison = compare.compare_files(before, after, options)
     answer = make_answer(comparison)
     if predicted is None:
@@ -99,38 +104,72 @@ def make_answer(comparison: Comparison) -> Answer:
     words = sentences.describe(comparison)
     surfaces = (comparison.before, comparison.after)
     file_notes = [note for surface in surfaces for note in surface.notes]
-    values = dict(comparison.values)
-    if comparison.track is not None:
-        values |= {name_in_track(name): value for name, value in comparison.track.values.items()}
+    track = comparison.track
+    answer = build(
+        sources=[surface.source for surface in surfaces],
+        words=words._replace(notes=(*words.notes, *file_notes)),
+        values=comparison.values,
+        track={} if track is None else track.values,
+        data=_make_data(comparison),
+        details={
+            "code": comparison.verdict.code,
+            "band": list(BAND),
+            "direction": comparison.direction or None,
+            **_describe_place(comparison),
+            "other_tracks": [to_json(other.values) for other in comparison.tracks[1:]],
+            "removed": dict(zip(SIDES, comparison.evidence.removed, strict=True)),
+            **_compare_roughness(comparison),
+            "notes": file_notes,
+        },
+    )
+    if sentences.is_known(comparison.values.get("worn_depth_mean")):
+        region = sentences.describe_region(comparison).removeprefix("the ")
+        answer.details["worn_depth_mean"]["over"] = region
+    if track is not None and track.section is not None:
+        answer.details["track"]["sections"] = track.n_sections
+    return answer
 
-    details = {
+
+def build(
+    *,
+    sources: list[str],
+    words: sentences.Words,
+    values: dict[str, Quantity],
+    track: dict[str, Quantity],
+    data: dict[str, Variable],
+    details: dict,
+) -> Answer:
+    """Return the answer of a comparison of two surfaces or runs.
+
+    Parameters
+    ----------
+    sources : list of str
+        Files or folders before and after wear.
+    words : Words
+    values, track : dict of str to Quantity
+        Quantities of the whole surface, and of the longest track ({} without one).
+    data : dict of str to Variable
+    details : dict
+        Further content of compare.json.
+    """
+    values = values | {name_in_track(name): value for name, value in track.items()}
+    content = {
         "patchfem": __version__,
         "verdict": words.verdict[0],
         "sentences": [*words.verdict[1:], *words.warnings, *words.notes],
-        "code": comparison.verdict.code,
         "confidence": LEVEL,
-        "band": list(BAND),
-        **{side: surface.source for side, surface in zip(SIDES, surfaces, strict=True)},
-        "direction": comparison.direction or None,
+        **dict(zip(SIDES, sources, strict=True)),
         **to_json(values),
-        **_describe_place(comparison),
-        "track": _track_to_json(comparison.track),
-        "other_tracks": [_track_to_json(track) for track in comparison.tracks[1:]],
-        "removed": dict(zip(SIDES, comparison.evidence.removed, strict=True)),
-        **_compare_roughness(comparison),
-        "notes": file_notes,
+        "track": to_json(track) or None,
     }
-    if sentences.is_known(values.get("worn_depth_mean")):
-        region = sentences.describe_region(comparison).removeprefix("the ")
-        details["worn_depth_mean"]["over"] = region
     return Answer(
         kind="compare",
-        title=" and ".join(Path(surface.source).name for surface in surfaces),
+        title=" and ".join(Path(source).name for source in sources),
         verdict=words.verdict,
         quantities={name: sentences.to_answer(value) for name, value in values.items()},
-        data=_make_data(comparison),
-        remarks=Remarks(words.warnings, (*words.notes, *file_notes)),
-        details=details,
+        data=data,
+        remarks=Remarks(words.warnings, words.notes),
+        details=content | details,
         origin={"patchfem": __version__},
     )
 
@@ -146,13 +185,6 @@ def _describe_place(comparison: Comparison) -> dict:
         registration["turned"] = bool(placement and placement.turned)
     basis = placement.basis if placement is not None else ""
     return {"reference": basis or None, "registration": registration}
-
-
-def _track_to_json(track: Track | None) -> dict | None:
-    """Return a track as an object of compare.json."""
-    if track is None:
-        return None
-    return {"sections": track.n_sections} | to_json(track.values)
 
 
 def _compare_roughness(comparison: Comparison) -> dict:

@@ -1,7 +1,8 @@
 """Definitions of the quantities of compare, profile and wear between two runs, by name."""
 
 from ...surface.compare.records import DEFINITIONS
-from ...surface.roughness import rows
+from ...surface.roughness.areal import AREAL
+from ...surface.roughness.parameters import PROFILE
 from ..quantities import Definition
 
 # names in a track -> names in compare.json and in the answer
@@ -20,17 +21,25 @@ _OWN = {
     "worn_share": ("1", "fraction of the common area, or of the area of the patch, that is worn"),
     "hidden_wear": (
         "m",
-        "largest mean of an even or wedge-shaped wear that measured surfaces cannot show, because it is a shift of the datum",
+        "largest mean of an even or wedge-shaped wear, which measured surfaces show as a shift of the datum",
     ),
     "track_hidden_wear": (
         "m",
-        "mean of the even or wedge-shaped part of the wear within the worn part, which a trace of this part alone cannot show",
+        "mean of the even or wedge-shaped wear of the worn part, which a trace of this part alone cannot show",
     ),
     "wear_coefficient": (
         "m2 N-1",
         "coefficient of Archard's law with which the computed depth of a run fits the measured depth",
     ),
     "patch_centre": ("m", "middle of the patch, in x of the second trace"),
+    "dominant_wavelength": (
+        "m",
+        "wavelength of the octave with the largest mean square height, of the levelled trace",
+    ),
+    "band_amplitude": (
+        "m",
+        "amplitude of a sine with the mean square of the waves from 60 to 110 um, of the levelled trace",
+    ),
     "difference_rms": (
         "m",
         "root mean square of measured less computed depth over the patch, with the fitted coefficient",
@@ -49,16 +58,15 @@ def list_names() -> list[str]:
 
 
 def find(name: str) -> Definition | None:
-    """Return the definition of a quantity of compare or profile; None if there is none."""
-    if name in _OWN:
-        return Definition(*_OWN[name])
-    if name in DEFINITIONS:
-        return Definition(*DEFINITIONS[name])
-    if name in rows.TABLE:
-        row = rows.TABLE[name]
-        return Definition(row.unit, row.text)
-    for part in DEFINITIONS:
+    """Return the definition of a quantity of compare, pairs or profile; None if there is none."""
+    for table in (_OWN, DEFINITIONS, AREAL):
+        if name in table:
+            return Definition(*table[name])
+    for letter, profile in (("P", "levelled trace"), ("R", "roughness profile"), ("", "profile")):
+        if name.startswith(letter) and name.removeprefix(letter) in PROFILE:
+            unit, text = PROFILE[name.removeprefix(letter)]
+            return Definition(unit, f"{text}, of the {profile}")
+    for part, (unit, text) in DEFINITIONS.items():
         if name == name_in_track(part):
-            unit, text = DEFINITIONS[part]
             return Definition(unit, f"{text}; of the longest track")
     return None

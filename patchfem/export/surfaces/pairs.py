@@ -11,7 +11,8 @@ from ...campaigns.surface_pairs import Group, GroupMeans, TableLine
 from ...core import PatchfemError
 from ...surface.compare.compare import DEFAULTS, Options
 from ..answer import Answer, Remarks, Variable
-from . import compare, sentences, variables, worn
+from . import compare, sentences, worn
+from .variables import along
 
 # Basis of the answer for a pair, in words; means are taken only over pairs with the same basis.
 KINDS = {
@@ -21,13 +22,17 @@ KINDS = {
     "flanks": "traces compared by the unworn flanks of a track",
     "nothing": "traces that cannot be registered to each other",
 }
+CHARTED = {
+    "worn_depth_mean": "m",
+    "amplitude_ratio": "1",
+}  # quantities of the charts and their units
 MEANS_NOTE = (
-    "Means have equal weights; their interval is the 95 % interval by Student's t from the scatter of the pairs, or from the "
-    "intervals of the pairs if these give a wider one. It does not include an error that all pairs share, such as calibration."
+    "Means have equal weights; their 95 % interval follows by Student's t from the scatter of the pairs, or from the "
+    "intervals of the pairs if it is wider. An error that all pairs share, such as calibration, is not included."
 )
 SHARED_NOTE = (
-    "Some pairs share the surface measured before wear; its errors are common to these pairs, and the intervals of the means "
-    "do not include them."
+    "Some pairs share the surface measured before wear; the intervals of the means do not include its errors, which are "
+    "common to these pairs."
 )
 
 
@@ -150,21 +155,11 @@ def _collect_means(groups: dict[Group, GroupMeans]) -> dict:
 
 
 def _make_data(rows: list[dict]) -> dict[str, Variable]:
-    """Return the table of the pairs as variables along `pair`: cells, outcome, quantities and their intervals."""
-    labels = dict.fromkeys(label for row in rows for label in row["labels"])
-    names = ("before", "after", "direction", *labels, "outcome", "verdict", "message")
-    cells = [
-        row["labels"] | {key: row.get(key) or "" for key in names if key not in labels}
-        for row in rows
-    ]
-    texts = {name: np.array([str(row.get(name, "")) for row in cells]) for name in names}
-    quantities = [
-        {
-            key: q
-            for key, q in row.items()
-            if isinstance(q, dict) and "value" in q and key not in names
-        }
-        for row in rows
-    ]
-    line = np.array([row["line"] for row in rows])
-    return variables.along("pair", "", line=line, **texts) | variables.table("pair", quantities)
+    """Return the quantities of the charts with their intervals over the line of each pair."""
+    data = along("pair", "1", line=np.array([float(row["line"]) for row in rows]))
+    for name, unit in CHARTED.items():
+        cells = [row.get(name, {}) for row in rows]
+        for key, suffix in (("value", ""), ("low", "_low"), ("high", "_high")):
+            values = np.array([cell.get(key) for cell in cells], float)
+            data |= along("pair", unit, **{name + suffix: values})
+    return data

@@ -72,7 +72,7 @@ def read_patch(folder: Path) -> PatchRun:
 
 
 def worn_depths(answer: Answer) -> np.ndarray:
-    """Return the worn depth (f, m), or (f, s, m) with strips, of both pieces together [m] after the cycles of `wear_frame`."""
+    """Return the worn depth [m] of both pieces after the cycles of `wear_frame`: (f, m), or (f, s, m) with strips."""
     if "wear_worn_depth" not in answer.data:
         raise PatchfemError("result.nc contains no wear_worn_depth; run the scene again")
     return answer.data["wear_worn_depth"].values

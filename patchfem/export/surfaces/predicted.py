@@ -21,7 +21,6 @@ MIN_DEPARTURE = (
     0.01  # smallest relative difference of the proportional coefficient that is reported
 )
 COEFFICIENT_MARGIN = 1.2  # of the coefficient that a note proposes, above the fitted one
-DIFFERENCE_KEYS = ("from", "to", "value", "computed")  # of `largest_difference` in compare.json
 
 
 def add_predicted(answer: Answer, comparison: Comparison, folder: Path, piece: str) -> Answer:
@@ -48,7 +47,6 @@ def add_predicted(answer: Answer, comparison: Comparison, folder: Path, piece: s
     values = {name: sentences.to_answer(value) for name, value in numbers.items()}
     sentence = describe(fitted)
     notes = describe_reliability(fitted)
-    part = fitted.difference
     entry = {
         "coefficient": values["wear_coefficient"].as_json(),
         "patch_centre": values["patch_centre"].as_json(),
@@ -60,7 +58,6 @@ def add_predicted(answer: Answer, comparison: Comparison, folder: Path, piece: s
         "proportional_coefficient": fitted.proportional,
         "extrapolated": fitted.is_extrapolated,
         "mirrored": fitted.is_mirrored,
-        "largest_difference": part and dict(zip(DIFFERENCE_KEYS, part, strict=True)),
         "notes": notes,
     }
     details = answer.details | {"predicted": entry}
@@ -128,18 +125,24 @@ def read_history(folder: Path, piece: str = "") -> WearHistory:
     wear = run.scene.get("wear", {})
     upper_share = float(wear.get("upper_share", 0.0))
     share = {"lower": 1 - upper_share, "upper": upper_share, "": 0.5}.get(piece, 0.0)
-    mistakes = {
-        "this run has no [wear]; add [wear] with coefficient and cycles to its scene and run it again": not wear,
-        "this run starts from worn pieces (wear.start); give a run that starts from unworn pieces": "start"
-        in wear,
-        "a trace shows one line of the patch; give a run without [contact.strips]": run.state.y
-        is not None,
-        f"with wear.upper_share = {upper_share:g} the pieces wear differently; say with --piece upper or --piece lower of "
-        "which piece the traces are": not piece and upper_share != share,
-        f"with wear.upper_share = {upper_share:g} there is no wear of a piece '{piece}'; give --piece upper or --piece lower": not share
-        > 0,
-    }
-    for text, applies in mistakes.items():
+    checks = (
+        (
+            not wear,
+            "this run has no [wear]; add [wear] with coefficient and cycles to its scene and run it again",
+        ),
+        (
+            "start" in wear,
+            "it starts from worn pieces (wear.start); give a run that starts from unworn pieces",
+        ),
+        (run.state.y is not None, "a trace shows one line; give a run without [contact.strips]"),
+        (
+            not piece and upper_share != share,
+            f"with wear.upper_share = {upper_share:g} the pieces wear differently; say with --piece upper or --piece "
+            "lower of which piece the traces are",
+        ),
+        (not share > 0, f"no piece '{piece}' wears; give --piece upper or --piece lower"),
+    )
+    for applies, text in checks:
         if applies:
             raise PatchfemError(f"compare --predicted {folder}: {text}")
 
@@ -161,27 +164,13 @@ def read_history(folder: Path, piece: str = "") -> WearHistory:
 
 
 def describe(fitted: PredictedWear) -> str:
-    """Return the sentence on the fitted coefficient and where the depths differ most."""
+    """Return the sentence on the fitted coefficient and the difference between both depths."""
     coefficient = sentences.format_value("wear_coefficient", fitted.coefficient)
-    mean = float(fitted.computed[fitted.on_patch].mean())
-    text = (
-        f"With a wear coefficient of {coefficient} the computed depth of the {fitted.history.piece} piece differs from the "
-        f"measured depth by {_state(fitted.difference_rms, mean)} rms"
-    )
-    part = fitted.difference
-    if part is None:
-        return f"{text}, which the noise of the traces explains."
-    word = "more" if part.value > 0 else "less"
+    percent = 100 * fitted.difference_rms / float(fitted.computed[fitted.on_patch].mean())
     return (
-        f"{text}, most from x = {format_length(part.start, 3)} to {format_length(part.end, 3)} of the patch, where "
-        f"{_state(abs(part.value), part.computed)} {word} than computed wore off."
+        f"With a wear coefficient of {coefficient} the computed depth of the {fitted.history.piece} piece differs from the "
+        f"measured depth by {format_length(fitted.difference_rms, 3)} rms ({format_number(percent, 2)} % of its mean)."
     )
-
-
-def _state(depth: float, total: float) -> str:
-    """Return a depth and the percentage of a total."""
-    percent = f" ({format_number(100 * depth / total, 2)} %)" if total > 0 else ""
-    return f"{format_length(depth, 3)}{percent}"
 
 
 def describe_reliability(fitted: PredictedWear) -> list[str]:
@@ -190,13 +179,14 @@ def describe_reliability(fitted: PredictedWear) -> list[str]:
     value = fitted.coefficient.value
     if fitted.is_extrapolated:
         notes.append(
-            "The measured depth is larger than that of the run, so that the coefficient is extrapolated from its last frames; "
-            f'run the scene again with wear.coefficient = "{COEFFICIENT_MARGIN * value:.2g} m^2/N" and compare again.'
+            "The measured depth is larger than that of the run, so that the coefficient is extrapolated from its "
+            f'last frames; run the scene again with wear.coefficient = "{COEFFICIENT_MARGIN * value:.2g} m^2/N" and compare '
+            "again."
         )
     if abs(fitted.proportional / value - 1) > MIN_DEPARTURE:
         notes.append(
-            "The computed depth is not proportional to the coefficient, because the pressure changes as the pieces wear; the "
-            f"last depth of the run in proportion would give {format_number(fitted.proportional, 4)} m^2/N."
+            "The computed depth is not proportional to the coefficient, because the pressure changes with wear; the last "
+            f"depth of the run in proportion would give {format_number(fitted.proportional, 4)} m^2/N."
         )
     if fitted.is_mirrored is None:
         notes.append(

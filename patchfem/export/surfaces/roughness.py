@@ -15,7 +15,7 @@ from ...surface.roughness.report import RoughnessReport
 from ...surface.roughness.spectrum import BAND
 from ..answer import Answer, Remarks, Variable
 from . import sentences
-from .variables import along, maps, table
+from .variables import along, maps
 
 KINDS = {"profile": "traces", "areal": "scans"}
 CONFIDENCE = 0.9  # of the interval of a parameter of a single trace, from 5 to 95 %
@@ -25,14 +25,14 @@ MAX_SIZE_RATIO = (
 # parameters in the headline: those of a scan, of a trace with a cut-off, and of one without
 MAIN = (("Sa", "Sq", "Sz"), ("Ra", "Rq", "Rz"), ("Pa", "Pq", "Pt"))
 INTERVAL_NOTE = (
-    "Intervals of a single trace are 90 % intervals (5 to 95 %) of the mean over all traces of this length, for Gaussian "
-    "heights with the spectrum of this trace."
+    "Intervals of a single trace are 90 % intervals (5 to 95 %) of the mean over its sections, by Student's t from their "
+    "scatter."
 )
 MEANS_NOTE = (
-    "Means have equal weights, and 95 % intervals by Student's t from the scatter of the files, without errors that all files "
-    "share, such as calibration."
+    "Means have equal weights, and 95 % intervals by Student's t from the scatter of the files; an error that all files "
+    "share, such as calibration, is not included."
 )
-SIZES_NOTE = "The files differ in length or step, so that the means of extremes and slopes mix quantities that are defined differently."
+SIZES_NOTE = "The files differ in length or step, so that the means of extremes and slopes mix different quantities."
 TWICE_NOTE = "One file is given twice, so that it counts twice in the means."
 
 
@@ -88,7 +88,7 @@ def make_answer(reports: list[RoughnessReport]) -> Answer:
         title="Roughness of " + ", ".join(Path(each.source).name for each in reports),
         verdict=(*headlines, *treatments)[: sentences.MAX_SENTENCES],
         quantities=quantities,
-        data=_make_data(reports, profiles),
+        data=_make_data(reports),
         remarks=Remarks(tuple(cautions), (*notes, *([MEANS_NOTE] if means else []))),
         details={"patchfem": __version__, "profiles": profiles, "means": means},
         origin={"patchfem": __version__},
@@ -191,10 +191,9 @@ def _find_moments(each: RoughnessReport) -> dict | None:
     return {"cutoff": cutoff, **values, "notes": notes}
 
 
-def _make_data(reports: list[RoughnessReport], profiles: list[dict]) -> dict[str, Variable]:
-    """Return the table of all files, their Abbott curves, and the profiles, map and spectrum of a single file."""
+def _make_data(reports: list[RoughnessReport]) -> dict[str, Variable]:
+    """Return the Abbott curves of all files, and the profiles, map and spectrum of a single file."""
     data = along("file", "", file=np.array([each.source for each in reports]))
-    data |= table("file", [profile["measures"] for profile in profiles])
     curves = [abbott_curve(each.heights) for each in reports]
     data |= along("material_ratio", "1", material_ratio=curves[0][0])
     heights = np.array([height for _, height in curves])

@@ -19,19 +19,19 @@ INTERVALS = "Numbers in brackets are 95 % intervals, which hold for the place th
 VERDICTS = {
     "worn": "Worn depth {mean}, the mean over {region}.",
     "no_wear": "No wear is shown: the mean worn depth over {region} is at most {at_most}.",
-    "grown": "Material grew: {grown} stand above the first surface and {lost} are lost; deposits, or files in the wrong order.",
+    "grown": "Material grew: {grown} stand above the first surface, {lost} are lost; deposits, or files in the wrong order.",
     "worn_and_grown": "Worn depth {mean}, the mean over {region}, and material grew: {lost} lost, {grown} grown.",
-    "growth_at_ends": "Either a scar of {scar_depth} over nearly all of the surface, or {growth_height} of material that grew at "
-    "the ends: both are possible.",
+    "growth_at_ends": "Either a scar of {scar_depth} over nearly all of the surface, or {growth_height} of material that "
+    "grew at the ends: both are possible.",
     "elsewhere": "Not comparable: the two surfaces have no part in common, and no unworn flanks of a track show a depth.",
     "no_datum": "No worn depth: the place is the same, but too few heights agree ({unworn} of all) to measure depths from.",
-    "mirror_finish": "Not comparable: the surface (rms height {rq}) is no rougher than the noise ({noise}), which hides its place.",
+    "mirror_finish": "Not comparable: the surface (rms height {rq}) is no rougher than the noise ({noise}).",
     "identical": "No wear: both files hold the same heights; was the same file given twice?",
 }
 
 # Second sentence where there is no worn depth: what would be seen, or what to do.
 ADVICE = {
-    "no_wear": "A track over the middle third, with unworn flanks, would be found from a mean depth of {detection_limit} on.",
+    "no_wear": "A track over the middle third with unworn flanks is found from a mean depth of {detection_limit} on.",
     "elsewhere": "Measure the same place again, or across the whole track with unworn surface on both sides.",
     "no_datum": "Measure a longer part, so that more of the unworn surface is on both traces.",
     "mirror_finish": "Mark the start of the traces on the part, and give the known shift of the second one.",
@@ -40,19 +40,19 @@ ADVICE = {
 
 # Sentences on findings: further sentences of the verdict, warnings, and notes.
 IN_VERDICT = {
-    "no_old_surface_left": "From {from} to {to} nothing of the first surface is left; the depth is measured below the unworn "
-    "flanks.",
-    "hidden_even_wear": "Even or wedge-shaped wear of both surfaces, by up to {limit} on average, looks like a shift of the datum "
-    "and is not in these depths.",
+    "no_old_surface_left": "From {from} to {to} nothing of the first surface is left; the depth is measured below "
+    "the unworn flanks.",
+    "hidden_even_wear": "Even or wedge-shaped wear of both surfaces{limit} looks like a shift of the datum and is not in "
+    "these depths.",
     "worn_tops": "Only the tops are lost; the valleys between them are those of the first surface.",
 }
 WARNINGS = {
     "identical_files": "Both files hold the same heights; was the same file given twice?",
-    "other_gain": "All heights after wear are {gain} times those before, as another gain of the instrument would make them, and "
-    "wear does not; calibrate z of both measurements.",
+    "other_gain": "All heights after wear are {gain} times those before, as another gain of the instrument would make "
+    "them, and wear does not; calibrate z of both measurements.",
     "exchanged": "Material stands above the first surface: maybe the files are in the wrong order.",
-    "other_step": "The traces have different steps, {before} before and {after} after; slopes and the largest depth depend on "
-    "them.",
+    "other_step": "The traces have different steps, {before} before and {after} after; slopes and the largest depth depend "
+    "on them.",
     "drift": "The datum drifts by {height}, more than the noise; the intervals contain this error.",
     "either_plane": "Another plane fits the unworn heights as well, and would give other depths.",
 }
@@ -60,10 +60,10 @@ NOTES = {
     "other_tracks": "{count} more tracks were found; compare.json lists them.",
     "track_cut": "The track leaves the common part, so that it may be wider than stated.",
     "deposits": "{amount} of material lie above the first surface: deposits or pile-up.",
-    "bow_subtracted": "A bow of {height} over the common length was subtracted, because a bent datum and wear of this shape look "
-    "alike; it would be a worn area of {area}.",
-    "mirrored": "The second surface was measured in the opposite direction; it was mirrored, so that its x counts from the other "
-    "end.",
+    "bow_subtracted": "A bow of {height} over the common length was subtracted, because a bent datum and wear of this shape "
+    "look alike; it would be a worn area of {area}.",
+    "mirrored": "The second surface was measured in the opposite direction; it was mirrored, so that its x counts from "
+    "the other end.",
     "turned": "The second scan is a replica: its heights were turned upside down.",
     "other_length": "Lengths in the second trace are {scale} ({low} to {high}) times those in the first.",
 }
@@ -210,8 +210,11 @@ def _format_numbers(numbers: dict, is_areal: bool) -> dict[str, str]:
         if name in AMOUNTS:
             unit = "m3" if is_areal else "m2"
         if isinstance(number, float):
-            fields[name] = format_rounded(number, unit)
+            # a ratio of lengths differs from 1 in its last digits
+            fields[name] = format_rounded(number, unit, digits=6 if unit == "1" else 4)
         elif number is not None:
             fields[name] = str(number)
     fields["amount"] = fields.get("volume", fields["area"])
+    # without a limit there is nothing to state
+    fields["limit"] = f", by up to {fields['limit']} on average," if "limit" in fields else ""
     return fields

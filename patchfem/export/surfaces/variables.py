@@ -26,6 +26,7 @@ TEXTS = {
     "computed_depth": "worn depth of the run with the fitted coefficient",
     "depth_difference": "measured less computed depth",
     "file": "measured surface",
+    "line": "line of the table of pairs",
     "primary": "height of the primary profile",
     "waviness": "height of the waviness profile",
     "roughness": "height of the roughness profile",
@@ -55,15 +56,4 @@ def maps(x: np.ndarray, y: np.ndarray, **heights: np.ndarray) -> dict[str, Varia
     for name, values in heights.items():
         shown = values[rows, columns].astype(np.float32)
         data[name] = Variable(("y", "x"), shown, "m", TEXTS[name])
-    return data
-
-
-def table(dimension: str, rows: list[dict[str, dict]]) -> dict[str, Variable]:
-    """Return the quantities {value, low, high, unit} of the rows of a table as variables NAME, NAME_low, NAME_high."""
-    units = {name: cell["unit"] for row in rows for name, cell in row.items()}
-    data = {}
-    for name, unit in units.items():
-        for key, suffix in (("value", ""), ("low", "_low"), ("high", "_high")):
-            cells = [row.get(name, {}).get(key) for row in rows]
-            data |= along(dimension, unit, **{name + suffix: np.array(cells, float)})
     return data

@@ -4,17 +4,15 @@ from pathlib import Path
 
 import numpy as np
 
-from ... import __version__
 from ...core import Missing, PatchfemError
 from ...formatting import format_length
-from ...surface.quantity import LEVEL, Quantity
+from ...surface.quantity import Quantity
 from ...wear import between_runs
 from ...wear.between_runs import Wear
 from .. import quantities
-from ..answer import Answer, Remarks, Variable
+from ..answer import Answer, Variable
 from . import sentences
-from .compare import SIDES
-from .definitions import name_in_track
+from .compare import SIDES, build
 from .patches import PatchRun, read_patch
 from .sentences import format_value, to_json
 from .variables import along, maps
@@ -77,7 +75,6 @@ def answer_runs(before: Path, after: Path) -> Answer:
 def make_answer(runs: tuple[PatchRun, PatchRun], wear: Wear) -> Answer:
     """Return the answer on the wear between two runs."""
     verdict = describe(runs, wear)
-    values = wear.values | {name_in_track(name): value for name, value in wear.track.items()}
     sides = {}
     warnings = []
     for side, run in zip(SIDES, runs, strict=True):
@@ -94,34 +91,24 @@ def make_answer(runs: tuple[PatchRun, PatchRun], wear: Wear) -> Answer:
 
     zero = to_json({"shift": Quantity(0.0, 0.0, 0.0, "m", "")})
     names = [name for name in MEASURES if any(name in side["measures"] for side in sides.values())]
-    details = {
-        "patchfem": __version__,
-        "verdict": verdict[0],
-        "sentences": list(verdict[1:]),
-        "confidence": LEVEL,
-        **{side: run.state.source for side, run in zip(SIDES, runs, strict=True)},
-        "direction": "x",
-        "reference": "run",
-        **zero,
-        **to_json(wear.values),
-        "registration": zero | {"mirrored": False},
-        "track": to_json(wear.track) or None,
-        "removed": dict.fromkeys(SIDES, 0),
-        "runs": sides,
-        "measures": {
-            name: {side: sides[side]["measures"].get(name) for side in SIDES} for name in names
-        },
-        "notes": warnings,
-    }
-    return Answer(
-        kind="compare",
-        title=" and ".join(Path(run.state.source).resolve().name for run in runs),
-        verdict=verdict,
-        quantities={name: sentences.to_answer(value) for name, value in values.items()},
+    return build(
+        sources=[run.state.source for run in runs],
+        words=sentences.Words(verdict, tuple(warnings), (NOTE,)),
+        values=wear.values,
+        track=wear.track,
         data=_make_data(runs, wear),
-        remarks=Remarks(tuple(warnings), (NOTE,)),
-        details=details,
-        origin={"patchfem": __version__},
+        details={
+            "direction": "x",
+            "reference": "run",
+            **zero,
+            "registration": zero | {"mirrored": False},
+            "removed": dict.fromkeys(SIDES, 0),
+            "runs": sides,
+            "measures": {
+                name: {side: sides[side]["measures"].get(name) for side in SIDES} for name in names
+            },
+            "notes": warnings,
+        },
     )
 
 
@@ -145,23 +132,12 @@ def describe(runs: tuple[PatchRun, PatchRun], wear: Wear) -> tuple[str, ...]:
         f"{volume} are lost, at most {largest} deep, at {_find_place(after, np.argmax(wear.depth))}"
     )
 
-    # a trace of the worn part alone shows less of the wear than a trace of the whole patch
-    mean, hidden, where = values["worn_depth_mean"], values["hidden_wear"], "of the whole patch"
-    if wear.track and values["worn_share"].value < 1:
-        mean, hidden, where = (
-            wear.track["depth_mean"],
-            wear.track["hidden_wear"],
-            "within this part",
-        )
-        ends = [format_length(wear.track[name].value, 3) for name in ("from", "to")]
-        text = format_value("depth_mean", mean)
-        loss += f"; worn is the part from x = {ends[0]} to {ends[1]}, by {text} on average"
     verdict = [headline, f"{loss}."]
-    if hidden.value > MIN_HIDDEN_RATIO * mean.value:
+    if values["hidden_wear"].value > MIN_HIDDEN_RATIO * values["worn_depth_mean"].value:
+        hidden = format_value("hidden_wear", values["hidden_wear"])
         measurement = "trace" if after.state.y is None else "scan"
         verdict.append(
-            f"Of this depth, {format_value('hidden_wear', hidden)} on average is even or wedge-shaped wear, which a "
-            f"{measurement} {where} alone cannot show."
+            f"Of this depth, {hidden} on average is even or wedge-shaped wear, which a {measurement} alone cannot show."
         )
     return (*verdict, *_describe_measures(runs))
 

@@ -8,7 +8,7 @@ from ...core import PatchfemError
 from .. import netcdf
 from ..answer import Answer, Variable
 from ..charts import axes as drawing
-from .charts import list_keys, make_measure_panel
+from ..charts.sweeps import list_keys, make_measure_panel
 
 
 def to_dataset(answer: Answer):

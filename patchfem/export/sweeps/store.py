@@ -69,7 +69,7 @@ def write_chunk(folder: Path, names: np.ndarray, results: CaseResults) -> Path:
 def read_chunk(path: Path) -> tuple[np.ndarray, CaseResults]:
     """Return the names (n,) and the results of the cases in a file; none if it is damaged."""
     try:
-        with h5netcdf.File(BytesIO(path.read_bytes()), "r") as file:
+        with h5py.File(BytesIO(path.read_bytes()), "r") as file:
             names = file["name"][...]
             words = str(file["outcome"].attrs["flag_meanings"]).split()
             results = CaseResults(np.array(words, object)[file["outcome"][...]])

@@ -13,7 +13,7 @@ from ...core import Outcome
 from ...formatting import format_number
 from ...response import rows
 from ..answer import Quantity
-from ..quantities import choose_scale, format_quantity
+from ..quantities import choose_scale, format_quantity, format_value
 
 SMALLEST_NUMBER = 0.01  # a smaller number of a pair has a unit of its own
 SMALLEST_SHARE = 0.01  # fraction of the variance below which a key is not named
@@ -57,7 +57,7 @@ def _describe_change(table: SweepTable, analysis: SweepAnalysis) -> str:
     low, high = _format_pair(name, column.unit, column.values[cases].tolist())
     varied = [key for key in table.keys if key.count > 1]
     if len(varied) == 1:
-        places = [format_key(varied[0].values[case], varied[0].unit) for case in cases]
+        places = [format_value(varied[0].values[case], varied[0].unit) for case in cases]
         return (
             f"With {varied[0].key}, {_label(name)} {changes} from {low} at {places[0]} "
             f"to {high} at {places[1]}."
@@ -80,16 +80,8 @@ def _format_pair(name: str, unit: str, values: list[float]) -> list[str]:
     for value in values:
         text = f"{format_number(value * scale, 4)} {label}".strip() if value else "0"
         is_small = 0 < abs(value * scale) < SMALLEST_NUMBER
-        texts.append(format_key(value, unit) if is_small else text)
+        texts.append(format_value(value, unit) if is_small else text)
     return texts
-
-
-def format_key(value: float | str, unit: str, digits: int = 4) -> str:
-    """Return a value of a swept key [SI] in a readable unit; a word is unchanged."""
-    if isinstance(value, str):
-        return value
-    label, scale = choose_scale("", unit or "1", abs(value))
-    return f"{format_number(float(value) * scale, digits)} {label}".strip()
 
 
 def _describe_limit(limits: list[KeyLimit]) -> str:
@@ -102,7 +94,7 @@ def _describe_limit(limits: list[KeyLimit]) -> str:
     # limits of a motion come before those of its patch, which change before the motion does
     moving = [limit for limit in open_ended if limit.measure in rows.TABLE]
     first = min(moving or open_ended, key=lambda limit: np.nan_to_num(limit.value, nan=limit.low))
-    ends = [format_key(end, first.unit, 3) for end in (first.low, first.high, first.value)]
+    ends = [format_value(end, first.unit, 3) for end in (first.low, first.high, first.value)]
     if not np.isfinite(first.value):
         return (
             f"{first.key} may reach at least {ends[0]} before {_label(first.measure)} changes by 5 %; "
@@ -117,7 +109,9 @@ def _describe_limit(limits: list[KeyLimit]) -> str:
 def describe_place(table: SweepTable, entry: PeakOnLine) -> str:
     """Return the values of the keys besides the frequency at which a peak was found."""
     others = [key for key in table.keys if key.key != FREQUENCY_KEY]
-    return ", ".join(f"{key.key} {format_key(key.values[entry.case], key.unit)}" for key in others)
+    return ", ".join(
+        f"{key.key} {format_value(key.values[entry.case], key.unit)}" for key in others
+    )
 
 
 def _describe_peaks(table: SweepTable, peaks: list[PeakOnLine]) -> str:
@@ -179,5 +173,5 @@ def _describe_unsettled(table: SweepTable) -> str:
     unsettled = values[~table.settled & np.isfinite(values)]
     if not unsettled.size or unsettled.max() <= np.nanmax(values[table.settled], initial=0.0):
         return ""
-    text = format_key(float(unsettled.max()), table.measures[name].unit)
+    text = format_value(float(unsettled.max()), table.measures[name].unit)
     return f" (their {_label(name)} is up to {text} at the end)"

@@ -4,19 +4,20 @@ Codes of the verdict: "worn", "no_wear", "grown", "worn_and_grown", "growth_at_e
 "no_datum", "mirror_finish", "identical".
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from scipy import ndimage
 
 from ...core import PatchfemError
 from ..areal import Areal
 from ..files.read import read_surface
-from ..profile import Profile, remove_spikes
+from ..profile import Profile, resample_evenly
 from ..quantity import SIDE, Quantity
-from . import changes
-from .fit import Fit, fit_unworn
+from . import changes, waves
+from .alignment import Aligned, align_traces, clean_trace
+from .flanks import find_flanked_track
 from .records import (
     Comparison,
     Datum,
@@ -24,33 +25,31 @@ from .records import (
     Finding,
     Placement,
     TraceCurves,
+    Track,
     name_quantity,
     name_unknown,
 )
-from .section import make_section, measure_hidden_area, measure_largest
-from .statistics import UNWORN_LIMIT, find_mode
-from .traces import MIN_SIGNIFICANCE, TraceModel, find_places, mirror
+from .section import Section, make_section, measure_hidden_area, measure_largest
+from .statistics import UNWORN_LIMIT
 from .track import cover_spans, find_spans, measure_track
+from .verdict import judge_change
 
-MIN_SAMPLES = 40  # smallest number of heights of a trace that is compared
-MIN_AGREEMENT = 3.0  # heights that agree, relative to those of unrelated traces
-MIN_AGREEING = 0.05  # fraction of heights that agree, in addition to that
-N_OTHER_PLACES = 15  # number of other places that show how many heights agree by chance
-MIN_UNWORN_FRACTION = 0.05  # fraction of heights below which there is no datum
-CLEAR_MISFIT = 0.9  # misfit of a place relative to that of a more significant one that it replaces
-BEND_GAIN = (
-    0.8  # noise about a parabola relative to that about a line, from which on it is subtracted
-)
-CONTROL = 3.0  # lost area / grown area, beyond which it is wear
-EVEN_TO_ROUNDING = 1 / np.sqrt(12)  # standard deviation of a uniform error of one digit
 END_SAMPLES = 5  # number of samples from an end at which growth includes it
+MAX_TRACK_FRACTION = (
+    0.8  # width of a track relative to the common part, beyond which it may be growth at its ends
+)
+MIN_SCAR_FRACTION = 0.9  # fraction of worn heights in such a scar; worn tops have a smaller one
+MIN_DEPOSITS = 0.05  # smallest grown area that is reported, relative to the lost area
+MIN_OTHER_LENGTH = 5e-4  # smallest error of length that is reported
+MAX_STEP_RATIO = 1.01  # ratio of two sampling intervals that counts as equal
+MIN_TOPS_FRACTION = 0.6  # fraction of worn heights in a track below which it consists of worn tops
 
 
 class Options(NamedTuple):
     """What is known of two surfaces.
 
     - units: of x (and y) and of z, for files that state none.
-    - direction: "x" or "y", along which traces run; "".
+    - direction: "x" or "y", along which traces run, or scans are evaluated; "".
     - shift: known x of the second trace minus x of the first [m].
     - datum: "straight" if that of the instrument is known to be, so that no bow is subtracted.
     - keep_spikes: whether spikes, dropouts and dust count.
@@ -66,8 +65,16 @@ class Options(NamedTuple):
 DEFAULTS = Options()
 
 
-def compare_files(before, after, options: Options = DEFAULTS) -> Comparison:
-    """Compare two files of traces or of areal scans."""
+def compare_files(before: Path, after: Path, options: Options = DEFAULTS) -> Comparison:
+    """Compare two files of traces or of areal scans.
+
+    Parameters
+    ----------
+    before, after : Path
+        Files in any format that `read_surface` reads.
+    options : Options
+        What is known of both.
+    """
     surfaces = [read_surface(path, options.units) for path in (before, after)]
     return compare_surfaces(*surfaces, options)
 
@@ -77,140 +84,103 @@ def compare_surfaces(
 ) -> Comparison:
     """Compare two traces of the same line, or two scans of the same region.
 
+    Parameters
+    ----------
+    before, after : Profile or Areal
+        Surfaces before and after wear; missing heights are NaN.
+    options : Options
+        What is known of both.
+
     Raises
     ------
     PatchfemError
         If a trace stands beside a scan, an option does not suit the surfaces, or a surface has too few
         heights.
     """
-    return _compare_traces(before, after, options)
+    n_scans = sum(isinstance(surface, Areal) for surface in (before, after))
+    rules = (
+        (
+            options.datum not in ("", "straight"),
+            f"datum {options.datum!r}: straight is needed, or nothing",
+        ),
+        (
+            options.direction not in ("", "x", "y"),
+            f"direction {options.direction!r}: x or y is needed",
+        ),
+        (n_scans == 1, "two traces are needed, or two areal scans"),
+        (
+            n_scans == 2 and options.shift is not None,
+            "a shift can be given only for traces; areal scans are registered automatically",
+        ),
+        (
+            n_scans == 2 and options.datum,
+            "a datum can be given only for traces; the plane of areal scans is fitted",
+        ),
+    )
+    for is_wrong, message in rules:
+        if is_wrong:
+            raise PatchfemError(f"compare: {message}")
+    if n_scans:
+        from .scans import compare_scans
+
+        return compare_scans(before, after, options.direction, keep_spikes=options.keep_spikes)
+    return replace(_compare_traces(before, after, options), direction=options.direction)
 
 
 def _compare_traces(before: Profile, after: Profile, options: Options) -> Comparison:
-    cleaned = [_clean(trace, options.keep_spikes) for trace in (before, after)]
-    removed = tuple(
-        int(raw.x.size - raw.missing.sum() - trace.x.size)
-        for raw, trace in zip((before, after), cleaned)
-    )
+    cleaned = [clean_trace(trace, options.keep_spikes) for trace in (before, after)]
     first, second = cleaned
+    removed = (
+        int((~before.missing).sum() - first.x.size),
+        int((~after.missing).sum() - second.x.size),
+    )
     if first.x.size == second.x.size and (first.z == second.z).all():
-        return Comparison(before, after, Finding("identical", {}), {})
-    aligned = _align_traces(first, second, options)
+        evidence = Evidence(removed=removed)
+        values = _name_unknowns("identical") | {
+            "hidden_wear": name_unknown("hidden_wear", "identical")
+        }
+        findings = (Finding("identical_files", {}),)
+        return Comparison(before, after, Finding("identical", {}), values, (), findings, evidence)
+
+    aligned = align_traces(first, second, options.shift, is_straight=bool(options.datum))
     if aligned.reason:
-        return Comparison(
-            before, after, Finding(aligned.reason, {}), _name_unknowns(aligned.reason)
-        )
-    return _measure_traces(before, after, aligned, removed)
+        section = find_flanked_track(first, second)
+        noise = 0.0
+        result = _compose_unplaced(cleaned, aligned, section)
+        lines = [resample_evenly(trace) for trace in cleaned]
+        step = max(line.step for line in lines)
+        lines = [_resample(line, step) for line in lines]
+    else:
+        result = _compose_placed(cleaned, aligned)
+        curves = result.evidence.curves
+        noise = result.evidence.datum.noise
+        step = float(np.median(np.diff(curves.x)))
+        lines = [_resample(Profile(curves.x, z, ""), step) for z in (curves.before, curves.after)]
+    count = min(line.z.size for line in lines)
+    heights = [line.z[None, :count] for line in lines]
+    values = result.values | waves.compare_waves(heights, step, noise)
+    return replace(
+        result,
+        before=before,
+        after=after,
+        values=values,
+        findings=(*result.findings, *_note_steps(before, after)),
+        evidence=replace(result.evidence, removed=removed),
+    )
 
 
-def _clean(trace: Profile, keep_spikes: bool) -> Profile:
-    clean = trace if keep_spikes else remove_spikes(trace)
-    known = ~clean.missing
-    if not keep_spikes:
-        known &= ~_find_saturated(trace.z)
-    if known.sum() < MIN_SAMPLES:
-        raise PatchfemError(
-            f"compare: {trace.source}: {known.sum()} heights; a comparison needs at least {MIN_SAMPLES}"
-        )
-    return replace(clean, x=clean.x[known], z=clean.z[known])
+def _resample(trace: Profile, step: float) -> Profile:
+    count = int(trace.length / step * (1 + 1e-9)) + 1
+    x = trace.x[0] + step * np.arange(count)
+    z = np.interp(x, trace.x, trace.z)
+    return Profile(x, z - np.polyval(np.polyfit(x, z, 1), x), trace.source)
 
 
-def _find_saturated(z) -> np.ndarray:
-    """Return the heights (n,) bool at the end of the range of the instrument, far from all others."""
-    levels = np.unique(z[~np.isnan(z)])
-    is_saturated = np.zeros(z.size, bool)
-    if levels.size > 3:
-        for extreme, inner, span in (
-            (levels[0], levels[1], levels[-1] - levels[1]),
-            (levels[-1], levels[-2], levels[-2] - levels[0]),
-        ):
-            is_extreme = z == extreme
-            if is_extreme.sum() > 1 and abs(extreme - inner) > span / 2:
-                is_saturated |= is_extreme
-    return is_saturated
-
-
-@dataclass(frozen=True, eq=False)
-class _Aligned:
-    """Two traces after alignment: the second one (mirrored if needed), model and fit; or a reason."""
-
-    second: Profile
-    is_mirrored: bool = False
-    model: TraceModel | None = None
-    fit: Fit | None = None
-    reason: str = ""
-
-
-class _TraceModel(TraceModel):
-    """Model of traces with the noise and the tests of a fit."""
-
-    def compute_noise_terms(self, jacobian) -> np.ndarray:
-        """Return terms (n, 3) of the variance: of the instrument, of positions on slopes, at kinks."""
-        slope = jacobian[:, 0]
-        kink = ndimage.maximum_filter1d(np.abs(np.gradient(slope)), 3)
-        return np.column_stack((np.ones(slope.size), slope**2, kink**2))
-
-    def find_changed(self, depth, noise) -> np.ndarray:
-        """Return the samples (n,) bool that noise does not explain."""
-        return changes.find_changed(depth, noise)
-
-
-def _align_traces(first: Profile, second: Profile, options: Options) -> _Aligned:
-    """Place the second trace on the first, and fit place and datum to the unworn heights."""
-    best = None
-    for place in find_places(first, second):
-        trace = mirror(second) if place.is_mirrored else second
-        model = _TraceModel(first, trace, place)
-        if model.x.size < MIN_SAMPLES:
-            continue
-        state, misfit = model.refine_place()
-        if best is None or misfit < CLEAR_MISFIT * best[3]:
-            best = place, model, state, misfit, trace
-    if best is None:
-        return _Aligned(second, reason="elsewhere")
-    place, model, state, _, trace = best
-
-    digit = EVEN_TO_ROUNDING * np.hypot(_find_digit(first.z), _find_digit(trace.z))
-    fits = []
-    for degree in (1,) if options.datum else (1, 2):
-        start = model.find_datum(state, degree)
-        fits.append(fit_unworn(model, start, slice(0, 3 + degree), digit))
-    fit = fits[0]
-    if len(fits) > 1 and np.median(fits[1].noise) < BEND_GAIN * np.median(fit.noise):
-        fit = fits[1]
-    if not options.keep_spikes:
-        is_speck = changes.find_specks(
-            model.x, model.second + fit.depth, model.second, fit.worn | fit.grown
-        )
-        if is_speck.any():
-            model.keep(~is_speck)
-            fit = fit_unworn(model, fit.state, slice(0, fit.jacobian.shape[1]), digit)
-
-    chance = _estimate_chance(model.second + fit.depth, model.second, np.median(fit.noise))
-    agreeing = fit.unworn.mean()
-    is_known = place.significance > MIN_SIGNIFICANCE and agreeing > MIN_UNWORN_FRACTION
-    if not is_known and agreeing < MIN_AGREEMENT * chance + MIN_AGREEING:
-        return _Aligned(trace, place.is_mirrored, model, fit, "elsewhere")
-    return _Aligned(trace, place.is_mirrored, model, fit)
-
-
-def _estimate_chance(first, second, noise: float) -> float:
-    """Return the fraction of heights of unrelated traces that agree within the noise.
-
-    They are those of both traces at other places, without their long waves.
-    """
-    waves = [z - ndimage.gaussian_filter1d(z, z.size / 40) for z in (first, second)]
-    fractions = []
-    for k in range(1, N_OTHER_PLACES + 1):
-        depth = np.roll(waves[0], k * first.size // (N_OTHER_PLACES + 1)) - waves[1]
-        fractions.append((np.abs(depth - find_mode(depth)) < UNWORN_LIMIT * noise).mean())
-    return float(np.median(fractions))
-
-
-def _find_digit(z) -> float:
-    """Return the smallest difference of two heights [m], at most their range over 100."""
-    steps = np.diff(np.unique(z))
-    return float(min(steps.min(), np.ptp(z) / 100)) if steps.size else 0.0
+def _note_steps(before: Profile, after: Profile) -> tuple[Finding, ...]:
+    steps = [float(np.median(np.diff(trace.x))) for trace in (before, after)]
+    if max(steps) <= MAX_STEP_RATIO * min(steps):
+        return ()
+    return (Finding("other_step", {"before": steps[0], "after": steps[1]}),)
 
 
 def _name_unknowns(reason: str) -> dict[str, Quantity]:
@@ -220,88 +190,192 @@ def _name_unknowns(reason: str) -> dict[str, Quantity]:
     return {name: name_unknown(name, reason) for name in names}
 
 
-def _measure_traces(before, after, aligned: _Aligned, removed) -> Comparison:
-    """Measure the worn depth of aligned traces, and find the verdict."""
+def _compose_placed(traces: list[Profile], aligned: Aligned) -> Comparison:
+    """Measure the worn depth of traces at the same place."""
     fit = aligned.fit
     model = aligned.model
-    section = make_section(model.x, fit)
-    length = float(section.widths.sum())
-    spans = find_spans(section)
-    inside = cover_spans(section, spans) & ~fit.grown
-    area, error = section.integrate(inside)
-    hidden = measure_hidden_area(section)
-    bounds = (area, max(area - SIDE * error, 0.0), area + SIDE * error + hidden)
-    lost = section.integrate(fit.worn)[0]
-    grown, grown_error = section.integrate(fit.grown, -1.0)
-    verdict = judge_areas(bounds, lost, error, grown, grown_error)
-    limit = changes.find_shallow_track(fit.depth).limit
-
-    values = _name_unknowns("no_wear")
+    section = make_section(model.x, model.second, fit, aligned.gain_error)
     errors = section.changes.std(axis=0)
-    placed = {"shift": (fit.state[0], errors[0]), "scale": (1 + fit.state[1], errors[1])}
-    placed["tilt"] = (-fit.state[3] / model.half, errors[3] / model.half)
+    placed = {
+        "shift": (fit.state[0], errors[0]),
+        "scale": (1 + fit.state[1], errors[1]),
+        "tilt": (-fit.state[3] / model.half, errors[3] / model.half),
+    }
     placement = {}
-    for name, (value, deviation) in placed.items():
-        placement[name] = name_quantity(
-            name, value, value - SIDE * deviation, value + SIDE * deviation
-        )
-    values |= placement
-    values["grown_area"] = name_quantity(
-        "grown_area", grown, max(grown - SIDE * grown_error, 0.0), grown + SIDE * grown_error
-    )
-    tracks = ()
-    if verdict.startswith("worn"):
-        values["worn_area"] = name_quantity("worn_area", *bounds)
-        values["worn_depth_mean"] = name_quantity(
-            "worn_depth_mean", *(bound / length for bound in bounds)
-        )
-        values["worn_depth_max"] = measure_largest(section, "worn_depth_max")
-        tracks = tuple(measure_track(section, span) for span in spans)
-        if tracks:
-            values["worn_depth_within"] = replace_name(
-                tracks[0].values["depth_mean"], "worn_depth_within"
-            )
-            for end in ("from", "to"):
-                place = tracks[0].values[end]
-                for side in ("before", "after"):
-                    name = f"worn_{end}_{side}"
-                    if place.value is None:
-                        values[name] = name_unknown(name, "cut_off")
-                    else:
-                        offset = 0.0 if side == "after" else fit.state[0]
-                        values[name] = name_quantity(name, *(v - offset for v in place[:3]))
-    line = np.polyval(np.polyfit(model.x, model.second + fit.depth, 1), model.x)
-    heights = model.second + fit.depth - line
-    curves = TraceCurves(
-        model.x, heights, heights - fit.depth, fit.depth, fit.noise, fit.unworn, fit.worn, fit.grown
-    )
+    for name, (value, error) in placed.items():
+        placement[name] = name_quantity(name, value, value - SIDE * error, value + SIDE * error)
     bend = float(fit.state[4])
     datum = Datum(
-        float(fit.unworn.mean()), float(np.median(fit.noise)), bend, section.correlation, limit
+        unworn=float(fit.unworn.mean()),
+        noise=float(np.median(fit.noise)),
+        bend=bend,
+        correlation=section.correlation,
+        detection_limit=changes.find_shallow_track(fit.depth).limit,
     )
-    evidence = Evidence(
-        Placement(placement, "x" if aligned.is_mirrored else ""), datum, curves, removed=removed
+    curves = _draw_curves(section, model.second + fit.depth)
+    place = Placement(placement, "x" if aligned.is_mirrored else "")
+
+    findings = [Finding("hidden_even_wear", {"limit": None})]
+    if aligned.is_mirrored:
+        findings.append(Finding("mirrored", {}))
+    if aligned.gain != 1.0:
+        findings.append(Finding("other_gain", {"gain": aligned.gain}))
+    if bend:
+        area = abs(bend) * 2 / 3 * float(np.ptp(section.x))
+        findings.append(Finding("bow_subtracted", {"height": abs(bend), "area": area}))
+    scale = placement["scale"]
+    if (
+        min(abs(scale.low - 1), abs(scale.high - 1)) > MIN_OTHER_LENGTH
+        and not scale.low < 1 < scale.high
+    ):
+        numbers = {"scale": scale.value, "low": scale.low, "high": scale.high}
+        findings.append(Finding("other_length", numbers))
+    if section.drift_height > datum.noise:
+        findings.append(Finding("drift", {"height": section.drift_height}))
+    result = _compose(traces, section, Evidence(place, datum, curves), findings)
+    hidden = name_quantity("hidden_wear", 0.0, 0.0, None)
+    return replace(result, values=result.values | {"hidden_wear": hidden})
+
+
+def _compose_unplaced(
+    traces: list[Profile], aligned: Aligned, section: Section | None
+) -> Comparison:
+    """Measure the worn depth below the flanks of the second trace, or state that there is no reference."""
+    hidden = {"hidden_wear": name_unknown("hidden_wear", "not_hidden")}
+    if section is None:
+        values = _name_unknowns(aligned.reason) | hidden
+        numbers = {}
+        if aligned.reason == "no_datum":
+            numbers["unworn"] = float(aligned.fit.unworn.mean())
+        return Comparison(*traces, Finding(aligned.reason, numbers), values)
+    placement = {name: name_unknown(name, "elsewhere") for name in ("shift", "scale", "tilt")}
+    noise = float(section.noise[0])
+    datum = Datum(float(section.unworn.mean()), noise, 0.0, section.correlation)
+    curves = _draw_curves(section, traces[1].z + section.depth)
+    evidence = Evidence(Placement(placement, basis="flanks"), datum, curves)
+    ends = section.x[section.worn][[0, -1]]
+    findings = [Finding("no_old_surface_left", {"from": float(ends[0]), "to": float(ends[1])})]
+    result = _compose(traces, section, evidence, findings)
+    return replace(result, values=result.values | hidden)
+
+
+def _draw_curves(section: Section, first) -> TraceCurves:
+    """Return the curves of aligned traces; first: heights (n,) [m] of the first one."""
+    heights = first - np.polyval(np.polyfit(section.x, first, 1), section.x)
+    return TraceCurves(
+        x=section.x,
+        before=heights,
+        after=heights - section.depth,
+        depth=section.depth,
+        noise=section.noise,
+        unworn=section.unworn,
+        worn=section.worn,
+        grown=section.grown,
     )
-    numbers = {"detection_limit": limit}
-    return Comparison(before, after, Finding(verdict, numbers), values, tracks, (), evidence)
 
 
-def replace_name(quantity: Quantity, name: str) -> Quantity:
-    return name_quantity(name, *quantity[:3])
+def _compose(
+    traces: list[Profile], section: Section, evidence: Evidence, findings: list[Finding]
+) -> Comparison:
+    """Measure a section, and find the verdict."""
+    placement = evidence.placement
+    length = float(section.widths.sum())
+    spans = find_spans(section)
+    # New roughness that stands above the first surface is no loss.
+    is_loss = section.depth > -UNWORN_LIMIT * section.noise
+    area, error = section.integrate(cover_spans(section, spans) & is_loss & ~section.grown)
+    error = float(np.hypot(error, section.model_error * area))
+    hidden = measure_hidden_area(section)
+    bounds = (area, max(area - SIDE * error, 0.0), area + SIDE * error + hidden)
+    lost = section.integrate(section.worn)
+    grown, grown_error = section.integrate(section.grown, -1.0)
+    code = judge_change(bounds, lost[0], error, grown, grown_error)
+    if placement.basis == "flanks" and code != "worn":
+        code = "elsewhere"
+    numbers = {"lost": area, "grown": grown, "basis": placement.basis}
+    numbers |= {"detection_limit": evidence.datum.detection_limit, "at_most": bounds[2] / length}
+
+    values = _name_unknowns("no_wear") | placement.values
+    low = max(grown - SIDE * grown_error, 0.0)
+    values["grown_area"] = name_quantity("grown_area", grown, low, grown + SIDE * grown_error)
+    tracks = ()
+    if code.startswith("worn"):
+        tracks = tuple(measure_track(section, span) for span in spans)
+        if _may_be_growth(section, spans, tracks):
+            code = "growth_at_ends"
+            numbers |= {
+                "scar_depth": bounds[0] / length,
+                "growth_height": tracks[0].values["depth_mean"].value,
+            }
+            tracks = ()
+            values = _name_unknowns("growth_at_ends") | placement.values
+    elif (
+        code == "grown" and section.grown[:END_SAMPLES].any() and section.grown[-END_SAMPLES:].any()
+    ):
+        code = "growth_at_ends"
+        height = grown / float(section.widths[section.grown].sum())
+        numbers |= {"scar_depth": height, "growth_height": height}
+    if code.startswith("worn"):
+        values["worn_area"] = name_quantity("worn_area", *bounds)
+        means = (bound / length for bound in bounds)
+        values["worn_depth_mean"] = name_quantity("worn_depth_mean", *means)
+        values["worn_depth_max"] = measure_largest(section, "worn_depth_max")
+        values |= _name_ends(tracks, placement, traces[1])
+        findings += _describe_tracks(section, spans, tracks)
+        if grown > MIN_DEPOSITS * area:
+            findings.append(Finding("deposits", {"area": grown}))
+        regions, cutoff = waves.measure_roughness(evidence.curves, spans[:1])
+        evidence = replace(evidence, roughness=regions, cutoff=cutoff)
+    if code == "grown":
+        findings.append(Finding("exchanged", {}))
+    return Comparison(*traces, Finding(code, numbers), values, tracks, tuple(findings), evidence)
 
 
-def judge_areas(bounds, lost: float, error: float, grown: float, grown_error: float) -> str:
-    """Return the verdict on lost and grown areas or volumes.
+def _may_be_growth(section: Section, spans: list, tracks: tuple[Track, ...]) -> bool:
+    """Return whether a scar over nearly all of the trace may be growth at its ends."""
+    if not tracks or any(tracks[0].cut):
+        return False
+    first, last = spans[0]
+    if section.worn[first : last + 1].mean() < MIN_SCAR_FRACTION:
+        return False
+    return tracks[0].values["width"].value > MAX_TRACK_FRACTION * float(section.widths.sum())
 
-    Noise is as often above zero as below, so what the same tests find above the first surface is a
-    control for what they find below it.
-    """
-    is_lost = bounds[1] > 0
-    is_grown = grown > 5 * grown_error
-    if is_lost and lost > CONTROL * grown:
-        return "worn"
-    if is_grown and grown > CONTROL * max(lost, 0.0):
-        return "grown"
-    if lost > 2 * SIDE * error and is_grown:
-        return "worn_and_grown"
-    return "no_wear"
+
+def _describe_tracks(section: Section, spans: list, tracks: tuple[Track, ...]) -> list[Finding]:
+    """Return what the numbers of the longest track leave out."""
+    findings = []
+    if len(tracks) > 1:
+        findings.append(Finding("other_tracks", {"count": len(tracks) - 1}))
+    if tracks and any(tracks[0].cut):
+        findings.append(Finding("track_cut", {}))
+    first, last = spans[0]
+    if section.worn[first : last + 1].mean() < MIN_TOPS_FRACTION:
+        findings.append(Finding("worn_tops", {}))
+    return findings
+
+
+def _name_ends(
+    tracks: tuple[Track, ...], placement: Placement, after: Profile
+) -> dict[str, Quantity]:
+    """Return the mean depth within the longest track, and its ends in both traces."""
+    if not tracks:
+        names = ["worn_depth_within"]
+        names += [f"worn_{end}_{side}" for end in ("from", "to") for side in ("before", "after")]
+        return {name: name_unknown(name, "no_track") for name in names}
+    track = tracks[0].values
+    values = {"worn_depth_within": name_quantity("worn_depth_within", *track["depth_mean"][:3])}
+    shift = placement.values["shift"].value
+    middle = float(after.x.mean())
+    for end in ("from", "to"):
+        for side in ("before", "after"):
+            name = f"worn_{end}_{side}"
+            places = track[end][:3]
+            if places[0] is None or (side == "before" and shift is None):
+                reason = "cut_off" if places[0] is None else "elsewhere"
+                values[name] = name_unknown(name, reason)
+                continue
+            if side == "before":
+                scale = placement.values["scale"].value
+                places = [middle + (x - middle) / scale - shift for x in places]
+            values[name] = name_quantity(name, *places)
+    return values

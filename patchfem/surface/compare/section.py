@@ -16,6 +16,8 @@ from .statistics import BIWEIGHT_SLOPE, UNWORN_LIMIT, estimate_correlation
 
 N_DRAWS = 200  # number of errors of the depths that are drawn
 MAX_GAP_STEPS = 1.5  # distance of two samples, in median steps, above which heights are missing
+MODEL_ERROR = 0.002  # relative standard deviation of an area due to tip, interpolation and gain
+N_DRIFT_PARTS = 40  # number of parts whose means show slow errors of the datum
 MIN_WALL = 10.0  # second difference of the depth, in standard deviations, at a wall
 # Error of the area at a wall relative to width times second difference: a jump between two samples is
 # uniform over the step, and has two second differences.
@@ -32,6 +34,10 @@ class Section:
     - unworn, worn, grown: masks (n,).
     - correlation: number of neighbouring samples that share an error.
     - changes: error (draws, k) of each fitted parameter.
+    - after: heights (n,) [m] of the second surface about a line.
+    - drift: variance of the area per length [m3] due to slow errors of the datum.
+    - drift_height: standard deviation [m] of these errors.
+    - model_error: relative standard deviation of all depths and areas due to the gain and the tip.
     """
 
     x: np.ndarray
@@ -43,6 +49,10 @@ class Section:
     correlation: float
     draws: np.ndarray
     changes: np.ndarray
+    after: np.ndarray
+    drift: float = 0.0
+    drift_height: float = 0.0
+    model_error: float = MODEL_ERROR
 
     @cached_property
     def widths(self) -> np.ndarray:
@@ -72,14 +82,23 @@ class Section:
         weights = np.where(inside, self.widths, 0.0)
         gaps = self.gap_errors[inside[1:] & inside[:-1]]
         walls = self.wall_errors[inside]
-        error = np.sqrt(np.var(self.draws @ weights) + gaps @ gaps + walls @ walls)
+        variance = np.var(self.draws @ weights) + gaps @ gaps + walls @ walls
+        error = np.sqrt(variance + self.drift * weights.sum())
         return sign * float(weights @ self.depth), float(error)
 
 
-def make_section(x, fit: Fit) -> Section:
+def make_section(x, second, fit: Fit, gain_error: float = 0.0) -> Section:
     """Draw errors of the depths of a fit from blocks of its unworn depths (Künsch 1989).
 
     The drawn errors move the fitted parameters too, by the influence of a biweight fit.
+
+    Parameters
+    ----------
+    x, second : (n,) array [m]
+        Places, and heights of the second surface.
+    fit : Fit
+    gain_error : float
+        Standard deviation of the gain of the instrument.
     """
     random = np.random.default_rng(0)
     pool = (fit.depth / fit.noise)[~fit.worn & ~fit.grown]
@@ -103,9 +122,43 @@ def make_section(x, fit: Fit) -> Section:
     influence = np.linalg.pinv(weighted / scale, rcond=1e-8) / scale[:, None]
     changes = (influence @ errors[:, fit.unworn].T).T / BIWEIGHT_SLOPE
     draws = errors * fit.noise - changes @ fit.jacobian.T
+    first = second + fit.depth
+    drift, drift_height = _estimate_drift(x, fit)
     return Section(
-        x, fit.depth, fit.noise, fit.unworn, fit.worn, fit.grown, correlation, draws, changes
+        x=x,
+        depth=fit.depth,
+        noise=fit.noise,
+        unworn=fit.unworn,
+        worn=fit.worn,
+        grown=fit.grown,
+        correlation=correlation,
+        draws=draws,
+        changes=changes,
+        after=second - np.polyval(np.polyfit(x, first, 1), x),
+        drift=drift,
+        drift_height=drift_height,
+        model_error=float(np.hypot(MODEL_ERROR, gain_error)),
     )
+
+
+def _estimate_drift(x, fit: Fit) -> tuple[float, float]:
+    """Return the variance of the area per length [m3] due to slow errors of the datum, and their size [m].
+
+    Means of unworn parts scatter more than the drawn noise, and neighbouring parts alike.
+    """
+    edges = np.linspace(0, x.size, N_DRIFT_PARTS + 1).astype(int)[:-1]
+    counts = np.add.reduceat(fit.unworn.astype(float), edges)
+    sums = np.add.reduceat(np.where(fit.unworn, fit.depth, 0.0), edges)
+    variances = np.add.reduceat(np.where(fit.unworn, fit.noise**2, 0.0), edges)
+    is_full = counts > x.size / N_DRIFT_PARTS / 2
+    if is_full.sum() < N_DRIFT_PARTS / 4:
+        return 0.0, 0.0
+    means = sums[is_full] / counts[is_full]
+    expected = np.mean(variances[is_full] / counts[is_full] ** 2)
+    excess = float(np.mean(means**2) - 2 * expected)
+    part = float(np.ptp(x)) / N_DRIFT_PARTS
+    excess = max(excess, 0.0)
+    return excess * estimate_correlation(means) * part, float(np.sqrt(excess))
 
 
 def measure_hidden_area(section: Section) -> float:
@@ -128,9 +181,10 @@ def measure_largest(section: Section, name: str) -> Quantity:
     is_sure = section.noise < MAX_NOISE_RATIO * np.median(section.noise)
     top = int(np.argmax(np.where(is_sure, smooth, -np.inf)))
     sigma = float(np.hypot(section.draws[:, top].std(), PARABOLA_ERROR * section.noise[top]))
-    near = max(int((smooth > smooth[top] - 2 * sigma).sum()), 1)
+    near = max((smooth > smooth[top] - 2 * sigma).sum() / section.correlation, 1.0)
     bias = float(np.sqrt(2 * np.log(near)) / 2 * sigma)
     value = smooth[top] - bias
+    sigma = float(np.hypot(sigma, section.model_error * abs(value)))
     raw = depth[max(top - 2, 0) : top + 3].max()
     low = value - bias - SIDE * sigma
     return name_quantity(name, value, max(low, 0.0), max(raw, value) + SIDE * sigma)

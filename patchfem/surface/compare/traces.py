@@ -14,11 +14,14 @@ from scipy import ndimage, signal, stats
 from scipy.interpolate import CubicSpline
 
 from ..profile import Profile, robust_deviation
-from .statistics import find_mode, solve_biweight_step
+from . import changes
+from .statistics import UNWORN_LIMIT, estimate_correlation, find_mode, solve_biweight_step
 
 STRETCHES = np.linspace(-0.01, 0.01, 21)  # relative errors of length that the search tries
 MIN_OVERLAP = 0.33  # common part relative to the shorter trace
 WAVES_PER_TRACE = 40  # deviations of the Gaussian that separates the waves of the search
+KINK_SAMPLES = 7  # number of samples over which an error of interpolation at a kink spreads
+MIN_QUIET = 40  # smallest number of unworn depths that show their correlation
 N_BLOCKS = 20  # number of parts whose own shifts and modes are found
 MAX_LAG = 20.0  # largest shift of a part from the place of the search, in samples
 N_SEARCH_PARTS = (
@@ -190,13 +193,31 @@ class TraceModel:
     def compute_depth(self, state) -> np.ndarray:
         """Return the depth (n,) [m]."""
         datum = np.polynomial.polynomial.polyval(self.u, state[2:])
-        return self.spline(self.map_places(state)) + datum - self.second
+        self.last_depth = self.spline(self.map_places(state)) + datum - self.second
+        return self.last_depth
 
     def compute_jacobian(self, state) -> np.ndarray:
         """Return the derivative (n, 5) of the depth by the state."""
         slope = self.spline(self.map_places(state), 1)
         datum = np.vander(self.u, 3, increasing=True)
         return np.column_stack((-slope, -slope * (self.x - self.middle), datum))
+
+    def compute_noise_terms(self, jacobian) -> np.ndarray:
+        """Return terms (n, 3) of the variance: of the instrument, of positions on slopes, at kinks."""
+        slope = jacobian[:, 0]
+        kink = ndimage.maximum_filter1d(np.abs(np.gradient(slope)), KINK_SAMPLES)
+        return np.column_stack((np.ones(slope.size), slope**2, kink**2))
+
+    def find_changed(self, depth, noise) -> np.ndarray:
+        """Return the samples (n,) bool that noise does not explain."""
+        changed = changes.find_changed(depth, noise)
+        heights = self.second + self.last_depth / 2
+        heights = heights - ndimage.gaussian_filter1d(heights, heights.size / WAVES_PER_TRACE)
+        relative = depth / noise
+        quiet = relative[np.abs(relative) < UNWORN_LIMIT]
+        if changed.any() or quiet.size < MIN_QUIET:
+            return changed
+        return changes.find_changed_tops(heights, relative, estimate_correlation(quiet))
 
     @cached_property
     def smoothing(self) -> float:

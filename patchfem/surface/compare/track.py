@@ -3,6 +3,7 @@
 An end is a change point from the unworn surface to a flank, by profile likelihood.
 """
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +20,11 @@ MIN_FRAGMENTS = (
 )
 MAX_TOP_FRACTION = 0.25  # largest gap between such tops relative to the width of those on one side
 MAX_GAP_RATIO = 4.0  # largest gap between such tops relative to the median gap
-N_END_GAPS = 3  # number of gaps between tops at an end that show how far it may lie outside
+MIN_CUT_SAMPLES = 4  # smallest number of samples of a top that was cut off
+MAX_CUT_SCATTER = 0.7  # scatter of its heights after wear relative to that before
+MIN_FAR_DEPTH = (
+    4.0  # standard deviations of a single height outside of a track that may belong to it
+)
 FLANK_FRACTION = 0.1  # length of the flanks beyond the known ends of a track, relative to its width
 MIN_CHANGED_FRACTION = 0.85  # fraction of changed heights in a wider gap that belongs to the track
 MAX_CUT_SAMPLES = 5  # number of samples between a track and the end of the section that cuts it off
@@ -52,7 +57,7 @@ def find_spans(section: Section) -> list[tuple[int, int]]:
     changed = np.abs(section.depth) > UNWORN_LIMIT * section.noise
     changed |= section.worn
     spans = find_runs(section.worn)
-    gaps = [later[0] - earlier[1] for earlier, later in zip(spans, spans[1:])]
+    gaps = [later[0] - earlier[1] for earlier, later in pairwise(spans)]
     max_gap = MAX_CUT_SAMPLES
     gap_fraction = MAX_GAP_FRACTION
     if len(spans) >= MIN_FRAGMENTS:
@@ -65,12 +70,25 @@ def find_spans(section: Section) -> list[tuple[int, int]]:
             (first, stop), (start, last) = spans[k : k + 2]
             gap = start - stop
             width = max(stop - first, last - start)
+            is_capped = _is_below_cut(section, spans[k], spans[k + 1])
             is_changed = gap <= width and changed[stop : start + 1].mean() > MIN_CHANGED_FRACTION
-            if gap <= max(gap_fraction * width, max_gap) or is_changed:
+            if gap <= max(gap_fraction * width, max_gap) or is_changed or is_capped:
                 spans[k : k + 2] = [(first, last)]
                 is_joined = True
                 break
     return sorted(spans, key=lambda span: section.x[span[0]] - section.x[span[1]])
+
+
+def _is_below_cut(section: Section, first: tuple[int, int], second: tuple[int, int]) -> bool:
+    """Return whether all heights between two worn parts lie below them: valleys under tops cut off."""
+    near = slice(first[0], second[1] + 1)
+    after = section.after[near]
+    after = after - np.polyval(np.polyfit(section.x[near], after, 1), section.x[near])
+    start = first[0]
+    cuts = [float(np.quantile(after[a - start : b + 1 - start], 0.9)) for a, b in (first, second)]
+    between = after[first[1] + 1 - start : second[0] - start]
+    margin = UNWORN_LIMIT * float(np.median(section.noise))
+    return bool(between.size and np.quantile(between, 0.98) <= max(cuts) + margin)
 
 
 def cover_spans(section: Section, spans: list[tuple[int, int]]) -> np.ndarray:
@@ -84,20 +102,49 @@ def cover_spans(section: Section, spans: list[tuple[int, int]]) -> np.ndarray:
 
 def find_ends(section: Section, span: tuple[int, int]) -> tuple[End, End]:
     """Find where a track begins and ends."""
-    relative = section.depth / section.noise
+    # Pile-up beside a track is no flank.
+    relative = np.where(section.grown, 0.0, section.depth / section.noise)
     first, last = span
     middle = (first + last) // 2 + 1
     start = _find_change_point(section.x[:middle], relative[:middle], first, section)
     back = slice(None, max(middle - 1, 0) - section.x.size - 1, -1)
     stop = _find_change_point(-section.x[back], relative[back], section.x.size - 1 - last, section)
 
-    # Worn tops do not show where between the last one and the next unworn one the track ends.
+    # Tops that were cut off do not show where, up to the next top, the track ends.
     runs = find_runs(section.worn[first : last + 1])
-    gaps = [section.x[first + b[0]] - section.x[first + a[1]] for a, b in zip(runs, runs[1:])]
-    if len(runs) >= MIN_FRAGMENTS:
-        start = start._replace(low=start.low - max(gaps[:N_END_GAPS]))
-        stop = stop._replace(low=stop.low - max(gaps[-N_END_GAPS:]))
+    left = _find_next_top(section, first + runs[0][0], first + runs[0][1], -1)
+    right = _find_next_top(section, first + runs[-1][0], first + runs[-1][1], 1)
+    start = start._replace(low=min(start.low, float(section.x[left])))
+    stop = stop._replace(low=min(stop.low, -float(section.x[right])))
+    reach = max(int(FLANK_FRACTION * (last - first)), MIN_FLANK_SAMPLES)
+    far = np.flatnonzero(relative > MIN_FAR_DEPTH)
+    left = far[(far >= first - reach) & (far < first)]
+    right = far[(far <= last + reach) & (far > last)]
+    if left.size:
+        start = start._replace(low=min(start.low, float(section.x[left[0]])))
+    if right.size:
+        stop = stop._replace(low=min(stop.low, -float(section.x[right[-1]])))
     return start, End(-stop.value, -stop.high, -stop.low)
+
+
+def _find_next_top(section: Section, first: int, last: int, way: int) -> int:
+    """Return the far side of the next top beyond a worn part whose tops were cut off, else its end.
+
+    The heights of a part that was cut scatter less after wear than before; those of a part that was
+    lowered evenly do not.
+    """
+    end = first if way < 0 else last
+    after = section.after[first : last + 1]
+    before = after + section.depth[first : last + 1]
+    if after.size < MIN_CUT_SAMPLES or np.std(np.diff(after, 2)) + after.std() > (
+        MAX_CUT_SCATTER * (np.std(np.diff(before, 2)) + before.std())
+    ):
+        return end
+    level = np.quantile(after, 0.9) + UNWORN_LIMIT * float(np.median(section.noise))
+    outside = section.after[:first][::-1] if way < 0 else section.after[last + 1 :]
+    above = find_runs(outside > level)
+    distance = above[0][1] + 1 if above else outside.size
+    return end + way * distance
 
 
 def _find_change_point(x, relative, worn: int, section: Section) -> End:
@@ -115,10 +162,13 @@ def _find_change_point(x, relative, worn: int, section: Section) -> End:
     step = float(np.median(np.diff(x)))
     if worn < 3:
         return End(float(x[worn]), float(x[0] - step), float(x[worn]))
-    deep = np.flatnonzero(relative[worn : worn + MAX_FLANK_SAMPLES] > FLANK_HEIGHT)
-    length = max(int(deep[0]) if deep.size else SHALLOW_SAMPLES, MIN_FLANK_SAMPLES)
+    # Above half of its depth, the floor of a shallow track begins.
+    inner = relative[worn : worn + MAX_FLANK_SAMPLES]
+    height = min(FLANK_HEIGHT, np.quantile(inner, 0.9) / 2)
+    deep = np.flatnonzero(inner > max(height, MIN_FAR_DEPTH))
+    length = int(deep[0]) + 3 if deep.size else SHALLOW_SAMPLES
     stop = min(worn + length, x.size)
-    low = max(2 * worn - stop, 0)
+    low = max(worn - max(length, MIN_FLANK_SAMPLES), 0)
     part = x[low:stop]
     depths = relative[low:stop]
     if part.size < 8:
@@ -127,7 +177,7 @@ def _find_change_point(x, relative, worn: int, section: Section) -> End:
     # The level of the unworn heights is uncertain, so the change point is sought for three levels.
     level = SIDE * float(section.draws.mean(axis=1).std() / np.median(section.noise))
     stride = max(part.size // MAX_CANDIDATES, 1)
-    places = part[2:-4:stride]
+    places = part[2:-1:stride]
     levels = np.array([depths, depths + level, depths - level])
     deviance = _fit_flanks(part, levels, places - step / 2, section.correlation)
     lowest = deviance.min(axis=2, keepdims=True)
@@ -229,7 +279,7 @@ def _average(section: Section, name: str, first: float, last: float) -> Quantity
 def _measure_floor(section: Section, start: float, width: float) -> Quantity:
     """Return the mean depth of the deepest fifth of the width."""
     edges = start + width * np.arange(N_FIFTHS + 1) / N_FIFTHS
-    parts = [_average(section, "depth_floor", *ends) for ends in zip(edges, edges[1:])]
+    parts = [_average(section, "depth_floor", *ends) for ends in pairwise(edges)]
     return max(parts, key=lambda part: part.value)
 
 

@@ -28,7 +28,7 @@ from patchfem.campaigns.sweeps.executors.cluster import Cluster
 from patchfem.campaigns.sweeps.executors.pool import Pool
 from patchfem.campaigns.sweeps.sweep import MAX_DEATHS, ChunkQueue
 from patchfem.core import Missing, PatchfemError
-from patchfem.export import SweepTarget, sweep_into
+from patchfem.export.sweeps.run import SweepTarget, sweep_into
 from patchfem.runs import FAILED_OUTCOME, CaseResults
 from patchfem.runs.batch.case_results import join_case_results
 from patchfem.scene import read_axes

@@ -17,8 +17,8 @@ from patchfem.campaigns.sweeps.changes import analyse
 from patchfem.export import page, store
 from patchfem.export.answer import Answer, Variable
 from patchfem.export.charts import panels, plotly
+from patchfem.export.charts.sweeps import MAX_DRAWN_CASES, make_measure_panel
 from patchfem.export.charts.table import CHARTS
-from patchfem.export.sweeps.charts import MAX_DRAWN_CASES, make_measure_panel
 from patchfem.export.sweeps.words import make_verdict
 
 MAX_PAGE_BYTES = 1_500_000
@@ -229,3 +229,13 @@ def test_exact_sweeps_beside_each_other(folders, tmp_path):
     assert names == {"one_key", "second"}
     headline = store.read(other).verdict[0]
     assert f"one_key: {headline}" in text and f"second: {headline}" in text
+
+
+@pytest.mark.parametrize("name", ["sweep.nc", "sweep.json", "summary.json"])
+def test_refuses_report_of_damaged_folder(folders, tmp_path, name):
+    """The report of a sweep with a damaged file ends with exit code 2 and one sentence."""
+    folder = shutil.copytree(folders["one key"], tmp_path / "damaged")
+    data = (folder / name).read_bytes()
+    (folder / name).write_bytes(data[: len(data) // 2])
+    answer = run_cli("report", folder, "-o", tmp_path / "page.html")
+    assert answer.code == 2 and "damaged" in answer.err and len(answer.err.splitlines()) == 1

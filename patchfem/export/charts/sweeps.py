@@ -17,10 +17,9 @@ from ...campaigns.sweeps.changes import MAIN_MEASURES
 from ...campaigns.sweeps.limits import NEGLIGIBLE_CHANGE
 from ...campaigns.sweeps.sweep_table import FINAL_OUTCOMES, MeasureColumn
 from ..answer import Answer, Variable
-from ..charts.panels import Axis, Curve, Panel
-from ..charts.table import Chart
-from ..quantities import choose_scale
-from .words import format_key
+from ..quantities import choose_scale, format_value
+from .panel import Axis, Curve, Panel
+from .table import Chart
 
 MAX_DRAWN_CASES = 1000  # cases of a measure, so that a page stays below 1.5 MB
 MAX_LINES = 8  # lines of a chart, one for each combination of the other keys
@@ -72,7 +71,7 @@ class SweepView(NamedTuple):
         """Return the values of the other keys of each line as text; [""] for a single line."""
         texts = [
             [
-                f"{name.replace('_', ' ')} {format_key(value, self.data[name].unit)}"
+                f"{name.replace('_', ' ')} {format_value(value, self.data[name].unit)}"
                 for value in self.data[name].values.tolist()
             ]
             for name in self.others

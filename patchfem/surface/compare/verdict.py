@@ -1,0 +1,38 @@
+"""Verdict on lost and grown material, for traces and scans alike."""
+
+CONTROL = 3.0  # lost over grown material, beyond which it is wear; and the reverse
+MIN_GROWTH = 5.0  # standard deviations of grown material that is reported
+MIN_LOSS = 4.0  # standard deviations of lost material that is reported beside as much growth
+
+
+def judge_change(
+    bounds: tuple[float, float, float],
+    lost: float,
+    error: float,
+    grown: float,
+    grown_error: float,
+) -> str:
+    """Return "worn", "grown", "worn_and_grown" or "no_wear" for areas [m2] or volumes [m3].
+
+    Noise is as often above zero as below, so what the same tests find above the first surface is a
+    control for what they find below it.
+
+    Parameters
+    ----------
+    bounds : tuple of float
+        Lost material in all tracks, with its interval.
+    lost : float
+        Material in places that are worn beyond doubt.
+    error : float
+        Standard deviation of the lost material.
+    grown, grown_error : float
+        Material above the first surface, and its standard deviation.
+    """
+    if bounds[1] > 0 and lost > CONTROL * grown:
+        return "worn"
+    is_grown = grown > MIN_GROWTH * grown_error
+    if is_grown and grown > CONTROL * max(lost, 0.0):
+        return "grown"
+    if is_grown and lost > MIN_LOSS * error:
+        return "worn_and_grown"
+    return "no_wear"
