@@ -188,6 +188,8 @@ def find_definition(name: str, kind: str = "") -> Definition | None:
         return Definition("1", FITTED_KEY)
     if kind in SURFACE_KINDS:
         return definitions.find(name) or definitions.find(rows.remove_interface_number(name))
+    if name in QUANTITIES:
+        return QUANTITIES[name]
     # quantities of a sweep: limits of its key, and extremes of measures
     name = name.removeprefix("largest_").removeprefix("smallest_")
     base_name = "limit" if name.startswith("limit_") else rows.remove_interface_number(name)

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from .. import __version__
-from ..core import PatchfemError
+from ..core import Missing, PatchfemError
 from ..disk.atomic_write import write_text
 from .answer import RUN_KINDS, Answer, Quantity, Remarks, Variable
 from .charts.table import CSV_UNITS, CURVES, Entries, Rows, Stack
@@ -138,8 +138,12 @@ def read_summary(folder: Path) -> dict:
     ------
     PatchfemError
         If there is none, if it is damaged, or if a version before 2.0 wrote it.
+    Missing
+        If there is no such folder.
     """
     path = Path(folder) / SUMMARY
+    if not path.parent.is_dir():
+        raise Missing(f"{folder}: no such results folder")
     if not path.is_file():
         raise PatchfemError(f"{folder}: this is not a results folder: it has no {SUMMARY}")
     try:

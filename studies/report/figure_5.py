@@ -24,13 +24,12 @@ from typing import NamedTuple
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
-from drawing import drawing
+from drawing import BLUE, GREY, ORANGE, drawing
 from report_methods import solve_euler
 from study_text import read_answer
 
 import patchfem as pf
 from patchfem.dynamics.cycles import find_hermite_extremes
-from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.model import build
 from patchfem.scene import load as load_scene
 

@@ -29,12 +29,11 @@ from typing import NamedTuple
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
-from drawing import drawing
+from drawing import BLUE, GREY, ORANGE, drawing
 from study_text import read_answer
 
 import patchfem as pf
 from patchfem.campaigns import LoopOptions, fit_hysteresis_loop
-from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.scene import loads
 
 FOLDER = Path(__file__).parent

@@ -21,11 +21,10 @@ from typing import NamedTuple
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
-from drawing import drawing
+from drawing import BLUE, ORANGE, drawing
 from study_text import read_answer
 
 import patchfem as pf
-from patchfem.export.drawing.pictures import BLUE, ORANGE
 
 FOLDER = Path(__file__).parent
 ANSWER = read_answer(__doc__)

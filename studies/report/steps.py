@@ -27,14 +27,13 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
-from drawing import drawing
+from drawing import BLUE, GREY, ORANGE, drawing
 from figure_27 import POINT
 from modal_test import march_samples
 from study_text import read_answer
 
 from patchfem.campaigns import FitRequest, RowsOptions, fit_rows
 from patchfem.campaigns.rows.fit import SearchSettings
-from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.inputs import read_table
 from patchfem.scene import loads, read_ranges
 

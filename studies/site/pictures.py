@@ -7,6 +7,7 @@ comparison, which takes about 20 CPU seconds. No browser is needed.
 """
 
 import json
+import re
 import os
 import sys
 from collections.abc import Iterator
@@ -155,8 +156,8 @@ def draw_sweep(swept) -> Figure:
     axis.axhspan(
         -TILT_LIMIT, TILT_LIMIT, color=BLUE, alpha=0.1, lw=0, label=f"within {TILT_LIMIT:g} %"
     )
-    allowed = swept.attrs["answer"].partition(";")[0].partition(")")[0].replace(" (", ",\n")
-    axis.set(xscale="log", xlabel="tilt [mrad]", ylabel="change [%]", title=allowed)
+    (allowed,) = re.findall(r"[\w.]+ may reach .*? changes by 5 %", swept.attrs["verdict"])
+    axis.set(xscale="log", xlabel="tilt [mrad]", ylabel="change [%]", title=allowed.replace(" before", "\nbefore"))
     axis.xaxis.set_major_formatter("{x:g}")
     axis.legend(loc="lower left")
     return figure

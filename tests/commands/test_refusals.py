@@ -20,7 +20,6 @@ FILES = {
     "cases.csv": "normal.load [N],friction.static\n10,0.3\n",
     "pairs.csv": "before,after\na.csv,b.csv\n",
     "trace.csv": TRACE,
-    "short.csv": TRACE[: TRACE.index("150,")],
     "bare.csv": TRACE.partition("\n")[2],
 }
 STATIC = ("--over", "friction.static=0.1,0.2")
@@ -80,13 +79,13 @@ REFUSED = {  # command -> [(arguments, texts of the lines of the message)]; exit
     "compare": [
         (
             ("trace.csv", "trace.csv", "--direction", "z"),
-            ("--direction z: the direction must be x or y",),
+            ("direction 'z': x or y is needed",),
         ),
         (
             ("trace.csv", "trace.csv", "--datum", "bent"),
-            ("--datum bent: give --datum straight, or leave it out",),
+            ("datum 'bent': straight is needed, or nothing",),
         ),
-        (("trace.csv", "trace.csv", "bare.csv"), ("3 files; two files are needed, or four",)),
+        (("trace.csv", "trace.csv", "bare.csv"), ("give two files BEFORE and AFTER",)),
         (
             ("trace.csv", "trace.csv", "--scene", "point.toml", "-o", "result"),
             ("the scene has no [contact]",),
@@ -99,15 +98,14 @@ REFUSED = {  # command -> [(arguments, texts of the lines of the message)]; exit
             ("trace.csv", "trace.csv", "--shift", "0"),
             ("--shift: '0' is a bare number without a unit",),
         ),
-        (("short.csv", "short.csv"), ("but not the whole band 60 um to 110 um",)),
         (
             ("trace.csv", "bare.csv", "--pairs", "pairs.csv"),
-            ("give the table alone, without other files",),
+            ("another file cannot be used with a table of pairs",),
         ),
         (("trace.csv",), ("give two files BEFORE and AFTER, or a table of pairs with --pairs",)),
         (
             ("--pairs", "pairs.csv", "--scene", "rig.toml"),
-            ("give the table alone, without --scene",),
+            ("--scene cannot be used with a table of pairs",),
         ),
     ],
     "profile": [

@@ -52,6 +52,11 @@ def name_in_track(name: str) -> str:
     return TRACK_NAMES.get(name, f"track_{name}")
 
 
+def list_names() -> list[str]:
+    """Return the names of all definitions; the parts of a track without the prefix track_."""
+    return list(dict.fromkeys([*_OWN, *DEFINITIONS, *rows.TABLE]))
+
+
 def find(name: str) -> Definition | None:
     """Return the definition of a quantity of compare, pairs or profile; None if there is none."""
     for table in (_OWN, DEFINITIONS, AREAL):

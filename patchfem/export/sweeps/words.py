@@ -11,6 +11,7 @@ from ...campaigns.sweeps.ranking import SobolIndex
 from ...campaigns.sweeps.sweep_table import FINAL_OUTCOMES, SweepTable
 from ...core import Outcome
 from ...formatting import format_number
+from ...response import rows
 from ..answer import Quantity
 from ..quantities import choose_scale, format_quantity, format_value
 
@@ -90,7 +91,9 @@ def _describe_limit(limits: list[KeyLimit]) -> str:
     if not open_ended:
         names = " and ".join(_label(limit.measure) for limit in small)
         return f"{names.capitalize()} changes by less than 5 % over all cases." if names else ""
-    first = min(open_ended, key=lambda limit: np.nan_to_num(limit.value, nan=limit.low))
+    # limits of a motion come before those of its patch, which change before the motion does
+    moving = [limit for limit in open_ended if limit.measure in rows.TABLE]
+    first = min(moving or open_ended, key=lambda limit: np.nan_to_num(limit.value, nan=limit.low))
     ends = [format_value(end, first.unit, 3) for end in (first.low, first.high, first.value)]
     if not np.isfinite(first.value):
         return (
