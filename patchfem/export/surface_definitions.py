@@ -1,9 +1,9 @@
 """Definitions of the quantities of compare, profile and wear between two runs, by name."""
 
-from ...surface.compare.records import DEFINITIONS
-from ...surface.roughness.areal import AREAL
-from ...surface.roughness.parameters import PROFILE
-from ..quantities import Definition
+from ..surface.compare.records import DEFINITIONS
+from ..surface.roughness.areal import AREAL
+from ..surface.roughness.parameters import PROFILE
+from .answer import Definition
 
 # names in a track -> names in compare.json and in the answer
 TRACK_NAMES = {"depth_mean": "track_depth"}
@@ -54,7 +54,9 @@ def name_in_track(name: str) -> str:
 
 def list_names() -> list[str]:
     """Return the names of all definitions; the parts of a track without the prefix track_."""
-    return list(dict.fromkeys([*_OWN, *DEFINITIONS, *rows.TABLE]))
+    heights = [f"P{name}" for name in PROFILE if name != "z"]
+    roughness = [name if name.startswith("Mr") else f"R{name}" for name in PROFILE]
+    return list(dict.fromkeys([*_OWN, *DEFINITIONS, *heights, *roughness, *AREAL]))
 
 
 def find(name: str) -> Definition | None:
