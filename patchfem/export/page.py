@@ -162,6 +162,7 @@ def _describe(answers: dict[str, Answer]) -> dict:
         "verdict": verdict,
         "warnings": _label_all(answers, lambda answer: answer.remarks.warnings),
         "measures": measures,
+        "has_errors": any("±" in text for row in measures for text in row["texts"]),
         "zeros": [name.replace("_", " ") for name in zeros],
     }
     if not is_single:
