@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ..campaigns.backbone.band import PREFERRED_METHODS
+from ..campaigns.backbone.band import PREFERRED_METHODS, Band
 from ..campaigns.backbone.records import Backbone, Curve
 from ..core import PatchfemError
 from ..formatting import format_quantity
@@ -14,20 +14,20 @@ from .runs import make_origin
 
 COLUMNS = ("amplitude", "frequency", "frequency_error", "damping", "damping_error")
 BAND_COLUMNS = ("amplitude", "frequency_low", "frequency_high", "damping_low", "damping_high")
-TEXTS = {  # unit and description of each variable
+# unit and description of what a curve contains, and of the ends of names
+TEXTS = {
     "amplitude": ("m", "half the peak-to-peak motion at the output"),
     "frequency": ("Hz", "frequency"),
-    "frequency_error": ("Hz", "numerical error of the frequency"),
-    "frequency_low": ("Hz", "lower limit of the frequency that tests measure"),
-    "frequency_high": ("Hz", "upper limit of the frequency that tests measure"),
     "damping": ("1", "damping ratio, structure and friction together"),
-    "damping_error": ("1", "numerical error of the damping ratio"),
-    "damping_low": ("1", "lower limit of the damping ratio that tests measure"),
-    "damping_high": ("1", "upper limit of the damping ratio that tests measure"),
+}
+ENDS = {
+    "error": "numerical error of the ",
+    "low": "lower limit that tests measure of the ",
+    "high": "upper limit that tests measure of the ",
 }
 
 
-def make_answer(backbone: Backbone, source, command: str = "") -> Answer:
+def make_answer(backbone: Backbone, source) -> Answer:
     """Return the answer of `backbone`.
 
     Parameters
@@ -35,11 +35,8 @@ def make_answer(backbone: Backbone, source, command: str = "") -> Answer:
     backbone : Backbone
     source : model.Source
         Scene of the mode.
-    command : str
-        Command line that repeats it; by default that without options.
     """
     measures = _make_quantities(backbone)
-    origin = make_origin(source, "backbone")
     return Answer(
         kind="backbone",
         title=source.title,
@@ -50,8 +47,7 @@ def make_answer(backbone: Backbone, source, command: str = "") -> Answer:
             notes=(*map(_make_sentence, backbone.notes), *backbone.answer.sentences[1:])
         ),
         details=_make_details(backbone, measures),
-        # the drive of the scene is ignored
-        origin=origin | {"driven": "", "command": command or origin["command"]},
+        origin=make_origin(source, "backbone"),
     )
 
 
@@ -104,40 +100,38 @@ def _make_quantities(backbone: Backbone) -> dict[str, Quantity]:
     out = {}
     curve = find_curve(backbone)
     if curve is not None:
+
+        def take(name: str, k: int) -> Quantity:
+            """Return frequency or damping ratio of point k of the curve."""
+            return Quantity(
+                getattr(curve, name)[k], TEXTS[name][0], getattr(curve, f"{name}_error")[k]
+            )
+
         largest = int(np.argmax(curve.damping))
-        points = {"at_smallest_amplitude": 0, "at_largest_amplitude": -1}
         for name in ("frequency", "damping"):
-            for place, k in points.items():
-                out[f"{name}_{place}"] = _take_point(curve, name, k)
-        out["largest_damping"] = _take_point(curve, "damping", largest)
+            out[f"{name}_at_smallest_amplitude"] = take(name, 0)
+            out[f"{name}_at_largest_amplitude"] = take(name, -1)
+        out["largest_damping"] = take("damping", largest)
         out["amplitude_of_largest_damping"] = Quantity(curve.amplitude[largest], "m")
-    out["free_frequency"] = Quantity(frequencies.free, "Hz", frequencies.free_error or None)
     no_frequency = "" if frequencies.stuck is not None else "a rigid contact leaves no motion"
-    out["stuck_frequency"] = Quantity(
-        frequencies.stuck, "Hz", frequencies.stuck_error, reason=no_frequency
-    )
-    optional = {
+    out |= {
+        "free_frequency": Quantity(frequencies.free, "Hz", frequencies.free_error or None),
+        "stuck_frequency": Quantity(
+            frequencies.stuck, "Hz", frequencies.stuck_error, reason=no_frequency
+        ),
         "exponent_micro": Quantity(backbone.exponents.micro),
         "exponent_gross": Quantity(backbone.exponents.gross),
         "flutter_amplitude": Quantity(backbone.flutter, "m"),
     }
-    return out | {name: one for name, one in optional.items() if one.value is not None}
-
-
-def _take_point(curve: Curve, name: str, k: int) -> Quantity:
-    """Return frequency or damping ratio of point k of a curve."""
-    return Quantity(getattr(curve, name)[k], TEXTS[name][0], getattr(curve, f"{name}_error")[k])
+    return {name: one for name, one in out.items() if one.value is not None or one.reason}
 
 
 def _make_verdict(backbone: Backbone, measures: dict[str, Quantity]) -> tuple[str, ...]:
     """Return the ends of the recommended curve, natural frequencies, largest damping, and which curve to use."""
 
     def show(name: str) -> str:
-        """Return a quantity with its error, or with five digits."""
-        quantity = measures[name]
-        if quantity.error and "±" in (text := quantities.format_quantity(name, quantity)):
-            return text
-        return format_quantity(quantity.value, quantity.unit, 5)
+        """Return a quantity as text."""
+        return quantities.format_quantity(name, measures[name])
 
     curve = find_curve(backbone)
     free = f"without the contact {show('free_frequency')}"
@@ -189,11 +183,15 @@ def _make_data(backbone: Backbone) -> dict[str, Variable]:
         records.insert(1, (records[0][0], band, BAND_COLUMNS[1:], ""))
         records.append(("band", band, BAND_COLUMNS, ""))
     data = {}
-    for prefix, record, names, end in records:
+    for prefix, record, names, method in records:
         for name in names:
-            unit, text = TEXTS[name]
+            base, _, end = name.partition("_")
+            unit, text = TEXTS[base]
             values = np.asarray(getattr(record, name), float)
-            data[f"{prefix}_{name}"] = Variable((f"{prefix}_amplitude",), values, unit, text + end)
+            dims = (f"{prefix}_amplitude",)
+            data[f"{prefix}_{name}"] = Variable(
+                dims, values, unit, ENDS.get(end, "") + text + method
+            )
     return data
 
 
@@ -201,24 +199,24 @@ def _make_details(backbone: Backbone, measures: dict) -> dict:
     """Return the content of backbone.json in SI units."""
     frequencies = backbone.frequencies
     band = backbone.answer.band
+
+    def list_columns(record: Curve | Band, names: tuple[str, ...]) -> dict[str, list[float]]:
+        """Return some columns of a curve or of the band as lists."""
+        return {name: getattr(record, name).tolist() for name in names}
+
     return {
         "mode": backbone.mode,
         "free_frequency": frequencies.free,
         "free_frequency_error": frequencies.free_error,
         "stuck_frequency": frequencies.stuck,
         "stuck_frequency_error": frequencies.stuck_error,
-        "curves": {
-            method: {name: getattr(curve, name).tolist() for name in COLUMNS}
-            for method, curve in backbone.curves.items()
-        },
+        "curves": {name: list_columns(one, COLUMNS) for name, one in backbone.curves.items()},
         "missing": backbone.missing,
-        "exponent": {
-            name: getattr(backbone.exponents, name) for name in ("micro", "gross", "micro_theory")
-        },
+        "exponent": backbone.exponents._asdict(),
         "flutter_amplitude": backbone.flutter,
         "notes": list(backbone.notes),
         "method": band and band.method,
-        "band": band and {name: getattr(band, name).tolist() for name in BAND_COLUMNS},
+        "band": band and list_columns(band, BAND_COLUMNS),
         "advice": backbone.answer.advice,
         "measures": {name: quantity.as_json() for name, quantity in measures.items()},
     }

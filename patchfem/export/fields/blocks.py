@@ -20,20 +20,18 @@ class Field(NamedTuple):
     - unit: SI unit.
     - shape: shape of one value.
     - codes: meaning of each of its codes, in their order.
-    - bits: bits of the mantissa that are kept; 19 are a relative error below 1e-6.
     """
 
     unit: str
     shape: tuple[int, ...] = ()
     codes: tuple[str, ...] = ()
-    bits: int = 19
 
 
 FIELDS = {
     "displacement": Field("m", (3,)),
     "stress": Field("Pa", (6,)),  # xx, yy, zz, xy, yz, xz; tension is positive
     "von_mises": Field("Pa"),
-    "stress_error": Field("1", bits=6),  # the estimate itself is accurate to about 10 %
+    "stress_error": Field("1"),
     "material": Field("1", codes=("substrate", "coating")),
     "part": Field("1", codes=PARTS),
     "weight": Field("m2"),

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from ...core import Missing, PatchfemError
-from ...disk.atomic_write import explain_mkdir_error, write_text
+from ...disk.atomic_write import explain_mkdir_error, write_rows, write_text
 from ...runs.pieces import compute_pieces
 from .blocks import FIELDS, PARTS, Block, make_blocks
 from .vtkhdf import Frames, write_blocks
@@ -168,8 +168,7 @@ def _write_csv(frames: Frames, out: Path, number: int) -> None:
             columns[f"{name} [{unit}]"] = values
         else:
             columns |= {f"{name}_{axis} [{unit}]": values[:, k] for k, axis in enumerate("xy")}
-    rows = zip(*(map(str, values) for values in columns.values()))
-    write_text(out, "\n".join([",".join(columns), *map(",".join, rows), ""]))
+    write_rows(out, [columns, *zip(*columns.values())])
 
 
 def create_folder(folder: Path) -> None:
