@@ -7,24 +7,14 @@ from ..campaigns.backbone.records import Backbone, Curve
 from ..core import PatchfemError
 from ..formatting import format_quantity
 from . import quantities
-from .answer import Answer, Quantity, Remarks, Variable
+from .answer import Answer, Quantity, Remarks, Variable, make_columns
 from .charts import axes, panels
 from .charts.table import CHARTS
 from .runs import make_origin
 
 COLUMNS = ("amplitude", "frequency", "frequency_error", "damping", "damping_error")
 BAND_COLUMNS = ("amplitude", "frequency_low", "frequency_high", "damping_low", "damping_high")
-# unit and description of what a curve contains, and of the ends of names
-TEXTS = {
-    "amplitude": ("m", "half the peak-to-peak motion at the output"),
-    "frequency": ("Hz", "frequency"),
-    "damping": ("1", "damping ratio, structure and friction together"),
-}
-ENDS = {
-    "error": "numerical error of the ",
-    "low": "lower limit that tests measure of the ",
-    "high": "upper limit that tests measure of the ",
-}
+UNITS = {"amplitude": "m", "frequency": "Hz", "damping": "1"}
 
 
 def make_answer(backbone: Backbone, source) -> Answer:
@@ -104,7 +94,7 @@ def _make_quantities(backbone: Backbone) -> dict[str, Quantity]:
         def take(name: str, k: int) -> Quantity:
             """Return frequency or damping ratio of point k of the curve."""
             return Quantity(
-                getattr(curve, name)[k], TEXTS[name][0], getattr(curve, f"{name}_error")[k]
+                getattr(curve, name)[k], UNITS[name], getattr(curve, f"{name}_error")[k]
             )
 
         largest = int(np.argmax(curve.damping))
@@ -174,24 +164,21 @@ def _make_data(backbone: Backbone) -> dict[str, Variable]:
     The band has variables of its own and, for the charts, is the interval of the recommended curve.
     """
     records = [
-        (method.replace("-", "_"), backbone.curves[method], COLUMNS, f", by {method}")
+        (method.replace("-", "_"), backbone.curves[method], COLUMNS)
         for method in PREFERRED_METHODS
         if method in backbone.curves
     ]
     band = backbone.answer.band
     if band is not None:
-        records.insert(1, (records[0][0], band, BAND_COLUMNS[1:], ""))
-        records.append(("band", band, BAND_COLUMNS, ""))
+        records.insert(1, (records[0][0], band, BAND_COLUMNS[1:]))
+        records.append(("band", band, BAND_COLUMNS))
     data = {}
-    for prefix, record, names, method in records:
-        for name in names:
-            base, _, end = name.partition("_")
-            unit, text = TEXTS[base]
-            values = np.asarray(getattr(record, name), float)
-            dims = (f"{prefix}_amplitude",)
-            data[f"{prefix}_{name}"] = Variable(
-                dims, values, unit, ENDS.get(end, "") + text + method
-            )
+    for prefix, record, names in records:
+        columns = {
+            f"{prefix}_{name}": (getattr(record, name), UNITS[name.partition("_")[0]])
+            for name in names
+        }
+        data |= make_columns(f"{prefix}_amplitude", columns)
     return data
 
 

@@ -1,9 +1,7 @@
 """The answer of `cost`: numerical error against CPU time, for several tolerances or values of a setting."""
 
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from typing import NamedTuple
-
-import numpy as np
 
 from ..campaigns.cost import (
     TOLERANCE,
@@ -19,7 +17,7 @@ from ..campaigns.cost import (
 from ..formatting import format_number
 from ..model.model import Model
 from . import quantities
-from .answer import Answer, Quantity, Remarks, Variable
+from .answer import Answer, Quantity, Remarks, Variable, encode, make_columns
 from .runs import make_origin
 
 # columns of cost.csv that every run has: attribute -> heading and unit
@@ -175,42 +173,37 @@ def _make_quantities(row: Row, main: str, tolerance: float) -> dict[str, Quantit
 def _make_data(rows: list[Row], main: str, tolerance: float) -> dict[str, Variable]:
     """Return a row for each run: the columns of cost.csv, which the charts and the table of the page show too."""
     runs = [row.run for row in rows]
-
-    def column(values: list, unit: str = "1", text: str = "") -> Variable:
-        """Return a variable over the runs; a missing number is NaN."""
-        array = np.array(values)
-        return Variable(
-            ("run",), array.astype(float) if array.dtype == object else array, unit, text
-        )
-
-    data = {"knob": column([row.knob for row in rows], "")}
+    columns = {"knob": ([row.knob for row in rows], "")}
     for attribute, (name, unit) in RUN_COLUMNS.items():
-        data[name] = column([getattr(run, attribute) for run in runs], unit)
+        columns[name] = ([getattr(run, attribute) for run in runs], unit)
     for name in dict.fromkeys(name for run in runs for name in run.values):
         for prefix, part in (("", "values"), ("error_", "errors"), ("distance_", "distances")):
             values = [getattr(run, part).get(name) for run in runs]
-            data[prefix + name] = column(values, _find_unit(name))
+            columns[prefix + name] = (values, _find_unit(name))
 
     # an exact run has no place on a logarithmic axis
-    data["largest_error"] = column([row.worst.fraction or None for row in rows])
-    data["worst_measure"] = column([row.worst.name.replace("_", " ") for row in rows], "")
-    data["main_measure"] = replace(data[main], text=main.replace("_", " "))
-    data["main_measure_error"] = data[f"error_{main}"]
+    columns["largest_error"] = ([row.worst.fraction or None for row in rows], "1")
+    columns["worst_measure"] = ([row.worst.name.replace("_", " ") for row in rows], "")
     for name in ("nodes", "steps"):
         counts = [getattr(run, name) for run in runs]
         if any(counts):
-            data[name] = column(counts)
+            columns[name] = (counts, "1")
+    data = make_columns("run", columns)
+    data |= {"main_measure": data[main], "main_measure_error": data[f"error_{main}"]}
 
     # a colour for each varied setting and for runs that miss the tolerance
     has_several = rows[0].knob != rows[-1].knob
-    texts = [
-        f"{row.knob.replace('_', ' ')}: " * has_several
-        + f"{'meets' if row.worst.fraction <= row.run.tolerance else 'misses'} its tolerance"
-        for row in rows
-    ]
-    meanings = tuple(dict.fromkeys(texts))
-    codes = np.array([meanings.index(text) for text in texts], np.int8)
-    data["result"] = Variable(("run",), codes, "", meanings=meanings)
-    ends = np.array([min(data["seconds"].values), max(data["seconds"].values)])
-    line = Variable(("end",), np.full(2, tolerance), text="tolerance of the scene")
-    return data | {"allowed_seconds": Variable(("end",), ends, "s"), "allowed_error": line}
+    data["result"] = encode(
+        "run",
+        [
+            f"{row.knob.replace('_', ' ')}: " * has_several
+            + f"{'meets' if row.worst.fraction <= row.run.tolerance else 'misses'} its tolerance"
+            for row in rows
+        ],
+    )
+    seconds = data["seconds"].values
+    ends = {
+        "allowed_seconds": ([seconds.min(), seconds.max()], "s"),
+        "allowed_error": ([tolerance, tolerance], "1"),
+    }
+    return data | make_columns("end", ends)

@@ -22,7 +22,7 @@ from ..model.model import build, write_resolved
 from ..scene.ranges import Range
 from ..scene.scene import Scene, add_sets, move_scene
 from . import page, store
-from .answer import Answer, Quantity, Remarks, Variable
+from .answer import Answer, Quantity, Remarks, Variable, encode, make_columns
 from .folder import STARTS, Folder
 from .quantities import format_quantity
 from .runs import make_origin
@@ -77,7 +77,7 @@ def fit_into(
         fit = fit_measurement(scene, to, free, options, listener, folder.path / STARTS)
         answer = make_answer(fit, scene)
         store.write(answer, folder.path)
-        text = format_fitted_scene(fit, scene, answer.details["measured"], folder.target)
+        text = format_fitted_scene(fit, scene, answer.verdict, folder.target)
         write_text(folder.path / FITTED_SCENE, text)
         if with_page:
             page.write_page(folder.path)
@@ -87,17 +87,14 @@ def fit_into(
 class Parts(NamedTuple):
     """What differs between the kinds of fits.
 
-    measured: name of the file; quantity: of the measurement; residual: sentence on the distance of fit and measurement;
-    details: further keys of fit.json; scores: quantities of the residual; data; notes.
+    residual: sentence on the distance of fit and measurement; details: further keys of fit.json, among them `measured` (name
+    of the file) and `quantity` (what was measured); scores: quantities of the residual; data.
     """
 
-    measured: str
-    quantity: str
     residual: str
     details: dict
     scores: dict[str, Quantity]
     data: dict[str, Variable]
-    notes: Sequence[str] = ()
 
 
 def make_answer(fit: AnyFit, scene: Scene) -> Answer:
@@ -114,10 +111,8 @@ def make_answer(fit: AnyFit, scene: Scene) -> Answer:
     details = {
         "patchfem": __version__,
         "title": scene.title,
-        "measured": parts.measured,
-        "quantity": parts.quantity,
         "outcome": "done",
-        "values": describe_values(fit),
+        "values": _describe_values(fit),
     }
     details |= search | parts.details
 
@@ -142,7 +137,7 @@ def make_answer(fit: AnyFit, scene: Scene) -> Answer:
         verdict=verdict,
         quantities=measures | parts.scores,
         data=parts.data | pairs,
-        remarks=Remarks(tuple(details["warnings"]), tuple(parts.notes)),
+        remarks=Remarks(tuple(details["warnings"]), tuple(details.get("notes", ()))),
         details=details,
         origin=make_origin(build(scene).source, "fit"),
     )
@@ -172,24 +167,10 @@ def _collect_pairs(correlation: list[list[float | None]], names: list[str]) -> d
     order = np.argsort(-np.abs(np.nan_to_num(values)), kind="stable")
     texts = [f"{names[first[k]]}, {names[second[k]]}" for k in order]
     columns = {
-        "pair": (texts, "", "names of two fitted values"),
-        "correlation": (values[order], "1", "correlation of their errors"),
+        "pair": (texts, ""),
+        "correlation": (values[order], "1"),
     }
-    return _make_columns("pair", columns)
-
-
-def _make_columns(dimension: str, columns: dict[str, tuple]) -> dict[str, Variable]:
-    """Return variables of a dimension from name -> (values, unit, description)."""
-    return {
-        name: Variable((dimension,), np.asarray(values), unit, text)
-        for name, (values, unit, text) in columns.items()
-    }
-
-
-def _encode(texts: list[str]) -> Variable:
-    """Return the texts of rows as codes with meanings."""
-    meanings, codes = np.unique(texts, return_inverse=True)
-    return Variable(("row",), codes.astype(np.int8), "", meanings=tuple(meanings.tolist()))
+    return make_columns("pair", columns)
 
 
 def _known(values) -> list:
@@ -197,17 +178,17 @@ def _known(values) -> list:
     return np.where(np.isfinite(values), values, None).tolist()
 
 
-def describe_values(fit: AnyFit) -> dict[str, dict]:
+def _describe_values(fit: AnyFit) -> dict[str, dict]:
     """Return all fitted values by scene key, as written in fit.json."""
     if isinstance(fit, FittedCoefficient):
         ends = {"low": fit.low, "high": fit.high, "interval": [fit.low, fit.high]}
         bounds = [fit.bounds.low, fit.bounds.high]
         return {COEFFICIENT_KEY: {"value": fit.value, "unit": WEAR_UNIT, **ends, "bounds": bounds}}
     keys = fit.keys
-    return {bound.key: describe_value(bound, keys.fit, k) for k, bound in enumerate(keys.ranges)}
+    return {bound.key: _describe_value(bound, keys.fit, k) for k, bound in enumerate(keys.ranges)}
 
 
-def describe_value(bound: Range, fit: Fit, k: int) -> dict:
+def _describe_value(bound: Range, fit: Fit, k: int) -> dict:
     """Return fitted value k with its confidence interval and range, as written in fit.json."""
     ends = fit.intervals.ends[k].tolist()
     interval = ends if np.isfinite(ends).all() else None
@@ -268,30 +249,29 @@ def describe_loop_fit(fit: FittedLoop) -> Parts:
         residual += f" The fitted loop dissipates {share} % of the measured work."
 
     # rows that are held out are drawn and scored apart
-    name = loop.quantity.replace("_", " ")
     columns = {
-        "slide": (loop.displacement, "m", "measured slide"),
-        loop.quantity: (loop.reading, unit, f"measured {name}"),
-        "fitted": (fit.model, unit, f"fitted {name}"),
-        "residual": (fit.model - loop.reading, unit, "fitted minus measured value"),
-        "row": (np.arange(loop.reading.size), "1", "row of the record"),
-        "held": (fit.held_out.astype(np.int8), "", "1 if the row is held out"),
+        "slide": (loop.displacement, "m"),
+        loop.quantity: (loop.reading, unit),
+        "fitted": (fit.model, unit),
+        "residual": (fit.model - loop.reading, unit),
+        "row": (np.arange(loop.reading.size), "1"),
+        "held": (fit.held_out.astype(np.int8), ""),
     }
     if loop.time is not None:
-        columns["time"] = (loop.time, "s", "time")
+        columns["time"] = (loop.time, "s")
     held = None
     if fit.held_out_rms is not None:
         held = {"rows": int(fit.held_out.sum()), "rms": fit.held_out_rms}
         scores["held_out_rms"] = Quantity(fit.held_out_rms, unit)
         shown = np.where(fit.held_out, loop.reading, np.nan)
-        columns["held_out"] = (shown, unit, f"measured {name} that is held out")
+        columns["held_out"] = (shown, unit)
     return Parts(
-        measured=loop.path.name,
-        quantity=loop.quantity,
         residual=residual,
         details={
+            "measured": loop.path.name,
+            "quantity": loop.quantity,
             "offsets": {
-                offset.name: describe_value(offset.range, fitted, k)
+                offset.name: _describe_value(offset.range, fitted, k)
                 for k, offset in enumerate(fit.offsets, len(fit.keys.ranges))
             },
             "unit": unit,
@@ -304,7 +284,7 @@ def describe_loop_fit(fit: FittedLoop) -> Parts:
             "steps_between_rows": fit.steps_per_row,
         },
         scores=scores,
-        data=_make_columns("row", columns),
+        data=make_columns("row", columns),
     )
 
 
@@ -313,28 +293,28 @@ def describe_curve_fit(fit: FittedCurve) -> Parts:
     measured = fit.measured
     n_rows = int(measured.amplitude.size)
     errors = 2 * measured.error  # half the width of a 95 % interval
-    columns = {"amplitude": (measured.amplitude, "m", "amplitude at the output")}
-    curve = {"curve_amplitude": (fit.beyond[0], "m", "amplitude at the output")}
+    columns = {"amplitude": (measured.amplitude, "m")}
+    curve = {"curve_amplitude": (fit.beyond[0], "m")}
     rms = {}
     for k, (name, unit) in enumerate((("frequency", "Hz"), ("damping", "1"))):
         value = measured.value[k]
         distance = fit.model[k] - value
         rms[name] = float(np.sqrt(np.mean((distance / value) ** 2)))
         columns |= {
-            name: (value, unit, f"measured {name}"),
-            f"{name}_error": (errors[k], unit, f"half the 95 % interval of the {name}"),
-            f"{name}_fitted": (fit.model[k], unit, f"fitted {name}"),
-            f"{name}_residual": (distance / errors[k], "1", f"deviation of the {name} / its error"),
+            name: (value, unit),
+            f"{name}_error": (errors[k], unit),
+            f"{name}_fitted": (fit.model[k], unit),
+            f"{name}_residual": (distance / errors[k], "1"),
         }
-        curve[f"curve_{name}"] = (fit.beyond[k + 1], unit, f"fitted {name}")
+        curve[f"curve_{name}"] = (fit.beyond[k + 1], unit)
     assumed = " The errors of the measured values are assumed." if measured.assumed else ""
     percent = {name: f"{100 * value:.2g} %" for name, value in rms.items()}
     return Parts(
-        measured=fit.path.name,
-        quantity="decay",
         residual=f"At {n_rows} amplitudes the residual is {percent['frequency']} rms of the frequency and "
         f"{percent['damping']} of the damping ratio, by method {fit.method}.{assumed}",
         details={
+            "measured": fit.path.name,
+            "quantity": "decay",
             "method": fit.method,
             "rows": n_rows,
             "rms": rms,
@@ -342,8 +322,7 @@ def describe_curve_fit(fit: FittedCurve) -> Parts:
             "evaluations": fit.n_computed,
         },
         scores={f"{name}_residual_rms": Quantity(value) for name, value in rms.items()},
-        data=_make_columns("row", columns) | _make_columns("curve_amplitude", curve),
-        notes=fit.notes,
+        data=make_columns("row", columns) | make_columns("curve_amplitude", curve),
     )
 
 
@@ -371,11 +350,11 @@ def describe_rows_fit(fit: FittedRows) -> Parts:
             instrument[key] = value
     rows, data = _collect_rows(fit)
     return Parts(
-        measured=fit.cells.path.name,
-        quantity="rows",
         residual=f"The rms of ln(computed/measured) is {', '.join(texts)}; {n_best} of {search.rms.size} starts led to "
         "within 1 % of the best.",
         details={
+            "measured": fit.cells.path.name,
+            "quantity": "rows",
             "scores": scores,
             "scores_stable": fit.compute_scores(only_stable=True),
             "unstable": fit.settings.unstable,
@@ -406,15 +385,12 @@ def _collect_rows(fit: FittedRows) -> tuple[list[dict], dict[str, Variable]]:
         for held, row in zip(is_held, entries, strict=True)
     ]
     data = {
-        "use": _encode(uses),
-        "drive": _encode([f"{row['frequency']:.6g} Hz" for row in entries]),
+        "use": encode("row", uses),
+        "drive": encode("row", [f"{row['frequency']:.6g} Hz" for row in entries]),
     }
-    columns = {
-        name: ([row[name] for row in entries], unit, f"{name} of the drive")
-        for name, unit in drives.items()
-    }
-    columns["flag"] = ([row["flag"] for row in entries], "", "flag of the row")
-    columns["held"] = (is_held.astype(np.int8), "", "1 if a reading of the row is held out")
+    columns = {name: ([row[name] for row in entries], unit) for name, unit in drives.items()}
+    columns["flag"] = ([row["flag"] for row in entries], "")
+    columns["held"] = (is_held.astype(np.int8), "")
     for part, (name, unit) in enumerate(KINDS.items()):
         # a row without a reading has no computed one
         is_kind = cells.is_acceleration == (name == "acceleration")
@@ -430,15 +406,15 @@ def _collect_rows(fit: FittedRows) -> tuple[list[dict], dict[str, Variable]]:
         measured = np.array(readings, float)
         ratio = computed / np.where(measured > 0, measured, np.nan)
         columns |= {
-            name: (measured, unit, f"measured {name}"),
-            f"computed_{name}": (computed, unit, f"computed {name}"),
-            f"{name}_ratio": (ratio, "1", f"computed over measured {name}"),
+            name: (measured, unit),
+            f"computed_{name}": (computed, unit),
+            f"{name}_ratio": (ratio, "1"),
         }
         # ends of the line on which both are equal
         known = np.concatenate([measured[measured > 0], computed[computed > 0]])
         ends = [known.min(), known.max()] if known.size else []
-        data |= _make_columns(f"equal_{name}", {f"equal_{name}": (ends, unit, "")})
-    return entries, data | _make_columns("row", columns)
+        data |= make_columns(f"equal_{name}", {f"equal_{name}": (ends, unit)})
+    return entries, data | make_columns("row", columns)
 
 
 def describe_wear_fit(fit: FittedCoefficient) -> Parts:
@@ -448,23 +424,28 @@ def describe_wear_fit(fit: FittedCoefficient) -> Parts:
     name = measured.name.replace("_", " ")
     text = format_quantity(measured.name, Quantity(unit="m", **ends))
     points = {
-        "coefficient": ([fit.value], WEAR_UNIT, "fitted coefficient"),
-        "depth": ([measured.value], "m", f"measured {name}"),
-        "depth_low": ([measured.low], "m", "lower limit of the depth"),
-        "depth_high": ([measured.high], "m", "upper limit of the depth"),
+        "coefficient": ([fit.value], WEAR_UNIT),
+        "depth": ([measured.value], "m"),
+        "depth_low": ([measured.low], "m"),
+        "depth_high": ([measured.high], "m"),
     }
     coefficients, depths = fit.curve[:, fit.curve[0] <= EXTENT * fit.high]
     curve = {
-        "curve_coefficient": (coefficients, WEAR_UNIT, "coefficient"),
-        "curve_depth": (depths, "m", f"computed {name}"),
+        "curve_coefficient": (coefficients, WEAR_UNIT),
+        "curve_depth": (depths, "m"),
     }
     return Parts(
-        measured=Path(measured.source).name,
-        quantity=measured.name,
         residual=f"The interval is that of the measured {name}, {text}.",
-        details={"runs": fit.runs, "model": fit.model, "data": ends, "warnings": []},
+        details={
+            "measured": Path(measured.source).name,
+            "quantity": measured.name,
+            "runs": fit.runs,
+            "model": fit.model,
+            "data": ends,
+            "warnings": [],
+        },
         scores={"fitted_depth": Quantity(fit.model, "m")},
-        data=_make_columns("point", points) | _make_columns("curve_coefficient", curve),
+        data=make_columns("point", points) | make_columns("curve_coefficient", curve),
     )
 
 
@@ -476,27 +457,19 @@ _DESCRIBE = {
 }
 
 
-def format_fitted_scene(fit: AnyFit, scene: Scene, measured: str, folder: Path) -> str:
-    """Return the text of the fitted scene, in SI units with all defaults, with comments that say what was fitted.
+def format_fitted_scene(fit: AnyFit, scene: Scene, verdict: Sequence[str], folder: Path) -> str:
+    """Return the text of the fitted scene, in SI units with all defaults, below comments that say what was fitted.
 
     Parameters
     ----------
     fit : FittedLoop, FittedCurve, FittedRows or FittedCoefficient
     scene : Scene
         Scene before the fit.
-    measured : str
-        Name of the measured file.
+    verdict : sequence of str
+        Sentences of the answer.
     folder : Path
         Folder to which the paths of the fitted scene are relative.
     """
-    comments = []
-    for key, entry in describe_values(fit).items():
-        interval = ", not determined"
-        if entry["interval"]:
-            interval = f", 95 % in [{entry['low']!r}, {entry['high']!r}]"
-        comments.append(
-            f"# {key} fitted to {measured}: {entry['value']!r} {entry['unit']}{interval}"
-        )
     if isinstance(fit, FittedCoefficient):
         fitted = add_sets(scene, [fit.bounds.format_assignment(fit.value)])
     else:
@@ -504,4 +477,4 @@ def format_fitted_scene(fit: AnyFit, scene: Scene, measured: str, folder: Path) 
     # the model is built before the scene moves, because its file names are relative to its folder
     model = build(fitted)
     text = write_resolved(move_scene(fitted, folder / FITTED_SCENE), model)
-    return "\n".join(comments) + "\n\n" + text
+    return "\n".join([*(f"# {sentence}" for sentence in verdict), "", text])

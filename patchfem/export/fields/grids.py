@@ -93,18 +93,16 @@ def export_frames(frames: Frames, out: Path, number: int) -> None:
         write_blocks(out, frames.blocks, frames.times)
     elif out.suffix == ".pvd":
         _write_pvd(frames, out)
-    elif out.suffix == ".vtu":
-        _write_vtu(frames, out, number)
     else:
-        _write_csv(frames, out, number)
+        write = _write_vtu if out.suffix == ".vtu" else _write_csv
+        write(frames, out, number)
 
 
 def _write_vtu(frames: Frames, out: Path, number: int) -> None:
     """Write a frame as one mesh with the array `part`; fields that a part lacks are NaN or -1 there."""
     grids = make_grids(frames.blocks, number, float(frames.times[number]))
     for code, name in enumerate(PARTS):
-        if name in grids.keys():
-            grids[name].cell_data["part"] = np.full(grids[name].n_cells, code, np.int8)
+        grids[name].cell_data["part"] = np.full(grids[name].n_cells, code, np.int8)
     for kind in ("point_data", "cell_data"):
         samples = {name: values for grid in grids for name, values in getattr(grid, kind).items()}
         for grid in grids:

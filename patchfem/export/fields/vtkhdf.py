@@ -31,7 +31,7 @@ class Frames(NamedTuple):
 
     - path: the file.
     - times (f,): [s].
-    - blocks: `lower`, `upper`, `interface` and, of a patch that wears in strips, `strips`.
+    - blocks: `lower`, `upper` and `interface`.
     """
 
     path: Path
@@ -183,7 +183,7 @@ def read_frames(path: Path) -> Frames:
         with h5py.File(path, "r") as file:
             root = file["VTKHDF"]
             times = root["Steps/Values"][:]
-            blocks = {part: _read_block(root[part], len(times)) for part in PARTS if part in root}
+            blocks = {part: _read_block(root[part], len(times)) for part in PARTS}
         for part, names in REQUIRED_FIELDS.items():
             present = blocks[part].point_data.keys() | blocks[part].cell_data.keys()
             if not names <= present:
