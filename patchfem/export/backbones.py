@@ -36,7 +36,7 @@ def make_answer(backbone: Backbone, source) -> Answer:
         remarks=Remarks(
             notes=(*map(_make_sentence, backbone.notes), *backbone.answer.sentences[1:])
         ),
-        details=_make_details(backbone, measures),
+        details=_make_details(backbone),
         origin=make_origin(source, "backbone"),
     )
 
@@ -44,13 +44,6 @@ def make_answer(backbone: Backbone, source) -> Answer:
 def _make_sentence(text: str) -> str:
     """Return a clause as a sentence."""
     return f"{text[0].upper()}{text[1:].rstrip('.')}."
-
-
-def find_curve(backbone: Backbone) -> Curve | None:
-    """Return the recommended curve of a backbone, or None if no method has one."""
-    return next(
-        (backbone.curves[name] for name in PREFERRED_METHODS if name in backbone.curves), None
-    )
 
 
 def backbone_axes(dataset, ax=None):
@@ -88,7 +81,8 @@ def _make_quantities(backbone: Backbone) -> dict[str, Quantity]:
     """Return frequencies, ends of the recommended curve, exponents and the amplitude of flutter."""
     frequencies = backbone.frequencies
     out = {}
-    curve = find_curve(backbone)
+    band = backbone.answer.band
+    curve = band and backbone.curves[band.method]
     if curve is not None:
 
         def take(name: str, k: int) -> Quantity:
@@ -123,7 +117,8 @@ def _make_verdict(backbone: Backbone, measures: dict[str, Quantity]) -> tuple[st
         """Return a quantity as text."""
         return quantities.format_quantity(name, measures[name])
 
-    curve = find_curve(backbone)
+    band = backbone.answer.band
+    curve = band and backbone.curves[band.method]
     free = f"without the contact {show('free_frequency')}"
     stuck = ""
     if backbone.frequencies.stuck is not None:
@@ -182,7 +177,7 @@ def _make_data(backbone: Backbone) -> dict[str, Variable]:
     return data
 
 
-def _make_details(backbone: Backbone, measures: dict) -> dict:
+def _make_details(backbone: Backbone) -> dict:
     """Return the content of backbone.json in SI units."""
     frequencies = backbone.frequencies
     band = backbone.answer.band
@@ -205,5 +200,4 @@ def _make_details(backbone: Backbone, measures: dict) -> dict:
         "method": band and band.method,
         "band": band and list_columns(band, BAND_COLUMNS),
         "advice": backbone.answer.advice,
-        "measures": {name: quantity.as_json() for name, quantity in measures.items()},
     }

@@ -4,6 +4,7 @@ A fit to a loop, to frequency and damping against amplitude, to rows of a rig or
 """
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import NamedTuple
 
@@ -378,8 +379,7 @@ def _collect_rows(fit: FittedRows) -> tuple[list[dict], dict[str, Variable]]:
     count = len(cells.rows)
     is_held = np.zeros(count, bool)
     is_held[cells.row[fit.held_out]] = True
-    drives = {"frequency": "Hz", "input": "m s-2"}
-    entries = [{name: getattr(row, name) for name in (*drives, "flag")} for row in cells.rows]
+    entries = [asdict(row) for row in cells.rows]
     uses = [
         ("held out" if held else "fitted") + ", unstable in the test" * ("U" in row["flag"])
         for held, row in zip(is_held, entries, strict=True)
@@ -388,8 +388,10 @@ def _collect_rows(fit: FittedRows) -> tuple[list[dict], dict[str, Variable]]:
         "use": encode("row", uses),
         "drive": encode("row", [f"{row['frequency']:.6g} Hz" for row in entries]),
     }
-    columns = {name: ([row[name] for row in entries], unit) for name, unit in drives.items()}
-    columns["flag"] = ([row["flag"] for row in entries], "")
+    columns = {
+        name: ([row[name] for row in entries], unit)
+        for name, unit in (("frequency", "Hz"), ("input", "m s-2"), ("flag", ""))
+    }
     columns["held"] = (is_held.astype(np.int8), "")
     for part, (name, unit) in enumerate(KINDS.items()):
         # a row without a reading has no computed one
@@ -399,11 +401,10 @@ def _collect_rows(fit: FittedRows) -> tuple[list[dict], dict[str, Variable]]:
         computed[places] = fit.computed[part, cells.condition[is_kind]]
         held = np.full(count, None)
         held[places] = fit.held_out[is_kind]
-        readings = [getattr(row, name) for row in cells.rows]
+        measured = np.array([row[name] for row in entries], float)
         for k, number in enumerate(_known(computed)):
-            entries[k][name] = {"measured": readings[k], "computed": number, "held": held[k]}
-
-        measured = np.array(readings, float)
+            reading = entries[k][name]
+            entries[k][name] = {"measured": reading, "computed": number, "held": held[k]}
         ratio = computed / np.where(measured > 0, measured, np.nan)
         columns |= {
             name: (measured, unit),

@@ -97,12 +97,8 @@ def magnify_pieces(
     slide_factor = min(magnify, 1.0) * _visible_factor(DRAWN_SLIDE_FRACTION * width, slide)
     places = points + magnify * all_motion
     places[:, len(lower.points) :, 0] += slide_factor * slide[:, None]
-    captions = [f"motion × {magnify:g}" for _ in slide]
-    if slide.any():
-        captions = [
-            f"motion × {magnify:g}, slide of {1e6 * moved:.3g} um × {slide_factor:g}"
-            for moved in slide
-        ]
+    slid = ", slide of {:.3g} um × {:g}" if slide.any() else ""
+    captions = [f"motion × {magnify:g}" + slid.format(1e6 * one, slide_factor) for one in slide]
     return DrawnPieces(window, MM * places, cells, is_inside, captions)
 
 

@@ -61,20 +61,18 @@ def make_result_grids(result, numbers) -> list:
     """
     pieces = compute_pieces(result)
     blocks = make_blocks(pieces)
+    units = {name: "MPa" if field.unit == "Pa" else field.unit for name, field in FIELDS.items()}
     frames = []
     for number in numbers:
         grids = make_grids(blocks, number, float(pieces.time[number]))
         for part, grid in zip(grids.keys(), grids):
-            units = []
             for data in (grid.point_data, grid.cell_data):
                 for name in data.keys():
-                    unit = FIELDS[name].unit
-                    if unit == "Pa":
-                        unit = "MPa"
+                    if units[name] == "MPa":
                         data[name] = data[name] / 1e6
-                    units.append(f"{name} [{unit}]")
-            grid.field_data["units"] = units
-            grid.set_active_scalars(ACTIVE_FIELDS.get(part))
+            names = [*grid.point_data.keys(), *grid.cell_data.keys()]
+            grid.field_data["units"] = [f"{name} [{units[name]}]" for name in names]
+            grid.set_active_scalars(ACTIVE_FIELDS[part])
         frames.append(grids)
     return frames
 

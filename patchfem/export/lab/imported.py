@@ -104,8 +104,12 @@ def convert_file(
     if form == "modes" and (shapes := _read_shapes(file, requests, settings)):
         return _write_modes(shapes, out, file.name, [])
     values, notes = _read_records(file, requests)
+    if settings.window not in ("", "hann", "none"):
+        raise PatchfemError(f"--window {settings.window}: hann or none")
+    segment = _parse_quantity(settings.segment, "time", "--segment")
+    averaging = (segment, settings.window or None)
     if form == "response":
-        return _write_response(values, out, settings, notes)
+        return _write_response(values, out, averaging, notes)
     begin = _parse_quantity(settings.begin, "time", "--begin")
     if form == "decay":
         return _write_decay(values, out, begin, notes)
@@ -113,7 +117,7 @@ def convert_file(
         modes = measured_modes.identify_decay_modes(values, begin)
     else:
         band = _parse_band(settings.band)
-        modes = measured_modes.identify_driven_modes(values, *_parse_segment(settings), band)
+        modes = measured_modes.identify_driven_modes(values, *averaging, band)
     return _write_modes(modes, out, file.name, notes)
 
 
@@ -197,11 +201,9 @@ def format_structure(modes: measured_modes.ListedModes, source: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _write_response(values: dict, out: Path, settings: EstimateOptions, notes: list[str]) -> dict:
-    """Write an estimated frequency response as a universal file."""
-    estimate, step, drive, response = measured_modes.estimate_record(
-        values, *_parse_segment(settings)
-    )
+def _write_response(values: dict, out: Path, averaging: tuple, notes: list[str]) -> dict:
+    """Write a frequency response as a universal file, estimated with a length [s] and a window of the segments."""
+    estimate, step, drive, response = measured_modes.estimate_record(values, *averaging)
     universal.write_response(out, estimate, drive, response)
     return {
         "lines": estimate.frequency.size,
@@ -253,19 +255,11 @@ def _parse_quantity(text: str, kind: str, option: str) -> float | None:
         raise PatchfemError(f"{option} {text}: {error}") from None
 
 
-def _parse_segment(settings: EstimateOptions) -> tuple[float | None, str | None]:
-    """Return the length of a segment [s] and the name of the window function; None for the default."""
-    if settings.window not in ("", "hann", "none"):
-        raise PatchfemError(f"--window {settings.window}: hann or none")
-    return _parse_quantity(settings.segment, "time", "--segment"), settings.window or None
-
-
 def _parse_band(text: str) -> tuple[float, float]:
     """Return both ends of a frequency band [Hz]."""
     if not text:
         return 0.0, float("inf")
-    parts = [part.strip() for part in text.split("..")]
-    ends = [_parse_quantity(part, "frequency", "--band") for part in parts]
+    ends = [_parse_quantity(part.strip(), "frequency", "--band") for part in text.split("..")]
     if len(ends) != 2 or None in ends or not 0 <= ends[0] < ends[1]:
         raise PatchfemError(
             f'--band {text}: two rising frequencies are needed, such as "20 Hz..400 Hz"'

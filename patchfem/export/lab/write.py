@@ -13,7 +13,6 @@ from .universal import Column
 
 # histories that form a friction loop with the slide of the same interface
 FORCES = ("friction_force", "force", "friction_ratio", "fitted")
-MAX_NAME_LENGTH = 63  # largest length of a MATLAB variable name, in characters
 MAX_STEP_RATIO = 5.0  # largest ratio of a time step to the last one if all samples are stored
 
 
@@ -98,12 +97,9 @@ def write_matlab(path: Path, answer: Answer) -> None:
     """Write all arrays of numbers as variables of a MATLAB file of version 5; `units.NAME` is the unit of NAME."""
     from scipy.io import savemat
 
-    content = {}
-    units = {}
-    for name, variable in answer.data.items():
-        if variable.values.dtype.kind in "fiu":
-            content[name[:MAX_NAME_LENGTH]] = variable.values
-            units[name[:MAX_NAME_LENGTH]] = variable.unit
+    arrays = {name: one for name, one in answer.data.items() if one.values.dtype.kind in "fiu"}
+    content = {name: one.values for name, one in arrays.items()}
+    units = {name: one.unit for name, one in arrays.items()}
     content |= {"title": answer.title, "source": universal.PROGRAM, "units": units}
     with write_atomically(path) as partial, open(partial, "wb") as file:
         savemat(file, content, oned_as="column", long_field_names=True)
