@@ -67,10 +67,9 @@ def make_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
         chosen = find_fastest_run(runs, tolerance) or runs[-1]
     row = next(row for row in rows if row.run is chosen)
     sentences = _describe_scene(row, runs) if knob == TOLERANCE else []
-    for one, curve in curves.items():
-        if one != TOLERANCE:
-            text = describe_fastest_setting(curve, tolerance)
-            sentences.append(f"{text[0].upper()}{text[1:]}.")
+    details = {one: describe_runs(one, curve, tolerance) for one, curve in curves.items()}
+    texts = [part["sentence"] for part in details.values() if part["sentence"]]
+    sentences += [f"{text[0].upper()}{text[1:]}." for text in texts]
     return Answer(
         kind="cost",
         title=model.source.title,
@@ -78,7 +77,7 @@ def make_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
         quantities=_make_quantities(row, main, tolerance),
         data=_make_data(rows, main, tolerance),
         remarks=Remarks(notes=tuple(dict.fromkeys(text for run in runs for text in run.remedies))),
-        details={one: describe_runs(one, curve, tolerance) for one, curve in curves.items()},
+        details=details,
         origin=make_origin(model.source, "cost"),
     )
 

@@ -22,12 +22,10 @@ def differs(quantity: Quantity | None, first: Quantity | None) -> bool:
 
 
 def _find_uncertainty(quantity: Quantity) -> float:
-    """Return the half-width of the error or of the interval of a quantity; its floor if both are unknown."""
-    if quantity.error is not None:
-        return max(quantity.error, quantity.floor)
-    if None not in (quantity.low, quantity.high):
-        return (quantity.high - quantity.low) / 2
-    return quantity.floor
+    """Return the half-width of the interval of a quantity, but at least its floor."""
+    if None in (quantity.low, quantity.high):
+        return quantity.floor
+    return max((quantity.high - quantity.low) / 2, quantity.floor)
 
 
 def format_entry(name: str, quantity: Quantity | None, first: Quantity | None) -> str:
