@@ -92,6 +92,30 @@ class Variable:
     meanings: tuple[str, ...] = ()
 
 
+def make_columns(dimension: str, columns: dict[str, tuple]) -> dict[str, Variable]:
+    """Return variables over one dimension.
+
+    Parameters
+    ----------
+    dimension : str
+    columns : dict
+        Name -> (values, unit). A number that is None becomes NaN; the name in words is the description.
+    """
+    variables = {}
+    for name, (values, unit) in columns.items():
+        array = np.asarray(values)
+        if array.dtype == object:
+            array = array.astype(float)
+        variables[name] = Variable((dimension,), array, unit, name.replace("_", " "))
+    return variables
+
+
+def encode(dimension: str, texts: list[str]) -> Variable:
+    """Return texts over one dimension as codes with meanings."""
+    meanings, codes = np.unique(texts, return_inverse=True)
+    return Variable((dimension,), codes.astype(np.int8), "", meanings=tuple(meanings.tolist()))
+
+
 @dataclass(frozen=True, slots=True)
 class Remarks:
     """Warnings about numerical trust, and notes about what the model leaves out."""
