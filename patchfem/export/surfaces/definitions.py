@@ -54,7 +54,9 @@ def name_in_track(name: str) -> str:
 
 def list_names() -> list[str]:
     """Return the names of all definitions; the parts of a track without the prefix track_."""
-    return list(dict.fromkeys([*_OWN, *DEFINITIONS, *rows.TABLE]))
+    heights = [f"P{name}" for name in PROFILE if name != "z"]
+    roughness = [name if name.startswith("Mr") else f"R{name}" for name in PROFILE]
+    return list(dict.fromkeys([*_OWN, *DEFINITIONS, *heights, *roughness, *AREAL]))
 
 
 def find(name: str) -> Definition | None:
