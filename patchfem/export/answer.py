@@ -6,8 +6,17 @@ page, `charts` pictures and `show` the lines on the screen.
 
 import math
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
+
+
+class Definition(NamedTuple):
+    """Unit and meaning of a quantity, and the number of digits that are displayed without an error."""
+
+    unit: str
+    text: str
+    digits: int = 4
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,8 +4,6 @@ The measures of runs are defined in `response.rows` and `runs.results.patch_rows
 verbs. KEY lists the quantities that come first: in the tiles of a page, on the screen and in the first columns of a table.
 """
 
-from typing import NamedTuple
-
 from ..formatting import (
     UNIT_LADDERS,
     choose_unit,
@@ -15,8 +13,8 @@ from ..formatting import (
 )
 from ..response import rows
 from ..runs.results import patch_rows
-from .answer import Quantity
-from .surfaces import definitions
+from . import surface_definitions
+from .answer import Definition, Quantity
 
 MAX_TILES = 10  # largest number of key quantities on a page and on the screen
 # words at the end of a name that mark a fraction (in percent) or a phase (in degrees)
@@ -84,14 +82,6 @@ KEY = (
     "normal_stiffness",
     "tangential_stiffness",
 )
-
-
-class Definition(NamedTuple):
-    """Unit and meaning of a quantity, and the number of digits that are displayed without an error."""
-
-    unit: str
-    text: str
-    digits: int = 4
 
 
 # kinds of answers whose quantities are defined in `surfaces.definitions`
@@ -187,7 +177,9 @@ def find_definition(name: str, kind: str = "") -> Definition | None:
     if "." in name:
         return Definition("1", FITTED_KEY)
     if kind in SURFACE_KINDS:
-        return definitions.find(name) or definitions.find(rows.remove_interface_number(name))
+        return surface_definitions.find(name) or surface_definitions.find(
+            rows.remove_interface_number(name)
+        )
     if name in QUANTITIES:
         return QUANTITIES[name]
     # quantities of a sweep: limits of its key, and extremes of measures

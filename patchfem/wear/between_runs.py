@@ -3,6 +3,7 @@
 In: the surface of a patch and the errors of its measures before and after. Out: `Wear`. Read `measure_wear` first.
 """
 
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -124,10 +125,9 @@ def measure_wear(first: PatchState, second: PatchState) -> Wear:
 
 def _require_same_patch(first: PatchState, second: PatchState) -> None:
     """Raise PatchfemError unless the states are those of one patch, the less worn one first."""
-    tables = [
-        {key: value for key, value in state.contact.items() if key not in LOADING_KEYS}
-        for state in (first, second)
-    ]
+    tables = [dict(state.contact) for state in (first, second)]
+    for table, key in product(tables, LOADING_KEYS):
+        table.pop(key, None)
     keys = {**tables[0], **tables[1]}
     unlike = [f"contact.{key}" for key in keys if tables[0].get(key) != tables[1].get(key)]
     both = f"{first.source} and {second.source}: these are two different patches"
@@ -224,7 +224,8 @@ def _measure_track(x, depth, is_worn, error: float, area: float) -> dict[str, Qu
     worn = np.flatnonzero(is_worn)
     first = max(int(worn[0]) - 1, 0)
     last = min(int(worn[-1]) + 1, x.size - 1)
-    start, end = float(x[first]), float(x[last])
+    start = float(x[first])
+    end = float(x[last])
     width = end - start
 
     # an end is known to the half of both neighbouring elements

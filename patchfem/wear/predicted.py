@@ -88,7 +88,7 @@ class WearHistory:
         """Half of the length of the patch [m]."""
         return float(np.ptp(self.x)) / 2
 
-    def depth_at(self, ratio: float) -> np.ndarray:
+    def interpolate_depth(self, ratio: float) -> np.ndarray:
         """Return the depth (m,) [m] for `ratio` times the coefficient of the run, extrapolated beyond it."""
         if ratio <= 1:
             return self._curve(ratio)
@@ -97,7 +97,7 @@ class WearHistory:
 
     def average(self, edges: np.ndarray, place: "Place") -> np.ndarray:
         """Return the mean depths (b,) [m] in the bins with edges (b + 1,) [m] along the trace."""
-        depth = self.depth_at(place.ratio)
+        depth = self.interpolate_depth(place.ratio)
         area = np.concatenate([[0.0], np.cumsum(np.diff(self.x) * (depth[1:] + depth[:-1]) / 2)])
         sign = -1 if place.is_mirrored else 1
         ends = np.interp(sign * (edges - place.centre), self.x, area)
@@ -143,13 +143,26 @@ class Bins(NamedTuple):
         return float(self.edges[1] - self.edges[0])
 
 
+class FittedDepths(NamedTuple):
+    """Measured and computed depth in bins on the patch.
+
+    - x: positions (b,) [m], 0 in the middle of the patch.
+    - measured, computed, noise: mean depths (b,) [m], and standard deviation of the measured one.
+    """
+
+    x: np.ndarray
+    measured: np.ndarray
+    computed: np.ndarray
+    noise: np.ndarray
+
+
 @dataclass(frozen=True, eq=False)
 class PredictedWear:
     """Computed worn depth, fitted to the measured one.
 
     - coefficient, centre: wear coefficient [m2/N], and middle of the patch in x of the second trace [m].
     - is_mirrored: whether x of the patch runs against x of the trace; None where both fit.
-    - x: positions (b,) [m] on the patch; measured, computed, noise: mean depths and standard deviation (b,) [m].
+    - depths: both depths along the patch.
     - proportional: coefficient [m2/N] for which the last depth of the run fits in proportion.
     """
 
@@ -157,10 +170,7 @@ class PredictedWear:
     coefficient: Quantity
     centre: Quantity
     is_mirrored: bool | None
-    x: np.ndarray
-    measured: np.ndarray
-    computed: np.ndarray
-    noise: np.ndarray
+    depths: FittedDepths
     proportional: float
 
     @property
@@ -171,12 +181,13 @@ class PredictedWear:
     @property
     def on_patch(self) -> np.ndarray:
         """Bins (b,) bool whose middle lies on the patch."""
-        return np.abs(self.x) <= self.history.half
+        return np.abs(self.depths.x) <= self.history.half
 
     @property
     def difference_rms(self) -> float:
         """Root mean square [m] of the difference between both depths over the patch."""
-        return float(np.sqrt(np.mean((self.measured - self.computed)[self.on_patch] ** 2)))
+        difference = self.depths.measured - self.depths.computed
+        return float(np.sqrt(np.mean(difference[self.on_patch] ** 2)))
 
 
 def fit_wear(measured: MeasuredDepth, history: WearHistory) -> PredictedWear:
@@ -294,13 +305,12 @@ def _search(bins: Bins, history: WearHistory) -> tuple[Place, list[Place]]:
         centre = float(bins.edges[0] + bins.width * shifts[shift] + history.half)
         places.append(Place(float(ratios[side, shift]), centre, bool(side)))
     best = places[0]
-    others = [
-        place
-        for place in places
-        if place.is_mirrored != best.is_mirrored
-        or abs(place.centre - best.centre) > 1.5 * bins.width
-    ]
-    return best, others[:MAX_PLACES]
+
+    def is_apart(place: Place) -> bool:
+        is_far = abs(place.centre - best.centre) > 1.5 * bins.width
+        return is_far or place.is_mirrored != best.is_mirrored
+
+    return best, list(filter(is_apart, places))[:MAX_PLACES]
 
 
 def _refine(bins: Bins, history: WearHistory, start: Place, *, is_fixed: bool = False) -> Place:
@@ -371,24 +381,21 @@ def _make_result(
             best.centre, min(centres) - half_centre, max(centres) + half_centre, "m", ""
         ),
         is_mirrored=None if is_unknown else best.is_mirrored,
-        x=x[order],
-        measured=bins.depth[order],
-        computed=computed[order],
-        noise=bins.noise[order],
+        depths=FittedDepths(x[order], bins.depth[order], computed[order], bins.noise[order]),
         proportional=proportional * history.coefficient,
     )
 
 
 def _differentiate(bins: Bins, history: WearHistory, best: Place) -> np.ndarray:
     """Return the derivatives (b, 2) of the computed depth by ratio and centre, from central differences."""
+
+    def average(name: str, change: float) -> np.ndarray:
+        place = best._replace(**{name: getattr(best, name) + change})
+        return history.average(bins.edges, place)
+
     columns = []
-    steps = {"ratio": 0.01 * best.ratio, "centre": bins.width / 2}
-    for name, step in steps.items():
-        ends = [
-            history.average(bins.edges, best._replace(**{name: getattr(best, name) + change}))
-            for change in (step, -step)
-        ]
-        columns.append((ends[0] - ends[1]) / (2 * step))
+    for name, step in (("ratio", 0.01 * best.ratio), ("centre", bins.width / 2)):
+        columns.append((average(name, step) - average(name, -step)) / (2 * step))
     return np.column_stack(columns)
 
 

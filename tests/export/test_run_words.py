@@ -126,7 +126,7 @@ def test_exact_incomplete_cycle_is_named():
 
 
 def test_exact_measured_row_is_compared_with_reading_of_sensor(tmp_path):
-    """The ratio to a measured row contains the factor of the sensor and its kind of amplitude: rms of a sine is peak/sqrt(2)."""
+    """The ratio to a measured row contains the factor of the sensor and its kind of amplitude (rms is peak/sqrt(2))."""
     (tmp_path / "rows.csv").write_text(
         "frequency [Hz],input [g],acceleration [g],displacement [mil]\n143,1,10,5\n", "utf-8"
     )

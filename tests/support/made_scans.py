@@ -1,7 +1,6 @@
 """Scan alignments with a given map of depths, as if position and reference plane were known."""
 
 import numpy as np
-
 from patchfem.surface.compare.robust import MAX_UNWORN
 from patchfem.surface.scans.alignment import ScanAlignment
 from patchfem.surface.scans.errors import draw_scan_errors

@@ -102,10 +102,12 @@ def strip_scripts(text: str) -> str:
     return re.sub(r"<script.*?</script>", "", text, flags=re.S)
 
 
+# attribute that gives an element of each tag its accessible name
+ACCESSIBLE_NAMES = {"html": "lang", "img": "alt", "th": "scope", "svg": "aria-label"}
+
+
 class _AccessibilityParser(HTMLParser):
     """Parser that collects tags without an accessible name in `lacks` and heading levels in `levels`."""
-
-    NAMES = {"html": "lang", "img": "alt", "th": "scope", "svg": "aria-label"}
 
     def __init__(self):
         super().__init__()
@@ -120,7 +122,7 @@ class _AccessibilityParser(HTMLParser):
         self.levels += [int(tag[1])] if re.fullmatch("h[1-6]", tag) else []
         self.ids += [attributes["id"]] if "id" in attributes else []
         self.links += [attributes[name] for name in ("href", "src") if name in attributes]
-        needed = self.NAMES.get(tag)
+        needed = ACCESSIBLE_NAMES.get(tag)
         if needed and not attributes.get(needed):
             self.lacks.append(self.get_starttag_text())
         if attributes.get("role") == "img" and not attributes.get("aria-label"):

@@ -17,9 +17,9 @@ from ...surface.profile import level, resample_evenly
 from ...surface.quantity import LEVEL, SIDE, Quantity
 from ...surface.roughness.spectrum import BAND
 from ..answer import Answer, Remarks, Variable
+from ..surface_definitions import name_in_track
 from . import predicted as predicted_wear
 from . import sentences
-from .definitions import name_in_track
 from .sentences import to_json
 from .variables import along, band, maps
 

@@ -67,13 +67,14 @@ def add_predicted(answer: Answer, comparison: Comparison, folder: Path, piece: s
     # the sentence belongs to the verdict, whose last sentence then becomes a note
     kept = sentences.MAX_SENTENCES - 1
     notes = (*answer.remarks.notes, *answer.verdict[kept:], *notes)
+    depths = fitted.depths
     data = along(
         "x_patch",
-        x_patch=fitted.x,
-        computed_depth=fitted.computed,
-        depth_difference=fitted.measured - fitted.computed,
+        x_patch=depths.x,
+        computed_depth=depths.computed,
+        depth_difference=depths.measured - depths.computed,
     )
-    data |= band("x_patch", "measured_depth", fitted.measured, SIDE * fitted.noise)
+    data |= band("x_patch", "measured_depth", depths.measured, SIDE * depths.noise)
     return replace(
         answer,
         verdict=(*answer.verdict[:kept], sentence),
@@ -166,7 +167,7 @@ def read_history(folder: Path, piece: str = "") -> WearHistory:
 def describe(fitted: PredictedWear) -> str:
     """Return the sentence on the fitted coefficient and the difference between both depths."""
     coefficient = sentences.format_value("wear_coefficient", fitted.coefficient)
-    percent = 100 * fitted.difference_rms / float(fitted.computed[fitted.on_patch].mean())
+    percent = 100 * fitted.difference_rms / float(fitted.depths.computed[fitted.on_patch].mean())
     return (
         f"With a wear coefficient of {coefficient} the computed depth of the {fitted.history.piece} piece differs from the "
         f"measured depth by {format_length(fitted.difference_rms, 3)} rms ({format_number(percent, 2)} % of its mean)."

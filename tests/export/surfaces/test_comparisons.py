@@ -11,8 +11,9 @@ import xarray
 from comparisons import FINDINGS, VERDICTS, compare_scans, compare_traces
 
 from patchfem.export import netcdf, page, quantities, store
+from patchfem.export import surface_definitions as definitions
 from patchfem.export.answer import Quantity
-from patchfem.export.surfaces import compare, definitions, sentences
+from patchfem.export.surfaces import compare, sentences
 
 # what the first sentence must state for each code of the verdict
 STATED = {

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 
 from patchfem.export import quantities
-from patchfem.export.surfaces import definitions
+from patchfem.export import surface_definitions as definitions
 from patchfem.response.rows import ROWS as MOTION
 from patchfem.runs.results.patch_rows import ROWS as STATIC
 from patchfem.scene import MATERIALS

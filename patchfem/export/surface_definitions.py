@@ -1,9 +1,9 @@
 """Definitions of the quantities of compare, profile and wear between two runs, by name."""
 
-from ...surface.compare.records import DEFINITIONS
-from ...surface.roughness.areal import AREAL
-from ...surface.roughness.parameters import PROFILE
-from ..quantities import Definition
+from ..surface.compare.records import DEFINITIONS
+from ..surface.roughness.areal import AREAL
+from ..surface.roughness.parameters import PROFILE
+from .answer import Definition
 
 # names in a track -> names in compare.json and in the answer
 TRACK_NAMES = {"depth_mean": "track_depth"}
