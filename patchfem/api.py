@@ -935,7 +935,7 @@ def profile(
     if length is not None and not 0 < length < float("inf"):
         raise PatchfemError(f"profile: cutoff: a length above zero is needed, not {length:g} m")
     paths = [_require_path(file, "profile") for file in files]
-    return roughness.answer_files(paths, units, length, limits).details
+    return roughness.answer_files(paths, units, cutoff=length, window=limits).details
 
 
 @_reject_removed_options

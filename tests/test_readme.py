@@ -362,6 +362,7 @@ def test_always_tilt_limit_agrees_on_all_pages(run_recipe):
     angle = f"{math.floor(1e5 * limits['loop_area']) / 100:g} mrad"
     gap = f"{math.floor(12.7e3 * limits['loop_area'])} um over the patch"
     doubling = f"{math.floor(1e6 * limits['pressure_peak']) / 1000:g} mrad"
+    assert_pages_quote_limit(f"{angle} ({gap})", f"the pressure peak doubles at {doubling}")
     with open("out/tilts-sweep/sweep.csv", encoding="utf-8") as file:
         first = float(next(csv.DictReader(file))["loop_area"])
     scene = (
@@ -397,7 +398,7 @@ def test_always_joint_and_pad_recipes_run(run_recipe):
         ]
         for name in ("before", "after")
     )
-    assert low < 1e3 * (sum(before) - sum(after)) / len(before) < high and high - low < 0.05 * depth
+    assert low < 1e3 * (sum(before) - sum(after)) / len(before) < high and high - low < 0.06 * depth
 
 
 def assert_pages_quote_limit(limit: str, peak: str) -> None:

@@ -39,13 +39,13 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 import bands
 from drawing import BLUE, GREY, ORANGE, drawing
 from patchfem.surface.compare.sentences import describe_ratio_change
-from patchfem.surface.compare.verdict import compose_verdict
 from study_text import read_answer
 
 from patchfem.core import frozen_array
 from patchfem.export import write_trace
 from patchfem.surface import BAND, Profile, level, make_report
 from patchfem.surface.compare.compare import compare_directions, compare_traces
+from patchfem.surface.compare.verdict import compose_verdict
 from patchfem.surface.roughness.spectrum import band_amplitude, estimate_spectrum
 
 FOLDER = Path(__file__).parent

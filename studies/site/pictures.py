@@ -7,8 +7,8 @@ comparison, which takes about 20 CPU seconds. No browser is needed.
 """
 
 import json
-import re
 import os
+import re
 import sys
 from collections.abc import Iterator
 from hashlib import sha256
@@ -157,7 +157,12 @@ def draw_sweep(swept) -> Figure:
         -TILT_LIMIT, TILT_LIMIT, color=BLUE, alpha=0.1, lw=0, label=f"within {TILT_LIMIT:g} %"
     )
     (allowed,) = re.findall(r"[\w.]+ may reach .*? changes by 5 %", swept.attrs["verdict"])
-    axis.set(xscale="log", xlabel="tilt [mrad]", ylabel="change [%]", title=allowed.replace(" before", "\nbefore"))
+    axis.set(
+        xscale="log",
+        xlabel="tilt [mrad]",
+        ylabel="change [%]",
+        title=allowed.replace(" before", "\nbefore"),
+    )
     axis.xaxis.set_major_formatter("{x:g}")
     axis.legend(loc="lower left")
     return figure

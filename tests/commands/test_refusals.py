@@ -115,7 +115,7 @@ REFUSED = {  # command -> [(arguments, texts of the lines of the message)]; exit
         (("trace.csv", "--window", "1 mm"), ("two positions are needed, such as '468 um,733 um'",)),
         (
             ("trace.csv", "--window", "1 mm,9 mm"),
-            ("from 1 mm to 9 mm, but the trace runs from 0 um to 2 mm",),
+            ("from 1 mm to 9 mm, but the surface along x from 0 um to 2 mm",),
         ),
         (("trace.csv", "--units", "mm"), ("give two units, of x and of z",)),
         (("bare.csv",), ("units are never guessed",)),
