@@ -63,8 +63,13 @@ class Quantity:
 
 
 def _finite_or_none(number: float | None) -> float | None:
-    """Return a number as float, or None if it is missing or not finite."""
-    return None if number is None or not math.isfinite(number) else float(number)
+    """Return a number as float, or None if it is missing, not finite, or too large for a float."""
+    if number is None:
+        return None
+    try:
+        return float(number) if math.isfinite(number) else None
+    except OverflowError:
+        return None
 
 
 @dataclass(frozen=True, eq=False, slots=True)
