@@ -72,11 +72,6 @@ PUBLIC = {
     ),
     "sweeps.case_models": ("SweepScene",),
     "sweeps.cases": ("Cases",),
-    "sweeps.estimate": (
-        "MAX_CASES_WITH_SUMMARY",
-        "MAX_CASES_WITH_TABLES",
-        "estimate_sweep",
-    ),
     "sweeps.executors.cluster": ("environment_versions",),
     "sweeps.parse_request": (
         "Request",
@@ -84,10 +79,9 @@ PUBLIC = {
         "read_cases",
         "read_sweep",
     ),
+    "sweeps.plan": ("plan_sweep",),
     "sweeps.sweep": (
-        "RemainingTime",
         "WorkerData",
-        "format_duration",
         "iterate_chunks",
     ),
 }

@@ -39,7 +39,7 @@ from switched import PROBLEMS, follow
 from patchfem.campaigns import Cases, SweepScene
 from patchfem.campaigns.sweeps.executors import LocalExecutor
 from patchfem.core import Missing
-from patchfem.export import compute_in_memory
+from patchfem.export.sweeps.run import compute_in_memory
 from patchfem.runs.batch import batches
 from patchfem.scene import loads, make_axis
 

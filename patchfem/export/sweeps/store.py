@@ -19,7 +19,7 @@ import h5py
 import numpy as np
 
 from ...disk.atomic_write import write_bytes
-from ...runs.batch.case_results import CaseResults
+from ...runs.batch.case_results import CaseResults, join_case_results
 
 CHUNKS = "chunks"
 SUFFIX = ".nc"
@@ -134,30 +134,30 @@ class Chunks:
         files = self.list_files()
         if len(files) <= 2 * -(-len(self.names) // MAX_CASES_PER_FILE) and not removes_others:
             return
-        small = {}
+        group = {}
         for path in files:
             names, results = read_chunk(path)
             if not len(names) or (removes_others and (self._find_rows(names) < 0).all()):
                 path.unlink()
-            elif len(names) < MAX_CASES_PER_FILE // 2:
-                small[path] = (names, results)
-            if sum(len(names) for names, _ in small.values()) >= MAX_CASES_PER_FILE:
-                self._replace_files(small)
-                small = {}
-        self._replace_files(small)
+                continue
+            group[path] = (names, results)
+            if sum(len(names) for names, _ in group.values()) >= MAX_CASES_PER_FILE:
+                self._merge(group)
+                group = {}
+        self._merge(group)
 
-    def _replace_files(self, contents: dict[Path, tuple[np.ndarray, CaseResults]]) -> None:
+    def _merge(self, group: dict[Path, tuple[np.ndarray, CaseResults]]) -> None:
         """Write the contents of several files into one, and then remove these files."""
-        if len(contents) < 2:
+        if len(group) < 2:
             return
-        names = np.concatenate([names for names, _ in contents.values()])
-        joined = CaseResults.blank(len(names))
-        start = 0
-        for part_names, part in contents.values():
-            joined.insert(range(start, start + len(part_names)), part)
-            start += len(part_names)
-        new = write_chunk(self.folder, names, joined)
-        for path in contents:
+        names = np.concatenate([names for names, _ in group.values()])
+        starts = np.cumsum([0, *(len(part) for part, _ in group.values())])
+        parts = [
+            (start + np.arange(len(part)), one)
+            for start, (part, one) in zip(starts, group.values())
+        ]
+        new = write_chunk(self.folder, names, join_case_results(len(names), parts))
+        for path in group:
             if path != new:
                 path.unlink()
 
