@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import run_cli
+from patchfem.export.surfaces.worn_runs import find_plane_below, hidden_line
 from scene_texts import COULOMB, POINT
 from test_compare_verb import NAMES
 
 import patchfem as pf
 from patchfem.export import compare_runs
 from patchfem.export.surfaces import worn
-from patchfem.export.surfaces.worn_runs import find_plane_below, hidden_line
 
 ROOT = Path(__file__).parents[2]
 GUIDE = ROOT / "patchfem" / "scene" / "guide" / "wear.md"

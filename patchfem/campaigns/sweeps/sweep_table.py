@@ -77,10 +77,6 @@ class MeasureColumn:
         unknown = np.full(count, np.nan, np.float32)
         return cls(unit, np.full(count, np.nan), unknown, np.zeros(count, np.float32))
 
-    def get_numbers(self, case: int) -> tuple[float, float, float]:
-        """Return value, error and floor of a case."""
-        return float(self.values[case]), float(self.errors[case]), float(self.floors[case])
-
     def misses(self, tolerance: float | np.ndarray) -> np.ndarray:
         """Return whether the error of each case (n,) exceeds tolerance * |value| + floor."""
         with np.errstate(invalid="ignore"):  # comparisons with NaN are false

@@ -26,7 +26,6 @@ MAX_MAP_VALUES = 40  # values of each key in a map
 # Ratio of the largest to the smallest value of a key and of a measure at which an axis is logarithmic.
 MIN_KEY_RATIO = 10.0
 MIN_MEASURE_RATIO = 100.0
-SHOWN_CHANGE = 0.2  # largest change in the close view of relative changes
 SYMBOLS = np.array(["circle", "circle-open", "x"])  # settled, over the tolerance, not settled
 
 
@@ -144,19 +143,10 @@ def make_relative(answers: dict[str, Answer], chart: Chart) -> Panel | None:
     ratios = np.concatenate([curve.y[np.isfinite(curve.y)] for curve in curves])
     # A logarithmic axis leaves out 0.
     is_log = bool(ratios.min() >= 0 and ratios.max() >= MIN_KEY_RATIO * ratios[ratios > 0].min())
-    one = np.ones(2)
-    ends = curves[0].x[[0, -1]]
-    band = Curve("± 5 %", ends, one, one - NEGLIGIBLE_CHANGE, one + NEGLIGIBLE_CHANGE)
+    band = [np.full(2, 1 + change) for change in (0, -NEGLIGIBLE_CHANGE, NEGLIGIBLE_CHANGE)]
+    curves.insert(0, Curve("± 5 %", curves[0].x[[0, -1]], *band))
     axis = Axis("value / value of the first case", is_log=is_log)
-    panels = [Panel("all changes", chart.style, x_axis, axis, [band, *curves])]
-    if np.abs(ratios - 1).max() > SHOWN_CHANGE:
-        near = [
-            replace(curve, y=np.where(np.abs(curve.y - 1) <= SHOWN_CHANGE, curve.y, np.nan))
-            for curve in curves
-        ]
-        axis = replace(axis, is_log=False)
-        panels.append(Panel("changes up to 20 %", chart.style, x_axis, axis, [band, *near]))
-    return _add_choices(chart, panels)
+    return Panel(chart.title, chart.style, x_axis, axis, curves, chart.caption)
 
 
 def make_menu(answers: dict[str, Answer], chart: Chart) -> Panel | None:

@@ -141,8 +141,12 @@ def _make_quantities(table: SweepTable, analysis: SweepAnalysis) -> dict[str, Qu
     for name, low, high, _ in analysis.ranges[:MAX_RANGES]:
         column = table.measures[name]
         for word, case in (("smallest", low), ("largest", high)):
-            value, error, floor = column.get_numbers(case)
-            quantities[f"{word}_{name}"] = Quantity(value, column.unit, error, floor=floor)
+            quantities[f"{word}_{name}"] = Quantity(
+                column.values[case],
+                column.unit,
+                column.errors[case],
+                floor=float(column.floors[case]),
+            )
     return quantities
 
 
