@@ -79,13 +79,6 @@ class Cases:
         """Return the `table.key=value` strings of a case."""
         return tuple(f"{axis.key}={text}" for axis, text in zip(self.axes, self.texts(number)))
 
-    def values(self, number: int) -> tuple:
-        """Return the values of a case in SI units, one per axis.
-
-        They are floats, or strings for a key that is not numeric.
-        """
-        return tuple(axis.values[k] for axis, k in zip(self.axes, self.axis_indices(number)))
-
     def make_columns(self, numbers: Sequence[int]) -> list[np.ndarray]:
         """Return the values (n,) of each axis in several cases: floats in SI, or strings."""
         columns = []
@@ -133,13 +126,9 @@ class Cases:
         if not contact_axes:
             return list(numbers)
         contact_axes.sort(key=lambda k: not self.axes[k].key.startswith(PIECE_KEYS))
-
-        def list_patch_values(number: int) -> list:
-            """Return the values of a case for the keys that change its patch."""
-            values = self.values(number)
-            return [values[k] for k in contact_axes]
-
-        return sorted(numbers, key=list_patch_values)
+        columns = self.make_columns(numbers)
+        order = np.lexsort([columns[k] for k in reversed(contact_axes)])
+        return np.asarray(numbers)[order].tolist()
 
     def compute_hashes(self, sweep_scene: SweepScene) -> np.ndarray:
         """Return hashes (n,) uint64 of the cases, which identify them in any sweep of the scene.
@@ -162,20 +151,20 @@ class Cases:
             content = " ".join(sign for _, sign in files)
             return f"[{keys[axis]}, {json.dumps(value)}, {json.dumps(content)}]"
 
-        def hash_cases(common_text: str) -> np.ndarray:
-            """Return the hashes (n,); `common_text` identifies the data common to all cases."""
-            hashes = np.empty(len(self), np.uint64)
-            for number in range(len(self)):
-                indices = list(map(int, self.axis_indices(number)))
-                values = [describe_value(axis, indices[axis]) for axis in order]
-                digest = sha256("\n".join([common_text, *values]).encode()).hexdigest()
-                hashes[number] = int(digest[:16], 16)
-            return hashes
-
         common_text = sweep_scene.hash_common_data()
+        hashes = np.empty(len(self), np.uint64)
+        for number in range(len(self)):
+            indices = list(map(int, self.axis_indices(number)))
+            values = [describe_value(axis, indices[axis]) for axis in order]
+            hashes[number] = _hash_to_integer("\n".join([common_text, *values]).encode())
         if sweep_scene.has_shared_meshes([axis.key for axis in self.axes]):
-            common_text = sha256(np.sort(hash_cases(common_text)).tobytes()).hexdigest()
-        return hash_cases(common_text)
+            hashes ^= np.uint64(_hash_to_integer(np.sort(hashes).tobytes()))
+        return hashes
+
+
+def _hash_to_integer(content: bytes) -> int:
+    """Return the first 64 bits of the SHA-256 hash of a content."""
+    return int.from_bytes(sha256(content).digest()[:8], "big")
 
 
 def take_values(axis: Axis, indices: Sequence[int]) -> Axis:
