@@ -54,11 +54,12 @@ def read_case_table(path: Path) -> tuple[Cases | None, list[str]]:
             f"{path}:{header_number}: the first line must be a header such as `{HEADER}`, not "
             f"'{','.join(heads)[:80]}'"
         ]
-    errors = [
-        f"{path}:{number}: the line must have {len(heads)} cells, as the header has, not {len(cells)}"
-        for number, cells in lines
-        if len(cells) != len(heads)
-    ]
+    errors = []
+    for number, cells in lines:
+        if len(cells) != len(heads):
+            errors.append(
+                f"{path}:{number}: the line must have {len(heads)} cells, as the header has, not {len(cells)}"
+            )
     for key, count in Counter(match[1] for match in matches).items():
         if count > 1:
             errors.append(

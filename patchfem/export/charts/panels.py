@@ -1,17 +1,14 @@
 """Data of a chart: the curves or maps that a row of the table selects from answers, in display units."""
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 
 from ...formatting import format_number, needs_log_scale
 from ..answer import Answer, Variable
-from ..quantities import choose_scale
-from .panel import Axis, Curve, Panel
+from .panel import Axis, Curve, Panel, join_names, make_axis, thin
 from .table import Chart
 
-MAX_CURVE_POINTS = 3000  # a longer curve keeps the extremes of as many intervals
 MAX_MAP_COLUMNS = 400  # a finer map keeps every n-th column
 N_SHOWN_CYCLES = 3  # number of cycles of the span "cycles"
 SWEEP_STYLES = ("relative", "menu", "maps", "shares")
@@ -162,11 +159,6 @@ def _split(name: str) -> tuple[str, str]:
     return variable, x_name
 
 
-def join_names(*names: str) -> str:
-    """Return the parts of an entry of the legend that are not empty."""
-    return ", ".join(name for name in names if name)
-
-
 def _find_x(data: dict[str, Variable], chart: Chart) -> str:
     """Return the first of the horizontal variables that the data has, or ""."""
     return next((name for name in chart.x.split() if name in data), "")
@@ -224,14 +216,6 @@ def _make_axis(name: str, unit: str, arrays: list, log: str, letter: str) -> Axi
     values = np.concatenate([np.asarray(values, float).ravel() for values in arrays])
     is_log = letter in log or ("auto" in log and needs_log_scale(values))
     return make_axis(name, unit, values, is_log)
-
-
-def make_axis(name: str, unit: str, values: np.ndarray, is_log: bool = False) -> Axis:
-    """Return the axis for values [SI]; a name such as `slip_fraction` is displayed in percent."""
-    label = name.replace("_", " ")
-    size = np.abs(values[np.isfinite(values)]).max(initial=0.0)
-    unit, scale = choose_scale(name, unit or "1", size)
-    return Axis(f"{label} [{unit}]" if unit else label, scale, is_log)
 
 
 def _make_curves(data: dict[str, Variable], chart: Chart, name: str, axes: tuple) -> list[Curve]:
@@ -321,20 +305,6 @@ def _find_band(data: dict[str, Variable], name: str) -> tuple[np.ndarray | None,
         error = np.where(error <= np.abs(values), error, np.nan)
         return values - error, values + error
     return None, None
-
-
-def thin(values: np.ndarray, count: int = MAX_CURVE_POINTS) -> np.ndarray:
-    """Return the indices that a curve needs: the smallest and the largest value of each of many intervals."""
-    if values.ndim > 1 or values.size <= 2 * count:
-        return np.arange(len(values))
-    edges = np.linspace(0, values.size, count + 1).astype(int)
-    picks = ((np.argmin, np.inf), (np.argmax, -np.inf))  # an unknown value is no extreme
-    extremes = [
-        start + pick(np.where(np.isnan(values[start:end]), unknown, values[start:end]))
-        for start, end in pairwise(edges)
-        for pick, unknown in picks
-    ]
-    return np.unique([0, *extremes, values.size - 1])
 
 
 def _split_by_code(curve: Curve, codes: Variable, keep: np.ndarray, is_joined: bool) -> list[Curve]:

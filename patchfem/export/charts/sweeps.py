@@ -16,8 +16,7 @@ from ...campaigns.sweeps.limits import NEGLIGIBLE_CHANGE
 from ...campaigns.sweeps.sweep_table import FINAL_OUTCOMES, MeasureColumn
 from ..answer import Answer, Variable
 from ..quantities import format_value
-from .panel import Axis, Curve, Panel
-from .panels import join_names, make_axis, thin
+from .panel import Axis, Curve, Panel, join_names, make_axis, thin
 from .table import Chart
 
 MAX_DRAWN_CASES = 1000  # cases of a measure, so that a page stays below 1.5 MB

@@ -91,9 +91,11 @@ class Writer:
             "numerics": results.numerics.get(case, {}),
             "case": dict(zip([axis.key for axis in self.cases.axes], self.cases.texts(number))),
         }
-        kind, title = "linear", ""
+        kind = "linear"
+        title = ""
         if isinstance(model, Model):
-            kind, title = model.kind, model.source.title
+            kind = model.kind
+            title = model.source.title
             details["effects"] = [
                 {"effect": name, "equations": EFFECTS[name].equations}
                 for name in model.source.effects
