@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 from patchfem.surface.compare.drift import model_drift
 
 COUNT = 2400

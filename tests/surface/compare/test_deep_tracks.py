@@ -9,11 +9,11 @@ from functools import cache
 import numpy as np
 import pytest
 from pairs import UM
+from patchfem.surface.compare.place import find_place_as_given
 
 from patchfem.core import PatchfemError, frozen_array
 from patchfem.surface import Profile
 from patchfem.surface.compare.compare import compare_files, compare_traces
-from patchfem.surface.compare.place import find_place_as_given
 from patchfem.surface.compare.verdict import compose_verdict
 
 COUNT, HELD_OUT = 500, 97000

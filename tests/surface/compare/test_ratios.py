@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 from pairs import UM, make_worn_pair
+from patchfem.surface.compare.ratios import Size
+from patchfem.surface.compare.sentences import compute_confidence, describe_ratio_change
 from synthetic import report_area
 
 from patchfem.core import PatchfemError, frozen_array
@@ -15,8 +17,6 @@ from patchfem.surface.compare.compare import (
     compare_waves,
     fill_scan,
 )
-from patchfem.surface.compare.ratios import Size
-from patchfem.surface.compare.sentences import compute_confidence, describe_ratio_change
 from patchfem.surface.compare.verdict import compose_verdict
 
 

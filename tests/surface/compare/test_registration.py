@@ -6,13 +6,13 @@ The method was tuned on seeds 0 to 150; the seeds of these tests are others.
 import numpy as np
 import pytest
 from pairs import UM, make_surface, make_worn_pair
+from patchfem.surface.compare.model import Parameter
+from patchfem.surface.compare.search import search_shift
 
 from patchfem.core import PatchfemError, frozen_array
 from patchfem.surface import Profile
 from patchfem.surface.compare.alignment import align
 from patchfem.surface.compare.compare import compare_traces
-from patchfem.surface.compare.model import Parameter
-from patchfem.surface.compare.search import search_shift
 from patchfem.surface.compare.verdict import compose_verdict
 
 HELD_OUT = 80000

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 from patchfem.surface.compare.errors import estimate_noise
 
 COUNT = 4000

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from patchfem.surface.roughness.rows import AREAL
 
 from patchfem.surface import make_report
 from patchfem.surface.areal import Areal
@@ -14,7 +15,6 @@ from patchfem.surface.roughness.areal import (
     rms_gradient,
 )
 from patchfem.surface.roughness.filter import ALPHA, filter_scan, mean_surface
-from patchfem.surface.roughness.rows import AREAL
 
 UM = 1e-6
 

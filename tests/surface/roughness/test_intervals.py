@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from patchfem.surface.roughness.intervals import Intervals
+from patchfem.surface.roughness.rows import PRIMARY, ROUGH, TABLE, WAVES
 from ring_traces import draw_traces
 
 from patchfem.surface import Heights, Profile, level
 from patchfem.surface.roughness.filter import filter_trace
-from patchfem.surface.roughness.intervals import Intervals
-from patchfem.surface.roughness.rows import PRIMARY, ROUGH, TABLE, WAVES
 from patchfem.surface.roughness.spectrum import band_amplitude, estimate_spectrum
 
 UM = 1e-6

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from patchfem.surface.roughness.rows import PRIMARY, TABLE
 from scipy.stats import norm
 
 from patchfem.surface import Heights, abbott_curve
@@ -13,7 +14,6 @@ from patchfem.surface.roughness.parameters import (
     mean_element_height,
     mean_spacing,
 )
-from patchfem.surface.roughness.rows import PRIMARY, TABLE
 
 UM = 1e-6
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from made_scans import make_alignment
-
-from patchfem.surface.areal import Areal
 from patchfem.surface.scans import change
 from patchfem.surface.scans.track import measure_scan_track
+
+from patchfem.surface.areal import Areal
 
 CELL, COUNT = 1e-6, 260
 SIDE, WIDTH, DEPTH, RIDGE = CELL * (COUNT - 1), 60e-6, 0.5e-6, 20e-6  # RIDGE: base of the ridges

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 import scan_pairs
 from command_line import run_cli
-
-from patchfem.__main__ import main
-from patchfem.export.folder import FILES
 from patchfem.export.surfaces.areal import write_x3p
-from patchfem.surface import read_surface
-from patchfem.surface.areal import Areal
 from patchfem.surface.scans import change, search
 from patchfem.surface.scans.model import rotation
 from patchfem.surface.scans.search import transform_scan
+
+from patchfem.__main__ import main
+from patchfem.export.folder import FILES
+from patchfem.surface import read_surface
+from patchfem.surface.areal import Areal
 
 STEP, COUNT, COARSE = 1e-6, 200, 112
 SIDE = STEP * (COUNT - 1)

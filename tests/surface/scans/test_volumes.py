@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 from made_scans import make_alignment
-from scipy.ndimage import gaussian_filter
-
 from patchfem.surface.scans.volumes import measure_volumes
+from scipy.ndimage import gaussian_filter
 
 STEP, COUNT, NOISE = 1e-6, 240, 20e-9
 AXIS = STEP * np.arange(COUNT)
