@@ -42,10 +42,6 @@ from .export.fields import multiblock
 from .export.fits import request as fits
 from .export.fits.options import FitOptions
 from .export.pages import headline, released, sentences
-from .export.surfaces import compare as compared_data
-from .export.surfaces import pairs as pairs_data
-from .export.surfaces import predicted as predicted_wear
-from .export.surfaces import roughness, worn, worn_runs
 from .export.sweeps import folder, page, tables
 from .export.sweeps import run as sweep_run
 from .mesh import files as mesh_files
@@ -73,10 +69,6 @@ from .scene.sets import (
     require_units,
 )
 from .scene.toml_text import read_text
-from .surface.compare import pairs as pairs_tables
-from .surface.compare import verdict
-from .surface.files import read as surfaces
-from .surface.roughness import report as roughness_report
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -958,6 +950,10 @@ def profile(
     >>> len(roughness["profiles"])
     1
     """
+    from .export.surfaces import roughness
+    from .surface.files import read as surfaces
+    from .surface.roughness import report as roughness_report
+
     length = _parse_length(cutoff, "profile: cutoff")
     limits = None
     if window is not None:
@@ -1272,6 +1268,13 @@ def compare(
     >>> comparison["amplitude_ratio"]["value"] < 1
     True
     """
+    from .export.surfaces import compare as compared_data
+    from .export.surfaces import pairs as pairs_data
+    from .export.surfaces import predicted as predicted_wear
+    from .export.surfaces import worn, worn_runs
+    from .surface.compare import pairs as pairs_tables
+    from .surface.compare import verdict
+
     settings = {
         "units": units,
         "shift": _parse_length(shift, "compare: shift"),

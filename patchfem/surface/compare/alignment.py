@@ -140,6 +140,11 @@ def _is_same_place(places: list[Place], place: Place, model: TraceModel, fit: Fi
     """Return whether the traces have a place in common: by its significance, or by the heights that agree."""
     chance = _estimate_chance(model.second + fit.depth, model.second, float(np.median(fit.noise)))
     agreeing = fit.unworn.mean()
+    waves = model.second - ndimage.gaussian_filter1d(
+        model.second, model.second.size / WAVES_PER_TRACE
+    )
+    if abs(fit.state[1]) > MAX_STRETCH or np.median(fit.noise) > waves.std():
+        return False
     is_clear = len(places) == 1
     if place.significance > (MIN_SIGNIFICANCE if is_clear else SURE_SIGNIFICANCE):
         return True

@@ -199,7 +199,7 @@ def _compose_placed(traces: list[Profile], aligned: Aligned) -> Comparison:
     placed = {
         "shift": (fit.state[0], errors[0]),
         "scale": (1 + fit.state[1], errors[1]),
-        "tilt": (-fit.state[3] / model.half, errors[3] / model.half),
+        "tilt": (fit.state[3] / model.half, errors[3] / model.half),
     }
     placement = {}
     for name, (value, error) in placed.items():
