@@ -189,12 +189,17 @@ def _measure_gain(model: TraceModel, fit: Fit) -> tuple[float, float]:
 
     Tops may be worn, which an error of the gain resembles, so they do not count.
     """
+    # The mean line is that of the unworn heights, so that a track does not bend it.
     smooth = model.second.size / WAVES_PER_TRACE
+    weight = fit.unworn.astype(float)
+    total = np.maximum(ndimage.gaussian_filter1d(weight, smooth), 1e-12)
     first, second = (
-        z - ndimage.gaussian_filter1d(z, smooth) for z in (model.second + fit.depth, model.second)
+        z - ndimage.gaussian_filter1d(weight * z, smooth) / total
+        for z in (model.second + fit.depth, model.second)
     )
     noise = float(np.median(fit.noise))
     use = (np.abs(fit.depth) < 4 * UNWORN_LIMIT * noise) & (first + second < 0)
+    use &= ~fit.worn & ~fit.grown
     if use.sum() < MIN_SAMPLES:
         return 1.0, np.inf
     first = first[use] - first[use].mean()

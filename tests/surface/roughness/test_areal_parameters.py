@@ -57,7 +57,7 @@ def test_exact_parameters_of_sine_surface():
     report = make_report(make_scan(UM * make_plane_wave(200, 400, 40.0, 0.0)))
     assert report["Sa"].value == pytest.approx(2 / np.pi * UM, rel=1e-2)
     assert report["Sq"].value == pytest.approx(UM / np.sqrt(2), rel=1e-2)
-    assert report["Sku"].value == pytest.approx(1.5, rel=1e-2)
+    assert report["Sku"].value == pytest.approx(1.5, rel=3e-2)
     assert report["Ssk"].value == pytest.approx(0.0, abs=2e-2)
     assert report["Sz"].value == pytest.approx(2 * UM, rel=3e-2)
 
