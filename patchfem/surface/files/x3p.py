@@ -109,12 +109,16 @@ class _Package:
                 )
         count = rows * columns
         if count > MAX_POINTS:
-            raise self.refuse(f"{count} heights, more than {MAX_POINTS:.0e}; export a part of the scan")
+            raise self.refuse(
+                f"{count} heights, more than {MAX_POINTS:.0e}; export a part of the scan"
+            )
         if kinds["Z"] != "A":
             raise self.refuse("the heights (CZ) are incremental; export the surface anew")
 
         stored = [axis for axis in "XYZ" if kinds[axis] == "A"]
-        read = self._read_binary if self.root.find("Record3/DataLink") is not None else self._read_list
+        read = (
+            self._read_binary if self.root.find("Record3/DataLink") is not None else self._read_list
+        )
         table = read(stored, count)
         numbers = np.arange(count)
         values = {"X": numbers % columns, "Y": numbers // columns} | dict(zip(stored, table.T))
@@ -122,7 +126,9 @@ class _Package:
         if stored != ["Z"] or is_list:
             known = np.isfinite(points["X"]) & np.isfinite(points["Y"])
             if known.sum() < 2:
-                raise self.refuse(f"{known.sum()} points with coordinates; a trace needs at least two")
+                raise self.refuse(
+                    f"{known.sum()} points with coordinates; a trace needs at least two"
+                )
             found = [points[axis][known] for axis in "XYZ"]
             return make_scan_from_points(self.raw.path, found, None, (1.0, 1.0, 1.0), METRES_NOTE)
         for axis, size in (("X", columns), ("Y", rows)):
@@ -196,7 +202,9 @@ class _Package:
 
     def verify_main(self, text: bytes) -> tuple[str, ...]:
         """Return a note if the checksum file lists main.xml with another checksum."""
-        name = posixpath.join(self.folder, self.find_text("Record4/ChecksumFile", "md5checksum.hex"))
+        name = posixpath.join(
+            self.folder, self.find_text("Record4/ChecksumFile", "md5checksum.hex")
+        )
         if name not in self.archive.namelist():
             return ()
         words = read_member(self.raw, self.archive, name, MAX_XML_BYTES).decode("latin-1").split()
