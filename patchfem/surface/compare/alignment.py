@@ -54,7 +54,7 @@ class Aligned:
     gain_error: float = MAX_GAIN_ERROR
 
 
-def clean_trace(trace: Profile, keep_spikes: bool) -> Profile:
+def clean_trace(trace: Profile, *, keep_spikes: bool = False) -> Profile:
     """Return the known heights of a trace, without spikes, dropouts and dust."""
     clean = trace if keep_spikes else remove_spikes(trace)
     known = ~clean.missing
@@ -113,10 +113,10 @@ def align_traces(
     place, model, state, _ = best
 
     digit = EVEN_DEVIATION * float(np.hypot(_find_digit(first.z), _find_digit(second.z)))
-    fit = _fit_datum(model, state, digit, is_straight)
+    fit = _fit_datum(model, state, digit, is_straight=is_straight)
     gain, gain_error = _measure_gain(model, fit)
     if abs(gain - 1) > max(5 * gain_error, MIN_GAIN_ERROR):
-        scaled = _fit_scaled(model, fit, gain, digit, is_straight)
+        scaled = _fit_scaled(model, fit, gain, digit, is_straight=is_straight)
         if scaled is not None:
             error = min(gain_error, MAX_GAIN_ERROR)
             return Aligned(model, scaled, "", place.is_mirrored, gain, error)
@@ -154,7 +154,7 @@ def _is_same_place(places: list[Place], place: Place, model: TraceModel, fit: Fi
     return agreeing > MIN_AGREEMENT * chance + MIN_AGREEING
 
 
-def _fit_datum(model: TraceModel, state, digit: float, is_straight: bool) -> Fit:
+def _fit_datum(model: TraceModel, state, digit: float, *, is_straight: bool) -> Fit:
     """Fit a straight and a parabolic datum, and return the better one."""
     fits = []
     for degree in (1,) if is_straight else (1, 2):
@@ -214,12 +214,16 @@ def _measure_gain(model: TraceModel, fit: Fit) -> tuple[float, float]:
     return gain, float(np.sqrt(10) * np.std(influence) / power)
 
 
-def _fit_scaled(model: TraceModel, fit: Fit, gain: float, digit: float, is_straight: bool):
+def _fit_scaled(
+    model: TraceModel, fit: Fit, gain: float, digit: float, *, is_straight: bool
+) -> Fit | None:
     """Divide the second trace by its gain; return the fit if it explains the depths better, else None."""
     second = model.second
     mean = second.mean()
     model.second = mean + (second - mean) / gain
-    scaled = _fit_datum(model, np.append(fit.state[:2], [0.0, 0.0, 0.0]), digit, is_straight)
+    scaled = _fit_datum(
+        model, np.append(fit.state[:2], [0.0, 0.0, 0.0]), digit, is_straight=is_straight
+    )
     is_quieter = np.median(scaled.noise) < np.median(fit.noise)
     changed, before = ((each.worn | each.grown).sum() for each in (scaled, fit))
     if is_quieter and changed <= before:

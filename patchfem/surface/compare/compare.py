@@ -128,7 +128,7 @@ def compare_surfaces(
 
 
 def _compare_traces(before: Profile, after: Profile, options: Options) -> Comparison:
-    cleaned = [clean_trace(trace, options.keep_spikes) for trace in (before, after)]
+    cleaned = [clean_trace(trace, keep_spikes=options.keep_spikes) for trace in (before, after)]
     first, second = cleaned
     removed = (
         int((~before.missing).sum() - first.x.size),

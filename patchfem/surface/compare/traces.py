@@ -81,7 +81,7 @@ def find_places(before: Profile, after: Profile) -> list[Place]:
                 x = middle + (trace.x - middle) / (1 + stretch)
                 for part in np.array_split(np.arange(x.size), n_parts):
                     second = _filter_waves(x[part], trace.z[part], step)
-                    found += _search_shift(first, second, stretch, is_mirrored)
+                    found += _search_shift(first, second, stretch, is_mirrored=is_mirrored)
         found.sort(key=lambda place: -place.significance)
         if found[0].significance > CLEAR_SIGNIFICANCE:
             return found[:1]
@@ -110,7 +110,7 @@ def _measure_overlap(before: Profile, after: Profile, place: Place) -> float:
     return float((high - low) / min(before.length, after.length))
 
 
-def _search_shift(first: Waves, second: Waves, stretch: float, is_mirrored: bool) -> list[Place]:
+def _search_shift(first: Waves, second: Waves, stretch: float, *, is_mirrored: bool) -> list[Place]:
     """Return the best shifts of the second trace with a given stretch, for each version of the waves."""
     places = []
     for versions in zip(first.versions, second.versions):
