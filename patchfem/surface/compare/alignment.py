@@ -32,6 +32,7 @@ BEND_GAIN = (
 MAX_NEW_GROWTH = 0.01  # fraction of the heights above the first trace that a parabola may add
 MAX_STRETCH = 0.015  # largest error of length of a place
 N_OTHER_PLACES = 15  # number of other places that show how many heights agree by chance
+MIN_NOISE = 1e-15  # smallest standard deviation of a depth [m]; flat traces have none
 EVEN_DEVIATION = 1 / np.sqrt(12)  # standard deviation of a uniform error of one digit
 MIN_GAIN_ERROR = 0.003  # smallest error of the gain that is corrected
 MAX_GAIN_ERROR = 0.01  # standard deviation of the gain of two calibrated measurements
@@ -113,6 +114,7 @@ def align_traces(
     place, model, state, _ = best
 
     digit = EVEN_DEVIATION * float(np.hypot(_find_digit(first.z), _find_digit(second.z)))
+    digit = max(digit, MIN_NOISE)
     fit = _fit_datum(model, state, digit, is_straight=is_straight)
     gain, gain_error = _measure_gain(model, fit)
     if abs(gain - 1) > max(5 * gain_error, MIN_GAIN_ERROR):

@@ -134,7 +134,7 @@ def _compare_traces(before: Profile, after: Profile, options: Options) -> Compar
         int((~before.missing).sum() - first.x.size),
         int((~after.missing).sum() - second.x.size),
     )
-    if first.x.size == second.x.size and (first.z == second.z).all():
+    if np.array_equal(first.z, second.z) and np.array_equal(first.x, second.x):
         evidence = Evidence(removed=removed)
         values = _name_unknowns("identical") | {
             "hidden_wear": name_unknown("hidden_wear", "identical")

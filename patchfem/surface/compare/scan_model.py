@@ -13,7 +13,13 @@ from scipy import ndimage
 
 from ..areal import Areal, fill_nearest
 from ..profile import robust_deviation
-from .statistics import compute_threshold, estimate_one_sided_scale, find_mode, solve_biweight_step
+from .statistics import (
+    TINY,
+    compute_threshold,
+    estimate_one_sided_scale,
+    find_mode,
+    solve_biweight_step,
+)
 
 SEARCH_PIXELS = 96  # points along the longer side of the images that are correlated
 ANGLES = np.radians(
@@ -73,8 +79,8 @@ def find_scan_place(before: Areal, after: Areal) -> ScanPlace:
         product = np.fft.irfft2(transform * np.fft.rfft2(turned, size).conj(), size)
         norm = np.fft.irfft2(ones[0] * np.fft.rfft2(turned**2, size).conj(), size)
         norm = np.sqrt(np.maximum(power * norm, 1e-12 * power.max() ** 2))
-        score = np.where(usable, product / norm, 0.0) * np.sqrt(np.maximum(count, 0.0))
-        scatter = robust_deviation(score[usable])
+        score = np.where(usable, product / (norm + TINY), 0.0) * np.sqrt(np.maximum(count, 0.0))
+        scatter = max(robust_deviation(score[usable]), 1e-12)
         at = np.unravel_index(np.argmax(score), size)
         significance = float(score[at] / scatter)
         if significance > best.significance:
