@@ -19,7 +19,6 @@ PUBLIC = {
     "cost": (
         "Cost",
         "TOLERANCE",
-        "find_affected_measures",
         "describe_fastest_setting",
         "find_fastest_settings",
         "find_measures_with_error",
@@ -27,20 +26,9 @@ PUBLIC = {
         "find_worst_error",
         "find_worst_run_error",
     ),
-    "fits.curve": (
-        "DEFAULT_STARTS",
-        "FittedCurve",
-        "fit_curve",
-    ),
-    "fits.loop": (
-        "FittedLoop",
-        "fit_hysteresis_loop",
-    ),
-    "fits.loop_path": ("LoopOptions",),
-    "fits.problem": (
-        "FittedKeys",
-        "parse_ranges",
-    ),
+    "fits.curve": ("FittedCurve",),
+    "fits.loop": ("FittedLoop",),
+    "fits.problem": ("FittedKeys",),
     "fits.request": (
         "FitOptions",
         "Listener",
@@ -56,20 +44,10 @@ PUBLIC = {
         "NUMERICAL_SETTINGS",
         "find_applicable_settings",
     ),
-    "rows.cells": ("compute_rms_scores",),
-    "rows.condition_models": (
-        "FitRequest",
-        "GAIN_KEYS",
-    ),
+    "rows.condition_models": ("GAIN_KEYS",),
     "rows.fit": (
         "FittedRows",
-        "RowsOptions",
         "SAME_SCORE",
-        "fit_rows",
-    ),
-    "rows.search": (
-        "SearchSettings",
-        "UNSTABLE",
     ),
     "surface_pairs": (
         "average_pairs",
@@ -83,7 +61,6 @@ PUBLIC = {
         "MAX_CASES_WITH_TABLES",
         "estimate_sweep",
     ),
-    "sweeps.executors.cluster": ("environment_versions",),
     "sweeps.parse_request": (
         "Request",
         "warn_of_invalid_cases",

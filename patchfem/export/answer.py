@@ -63,8 +63,13 @@ class Quantity:
 
 
 def _finite_or_none(number: float | None) -> float | None:
-    """Return a number as float, or None if it is missing or not finite."""
-    return None if number is None or not math.isfinite(number) else float(number)
+    """Return a number as float, or None if it is missing, not finite, or too large for a float."""
+    if number is None:
+        return None
+    try:
+        return float(number) if math.isfinite(number) else None
+    except OverflowError:
+        return None
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -90,6 +95,30 @@ class Variable:
     unit: str = "1"
     text: str = ""
     meanings: tuple[str, ...] = ()
+
+
+def make_columns(dimension: str, columns: dict[str, tuple]) -> dict[str, Variable]:
+    """Return variables over one dimension.
+
+    Parameters
+    ----------
+    dimension : str
+    columns : dict
+        Name -> (values, unit). A number that is None becomes NaN; the name in words is the description.
+    """
+    variables = {}
+    for name, (values, unit) in columns.items():
+        array = np.asarray(values)
+        if array.dtype == object:
+            array = array.astype(float)
+        variables[name] = Variable((dimension,), array, unit, name.replace("_", " "))
+    return variables
+
+
+def encode(dimension: str, texts: list[str]) -> Variable:
+    """Return texts over one dimension as codes with meanings."""
+    meanings, codes = np.unique(texts, return_inverse=True)
+    return Variable((dimension,), codes.astype(np.int8), "", meanings=tuple(meanings.tolist()))
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,32 +2,22 @@
 
 import numpy as np
 
-from ..campaigns.backbone.band import PREFERRED_METHODS
+from ..campaigns.backbone.band import PREFERRED_METHODS, Band
 from ..campaigns.backbone.records import Backbone, Curve
 from ..core import PatchfemError
 from ..formatting import format_quantity
 from . import quantities
-from .answer import Answer, Quantity, Remarks, Variable
+from .answer import Answer, Quantity, Remarks, Variable, make_columns
 from .charts import axes, panels
 from .charts.table import CHARTS
 from .runs import make_origin
 
 COLUMNS = ("amplitude", "frequency", "frequency_error", "damping", "damping_error")
 BAND_COLUMNS = ("amplitude", "frequency_low", "frequency_high", "damping_low", "damping_high")
-TEXTS = {  # unit and description of each variable
-    "amplitude": ("m", "half the peak-to-peak motion at the output"),
-    "frequency": ("Hz", "frequency"),
-    "frequency_error": ("Hz", "numerical error of the frequency"),
-    "frequency_low": ("Hz", "lower limit of the frequency that tests measure"),
-    "frequency_high": ("Hz", "upper limit of the frequency that tests measure"),
-    "damping": ("1", "damping ratio, structure and friction together"),
-    "damping_error": ("1", "numerical error of the damping ratio"),
-    "damping_low": ("1", "lower limit of the damping ratio that tests measure"),
-    "damping_high": ("1", "upper limit of the damping ratio that tests measure"),
-}
+UNITS = {"amplitude": "m", "frequency": "Hz", "damping": "1"}
 
 
-def make_answer(backbone: Backbone, source, command: str = "") -> Answer:
+def make_answer(backbone: Backbone, source) -> Answer:
     """Return the answer of `backbone`.
 
     Parameters
@@ -35,11 +25,8 @@ def make_answer(backbone: Backbone, source, command: str = "") -> Answer:
     backbone : Backbone
     source : model.Source
         Scene of the mode.
-    command : str
-        Command line that repeats it; by default that without options.
     """
     measures = _make_quantities(backbone)
-    origin = make_origin(source, "backbone")
     return Answer(
         kind="backbone",
         title=source.title,
@@ -49,22 +36,14 @@ def make_answer(backbone: Backbone, source, command: str = "") -> Answer:
         remarks=Remarks(
             notes=(*map(_make_sentence, backbone.notes), *backbone.answer.sentences[1:])
         ),
-        details=_make_details(backbone, measures),
-        # the drive of the scene is ignored
-        origin=origin | {"driven": "", "command": command or origin["command"]},
+        details=_make_details(backbone),
+        origin=make_origin(source, "backbone"),
     )
 
 
 def _make_sentence(text: str) -> str:
     """Return a clause as a sentence."""
     return f"{text[0].upper()}{text[1:].rstrip('.')}."
-
-
-def find_curve(backbone: Backbone) -> Curve | None:
-    """Return the recommended curve of a backbone, or None if no method has one."""
-    return next(
-        (backbone.curves[name] for name in PREFERRED_METHODS if name in backbone.curves), None
-    )
 
 
 def backbone_axes(dataset, ax=None):
@@ -102,44 +81,44 @@ def _make_quantities(backbone: Backbone) -> dict[str, Quantity]:
     """Return frequencies, ends of the recommended curve, exponents and the amplitude of flutter."""
     frequencies = backbone.frequencies
     out = {}
-    curve = find_curve(backbone)
+    band = backbone.answer.band
+    curve = band and backbone.curves[band.method]
     if curve is not None:
+
+        def take(name: str, k: int) -> Quantity:
+            """Return frequency or damping ratio of point k of the curve."""
+            return Quantity(
+                getattr(curve, name)[k], UNITS[name], getattr(curve, f"{name}_error")[k]
+            )
+
         largest = int(np.argmax(curve.damping))
-        points = {"at_smallest_amplitude": 0, "at_largest_amplitude": -1}
         for name in ("frequency", "damping"):
-            for place, k in points.items():
-                out[f"{name}_{place}"] = _take_point(curve, name, k)
-        out["largest_damping"] = _take_point(curve, "damping", largest)
+            out[f"{name}_at_smallest_amplitude"] = take(name, 0)
+            out[f"{name}_at_largest_amplitude"] = take(name, -1)
+        out["largest_damping"] = take("damping", largest)
         out["amplitude_of_largest_damping"] = Quantity(curve.amplitude[largest], "m")
-    out["free_frequency"] = Quantity(frequencies.free, "Hz", frequencies.free_error or None)
     no_frequency = "" if frequencies.stuck is not None else "a rigid contact leaves no motion"
-    out["stuck_frequency"] = Quantity(
-        frequencies.stuck, "Hz", frequencies.stuck_error, reason=no_frequency
-    )
-    optional = {
+    out |= {
+        "free_frequency": Quantity(frequencies.free, "Hz", frequencies.free_error or None),
+        "stuck_frequency": Quantity(
+            frequencies.stuck, "Hz", frequencies.stuck_error, reason=no_frequency
+        ),
         "exponent_micro": Quantity(backbone.exponents.micro),
         "exponent_gross": Quantity(backbone.exponents.gross),
         "flutter_amplitude": Quantity(backbone.flutter, "m"),
     }
-    return out | {name: one for name, one in optional.items() if one.value is not None}
-
-
-def _take_point(curve: Curve, name: str, k: int) -> Quantity:
-    """Return frequency or damping ratio of point k of a curve."""
-    return Quantity(getattr(curve, name)[k], TEXTS[name][0], getattr(curve, f"{name}_error")[k])
+    return {name: one for name, one in out.items() if one.value is not None or one.reason}
 
 
 def _make_verdict(backbone: Backbone, measures: dict[str, Quantity]) -> tuple[str, ...]:
     """Return the ends of the recommended curve, natural frequencies, largest damping, and which curve to use."""
 
     def show(name: str) -> str:
-        """Return a quantity with its error, or with five digits."""
-        quantity = measures[name]
-        if quantity.error and "±" in (text := quantities.format_quantity(name, quantity)):
-            return text
-        return format_quantity(quantity.value, quantity.unit, 5)
+        """Return a quantity as text."""
+        return quantities.format_quantity(name, measures[name])
 
-    curve = find_curve(backbone)
+    band = backbone.answer.band
+    curve = band and backbone.curves[band.method]
     free = f"without the contact {show('free_frequency')}"
     stuck = ""
     if backbone.frequencies.stuck is not None:
@@ -180,45 +159,45 @@ def _make_data(backbone: Backbone) -> dict[str, Variable]:
     The band has variables of its own and, for the charts, is the interval of the recommended curve.
     """
     records = [
-        (method.replace("-", "_"), backbone.curves[method], COLUMNS, f", by {method}")
+        (method.replace("-", "_"), backbone.curves[method], COLUMNS)
         for method in PREFERRED_METHODS
         if method in backbone.curves
     ]
     band = backbone.answer.band
     if band is not None:
-        records.insert(1, (records[0][0], band, BAND_COLUMNS[1:], ""))
-        records.append(("band", band, BAND_COLUMNS, ""))
+        records.insert(1, (records[0][0], band, BAND_COLUMNS[1:]))
+        records.append(("band", band, BAND_COLUMNS))
     data = {}
-    for prefix, record, names, end in records:
-        for name in names:
-            unit, text = TEXTS[name]
-            values = np.asarray(getattr(record, name), float)
-            data[f"{prefix}_{name}"] = Variable((f"{prefix}_amplitude",), values, unit, text + end)
+    for prefix, record, names in records:
+        columns = {
+            f"{prefix}_{name}": (getattr(record, name), UNITS[name.partition("_")[0]])
+            for name in names
+        }
+        data |= make_columns(f"{prefix}_amplitude", columns)
     return data
 
 
-def _make_details(backbone: Backbone, measures: dict) -> dict:
+def _make_details(backbone: Backbone) -> dict:
     """Return the content of backbone.json in SI units."""
     frequencies = backbone.frequencies
     band = backbone.answer.band
+
+    def list_columns(record: Curve | Band, names: tuple[str, ...]) -> dict[str, list[float]]:
+        """Return some columns of a curve or of the band as lists."""
+        return {name: getattr(record, name).tolist() for name in names}
+
     return {
         "mode": backbone.mode,
         "free_frequency": frequencies.free,
         "free_frequency_error": frequencies.free_error,
         "stuck_frequency": frequencies.stuck,
         "stuck_frequency_error": frequencies.stuck_error,
-        "curves": {
-            method: {name: getattr(curve, name).tolist() for name in COLUMNS}
-            for method, curve in backbone.curves.items()
-        },
+        "curves": {name: list_columns(one, COLUMNS) for name, one in backbone.curves.items()},
         "missing": backbone.missing,
-        "exponent": {
-            name: getattr(backbone.exponents, name) for name in ("micro", "gross", "micro_theory")
-        },
+        "exponent": backbone.exponents._asdict(),
         "flutter_amplitude": backbone.flutter,
         "notes": list(backbone.notes),
         "method": band and band.method,
-        "band": band and {name: getattr(band, name).tolist() for name in BAND_COLUMNS},
+        "band": band and list_columns(band, BAND_COLUMNS),
         "advice": backbone.answer.advice,
-        "measures": {name: quantity.as_json() for name, quantity in measures.items()},
     }

@@ -1,6 +1,5 @@
 """Conversion of a results folder: another format, a picture, a film or a window."""
 
-import json
 import os
 import sys
 from pathlib import Path
@@ -8,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ..core import Missing, PatchfemError
-from . import lab, pieces
+from . import lab, pieces, store
 from .fields import grids
 from .fields.vtkhdf import NAME, Frames, find_fields, read_frames
 from .lab import write
@@ -122,7 +121,9 @@ def view_results(
         )
     frames = read_frames(find_fields(folder))
     number = grids.find_frame(frames, frame)
-    title = _find_title(folder)
+    has_summary = (folder / store.SUMMARY).is_file()
+    title = store.read_summary(folder)["title"] if has_summary else ""
+    title = title or folder.resolve().name
     if out is None:
         _open_window(frames, number, title)
         return ""
@@ -130,15 +131,6 @@ def view_results(
     if is_film:
         return pieces.write_film(frames, title, magnify, out)
     return pieces.write_picture(frames, number, title, magnify, out)
-
-
-def _find_title(folder: Path) -> str:
-    """Return the title of the scene of a results folder, or the name of the folder."""
-    try:
-        title = json.loads((folder / "summary.json").read_text("utf-8"))["title"]
-    except (OSError, ValueError, KeyError):
-        title = ""
-    return title or folder.resolve().name
 
 
 def _open_window(frames: Frames, number: int, title: str) -> None:

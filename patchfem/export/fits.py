@@ -4,7 +4,7 @@ A fit to a loop, to frequency and damping against amplitude, to rows of a rig or
 """
 
 from collections.abc import Sequence
-from itertools import combinations
+from dataclasses import asdict
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,10 +13,8 @@ import numpy as np
 from .. import __version__
 from ..campaigns.fits.curve import EXTENT, FittedCurve
 from ..campaigns.fits.loop import FittedLoop
-from ..campaigns.fits.problem import FittedKeys
 from ..campaigns.fits.request import FitOptions, Listener, fit_measurement
 from ..campaigns.fits.wear import COEFFICIENT_KEY, FittedCoefficient
-from ..campaigns.rows.condition_models import GAIN_KEYS
 from ..campaigns.rows.fit import SAME_SCORE, FittedRows
 from ..disk.atomic_write import write_text
 from ..formatting import format_number
@@ -25,7 +23,7 @@ from ..model.model import build, write_resolved
 from ..scene.ranges import Range
 from ..scene.scene import Scene, add_sets, move_scene
 from . import page, store
-from .answer import Answer, Quantity, Remarks, Variable
+from .answer import Answer, Quantity, Remarks, Variable, encode, make_columns
 from .folder import STARTS, Folder
 from .quantities import format_quantity
 from .runs import make_origin
@@ -35,6 +33,13 @@ MAX_NAMED_VALUES = 2  # largest number of fitted values in the headline
 MIN_NAMED_CORRELATION = 0.95  # smallest correlation of two values that the verdict states
 LOOP_UNITS = {"force": "N", "friction_ratio": "1"}
 KINDS = {"acceleration": "m s-2", "displacement": "m"}  # readings of a row, and their units
+# settings and gains of the sensors of a rig that a scene may leave out
+INSTRUMENT = {
+    "reading": "peak",
+    "reading_cutoff": None,
+    "acceleration_gain": 1.0,
+    "displacement_gain": 1.0,
+}
 WEAR_UNIT = "m2 N-1"
 AnyFit = FittedLoop | FittedCurve | FittedRows | FittedCoefficient
 
@@ -46,7 +51,6 @@ def fit_into(
     options: FitOptions,
     target: Path,
     listener: Listener,
-    command: str = "",
     with_page: bool = True,
 ) -> Answer:
     """Fit keys of a scene to a measurement, and write the results folder.
@@ -57,8 +61,6 @@ def fit_into(
         As for `campaigns.fits.request.fit_measurement`.
     target : Path
         Results folder, which is claimed before the work.
-    command : str
-        Command line that repeats it; by default that without options.
     with_page : bool
 
     Returns
@@ -74,9 +76,9 @@ def fit_into(
         if folder.dropped and listener.say is not None:
             listener.say(folder.dropped)
         fit = fit_measurement(scene, to, free, options, listener, folder.path / STARTS)
-        answer = make_answer(fit, scene, command)
+        answer = make_answer(fit, scene)
         store.write(answer, folder.path)
-        text = format_fitted_scene(fit, scene, answer.details["measured"], folder.target)
+        text = format_fitted_scene(fit, scene, answer.verdict, folder.target)
         write_text(folder.path / FITTED_SCENE, text)
         if with_page:
             page.write_page(folder.path)
@@ -86,20 +88,17 @@ def fit_into(
 class Parts(NamedTuple):
     """What differs between the kinds of fits.
 
-    measured: name of the file; quantity: of the measurement; residual: sentence on the distance of fit and measurement;
-    details: further keys of fit.json; scores: quantities of the residual; data; notes.
+    residual: sentence on the distance of fit and measurement; details: further keys of fit.json, among them `measured` (name
+    of the file) and `quantity` (what was measured); scores: quantities of the residual; data.
     """
 
-    measured: str
-    quantity: str
     residual: str
     details: dict
     scores: dict[str, Quantity]
     data: dict[str, Variable]
-    notes: Sequence[str] = ()
 
 
-def make_answer(fit: AnyFit, scene: Scene, command: str = "") -> Answer:
+def make_answer(fit: AnyFit, scene: Scene) -> Answer:
     """Return the answer of a fit.
 
     Parameters
@@ -107,42 +106,42 @@ def make_answer(fit: AnyFit, scene: Scene, command: str = "") -> Answer:
     fit : FittedLoop, FittedCurve, FittedRows or FittedCoefficient
     scene : Scene
         Scene before the fit.
-    command : str
-        Command line that repeats it; by default that without options.
     """
     parts = _DESCRIBE[type(fit)](fit)
-    values = describe_values(fit)
-    offsets = parts.details.get("offsets", {})
-    fitted = values | {f"offset_{name}": entry for name, entry in offsets.items()}
-    measures = {name: _make_quantity(entry) for name, entry in fitted.items()} | parts.scores
-    pairs = _collect_pairs(parts.details.get("correlation", []), list(fitted))
-    origin = make_origin(build(scene).source, "fit")
-    is_search = not isinstance(fit, FittedCoefficient)
+    search = {} if isinstance(fit, FittedCoefficient) else _describe_search(fit)
     details = {
         "patchfem": __version__,
         "title": scene.title,
-        "measured": parts.measured,
-        "quantity": parts.quantity,
-        "outcome": str(fit.keys.outcome) if is_search else "done",
-        "values": values,
-    } | parts.details
-    headline = _make_headline(details, measures)
+        "outcome": "done",
+        "values": _describe_values(fit),
+    }
+    details |= search | parts.details
+
+    fitted = dict(details["values"])
+    fitted |= {f"offset_{name}": entry for name, entry in details.get("offsets", {}).items()}
+    measures = {}
+    for name, entry in fitted.items():
+        reason = "" if entry["interval"] else "the measurement does not determine an interval"
+        ends = {"low": entry["low"], "high": entry["high"]}
+        measures[name] = Quantity(entry["value"], entry["unit"], **ends, reason=reason)
+    pairs = _collect_pairs(details.get("correlation", []), list(fitted))
+    verdict = (_make_headline(details, measures), parts.residual)
+    if pairs and abs(pairs["correlation"].values[0]) >= MIN_NAMED_CORRELATION:
+        names = pairs["pair"].values[0].replace(", ", " and ")
+        verdict += (
+            f"{names} are correlated by {pairs['correlation'].values[0]:.2f}: the measurement determines a combination of "
+            "them better than each one.",
+        )
     return Answer(
         kind="fit",
         title=scene.title,
-        verdict=(headline, parts.residual, *_describe_pairs(pairs)),
-        quantities=measures,
+        verdict=verdict,
+        quantities=measures | parts.scores,
         data=parts.data | pairs,
-        remarks=Remarks(tuple(details["warnings"]), tuple(parts.notes)),
+        remarks=Remarks(tuple(details["warnings"]), tuple(details.get("notes", ()))),
         details=details,
-        origin=origin | {"driven": "", "command": command or origin["command"]},
+        origin=make_origin(build(scene).source, "fit"),
     )
-
-
-def _make_quantity(entry: dict) -> Quantity:
-    """Return a fitted value of fit.json as a quantity."""
-    reason = "" if entry["interval"] else "the measurement does not determine an interval"
-    return Quantity(entry["value"], entry["unit"], None, entry["low"], entry["high"], reason=reason)
 
 
 def _make_headline(details: dict, measures: dict[str, Quantity]) -> str:
@@ -162,68 +161,45 @@ def _make_headline(details: dict, measures: dict[str, Quantity]) -> str:
 
 def _collect_pairs(correlation: list[list[float | None]], names: list[str]) -> dict[str, Variable]:
     """Return the correlation of each pair of fitted values, the strongest first; {} for a single value."""
-    pairs = [
-        (f"{names[i]}, {names[k]}", np.nan if correlation[i][k] is None else correlation[i][k])
-        for i, k in combinations(range(len(correlation)), 2)
-    ]
-    if not pairs:
+    if len(names) < 2:
         return {}
-    pairs.sort(key=lambda pair: -abs(np.nan_to_num(pair[1])))
-    texts, values = zip(*pairs, strict=True)
-    return _make_columns(
-        "pair",
-        {
-            "pair": (texts, "", "names of two fitted values"),
-            "correlation": (values, "1", "correlation of their errors"),
-        },
-    )
-
-
-def _describe_pairs(pairs: dict[str, Variable]) -> list[str]:
-    """Return a sentence on the most correlated pair of values, if only a combination of them is well determined."""
-    if not pairs or not abs(pairs["correlation"].values[0]) >= MIN_NAMED_CORRELATION:
-        return []
-    names = pairs["pair"].values[0].replace(", ", " and ")
-    return [
-        f"{names} are correlated by {pairs['correlation'].values[0]:.2f}: the measurement determines a combination of them "
-        "better than each one."
-    ]
-
-
-def _make_columns(dimension: str, columns: dict[str, tuple]) -> dict[str, Variable]:
-    """Return variables of a dimension from name -> (values, unit, description)."""
-    return {
-        name: Variable((dimension,), np.asarray(values), unit, text)
-        for name, (values, unit, text) in columns.items()
+    first, second = np.triu_indices(len(names), 1)
+    values = np.array(correlation, float)[first, second]
+    order = np.argsort(-np.abs(np.nan_to_num(values)), kind="stable")
+    texts = [f"{names[first[k]]}, {names[second[k]]}" for k in order]
+    columns = {
+        "pair": (texts, ""),
+        "correlation": (values[order], "1"),
     }
+    return make_columns("pair", columns)
 
 
-def _encode(texts: list[str]) -> Variable:
-    """Return the texts of rows as codes with meanings."""
-    meanings, codes = np.unique(texts, return_inverse=True)
-    return Variable(("row",), codes.astype(np.int8), "", meanings=tuple(meanings.tolist()))
+def _known(values) -> list:
+    """Return numbers as nested lists, or a single number, with None for those that are not finite."""
+    return np.where(np.isfinite(values), values, None).tolist()
 
 
-def describe_values(fit: AnyFit) -> dict[str, dict]:
+def _describe_values(fit: AnyFit) -> dict[str, dict]:
     """Return all fitted values by scene key, as written in fit.json."""
     if isinstance(fit, FittedCoefficient):
         ends = {"low": fit.low, "high": fit.high, "interval": [fit.low, fit.high]}
         bounds = [fit.bounds.low, fit.bounds.high]
         return {COEFFICIENT_KEY: {"value": fit.value, "unit": WEAR_UNIT, **ends, "bounds": bounds}}
     keys = fit.keys
-    return {bound.key: describe_value(bound, keys.fit, k) for k, bound in enumerate(keys.ranges)}
+    return {bound.key: _describe_value(bound, keys.fit, k) for k, bound in enumerate(keys.ranges)}
 
 
-def describe_value(bound: Range, fit: Fit, k: int) -> dict:
+def _describe_value(bound: Range, fit: Fit, k: int) -> dict:
     """Return fitted value k with its confidence interval and range, as written in fit.json."""
     ends = fit.intervals.ends[k].tolist()
-    low, high = ends if np.isfinite(ends).all() else (None, None)
+    interval = ends if np.isfinite(ends).all() else None
+    low, high = interval or (None, None)
     return {
         "value": float(fit.values[k]),
         "unit": bound.unit,
         "low": low,
         "high": high,
-        "interval": None if low is None else ends,
+        "interval": interval,
         "method": fit.intervals.methods[k],
         "bounds": [bound.low, bound.high],
         "at_bound": fit.at_bound[k] or None,
@@ -231,19 +207,22 @@ def describe_value(bound: Range, fit: Fit, k: int) -> dict:
     }
 
 
-def _describe_search(keys: FittedKeys, bounds: list[Range]) -> dict:
-    """Return what the data do not determine, correlation and counts of a search, as written in fit.json."""
-    fit = keys.fit
-    correlation = fit.intervals.correlation
+def _describe_search(fit: FittedLoop | FittedCurve | FittedRows) -> dict:
+    """Return outcome, warnings and counts of a search, and what the data do not determine, as written in fit.json."""
+    keys = fit.keys
+    intervals = keys.fit.intervals
+    names = [bound.key for bound in keys.ranges]
+    names += [offset.range.key for offset in getattr(fit, "offsets", ())]
     return {
+        "outcome": str(keys.outcome),
         "unknown": [
-            {bound.key: part for bound, part in zip(bounds, row, strict=True) if part}
-            for row in fit.intervals.unknown.tolist()
+            {name: part for name, part in zip(names, row, strict=True) if part}
+            for row in intervals.unknown.tolist()
         ],
-        "correlation": np.where(np.isfinite(correlation), correlation, None).tolist(),
-        "evaluations": fit.counts.evaluations,
-        "failures": fit.counts.failures,
-        "descents_agreed": fit.agreed,
+        "correlation": _known(intervals.correlation),
+        "evaluations": keys.fit.counts.evaluations,
+        "failures": keys.fit.counts.failures,
+        "descents_agreed": keys.fit.agreed,
         "warnings": keys.warnings,
         "seconds": round(keys.seconds, 6),
     }
@@ -251,8 +230,8 @@ def _describe_search(keys: FittedKeys, bounds: list[Range]) -> dict:
 
 def describe_loop_fit(fit: FittedLoop) -> Parts:
     """Return the parts of a fit to a friction loop."""
-    keys = fit.keys
     loop = fit.loop
+    fitted = fit.keys.fit
     unit = LOOP_UNITS[loop.quantity]
     peak = float(np.abs(loop.reading).max())
     n_rows = int((~fit.held_out).sum())
@@ -265,54 +244,48 @@ def describe_loop_fit(fit: FittedLoop) -> Parts:
         f"The residual of {n_rows} rows is {text} rms, {100 * fit.rms / peak:.2g} % of the peak."
     )
     if loop.quantity == "force":
-        measured, fitted = np.trapezoid([loop.reading, fit.model], loop.displacement)
-        scores["work_measured"] = Quantity(measured, "J")
-        scores["work_fitted"] = Quantity(fitted, "J")
-        share = format_number(100 * fitted / measured, 4)
+        works = np.trapezoid([loop.reading, fit.model], loop.displacement)
+        scores["work_measured"], scores["work_fitted"] = (Quantity(work, "J") for work in works)
+        share = format_number(100 * works[1] / works[0], 4)
         residual += f" The fitted loop dissipates {share} % of the measured work."
 
     # rows that are held out are drawn and scored apart
-    name = loop.quantity.replace("_", " ")
-    columns = {} if loop.time is None else {"time": (loop.time, "s", "time")}
-    columns |= {
-        "slide": (loop.displacement, "m", "measured slide"),
-        loop.quantity: (loop.reading, unit, f"measured {name}"),
-        "fitted": (fit.model, unit, f"fitted {name}"),
-        "residual": (fit.model - loop.reading, unit, "fitted minus measured value"),
-        "row": (np.arange(loop.reading.size), "1", "row of the record"),
-        "held": (fit.held_out.astype(np.int8), "", "1 if the row is held out"),
+    columns = {
+        "slide": (loop.displacement, "m"),
+        loop.quantity: (loop.reading, unit),
+        "fitted": (fit.model, unit),
+        "residual": (fit.model - loop.reading, unit),
+        "row": (np.arange(loop.reading.size), "1"),
+        "held": (fit.held_out.astype(np.int8), ""),
     }
+    if loop.time is not None:
+        columns["time"] = (loop.time, "s")
     held = None
     if fit.held_out_rms is not None:
         held = {"rows": int(fit.held_out.sum()), "rms": fit.held_out_rms}
         scores["held_out_rms"] = Quantity(fit.held_out_rms, unit)
         shown = np.where(fit.held_out, loop.reading, np.nan)
-        columns["held_out"] = (shown, unit, f"measured {name} that is held out")
-
-    offsets = {
-        offset.name: describe_value(offset.range, keys.fit, k)
-        for k, offset in enumerate(fit.offsets, len(keys.ranges))
-    }
-    effective_rows = keys.fit.intervals.rows
-    details = {
-        "offsets": offsets,
-        "unit": unit,
-        "rows": n_rows,
-        "effective_rows": None if np.isnan(effective_rows) else effective_rows,
-        "rms": fit.rms,
-        "held": held,
-        "peak": peak,
-        "step_error": fit.step_error,
-        "steps_between_rows": fit.steps_per_row,
-    }
-    bounds = [*keys.ranges, *(offset.range for offset in fit.offsets)]
+        columns["held_out"] = (shown, unit)
     return Parts(
-        measured=loop.path.name,
-        quantity=loop.quantity,
         residual=residual,
-        details=details | _describe_search(keys, bounds),
+        details={
+            "measured": loop.path.name,
+            "quantity": loop.quantity,
+            "offsets": {
+                offset.name: _describe_value(offset.range, fitted, k)
+                for k, offset in enumerate(fit.offsets, len(fit.keys.ranges))
+            },
+            "unit": unit,
+            "rows": n_rows,
+            "effective_rows": _known(fitted.intervals.rows),
+            "rms": fit.rms,
+            "held": held,
+            "peak": peak,
+            "step_error": fit.step_error,
+            "steps_between_rows": fit.steps_per_row,
+        },
         scores=scores,
-        data=_make_columns("row", columns),
+        data=make_columns("row", columns),
     )
 
 
@@ -321,33 +294,36 @@ def describe_curve_fit(fit: FittedCurve) -> Parts:
     measured = fit.measured
     n_rows = int(measured.amplitude.size)
     errors = 2 * measured.error  # half the width of a 95 % interval
-    columns = {"amplitude": (measured.amplitude, "m", "amplitude at the output")}
-    curve = {"curve_amplitude": (fit.beyond[0], "m", "amplitude at the output")}
+    columns = {"amplitude": (measured.amplitude, "m")}
+    curve = {"curve_amplitude": (fit.beyond[0], "m")}
     rms = {}
     for k, (name, unit) in enumerate((("frequency", "Hz"), ("damping", "1"))):
         value = measured.value[k]
         distance = fit.model[k] - value
         rms[name] = float(np.sqrt(np.mean((distance / value) ** 2)))
         columns |= {
-            name: (value, unit, f"measured {name}"),
-            f"{name}_error": (errors[k], unit, f"half the 95 % interval of the {name}"),
-            f"{name}_fitted": (fit.model[k], unit, f"fitted {name}"),
-            f"{name}_residual": (distance / errors[k], "1", f"deviation of the {name} / its error"),
+            name: (value, unit),
+            f"{name}_error": (errors[k], unit),
+            f"{name}_fitted": (fit.model[k], unit),
+            f"{name}_residual": (distance / errors[k], "1"),
         }
-        curve[f"curve_{name}"] = (fit.beyond[k + 1], unit, f"fitted {name}")
-    details = {"method": fit.method, "rows": n_rows, "rms": rms, "notes": list(fit.notes)}
-    search = _describe_search(fit.keys, fit.keys.ranges) | {"evaluations": fit.n_computed}
+        curve[f"curve_{name}"] = (fit.beyond[k + 1], unit)
     assumed = " The errors of the measured values are assumed." if measured.assumed else ""
     percent = {name: f"{100 * value:.2g} %" for name, value in rms.items()}
     return Parts(
-        measured=fit.path.name,
-        quantity="decay",
         residual=f"At {n_rows} amplitudes the residual is {percent['frequency']} rms of the frequency and "
         f"{percent['damping']} of the damping ratio, by method {fit.method}.{assumed}",
-        details=details | search,
+        details={
+            "measured": fit.path.name,
+            "quantity": "decay",
+            "method": fit.method,
+            "rows": n_rows,
+            "rms": rms,
+            "notes": list(fit.notes),
+            "evaluations": fit.n_computed,
+        },
         scores={f"{name}_residual_rms": Quantity(value) for name, value in rms.items()},
-        data=_make_columns("row", columns) | _make_columns("curve_amplitude", curve),
-        notes=fit.notes,
+        data=make_columns("row", columns) | make_columns("curve_amplitude", curve),
     )
 
 
@@ -361,109 +337,85 @@ def describe_rows_fit(fit: FittedRows) -> Parts:
     totals = {name: score["all"] for name, score in scores.items() if score is not None}
     texts = [f"{name.replace('_', ' ')} {value:.3f}" for name, value in totals.items() if value]
     n_best = int((search.rms <= np.nanmin(search.rms) * SAME_SCORE).sum())
-    rows = _list_rows(fit)
-    details = {
-        "scores": scores,
-        "scores_stable": fit.compute_scores(only_stable=True),
-        "unstable": fit.settings.unstable,
-        "reading": _list_instrument_settings(fit),
-        "readings": int((~fit.held_out).sum()),
-        "held": int(fit.held_out.sum()),
-        "rms": fit.keys.fit.rms,
-        "seed": fit.settings.seed,
-        "starts": _list_starts(fit),
-        "rows": rows,
-        "motions": fit.n_motions,
+    names = [bound.key for bound in fit.keys.ranges]
+    starts = []
+    for first, last, rms in zip(search.starts, search.ends, _known(search.rms), strict=True):
+        begin, end = (dict(zip(names, values.tolist(), strict=True)) for values in (first, last))
+        starts.append({"from": begin, "to": None if rms is None else end, "training": rms})
+    instrument = {
+        name: getattr(fit.models.instrument, name, default) for name, default in INSTRUMENT.items()
     }
+    for name, value in zip(names, fit.keys.fit.values.tolist(), strict=True):
+        table, _, key = name.partition(".")
+        if table == "measured":
+            instrument[key] = value
+    rows, data = _collect_rows(fit)
     return Parts(
-        measured=fit.cells.path.name,
-        quantity="rows",
         residual=f"The rms of ln(computed/measured) is {', '.join(texts)}; {n_best} of {search.rms.size} starts led to "
         "within 1 % of the best.",
-        details=details | _describe_search(fit.keys, fit.keys.ranges),
+        details={
+            "measured": fit.cells.path.name,
+            "quantity": "rows",
+            "scores": scores,
+            "scores_stable": fit.compute_scores(only_stable=True),
+            "unstable": fit.settings.unstable,
+            "reading": instrument,
+            "readings": int((~fit.held_out).sum()),
+            "held": int(fit.held_out.sum()),
+            "rms": fit.keys.fit.rms,
+            "seed": fit.settings.seed,
+            "starts": starts,
+            "rows": rows,
+            "motions": fit.n_motions,
+        },
         scores={f"score_{name}": Quantity(value) for name, value in totals.items()},
-        data=_collect_rows(rows),
+        data=data,
     )
 
 
-def _list_instrument_settings(fit: FittedRows) -> dict[str, float | str | None]:
-    """Return the settings and gains of the sensors that measure the motion of a rig."""
-    instrument = fit.models.instrument
-    values = {key: entry["value"] for key, entry in describe_values(fit).items()}
-    defaults = {"reading": "peak", "reading_cutoff": None}
-    defaults |= {key.partition(".")[2]: 1.0 for key in GAIN_KEYS}
-    return {
-        name: values.get(f"measured.{name}", getattr(instrument, name, default))
-        for name, default in defaults.items()
-    }
-
-
-def _list_starts(fit: FittedRows) -> list[dict]:
-    """Return for each search its initial values, its final values and its score on the training data."""
-    names = [bound.key for bound in fit.keys.ranges]
-    starts = []
-    for first, last, rms in zip(fit.search.starts, fit.search.ends, fit.search.rms, strict=True):
-        is_finished = bool(np.isfinite(rms))
-        ends = dict(zip(names, last.tolist(), strict=True)) if is_finished else None
-        begin = dict(zip(names, first.tolist(), strict=True))
-        starts.append({"from": begin, "to": ends, "training": float(rms) if is_finished else None})
-    return starts
-
-
-def _list_rows(fit: FittedRows) -> list[dict]:
-    """Return measured and computed readings of each row in SI units."""
+def _collect_rows(fit: FittedRows) -> tuple[list[dict], dict[str, Variable]]:
+    """Return measured and computed readings of each row: as written in fit.json, and as arrays with their ratios."""
     cells = fit.cells
-    places = zip(cells.row.tolist(), cells.is_acceleration.tolist(), strict=True)
-    numbers = {place: number for number, place in enumerate(places)}
-    entries = []
-    for k, row in enumerate(cells.rows):
-        entry = {"frequency": row.frequency, "input": row.input, "flag": row.flag}
-        for part, name in enumerate(KINDS):
-            number = numbers.get((k, name == "acceleration"))
-            computed = None
-            if number is not None:
-                computed = float(fit.computed[part, cells.condition[number]])
-            entry[name] = {
-                "measured": getattr(row, name),
-                "computed": computed if computed is None or np.isfinite(computed) else None,
-                "held": None if number is None else bool(fit.held_out[number]),
-            }
-        entries.append(entry)
-    return entries
-
-
-def _collect_rows(rows: list[dict]) -> dict[str, Variable]:
-    """Return the rows of a fit as arrays, with the ratios of computed to measured readings."""
-    held = np.array([any(row[name]["held"] for name in KINDS) for row in rows])
+    count = len(cells.rows)
+    is_held = np.zeros(count, bool)
+    is_held[cells.row[fit.held_out]] = True
+    entries = [asdict(row) for row in cells.rows]
     uses = [
-        ("held out" if is_held else "fitted") + ", unstable in the test" * ("U" in row["flag"])
-        for is_held, row in zip(held, rows, strict=True)
+        ("held out" if held else "fitted") + ", unstable in the test" * ("U" in row["flag"])
+        for held, row in zip(is_held, entries, strict=True)
     ]
     data = {
-        "use": _encode(uses),
-        "drive": _encode([f"{row['frequency']:.6g} Hz" for row in rows]),
+        "use": encode("row", uses),
+        "drive": encode("row", [f"{row['frequency']:.6g} Hz" for row in entries]),
     }
     columns = {
-        "frequency": ([row["frequency"] for row in rows], "Hz", "frequency of the drive"),
-        "input": ([row["input"] for row in rows], "m s-2", "acceleration of the base"),
-        "flag": ([row["flag"] for row in rows], "", "flag of the row"),
-        "held": (held.astype(np.int8), "", "1 if a reading of the row is held out"),
+        name: ([row[name] for row in entries], unit)
+        for name, unit in (("frequency", "Hz"), ("input", "m s-2"), ("flag", ""))
     }
-    for name, unit in KINDS.items():
-        measured, computed = (
-            np.array([row[name][part] for row in rows], float) for part in ("measured", "computed")
-        )
+    columns["held"] = (is_held.astype(np.int8), "")
+    for part, (name, unit) in enumerate(KINDS.items()):
+        # a row without a reading has no computed one
+        is_kind = cells.is_acceleration == (name == "acceleration")
+        places = cells.row[is_kind]
+        computed = np.full(count, np.nan)
+        computed[places] = fit.computed[part, cells.condition[is_kind]]
+        held = np.full(count, None)
+        held[places] = fit.held_out[is_kind]
+        measured = np.array([row[name] for row in entries], float)
+        for k, number in enumerate(_known(computed)):
+            reading = entries[k][name]
+            entries[k][name] = {"measured": reading, "computed": number, "held": held[k]}
         ratio = computed / np.where(measured > 0, measured, np.nan)
         columns |= {
-            name: (measured, unit, f"measured {name}"),
-            f"computed_{name}": (computed, unit, f"computed {name}"),
-            f"{name}_ratio": (ratio, "1", f"computed over measured {name}"),
+            name: (measured, unit),
+            f"computed_{name}": (computed, unit),
+            f"{name}_ratio": (ratio, "1"),
         }
         # ends of the line on which both are equal
         known = np.concatenate([measured[measured > 0], computed[computed > 0]])
         ends = [known.min(), known.max()] if known.size else []
-        data |= _make_columns(f"equal_{name}", {f"equal_{name}": (ends, unit, "")})
-    return data | _make_columns("row", columns)
+        data |= make_columns(f"equal_{name}", {f"equal_{name}": (ends, unit)})
+    return entries, data | make_columns("row", columns)
 
 
 def describe_wear_fit(fit: FittedCoefficient) -> Parts:
@@ -473,23 +425,28 @@ def describe_wear_fit(fit: FittedCoefficient) -> Parts:
     name = measured.name.replace("_", " ")
     text = format_quantity(measured.name, Quantity(unit="m", **ends))
     points = {
-        "coefficient": ([fit.value], WEAR_UNIT, "fitted coefficient"),
-        "depth": ([measured.value], "m", f"measured {name}"),
-        "depth_low": ([measured.low], "m", "lower limit of the depth"),
-        "depth_high": ([measured.high], "m", "upper limit of the depth"),
+        "coefficient": ([fit.value], WEAR_UNIT),
+        "depth": ([measured.value], "m"),
+        "depth_low": ([measured.low], "m"),
+        "depth_high": ([measured.high], "m"),
     }
     coefficients, depths = fit.curve[:, fit.curve[0] <= EXTENT * fit.high]
     curve = {
-        "curve_coefficient": (coefficients, WEAR_UNIT, "coefficient"),
-        "curve_depth": (depths, "m", f"computed {name}"),
+        "curve_coefficient": (coefficients, WEAR_UNIT),
+        "curve_depth": (depths, "m"),
     }
     return Parts(
-        measured=Path(measured.source).name,
-        quantity=measured.name,
         residual=f"The interval is that of the measured {name}, {text}.",
-        details={"runs": fit.runs, "model": fit.model, "data": ends, "warnings": []},
+        details={
+            "measured": Path(measured.source).name,
+            "quantity": measured.name,
+            "runs": fit.runs,
+            "model": fit.model,
+            "data": ends,
+            "warnings": [],
+        },
         scores={"fitted_depth": Quantity(fit.model, "m")},
-        data=_make_columns("point", points) | _make_columns("curve_coefficient", curve),
+        data=make_columns("point", points) | make_columns("curve_coefficient", curve),
     )
 
 
@@ -501,27 +458,19 @@ _DESCRIBE = {
 }
 
 
-def format_fitted_scene(fit: AnyFit, scene: Scene, measured: str, folder: Path) -> str:
-    """Return the text of the fitted scene, in SI units with all defaults, with comments that say what was fitted.
+def format_fitted_scene(fit: AnyFit, scene: Scene, verdict: Sequence[str], folder: Path) -> str:
+    """Return the text of the fitted scene, in SI units with all defaults, below comments that say what was fitted.
 
     Parameters
     ----------
     fit : FittedLoop, FittedCurve, FittedRows or FittedCoefficient
     scene : Scene
         Scene before the fit.
-    measured : str
-        Name of the measured file.
+    verdict : sequence of str
+        Sentences of the answer.
     folder : Path
         Folder to which the paths of the fitted scene are relative.
     """
-    comments = []
-    for key, entry in describe_values(fit).items():
-        interval = ", not determined"
-        if entry["interval"]:
-            interval = f", 95 % in [{entry['low']!r}, {entry['high']!r}]"
-        comments.append(
-            f"# {key} fitted to {measured}: {entry['value']!r} {entry['unit']}{interval}"
-        )
     if isinstance(fit, FittedCoefficient):
         fitted = add_sets(scene, [fit.bounds.format_assignment(fit.value)])
     else:
@@ -529,4 +478,4 @@ def format_fitted_scene(fit: AnyFit, scene: Scene, measured: str, folder: Path) 
     # the model is built before the scene moves, because its file names are relative to its folder
     model = build(fitted)
     text = write_resolved(move_scene(fitted, folder / FITTED_SCENE), model)
-    return "\n".join(comments) + "\n\n" + text
+    return "\n".join([*(f"# {sentence}" for sentence in verdict), "", text])

@@ -33,6 +33,7 @@ FILE_TEXTS = {
 WIDE_STYLES = ("relative", "menu", "maps", "film")  # styles of charts that take the whole width
 TALL_STYLES = ("relative", "menu", "maps", "shares", "film", "bars")
 COMPRESSION = 6  # of the figures in a page
+MAX_LISTED_CASES = 25  # largest number of cases of a sweep that the page lists
 
 
 def write_page(folder: Path) -> Path:
@@ -161,6 +162,7 @@ def _describe(answers: dict[str, Answer]) -> dict:
         "verdict": verdict,
         "warnings": _label_all(answers, lambda answer: answer.remarks.warnings),
         "measures": measures,
+        "has_errors": any("±" in text for row in measures for text in row["texts"]),
         "zeros": [name.replace("_", " ") for name in zeros],
     }
     if not is_single:
@@ -236,7 +238,7 @@ def _explain(name: str, answers: dict[str, Answer]) -> str:
 
 def make_tables(answer: Answer) -> list[dict]:
     """Return the tables of an answer that have rows: `title`, `headings` and `rows` of strings."""
-    tables = []
+    tables = _make_case_table(answer) if answer.kind == "sweep" else []
     for table in TABLES.get(answer.kind, ()):
         rows = _find_rows(answer, table.source)
         if not rows:
@@ -250,6 +252,24 @@ def make_tables(answer: Answer) -> list[dict]:
             }
         )
     return tables
+
+
+def _make_case_table(answer: Answer) -> list[dict]:
+    """Return a table of the main measures of each case, for a sweep of few cases over one key; else no table."""
+    dims = {variable.dims for variable in answer.data.values() if variable.dims}
+    key = next(iter(dims))[0] if len(dims) == 1 else ""
+    rows = _find_rows(answer, key) if key in answer.data else []
+    if not 0 < len(rows) <= MAX_LISTED_CASES:
+        return []
+    known = [
+        name
+        for name in quantities.KEY
+        if any(row.get(name, {}).get("value") is not None for row in rows)
+    ]
+    names = [key, *known][: quantities.MAX_TILES]
+    columns = [Column(name, name.replace("_", " ")) for name in names]
+    cells = [[_format_cell(row, column) for column in columns] for row in rows]
+    return [{"title": "Cases", "headings": [column.title for column in columns], "rows": cells}]
 
 
 def _find_rows(answer: Answer, source: str) -> list[dict]:

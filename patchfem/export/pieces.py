@@ -29,18 +29,6 @@ DRAWN_SLIDE_FRACTION = 0.03  # largest slide of the upper piece as drawn, over i
 # Fraction of the stresses that the colours cover; larger ones are peaks in corners.
 COLOURED_FRACTION = 0.998
 MM = 1e3  # mm per m
-# Characters in place of the icons of matplotlib's player, which come from the network.
-ICONS = {
-    "minus": "−",
-    "fast-backward": "|◀",
-    "step-backward": "‹",
-    "play fa-flip-horizontal": "◀",
-    "pause": "||",
-    "play": "▶",
-    "step-forward": "›",
-    "fast-forward": "▶|",
-    "plus": "+",
-}
 
 
 class DrawnPieces(NamedTuple):
@@ -109,12 +97,8 @@ def magnify_pieces(
     slide_factor = min(magnify, 1.0) * _visible_factor(DRAWN_SLIDE_FRACTION * width, slide)
     places = points + magnify * all_motion
     places[:, len(lower.points) :, 0] += slide_factor * slide[:, None]
-    captions = [f"motion × {magnify:g}" for _ in slide]
-    if slide.any():
-        captions = [
-            f"motion × {magnify:g}, slide of {1e6 * moved:.3g} um × {slide_factor:g}"
-            for moved in slide
-        ]
+    slid = ", slide of {:.3g} um × {:g}" if slide.any() else ""
+    captions = [f"motion × {magnify:g}" + slid.format(1e6 * one, slide_factor) for one in slide]
     return DrawnPieces(window, MM * places, cells, is_inside, captions)
 
 
@@ -232,9 +216,10 @@ def write_picture(frames: Frames, number: int, title: str, magnify: float | None
 
 
 def _make_page(player: str, title: str) -> str:
-    """Return the page of a player of matplotlib, with characters for the icons that it would load."""
+    """Return the page of a player of matplotlib, with words for the icons that it would load from the network."""
     player = re.sub(r"<link[^>]*>", "", player)
-    player = re.sub(r'<i class="fa fa-([^"]*)"></i>', lambda icon: ICONS[icon[1]], player)
+    player = re.sub(r'(<button title="([^"]*)"[^>]*>)\s*<i [^>]*></i>', r"\1\2", player)
+    player = player.replace("width: 36px", "padding: 4px")
     return f'<!DOCTYPE html><meta charset="utf-8"><title>{escape(title)}</title>{player}'
 
 

@@ -75,7 +75,8 @@ def make_origin(source, verb: str) -> dict:
         "scene": source.text,
         "resolved": source.resolved,
         "command": make_command(verb, source.path, source.sets),
-        "driven": describe_drive(tomllib.loads(source.resolved)),
+        # other verbs ignore or vary the drive of the scene
+        "driven": describe_drive(tomllib.loads(source.resolved)) if verb == "run" else "",
         "versions": list_versions(),
     }
 

@@ -1,6 +1,7 @@
 """Comparison of several answers of the same kind: what differs in their scenes and in their measures."""
 
 import tomllib
+from textwrap import shorten
 from typing import Any
 
 from ..formatting import format_number
@@ -16,38 +17,32 @@ def differs(quantity: Quantity | None, first: Quantity | None) -> bool:
     """Return whether a quantity differs from that of the first answer by more than both errors."""
     if quantity is None or first is None or None in (quantity.value, first.value):
         return False
-    if quantity.unit != first.unit:
-        return False
-    return abs(quantity.value - first.value) > sum(map(_find_uncertainty, (quantity, first)))
+    limit = _find_uncertainty(quantity) + _find_uncertainty(first)
+    return quantity.unit == first.unit and abs(quantity.value - first.value) > limit
 
 
 def _find_uncertainty(quantity: Quantity) -> float:
-    """Return the half-width of the error or of the interval of a quantity; its floor if both are unknown."""
-    if quantity.error is not None:
-        return max(quantity.error, quantity.floor)
-    if None not in (quantity.low, quantity.high):
-        return (quantity.high - quantity.low) / 2
-    return quantity.floor
-
-
-def format_change(quantity: Quantity, first: Quantity) -> str:
-    """Return the change from the first value in percent, or as a factor if it is large; "" if the first value is 0."""
-    if abs(first.value) <= _find_uncertainty(first):
-        return ""
-    factor = quantity.value / first.value
-    if abs(factor) >= MIN_FACTOR:
-        return f"x {format_number(factor, 2)}"
-    change = (quantity.value - first.value) / abs(first.value)
-    return f"{100 * change:+.{1 if abs(change) > 0.01 else 2}f} %"
+    """Return the half-width of the interval of a quantity, but at least its floor."""
+    if None in (quantity.low, quantity.high):
+        return quantity.floor
+    return max((quantity.high - quantity.low) / 2, quantity.floor)
 
 
 def format_entry(name: str, quantity: Quantity | None, first: Quantity | None) -> str:
-    """Return a quantity as text, with its change from the first answer if it differs by more than both errors."""
+    """Return a quantity as text, with its change from the first answer if it differs by more than both errors.
+
+    The change is in percent, or a factor if it is large; there is none from a value that may be 0.
+    """
     if quantity is None:
         return ""
     text = format_quantity(name, quantity)
-    change = format_change(quantity, first) if differs(quantity, first) else ""
-    return f"{text} ({change})" if change else text
+    if not differs(quantity, first) or abs(first.value) <= _find_uncertainty(first):
+        return text
+    factor = quantity.value / first.value
+    if abs(factor) >= MIN_FACTOR:
+        return f"{text} (x {format_number(factor, 2)})"
+    change = (quantity.value - first.value) / abs(first.value)
+    return f"{text} ({100 * change:+.{1 if abs(change) > 0.01 else 2}f} %)"
 
 
 def compare_measures(answers: dict[str, Answer]) -> list[str]:
@@ -56,20 +51,18 @@ def compare_measures(answers: dict[str, Answer]) -> list[str]:
     first = answers[first_name].quantities
     changed = [
         name
-        for name in first
-        if any(differs(answers[other].quantities.get(name), first[name]) for other in others)
+        for name in dict.fromkeys([*KEY, *first])
+        if any(differs(answers[other].quantities.get(name), first.get(name)) for other in others)
     ]
     if not changed:
         return ["No measure differs by more than its error."]
-    order = {name: number for number, name in enumerate(KEY)}
-    changed.sort(key=lambda name: order.get(name, len(order)))
     sentences = []
     for name in changed[:MAX_SENTENCES]:
-        parts = [f"{format_quantity(name, first[name])} in {first_name}"]
-        for other in others:
-            text = format_entry(name, answers[other].quantities.get(name), first[name])
+        parts = []
+        for label, answer in answers.items():
+            text = format_entry(name, answer.quantities.get(name), first[name])
             if text:
-                parts.append(f"{text} in {other}")
+                parts.append(f"{text} in {label}")
         sentences.append(f"{name[0].upper()}{name[1:].replace('_', ' ')}: {', '.join(parts)}.")
     if len(changed) > MAX_SENTENCES:
         sentences.append(f"{len(changed) - MAX_SENTENCES} more measures differ; see the table.")
@@ -82,9 +75,11 @@ def list_scene_differences(answers: dict[str, Answer]) -> list[dict]:
         name: _flatten(tomllib.loads(answer.origin.get("resolved", "")))
         for name, answer in answers.items()
     }
-    keys = dict.fromkeys(key for scene in scenes.values() for key in scene)
-    rows = [[key, *(_format_value(scene.get(key)) for scene in scenes.values())] for key in keys]
-    rows = [row for row in rows if len(set(row[1:])) > 1]
+    rows = []
+    for key in dict.fromkeys(key for scene in scenes.values() for key in scene):
+        texts = [str(scene.get(key, "-")) for scene in scenes.values()]
+        if len(set(texts)) > 1:
+            rows.append([key, *(shorten(text, MAX_CELL_LENGTH) for text in texts)])
     if not rows:
         return []
     return [{"title": "Where the scenes differ", "headings": ["key", *answers], "rows": rows}]
@@ -102,9 +97,3 @@ def _flatten(table: Any, prefix: str = "") -> dict[str, Any]:
     for name, entry in pairs:
         flat |= _flatten(entry, f"{prefix}.{name}" if prefix else str(name))
     return flat
-
-
-def _format_value(value: Any) -> str:
-    """Return a value of a scene as text, cut if it is long; a dash if there is none."""
-    text = "-" if value is None else str(value)
-    return text if len(text) <= MAX_CELL_LENGTH else f"{text[: MAX_CELL_LENGTH - 3]}..."

@@ -51,10 +51,7 @@ PUBLIC = {
         "has_error_meshes",
         "static_measures_without_errors",
     ),
-    "patch.jenkins_elements": (
-        "elements",
-        "strip_elements",
-    ),
+    "patch.jenkins_elements": ("elements",),
     "patch.mesh_levels": (
         "solve_with_coarser",
         "solve_on_split_mesh",
@@ -79,7 +76,6 @@ PUBLIC = {
     ),
     "results.patch_rows": (
         "TABLE",
-        "minimum_value",
         "find_unknown_measures",
     ),
     "results.result": (

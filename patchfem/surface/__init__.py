@@ -7,28 +7,7 @@ traces (`compare`) or two scans (`scans`). Read `profile` first, then `nodes`.
 
 # Names that other folders use, by module.
 PUBLIC = {
-    "areal": ("level_plane",),
-    "compare.compare": (
-        "AMPLITUDE",
-        "Comparison",
-        "SLOPE",
-    ),
-    "compare.pairs": (
-        "average_pairs",
-        "collect_quantities",
-        "compare_pairs",
-        "find_group",
-        "parse_quantity",
-        "read_pairs",
-    ),
-    "compare.ratios": (
-        "correlate_traces",
-        "divide_sizes",
-        "measure_size",
-        "resample",
-    ),
-    "compare.reference": ("NO_LIMIT",),
-    "compare.verdict": ("judge_files",),
+    "compare.compare": ("Comparison",),
     "files.read": (
         "read_profile",
         "read_surface",
@@ -52,18 +31,10 @@ PUBLIC = {
     "quantity": (
         "LEVEL",
         "Quantity",
-        "make_unknown",
     ),
     "roughness.filter": ("mean_line",),
     "roughness.form": ("parse_form_option",),
-    "roughness.means": (
-        "Means",
-        "average_reports",
-    ),
-    "roughness.parameters": (
-        "Heights",
-        "abbott_curve",
-    ),
+    "roughness.parameters": ("abbott_curve",),
     "roughness.peaks": (
         "Moments",
         "PERSSON",
@@ -81,9 +52,5 @@ PUBLIC = {
     "roughness.spectrum": (
         "BAND",
         "Spectrum",
-    ),
-    "scans.change": (
-        "Change",
-        "refuse_hidden_wear",
     ),
 }

@@ -12,7 +12,6 @@ PUBLIC = {
     "depth": ("wear_rates",),
     "between_runs": (
         "PatchState",
-        "find_plane_below",
         "measure_wear",
     ),
     "jumps": (

@@ -19,7 +19,7 @@ from patchfem.export.fields.blocks import FIELDS
 from patchfem.export.fields.film import stress_frames
 from patchfem.export.fields.vtkhdf import NAME, read_frames
 
-PARTS = ["lower", "upper", "interface", "strips"]
+PARTS = ["lower", "upper", "interface"]
 MAX_ROUNDING = 1e-6  # relative error of a number in the file
 MAX_ESTIMATE_ROUNDING = 1e-2  # that of stress_error, which is an estimate itself
 
@@ -73,10 +73,6 @@ def test_exact_vtk_reads_pieces(tmp_path, capfd):
         np.testing.assert_allclose(
             grids["interface"]["worn_depth"], worn.mean(axis=0), 2 * MAX_ROUNDING
         )
-        np.testing.assert_allclose(
-            grids["strips"]["worn_depth"].reshape(2, 2, 4)[:, 1], worn, 2 * MAX_ROUNDING
-        )
-    assert np.ptp(grids["strips"].points[:, 2]) == pytest.approx(small.pieces.width)
 
 
 def test_exact_load_of_file_is_load_of_run(bench_folder):
@@ -258,7 +254,7 @@ def test_exact_grids_of_result_agree_with_patch_and_file(crowned_run, tmp_path):
     crowned_run.save(tmp_path / "run")
     for number, (time, written) in enumerate(read_with_vtk(tmp_path / "run" / NAME)):
         grids = all_frames[number]
-        assert grids.keys() == written.keys() == PARTS[:3]
+        assert grids.keys() == written.keys() == PARTS
         assert grids["upper"].field_data["TimeValue"][0] == time
         for part in grids.keys():
             units = dict(text.rstrip("]").split(" [") for text in grids[part].field_data["units"])

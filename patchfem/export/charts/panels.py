@@ -148,10 +148,14 @@ def _finish(chart: Chart, panel: Panel, data: dict, second_axis: Axis | None) ->
 def _find_map_rows(
     data: dict[str, Variable], variable: Variable, x_axis: Axis
 ) -> tuple[Axis, np.ndarray]:
-    """Return the vertical axis of a map and its positions: those of a coordinate y in the units of x, or frames."""
+    """Return the vertical axis of a map and its positions: a coordinate y in the units of x, the time, or frames."""
     if variable.dims[0] == "y" and "y" in data:
         label = x_axis.label.replace("x [", "y [")
         return Axis(label, x_axis.scale), data["y"].values * x_axis.scale
+    if "frame_time" in data and len(variable.values) > 1:
+        times = data["frame_time"].values - data["frame_time"].values[0]
+        axis = _make_axis("time in the last cycle", "s", [times], "", "y")
+        return axis, times * axis.scale
     return Axis("frame"), np.arange(len(variable.values))
 
 
@@ -180,6 +184,10 @@ def _select(data: dict[str, Variable], chart: Chart) -> dict[str, Variable]:
         return {}
     if chart.style == "line" and np.ptp(np.asarray(data[x_name].values, float)) == 0:
         return {}  # a single point, or a curve over another variable
+    if chart.style == "map" and "frame_time" in data:
+        # the first frame is the pressed state, and the slip of the second one has no frame before it
+        motion = np.arange(2, data["frame_time"].values.size)
+        data = {name: _take(variable, "frame", motion) for name, variable in data.items()}
     keep = _find_span(data, chart, x_name)
     if keep is None:
         return data

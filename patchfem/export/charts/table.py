@@ -454,10 +454,10 @@ FIT = (
 COST = (
     Chart(
         "Error against time",
-        "cpu_seconds",
+        "seconds",
         ("largest_error",),
         "points",
-        by="outcome",
+        by="result",
         log="xy",
         lines=("allowed_error@allowed_seconds",),
         labels=("CPU time", "error of the worst measure"),
@@ -465,10 +465,10 @@ COST = (
     ),
     Chart(
         "Value against time",
-        "cpu_seconds",
-        ("value",),
+        "seconds",
+        ("main_measure",),
         "points",
-        by="outcome",
+        by="result",
         log="x",
         labels=("CPU time", "*"),
         caption="The least accurate of the key measures in each run, with its numerical error.",
@@ -837,16 +837,15 @@ TABLES["fit"] = (
 TABLES["cost"] = (
     Table(
         "Runs",
-        "point",
+        "run",
         (
-            Column("varied", "varied"),
-            Column("label", "setting"),
+            Column("setting", "setting"),
             Column("nodes", "interface nodes"),
             Column("steps", "steps per cycle"),
-            Column("cpu_seconds", "CPU s", "rounded"),
+            Column("seconds", "CPU s", "rounded"),
             Column("largest_error", "largest error", "rounded"),
             Column("worst_measure", "of"),
-            Column("value", "value"),
+            Column("main_measure", "value"),
             Column("result", "result"),
         ),
     ),

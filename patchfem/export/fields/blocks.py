@@ -6,11 +6,8 @@ import numpy as np
 
 from ...runs.pieces import PieceFields, Pieces
 
-# Parts of a run in the order of their codes in the array `part`; only a patch that wears in strips
-# has strips.
-PARTS = ("lower", "upper", "interface", "strips")
-
-
+# parts of a run in the order of their codes in the array `part`
+PARTS = ("lower", "upper", "interface")
 CELL_TYPES = np.array([0, 1, 3, 5, 9], np.uint8)  # cell type of VTK by number of nodes
 
 
@@ -20,20 +17,18 @@ class Field(NamedTuple):
     - unit: SI unit.
     - shape: shape of one value.
     - codes: meaning of each of its codes, in their order.
-    - bits: bits of the mantissa that are kept; 19 are a relative error below 1e-6.
     """
 
     unit: str
     shape: tuple[int, ...] = ()
     codes: tuple[str, ...] = ()
-    bits: int = 19
 
 
 FIELDS = {
     "displacement": Field("m", (3,)),
     "stress": Field("Pa", (6,)),  # xx, yy, zz, xy, yz, xz; tension is positive
     "von_mises": Field("Pa"),
-    "stress_error": Field("1", bits=6),  # the estimate itself is accurate to about 10 %
+    "stress_error": Field("1"),
     "material": Field("1", codes=("substrate", "coating")),
     "part": Field("1", codes=PARTS),
     "weight": Field("m2"),
@@ -74,27 +69,21 @@ class Block(NamedTuple):
 
 
 def make_blocks(pieces: Pieces) -> dict[str, Block]:
-    """Return both pieces, their interface and its strips as blocks.
+    """Return both pieces and their interface as blocks.
 
     The interface moves with the lower piece. A field of strips has its mean over the width there.
     """
     x = pieces.x
-    strips = {
-        name: values
-        for name, values in pieces.interface.items()
-        if values.ndim == 3 and not FIELDS[name].shape
-    }
-    means = {name: values.mean(axis=1) for name, values in strips.items()}
-    fields = pieces.interface | means | {"weight": pieces.weight[None]}
+    fields = {"weight": pieces.weight[None]}
+    for name, values in pieces.interface.items():
+        has_strips = values.ndim == 3 and not FIELDS[name].shape
+        fields[name] = values.mean(axis=1) if has_strips else values
     segments = np.stack([np.arange(x.size - 1), np.arange(1, x.size)], axis=1)
-    blocks = {
+    return {
         "lower": _piece_block(pieces.lower),
         "upper": _piece_block(pieces.upper),
         "interface": Block(_pad(x[:, None], 3), segments, _store(fields), {}),
     }
-    if strips:
-        blocks["strips"] = _strips_block(x, pieces.width, strips)
-    return blocks
 
 
 def _piece_block(piece: PieceFields) -> Block:
@@ -108,23 +97,6 @@ def _piece_block(piece: PieceFields) -> Block:
     }
     point_data = {"displacement": piece.displacement}
     return Block(_pad(piece.points, 3), cells, _store(point_data), _store(cell_data))
-
-
-def _strips_block(x, width: float, strips: dict) -> Block:
-    """Return strips side by side along z, each with values (f, s, k) that are constant across it."""
-    count = next(iter(strips.values())).shape[1]
-    edges = np.linspace(-width / 2, width / 2, count + 1)
-    z = np.repeat(np.stack([edges[:-1], edges[1:]], axis=1).ravel(), x.size)
-    points = np.column_stack([np.tile(x, 2 * count), 0 * z, z])
-    node = np.arange(z.size).reshape(count, 2, x.size)
-    low, high = node[:, 0], node[:, 1]
-    corners = (low[:, :-1], low[:, 1:], high[:, 1:], high[:, :-1])
-    cells = np.stack([corner.ravel() for corner in corners], axis=1)
-    both_edges = {
-        name: np.repeat(values, 2, axis=1).reshape(len(values), -1)
-        for name, values in strips.items()
-    }
-    return Block(points, cells, _store(both_edges), {})
 
 
 def _pad(values: np.ndarray, count: int) -> np.ndarray:

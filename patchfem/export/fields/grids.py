@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from ...core import Missing, PatchfemError
-from ...disk.atomic_write import explain_mkdir_error, write_text
+from ...disk.atomic_write import explain_mkdir_error, write_rows, write_text
 from ...runs.pieces import compute_pieces
 from .blocks import FIELDS, PARTS, Block, make_blocks
 from .vtkhdf import Frames, write_blocks
@@ -61,20 +61,18 @@ def make_result_grids(result, numbers) -> list:
     """
     pieces = compute_pieces(result)
     blocks = make_blocks(pieces)
+    units = {name: "MPa" if field.unit == "Pa" else field.unit for name, field in FIELDS.items()}
     frames = []
     for number in numbers:
         grids = make_grids(blocks, number, float(pieces.time[number]))
         for part, grid in zip(grids.keys(), grids):
-            units = []
             for data in (grid.point_data, grid.cell_data):
                 for name in data.keys():
-                    unit = FIELDS[name].unit
-                    if unit == "Pa":
-                        unit = "MPa"
+                    if units[name] == "MPa":
                         data[name] = data[name] / 1e6
-                    units.append(f"{name} [{unit}]")
-            grid.field_data["units"] = units
-            grid.set_active_scalars(ACTIVE_FIELDS.get(part))
+            names = [*grid.point_data.keys(), *grid.cell_data.keys()]
+            grid.field_data["units"] = [f"{name} [{units[name]}]" for name in names]
+            grid.set_active_scalars(ACTIVE_FIELDS[part])
         frames.append(grids)
     return frames
 
@@ -93,18 +91,16 @@ def export_frames(frames: Frames, out: Path, number: int) -> None:
         write_blocks(out, frames.blocks, frames.times)
     elif out.suffix == ".pvd":
         _write_pvd(frames, out)
-    elif out.suffix == ".vtu":
-        _write_vtu(frames, out, number)
     else:
-        _write_csv(frames, out, number)
+        write = _write_vtu if out.suffix == ".vtu" else _write_csv
+        write(frames, out, number)
 
 
 def _write_vtu(frames: Frames, out: Path, number: int) -> None:
     """Write a frame as one mesh with the array `part`; fields that a part lacks are NaN or -1 there."""
     grids = make_grids(frames.blocks, number, float(frames.times[number]))
     for code, name in enumerate(PARTS):
-        if name in grids.keys():
-            grids[name].cell_data["part"] = np.full(grids[name].n_cells, code, np.int8)
+        grids[name].cell_data["part"] = np.full(grids[name].n_cells, code, np.int8)
     for kind in ("point_data", "cell_data"):
         samples = {name: values for grid in grids for name, values in getattr(grid, kind).items()}
         for grid in grids:
@@ -168,8 +164,7 @@ def _write_csv(frames: Frames, out: Path, number: int) -> None:
             columns[f"{name} [{unit}]"] = values
         else:
             columns |= {f"{name}_{axis} [{unit}]": values[:, k] for k, axis in enumerate("xy")}
-    rows = zip(*(map(str, values) for values in columns.values()))
-    write_text(out, "\n".join([",".join(columns), *map(",".join, rows), ""]))
+    write_rows(out, [columns, *zip(*columns.values())])
 
 
 def create_folder(folder: Path) -> None:

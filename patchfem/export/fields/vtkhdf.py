@@ -31,7 +31,7 @@ class Frames(NamedTuple):
 
     - path: the file.
     - times (f,): [s].
-    - blocks: `lower`, `upper`, `interface` and, of a patch that wears in strips, `strips`.
+    - blocks: `lower`, `upper` and `interface`.
     """
 
     path: Path
@@ -134,26 +134,13 @@ def _write_field(group, name: str, values: np.ndarray) -> None:
     well.
     """
     field = FIELDS[name]
-    flat = _round_mantissa(values, field.bits).reshape(-1, *values.shape[2:])
+    flat = values.reshape(-1, *values.shape[2:])
     chunks = (values.shape[1], *(1 for _ in values.shape[2:]))
     dataset = _write_array(group, name, flat, chunks)
     dataset.attrs["units"] = field.unit
     if field.codes:
         dataset.attrs["flag_values"] = np.arange(len(field.codes), dtype=np.int8)
         dataset.attrs["flag_meanings"] = " ".join(field.codes)
-
-
-def _round_mantissa(values: np.ndarray, bits: int) -> np.ndarray:
-    """Return single-precision values with some bits of their mantissa, and others as they are.
-
-    The other bits are zeros, which compress well.
-    """
-    if values.dtype != np.float32:
-        return values
-    dropped = np.uint32(23 - bits)
-    half = np.uint32(1 << (22 - bits))
-    rounded = (np.ascontiguousarray(values).view(np.uint32) + half) >> dropped << dropped
-    return np.where(np.isfinite(values), rounded.view(np.float32), values)
 
 
 def find_fields(folder: Path) -> Path:
@@ -196,7 +183,7 @@ def read_frames(path: Path) -> Frames:
         with h5py.File(path, "r") as file:
             root = file["VTKHDF"]
             times = root["Steps/Values"][:]
-            blocks = {part: _read_block(root[part], len(times)) for part in PARTS if part in root}
+            blocks = {part: _read_block(root[part], len(times)) for part in PARTS}
         for part, names in REQUIRED_FIELDS.items():
             present = blocks[part].point_data.keys() | blocks[part].cell_data.keys()
             if not names <= present:

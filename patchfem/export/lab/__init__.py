@@ -6,5 +6,4 @@ laboratory files as tables and modes, `structures` writes matrices and friction 
 Read `write` first.
 """
 
-UNIVERSAL = (".uff", ".unv", ".uf", ".58")
-ENDINGS = (*UNIVERSAL, ".mat", ".csv")
+ENDINGS = (".uff", ".unv", ".uf", ".58", ".mat", ".csv")

@@ -8,7 +8,7 @@ import numpy as np
 
 from ... import formatting
 from ...core import PatchfemError
-from ...disk.atomic_write import write_atomically, write_text
+from ...disk.atomic_write import write_text
 from ...identify import measured_modes
 from ...inputs import laboratory, records
 from ...inputs import universal as universal_files
@@ -17,10 +17,18 @@ from ...scene.keys import quantities
 from ...structure import universal as universal_modes
 from . import universal
 from .universal import Column
-from .write import write_columns
+from .write import format_columns
 
 # columns of an exported file that can be its displacement, in order of preference; 1.x wrote the first one
 EXPORTED_NAMES = {"displacement": ("output_displacement", "relative_displacement", "slide")}
+# form of a file by its ending, and the options that each form uses
+FORMS = {".csv": "table", ".toml": "modes", ".uff": "response", ".unv": "response"}
+USED = {
+    "table": (),
+    "decay": ("decay", "begin"),
+    "modes": ("segment", "window", "band", "decay", "begin"),
+    "response": ("segment", "window"),
+}
 DECAY_UNITS = {"time": "s", "amplitude": "m", "frequency": "Hz", "damping": "1"}
 
 
@@ -73,69 +81,66 @@ def convert_file(
     PatchfemError
         If options do not fit together.
     """
-    ending = out.suffix.lower()
-    if ending not in (".csv", ".toml", ".uff", ".unv"):
+    form = FORMS.get(out.suffix.lower())
+    if form is None:
         raise PatchfemError(
             f"{out}: records are written as .csv, modes as .toml, a frequency response as .uff"
         )
-    is_table = ending == ".csv" and not settings.decay
-    if zero and not is_table:
+    if form == "table" and settings.decay:
+        form = "decay"
+    if zero and form != "table":
         raise PatchfemError(
             "--zero can be used only when importing a table of records (-o table.csv), not with --decay"
         )
-    unused = {
-        ".csv": ("segment", "window", "band") if settings.decay else EstimateOptions._fields,
-        ".toml": (),
-    }
-    unused = unused.get(ending, ("band", "decay", "begin"))
-    if any(getattr(settings, name) for name in unused):
-        options = ", ".join(f"--{name}" for name in unused)
+    given = [name for name, value in settings._asdict().items() if value]
+    unused = [f"--{name}" for name in given if name not in USED[form]]
+    if unused:
         raise PatchfemError(
-            f"{out}: {options} can be used only for modes (-o modes.toml); --segment and --window also for responses "
-            "(-o response.uff)"
+            f"{out}: {', '.join(unused)} can be used only for modes (-o modes.toml); --segment and --window also for "
+            "responses (-o response.uff), --begin with --decay also for a table of the decay"
         )
-    if is_table:
+    if form == "table":
         return _write_table(file, out, requests, zero)
-    convert = {".csv": _write_decay, ".toml": _write_modes}.get(ending, _write_response)
-    return convert(file, out, requests, settings)
+    if form == "modes" and (shapes := _read_shapes(file, requests, settings)):
+        return _write_modes(shapes, out, file.name, [])
+    values, notes = _read_records(file, requests)
+    if settings.window not in ("", "hann", "none"):
+        raise PatchfemError(f"--window {settings.window}: hann or none")
+    segment = _parse_quantity(settings.segment, "time", "--segment")
+    averaging = (segment, settings.window or None)
+    if form == "response":
+        return _write_response(values, out, averaging, notes)
+    begin = _parse_quantity(settings.begin, "time", "--begin")
+    if form == "decay":
+        return _write_decay(values, out, begin, notes)
+    if settings.decay:
+        modes = measured_modes.identify_decay_modes(values, begin)
+    else:
+        band = _parse_band(settings.band)
+        modes = measured_modes.identify_driven_modes(values, *averaging, band)
+    return _write_modes(modes, out, file.name, notes)
 
 
-def _write_table(file: Path, out: Path, requests, zero: bool) -> dict:
+def _write_table(file: Path, out: Path, requests: Iterable[str], zero: bool) -> dict:
     """Write measured records as a table."""
     found = laboratory.read_records(file, records.parse_requests(requests))
     values = records.shift_to_zero(found.values) if zero else found.values
     units = {name: SI_UNITS[name] for name in values}
-    _write_csv(out, [Column(name, units[name], column) for name, column in values.items()])
-
-    starts = [
-        f"{name} starts at {values[name][0]:g} {units[name]}"
-        for name in ("time", "displacement", "lateral")
-        if "displacement" in values and name in values and values[name][0] != 0
-    ]
-    notes = list(found.notes)
-    if starts:
-        notes.append(
-            f"{', '.join(starts)}: slide.file needs a table that starts at 0; use --zero to subtract the first row"
-        )
-    rows = len(next(iter(values.values())))
-    return {
-        "rows": rows,
-        "units": units,
-        "notes": notes,
-        "told": f"{rows} rows of {', '.join(values)}",
-    }
+    columns = [Column(name, units[name], column) for name, column in values.items()]
+    write_text(out, format_columns(columns))
+    rows = columns[0].values.size
+    told = f"{rows} rows of {', '.join(values)}"
+    return {"rows": rows, "units": units, "notes": found.notes, "told": told}
 
 
-def _write_decay(file: Path, out: Path, requests, settings: EstimateOptions) -> dict:
+def _write_decay(values: dict, out: Path, begin: float | None, notes: list[str]) -> dict:
     """Write frequency and damping ratio of a measured decay as a table."""
-    values, notes = _read_records(file, requests)
-    begin = _parse_quantity(settings.begin, "time", "--begin")
     curve, curve_notes = measured_modes.compute_decay_curve(values, begin)
     columns = [
         Column(f"decay_{name}", DECAY_UNITS[name.removesuffix("_error")], column)
         for name, column in curve._asdict().items()
     ]
-    _write_csv(out, columns)
+    write_text(out, format_columns(columns))
     ends = [
         f"{formatting.format_value(curve.frequency[k], curve.frequency_error[k], unit='Hz')} with a damping ratio of "
         f"{formatting.format_value(curve.damping[k], curve.damping_error[k])} at "
@@ -150,36 +155,15 @@ def _write_decay(file: Path, out: Path, requests, settings: EstimateOptions) -> 
     }
 
 
-def _write_csv(out: Path, columns: list[Column]) -> None:
-    """Write columns as a CSV file; Missing if the file cannot be written."""
-    with write_atomically(out) as partial:
-        write_columns(partial, columns)
-
-
-def _write_modes(file: Path, out: Path, requests, settings: EstimateOptions) -> dict:
+def _write_modes(
+    modes: measured_modes.ListedModes, out: Path, source: str, notes: list[str]
+) -> dict:
     """Write identified modes as tables of a scene."""
-    notes = []
-    shapes = _read_shapes(file, requests, settings)
-    if shapes is not None:
-        places = records.parse_requests(requests, measured_modes.SHAPE_QUANTITIES)
-        modes = measured_modes.list_shape_modes(
-            shapes, {request.quantity: request.source for request in places}
-        )
-    else:
-        values, notes = _read_records(file, requests)
-        if settings.decay:
-            begin = _parse_quantity(settings.begin, "time", "--begin")
-            modes = measured_modes.identify_decay_modes(values, begin)
-        else:
-            modes = measured_modes.identify_driven_modes(
-                values, *_parse_segment(settings), _parse_band(settings.band)
-            )
-    write_text(out, format_structure(modes, file.name))
+    write_text(out, format_structure(modes, source))
+    columns = (modes.frequency.tolist(), modes.damping.tolist(), modes.descriptions)
     entries = [
         {"frequency": frequency, "damping": damping, "about": about}
-        for frequency, damping, about in zip(
-            modes.frequency.tolist(), modes.damping.tolist(), modes.descriptions, strict=True
-        )
+        for frequency, damping, about in zip(*columns, strict=True)
     ]
     texts = [f"{one['frequency']:.5g} Hz with a damping of {one['damping']:.4g}" for one in entries]
     return {
@@ -197,35 +181,30 @@ def format_structure(modes: measured_modes.ListedModes, source: str) -> str:
         """Return a text as one line for a comment."""
         return "".join(letter if letter.isprintable() else "?" for letter in text)
 
-    lines = [f"# modes of {printable(source)}, by {universal.PROGRAM}"]
-    lines += [f"# {printable(note)}" for note in modes.notes]
     mass = 'moving_mass = "1 kg"  # assumed: not in the record'
     if modes.mass is not None:
         mass = f'moving_mass = "{modes.mass!r} kg"'
-    lines += ["", "[structure]", mass]
-    for k, (frequency, damping) in enumerate(np.c_[modes.frequency, modes.damping].tolist()):
-        about = modes.descriptions[k]
+    remarks = [f"modes of {source}, by {universal.PROGRAM}", *modes.notes]
+    lines = [*(f"# {printable(remark)}" for remark in remarks), "", "[structure]", mass]
+    for k, about in enumerate(modes.descriptions):
+        comment = f"  # {printable(about)}" if about else ""
         lines += [
             "",
             "[[structure.mode]]",
             f'name = "mode {k + 1}"',
-            f'frequency = "{frequency!r} Hz"',
+            f'frequency = "{float(modes.frequency[k])!r} Hz"',
+            f"damping = {float(modes.damping[k])!r}{comment}",
         ]
-        lines.append(f"damping = {damping!r}" + (f"  # {printable(about)}" if about else ""))
         for key, row in modes.rows.items():
             value = repr(float(row[k]))
             lines.append(f'{key} = "{value} rad/m"' if key == "pitch" else f"{key} = {value}")
     return "\n".join(lines) + "\n"
 
 
-def _write_response(file: Path, out: Path, requests, settings: EstimateOptions) -> dict:
-    """Write an estimated frequency response as a universal file."""
-    values, notes = _read_records(file, requests)
-    estimate, step, drive, response = measured_modes.estimate_record(
-        values, *_parse_segment(settings)
-    )
-    with write_atomically(out) as partial:
-        universal.write_response(partial, estimate, drive, response)
+def _write_response(values: dict, out: Path, averaging: tuple, notes: list[str]) -> dict:
+    """Write a frequency response as a universal file, estimated with a length [s] and a window of the segments."""
+    estimate, step, drive, response = measured_modes.estimate_record(values, *averaging)
+    universal.write_response(out, estimate, drive, response)
     return {
         "lines": estimate.frequency.size,
         "segments": estimate.segments,
@@ -249,9 +228,9 @@ def _read_records(file: Path, requests) -> tuple[dict[str, np.ndarray], list[str
 
 
 def _read_shapes(
-    file: Path, requests, settings: EstimateOptions
-) -> universal_modes.MeasuredModes | None:
-    """Return mode shapes or those of frequency responses of a universal file; None for a file of records."""
+    file: Path, requests: Iterable[str], settings: EstimateOptions
+) -> measured_modes.ListedModes | None:
+    """Return the modes of mode shapes or frequency responses in a universal file; None for a file of records."""
     names = {text.partition("=")[0].strip() for text in requests}
     is_universal = file.suffix.lower() in laboratory.UNIVERSAL_EXTENSIONS
     if not is_universal or settings != EstimateOptions() or names & set(CHANNEL_UNITS):
@@ -260,9 +239,12 @@ def _read_shapes(
     if not any(one["type"] == 55 or int(one.get("func_type", 0)) == 4 for one in datasets):
         return None
     try:
-        return universal_modes.read_universal(file)
+        shapes = universal_modes.read_universal(file)
     except PatchfemError as error:
         raise type(error)(str(error).removeprefix("structure.file: ")) from None
+    places = records.parse_requests(requests, measured_modes.SHAPE_QUANTITIES)
+    sources = {request.quantity: request.source for request in places}
+    return measured_modes.list_shape_modes(shapes, sources)
 
 
 def _parse_quantity(text: str, kind: str, option: str) -> float | None:
@@ -273,19 +255,11 @@ def _parse_quantity(text: str, kind: str, option: str) -> float | None:
         raise PatchfemError(f"{option} {text}: {error}") from None
 
 
-def _parse_segment(settings: EstimateOptions) -> tuple[float | None, str | None]:
-    """Return the length of a segment [s] and the name of the window function; None for the default."""
-    if settings.window not in ("", "hann", "none"):
-        raise PatchfemError(f"--window {settings.window}: hann or none")
-    return _parse_quantity(settings.segment, "time", "--segment"), settings.window or None
-
-
 def _parse_band(text: str) -> tuple[float, float]:
     """Return both ends of a frequency band [Hz]."""
     if not text:
         return 0.0, float("inf")
-    parts = [part.strip() for part in text.split("..")]
-    ends = [_parse_quantity(part, "frequency", "--band") for part in parts]
+    ends = [_parse_quantity(part.strip(), "frequency", "--band") for part in text.split("..")]
     if len(ends) != 2 or None in ends or not 0 <= ends[0] < ends[1]:
         raise PatchfemError(
             f'--band {text}: two rising frequencies are needed, such as "20 Hz..400 Hz"'

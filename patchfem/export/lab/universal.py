@@ -12,6 +12,7 @@ import numpy as np
 
 from ... import __version__
 from ...core import Missing, PatchfemError
+from ...disk.atomic_write import write_atomically
 
 PROGRAM = f"patchfem {__version__}"
 # type codes of dataset 58 by the unit of a quantity; 1 (general) for other units
@@ -77,8 +78,6 @@ def make_dataset(
         "ref_node": 0,
         "ref_dir": 0,
         "orddenom_spec_data_type": 0,
-        "z_axis_spec_data_type": 0,
-        "abscissa_spacing": 0,
         "abscissa_spec_data_type": TYPES[x.unit],
         "abscissa_axis_units_lab": x.unit,
         "ordinate_spec_data_type": TYPES.get(y.unit, 1),
@@ -88,7 +87,9 @@ def make_dataset(
     } | entries
 
 
-def write_histories(path: Path, time, columns: Sequence, loops: Sequence, title: str) -> None:
+def write_histories(
+    path: Path, columns: Sequence[Column], loops: Sequence[tuple[Column, Column]], title: str
+) -> None:
     """Write histories and friction loops.
 
     The first line of identification is the name of the history (of a loop, "force over slide"), the fourth the title; the
@@ -97,8 +98,8 @@ def write_histories(path: Path, time, columns: Sequence, loops: Sequence, title:
     Parameters
     ----------
     path : Path
-    time : Column or None
     columns : sequence of Column
+        The time comes first; without it there are only loops.
     loops : sequence of (Column, Column)
         Slide and force.
     title : str
@@ -115,13 +116,14 @@ def write_histories(path: Path, time, columns: Sequence, loops: Sequence, title:
             raise PatchfemError(
                 f"{column.label} has values that are not finite, which a universal file cannot contain; export .mat or .csv"
             )
-    curves = [(column.label, HISTORY, time, column) for column in columns if time is not None]
-    curves += [(f"{force.label} over {slide.label}", LOOP, slide, force) for slide, force in loops]
+    time, *histories = columns
+    curves = [(f"{force.label} over {slide.label}", LOOP, slide, force) for slide, force in loops]
+    if time.name == "time":
+        curves = [(column.label, HISTORY, time, column) for column in histories] + curves
     if not curves:
         raise PatchfemError("there is neither time nor loop to write")
     line = "".join(letter if " " <= letter <= "~" else "?" for letter in title)[:80].strip()
-    entries = {"id4": line or "NONE"}
-    write_datasets(path, [make_dataset(*curve, **entries) for curve in curves])
+    write_datasets(path, [make_dataset(*curve, id4=line or "NONE") for curve in curves])
 
 
 def write_response(path: Path, estimate, drive: str, response: str) -> None:
@@ -162,14 +164,14 @@ def write_datasets(path: Path, datasets: list[dict]) -> None:
         raise Missing(
             "writing universal files needs the package pyuff; run pip install 'patchfem[lab]'"
         ) from None
-    path = Path(path)
-    path.write_bytes(b"")
-    file = pyuff.UFF(str(path))
-    file.write_sets(SI_UNITS, "add")
-    for dataset in datasets:
-        start = path.stat().st_size
-        file.write_sets(dataset, "add")
-        _correct_byte_count(path, start, dataset["data"].nbytes + dataset["x"].nbytes)
+    with write_atomically(path) as partial:
+        partial.write_bytes(b"")
+        file = pyuff.UFF(str(partial))
+        file.write_sets(SI_UNITS, "add")
+        for dataset in datasets:
+            start = partial.stat().st_size
+            file.write_sets(dataset, "add")
+            _correct_byte_count(partial, start, dataset["data"].nbytes + dataset["x"].nbytes)
 
 
 def _correct_byte_count(path: Path, start: int, size: int) -> None:

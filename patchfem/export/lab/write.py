@@ -5,22 +5,14 @@ from pathlib import Path
 import numpy as np
 
 from ...core import Missing, PatchfemError
-from ...disk.atomic_write import write_atomically
+from ...disk.atomic_write import write_atomically, write_text
 from .. import store
 from ..answer import Answer
-from . import ENDINGS, universal
+from . import universal
 from .universal import Column
 
-# pairs of variables that form a friction loop; of a force, the first pair that a folder contains
-LOOPS = (
-    ("slide", "friction_force"),
-    ("relative_displacement", "friction_force"),
-    ("slide", "force"),
-    ("slide", "friction_ratio"),
-    ("slide", "fitted"),
-)
-FIT_COLUMNS = ("slide", "force", "friction_ratio", "fitted")
-MAX_NAME_LENGTH = 63  # largest length of a MATLAB variable name, in characters
+# histories that form a friction loop with the slide of the same interface
+FORCES = ("friction_force", "force", "friction_ratio", "fitted")
 MAX_STEP_RATIO = 5.0  # largest ratio of a time step to the last one if all samples are stored
 
 
@@ -37,80 +29,67 @@ def export_histories(folder: Path, out: Path) -> str:
     Raises
     ------
     PatchfemError
-        For another ending, and for a folder without histories.
+        For a folder without histories.
     Missing
         If the folder does not exist, or if the file cannot be written.
     """
-    out = Path(out)
-    ending = out.suffix.lower()
-    if ending not in ENDINGS:
-        raise PatchfemError(f"{out}: histories are exported as {', '.join(ENDINGS)}")
-    if not Path(folder).is_dir():
+    if not folder.is_dir():
         raise Missing(f"{folder}: no such results folder")
     answer = store.read(folder)
-    time, columns = list_columns(answer)
-    if not columns:
+    columns = list_columns(answer)
+    histories = [column for column in columns if column.name != "time"]
+    if not histories:
         raise PatchfemError(
             f"{folder}: these results have no history; fields are exported as .pvd, .vtu, .vtkhdf, or .csv of the interface"
         )
-
     tail = ""
-    with write_atomically(out) as partial:
-        if ending == ".mat":
-            write_matlab(partial, answer)
-        elif ending == ".csv":
-            write_columns(partial, [time, *columns] if time else columns)
-        else:
-            loops = find_loops(columns)
-            universal.write_histories(partial, time, columns, loops, answer.title)
-            tail = f"; {len(loops)} loops"
-    names = list(dict.fromkeys(column.name for column in columns))
-    return f"{out}: {columns[0].values.size} rows of {', '.join(names)}{_note_thinning(time)}{tail}"
+    if out.suffix.lower() == ".csv":
+        write_text(out, format_columns(columns))
+    elif out.suffix.lower() == ".mat":
+        write_matlab(out, answer)
+    else:
+        slides = {column.number: column for column in histories if column.name == "slide"}
+        loops = [
+            (slides[force.number], force)
+            for force in histories
+            if force.name in FORCES and force.number in slides
+        ]
+        universal.write_histories(out, columns, loops, answer.title)
+        tail = f"; {len(loops)} loops"
+    names = ", ".join(dict.fromkeys(column.name for column in histories))
+    size = histories[0].values.size
+    return f"{out}: {size} rows of {names}{_note_thinning(answer)}{tail}"
 
 
-def list_columns(answer: Answer) -> tuple[Column | None, list[Column]]:
-    """Return the time and the histories of a run, or the time and the columns of a fitted loop.
-
-    The time is None if the record of a fit has none; the histories are empty if there are none.
-    """
-    dimension = "row" if answer.kind == "fit" else "time"
+def list_columns(answer: Answer) -> list[Column]:
+    """Return time and histories of a run, or the columns of a fitted loop, whose record may have no time."""
+    is_fit = answer.kind == "fit"
+    dimension = "row" if is_fit else "time"
     columns = []
     for name, variable in answer.data.items():
-        is_history = (
-            dimension in variable.dims and name != "time" and variable.values.dtype.kind == "f"
-        )
-        if not is_history or (answer.kind == "fit" and name not in FIT_COLUMNS):
+        is_history = dimension in variable.dims and variable.values.dtype.kind == "f"
+        if not is_history or (is_fit and name not in ("time", "slide", *FORCES)):
             continue
         values = np.moveaxis(variable.values, variable.dims.index(dimension), -1)
         if values.ndim == 1:
             columns.append(Column(name, variable.unit, values))
         elif values.ndim == 2:
             columns += [Column(name, variable.unit, row, k) for k, row in enumerate(values, 1)]
-    time = answer.data.get("time")
-    return time and Column("time", "s", time.values), columns
+    return sorted(columns, key=lambda column: column.name != "time")
 
 
-def find_loops(columns: list[Column]) -> list[tuple[Column, Column]]:
-    """Return slide and force of the friction loop of each interface."""
-    known = {(column.name, column.number): column for column in columns}
-    loops = {}
-    for slide, force in LOOPS:
-        for name, number in known:
-            if name == slide and (force, number) in known:
-                loop = known[slide, number], known[force, number]
-                loops.setdefault((force, number), loop)
-    return list(loops.values())
-
-
-def _note_thinning(time: Column | None) -> str:
+def _note_thinning(answer: Answer) -> str:
     """Return a note that only the reversals of early histories are stored, or "" if the rows are even all along."""
-    steps = np.zeros(1) if time is None else np.diff(time.values)
-    if steps.max() <= MAX_STEP_RATIO * steps[-1]:
+    if "time" not in answer.data:
         return ""
-    even_from = time.values[np.flatnonzero(steps > MAX_STEP_RATIO * steps[-1])[-1] + 1]
+    time = answer.data["time"].values
+    steps = np.diff(time)
+    (uneven,) = np.nonzero(steps > MAX_STEP_RATIO * steps[-1])
+    if not uneven.size:
+        return ""
     return (
-        f"; before {even_from:.4g} s the rows are turning points, stops and starts of slip alone (fewer drive.cycles give "
-        "even rows)"
+        f"; before {time[uneven[-1] + 1]:.4g} s the rows are turning points, stops and starts of slip alone (fewer "
+        "drive.cycles give even rows)"
     )
 
 
@@ -118,21 +97,17 @@ def write_matlab(path: Path, answer: Answer) -> None:
     """Write all arrays of numbers as variables of a MATLAB file of version 5; `units.NAME` is the unit of NAME."""
     from scipy.io import savemat
 
-    arrays = {
-        name[:MAX_NAME_LENGTH]: variable
-        for name, variable in answer.data.items()
-        if variable.values.dtype.kind in "fiu"
-    }
-    content = {name: variable.values for name, variable in arrays.items()}
-    units = {name: variable.unit for name, variable in arrays.items()}
-    origin = {"title": answer.title, "source": universal.PROGRAM, "units": units}
-    with open(path, "wb") as file:
-        savemat(file, content | origin, oned_as="column", long_field_names=True)
+    arrays = {name: one for name, one in answer.data.items() if one.values.dtype.kind in "fiu"}
+    content = {name: one.values for name, one in arrays.items()}
+    units = {name: one.unit for name, one in arrays.items()}
+    content |= {"title": answer.title, "source": universal.PROGRAM, "units": units}
+    with write_atomically(path) as partial, open(partial, "wb") as file:
+        savemat(file, content, oned_as="column", long_field_names=True)
 
 
-def write_columns(path: Path, columns: list[Column]) -> None:
-    """Write columns of equal length as CSV with units in the header and all digits."""
+def format_columns(columns: list[Column]) -> str:
+    """Return columns of equal length as CSV with units in the header and all digits."""
     lines = [",".join(f"{column.label} [{column.unit}]" for column in columns)]
     rows = zip(*(column.values.tolist() for column in columns), strict=True)
     lines += [",".join(map(repr, row)) for row in rows]
-    Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return "\n".join(lines) + "\n"
