@@ -95,8 +95,11 @@ def compare(
         _compare_pairs(pairs, options, output)
         return
     if len(files) != 2:
+        removed = ""
+        if len(files) == 4:
+            removed = "; four files were removed in patchfem 2.0, compare each direction by itself"
         raise UsageError(
-            "compare: give two files BEFORE and AFTER, or a table of pairs with --pairs"
+            f"compare: give two files BEFORE and AFTER, or a table of pairs with --pairs{removed}"
         )
     name = f"{before.resolve().stem}-{after.resolve().stem}"
     output = Output(choose_folder(out, name), json_, quiet, not no_page, plot, verbose)

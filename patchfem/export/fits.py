@@ -4,7 +4,7 @@ A fit to a loop, to frequency and damping against amplitude, to rows of a rig or
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -52,6 +52,7 @@ def fit_into(
     target: Path,
     listener: Listener,
     with_page: bool = True,
+    command: str = "",
 ) -> Answer:
     """Fit keys of a scene to a measurement, and write the results folder.
 
@@ -62,6 +63,8 @@ def fit_into(
     target : Path
         Results folder, which is claimed before the work.
     with_page : bool
+    command : str
+        Command that repeats the fit; "" in Python.
 
     Returns
     -------
@@ -77,6 +80,8 @@ def fit_into(
             listener.say(folder.dropped)
         fit = fit_measurement(scene, to, free, options, listener, folder.path / STARTS)
         answer = make_answer(fit, scene)
+        if command:
+            answer = replace(answer, origin=answer.origin | {"command": command})
         store.write(answer, folder.path)
         text = format_fitted_scene(fit, scene, answer.verdict, folder.target)
         write_text(folder.path / FITTED_SCENE, text)

@@ -201,7 +201,11 @@ def test_exact_vtkhdf_export_equals_file(tmp_path):
     [
         (["-o", "a.mat"], 2, "it has no summary.json"),
         (["-o", "a.xlsx"], 2, ".pvd, .vtkhdf, .vtu, .csv"),
-        (["-o", "a.py"], 2, "the script for ParaView was removed in 2.0; open fields.vtkhdf"),
+        (
+            ["-o", "a.py"],
+            2,
+            "the script for ParaView was removed in patchfem 2.0; open fields.vtkhdf",
+        ),
         (["-o", "a.vtu", "--frame", "-4"], 2, "frames 0 to 2"),
         (["-o", "a.pvd", "--frame", "1"], 2, "contains all frames"),
         ([], 2, "-o"),

@@ -211,7 +211,7 @@ def test_always_export_states_omitted_features(tmp_path, text, message):
             "cannot be written with [normal.grooves]",
         ),
         (FRICTION_RIG, ".csv", "a structure is exported as .mat"),
-        (FRICTION_RIG, ".npz", "removed in 2.0"),
+        (FRICTION_RIG, ".npz", "removed in patchfem 2.0"),
         (
             POINT + PLASTIC + '[slide]\nkind = "triangle"\namplitude = "8 um"\nspeed = "1 mm/s"\n',
             ".mat",

@@ -47,7 +47,11 @@ def export_structure(model: Model, out: Path) -> str:
 
     out = Path(out)
     if out.suffix.lower() != ".mat":
-        removed = ", whose .npz form was removed in 2.0" if out.suffix.lower() == ".npz" else ""
+        removed = (
+            "; .npz was removed in patchfem 2.0, scipy.io.loadmat reads .mat in Python"
+            if out.suffix.lower() == ".npz"
+            else ""
+        )
         raise PatchfemError(f"{out}: a structure is exported as .mat{removed}")
     with locate_errors(model.source):
         if model.rig is None:

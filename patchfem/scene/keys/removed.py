@@ -56,6 +56,7 @@ REMOVED_OPTIONS_2 = {
         "--from-patch",
     ): "run the scene with its patch, or fit the law of a point to a loop that `run` and `export` wrote",
     ("fit", "--amplitudes"): "leave it out: it belonged to --from-patch",
+    ("export", "--of"): "leave it out: choose the field in ParaView",
 }
 
 
