@@ -3,7 +3,7 @@
 from itertools import pairwise
 
 import numpy as np
-from scipy import ndimage
+from scipy import ndimage, special
 
 from ...core import PatchfemError
 from ..profile import Profile
@@ -13,8 +13,9 @@ from ..roughness.report import fitting_cutoff
 from ..roughness.spectrum import BAND
 from .records import TraceCurves, name_quantity, name_unknown
 
-N_BLOCKS = 12  # number of blocks whose ratios show the scatter of a ratio
-STUDENT = 2.2  # half-width of a 95 % interval from N_BLOCKS values, in standard deviations
+MAX_BLOCKS = 12  # largest number of blocks whose ratios show the scatter of a ratio
+MIN_BLOCKS = 4  # smallest number of blocks
+BLOCK_WAVES = 2.0  # smallest length of a block in the longest wave; shorter blocks are correlated
 CUTOFF_TO_DEVIATION = (
     0.187  # deviation of the Gaussian filter of ISO 16610-21 relative to its cut-off
 )
@@ -47,12 +48,16 @@ def compare_waves(lines: list[np.ndarray], step: float, noise: float) -> dict[st
     slopes = [np.diff(z, axis=1) / step for z in lines]
     # White noise has the slope noise sqrt(2)/step, and the fraction of its band in the amplitude.
     band_noise = noise / np.sqrt(2) * np.sqrt(2 * step * (1 / BAND[0] - 1 / BAND[1]))
+    count = int(np.clip(length / (BLOCK_WAVES * BAND[1]), MIN_BLOCKS, MAX_BLOCKS))
+    if min(len(line) for line in lines) >= MAX_BLOCKS:
+        count = MAX_BLOCKS  # groups of lines
+    student = float(special.stdtrit(count - 1, 0.975))
     values = {}
     for name, sizes, error in (
         ("amplitude_ratio", passed, band_noise),
         ("slope_ratio", slopes, noise / step),
     ):
-        blocks = np.array([_mean_squares(size) for size in sizes])
+        blocks = np.array([_mean_squares(size, count) for size in sizes])
         totals = blocks.mean(axis=1)
         if not totals.min() > 0 or error**2 > MAX_NOISE_FRACTION * totals.min():
             values[name] = name_unknown(name, "noise")
@@ -60,8 +65,8 @@ def compare_waves(lines: list[np.ndarray], step: float, noise: float) -> dict[st
         ratio = float(np.sqrt(totals[1] / totals[0]))
         # Linearised ratio of two means: the scatter of its numerator and denominator together.
         influence = blocks[1] / totals[1] - blocks[0] / totals[0]
-        scatter = influence.std(ddof=1) / np.sqrt(N_BLOCKS) / 2
-        width = STUDENT * float(np.hypot(scatter, RATIO_ERROR))
+        scatter = influence.std(ddof=1) / np.sqrt(count) / 2
+        width = student * float(np.hypot(scatter, RATIO_ERROR))
         values[name] = name_quantity(name, ratio, ratio * np.exp(-width), ratio * np.exp(width))
     return values
 
@@ -72,9 +77,9 @@ def _pass_band(z, step: float) -> np.ndarray:
     return ndimage.gaussian_filter1d(z, short) - ndimage.gaussian_filter1d(z, long)
 
 
-def _mean_squares(values) -> np.ndarray:
+def _mean_squares(values, count: int) -> np.ndarray:
     """Return the mean squares of blocks: along a single line, or of groups of lines."""
-    parts = np.array_split(values, N_BLOCKS, axis=0 if len(values) >= N_BLOCKS else 1)
+    parts = np.array_split(values, count, axis=0 if len(values) >= MAX_BLOCKS else 1)
     return np.array([np.mean(part**2) for part in parts])
 
 
