@@ -28,7 +28,6 @@ PUBLIC = {
     ),
     "fits.curve": ("FittedCurve",),
     "fits.loop": ("FittedLoop",),
-    "fits.problem": ("FittedKeys",),
     "fits.request": (
         "FitOptions",
         "Listener",
@@ -44,7 +43,6 @@ PUBLIC = {
         "NUMERICAL_SETTINGS",
         "find_applicable_settings",
     ),
-    "rows.condition_models": ("GAIN_KEYS",),
     "rows.fit": (
         "FittedRows",
         "SAME_SCORE",
@@ -56,21 +54,15 @@ PUBLIC = {
     ),
     "sweeps.case_models": ("SweepScene",),
     "sweeps.cases": ("Cases",),
-    "sweeps.estimate": (
-        "MAX_CASES_WITH_SUMMARY",
-        "MAX_CASES_WITH_TABLES",
-        "estimate_sweep",
-    ),
     "sweeps.parse_request": (
         "Request",
         "warn_of_invalid_cases",
         "read_cases",
         "read_sweep",
     ),
+    "sweeps.plan": ("plan_sweep",),
     "sweeps.sweep": (
-        "RemainingTime",
         "WorkerData",
-        "format_duration",
         "iterate_chunks",
     ),
 }

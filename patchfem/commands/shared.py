@@ -283,30 +283,28 @@ class Progress:
         if self.on_terminal and not self.is_silent:
             print("\r\x1b[K", end="", file=sys.stderr, flush=True)
 
-    def __call__(self, fraction: float) -> None:
-        """Show the completed fraction, from 0 to 1, and the remaining time."""
+    def __call__(self, fraction: float, text: str = "") -> None:
+        """Show the completed fraction, from 0 to 1, or a text on it, and the remaining time.
+
+        Nothing is shown if the last line is too recent.
+        """
         now = self.clock()
         self.first = self.first or (now, fraction)
         first_time, first_fraction = self.first
-        left = None
-        if fraction > first_fraction:
-            left = (now - first_time) * (1 - fraction) / (fraction - first_fraction)
-        self._show(f"{fraction:.0%} done", left)
-
-    def count(self, done: int, total: int, seconds_left: float | None) -> None:
-        """Show the number of completed cases and the remaining time [s]."""
-        self.done = done
-        self.first = self.first or (self.clock(), done)
-        self._show(f"{done}/{total} cases", seconds_left)
-
-    def _show(self, text: str, seconds_left: float | None) -> None:
-        """Show a line, unless the last one is too recent."""
         interval = self.TERMINAL_INTERVAL if self.on_terminal else self.INTERVAL
         if self.is_silent or self.clock() - self.shown_at < interval:
             return
-        if seconds_left is not None:
-            text += f", about {format_duration(seconds_left)} left"
+        text = text or f"{fraction:.0%} done"
+        if fraction > first_fraction:
+            left = (now - first_time) * (1 - fraction) / (fraction - first_fraction)
+            text += f", about {format_duration(left)} left"
         self._print(text)
+
+    def count(self, done: int, total: int) -> None:
+        """Show the number of completed cases, and the remaining time; the first call may count stored cases."""
+        if done > self.done:
+            self(done / total, f"{done}/{total} cases")
+        self.done = done
 
     def _show_elapsed_time(self) -> None:
         """Show the elapsed time while nothing is complete."""

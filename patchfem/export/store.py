@@ -117,7 +117,7 @@ def read(folder: Path) -> Answer:
             origin = origin | {"resolved": (folder / SCENE).read_text("utf-8")}
         path = folder / data_file(kind)
         data = read_netcdf(path) if path.is_file() else {}
-    except (OSError, ValueError, KeyError, RuntimeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, RuntimeError) as error:
         raise PatchfemError(f"{folder}: a file of this folder is damaged: {error}") from None
     return Answer(
         kind=kind,

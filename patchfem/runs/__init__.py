@@ -26,7 +26,6 @@ it:
 PUBLIC = {
     "accuracy_curve": ("compute_accuracy_curve",),
     "batch.batches": (
-        "batch_compile_seconds",
         "choose_batch",
         "solve_models",
     ),
@@ -56,7 +55,6 @@ PUBLIC = {
         "solve_with_coarser",
         "solve_on_split_mesh",
     ),
-    "patch.sweep_meshes": ("geometry_key",),
     "patch.press": ("nodal_areas",),
     "patch.result": ("make_piece_meshes_of_run",),
     "patch.values": (

@@ -1,13 +1,21 @@
 """Measured surfaces: read, levelled and cleaned, their roughness, and their wear.
 
 In: files of traces and areal scans (`files`). Out: levelled heights averaged over the cells of the
-interface nodes (`nodes`), roughness with intervals (`roughness`), and what changed between two
-traces (`compare`) or two scans (`scans`). Read `profile` first, then `nodes`.
+interface nodes (`nodes`), roughness (`roughness`), and what changed between two traces or two scans
+(`compare`). Read `profile` first, then `compare.records` and `compare.compare`.
 """
 
 # Names that other folders use, by module.
 PUBLIC = {
-    "compare.compare": ("Comparison",),
+    "areal": ("Areal", "level_plane"),
+    "compare.compare": ("Options", "compare_files", "compare_surfaces"),
+    "compare.records": (
+        "Comparison",
+        "Finding",
+        "ScanMaps",
+        "Track",
+        "TraceCurves",
+    ),
     "files.read": (
         "read_profile",
         "read_surface",
@@ -31,6 +39,7 @@ PUBLIC = {
     "quantity": (
         "LEVEL",
         "Quantity",
+        "average_quantities",
     ),
     "roughness.filter": ("mean_line",),
     "roughness.form": ("parse_form_option",),

@@ -37,15 +37,15 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "wear"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 import bands
-from drawing import BLUE, GREY, ORANGE, drawing
-from patchfem.surface.compare.sentences import describe_ratio_change
+from drawing import drawing
 from study_text import read_answer
 
 from patchfem.core import frozen_array
 from patchfem.export import write_trace
+from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.surface import BAND, Profile, level, make_report
-from patchfem.surface.compare.compare import compare_directions, compare_traces
-from patchfem.surface.compare.verdict import compose_verdict
+from patchfem.surface.compare.compare import Options, compare_surfaces
+from patchfem.surface.compare.waves import compare_waves
 from patchfem.surface.roughness.spectrum import band_amplitude, estimate_spectrum
 
 FOLDER = Path(__file__).parent
@@ -96,25 +96,34 @@ def cut(before, after, line: int) -> Set:
         (trace(before[line], "before, x"), trace(after[other], "after, x")),
         (trace(before[:, line], "before, y"), trace(after[:, other], "after, y")),
     )
-    parts = [compare_traces(*pair, direction) for pair, direction in zip(pairs, "xy")]
-    return Set(pairs, parts, tuple(amplitude for _, amplitude, _ in compare_directions(parts)))
+    parts = [compare_surfaces(*pair, Options(direction=way)) for pair, way in zip(pairs, "xy")]
+    across = []
+    for along_x, along_y in zip(*pairs):
+        lines = [level(each).z[None] for each in (along_y, along_x)]
+        across.append(compare_waves(lines, bands.STEP, 0.0)["amplitude_ratio"])
+    return Set(pairs, parts, tuple(across))
+
+
+def is_reduced(ratio) -> bool:
+    """Return whether the interval of a ratio lies below one."""
+    return ratio.high is not None and ratio.high < 1
 
 
 def counts(sets: list) -> tuple:
     """Count the sets whose waves are reduced along x, reduced along y, and lower along x than along y after and before."""
     ratios = [
-        (*[part.ratios.amplitude for part in one.parts], one.across[1], one.across[0])
+        (*[part.values["amplitude_ratio"] for part in one.parts], one.across[1], one.across[0])
         for one in sets
     ]
-    return tuple(
-        sum(describe_ratio_change(each[k]) == "reduced" for each in ratios) for k in range(4)
-    )
+    return tuple(sum(is_reduced(each[k]) for each in ratios) for k in range(4))
 
 
 def count_held(sets: list, row) -> int:
     """Count the comparisons of the sets whose interval contains the ratio of the whole areas."""
     return sum(
-        one.parts[way].ratios.amplitude.low < row.after[way] < one.parts[way].ratios.amplitude.high
+        one.parts[way].values["amplitude_ratio"].low
+        < row.after[way]
+        < one.parts[way].values["amplitude_ratio"].high
         for one in sets
         for way in (0, 1)
     )
@@ -163,7 +172,7 @@ def picture(sets: list, path: Path) -> Path:
                 )
                 axis.title.set_fontsize(10)
         at = np.arange(1, len(sets) + 1)
-        along = [[one.parts[way].ratios.amplitude for one in sets] for way in (0, 1)]
+        along = [[one.parts[way].values["amplitude_ratio"] for one in sets] for way in (0, 1)]
         across = [[one.across[when] for one in sets] for when in (0, 1)]
         for axis, pair, colours, names in (
             (axes[2, 0], along, (BLUE, ORANGE), ("along x", "along y")),
@@ -217,7 +226,7 @@ def main(
             f"along y; wave heights of traces {low[0]:.1f} to {low[1]:.1f} um before, {high[0]:.1f} to {high[1]:.1f} "
             f"um after; of {count} sets reduced along x {x}, along y {y}, lower along x than along y after {less}, "
             f"before {earlier}; the interval holds the ratio of the areas in {count_held(sets, row)} of {2 * count}; "
-            f"with a worn depth {sum(bool(part.basis) for one in sets for part in one.parts)}"
+            f"with a worn depth {sum(part.verdict.code == 'worn' for one in sets for part in one.parts)}"
         )
         for way, (first, last) in zip((0, 1), zip(*PRINTED_HEIGHTS)):
             high = totals(sets, way)
@@ -228,7 +237,7 @@ def main(
             )
     sets = found[strokes[0]][0]
     parts = middle(sets).parts
-    print("the drawn set: " + compose_verdict(parts, compare_directions(parts))[0])
+    print("the drawn set: " + ", ".join(part.verdict.code for part in parts))
     if path is not None:
         picture(sets, path)
     print(ANSWER)

@@ -277,25 +277,18 @@ def test_refuses_sweep_without_valid_case(rig_scene, tmp_path):
 
 
 def test_exact_sweep_plan_counts_cases(rig_scene):
-    """The plan of a sweep gives the number of cases, and a time in proportion to them."""
+    """The plan of a sweep gives the number of cases, but no time and no memory."""
     sweep_plan = json.loads(run_cli("plan", rig_scene, *OVER, "--json").out)
     single_plan = json.loads(run_cli("plan", rig_scene, "--json").out)
     assert sweep_plan["cases"] == 6 and sweep_plan["values"] == {
         "normal.load": 3,
         "drive.acceleration": 2,
     }
-    half, more = (
-        json.loads(
-            run_cli("plan", rig_scene, "--over", f"friction.static=0.1..0.6:{n}", "--json").out
-        )
-        for n in (1000, 2000)
-    )
-    assert more["seconds"] - half["seconds"] == pytest.approx(
-        1000 * more["seconds_per_case"], rel=0.05
-    )
+    assert sweep_plan["seconds"] is None and "disk_bytes" not in sweep_plan
     assert (sweep_plan["kind"], sweep_plan["engine"], sweep_plan["effects"]) == (
         single_plan["kind"],
         single_plan["engine"],
         single_plan["effects"],
     )
-    assert "6 cases of 3 normal.load, 2 drive.acceleration" in run_cli("plan", rig_scene, *OVER).out
+    screen = run_cli("plan", rig_scene, *OVER).out
+    assert "6 cases of 3 normal.load, 2 drive.acceleration\n" in screen and "cost" not in screen

@@ -4,8 +4,8 @@
 
 Four generators belong to the tests: `known_pairs`, `worn_kinds`, `track_pairs` (kinds in turn), and tracks of 0.3 to 8
 standard deviations of the depth noise over the middle third. The others are functions `FUNCTION(seed, count)` of
-somebody who had not seen the method; they yield dicts with the keys that `read_dict` reads, or are named `make(seed)`. Seeds below 900000 may
-have been used in developing it.
+somebody who had not seen the method; they yield dicts with the keys that `read_dict` reads, or are named `make(seed)`.
+Seeds below 900000 may have been used in developing it.
 
 What counts:
 

@@ -41,6 +41,8 @@ class SweepAnalysis:
 
     Attributes
     ----------
+    cases : dict
+        Counts of `SweepTable.count_cases`.
     ranges : list of MeasureRange
         Ranges of the main measures that vary by more than their errors, largest change first; a
         requested measure is the first one.
@@ -52,6 +54,7 @@ class SweepAnalysis:
         Quantiles of random cases by measure.
     """
 
+    cases: dict[str, int | dict]
     ranges: list[MeasureRange]
     limits: list[KeyLimit]
     peaks: list[PeakOnLine]
@@ -67,6 +70,7 @@ def analyse(table: SweepTable, requested: str = "") -> SweepAnalysis:
             ranges += find_range(table, name)
     ranges.sort(key=lambda entry: (entry.measure != requested, -entry.relative))
     return SweepAnalysis(
+        cases=table.count_cases(),
         ranges=ranges,
         limits=find_limits(table),
         peaks=find_peaks(table),

@@ -82,26 +82,22 @@ def find_limits(table: SweepTable) -> list[KeyLimit]:
         return []
 
     limits = []
-    along = _split_into_lines(key.values, table.shape, axis)[0]
+    lines = table.split_lines(axis)
+    along = key.values[lines[0]]
     order = np.argsort(along)
     for name, largest in CHANGE_AT_LIMIT.items():
         column = table.measures.get(name)
         if column is None or not np.any(np.abs(column.values) > column.floors):
             continue
-        values = _split_into_lines(table.trusted(name), table.shape, axis)[:, order]
-        errors = _split_into_lines(column.errors, table.shape, axis)[:, order]
+        values = table.trusted(name)
+        errors = np.nan_to_num(column.errors)
         on_lines = [
-            _find_limit_on_line(name, key, along[order], line, np.nan_to_num(error), largest)
-            for line, error in zip(values, errors)
+            _find_limit_on_line(name, key, along[order], values[line], errors[line], largest)
+            for line in lines[:, order]
         ]
         if None not in on_lines:
             limits.append(min(on_lines, key=_rank_limit))
     return limits
-
-
-def _split_into_lines(values: np.ndarray, shape: tuple[int, ...], axis: int) -> np.ndarray:
-    """Return the values of cases as lines along one key, (lines, values of the key)."""
-    return np.moveaxis(values.reshape(shape), axis, -1).reshape(-1, shape[axis])
 
 
 def _find_limit_on_line(

@@ -63,11 +63,10 @@ def find_peaks(table: SweepTable) -> list[PeakOnLine]:
     names = [name for name in HEIGHT_MEASURES if name in table.measures]
     if not axes or not names or not table.is_grid:
         return []
-    cases = np.moveaxis(np.arange(len(table)).reshape(table.shape), axes[0], -1)
     heights, errors = _find_heights(table, names[0])
 
     peaks = []
-    for line in cases.reshape(-1, table.shape[axes[0]]):
+    for line in table.split_lines(axes[0]):
         frequency = table.keys[axes[0]].values[line]
         line = line[np.argsort(frequency)]
         peak = locate_peak(np.sort(frequency), heights[line], errors[line])

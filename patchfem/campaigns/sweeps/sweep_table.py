@@ -7,7 +7,6 @@ for each measure.
 from __future__ import annotations
 
 import re
-from array import array
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -78,10 +77,6 @@ class MeasureColumn:
         unknown = np.full(count, np.nan, np.float32)
         return cls(unit, np.full(count, np.nan), unknown, np.zeros(count, np.float32))
 
-    def get_numbers(self, case: int) -> tuple[float, float, float]:
-        """Return value, error and floor of a case."""
-        return float(self.values[case]), float(self.errors[case]), float(self.floors[case])
-
     def misses(self, tolerance: float | np.ndarray) -> np.ndarray:
         """Return whether the error of each case (n,) exceeds tolerance * |value| + floor."""
         with np.errstate(invalid="ignore"):  # comparisons with NaN are false
@@ -122,22 +117,17 @@ class SweepTable:
         return len(self.outcome)
 
     @classmethod
-    def blank(cls, cases: Cases, tolerance: float | None = None) -> SweepTable:
+    def blank(cls, cases: Cases, tolerance: float = np.nan) -> SweepTable:
         """Return the table of cases without results.
 
-        tolerance: that of all cases; None if it is swept or unknown.
+        tolerance: that of all cases, unless it is swept.
         """
-        indices = [np.arange(len(cases))] * len(cases.axes)
-        if not cases.is_table:
-            indices = np.unravel_index(np.arange(len(cases)), cases.shape)
-        keys = []
-        for axis, index in zip(cases.axes, indices):
-            is_number = isinstance(axis.values, array) or isinstance(axis.values[0], float)
-            values = np.asarray(axis.values, float if is_number else str)
-            keys.append(SweptKey(axis.key, convert_unit(axis.unit), values[index]))
+        keys = [
+            SweptKey(axis.key, convert_unit(axis.unit), values)
+            for axis, values in zip(cases.axes, cases.make_columns(range(len(cases))))
+        ]
         swept = [key.values for key in keys if key.key == "accuracy.tolerance"]
-        if tolerance is None:
-            tolerance = swept[0] if swept else np.nan
+        tolerance = swept[0] if swept else tolerance
         outcome = np.full(len(cases), "", object)
         return cls(tuple(keys), cases.shape, outcome, tolerance, cases.is_random)
 
@@ -145,6 +135,11 @@ class SweepTable:
     def is_grid(self) -> bool:
         """Whether the cases are all combinations of the values of the keys."""
         return len(self.shape) == len(self.keys) and not self.is_random
+
+    def split_lines(self, axis: int) -> np.ndarray:
+        """Return the numbers of the cases of a grid as lines along one key, (lines, values of the key)."""
+        numbers = np.moveaxis(np.arange(len(self)).reshape(self.shape), axis, -1)
+        return numbers.reshape(-1, self.shape[axis])
 
     @property
     def settled(self) -> np.ndarray:
@@ -176,15 +171,17 @@ class SweepTable:
         counts = settled if needs_settling else np.ones(len(self), bool)
         return np.where(counts & ~column.misses(self.tolerance), column.values, np.nan)
 
-    def count_outcomes(self) -> dict[str, int]:
-        """Return the number of cases by outcome, the most frequent first."""
-        return dict(Counter(map(str, self.outcome)).most_common())
+    def count_cases(self) -> dict[str, int | dict]:
+        """Return the counts of cases in sweep.json.
 
-    def count_misses(self) -> dict[str, dict[str, float | None]]:
-        """Return for each measure whose tolerance is missed the `count` of such cases and the `worst`.
-
-        The worst is the largest error/|value|; None if all these values are 0.
+        Returns
+        -------
+        dict
+            `count`, `failed`, `unfinished` and by outcome `outcomes`, the most frequent first;
+            `over_tolerance` by measure whose tolerance is missed: the `count` of such cases and the
+            `worst` error/|value|, which is None if all these values are 0.
         """
+        outcomes = Counter(map(str, self.outcome))
         missed = {}
         for name, column in self.measures.items():
             cases = np.flatnonzero(column.misses(self.tolerance))
@@ -193,11 +190,13 @@ class SweepTable:
             if cases.size:
                 worst = float(ratios.max()) if ratios.size else None
                 missed[name] = {"count": int(cases.size), "worst": worst}
-        return missed
-
-    def count_failed(self) -> int:
-        """Return the number of cases that were refused or ended with an error."""
-        return int(np.sum(self.outcome == FAILED_OUTCOME))
+        return {
+            "count": len(self),
+            "failed": outcomes[FAILED_OUTCOME],
+            "unfinished": outcomes[""],
+            "outcomes": dict(outcomes.most_common()),
+            "over_tolerance": missed,
+        }
 
 
 def convert_unit(unit: str) -> str:

@@ -1,10 +1,14 @@
 """A chart with its data in display units, which plotly.js or matplotlib draws."""
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 
 from ...formatting import format_number
+from ..quantities import choose_scale
+
+MAX_CURVE_POINTS = 3000  # a longer curve keeps the extremes of as many intervals
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,3 +101,30 @@ class Panel:
                 )
                 ranges.append(f"{curve.name or self.y.label} from {low} to {high}")
         return f"{self.title}: {self.y.label} against {self.x.label}; {'; '.join(ranges)}."
+
+
+def make_axis(name: str, unit: str, values: np.ndarray, is_log: bool = False) -> Axis:
+    """Return the axis for values [SI]; a name such as `slip_fraction` is displayed in percent."""
+    label = name.replace("_", " ")
+    size = np.abs(values[np.isfinite(values)]).max(initial=0.0)
+    unit, scale = choose_scale(name, unit or "1", size)
+    return Axis(f"{label} [{unit}]" if unit else label, scale, is_log)
+
+
+def thin(values: np.ndarray, count: int = MAX_CURVE_POINTS) -> np.ndarray:
+    """Return the indices that a curve needs: the smallest and the largest value of each of many intervals."""
+    if values.ndim > 1 or values.size <= 2 * count:
+        return np.arange(len(values))
+    edges = np.linspace(0, values.size, count + 1).astype(int)
+    picks = ((np.argmin, np.inf), (np.argmax, -np.inf))  # an unknown value is no extreme
+    extremes = [
+        start + pick(np.where(np.isnan(values[start:end]), unknown, values[start:end]))
+        for start, end in pairwise(edges)
+        for pick, unknown in picks
+    ]
+    return np.unique([0, *extremes, values.size - 1])
+
+
+def join_names(*names: str) -> str:
+    """Return the parts of an entry of the legend that are not empty."""
+    return ", ".join(name for name in names if name)

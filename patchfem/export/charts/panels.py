@@ -1,16 +1,14 @@
 """Data of a chart: the curves or maps that a row of the table selects from answers, in display units."""
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 
-from ...formatting import UNIT_LADDERS, choose_unit, format_number, needs_log_scale
+from ...formatting import format_number, needs_log_scale
 from ..answer import Answer, Variable
-from .panel import Axis, Curve, Panel
+from .panel import Axis, Curve, Panel, join_names, make_axis, thin
 from .table import Chart
 
-MAX_CURVE_POINTS = 3000  # a longer curve keeps the extremes of as many intervals
 MAX_MAP_COLUMNS = 400  # a finer map keeps every n-th column
 N_SHOWN_CYCLES = 3  # number of cycles of the span "cycles"
 SWEEP_STYLES = ("relative", "menu", "maps", "shares")
@@ -118,7 +116,7 @@ def make_panel(answers: dict[str, Answer], chart: Chart) -> Panel | None:
             own_curves = [replace(own_curves[0], name="")]
         if len(answers) > 1:  # a colour for each answer, and a dash for each of its curves
             own_curves = [
-                replace(curve, name=_join_names(label, curve.name), colour=number, dash=dash)
+                replace(curve, name=join_names(label, curve.name), colour=number, dash=dash)
                 for dash, curve in enumerate(own_curves)
             ]
         curves += own_curves
@@ -163,11 +161,6 @@ def _split(name: str) -> tuple[str, str]:
     """Return the variable and its own horizontal variable of "NAME@X"; "" for none."""
     variable, _, x_name = name.partition("@")
     return variable, x_name
-
-
-def _join_names(*names: str) -> str:
-    """Return the parts of an entry of the legend that are not empty."""
-    return ", ".join(name for name in names if name)
 
 
 def _find_x(data: dict[str, Variable], chart: Chart) -> str:
@@ -227,16 +220,10 @@ def _take(variable: Variable, dimension: str, indices: np.ndarray) -> Variable:
 
 
 def _make_axis(name: str, unit: str, arrays: list, log: str, letter: str) -> Axis:
-    """Return the axis for some arrays [SI]."""
-    numbers = [np.asarray(values, float).ravel() for values in arrays]
-    values = np.concatenate(numbers)
-    finite = np.abs(values[np.isfinite(values)])
-    label = name.replace("_", " ")
+    """Return the axis for some arrays [SI]; `log` and `letter` as in Chart."""
+    values = np.concatenate([np.asarray(values, float).ravel() for values in arrays])
     is_log = letter in log or ("auto" in log and needs_log_scale(values))
-    if unit in UNIT_LADDERS:
-        unit, scale = choose_unit(UNIT_LADDERS[unit], finite.max(initial=0.0))
-        return Axis(f"{label} [{unit}]", scale, is_log)
-    return Axis(f"{label} [{unit}]" if unit not in ("", "1") else label, 1.0, is_log)
+    return make_axis(name, unit, values, is_log)
 
 
 def _make_curves(data: dict[str, Variable], chart: Chart, name: str, axes: tuple) -> list[Curve]:
@@ -266,7 +253,7 @@ def _make_curves(data: dict[str, Variable], chart: Chart, name: str, axes: tuple
         )
         x_rows = x_values if x_values.ndim == 2 else [x_values] * len(variable.values)
         rows = [
-            (_join_names(label, f"interface {interface}"), x_row, values)
+            (join_names(label, f"interface {interface}"), x_row, values)
             for interface, x_row, values in zip(names, x_rows, variable.values, strict=True)
         ]
     elif variable.values.ndim == 2 and chart.style == "overlay":
@@ -280,7 +267,7 @@ def _make_curves(data: dict[str, Variable], chart: Chart, name: str, axes: tuple
     low, high = _find_band(data, name)
     curves = []
     for text, x_row, values in rows:
-        keep = _thin(values)
+        keep = thin(values)
         band = [
             None if end is None or end.shape != values.shape else (end * y_axis.scale)[keep]
             for end in (low, high)
@@ -288,7 +275,7 @@ def _make_curves(data: dict[str, Variable], chart: Chart, name: str, axes: tuple
         curves.append(Curve(text, x_row[keep], (values * y_axis.scale)[keep], *band))
     if chart.by in data and len(curves) == 1 and not is_line:
         is_joined = chart.style != "points"
-        return _split_by_code(curves[0], data[chart.by], _thin(rows[0][2]), is_joined)
+        return _split_by_code(curves[0], data[chart.by], thin(rows[0][2]), is_joined)
     return curves
 
 
@@ -326,16 +313,6 @@ def _find_band(data: dict[str, Variable], name: str) -> tuple[np.ndarray | None,
         error = np.where(error <= np.abs(values), error, np.nan)
         return values - error, values + error
     return None, None
-
-
-def _thin(values: np.ndarray) -> np.ndarray:
-    """Return the indices that a curve needs: the smallest and the largest value of each of many intervals."""
-    if values.ndim > 1 or values.size <= 2 * MAX_CURVE_POINTS:
-        return np.arange(len(values))
-    edges = np.linspace(0, values.size, MAX_CURVE_POINTS + 1).astype(int)
-    parts = [(start, values[start:end]) for start, end in pairwise(edges)]
-    extremes = [start + pick(part) for start, part in parts for pick in (np.argmin, np.argmax)]
-    return np.unique([0, *extremes, values.size - 1])
 
 
 def _split_by_code(curve: Curve, codes: Variable, keep: np.ndarray, is_joined: bool) -> list[Curve]:
@@ -378,10 +355,10 @@ def make_film(frames: dict[str, np.ndarray], title: str, unit: str) -> Panel:
         SI unit of the values.
     """
     positions = np.concatenate([frames["x"], frames["y"]])
-    x_axis = _make_axis("x", "m", [positions], "", "x")
-    y_axis = _make_axis("y", "m", [positions], "", "y")
-    colours = _make_axis(title, unit, [frames["values"]], "", "z")
-    times = _make_axis("time", "s", [frames["times"]], "", "z")
+    x_axis = make_axis("x", "m", positions)
+    y_axis = make_axis("y", "m", positions)
+    colours = make_axis(title, unit, frames["values"])
+    times = make_axis("time", "s", frames["times"])
     time_unit = times.label.partition("[")[2].rstrip("]")
     curves = [
         Curve(

@@ -1,14 +1,12 @@
 """Charts of a sweep: panels of the styles `relative`, `menu`, `maps` and `shares`.
 
-They take answers of kind "sweep", from memory or from their folders. Of more than MAX_DRAWN_CASES
-cases, evenly spaced ones and those in which a measure is largest or smallest are drawn.
+They take answers of kind "sweep", from memory or from their folders.
 """
 
 from __future__ import annotations
 
 import re
 from dataclasses import replace
-from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -17,8 +15,8 @@ from ...campaigns.sweeps.changes import MAIN_MEASURES
 from ...campaigns.sweeps.limits import NEGLIGIBLE_CHANGE
 from ...campaigns.sweeps.sweep_table import FINAL_OUTCOMES, MeasureColumn
 from ..answer import Answer, Variable
-from ..quantities import choose_scale, format_value
-from .panel import Axis, Curve, Panel
+from ..quantities import format_value
+from .panel import Axis, Curve, Panel, join_names, make_axis, thin
 from .table import Chart
 
 MAX_DRAWN_CASES = 1000  # cases of a measure, so that a page stays below 1.5 MB
@@ -27,7 +25,6 @@ MAX_MAP_VALUES = 40  # values of each key in a map
 # Ratio of the largest to the smallest value of a key and of a measure at which an axis is logarithmic.
 MIN_KEY_RATIO = 10.0
 MIN_MEASURE_RATIO = 100.0
-SHOWN_CHANGE = 0.2  # largest change in the close view of relative changes
 SYMBOLS = np.array(["circle", "circle-open", "x"])  # settled, over the tolerance, not settled
 
 
@@ -49,46 +46,59 @@ class SweepView(NamedTuple):
     axis: str
     others: list[str]
 
-    def split(self, name: str, default: float = np.nan) -> np.ndarray:
-        """Return a variable as (lines, values of the key on the axis); the default if it is missing."""
+    @property
+    def is_grid(self) -> bool:
+        """Whether the cases are all combinations of the values of the keys."""
+        return self.data[self.axis].dims == (self.axis,)
+
+    def split(self, name: str, default: float | str = np.nan) -> np.ndarray:
+        """Return a variable as (lines, values of the key on the axis), or the default if it is missing."""
         if name not in self.data:
             return np.array(default)
         variable = self.data[name]
-        moved = np.moveaxis(
-            variable.values, variable.dims.index(self.axis) if self.others else 0, -1
-        )
+        place = variable.dims.index(self.axis) if self.others else 0
+        moved = np.moveaxis(variable.values, place, -1)
         return moved.reshape(-1, moved.shape[-1])
 
     def find_symbols(self, name: str) -> np.ndarray:
         """Return the symbol of each case (lines, values): settled, over the tolerance or not settled."""
-        tolerance = self.details.get("tolerance")
         parts = (self.split(name), self.split(f"{name}_error"), self.split(f"{name}_floor", 0.0))
-        is_over = MeasureColumn("", *parts).misses(np.nan if tolerance is None else tolerance)
+        tolerance = self.details.get("tolerance") or np.nan
+        is_over = MeasureColumn("", *parts).misses(tolerance)
         has_settled = np.isin(self.split("outcome", FINAL_OUTCOMES[0]), FINAL_OUTCOMES)
         return SYMBOLS[np.where(has_settled, is_over.astype(int), 2)]
 
     def name_lines(self) -> list[str]:
         """Return the values of the other keys of each line as text; [""] for a single line."""
-        texts = [
-            [
-                f"{name.replace('_', ' ')} {format_value(value, self.data[name].unit)}"
-                for value in self.data[name].values.tolist()
-            ]
-            for name in self.others
-        ]
-        return [", ".join(line) for line in product(*texts)]
+        lines = [""]
+        for name in self.others:
+            variable = self.data[name]
+            label = name.replace("_", " ")
+            values = [format_value(value, variable.unit) for value in variable.values.tolist()]
+            lines = [join_names(line, f"{label} {value}") for line in lines for value in values]
+        return lines
+
+    def scale(self, name: str, min_ratio: float = MIN_KEY_RATIO) -> tuple[Axis, np.ndarray]:
+        """Return the axis of a variable and its values in the unit of the axis; words stay words.
+
+        `min_ratio` is the ratio of its values at which the axis is logarithmic.
+        """
+        values = self.data[name].values
+        if values.dtype.kind != "f":
+            return Axis(name.replace("_", " ")), values.astype(str)
+        finite = values[np.isfinite(values)]
+        is_log = finite.min(initial=np.inf) > 0 and finite.max() >= min_ratio * finite.min()
+        axis = make_axis(name, self.data[name].unit, values, bool(is_log))
+        return axis, values * axis.scale
 
 
 def view_sweep(answer: Answer, axis: str = "") -> SweepView:
     """Return the view of a sweep along a key; by default the numerical key with the most values."""
-    data = answer.data
     keys = list_keys(answer)
-    counts = {
-        key: (data[key].values.dtype.kind == "f", np.unique(data[key].values).size) for key in keys
-    }
-    axis = axis or max(keys, key=counts.__getitem__)
-    is_grid = data[axis].dims == (axis,)
-    return SweepView(data, answer.details, axis, [key for key in keys if key != axis] * is_grid)
+    columns = {key: answer.data[key].values for key in keys}
+    counts = {key: (one.dtype.kind == "f", np.unique(one).size) for key, one in columns.items()}
+    view = SweepView(answer.data, answer.details, axis or max(keys, key=counts.__getitem__), [])
+    return view._replace(others=[key for key in keys if view.is_grid and key != view.axis])
 
 
 def list_keys(answer: Answer) -> list[str]:
@@ -107,75 +117,35 @@ def list_measures(answers: dict[str, Answer]) -> list[str]:
     return sorted(names, key=lambda name: name not in MAIN_MEASURES)
 
 
-def make_axis(name: str, variable: Variable, min_ratio: float) -> tuple[Axis, np.ndarray]:
-    """Return the axis of a variable and its values in the unit of the axis; words stay words.
-
-    `min_ratio` is the ratio of its values at which it is logarithmic.
-    """
-    label = name.replace("_", " ")
-    values = variable.values
-    if values.dtype.kind != "f":
-        return Axis(label), values.astype(str)
-    finite = values[np.isfinite(values)]
-    unit, scale = choose_scale(name, variable.unit or "1", np.abs(finite).max(initial=0.0))
-    is_log = bool(finite.size and finite.min() > 0 and finite.max() >= min_ratio * finite.min())
-    return Axis(f"{label} [{unit}]" if unit else label, scale, is_log), values * scale
-
-
 def spread_indices(size: int, count: int) -> np.ndarray:
     """Return at most `count` evenly spaced indices of `size` elements, both ends included."""
     return np.unique(np.linspace(0, size - 1, min(size, count)).astype(int))
 
 
-def select_cases(values: np.ndarray, count: int) -> np.ndarray:
-    """Return the indices of about `count` of the values (n,): evenly spaced ones and the extremes."""
-    finite = np.flatnonzero(np.isfinite(values))
-    extremes = [finite[pick(values[finite])] for pick in (np.argmin, np.argmax) if finite.size]
-    return np.unique([*spread_indices(values.size, count), *extremes]).astype(int)
-
-
-def join_texts(*texts: str) -> str:
-    """Return the texts that are not empty, separated by commas."""
-    return ", ".join(text for text in texts if text)
-
-
 def make_relative(answers: dict[str, Answer], chart: Chart) -> Panel | None:
     """Return the main measures relative to their first case along the only key, with the band of 5 %."""
     curves = []
-    x_axis = None
     for title, answer in answers.items():
         view = view_sweep(answer)
-        if view.others or answer.data[view.axis].dims != (view.axis,):
+        if view.others or not view.is_grid:
             continue
-        x_axis, x = make_axis(view.axis, answer.data[view.axis], MIN_KEY_RATIO)
+        x_axis, x = view.scale(view.axis)
         for name in chart.y:
             values = view.split(name).ravel()
             if values.size > 1 and abs(values[0]) > 0:  # False for NaN
-                keep = select_cases(values, MAX_DRAWN_CASES)
-                label = join_texts(title, name.replace("_", " "))
+                keep = thin(values, MAX_DRAWN_CASES // 2)
+                label = join_names(title, name.replace("_", " "))
                 curves.append(Curve(label, x[keep], values[keep] / values[0]))
     if not curves:
         return None
 
-    # A logarithmic axis has no place for 0.
     ratios = np.concatenate([curve.y[np.isfinite(curve.y)] for curve in curves])
-    positive = ratios[ratios > 0]
-    is_log = bool(ratios.min() >= 0 and ratios.max() >= MIN_KEY_RATIO * positive.min())
-    limits = {"all changes": np.inf}
-    if np.abs(ratios - 1).max() > SHOWN_CHANGE:
-        limits["changes up to 20 %"] = SHOWN_CHANGE
-    panels = []
-    ends = curves[0].x[[0, -1]]
-    one = np.ones(2)
-    for title, limit in limits.items():
-        is_log &= limit > SHOWN_CHANGE
-        axis = Axis("value / value of the first case", is_log=is_log)
-        shown = [Curve("± 5 %", ends, one, one - NEGLIGIBLE_CHANGE, one + NEGLIGIBLE_CHANGE)]
-        for curve in curves:
-            is_shown = (np.abs(curve.y - 1) <= limit) & (not is_log or curve.y > 0)
-            shown.append(replace(curve, y=np.where(is_shown, curve.y, np.nan)))
-        panels.append(Panel(title, chart.style, x_axis, axis, shown))
-    return _add_choices(chart, panels)
+    # A logarithmic axis leaves out 0.
+    is_log = bool(ratios.min() >= 0 and ratios.max() >= MIN_KEY_RATIO * ratios[ratios > 0].min())
+    band = [np.full(2, 1 + change) for change in (0, -NEGLIGIBLE_CHANGE, NEGLIGIBLE_CHANGE)]
+    curves.insert(0, Curve("± 5 %", curves[0].x[[0, -1]], *band))
+    axis = Axis("value / value of the first case", is_log=is_log)
+    return Panel(chart.title, chart.style, x_axis, axis, curves, chart.caption)
 
 
 def make_menu(answers: dict[str, Answer], chart: Chart) -> Panel | None:
@@ -185,14 +155,11 @@ def make_menu(answers: dict[str, Answer], chart: Chart) -> Panel | None:
 
 
 def _add_choices(chart: Chart, panels: list[Panel]) -> Panel | None:
-    """Return a panel with a menu of panels; None without panels."""
+    """Return a panel with a menu of panels, or the only panel; None without panels."""
     if not panels:
         return None
-    choices = panels if len(panels) > 1 else []
-    labels = {"title": chart.title, "style": chart.style, "caption": chart.caption}
-    return replace(
-        panels[0], choices=choices, **(labels if choices else labels | {"style": panels[0].style})
-    )
+    panel = replace(panels[0], title=chart.title, caption=chart.caption)
+    return replace(panel, style=chart.style, choices=panels) if len(panels) > 1 else panel
 
 
 def make_measure_panel(answers: dict[str, Answer], name: str) -> Panel:
@@ -206,27 +173,25 @@ def make_measure_panel(answers: dict[str, Answer], name: str) -> Panel:
     for title, answer in answers.items():
         if name not in answer.data:
             continue
-        shares = answer.details.get("ranking", {}).get(name)
         view = view_sweep(answer)
+        shares = answer.details.get("ranking", {}).get(name)
         if shares and not view.others:
             view = view_sweep(answer, re.sub(r"\W", "_", shares[0]["key"]))
-        x_axis, x = make_axis(view.axis, answer.data[view.axis], MIN_KEY_RATIO)
-        y_axis, _ = make_axis(name, answer.data[name], MIN_MEASURE_RATIO)
-        axes = axes or (x_axis, y_axis)
+        x_axis, x = view.scale(view.axis)
+        axes = axes or (x_axis, view.scale(name, MIN_MEASURE_RATIO)[0])
         values = view.split(name) * axes[1].scale
         errors = np.broadcast_to(view.split(f"{name}_error") * axes[1].scale, values.shape)
         symbols = np.broadcast_to(view.find_symbols(name), values.shape)
         texts = view.name_lines()
         lines = spread_indices(len(values), MAX_LINES)
         for line in lines:
-            keep = select_cases(values[line], MAX_DRAWN_CASES // len(lines))
+            keep = thin(values[line], MAX_DRAWN_CASES // (2 * len(lines)))
             y, error, marks = (array[line][keep] for array in (values, errors, symbols))
             band = (None, None) if np.isnan(error).all() else (y - error, y + error)
             is_plain = (marks == SYMBOLS[0]).all()
-            label = join_texts(title, texts[line])
+            label = join_names(title, texts[line])
             curves.append(Curve(label, x[keep], y, *band, symbols=None if is_plain else marks))
-    is_line = view.data[view.axis].dims == (view.axis,)
-    return Panel(name.replace("_", " "), "dots" if is_line else "points", *axes, curves)
+    return Panel(name.replace("_", " "), "dots" if view.is_grid else "points", *axes, curves)
 
 
 def make_map_menu(answers: dict[str, Answer], chart: Chart) -> Panel | None:
@@ -234,13 +199,13 @@ def make_map_menu(answers: dict[str, Answer], chart: Chart) -> Panel | None:
     view = view_sweep(next(iter(answers.values())))
     if len(answers) > 1 or len(view.others) != 1:
         return None
-    x_axis, x = make_axis(view.axis, view.data[view.axis], MIN_KEY_RATIO)
-    y_axis, y = make_axis(view.others[0], view.data[view.others[0]], MIN_KEY_RATIO)
+    x_axis, x = view.scale(view.axis)
+    y_axis, y = view.scale(view.others[0])
     columns = spread_indices(x.size, MAX_MAP_VALUES)
     rows = spread_indices(y.size, MAX_MAP_VALUES)
     panels = []
     for name in list_measures(answers):
-        axis, _ = make_axis(name, view.data[name], MIN_MEASURE_RATIO)
+        axis, _ = view.scale(name)
         values = view.split(name)[np.ix_(rows, columns)] * axis.scale
         if np.isfinite(values).any():
             curve = Curve("", x[columns], values, rows=y[rows])
@@ -255,11 +220,9 @@ def make_shares(answers: dict[str, Answer], chart: Chart) -> Panel | None:
     ranking = next(iter(answers.values())).details.get("ranking", {})
     for name, indices in ranking.items() if len(answers) == 1 else ():
         # The first bar is at the bottom.
-        rows = [
-            [index[part] for index in indices[::-1]] for part in ("first", "total", "low", "high")
-        ]
-        first, total, low, high = 100 * np.array(rows)
-        keys = np.array([index["key"] for index in indices[::-1]])
+        columns = {part: np.array([index[part] for index in indices[::-1]]) for part in indices[0]}
+        keys = columns.pop("key")
+        first, total, low, high = (100 * column for column in columns.values())
         ends = (None, None) if (low == high).all() else (low, high)
         curves = [Curve("with interactions", keys, total, *ends), Curve("alone", keys, first)]
         axes = (Axis("share of the variance [%]"), Axis(""))

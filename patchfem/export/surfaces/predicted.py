@@ -123,7 +123,7 @@ def read_history(folder: Path, piece: str = "") -> WearHistory:
         If the folder is not that of a run from unworn pieces with [wear], without strips.
     """
     run = read_patch(folder)
-    wear = run.scene.get("wear", {})
+    wear = run.tables.get("wear", {})
     upper_share = float(wear.get("upper_share", 0.0))
     share = {"lower": 1 - upper_share, "upper": upper_share, "": 0.5}.get(piece, 0.0)
     checks = (

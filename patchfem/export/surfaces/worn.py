@@ -65,7 +65,7 @@ def answer_runs(before: Path, after: Path) -> Answer:
                 f"{path}: a file, while {other} is a folder: two files of surfaces or two results folders are needed"
             )
     runs = (read_patch(before), read_patch(after))
-    if "wear" not in runs[1].scene:
+    if "wear" not in runs[1].tables:
         raise PatchfemError(
             f"{after}: this run has no [wear], so nothing wore off; give the run with [wear] as the second folder"
         )
@@ -119,8 +119,8 @@ def describe(runs: tuple[PatchRun, PatchRun], wear: Wear) -> tuple[str, ...]:
         return ("Nothing wore off between the two runs.",)
     after = runs[1]
     since = f" (the surface before: {runs[0].cycles:.6g})" if runs[0].cycles else ""
-    if "start" in after.scene["wear"]:
-        since += f", continued from {Path(after.scene['wear']['start']).name}"
+    if "start" in after.tables["wear"]:
+        since += f", continued from {Path(after.tables['wear']['start']).name}"
     depth = format_value("worn_depth_mean", values["worn_depth_mean"])
     headline = (
         f"Worn depth {depth}, the mean over the patch, after {after.cycles:.6g} cycles{since}."

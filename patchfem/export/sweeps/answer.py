@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import shlex
-from collections import defaultdict
+from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 
 import numpy as np
 
@@ -21,11 +22,10 @@ from ...scene.keys.lookup import find_key
 from ..answer import Answer, Quantity, Remarks, Variable
 from ..runs import list_versions
 from .tables import sort_measures
-from .words import describe_place, make_verdict
+from .words import describe_place, make_peak_quantities, make_verdict
 
 MAX_RANGES = 3  # measures whose largest and smallest values are quantities
 MAX_MESSAGES = 5  # messages of failed cases among the warnings
-MAX_COMMAND_LENGTH = 2000  # characters of the values in a command; a longer list is a file
 MAX_CASES_TRIED = 3  # cases that are tried until one is valid, for the tolerance of all
 
 
@@ -72,16 +72,12 @@ def identify_sweep(sweep_scene: SweepScene, cases: Cases) -> dict[str, str | lis
     return {"scene": sweep_scene.hash_common_data(), "keys": [axis.key for axis in cases.axes]}
 
 
-def read_tolerance(sweep_scene: SweepScene, cases: Cases) -> float | None:
-    """Return the tolerance that all cases share; None if it is swept or no case is valid."""
-    if any(axis.key == "accuracy.tolerance" for axis in cases.axes):
-        return None
+def read_tolerance(sweep_scene: SweepScene, cases: Cases) -> float:
+    """Return the tolerance of the first valid case; NaN if none of the first cases is valid."""
     for number in range(min(len(cases), MAX_CASES_TRIED)):
-        try:
+        with suppress(PatchfemError):
             return sweep_scene.read_scene(cases.assignments(number)).accuracy.tolerance
-        except PatchfemError:  # the case is invalid
-            continue
-    return None
+    return np.nan
 
 
 def _make_command(sweep_scene: SweepScene, cases: Cases) -> str:
@@ -91,29 +87,17 @@ def _make_command(sweep_scene: SweepScene, cases: Cases) -> str:
         words += ["--set", assignment]
     if sweep_scene.of:
         words += ["--of", sweep_scene.of]
-    cells = list(cases.request_arguments)
-    for axis in () if cases.is_table else cases.axes:
-        cells += ["--over", f"{axis.key}={','.join(axis.texts)}"]
-    if not cells or sum(map(len, cells)) > MAX_COMMAND_LENGTH:
-        cells = ["--cases", "sweep.csv"]
-    return shlex.join([*words, *cells])
+    return shlex.join([*words, *cases.arguments])
 
 
 def _make_details(table: SweepTable, analysis: SweepAnalysis) -> dict:
     """Return the numbers of sweep.json."""
-    outcomes = table.count_outcomes()
     ranking = {
         name: [index._asdict() for index in indices] for name, indices in analysis.ranking.items()
     }
     tolerance = np.ravel(table.tolerance)
     return {
-        "cases": {
-            "count": len(table),
-            "failed": table.count_failed(),
-            "unfinished": outcomes.get("", 0),
-            "outcomes": outcomes,
-            "over_tolerance": table.count_misses(),
-        },
+        "cases": analysis.cases,
         "ranking": ranking,
         "limits": [limit._asdict() for limit in analysis.limits if np.isfinite(limit.value)],
         "peaks": [_make_peak_row(table, entry) for entry in analysis.peaks],
@@ -129,19 +113,8 @@ def _make_peak_row(table: SweepTable, entry: PeakOnLine) -> dict:
     """Return a peak as a row of sweep.json."""
     unit = table.measures[entry.measure].unit
     row = {"measure": entry.measure, "case": describe_place(table, entry)}
-    quantities = _make_peak_quantities(entry, unit)
+    quantities = make_peak_quantities(entry, unit)
     return row | {name: quantity.as_json() for name, quantity in quantities.items()}
-
-
-def _make_peak_quantities(entry: PeakOnLine, unit: str) -> dict[str, Quantity]:
-    """Return frequency, height and width of a peak, whose height has this unit."""
-    peak = entry.peak
-    reason = "" if np.isfinite(peak.width) else "the cases do not show it"
-    return {
-        "peak_frequency": Quantity(peak.frequency, "Hz", peak.frequency_error),
-        "peak_height": Quantity(peak.height, unit, peak.height_error),
-        "half_power_width": Quantity(peak.width, "Hz", peak.width_error, reason=reason),
-    }
 
 
 def _make_quantile_row(values: np.ndarray, unit: str) -> dict:
@@ -155,7 +128,7 @@ def _make_quantities(table: SweepTable, analysis: SweepAnalysis) -> dict[str, Qu
     quantities = {}
     if len(analysis.peaks) == 1:
         unit = table.measures[analysis.peaks[0].measure].unit
-        quantities |= _make_peak_quantities(analysis.peaks[0], unit)
+        quantities |= make_peak_quantities(analysis.peaks[0], unit)
     for limit in analysis.limits:
         reason = "" if np.isfinite(limit.value) else "the cases do not show where it lies"
         quantities[f"limit_{limit.measure}"] = Quantity(
@@ -168,8 +141,12 @@ def _make_quantities(table: SweepTable, analysis: SweepAnalysis) -> dict[str, Qu
     for name, low, high, _ in analysis.ranges[:MAX_RANGES]:
         column = table.measures[name]
         for word, case in (("smallest", low), ("largest", high)):
-            value, error, floor = column.get_numbers(case)
-            quantities[f"{word}_{name}"] = Quantity(value, column.unit, error, floor=floor)
+            quantities[f"{word}_{name}"] = Quantity(
+                column.values[case],
+                column.unit,
+                column.errors[case],
+                floor=float(column.floors[case]),
+            )
     return quantities
 
 
@@ -183,10 +160,7 @@ def _make_data(table: SweepTable, case_folders: Sequence[str]) -> dict[str, Vari
     if not table.is_grid:
         data["case"] = Variable(dims, np.arange(len(table)), "1", "number of the case")
     for axis, key in enumerate(table.keys):
-        values = key.values
-        if table.is_grid:
-            values = np.moveaxis(values.reshape(table.shape), axis, -1)
-            values = values.reshape(-1, table.shape[axis])[0]
+        values = key.values[table.split_lines(axis)[0]] if table.is_grid else key.values
         own_dims = (key.name,) if table.is_grid else dims
         data[key.name] = Variable(own_dims, values, key.unit, _describe_key(key))
 
@@ -224,14 +198,9 @@ def _describe_key(key: SweptKey) -> str:
 
 
 def _describe_failures(table: SweepTable) -> tuple[str, ...]:
-    """Return a sentence for each message of failed cases, for at most MAX_MESSAGES messages."""
-    cases = defaultdict(list)
-    for number in sorted(table.messages):
-        cases[table.messages[number]].append(number + 1)
-    sentences = []
-    for message, numbers in list(cases.items())[:MAX_MESSAGES]:
-        others = f" and {len(numbers) - 1} more" if len(numbers) > 1 else ""
-        sentences.append(f"case {numbers[0]}{others}: {message}")
-    if len(cases) > MAX_MESSAGES:
-        sentences.append("the messages of all failed cases are in sweep.csv")
-    return tuple(sentences)
+    """Return the most frequent messages of failed cases, each with the number of cases."""
+    counts = Counter(table.messages[number] for number in sorted(table.messages))
+    return tuple(
+        f"{message} ({count} of {len(table)} cases)"
+        for message, count in counts.most_common(MAX_MESSAGES)
+    )

@@ -16,12 +16,7 @@ def to_dataset(answer: Answer):
 
     Its attributes are those of sweep.nc, the `answer` in one sentence and the `tolerance`.
     """
-    dataset = netcdf.to_dataset(answer)
-    dataset = dataset.set_coords(list_keys(answer))
-    dataset.attrs["answer"] = answer.details["answer"]
-    if answer.details["tolerance"] is not None:
-        dataset.attrs["tolerance"] = answer.details["tolerance"]
-    return dataset
+    return netcdf.to_dataset(answer).set_coords(list_keys(answer))
 
 
 def sweep_axes(dataset, measure: str, axes=None):
@@ -41,13 +36,8 @@ def sweep_axes(dataset, measure: str, axes=None):
         If the dataset is not that of a sweep, or does not have this measure.
     """
     names = [str(name) for name in getattr(dataset, "data_vars", ()) if f"{name}_error" in dataset]
-    if not names:
-        raise PatchfemError(
-            "plot.sweep: a Dataset returned by pf.sweep is needed, with measures and their errors",
-            "",
-        )
     if measure not in names:
-        listed = ", ".join(sorted(names))
+        listed = ", ".join(sorted(names)) or "none; give a Dataset returned by pf.sweep"
         raise PatchfemError(f"plot.sweep: no measure {measure!r}; there are {listed}", "")
     if axes is None:
         from matplotlib.figure import Figure

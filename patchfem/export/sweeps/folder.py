@@ -18,7 +18,6 @@ from pathlib import Path
 import numpy as np
 
 from ...campaigns.sweeps.cases import Cases
-from ...campaigns.sweeps.sweep_table import SweepTable
 from ...core import Missing, PatchfemError
 from ...disk.atomic_write import WriteError, explain_mkdir_error, write_bytes, write_text
 from ...disk.lock import FolderLock
@@ -35,15 +34,34 @@ TABLES = ("sweep.csv", "sweep.nc", "sweep.json", "summary.json", "report.html")
 
 
 @dataclass(frozen=True, slots=True)
-class SummaryWriter:
-    """Function that makes summary.json of a case, in the process that ran the case."""
+class Writer:
+    """Writer of the files of cases, on any machine that has access to the folder of the sweep.
+
+    Attributes
+    ----------
+    cases : Cases
+    target : Path
+    shown : Path
+        The folder as the user named it.
+    names : (n,) array of uint64
+        Names of the cases.
+    keep : str
+        As in `run.SweepTarget`.
+    token : str
+        Name of a file by which the folder is identified.
+    """
 
     cases: Cases
+    target: Path
+    shown: Path
+    names: np.ndarray
+    keep: str
+    token: str
 
-    def __call__(
+    def make_summary(
         self, number: int, model: Model | PatchfemError, results: CaseResults, case: int
     ) -> str:
-        """Return the text of summary.json.
+        """Return the text of summary.json of a case.
 
         Parameters
         ----------
@@ -56,76 +74,59 @@ class SummaryWriter:
         """
         quantities = {
             name: Quantity(
-                float(results.values[name][case]),
+                results.values[name][case],
                 unit,
-                float(results.errors[name][case]),
+                results.errors[name][case],
                 floor=float(results.floors[name][case]),
                 reason=results.reasons.get(name, {}).get(case, ""),
             )
             for name, unit in results.units.items()
             if results.has(name, case)
         }
-        has_model = isinstance(model, Model)
-        effects = model.source.effects if has_model else ()
         details = {
             "outcome": str(results.outcome[case]),
-            "effects": [{"effect": name, "equations": EFFECTS[name].equations} for name in effects],
-            "not_in_scene": list(model.absent) if has_model else [],
+            "effects": [],
+            "not_in_scene": [],
             "seconds": {"total": float(results.seconds[case])},
             "numerics": results.numerics.get(case, {}),
             "case": dict(zip([axis.key for axis in self.cases.axes], self.cases.texts(number))),
         }
+        kind = "linear"
+        title = ""
+        if isinstance(model, Model):
+            kind = model.kind
+            title = model.source.title
+            details["effects"] = [
+                {"effect": name, "equations": EFFECTS[name].equations}
+                for name in model.source.effects
+            ]
+            details["not_in_scene"] = list(model.absent)
         if case in results.messages:
             details["message"] = results.messages[case]
         remarks = Remarks(results.warnings.get(case, ()), results.notes.get(case, ()))
-        kind = model.kind if has_model else "linear"
-        title = model.source.title if has_model else ""
         answer = Answer(kind, title, (), quantities, remarks=remarks, details=details)
         return json.dumps(answers.make_summary(answer), allow_nan=False, ensure_ascii=False) + "\n"
 
-
-@dataclass(frozen=True, slots=True)
-class ResultsWriter:
-    """Function that writes the results folder of a case; page: whether it has a report.html."""
-
-    folder: Path
-    names: np.ndarray
-    page: bool = False
-
-    def __call__(self, number: int, result) -> None:
-        """Write the folder of a case after its run."""
+    def write_results(self, number: int, result) -> None:
+        """Write the results folder of a case after its run."""
         # Only these sweeps need the modules that write the fields of a run.
         from ..folder import Folder as ResultsFolder
         from ..run_folder import write_results, write_run_page
 
-        with ResultsFolder(self.folder / CASES / case_folder_name(self.names[number])) as folder:
+        with ResultsFolder(self.target / CASES / case_folder_name(self.names[number])) as folder:
             written = write_results(result, folder.path)
-        if self.page:
+        if self.keep == "pages":
             write_run_page(written, folder.target)
-
-
-@dataclass(frozen=True, slots=True)
-class Writer:
-    """Function that stores results in the folder of a sweep, from any machine that has access to it.
-
-    `token` is the name of a file by which the folder is identified; keep: as in `run.SweepTarget`.
-    """
-
-    target: Path
-    shown: Path
-    names: np.ndarray
-    keep: str
-    token: str
 
     def __call__(self, numbers: Sequence[int], results: CaseResults, texts: Sequence[str]) -> bool:
         """Write results as `put` does; return False if the folder is not accessible or the disk is full."""
-        if not (self.target / CHUNKS / self.token).is_file():
-            return False
         try:
-            self.put(numbers, results, texts)
+            is_accessible = (self.target / CHUNKS / self.token).is_file()
+            if is_accessible:
+                self.put(numbers, results, texts)
+            return is_accessible
         except Missing:  # the process that requested the cases writes them and reports the error
             return False
-        return True
 
     def put(self, numbers: Sequence[int], results: CaseResults, texts: Sequence[str]) -> None:
         """Write the summaries of cases, then their chunk.
@@ -239,17 +240,18 @@ class Folder:
                 "--resume to replace that sweep"
             )
 
-    def load(self, table: SweepTable) -> None:
-        """Insert all stored results into a table."""
+    def find_stored_cases(self, keep: str) -> np.ndarray:
+        """Return whether each case (n,) has a result and the files that `keep` requires."""
+        required = [answers.SUMMARY, answers.SCENE, answers.PAGE]
+        required = required[: ("none", "summaries", "results", "pages").index(keep)]
+        is_stored = np.zeros(len(self.chunks.names), bool)
         for numbers, results in self.chunks.iterate_results():
-            table.insert(numbers, results)
-
-    def has_files(self, number: int, keep: str, has_failed: bool) -> bool:
-        """Return whether the folder of a case has the files that `keep` requires."""
-        count = {"summaries": 1, "results": 2, "pages": 3}[keep]
-        required = (answers.SUMMARY, answers.SCENE, answers.PAGE)[: 1 if has_failed else count]
-        folder = self.target / CASES / case_folder_name(self.chunks.names[number])
-        return all((folder / name).is_file() for name in required)
+            is_stored[numbers] = True
+            for case, number in enumerate(numbers.tolist()) if required else ():
+                files = required[:1] if case in results.messages else required  # a case that failed
+                folder = self.target / CASES / case_folder_name(self.chunks.names[number])
+                is_stored[number] = all((folder / name).is_file() for name in files)
+        return is_stored
 
     def case_folder_names(self) -> list[str]:
         """Return the folder names of the cases in cases/, or [] if no case has a folder."""
@@ -257,9 +259,9 @@ class Folder:
             return []
         return [case_folder_name(name) for name in self.chunks.names]
 
-    def remove_tables(self) -> None:
-        """Remove the tables."""
-        for name in TABLES:
+    def remove_tables(self, *names: str) -> None:
+        """Remove some of the tables; all without names."""
+        for name in names or TABLES:
             (self.target / name).unlink(missing_ok=True)
 
     def clean(self, *, removes_others: bool, keep: str = "") -> None:
@@ -274,15 +276,14 @@ class Folder:
         """
         self.chunks.merge_files(removes_others=removes_others)
         own = set() if keep == "none" else set(self.case_folder_names())
-        incomplete = [path for path in (self.target / CHUNKS).glob(".*") if path.name != self.token]
-        for path in (self.target / CASES).glob("*"):
-            is_incomplete = path.name.startswith(".") or path.name.endswith(".partial")
-            if is_incomplete or (removes_others and path.name not in own):
-                incomplete.append(path)
-        for path in incomplete:
-            if path.is_dir():
-                shutil.rmtree(path, ignore_errors=True)
-            else:
-                path.unlink(missing_ok=True)
+        stored = {*self.chunks.list_files(), self.target / CHUNKS / self.token}
+        stored |= {self.target / CASES / name for name in own}
+        for folder in (CHUNKS, CASES):
+            for path in (self.target / folder).glob("*"):
+                is_incomplete = path.name.startswith(".") or path.name.endswith(".partial")
+                if path not in stored and (is_incomplete or removes_others):
+                    shutil.rmtree(path, ignore_errors=True) if path.is_dir() else path.unlink(
+                        missing_ok=True
+                    )
         with suppress(OSError):  # the folder does not exist, or still contains cases
             (self.target / CASES).rmdir()

@@ -9,7 +9,6 @@ written under another name and renamed. A file that cannot be read holds no case
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Iterator
 from io import BytesIO
 from pathlib import Path
@@ -19,7 +18,7 @@ import h5py
 import numpy as np
 
 from ...disk.atomic_write import write_bytes
-from ...runs.batch.case_results import CaseResults
+from ...runs.batch.case_results import CaseResults, join_case_results
 
 CHUNKS = "chunks"
 SUFFIX = ".nc"
@@ -35,8 +34,7 @@ def write_chunk(folder: Path, names: np.ndarray, results: CaseResults) -> Path:
     OSError or WriteError
         If there is no space.
     """
-    words = sorted(set(map(str, results.outcome)))
-    codes = np.array([words.index(str(word)) for word in results.outcome], np.uint8)
+    words, codes = np.unique(results.outcome.astype(str), return_inverse=True)
     # h5py stores a file in memory with fewer overheads than in a folder on a network.
     with h5py.File("chunk", "w", driver="core", backing_store=False, libver="latest") as memory:
         with h5netcdf.File(memory, "w") as file:
@@ -44,7 +42,7 @@ def write_chunk(folder: Path, names: np.ndarray, results: CaseResults) -> Path:
             file.attrs["measures"] = json.dumps(results.units)
             file.attrs["messages"] = json.dumps(results.messages, ensure_ascii=False)
             file.create_variable("name", ("case",), data=np.asarray(names, np.uint64))
-            outcome = file.create_variable("outcome", ("case",), data=codes)
+            outcome = file.create_variable("outcome", ("case",), data=codes.astype(np.uint8))
             outcome.attrs["flag_values"] = np.arange(len(words), dtype=np.uint8)
             outcome.attrs["flag_meanings"] = " ".join(words)
             for part, kind in TABLE_TYPES.items() if results.units else ():
@@ -102,10 +100,8 @@ class Chunks:
 
     def list_files(self) -> list[Path]:
         """Return the files of the folder, the newest last."""
-        entries = [entry for entry in os.scandir(self.folder) if entry.name.endswith(SUFFIX)]
-        entries = [entry for entry in entries if not entry.name.startswith(".")]
-        entries.sort(key=lambda entry: (entry.stat().st_mtime_ns, entry.name))
-        return [Path(entry.path) for entry in entries]
+        files = self.folder.glob(f"[!.]*{SUFFIX}")
+        return sorted(files, key=lambda path: (path.stat().st_mtime_ns, path.name))
 
     def iterate_results(self) -> Iterator[tuple[np.ndarray, CaseResults]]:
         """Yield the numbers of the requested cases that a file contains, and their results.
@@ -134,30 +130,30 @@ class Chunks:
         files = self.list_files()
         if len(files) <= 2 * -(-len(self.names) // MAX_CASES_PER_FILE) and not removes_others:
             return
-        small = {}
+        group = {}
         for path in files:
             names, results = read_chunk(path)
             if not len(names) or (removes_others and (self._find_rows(names) < 0).all()):
                 path.unlink()
-            elif len(names) < MAX_CASES_PER_FILE // 2:
-                small[path] = (names, results)
-            if sum(len(names) for names, _ in small.values()) >= MAX_CASES_PER_FILE:
-                self._replace_files(small)
-                small = {}
-        self._replace_files(small)
+                continue
+            group[path] = (names, results)
+            if sum(len(names) for names, _ in group.values()) >= MAX_CASES_PER_FILE:
+                self._merge(group)
+                group = {}
+        self._merge(group)
 
-    def _replace_files(self, contents: dict[Path, tuple[np.ndarray, CaseResults]]) -> None:
+    def _merge(self, group: dict[Path, tuple[np.ndarray, CaseResults]]) -> None:
         """Write the contents of several files into one, and then remove these files."""
-        if len(contents) < 2:
+        if len(group) < 2:
             return
-        names = np.concatenate([names for names, _ in contents.values()])
-        joined = CaseResults.blank(len(names))
-        start = 0
-        for part_names, part in contents.values():
-            joined.insert(range(start, start + len(part_names)), part)
-            start += len(part_names)
-        new = write_chunk(self.folder, names, joined)
-        for path in contents:
+        names = np.concatenate([names for names, _ in group.values()])
+        starts = np.cumsum([0, *(len(part) for part, _ in group.values())])
+        parts = [
+            (start + np.arange(len(part)), one)
+            for start, (part, one) in zip(starts, group.values())
+        ]
+        new = write_chunk(self.folder, names, join_case_results(len(names), parts))
+        for path in group:
             if path != new:
                 path.unlink()
 

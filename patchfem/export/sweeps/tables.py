@@ -6,13 +6,14 @@ from collections.abc import Iterator, Sequence
 from itertools import chain
 from pathlib import Path
 
+import numpy as np
+
 from ...campaigns.sweeps.cases import Cases
 from ...campaigns.sweeps.sweep_table import SweepTable
 from ...disk.atomic_write import write_rows
 from ...response import rows
 from ...runs.results.patch_rows import TABLE as STATIC
 
-CASES_PER_BLOCK = 256  # cases whose strings are in memory at the same time
 MEASURE_ORDER = {name: place for place, name in enumerate((*STATIC, *rows.TABLE))}
 
 
@@ -43,28 +44,27 @@ def write_csv(cases: Cases, table: SweepTable, case_folders: Sequence[str], path
     """
     names = sort_measures(table)
     heads = [axis.key for axis in cases.axes] + ["outcome"]
-    heads += [head for name in names for head in (name, f"{name}_error")] + ["message"]
-    heads += ["case"] if case_folders else []
-    write_rows(path, chain([heads], _make_rows(cases, table, names, case_folders)))
+    texts = []
+    for name in names:
+        heads += [name, f"{name}_error"]
+        texts.append(_format_numbers(table.measures[name].values, "{!r}"))
+        texts.append(_format_numbers(table.measures[name].errors, "{:.6g}"))
+    heads += ["message"] + ["case"] * bool(case_folders)
+    # The rows are made one by one, because the cells of all cases would fill the memory.
+    lines = (
+        [
+            *cases.texts(number),
+            str(table.outcome[number]),
+            *cells,
+            table.messages.get(number, ""),
+            *case_folders[number : number + 1],
+        ]
+        for number, *cells in zip(range(len(table)), *texts)
+    )
+    write_rows(path, chain([heads], lines))
 
 
-def _make_rows(
-    cases: Cases, table: SweepTable, names: list[str], case_folders: Sequence[str]
-) -> Iterator[list[str]]:
-    """Yield the rows of the cases."""
-    columns = [table.measures[name] for name in names]
-    for first in range(0, len(table), CASES_PER_BLOCK):
-        block = slice(first, first + CASES_PER_BLOCK)
-        texts = []
-        for column in columns:
-            texts.append(_format_numbers(column.values[block], "{!r}"))
-            texts.append(_format_numbers(column.errors[block], "{:.6g}"))
-        for number, *cells in zip(range(len(table))[block], *texts, strict=bool(texts)):
-            folder = case_folders[number : number + 1]
-            message = table.messages.get(number, "")
-            yield [*cases.texts(number), str(table.outcome[number]), *cells, message, *folder]
-
-
-def _format_numbers(numbers, template: str) -> list[str]:
-    """Return numbers as strings; "" for NaN."""
-    return ["" if number != number else template.format(number) for number in numbers.tolist()]
+def _format_numbers(numbers: np.ndarray, template: str) -> Iterator[str]:
+    """Yield numbers as strings; "" for NaN."""
+    for number in map(float, numbers):
+        yield "" if number != number else template.format(number)

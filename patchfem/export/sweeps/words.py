@@ -8,14 +8,13 @@ from ...campaigns.sweeps.changes import MAIN_MEASURES, SweepAnalysis
 from ...campaigns.sweeps.limits import DOUBLING, KeyLimit
 from ...campaigns.sweeps.peaks import FREQUENCY_KEY, PeakOnLine
 from ...campaigns.sweeps.ranking import SobolIndex
-from ...campaigns.sweeps.sweep_table import FINAL_OUTCOMES, SweepTable
+from ...campaigns.sweeps.sweep_table import SweepTable
 from ...core import Outcome
 from ...formatting import format_number
 from ...response import rows
 from ..answer import Quantity
 from ..quantities import choose_scale, format_quantity, format_value
 
-SMALLEST_NUMBER = 0.01  # a smaller number of a pair has a unit of its own
 SMALLEST_SHARE = 0.01  # fraction of the variance below which a key is not named
 MAX_NAMED_KEYS = 3  # keys with their shares in a sentence
 
@@ -27,34 +26,31 @@ def make_verdict(table: SweepTable, analysis: SweepAnalysis) -> tuple[str, ...]:
         for name, indices in list(analysis.ranking.items())[:1]:
             sentences.append(_describe_ranking(name, indices))
         for name, (low, _, high) in list(analysis.quantiles.items())[:1]:
-            ends = _format_pair(name, table.measures[name].unit, [float(low), float(high)])
+            ends = (_format_measure(name, table.measures[name].unit, end) for end in (low, high))
             sentences.append(f"90 % of the cases have a {_label(name)} of {' to '.join(ends)}.")
     elif analysis.peaks:
         sentences.append(_describe_peaks(table, analysis.peaks))
     elif analysis.limits:
         sentences.append(_describe_limit(analysis.limits))
-    return (*(sentence for sentence in sentences if sentence), _describe_cases(table))
+    return (*(sentence for sentence in sentences if sentence), _describe_cases(table, analysis))
 
 
 def _describe_change(table: SweepTable, analysis: SweepAnalysis) -> str:
     """Return the headline: the measure that changes most, by how much, and with which key."""
-    n_known = int(np.sum(table.outcome != "")) - table.count_failed()
-    if not n_known:
-        return "No case has a result."
+    counts = analysis.cases
+    n_known = counts["count"] - counts["unfinished"] - counts["failed"]
+    if n_known < 2:
+        one = "Only one case has a result, so that no change is known."
+        return one if n_known else "No case has a result."
     if not analysis.ranges:
-        text = "Only one case has a result, so that no change is known."
-        return (
-            text
-            if n_known == 1
-            else f"No main measure of {n_known} cases changes by more than its error."
-        )
+        return f"No main measure of {n_known} cases changes by more than its error."
 
     name, *cases, relative = analysis.ranges[0]
     # a requested measure comes first even if others change more
     is_most = relative == max(entry.relative for entry in analysis.ranges)
     changes = "changes most:" if is_most else "changes"
     column = table.measures[name]
-    low, high = _format_pair(name, column.unit, column.values[cases].tolist())
+    low, high = (_format_measure(name, column.unit, column.values[case]) for case in cases)
     varied = [key for key in table.keys if key.count > 1]
     if len(varied) == 1:
         places = [format_value(varied[0].values[case], varied[0].unit) for case in cases]
@@ -73,15 +69,10 @@ def _label(name: str) -> str:
     return name.replace("_", " ")
 
 
-def _format_pair(name: str, unit: str, values: list[float]) -> list[str]:
-    """Return two values of a measure in the unit of the larger one, unless the other is too small for it."""
-    label, scale = choose_scale(name, unit, max(map(abs, values)))
-    texts = []
-    for value in values:
-        text = f"{format_number(value * scale, 4)} {label}".strip() if value else "0"
-        is_small = 0 < abs(value * scale) < SMALLEST_NUMBER
-        texts.append(format_value(value, unit) if is_small else text)
-    return texts
+def _format_measure(name: str, unit: str, value: float) -> str:
+    """Return a value of a measure with its unit."""
+    label, scale = choose_scale(name, unit, value)
+    return f"{format_number(value * scale, 4)} {label}".strip() if value else "0"
 
 
 def _describe_limit(limits: list[KeyLimit]) -> str:
@@ -114,22 +105,30 @@ def describe_place(table: SweepTable, entry: PeakOnLine) -> str:
     )
 
 
+def make_peak_quantities(entry: PeakOnLine, unit: str) -> dict[str, Quantity]:
+    """Return frequency, height and width of a peak, whose height has this unit."""
+    peak = entry.peak
+    reason = "" if np.isfinite(peak.width) else "the cases do not show it"
+    return {
+        "peak_frequency": Quantity(peak.frequency, "Hz", peak.frequency_error),
+        "peak_height": Quantity(peak.height, unit, peak.height_error),
+        "half_power_width": Quantity(peak.width, "Hz", peak.width_error, reason=reason),
+    }
+
+
 def _describe_peaks(table: SweepTable, peaks: list[PeakOnLine]) -> str:
     """Return where the first and the last of the peaks over frequency lie."""
+    name = peaks[0].measure
     clauses = []
     for entry in peaks if len(peaks) < 3 else (peaks[0], peaks[-1]):
-        name, _, peak = entry
-        height = Quantity(peak.height, table.measures[name].unit, peak.height_error)
-        texts = [format_quantity(name, height)]
-        if np.isfinite(peak.width):
-            width = Quantity(peak.width, "Hz", peak.width_error)
-            texts.append(f"half-power width {format_quantity('', width)}")
+        quantities = make_peak_quantities(entry, table.measures[name].unit)
+        frequency, height, width = (format_quantity("", one) for one in quantities.values())
         place = describe_place(table, entry)
-        frequency = Quantity(peak.frequency, "Hz", peak.frequency_error)
-        clauses.append(
-            f"{format_quantity('', frequency)}{' with ' * bool(place)}{place} ({', '.join(texts)})"
-        )
-    return f"{_label(peaks[0].measure).capitalize()} peaks at {' and at '.join(clauses)}."
+        text = f"{frequency}{' with ' * bool(place)}{place} ({height}"
+        if np.isfinite(entry.peak.width):
+            text += f", half-power width {width}"
+        clauses.append(f"{text})")
+    return f"{_label(name).capitalize()} peaks at {' and at '.join(clauses)}."
 
 
 def _describe_ranking(name: str, indices: list[SobolIndex]) -> str:
@@ -142,17 +141,17 @@ def _describe_ranking(name: str, indices: list[SobolIndex]) -> str:
     return f"Shares of the variance of {_label(name)}: {', '.join(parts)}."
 
 
-def _describe_cases(table: SweepTable) -> str:
+def _describe_cases(table: SweepTable, analysis: SweepAnalysis) -> str:
     """Return how many cases there are, and how many are missing, failed, unsettled or over the tolerance."""
-    outcomes = table.count_outcomes()
+    cases = analysis.cases
     counts = {
-        "unfinished": outcomes.pop("", 0),
-        "failed": outcomes.pop("failed", 0),
-        "not converged": outcomes.pop(Outcome.NOT_CONVERGED, 0),
+        "unfinished": cases["unfinished"],
+        "failed": cases["failed"],
+        "not converged": cases["outcomes"].get(Outcome.NOT_CONVERGED, 0),
     }
-    unsettled = sum(count for name, count in outcomes.items() if name not in FINAL_OUTCOMES)
-    counts[f"unsettled{_describe_unsettled(table)}"] = unsettled
-    missed = table.count_misses()
+    n_unsettled = cases["count"] - int(table.settled.sum()) - sum(counts.values())
+    counts[f"unsettled{_describe_unsettled(table)}"] = n_unsettled
+    missed = cases["over_tolerance"]
     main = [name for name in MAIN_MEASURES if name in missed] or list(missed)
     if main:
         name = max(main, key=lambda name: missed[name]["count"])

@@ -32,6 +32,7 @@ BEND_GAIN = (
 MAX_NEW_GROWTH = 0.01  # fraction of the heights above the first trace that a parabola may add
 MAX_STRETCH = 0.015  # largest error of length of a place
 N_OTHER_PLACES = 15  # number of other places that show how many heights agree by chance
+MIN_NOISE = 1e-15  # smallest standard deviation of a depth [m]; flat traces have none
 EVEN_DEVIATION = 1 / np.sqrt(12)  # standard deviation of a uniform error of one digit
 MIN_GAIN_ERROR = 0.003  # smallest error of the gain that is corrected
 MAX_GAIN_ERROR = 0.01  # standard deviation of the gain of two calibrated measurements
@@ -54,7 +55,7 @@ class Aligned:
     gain_error: float = MAX_GAIN_ERROR
 
 
-def clean_trace(trace: Profile, keep_spikes: bool) -> Profile:
+def clean_trace(trace: Profile, *, keep_spikes: bool = False) -> Profile:
     """Return the known heights of a trace, without spikes, dropouts and dust."""
     clean = trace if keep_spikes else remove_spikes(trace)
     known = ~clean.missing
@@ -113,10 +114,11 @@ def align_traces(
     place, model, state, _ = best
 
     digit = EVEN_DEVIATION * float(np.hypot(_find_digit(first.z), _find_digit(second.z)))
-    fit = _fit_datum(model, state, digit, is_straight)
+    digit = max(digit, MIN_NOISE)
+    fit = _fit_datum(model, state, digit, is_straight=is_straight)
     gain, gain_error = _measure_gain(model, fit)
     if abs(gain - 1) > max(5 * gain_error, MIN_GAIN_ERROR):
-        scaled = _fit_scaled(model, fit, gain, digit, is_straight)
+        scaled = _fit_scaled(model, fit, gain, digit, is_straight=is_straight)
         if scaled is not None:
             error = min(gain_error, MAX_GAIN_ERROR)
             return Aligned(model, scaled, "", place.is_mirrored, gain, error)
@@ -140,6 +142,11 @@ def _is_same_place(places: list[Place], place: Place, model: TraceModel, fit: Fi
     """Return whether the traces have a place in common: by its significance, or by the heights that agree."""
     chance = _estimate_chance(model.second + fit.depth, model.second, float(np.median(fit.noise)))
     agreeing = fit.unworn.mean()
+    waves = model.second - ndimage.gaussian_filter1d(
+        model.second, model.second.size / WAVES_PER_TRACE
+    )
+    if abs(fit.state[1]) > MAX_STRETCH or np.median(fit.noise) > waves.std():
+        return False
     is_clear = len(places) == 1
     if place.significance > (MIN_SIGNIFICANCE if is_clear else SURE_SIGNIFICANCE):
         return True
@@ -149,7 +156,7 @@ def _is_same_place(places: list[Place], place: Place, model: TraceModel, fit: Fi
     return agreeing > MIN_AGREEMENT * chance + MIN_AGREEING
 
 
-def _fit_datum(model: TraceModel, state, digit: float, is_straight: bool) -> Fit:
+def _fit_datum(model: TraceModel, state, digit: float, *, is_straight: bool) -> Fit:
     """Fit a straight and a parabolic datum, and return the better one."""
     fits = []
     for degree in (1,) if is_straight else (1, 2):
@@ -184,12 +191,17 @@ def _measure_gain(model: TraceModel, fit: Fit) -> tuple[float, float]:
 
     Tops may be worn, which an error of the gain resembles, so they do not count.
     """
+    # The mean line is that of the unworn heights, so that a track does not bend it.
     smooth = model.second.size / WAVES_PER_TRACE
+    weight = fit.unworn.astype(float)
+    total = np.maximum(ndimage.gaussian_filter1d(weight, smooth), 1e-12)
     first, second = (
-        z - ndimage.gaussian_filter1d(z, smooth) for z in (model.second + fit.depth, model.second)
+        z - ndimage.gaussian_filter1d(weight * z, smooth) / total
+        for z in (model.second + fit.depth, model.second)
     )
     noise = float(np.median(fit.noise))
     use = (np.abs(fit.depth) < 4 * UNWORN_LIMIT * noise) & (first + second < 0)
+    use &= ~fit.worn & ~fit.grown
     if use.sum() < MIN_SAMPLES:
         return 1.0, np.inf
     first = first[use] - first[use].mean()
@@ -204,12 +216,16 @@ def _measure_gain(model: TraceModel, fit: Fit) -> tuple[float, float]:
     return gain, float(np.sqrt(10) * np.std(influence) / power)
 
 
-def _fit_scaled(model: TraceModel, fit: Fit, gain: float, digit: float, is_straight: bool):
+def _fit_scaled(
+    model: TraceModel, fit: Fit, gain: float, digit: float, *, is_straight: bool
+) -> Fit | None:
     """Divide the second trace by its gain; return the fit if it explains the depths better, else None."""
     second = model.second
     mean = second.mean()
     model.second = mean + (second - mean) / gain
-    scaled = _fit_datum(model, np.append(fit.state[:2], [0.0, 0.0, 0.0]), digit, is_straight)
+    scaled = _fit_datum(
+        model, np.append(fit.state[:2], [0.0, 0.0, 0.0]), digit, is_straight=is_straight
+    )
     is_quieter = np.median(scaled.noise) < np.median(fit.noise)
     changed, before = ((each.worn | each.grown).sum() for each in (scaled, fit))
     if is_quieter and changed <= before:

@@ -149,6 +149,8 @@ def make_boxes(degree: int, n_beside: int, n_inside: int) -> Boxes:
 
 def find_shallow_track(depth) -> ShallowTrack:
     """Find a track in the means of 60 parts, by the likelihood ratio of a box beside a cubic datum."""
+    if depth.size < 2 * N_PARTS:
+        return ShallowTrack(slice(0), MIN_STEP * float(depth.std()))
     edges = np.linspace(0, depth.size, N_PARTS + 1).astype(int)
     means = np.add.reduceat(depth, edges[:-1]) / np.diff(edges)
     boxes = make_boxes(DATUM_DEGREE, FLANK_PARTS, MIN_TRACK_PARTS)

@@ -128,13 +128,13 @@ def compare_surfaces(
 
 
 def _compare_traces(before: Profile, after: Profile, options: Options) -> Comparison:
-    cleaned = [clean_trace(trace, options.keep_spikes) for trace in (before, after)]
+    cleaned = [clean_trace(trace, keep_spikes=options.keep_spikes) for trace in (before, after)]
     first, second = cleaned
     removed = (
         int((~before.missing).sum() - first.x.size),
         int((~after.missing).sum() - second.x.size),
     )
-    if first.x.size == second.x.size and (first.z == second.z).all():
+    if np.array_equal(first.z, second.z) and np.array_equal(first.x, second.x):
         evidence = Evidence(removed=removed)
         values = _name_unknowns("identical") | {
             "hidden_wear": name_unknown("hidden_wear", "identical")
@@ -199,7 +199,7 @@ def _compose_placed(traces: list[Profile], aligned: Aligned) -> Comparison:
     placed = {
         "shift": (fit.state[0], errors[0]),
         "scale": (1 + fit.state[1], errors[1]),
-        "tilt": (-fit.state[3] / model.half, errors[3] / model.half),
+        "tilt": (fit.state[3] / model.half, errors[3] / model.half),
     }
     placement = {}
     for name, (value, error) in placed.items():

@@ -49,6 +49,13 @@ def find_flanked_track(before: Profile, after: Profile) -> Section | None:
     roughness = np.median(np.abs(errors[:, beside]), axis=1)
     if np.median(np.abs(depth[beside])) > MIN_CLEARANCE * roughness.max():
         return None
+    # A round track reaches beyond the best box, up to where the means of parts are those of flanks.
+    means = _average_parts(depth[None], edges)[0]
+    scatter = _average_parts(errors, edges).std()
+    while first > 1 and means[first - 1] > scatter:
+        first -= 1
+    while stop < N_PARTS - 1 and means[stop] > scatter:
+        stop += 1
     worn = np.zeros(n, bool)
     worn[edges[first] : edges[stop]] = True
     noise = np.full(n, float(errors[:, beside].std()))

@@ -13,7 +13,13 @@ from scipy import ndimage
 
 from ..areal import Areal, fill_nearest
 from ..profile import robust_deviation
-from .statistics import compute_threshold, estimate_one_sided_scale, find_mode, solve_biweight_step
+from .statistics import (
+    TINY,
+    compute_threshold,
+    estimate_one_sided_scale,
+    find_mode,
+    solve_biweight_step,
+)
 
 SEARCH_PIXELS = 96  # points along the longer side of the images that are correlated
 ANGLES = np.radians(
@@ -73,8 +79,8 @@ def find_scan_place(before: Areal, after: Areal) -> ScanPlace:
         product = np.fft.irfft2(transform * np.fft.rfft2(turned, size).conj(), size)
         norm = np.fft.irfft2(ones[0] * np.fft.rfft2(turned**2, size).conj(), size)
         norm = np.sqrt(np.maximum(power * norm, 1e-12 * power.max() ** 2))
-        score = np.where(usable, product / norm, 0.0) * np.sqrt(np.maximum(count, 0.0))
-        scatter = robust_deviation(score[usable])
+        score = np.where(usable, product / (norm + TINY), 0.0) * np.sqrt(np.maximum(count, 0.0))
+        scatter = max(robust_deviation(score[usable]), 1e-12)
         at = np.unravel_index(np.argmax(score), size)
         significance = float(score[at] / scatter)
         if significance > best.significance:
@@ -104,7 +110,8 @@ def _locate(before, after, pixel, shapes, lag, angle: float, significance: float
     centers = [(np.array(shape) - 1) / 2 for shape in shapes]
     # The middle of the second image lies at this place of the first scan.
     place = middles[0] + (centers[1] + lag - centers[0]) * pixel
-    cos, sin = np.cos(angle), np.sin(angle)
+    cos = np.cos(angle)
+    sin = np.sin(angle)
     dy, dx = place - middles[0]
     shift_x = middles[1][1] - middles[0][1] - (cos * dx - sin * dy)
     shift_y = middles[1][0] - middles[0][0] - (sin * dx + cos * dy)
@@ -136,9 +143,9 @@ class ScanModel:
         half = np.array([np.ptp(before.y), np.ptp(before.x)]) / 2
         v, u = self.points / half[:, None, None]
         self.plane = np.array([np.ones(u.shape), u, v])
-        self.place(state, np.isfinite(after.z))
+        self.keep_common(state, np.isfinite(after.z))
 
-    def place(self, state, is_measured) -> None:
+    def keep_common(self, state, is_measured) -> None:
         """Keep the points that both scans show at a state."""
         pixels = self._map_pixels(state)
         weights = ndimage.map_coordinates(is_measured.astype(float), pixels, order=1, cval=0.0)
@@ -146,7 +153,8 @@ class ScanModel:
 
     def _map_pixels(self, state) -> np.ndarray:
         """Return the rows and columns (2, m, n) of the points in the second scan."""
-        cos, sin = np.cos(state[2]), np.sin(state[2])
+        cos = np.cos(state[2])
+        sin = np.sin(state[2])
         dy, dx = self.points
         turned = np.array([sin * dx + cos * dy + state[1], cos * dx - sin * dy + state[0]])
         return (turned + (self.middle - self.start)[:, None, None]) / self.steps[:, None, None]
@@ -170,7 +178,8 @@ class ScanModel:
             ndimage.map_coordinates(g, pixels, order=1, mode="nearest") for g in self.gradient
         )
         dy, dx = self.points[:, self.known]
-        cos, sin = np.cos(state[2]), np.sin(state[2])
+        cos = np.cos(state[2])
+        sin = np.sin(state[2])
         turn = gx * (-sin * dx - cos * dy) + gy * (cos * dx - sin * dy)
         return np.column_stack((-gx, -gy, -turn, *self.plane[:, self.known]))
 

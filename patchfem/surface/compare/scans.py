@@ -41,10 +41,10 @@ MIN_TILE_FRACTION = 0.3  # fraction of unworn points in a tile whose mean shows 
 MIN_TILES = 6  # smallest number of such tiles
 MIN_ELONGATION = 2.0  # length of a worn place relative to its width, from which on it is a track
 MIN_SECTIONS = 8  # smallest number of sections across a track
-MODEL_ERROR = 0.002  # relative standard deviation of a volume due to interpolation and gain
+MODEL_ERROR = 0.01  # relative standard deviation of a volume: gain of two calibrated instruments
 VARIANTS = (("", False), ("x", False), ("", True), ("x", True))  # mirrored along, heights inverted
 NAMES = ("worn_volume", "grown_volume", "worn_share", "worn_depth_mean", "worn_depth_max")
-PLACED = ("shift_x", "shift_y", "rotation")
+PLACEMENT_NAMES = ("shift_x", "shift_y", "rotation")
 
 
 def compare_scans(
@@ -61,7 +61,7 @@ def compare_scans(
     keep_spikes : bool
         Whether single heights far off their neighbours count.
     """
-    cleaned = [_clean(scan, keep_spikes) for scan in (before, after)]
+    cleaned = [_clean(scan, keep_spikes=keep_spikes) for scan in (before, after)]
     counts = [
         int((~a.missing).sum() - (~b.missing).sum()) for a, b in zip((before, after), cleaned)
     ]
@@ -90,7 +90,7 @@ def compare_scans(
     )
 
 
-def _clean(scan: Areal, keep_spikes: bool) -> Areal:
+def _clean(scan: Areal, *, keep_spikes: bool) -> Areal:
     if min(scan.z.shape) < MIN_SIDE:
         rows, columns = scan.z.shape
         raise PatchfemError(
@@ -102,7 +102,7 @@ def _clean(scan: Areal, keep_spikes: bool) -> Areal:
     return replace(scan, z=np.where(find_scan_spikes(scan), np.nan, scan.z))
 
 
-def _transform(scan: Areal, mirrored: str, is_inverted: bool) -> Areal:
+def _transform(scan: Areal, mirrored: str, *, is_inverted: bool) -> Areal:
     z = scan.z[:, ::-1] if mirrored else scan.z
     x = (scan.x[0] + scan.x[-1] - scan.x)[::-1] if mirrored else scan.x
     return replace(scan, x=x, z=-z if is_inverted else z)
@@ -112,7 +112,7 @@ def _align(before: Areal, after: Areal) -> tuple[ScanModel | None, Fit | None, t
     """Place the second scan on the first, as given, mirrored or inverted, and fit its plane."""
     best: tuple[ScanPlace, tuple[str, bool], Areal] | None = None
     for variant in VARIANTS:
-        scan = _transform(after, *variant)
+        scan = _transform(after, variant[0], is_inverted=variant[1])
         place = find_scan_place(before, scan)
         if best is None or place.significance > best[0].significance:
             best = place, variant, scan
@@ -127,7 +127,7 @@ def _align(before: Areal, after: Areal) -> tuple[ScanModel | None, Fit | None, t
     if coarse.known.mean() < MIN_COMMON:
         return None, None, variant
     state = coarse.refine_place(state)
-    coarse.place(state, np.isfinite(scan.z))
+    coarse.keep_common(state, np.isfinite(scan.z))
     if coarse.known.mean() < MIN_COMMON:
         return None, None, variant
     state = coarse.find_plane(state)
@@ -205,7 +205,7 @@ def _measure(
     errors = np.sqrt(np.diag(covariance)) / scale
     placed = {
         name: name_quantity(name, value, value - SIDE * deviation, value + SIDE * deviation)
-        for name, value, deviation in zip(PLACED, fit.state, errors)
+        for name, value, deviation in zip(PLACEMENT_NAMES, fit.state, errors)
     }
     datum = Datum(float(fit.unworn.mean()), float(np.median(fit.noise)), 0.0, 1.0)
     evidence = Evidence(Placement(placed, variant[0], variant[1]), datum, maps)

@@ -16,7 +16,7 @@ from .statistics import BIWEIGHT_SLOPE, UNWORN_LIMIT, estimate_correlation
 
 N_DRAWS = 200  # number of errors of the depths that are drawn
 MAX_GAP_STEPS = 1.5  # distance of two samples, in median steps, above which heights are missing
-MODEL_ERROR = 0.002  # relative standard deviation of an area due to tip, interpolation and gain
+MODEL_ERROR = 0.004  # relative standard deviation of an area due to tip, interpolation and gain
 N_DRIFT_PARTS = 40  # number of parts whose means show slow errors of the datum
 MIN_WALL = 10.0  # second difference of the depth, in standard deviations, at a wall
 # Error of the area at a wall relative to width times second difference: a jump between two samples is

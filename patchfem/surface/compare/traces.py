@@ -15,7 +15,7 @@ from scipy.interpolate import CubicSpline
 
 from ..profile import Profile, robust_deviation
 from . import changes
-from .statistics import UNWORN_LIMIT, estimate_correlation, find_mode, solve_biweight_step
+from .statistics import TINY, UNWORN_LIMIT, estimate_correlation, find_mode, solve_biweight_step
 
 STRETCHES = np.linspace(-0.01, 0.01, 21)  # relative errors of length that the search tries
 MIN_OVERLAP = 0.33  # common part relative to the shorter trace
@@ -81,7 +81,7 @@ def find_places(before: Profile, after: Profile) -> list[Place]:
                 x = middle + (trace.x - middle) / (1 + stretch)
                 for part in np.array_split(np.arange(x.size), n_parts):
                     second = _filter_waves(x[part], trace.z[part], step)
-                    found += _search_shift(first, second, stretch, is_mirrored)
+                    found += _search_shift(first, second, stretch, is_mirrored=is_mirrored)
         found.sort(key=lambda place: -place.significance)
         if found[0].significance > CLEAR_SIGNIFICANCE:
             return found[:1]
@@ -110,7 +110,7 @@ def _measure_overlap(before: Profile, after: Profile, place: Place) -> float:
     return float((high - low) / min(before.length, after.length))
 
 
-def _search_shift(first: Waves, second: Waves, stretch: float, is_mirrored: bool) -> list[Place]:
+def _search_shift(first: Waves, second: Waves, stretch: float, *, is_mirrored: bool) -> list[Place]:
     """Return the best shifts of the second trace with a given stretch, for each version of the waves."""
     places = []
     for versions in zip(first.versions, second.versions):
@@ -130,7 +130,7 @@ def _filter_waves(x, z, step: float) -> Waves:
     # Without their periods, turned surfaces differ from one feed to the next.
     spectrum = np.fft.rfft(whole * signal.windows.tukey(z.size, 0.1))
     size = np.abs(spectrum)
-    white = np.fft.irfft(spectrum / (size + np.median(size)), z.size)
+    white = np.fft.irfft(spectrum / (size + np.median(size) + TINY), z.size)
     versions = (whole, valleys, white)
     return Waves(places[0], step, tuple(version - version.mean() for version in versions))
 
@@ -147,7 +147,9 @@ def _correlate(first, second) -> list[tuple[float, float]]:
     )
     usable = np.flatnonzero(count > MIN_OVERLAP * min(first.size, second.size))
     norm = np.sqrt(np.maximum(power1[usable] * power2[usable], 1e-12 * power1.max() * power2.max()))
-    fisher = np.arctanh(np.clip(product[usable] / norm, -0.9999, 0.9999)) * np.sqrt(count[usable])
+    fisher = np.arctanh(np.clip(product[usable] / (norm + TINY), -0.9999, 0.9999)) * np.sqrt(
+        count[usable]
+    )
     scatter = max(robust_deviation(fisher - np.median(fisher)), 1e-12)
     peaks = []
     for _ in range(N_PEAKS):

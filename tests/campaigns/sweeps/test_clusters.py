@@ -50,7 +50,7 @@ def test_exact_worker_in_other_folder_uses_scene_files(scene_path, monkeypatch):
     """A worker in another folder reads the files of the scene, gives the same results, and stays in its folder."""
     monkeypatch.chdir(scene_path.parent)
     work = make_work(Path("bench.toml"), BY_FILE)
-    want, _ = compute_chunk(work, [0, 1, 2])
+    _, (want, _) = compute_chunk(work, [0, 1, 2])
     there = make_work(scene_path, BY_FILE)
     mine = environment_versions(work)
     monkeypatch.chdir(scene_path.parents[1] / "there")
