@@ -923,9 +923,6 @@ def profile(
     >>> len(roughness["profiles"])
     1
     """
-    from .export.surfaces import roughness
-    from .surface.files import read as surfaces
-    from .surface.roughness import report as roughness_report
 
     length = _parse_length(cutoff, "profile: cutoff")
     limits = None

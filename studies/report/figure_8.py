@@ -33,7 +33,8 @@ from drawing import BLUE, GREY, ORANGE, drawing
 from study_text import read_answer
 
 import patchfem as pf
-from patchfem.campaigns import LoopOptions, fit_hysteresis_loop
+from patchfem.campaigns.fits.loop import fit_hysteresis_loop
+from patchfem.campaigns.fits.loop_path import LoopOptions
 from patchfem.scene import loads
 
 FOLDER = Path(__file__).parent

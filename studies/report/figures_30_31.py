@@ -38,11 +38,11 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "wear"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 import bands
 from drawing import drawing
+from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from study_text import read_answer
 
 from patchfem.core import frozen_array
 from patchfem.export import write_trace
-from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.surface import BAND, Profile, level, make_report
 from patchfem.surface.compare.compare import Options, compare_surfaces
 from patchfem.surface.compare.waves import compare_waves

@@ -32,8 +32,8 @@ from figure_27 import POINT
 from modal_test import march_samples
 from study_text import read_answer
 
-from patchfem.campaigns import FitRequest, RowsOptions, fit_rows
-from patchfem.campaigns.rows.fit import SearchSettings
+from patchfem.campaigns.rows.condition_models import FitRequest
+from patchfem.campaigns.rows.fit import RowsOptions, SearchSettings, fit_rows
 from patchfem.inputs import read_table
 from patchfem.scene import loads, read_ranges
 

@@ -23,8 +23,7 @@ from rungs import (
     TABLE,
 )
 
-from patchfem.campaigns import compute_rms_scores
-from patchfem.campaigns.rows.cells import read_response_table
+from patchfem.campaigns.rows.cells import compute_rms_scores, read_response_table
 from patchfem.campaigns.rows.model_readings import ModelReadings
 from patchfem.campaigns.rows.search import make_residual
 from patchfem.core import G_N

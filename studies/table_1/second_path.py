@@ -19,9 +19,9 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 from null_models import fit_null_model
 
-from patchfem.campaigns import FitRequest, RowsOptions, compute_rms_scores, fit_rows
-from patchfem.campaigns.rows.cells import read_response_table
-from patchfem.campaigns.rows.fit import SearchSettings
+from patchfem.campaigns.rows.cells import compute_rms_scores, read_response_table
+from patchfem.campaigns.rows.condition_models import FitRequest
+from patchfem.campaigns.rows.fit import RowsOptions, SearchSettings, fit_rows
 from patchfem.campaigns.rows.model_readings import ModelReadings
 from patchfem.scene import load, loads, read_ranges
 

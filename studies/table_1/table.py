@@ -17,8 +17,7 @@ from fitting import NULLS as RIVALS
 from null_models import NULL_MODELS, fit_null_model
 from rungs import FOLDER, PROTOCOLS, ROOT2, RUNGS, STUCK_READING, TABLE, variants
 
-from patchfem.campaigns import compute_rms_scores
-from patchfem.campaigns.rows.cells import read_response_table
+from patchfem.campaigns.rows.cells import compute_rms_scores, read_response_table
 
 UNITS = {
     "static": "",

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from study_module import make_study_fixture
 
-from patchfem.campaigns import compute_rms_scores
-from patchfem.campaigns.rows.cells import read_response_table
+from patchfem.campaigns.rows.cells import compute_rms_scores, read_response_table
 
 models = make_study_fixture("table_1/null_models.py")
 fitting = make_study_fixture("table_1/fitting.py")
