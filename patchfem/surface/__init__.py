@@ -7,14 +7,13 @@ interface nodes (`nodes`), roughness (`roughness`), and what changed between two
 
 # Names that other folders use, by module.
 PUBLIC = {
-    "areal": ("Areal", "level_plane"),
+    "areal": ("level_plane"),
     "compare.compare": ("Options", "compare_files", "compare_surfaces"),
     "compare.records": (
         "Comparison",
         "Finding",
         "ScanMaps",
         "Track",
-        "TraceCurves",
     ),
     "files.read": (
         "read_profile",

@@ -11,8 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.stats import t as student
 
 from patchfem import SceneError, build
-from patchfem.campaigns import fit_hysteresis_loop
-from patchfem.campaigns.fits.loop import LOAD_UNITS
+from patchfem.campaigns.fits.loop import LOAD_UNITS, fit_hysteresis_loop
 from patchfem.campaigns.fits.loop_model import BenchModel
 from patchfem.core import PatchfemError
 from patchfem.export.fits import format_fitted_scene

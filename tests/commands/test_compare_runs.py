@@ -13,7 +13,7 @@ from scene_texts import COULOMB, POINT
 from test_compare_verb import NAMES
 
 import patchfem as pf
-from patchfem.wear import find_plane_below
+from patchfem.wear.between_runs import find_plane_below
 
 ROOT = Path(__file__).parents[2]
 GUIDE = ROOT / "patchfem" / "scene" / "guide" / "wear.md"

@@ -61,7 +61,8 @@ def parse_quantity(text: str) -> tuple[float, float | None]:
     ValueError if the text has another form.
     """
     match = re.fullmatch(
-        r"\(?(-?[\d.]+(?:e-?\d+)?)(?: ± ([\d.]+(?:e-?\d+)?))?\)?(e-?\d+)?(?: (\S.*?))?(?: \(.*\))?", text
+        r"\(?(-?[\d.]+(?:e-?\d+)?)(?: ± ([\d.]+(?:e-?\d+)?))?\)?(e-?\d+)?(?: (\S.*?))?(?: \(.*\))?",
+        text,
     )
     if match is None:
         raise ValueError(f"{text!r} is not a quantity")

@@ -47,7 +47,9 @@ RELATIVE_OF_ERRORS = 0.02
 MIN_ERROR = 1e-12
 MIN_CHECK = 1e-7
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
-UNSTABLE_KEYS = re.compile(r"seconds|versions|\bpatchfem$|version|sha256|\bdate\b|\bcreated\b|\.motions$")
+UNSTABLE_KEYS = re.compile(
+    r"seconds|versions|\bpatchfem$|version|sha256|\bdate\b|\bcreated\b|\.motions$"
+)
 
 
 def run_group(name: str, folder: Path) -> dict:

@@ -9,11 +9,10 @@ from command_line import run_cli
 
 import patchfem as pf
 from patchfem import SceneError, run
-from patchfem.campaigns import FitRequest, RowsOptions, fit_rows
 from patchfem.campaigns.rows.cells import read_response_table
 from patchfem.campaigns.rows.checkpoint import SearchCheckpoint
-from patchfem.campaigns.rows.condition_models import ConditionModels
-from patchfem.campaigns.rows.fit import SearchSettings
+from patchfem.campaigns.rows.condition_models import ConditionModels, FitRequest
+from patchfem.campaigns.rows.fit import RowsOptions, SearchSettings, fit_rows
 from patchfem.campaigns.rows.model_readings import ModelReadings
 from patchfem.campaigns.rows.search import make_residual
 from patchfem.core import G_N, PatchfemError

@@ -11,9 +11,13 @@ import pytest
 from command_line import run_cli
 from scene_texts import BENCH
 
-from patchfem.campaigns import Cases, SweepScene, WorkerData, environment_versions
+from patchfem.campaigns import Cases, SweepScene, WorkerData
 from patchfem.campaigns.sweeps.executors import cluster
-from patchfem.campaigns.sweeps.executors.cluster import Cluster, _compute_on_worker
+from patchfem.campaigns.sweeps.executors.cluster import (
+    Cluster,
+    _compute_on_worker,
+    environment_versions,
+)
 from patchfem.campaigns.sweeps.sweep import compute_chunk
 from patchfem.core import Missing
 from patchfem.scene import read_axes

@@ -6,7 +6,8 @@ import scan_pairs
 from scipy.ndimage import gaussian_filter
 
 from patchfem.core import PatchfemError
-from patchfem.surface import Areal, Options, Profile, compare_surfaces
+from patchfem.surface import Options, Profile, compare_surfaces
+from patchfem.surface.areal import Areal
 
 UM = 1e-6
 STEP = 2 * UM

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from patchfem.surface.roughness.rows import AREAL
 
 from patchfem.surface import make_report
 from patchfem.surface.areal import Areal
