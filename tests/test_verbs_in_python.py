@@ -355,7 +355,7 @@ def test_refuses_arguments_of_wrong_type(odd):
     for verb in verbs:
         with pytest.raises(
             pf.PatchfemError,
-            match=r"needed|at least one|unknown kind|must be a dict|settings|not a",
+            match=r"needed|at least one|unknown kind|must be a dict|settings|not a|give a Dataset",
         ):
             verb(odd)
 

@@ -74,13 +74,13 @@ def motion(step: float | None = None) -> Motion:
     found = pf.run(FOLDER / "figure_5.toml")
     kept = found.to_xarray()
     kept = kept.isel(time=kept.time.values >= 7 * period - 1e-6)
-    block = -kept.output_displacement.values
-    slide = -kept.relative_displacement.values[0]
+    block = -kept.relative_displacement.values
+    slide = -kept.slide.values
     return Motion(
         kept.time.values - 7 * period,
         block,
         block - slide,
-        kept.friction_force.values[0],
+        kept.friction_force.values,
         found.measures["relative_displacement_amplitude"].value,
     )
 

@@ -104,10 +104,10 @@ def loop(frequency: float = 10.0, static: float = 0.3) -> Loop:
     time = np.linspace(5 * period, 6 * period, 4001)
     column = {
         name: np.interp(time, kept.time.values, np.squeeze(kept[name].values))
-        for name in ("output_displacement", "relative_displacement", "friction_force")
+        for name in ("relative_displacement", "slide", "friction_force")
     }
-    block = column["output_displacement"]
-    slip = column["relative_displacement"]
+    block = column["relative_displacement"]
+    slip = column["slide"]
     cell = STIFFNESS * block
     slider = block + slip
     turns = np.count_nonzero(np.diff(np.sign(np.diff(cell))))

@@ -41,7 +41,7 @@ REFUSED = {  # command -> [(arguments, texts of the lines of the message)]; exit
         (("--random", "4"), ("give each range by --over",)),
         (("--random", "4", "--sobol", "4", "--over", "friction.static=0.1..0.2"), ("one of them",)),
         ((*STATIC, "--shard", "5/4"), ("--shard 5/4",)),
-        ((*STATIC, "--of", "damping"), ("did you mean 'equivalent_damping', ",)),
+        ((*STATIC, "--of", "damping"), ("'equivalent_damping'?",)),
         ((*STATIC, "--of", "zzz"), ("--of zzz: unknown measure; use a name that",)),
         ((*STATIC, "-o", "."), ("bare.csv",)),
         ((*STATIC, "--keep", "pages", "--no-page"), ("--no-page",)),

@@ -185,7 +185,7 @@ def _validate_measure_name(measure: str) -> list[str]:
     known = [*rows.TABLE, *patch_rows.TABLE]
     if not measure or rows.remove_interface_number(measure) in known:
         return []
-    advice = "use a name that `patchfem run` prints, such as loop_area"
+    advice = "use a name that `patchfem run -v` prints, such as loop_area"
     names = get_close_matches(measure, known, MAX_SUGGESTIONS, 0.5)
     if names:
         advice = f"did you mean {' or '.join(map(repr, names))}?"

@@ -104,7 +104,7 @@ class Panel:
 
 
 def make_axis(name: str, unit: str, values: np.ndarray, is_log: bool = False) -> Axis:
-    """Return the axis for values [SI]; a name such as `slip_fraction` is displayed in percent."""
+    """Return the axis for values [SI]; a name such as `contact_fraction` is displayed in percent."""
     label = name.replace("_", " ")
     size = np.abs(values[np.isfinite(values)]).max(initial=0.0)
     unit, scale = choose_scale(name, unit or "1", size)
