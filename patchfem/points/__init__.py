@@ -5,7 +5,7 @@ slip, laws that are much faster than the drive; and, with one point, for hundred
 
 1. `return_maps_kernels`  force, tangent and state of each law after a step of slide
 2. `laws`                 numbers and first memory of the laws from their keys
-3. `case_rows`, `case_kernels`, `cases`  many cases of one mode and one point: sweep rows with errors from half the steps
+3. `case_rows`, `case_kernels`, `cases`  many cases of one mode and one point with their measures
 4. `contacts`             points of a rig from elements, bonds, patches and varying loads
 5. `march_rows`, `march_kernels`, `march`  modes with many points: `march.march` returns a `march.Motion`
 
@@ -14,7 +14,8 @@ A law is a number in `return_maps_kernels.Law` with a branch in each of five fun
 
 # Names that other folders use, by module.
 PUBLIC = {
-    "cases": ("CaseRuns", "make_case", "run_cases", "stack_cases"),
+    "case_rows": ("Cases", "Number"),
+    "cases": ("CaseMarch", "list_parameters", "march_cases"),
     "contacts": (
         "Contact",
         "PointSet",

@@ -13,9 +13,9 @@ import numpy as np
 from ..compiled.jit import njit
 from ..friction.flags_kernels import NJIT_KERNEL
 from .case_rows import Now, Number, Seen
-from .return_maps_kernels import Law, Step, advance, mean_force, prepare, read
+from .return_maps_kernels import Law, MeanForce, Step, advance, mean_force, prepare, read
 
-LEVELS = 4  # halvings of a step that contains an event
+LEVELS = 5  # halvings of a step that contains an event
 TICKS = 1 << LEVELS  # shortest steps in a step
 TAYLOR_TERMS = 12  # of the exponential of a shortest step, whose product with any rate is below 0.1
 MAX_ITERATIONS = 60  # Newton steps and bisections for the increment of a step
@@ -23,9 +23,13 @@ RESIDUAL = 1e-11  # residual of a step relative to its increments
 SAME_CYCLE = (
     1e-8  # change between two cycles relative to the range of the motion, below which it repeats
 )
-MAX_BEND = (
-    0.5  # relative change of the second difference of the acceleration, above which it has a corner
+GAUSS_POINT = (
+    0.7745966692414834  # sqrt(3/5), distance of the outer points of Gauss's rule from the middle
 )
+# Distance of the mean force from the mean of the forces at both ends of a step, relative to the force of the drive and to
+# the squared phase of a whole step, above which the step is halved
+MAX_FORCE_BEND = 0.3
+FULL_STICK = 1e-9  # fraction of the slide below which its irreversible or elastic part is round-off
 N_READ = 2  # measured cycles of a motion that repeats
 
 
@@ -77,8 +81,9 @@ def solve_step(free, response, h, case, now, numbers, memory, j):
 
     Returns
     -------
-    (float, float, float)
-        Increment [m], velocity at the end [m/s] and path-mean force [N].
+    (float, float, float, float)
+        Increment [m], velocity at the end [m/s], path-mean force [N], and its distance from the mean of the forces at both
+        ends [N].
     """
     mobility = case[Number.MOBILITY]
     beta = response[0, 2] * mobility
@@ -95,6 +100,7 @@ def solve_step(free, response, h, case, now, numbers, memory, j):
     low = -inf
     high = inf
     change = 0.0
+    mean = MeanForce(0.0, 0.0, 0.0, 0.0, 0.0)
     for _ in range(MAX_ITERATIONS):
         mean = mean_force(numbers, memory, j, load, Step(dq, h, start, end, gamma))
         force = mean.force
@@ -119,7 +125,8 @@ def solve_step(free, response, h, case, now, numbers, memory, j):
             dq = 0.5 * (low + high) if high - low < inf else free[0] - beta * force
         # Velocity and displacement at the end differ from the free ones by the same mean force.
         end = free[1] - gamma / beta * (free[0] - dq - tilt * change) - velocity_tilt * change
-    return dq, end, force
+    bend = mean.bend if not follows_path else force - now[Now.FORCE] - 0.5 * change
+    return dq, end, force, bend
 
 
 @njit(**NJIT_KERNEL)
@@ -137,12 +144,15 @@ def end_at_event(q, v, h, hold, case, now, numbers, memory, j):
         # Release: the force falls to that of slip at a fraction of the step.
         first = abs(now[Now.FORCE])
         fraction = (rest_force - first) / (abs(hold) - first) if abs(hold) > first else 1.0
-        rest = (1 - min(max(fraction, 0.0), 1.0)) * h
+        fraction = min(max(fraction, 0.0), 1.0)
+        now[Now.EVENT] = fraction
+        rest = (1 - fraction) * h
         memory[0, j] = 1.0 if hold > 0 else -1.0
         now[Now.VELOCITY] = mobility * (hold - memory[0, j] * slip_force) * rest
         now[Now.SLIDE] += 0.5 * now[Now.VELOCITY] * rest
         return
     fraction = now[Now.VELOCITY] / (now[Now.VELOCITY] - v)
+    now[Now.EVENT] = fraction
     rest = (1 - fraction) * h
     if abs(hold) <= rest_force:
         memory[0, j] = 0.0
@@ -157,11 +167,13 @@ def end_at_event(q, v, h, hold, case, now, numbers, memory, j):
 
 
 @njit(**NJIT_KERNEL)
-def try_step(waves, h, response, is_shortest, case, now, numbers, memory, j):
+def try_step(waves, h, response, is_shortest, max_bend, case, now, numbers, memory, j):
     """Advance a case by a step, or return False if the step contains an event and can be halved.
 
-    `waves` are the sines of the drive at the start, in the middle and at the end.
+    `waves` are the sines of the drive at the start, in the middle and at the end; `max_bend` [N] is the largest difference
+    of the mean force from the mean of the forces at both ends, above which the law has a corner in the step.
     """
+    now[Now.EVENT] = -1.0
     drive = case[Number.DRIVE]
     q = now[Now.SLIDE]
     v = now[Now.VELOCITY]
@@ -193,11 +205,12 @@ def try_step(waves, h, response, is_shortest, case, now, numbers, memory, j):
         end = free_velocity - response[1, 2] * mobility * force
     else:
         prepare(numbers, memory, j, Step(0.0, h, v, v, 0.0))
-        dq, end, force = solve_step(
+        dq, end, force, bend = solve_step(
             (free, free_velocity), response, h, case, now, numbers, memory, j
         )
-        if v * end < 0 and not is_shortest:
-            # A law takes the net increment of a reversal inside the step as its path.
+        # A law takes the net increment of a reversal inside the step as its path.
+        turns = v * end < 0 and numbers[0, j] != Law.TANH
+        if (turns or abs(bend) > max_bend) and not is_shortest:
             return False
     if is_rigid and memory[0, j] * end < 0:
         if is_shortest:
@@ -205,7 +218,16 @@ def try_step(waves, h, response, is_shortest, case, now, numbers, memory, j):
             now[Now.MEAN] = force
             end_at_event(q + dq, end, h, hold, case, now, numbers, memory, j)
         return is_shortest
-    advance(numbers, memory, j, load, Step(dq, h, v, end, response[1, 2] * mobility))
+    first = 0.0
+    if v * end < 0 and numbers[0, j] != Law.TANH:
+        # The extreme lies where a linear velocity is 0.
+        fraction = v / (v - end)
+        now[Now.EVENT] = fraction
+        first = 0.5 * v * fraction * h
+        advance(numbers, memory, j, load, Step(first, fraction * h, v, 0.0, 0.0))
+        h -= fraction * h
+        v = 0.0
+    advance(numbers, memory, j, load, Step(dq - first, h, v, end, response[1, 2] * mobility))
     now[Now.SLIDE] = q + dq
     now[Now.VELOCITY] = end
     now[Now.MEAN] = force
@@ -264,8 +286,113 @@ def observe_extremes(h, start, now, seen, observes):
 
 
 @njit(**NJIT_KERNEL)
-def observe_step(time, h, omega, acceleration, start, now, seen):
-    """Add a step to the measures of the window; `acceleration` is that at the output at its end."""
+def find_acceleration(sine, q, v, force, case):
+    """Return the absolute acceleration at the output."""
+    a = case[Number.DRIVE] * sine - case[Number.DAMPING] * v - case[Number.STIFFNESS] * q
+    return case[Number.OUTPUT] * (a - case[Number.MOBILITY] * force) + case[Number.BASE] * sine
+
+
+@njit(**NJIT_KERNEL)
+def observe_acceleration(waves, h, case, start, now, seen):
+    """Update the largest acceleration: that of a parabola through both ends and the middle, or beside an event."""
+    q = now[Now.SLIDE]
+    v = now[Now.VELOCITY]
+    last = find_acceleration(waves[2], q, v, now[Now.FORCE], case)
+    peak = abs(last)
+    if now[Now.EVENT] >= 0:
+        sine = waves[0] + now[Now.EVENT] * (waves[2] - waves[0])
+        before = find_acceleration(sine, q, 0.0, start[2], case)
+        after = find_acceleration(sine, q, 0.0, now[Now.FORCE], case)
+        peak = max(peak, abs(before), abs(after))
+    else:
+        first = find_acceleration(waves[0], start[0], start[1], start[2], case)
+        q_middle = 0.5 * (start[0] + q) + h / 8 * (start[1] - v)
+        v_middle = 1.5 * (q - start[0]) / h - 0.25 * (start[1] + v)
+        # The force in the middle has the mean of the step by Simpson's rule.
+        force = 1.5 * now[Now.MEAN] - 0.25 * (start[2] + now[Now.FORCE])
+        middle = find_acceleration(waves[1], q_middle, v_middle, force, case)
+        bend = first - 2 * middle + last
+        tilt = last - first
+        peak = max(peak, abs(first))
+        if abs(tilt) < 2 * abs(bend):
+            peak = max(peak, abs(middle - tilt * tilt / (8 * bend)))
+    seen[Seen.MAX_ACCELERATION] = max(seen[Seen.MAX_ACCELERATION], peak)
+
+
+@njit(**NJIT_KERNEL)
+def observe_harmonics(time, h, omega, start, now, seen):
+    """Add the integrals of the slide, a cubic in the step, by Gauss's rule with three points."""
+    q = now[Now.SLIDE]
+    v = now[Now.VELOCITY]
+    for k in range(3):
+        s = 0.5 + 0.5 * GAUSS_POINT * (k - 1)
+        weight = h * (4 / 9 if k == 1 else 5 / 18)
+        rest = 1 - s
+        value = start[0] + s * s * (3 - 2 * s) * (q - start[0])
+        value = weight * (value + h * s * rest * (rest * start[1] - s * v))
+        c = cos(omega * (time + s * h))
+        w = sin(omega * (time + s * h))
+        seen[Seen.COS_1] += value * c
+        seen[Seen.SIN_1] += value * w
+        seen[Seen.COS_3] += value * c * (4 * c * c - 3)
+        seen[Seen.SIN_3] += value * w * (3 - 4 * w * w)
+        seen[Seen.LAST_MEAN] += value
+    seen[Seen.SPAN] += h
+
+
+@njit(**NJIT_KERNEL)
+def observe_stick(time, h, omega, is_rigid, start, now, seen):
+    """Add the time of stick, in which less than half of the slide is irreversible.
+
+    The irreversible fraction is interpolated between the middles of steps.
+    """
+    dq = now[Now.SLIDE] - start[0]
+    event = now[Now.EVENT]
+    path = abs(dq)
+    excess = -0.5
+    if event >= 0 and is_rigid:
+        # The point stops, is released or turns.
+        moves_first = event if start[1] != 0 else 0.0
+        moves_last = 1 - event if now[Now.VELOCITY] != 0 else 0.0
+        excess += moves_first + moves_last
+    elif path > 0:
+        if event >= 0:
+            first = 0.5 * start[1] * event * h
+            path = abs(first) + abs(dq - first)
+        excess += abs(now[Now.SLIP] - start[3]) / path
+    centre = time + 0.5 * h
+    elapsed = centre - seen[Seen.MIDDLE]
+    last = seen[Seen.EXCESS]
+    if seen[Seen.SPAN] == h:
+        last = excess
+    sticking = 0.0
+    if last < 0 and excess < 0:
+        sticking = elapsed
+    elif last < 0 or excess < 0:
+        # The law changes at once if it sticks or slips completely in one of both steps, else gradually.
+        before = elapsed - 0.5 * h
+        part = last / (last - excess)
+        crossing = 2 * part * before if part < 0.5 else before + (part - 0.5) * h
+        if 0.5 - abs(last) < FULL_STICK:
+            crossing = before + (0.5 - abs(excess)) * h
+        elif 0.5 - abs(excess) < FULL_STICK:
+            crossing = 2 * before * abs(last)
+        sticking = crossing if last < 0 else elapsed - crossing
+        if last < 0:
+            angle = 2 * omega * (seen[Seen.MIDDLE] + crossing)
+            seen[Seen.STARTS] += 1
+            seen[Seen.START_COS] += cos(angle)
+            seen[Seen.START_SIN] += sin(angle)
+    seen[Seen.STUCK] += sticking
+    seen[Seen.STICK] = sticking + (seen[Seen.STICK] if last < 0 else 0.0)
+    seen[Seen.LONGEST_STICK] = max(seen[Seen.LONGEST_STICK], seen[Seen.STICK])
+    seen[Seen.MIDDLE] = centre
+    seen[Seen.EXCESS] = excess
+
+
+@njit(**NJIT_KERNEL)
+def observe_forces(start, now, seen):
+    """Add the extremes of force and slip, and the friction work."""
     dq = now[Now.SLIDE] - start[0]
     seen[Seen.MAX_FORCE] = max(seen[Seen.MAX_FORCE], abs(now[Now.FORCE]))
     seen[Seen.MIN_SLIP] = min(seen[Seen.MIN_SLIP], now[Now.SLIP])
@@ -273,56 +400,6 @@ def observe_step(time, h, omega, acceleration, start, now, seen):
     seen[Seen.WORK] += now[Now.MEAN] * dq
     seen[Seen.SAMPLED] += 0.5 * (start[2] + now[Now.FORCE]) * dq
     seen[Seen.PASSED] += abs(now[Now.MEAN] * dq)
-
-    # A parabola through three accelerations has the peak between them, unless the second difference jumps.
-    before = seen[Seen.BEFORE]
-    bend = seen[Seen.BEFORE_THAT] - 2 * before + acceleration
-    tilt = acceleration - seen[Seen.BEFORE_THAT]
-    peak = abs(acceleration)
-    is_smooth = abs(bend - seen[Seen.BEND]) < MAX_BEND * abs(bend)
-    if bend * before < 0 and abs(tilt) < abs(bend) and is_smooth:
-        peak = max(peak, abs(before - tilt * tilt / (8 * bend)))
-    seen[Seen.MAX_ACCELERATION] = max(seen[Seen.MAX_ACCELERATION], peak)
-    seen[Seen.BEND] = bend
-    seen[Seen.BEFORE_THAT] = before
-    seen[Seen.BEFORE] = acceleration
-
-    # Harmonics of the slide by Simpson's rule, with the middle of its cubic.
-    middle = 0.5 * (start[0] + now[Now.SLIDE]) + h / 8 * (start[1] - now[Now.VELOCITY])
-    for k in range(3):
-        value = middle if k == 1 else (start[0] if k == 0 else now[Now.SLIDE])
-        weight = h / 6 * value * (4 if k == 1 else 1)
-        angle = omega * (time + 0.5 * k * h)
-        seen[Seen.COS_1] += weight * cos(angle)
-        seen[Seen.SIN_1] += weight * sin(angle)
-        seen[Seen.COS_3] += weight * cos(3 * angle)
-        seen[Seen.SIN_3] += weight * sin(3 * angle)
-        seen[Seen.LAST_MEAN] += weight
-    seen[Seen.SPAN] += h
-
-    # Stick while less than half of the slide is irreversible, interpolated between the middles of steps.
-    excess = -0.5
-    if dq != 0:
-        excess = abs((now[Now.SLIP] - start[3]) / dq) - 0.5
-    centre = time + 0.5 * h
-    elapsed = centre - seen[Seen.MIDDLE]
-    last = seen[Seen.EXCESS]
-    if seen[Seen.SPAN] == h:
-        # The first step stands also for the last half step of the window, which ends at the same phase.
-        elapsed = h
-        last = excess
-    if last < 0 and excess < 0:
-        seen[Seen.STUCK] += elapsed
-    elif last < 0 or excess < 0:
-        crossing = last / (last - excess) * elapsed
-        seen[Seen.STUCK] += crossing if last < 0 else elapsed - crossing
-        if last < 0:
-            angle = 2 * omega * (seen[Seen.MIDDLE] + crossing)
-            seen[Seen.STARTS] += 1
-            seen[Seen.START_COS] += cos(angle)
-            seen[Seen.START_SIN] += sin(angle)
-    seen[Seen.MIDDLE] = centre
-    seen[Seen.EXCESS] = excess
 
 
 @njit(**NJIT_KERNEL)
@@ -332,7 +409,6 @@ def start_window(now, seen):
     seen[Seen.MIN_SLIP] = seen[Seen.MAX_SLIP] = now[Now.SLIP]
     seen[Seen.START_SLIDE] = now[Now.SLIDE]
     seen[Seen.START_VELOCITY] = now[Now.VELOCITY]
-    seen[Seen.BEFORE] = seen[Seen.BEFORE_THAT] = nan
 
 
 @njit(**NJIT_KERNEL)
@@ -386,6 +462,9 @@ def march_cycle(steps, table, waves, observes, case, now, numbers, memory, j, se
     """March a case over a cycle; `waves` are those of `march_cases`."""
     omega = case[Number.OMEGA]
     step = 2 * np.pi / omega / steps
+    max_bend = (
+        MAX_FORCE_BEND * (omega * step) ** 2 * abs(case[Number.DRIVE]) / case[Number.MOBILITY]
+    )
     level = 0
     tick = 0
     start = (0.0, 0.0, 0.0, 0.0)
@@ -410,7 +489,9 @@ def march_cycle(steps, table, waves, observes, case, now, numbers, memory, j, se
             )
             cosines = rotate_cosine(waves, k, first), rotate_cosine(waves, k, first + 2 * size)
         start = now[Now.SLIDE], now[Now.VELOCITY], now[Now.FORCE], now[Now.SLIP]
-        if not try_step(drive, h, table[level], level == LEVELS, case, now, numbers, memory, j):
+        if not try_step(
+            drive, h, table[level], level == LEVELS, max_bend, case, now, numbers, memory, j
+        ):
             level += 1
             continue
 
@@ -420,11 +501,10 @@ def march_cycle(steps, table, waves, observes, case, now, numbers, memory, j, se
         now[Now.SIN] += 0.5 * h * (start[0] * drive[0] + now[Now.SLIDE] * drive[2])
         observe_extremes(h, start, now, seen, observes)
         if observes:
-            acceleration = case[Number.DRIVE] * drive[2] - case[Number.DAMPING] * now[Now.VELOCITY]
-            acceleration -= case[Number.STIFFNESS] * now[Now.SLIDE]
-            acceleration -= case[Number.MOBILITY] * now[Now.FORCE]
-            acceleration = case[Number.OUTPUT] * acceleration + case[Number.BASE] * drive[2]
-            observe_step(time, h, omega, acceleration, start, now, seen)
+            observe_forces(start, now, seen)
+            observe_acceleration(drive, h, case, start, now, seen)
+            observe_harmonics(time, h, omega, start, now, seen)
+            observe_stick(time, h, omega, numbers[0, j] == Law.COULOMB, start, now, seen)
         tick += size
         if level > 0 and tick % (2 * size) == 0:
             level -= 1
@@ -442,7 +522,7 @@ def march_cases(steps, waves, parameters, numbers, memory, nows, seens, historie
         Sines and cosines of the drive at half steps of a cycle, and at half of the shortest steps of a step.
     parameters, numbers, memory
         See `case_rows.Cases`; the memory is changed.
-    nows : (c, 17), seens : (c, 30), histories : (c, n, 4) array
+    nows : (c, 18), seens : (c, 30), histories : (c, n, 4) array
         State, observations, and extremes and phasor of every cycle; output.
     table : (LEVELS + 1, 2, 5) array
         Workspace.
@@ -490,3 +570,6 @@ def march_cases(steps, waves, parameters, numbers, memory, nows, seens, historie
                 now[Now.FRICTION] += n_skipped * (now[Now.FRICTION] - sums[3])
                 cycle += n_skipped
                 first = cycle
+        if seen[Seen.EXCESS] < 0:
+            # The second half of the last step
+            seen[Seen.STUCK] += 2 * np.pi / omega - seen[Seen.MIDDLE]

@@ -33,7 +33,8 @@ class Now(IntEnum):
 
     Slide, velocity, mean force of the last step, force, irreversible slide; extremes, cosine and sine integrals of the
     slide in the cycle; slide, velocity and force at the last cycle end; work of the drive, its magnitude, loss of the
-    damper, friction work per mass, largest energy.
+    damper, friction work per mass, largest energy; fraction of the last step at which a rigid point stops, turns or is
+    released, -1 without such an event.
     """
 
     SLIDE = 0
@@ -53,17 +54,18 @@ class Now(IntEnum):
     VISCOUS = 14
     FRICTION = 15
     STORED = 16
+    EVENT = 17
 
 
 class Seen(IntEnum):
     """Columns of what is observed in the window, per unit of the slide and of the force.
 
     Extremes of acceleration, force and slip; time stuck; number of slip starts with the sums of cosine and sine of
-    twice their phases; middle of the last step and its excess of slip over half of the slide; integrals of the slide
-    times harmonics 1 and 3; friction work by mean forces, by the trapezoidal rule, and its magnitude; integral of the
-    slide in the first and in the last cycle, sums of range and secant, number of secants; forces at the extremes of the
-    cycle; slide and velocity at the start; duration; two earlier accelerations at the output;
-    number of cycles; last second difference of the acceleration.
+    twice their phases; middle of the last step and its excess of slip over half of the slide; duration of the present
+    and of the longest stick; integrals of the slide times harmonics 1 and 3; friction work by mean forces, by the
+    trapezoidal rule, and its magnitude; integral of the slide in the first and in the last cycle; sums of range and
+    secant, number of secants; forces at the extremes of the cycle; slide and velocity at the start; duration; number of
+    cycles.
     """
 
     MAX_ACCELERATION = 0
@@ -76,27 +78,26 @@ class Seen(IntEnum):
     START_SIN = 7
     MIDDLE = 8
     EXCESS = 9
-    COS_1 = 10
-    SIN_1 = 11
-    COS_3 = 12
-    SIN_3 = 13
-    WORK = 14
-    SAMPLED = 15
-    PASSED = 16
-    FIRST_MEAN = 17
-    LAST_MEAN = 18
-    RANGE = 19
-    SECANT = 20
-    N_SECANTS = 21
-    FORCE_AT_MIN = 22
-    FORCE_AT_MAX = 23
-    START_SLIDE = 24
-    START_VELOCITY = 25
-    SPAN = 26
-    BEFORE = 27
-    BEFORE_THAT = 28
+    STICK = 10
+    LONGEST_STICK = 11
+    COS_1 = 12
+    SIN_1 = 13
+    COS_3 = 14
+    SIN_3 = 15
+    WORK = 16
+    SAMPLED = 17
+    PASSED = 18
+    FIRST_MEAN = 19
+    LAST_MEAN = 20
+    RANGE = 21
+    SECANT = 22
+    N_SECANTS = 23
+    FORCE_AT_MIN = 24
+    FORCE_AT_MAX = 25
+    START_SLIDE = 26
+    START_VELOCITY = 27
+    SPAN = 28
     N_CYCLES = 29
-    BEND = 30
 
 
 class Cases(NamedTuple):

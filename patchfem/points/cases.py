@@ -1,8 +1,4 @@
-"""Sweeps over cases of one mode and one contact point: measures with errors from half of the steps.
-
-A case starts with few steps per cycle, which are doubled until its measures meet the tolerance. Cases that miss it with
-the largest number are listed, so that another engine can compute them.
-"""
+"""Motion of many cases of one mode and one contact point, and their measures."""
 
 from typing import NamedTuple
 
@@ -12,191 +8,96 @@ from .. import compiled
 from ..core import ModalBasis, SineDrive
 from .case_kernels import LEVELS, TICKS
 from .case_rows import Cases, Now, Number, Seen
-from .laws import PointLaw
 from .return_maps_kernels import Law
 
-STEPS = (64, 128, 256, 512, 1024)  # steps per cycle
-SAFETY = 3.0  # error / change from half of the steps: grid convergence index 3/(2 - 1) of order 1
-# Fraction of the tolerance that two runs do not show, because both place a reversal or a corner of the law alike
-FLOOR_FRACTION = 0.1
-# Error in steps of measures that are resolved only to a sample
-SAMPLE_ERRORS = {"stick_fraction": 0.5, "slip_start_phase": 2 * np.pi}
 FULL_STICK = 1e-12  # fraction of the time below which slip is round-off
 MIN_ALIGNMENT = 0.95  # resultant of the phases of slip starts below which they have no common phase
 MIN_ACCELERATION = 1e-9  # first harmonic [m s-2] below which it has no distortion
-PHASE = "slip_start_phase"
-MAIN = (
-    "relative_displacement_amplitude",
-    "absolute_acceleration_peak",
-    "loop_area",
-    "friction_force_peak",
-)
-
-
-class CaseRuns(NamedTuple):
-    """Results of c cases.
-
-    - values, errors: measures (c,) by name; NaN where a case does not have the measure
-    - extremes (c, n, 2), phasors (c, n): of the output in every cycle [m]
-    - steps (c,): steps per cycle
-    - missed: numbers of the cases with an error above the tolerance
-    """
-
-    values: dict
-    errors: dict
-    extremes: np.ndarray
-    phasors: np.ndarray
-    steps: np.ndarray
-    missed: np.ndarray
+MIN_SLIDE_RANGE = 1e-15  # range of the slide [m] below which the contact is at rest
 
 
 class CaseMarch(NamedTuple):
-    """Values by name, and history (c, n, 4) of the cycles of some cases."""
+    """Results of c cases.
 
-    values: dict
-    history: np.ndarray
+    - values: measures (c,) by name; NaN where a case does not have the measure
+    - extremes (c, n, 2), phasors (c, n): of the output in every cycle [m]
+    - repeats (c,): whether the motion has become periodic
+    - longest_stick (c,): duration of the longest stick in the measured cycles [s]
+    """
+
+    values: dict[str, np.ndarray]
+    extremes: np.ndarray
+    phasors: np.ndarray
+    repeats: np.ndarray
+    longest_stick: np.ndarray
 
 
-def make_case(
-    modes: ModalBasis, drive: SineDrive, law: PointLaw, cycles: int, *,
-    start=None, reference: float = 0.0, window: int | None = None,
-) -> Cases:  # fmt: skip
-    """Return a batch of one case from the records of a rig.
+def list_parameters(
+    modes: ModalBasis, drive: SineDrive, load, cycles: int, window: int, start=None
+) -> tuple:
+    """Return the columns of `Cases.parameters`, in the order of `Number`.
 
     Parameters
     ----------
     modes : ModalBasis
-        Of one mode that moves the contact.
+        Of one mode that moves the contact; its numbers may be arrays (c,).
     drive : SineDrive
-    law : PointLaw
-        Law of the contact with its load.
+    load : float or (c,)
+        Normal load [N].
     cycles, window : int
-        Number of cycles, and of the last of them that are measured: ten, or a tenth of the run where that is shorter.
+        Number of cycles, and of the last of them that are measured.
     start : core.InitialState, optional
-    reference : float
-        Stiffness of the first mode at the contact [N/m].
     """
     slide, output = modes.slide[0], modes.output[0]
-    parameters = np.zeros((1, len(Number)))
-    parameters[0] = (
-        modes.damping_matrix[0, 0], modes.omega[0] ** 2, -slide * modes.base[0] * drive.acceleration,
-        slide**2 / modes.mass, drive.omega, law.load, output / slide, drive.acceleration * drive.moving,
-        slide * (start.z[0] if start is not None else 0.0), slide * (start.v[0] if start is not None else 0.0),
-        cycles, window or max(1, min(10, int(cycles) // 10)),
-    )  # fmt: skip
-    return Cases(parameters, law.numbers[:, None], law.memory[:, None], np.array([reference]))
-
-
-def stack_cases(cases) -> Cases:
-    """Return several batches with the same law and number of cycles as one."""
-    return Cases(
-        np.concatenate([one.parameters for one in cases]),
-        np.ascontiguousarray(np.concatenate([one.numbers for one in cases], axis=1)),
-        np.ascontiguousarray(np.concatenate([one.memory for one in cases], axis=1)),
-        np.concatenate([one.reference for one in cases]),
+    return (
+        modes.damping_matrix[0, 0],
+        modes.omega[0] ** 2,
+        -slide * modes.base[0] * drive.acceleration,
+        slide**2 / modes.mass,
+        drive.omega,
+        load,
+        output / slide,
+        drive.acceleration * drive.moving,
+        slide * (start.z[0] if start is not None else 0.0),
+        slide * (start.v[0] if start is not None else 0.0),
+        cycles,
+        window,
     )
 
 
-def run_cases(cases: Cases, tolerance: float, steps=STEPS) -> CaseRuns:
-    """Run cases with as many steps as the tolerance of their main measures needs.
+def march_cases(cases: Cases, steps: int) -> CaseMarch:
+    """Run cases with a number of steps per cycle, and compute their measures.
 
     Parameters
     ----------
     cases : Cases
         With the same number of cycles.
-    tolerance : float
-        Largest relative error.
-    steps : sequence of int
-        Steps per cycle, each twice the one before.
-    """
-    n = len(cases.parameters)
-    left = np.arange(n)
-    coarse = march_with(cases, steps[0] // 2)
-    coarser = march_with(cases, steps[0] // 4).values
-    used = np.zeros(n, int)
-    results: dict = {}
-    for count in steps:
-        part = cases.select(left)
-        fine = march_with(part, count)
-        errors = estimate_errors((fine.values, coarse.values, coarser), count, tolerance)
-        is_met = np.ones(left.size, bool)
-        size = fine.values["friction_force_peak"] * fine.values["relative_displacement_amplitude"]
-        for name in MAIN:
-            # The loop area is a difference of terms of the size force times amplitude.
-            larger = np.abs(fine.values[name]) + (size if name == "loop_area" else 0.0)
-            with np.errstate(invalid="ignore"):
-                is_met &= errors[name] <= tolerance * larger
-        rows = {f"value {name}": value for name, value in fine.values.items()}
-        rows |= {f"error {name}": error for name, error in errors.items()} | {
-            "history": fine.history
-        }
-        for name, row in rows.items():
-            results.setdefault(name, np.full((n, *row.shape[1:]), np.nan))[left] = row
-        used[left] = count
-        left = left[~is_met]
-        if not left.size:
-            break
-        coarser = {name: value[~is_met] for name, value in coarse.values.items()}
-        coarse = CaseMarch(
-            {name: value[~is_met] for name, value in fine.values.items()}, fine.history[:0]
-        )
-    output = cases.parameters[:, Number.OUTPUT, None, None]
-    extremes = np.sort(results["history"][..., :2] * output, axis=-1)
-    phasors = (results["history"][..., 2] - 1j * results["history"][..., 3]) * output[..., 0]
-    return CaseRuns(
-        {name[6:]: row for name, row in results.items() if name.startswith("value ")},
-        {name[6:]: row for name, row in results.items() if name.startswith("error ")},
-        extremes,
-        phasors * cases.parameters[:, Number.OMEGA, None] / np.pi,
-        used,
-        left,
-    )
-
-
-def estimate_errors(runs, steps: int, tolerance: float) -> dict:
-    """Return the errors (c,) of measures by name.
-
-    Parameters
-    ----------
-    runs : sequence of dict
-        Measures (c,) by name with `steps` steps per cycle, with half and with a quarter of them. The last change counts
-        as at least a quarter of the one before, so that a change that is small by accident gives no small error.
     steps : int
-    tolerance : float
-        Relative tolerance.
+        Whole steps per cycle; steps with an event are halved.
     """
-    values = runs[0]
-    errors = {}
-    for name, value in values.items():
-        changes = np.array([value - runs[1][name], runs[1][name] - runs[2][name]])
-        if name == PHASE:
-            changes = (changes + np.pi / 2) % np.pi - np.pi / 2
-        change = np.fmax(np.abs(changes[0]), np.abs(changes[1]) / 4)
-        # A measure that only one of the two finest runs has shows an event that the other missed.
-        change = np.where(np.isnan(changes[0]), np.nan, change)
-        errors[name] = SAFETY * change + FLOOR_FRACTION * tolerance * np.abs(value)
-        errors[name] += SAMPLE_ERRORS.get(name, 0.0) / steps
-    # These measures are errors themselves.
-    for name in ("energy_balance", "work_check"):
-        errors[name] = np.maximum(errors[name], values[name])
-    return errors
-
-
-def march_with(cases: Cases, steps: int) -> CaseMarch:
-    """Run cases with a number of steps per cycle, and compute their measures."""
     n = len(cases.parameters)
+    columns = cases.parameters.T
     phase = (
         np.pi / steps * np.concatenate([np.arange(2 * steps + 1), np.arange(2 * TICKS + 1) / TICKS])
     )
     now = np.zeros((n, len(Now)))
     seen = np.zeros((n, len(Seen)))
-    history = np.zeros((n, int(cases.parameters[:, Number.CYCLES].max(initial=0)), 4))
+    history = np.zeros((n, int(columns[Number.CYCLES].max(initial=0)), 4))
     compiled.load("points.case_kernels").march_cases(
         steps, np.array([np.sin(phase), np.cos(phase)]), cases.parameters, cases.numbers,
         cases.memory.copy(), now, seen, history, np.zeros((LEVELS + 1, 2, 5)),
     )  # fmt: skip
+
+    output = columns[Number.OUTPUT][:, None]
+    phasors = (history[..., 2] - 1j * history[..., 3]) * columns[Number.OMEGA][:, None] / np.pi
     with np.errstate(all="ignore"):
-        return CaseMarch(compute_measures(cases, now, seen, history), history)
+        return CaseMarch(
+            compute_measures(cases, now, seen, history),
+            np.sort(history[..., :2] * output[..., None], axis=-1),
+            phasors * output,
+            seen[:, Seen.N_CYCLES] < columns[Number.WINDOW],
+            seen[:, Seen.LONGEST_STICK],
+        )
 
 
 def compute_measures(cases: Cases, now, seen, history) -> dict:
@@ -205,7 +106,7 @@ def compute_measures(cases: Cases, now, seen, history) -> dict:
     Parameters
     ----------
     cases : Cases
-    now : (c, 17), seen : (c, 30), history : (c, n, 4) array
+    now : (c, 18), seen : (c, 30), history : (c, n, 4) array
         State at the end and observations, see `case_rows`.
     """
     columns = cases.parameters.T
@@ -225,7 +126,7 @@ def compute_measures(cases: Cases, now, seen, history) -> dict:
         "friction_force_peak": seen[:, Seen.MAX_FORCE],
         "slip_amplitude": (seen[:, Seen.MAX_SLIP] - seen[:, Seen.MIN_SLIP]) / 2,
         "stick_fraction": np.where(stuck > 1 - FULL_STICK, 1.0, stuck),
-        PHASE: _mean_phase(seen),
+        "slip_start_phase": _mean_phase(seen),
         "normal_load": columns[Number.LOAD],
         "loop_area": work / count,
         "drift_per_cycle": (seen[:, Seen.LAST_MEAN] - seen[:, Seen.FIRST_MEAN])
@@ -295,7 +196,7 @@ def _compute_harmonics(cases: Cases, now, seen, area, slide_range) -> dict:
     count = np.maximum(seen[:, Seen.N_CYCLES], 1)
     half_range = seen[:, Seen.RANGE] / count / 2
     n_secants = seen[:, Seen.N_SECANTS]
-    moves = slide_range > 1e-15
+    moves = slide_range > MIN_SLIDE_RANGE
     damping = area / (2 * np.pi * cases.reference * half_range**2)
     is_known = moves & (cases.reference > 0)
     return {

@@ -7,7 +7,6 @@ import numpy as np
 from ..friction.bonds.parameters import Bonds
 from ..friction.laws.iwan import max_yield_displacement
 from ..friction.laws.stretch import growth_numbers
-from ..friction.record import make_law
 from .return_maps_kernels import Law, Masing
 
 N_NUMBERS = 10  # rows of numbers of a point
@@ -17,18 +16,26 @@ MIN_LOAD = 1e-12  # load [N] in place of no load, to which a stiffness refers
 
 
 class PointLaw(NamedTuple):
-    """Law of a contact point with its rows of numbers and memory, and the load [N] per which they are."""
+    """Law of a contact point, or of c points with numbers that differ.
+
+    - numbers (10,) or (10, c), memory (m,) or (m, c): see `return_maps_kernels`
+    - load: normal load [N] per which the numbers are, a float or (c,)
+    """
 
     numbers: np.ndarray
     memory: np.ndarray
-    load: float
+    load: float | np.ndarray
 
 
-def _pack(law: Law, numbers, memory=(), load: float = 1.0, n_memory: int = N_MEMORY) -> PointLaw:
-    rows = np.zeros(N_NUMBERS)
-    rows[: 1 + len(numbers)] = (law, *numbers)
-    state = np.zeros(n_memory)
-    state[: len(memory)] = memory
+def _pack(law: Law, numbers, memory=(), load=1.0, n_memory: int = N_MEMORY) -> PointLaw:
+    """Return a PointLaw from the first rows of numbers and memory; floats or (c,)."""
+    shape = np.broadcast_shapes(np.shape(load), *map(np.shape, (*numbers, *memory)))
+    rows = np.zeros((N_NUMBERS, *shape))
+    state = np.zeros((n_memory, *shape))
+    for row, number in enumerate((law, *numbers)):
+        rows[row] = number
+    for row, number in enumerate(memory):
+        state[row] = number
     return PointLaw(rows, state, load)
 
 
@@ -63,41 +70,44 @@ def make_interlocking(stiffness: float, wavelength: float) -> PointLaw:
     return _pack(Law.INTERLOCK, (stiffness, wavelength))
 
 
-def make_point_law(friction, load: float, bonds: Bonds | None = None) -> PointLaw:
+def make_point_law(friction, load, bonds: Bonds | None = None) -> PointLaw:
     """Return the law that the keys of a table [friction] define, under a load [N].
 
     Parameters
     ----------
     friction : table
-        Keys in SI units.
-    load : float
+        Keys in SI units; floats, or arrays (c,) of the values of c points.
+    load : float or (c,)
         Normal load [N].
     bonds : Bonds, optional
-        Bonds of the law "nonlocal" with their rest speed.
+        Bonds of the law "nonlocal" with their rest speed; without them the bonds have the keys `static` and
+        `bond_length` alone.
     """
     name = friction.law
-    load = max(load, MIN_LOAD)
+    load = np.maximum(load, MIN_LOAD)
+    limit = friction.static * load
+    kinetic = getattr(friction, "kinetic", None)
+    kinetic = friction.static if kinetic is None else kinetic
     if name == "coulomb":
-        kinetic = friction.static if friction.kinetic is None else friction.kinetic
         return make_coulomb(friction.static, kinetic, load)
     if name == "tanh":
         return make_tanh(friction.static, friction.reference_speed, load)
     if name == "elastic-plastic":
-        length = friction.bond_length or friction.static * load / friction.stiffness
+        has_length = friction.bond_length is not None
+        length = friction.bond_length if has_length else limit / friction.stiffness
         return make_jenkins(friction.static, length, load)
     if name == "nonlocal":
-        return make_bonds(bonds, load)
+        return make_bonds(bonds or Bonds(friction.static, friction.bond_length), load)
     if name == "iwan":
-        limit = friction.static * load
         chi, beta = friction.chi, friction.beta
         length = max_yield_displacement(limit, friction.stiffness, chi, beta)
-        memory = np.zeros(Masing.VIRGIN + 1)
-        memory[Masing.VIRGIN] = 1.0
+        memory = (*(0.0,) * Masing.VIRGIN, 1.0)
         size = Masing.STACK + 2 * REVERSALS
         return _pack(Law.MASING, (limit, length, chi + 1, beta), memory, load, size)
-    element = make_law(friction, load).element(load).numbers
     if name == "bouc-wen":
-        return _pack(Law.BOUC_WEN, (element[1] / load, *element[2:5]), load=load)
-    per_load = element[1:7] / load
-    per_load[3] = element[4]
-    return _pack(Law.LUGRE, per_load, load=load)
+        length = limit / friction.stiffness
+        numbers = (friction.static, length, friction.exponent, friction.shape)
+        return _pack(Law.BOUC_WEN, numbers, load=load)
+    per_load = (friction.stiffness / load, kinetic, friction.static, friction.stribeck_speed)
+    damping = (friction.micro_damping / load, friction.viscous / load)
+    return _pack(Law.LUGRE, (*per_load, *damping), load=load)

@@ -50,7 +50,7 @@ PIECE = (
     0.25  # longest piece of a path in relaxation lengths that the Bouc-Wen law integrates at once
 )
 MAX_PIECES = 400  # pieces of a path; z has saturated long before
-SATURATED = 1e-14  # distance of |z| from 1 below which the Bouc-Wen law slips freely
+SATURATED = 1e-10  # distance of |z| from 1 below which the Bouc-Wen law slips freely
 DIFFERENCE = 1e-6  # relative increment of the numerical tangent of the LuGre law
 
 
@@ -98,13 +98,15 @@ class Step(NamedTuple):
 class MeanForce(NamedTuple):
     """Path-mean force [N], its derivatives by increment [N/m] and end velocity [N s/m], and the force at the end [N].
 
-    For a step that is long for the law the force at the end is that at the start, as if it did not change.
+    For a step that is long for the law the force at the end is that at the start, as if it did not change. For laws of
+    the velocity `bend` [N] is the mean force less the mean of the forces at both ends.
     """
 
     force: float
     by_increment: float
     by_velocity: float
     end: float
+    bend: float
 
 
 class PointState(NamedTuple):
@@ -137,14 +139,18 @@ def mean_force(numbers, memory, j, load, step):
         return _end_path(stiffness * mean, stiffness * slope, dq)
     if law == Law.COULOMB:
         force = memory[0, j] * numbers[2, j] * load
-        return MeanForce(force, 0.0, 0.0, force)
+        return MeanForce(force, 0.0, 0.0, force, 0.0)
     if law == Law.TANH:
         return _mean_tanh(numbers[1, j] * load, numbers[2, j], step)
     if law == Law.LUGRE:
-        force = _mean_lugre(numbers, memory[0, j], j, load, dq, step.duration).mean
+        relaxed = _mean_lugre(numbers, memory[0, j], j, load, dq, step.duration)
+        force = relaxed.mean
+        last = _lugre_force(numbers, j, load, relaxed.end, step.end_velocity)
         change = DIFFERENCE * (abs(dq) + numbers[3, j] / numbers[1, j])
         other = _mean_lugre(numbers, memory[0, j], j, load, dq + change, step.duration).mean
-        return MeanForce(force, (other - force) / change, 0.0, force)
+        return MeanForce(
+            force, (other - force) / change, 0.0, force, force - 0.5 * (memory[1, j] + last)
+        )
     if law == Law.CUBIC or law == Law.INTERLOCK:
         force, slope = _mean_spring(numbers, memory[0, j], j, dq)
         return _end_path(force, slope, dq)
@@ -160,13 +166,13 @@ def mean_force(numbers, memory, j, load, step):
         stiffness = numbers[1, j] * load / numbers[2, j]
     if abs(dq) < 1e-9 * numbers[2, j]:
         return _end_path(start + 0.5 * (path.end - start), 0.5 * stiffness, dq)
-    return MeanForce(path.mean, (path.end - path.mean) / dq, 0.0, path.end)
+    return MeanForce(path.mean, (path.end - path.mean) / dq, 0.0, path.end, 0.0)
 
 
 @njit(**NJIT_KERNEL)
 def _end_path(force, slope, dq):
     """Return the `MeanForce` of a law of the path alone, as d(mean dq)/d(dq) is the force at the end."""
-    return MeanForce(force, slope, 0.0, force + slope * dq)
+    return MeanForce(force, slope, 0.0, force + slope * dq, 0.0)
 
 
 @njit(**NJIT_KERNEL)
@@ -196,6 +202,7 @@ def _mean_tanh(limit, speed, step):
     stiffness = limit / speed
     slope = stiffness * (1 - last * last)
     change = step.end_velocity - step.start_velocity
+    trapezoid = 0.5 * limit * (first + last)
     secant = slope
     if abs(change) > 1e-9 * speed:
         secant = limit * (last - first) / change
@@ -204,11 +211,13 @@ def _mean_tanh(limit, speed, step):
         velocity = 1.5 * step.increment / step.duration
         middle = tanh((velocity - 0.25 * (step.start_velocity + step.end_velocity)) / speed)
         middle_slope = stiffness * (1 - middle * middle)
+        force = limit * (first + 4 * middle + last) / 6
         return MeanForce(
-            limit * (first + 4 * middle + last) / 6,
+            force,
             middle_slope / step.duration,
             (slope - middle_slope) / 6,
             limit * last,
+            force - trapezoid,
         )
     decay = exp(-x)
     theta = 1 / (1 - decay) - 1 / x
@@ -216,7 +225,8 @@ def _mean_tanh(limit, speed, step):
     if abs(change) > 1e-9 * speed:
         by_x = 1 / (x * x) - decay / ((1 - decay) * (1 - decay))
         tangent += limit * (last - first) * by_x * step.mobility * (slope - secant) / change
-    return MeanForce(limit * (first + theta * (last - first)), 0.0, tangent, limit * first)
+    force = limit * (first + theta * (last - first))
+    return MeanForce(force, 0.0, tangent, limit * first, force - trapezoid)
 
 
 @njit(**NJIT_KERNEL)
@@ -235,6 +245,14 @@ def _mean_lugre(numbers, stretch, j, load, dq, duration):
     relaxed = _relax(stretch, direction * length, abs(dq) / length)
     damping = numbers[5, j] * (relaxed.end - stretch) / duration + numbers[6, j] * velocity
     return Relaxed(relaxed.end, load * (numbers[1, j] * relaxed.mean + damping))
+
+
+@njit(**NJIT_KERNEL)
+def _lugre_force(numbers, j, load, stretch, velocity):
+    """Return the force of the LuGre law at a stretch and a velocity."""
+    limit = _stribeck_limit(numbers, j, velocity)
+    rate = velocity - abs(velocity) * stretch * numbers[1, j] / limit
+    return load * (numbers[1, j] * stretch + numbers[5, j] * rate + numbers[6, j] * velocity)
 
 
 @njit(**NJIT_KERNEL)
@@ -435,11 +453,8 @@ def advance(numbers, memory, j, load, step):
     elif law == Law.TANH:
         memory[0, j] = numbers[1, j] * load * tanh(step.end_velocity / numbers[2, j])
     elif law == Law.LUGRE:
-        z = _mean_lugre(numbers, memory[0, j], j, load, dq, step.duration).end
-        v = step.end_velocity
-        rate = v - abs(v) * z * numbers[1, j] / _stribeck_limit(numbers, j, v)
-        memory[0, j] = z
-        memory[1, j] = load * (numbers[1, j] * z + numbers[5, j] * rate + numbers[6, j] * v)
+        memory[0, j] = _mean_lugre(numbers, memory[0, j], j, load, dq, step.duration).end
+        memory[1, j] = _lugre_force(numbers, j, load, memory[0, j], step.end_velocity)
     elif law == Law.MASING:
         _walk(numbers, memory, j, dq, True)
     elif law == Law.BOUC_WEN:

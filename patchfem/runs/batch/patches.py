@@ -14,7 +14,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import Outcome, compute_allowed_error
-from ...elasticity.lapack import use_one_blas_thread
 from ...model.model import Model
 from ...model.similar_models import SimilarModels, select_models
 from ..accuracy_warnings import AccuracyContext, tolerance_warnings
@@ -51,16 +50,6 @@ def group_key(model: Model) -> Hashable:
     return geometry_key(model.patch), static_batch.batch_key(model.patch), model.accuracy.tolerance
 
 
-def group_models(models: Sequence[Model]) -> dict:
-    """Return the indices of models whose patches differ only in numbers, by group key."""
-    is_supported = (
-        isinstance(models, SimilarModels)
-        and models.first.kind == "patch"
-        and not refusal_reason(models.first)
-    )
-    return {group_key(models.first): range(len(models))} if is_supported else {}
-
-
 def attach_solved_patches(models: Sequence[Model]) -> list[Model]:
     """Solve the patches of models in batches, and return the models with the solved patches.
 
@@ -84,28 +73,6 @@ def attach_solved_patches(models: Sequence[Model]) -> list[Model]:
                     models[case], patch=replace(models[case].patch, solved=solved)
                 )
     return solved_models
-
-
-def solve_patches_then_motions(
-    models: Sequence[Model], cases_per_call: int, solve: Callable
-) -> CaseResults:
-    """Solve the patches of models in batches, then compute the motions in chunks.
-
-    Parameters
-    ----------
-    models : sequence of Model
-    cases_per_call : int
-        Number of cases per call of `solve`.
-    solve : callable
-        Function that returns the CaseResults of models with solved patches.
-    """
-    results = CaseResults.blank(len(models))
-    for first in range(0, len(models), cases_per_call):
-        # for such small systems, the synchronization of BLAS threads takes longer than the solution
-        with use_one_blas_thread():
-            part = attach_solved_patches(models[first : first + cases_per_call])
-            results.insert(range(first, first + len(part)), solve(part))
-    return results
 
 
 def solve(models: Sequence[Model], report: Callable | None = None) -> CaseResults:

@@ -1,0 +1,423 @@
+"""Batch of lumped cases, with one mode and one contact point, by time steps of `points.cases`.
+
+In: models of a group. Out: `CaseResults`. Each case has as many steps as its tolerance needs. A case that misses it, or
+that vibrates freely while its interface sticks, is computed by a single run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from time import perf_counter
+from types import SimpleNamespace
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core import Outcome, SineDrive
+from ...effects import law_has_trait, needs_bond_list
+from ...model.model import Model
+from ...model.similar_models import SimilarModels, collect_columns
+from ...points.case_rows import Cases, Number
+from ...points.cases import CaseMarch, list_parameters, march_cases
+from ...points.laws import N_NUMBERS, make_point_law
+from ...response import rows
+from ...response.errors import convergence_errors, total_error
+from ...response.outcome import (
+    AMPLITUDE_ROUND_OFF,
+    classify_periodic,
+    is_drifting,
+    is_still_changing,
+    steady_estimate_error,
+)
+from ...response.reasons import (
+    CHANGE_NOT_RESOLVED_REASON,
+    STEADY_AMPLITUDE,
+    STICKS_AT_REVERSAL_REASON,
+    find_missing,
+)
+from ...response.ringing import MIN_PERIODS, MIN_REFINED_FRACTION
+from ...response.rows import INTERNAL_VALUES, TABLE, error_floor, larger_term
+from ...response.settling import (
+    CLASSES,
+    extrapolate_steady_amplitudes,
+    window_amplitude_means,
+)
+from ...scene.rules.accuracy import list_fixed_settings
+from ...structure.drive_sizes import find_max_acceleration, find_min_decay_rate
+from ..results.notes import MAX_WORK_CHECK
+from ..results.result import shorten_file_names
+from ..rig.motion_warnings import note_on_creep
+from . import one_by_one
+from .case_results import CaseResults, has_unreadable_measurements, solve_in_parts
+
+ENGINE = "points"  # name of the engine in the settings of a case
+STEPS = (32, 64, 128, 256, 512, 1024)  # steps per cycle, after two marches with a half and a quarter
+MAX_CASES_PER_CALL = 1024  # cases whose cycles are held in memory
+MIN_CYCLES = 20  # smallest number of cycles of a run
+MAX_CYCLES = 4000  # largest number of cycles of a run, limited by the memory of the extremes
+MIN_TOLERANCE = 1e-4  # smallest tolerance that STEPS meet
+# Part of the tolerance that the difference of two marches does not show
+UNSEEN_FRACTION = 0.01
+N_FINAL_WINDOWS = 5  # windows from which the steady motion is extrapolated (response.settling)
+# Largest slip amplitude of a sticking interface, relative to the stretch at the friction limit
+MAX_STICK_SLIP = 1e-3
+AMPLITUDE = "relative_displacement_amplitude"
+RIGID_SECANT = "secant_stiffness"
+
+
+class Scales(NamedTuple):
+    """Tolerances and reference quantities of n cases, (n,) each.
+
+    - tolerance: relative tolerance [1]
+    - displacement: displacement scale of the rig [m]
+    - acceleration: largest acceleration of the drive [m s-2]
+    - decay: smallest decay rate of the mode [1/s]
+    - stick_stiffness: stiffness of the law during stick [N/m]; 0 of rigid and of viscous laws
+    """
+
+    tolerance: np.ndarray
+    displacement: np.ndarray
+    acceleration: np.ndarray
+    decay: np.ndarray
+    stick_stiffness: np.ndarray
+
+
+class Refined(NamedTuple):
+    """March of n cases with as many steps as their tolerances need.
+
+    - march: results
+    - errors: errors (n,) by name
+    - steps (n,): steps per cycle
+    - is_met (n,): whether all measures meet the tolerance
+    """
+
+    march: CaseMarch
+    errors: dict[str, np.ndarray]
+    steps: np.ndarray
+    is_met: np.ndarray
+
+
+def refusal_reason(model: Model) -> str:
+    """Return why a model is not one mode with one point under a sine that steps can follow, or ""."""
+    rig = model.rig
+    if rows.SINGLE_RUN_ROWS:
+        return f"the measure {rows.SINGLE_RUN_ROWS[0].name} is computed only by single runs"
+    if (
+        model.kind != "rig"
+        or model.patch is not None
+        or model.wear is not None
+        or model.heat is not None
+        or has_unreadable_measurements(model)
+    ):
+        return "the contact of the case is not a single point, or its table of measured responses cannot be read"
+    friction, modes = model.friction, rig.modes
+    if (
+        len(rig.friction.interfaces) != 1
+        or rig.friction.load_varies
+        or rig.friction.names
+        or rig.springs.is_nonlinear
+        or np.isfinite(rig.springs.travel)
+        or law_has_trait(friction.law, "averaged")
+    ):
+        return "the interface of the case is not one point under a constant load, or its flexure has an end stop"
+    if law_has_trait(friction.law, "bonds") and (
+        needs_bond_list(friction)
+        or friction.slip_growth is not None
+        or friction.initial_bonds != 1
+        or friction.breakaway
+    ):
+        return "its bonds grow, differ or are computed as a list of bonds"
+    if (
+        modes.omega.size != 1
+        or modes.gauge is not None
+        or rig.structure.richer_rig is not None
+        or not isinstance(rig.drive.signal, SineDrive)
+        or rig.drive.levels.amplitudes
+        or not (modes.base[0] and modes.slide[0] and modes.output[0])
+    ):
+        return "the case is not one mode with one sensor under one sine"
+    cycles = rig.drive.cycles
+    if not MIN_CYCLES <= cycles <= MAX_CYCLES or cycles != int(cycles):
+        return "its number of cycles is not whole, too small or too large"
+    if (
+        model.accuracy.method != "auto"
+        or list_fixed_settings(model.accuracy)
+        or model.accuracy.tolerance < MIN_TOLERANCE
+    ):
+        return "the case asks for another method, or for an accuracy beyond that of a batch"
+    return ""
+
+
+def group_key(model: Model) -> tuple[int, str]:
+    """Return a hashable key; models with equal keys are computed together."""
+    return int(model.rig.drive.cycles), model.friction.law
+
+
+def solve(models: Sequence[Model], report: Callable | None = None) -> CaseResults:
+    """Compute the case results of a group of models."""
+    return solve_in_parts(models, MAX_CASES_PER_CALL, partial(_solve_cases, report=report))
+
+
+def _solve_cases(models: Sequence[Model], report: Callable | None) -> CaseResults:
+    """Compute the case results of models by one march for each number of steps."""
+    begin = perf_counter()
+    cases, scales = collect_cases(models)
+    refined = refine(cases, scales)
+    results = make_results(models, cases, scales, refined)
+    _insert_texts(models, results)
+    results.seconds[:] = (perf_counter() - begin) / len(models)
+    is_alone = needs_single_run(cases, scales, refined, results)
+    one_by_one.replace_by_single_runs(results, models, is_alone, report)
+    return results
+
+
+def collect_cases(models: Sequence[Model]) -> tuple[Cases, Scales]:
+    """Return models with one law and number of cycles as cases, with their scales."""
+    columns = collect_columns(models, _list_numbers)
+    first, second = len(Number), len(Number) + N_NUMBERS
+    memory = columns[second : -1 - len(Scales._fields)]
+    cases = Cases(
+        np.ascontiguousarray(columns[:first].T), np.ascontiguousarray(columns[first:second]),
+        np.ascontiguousarray(memory), columns[-1 - len(Scales._fields)],
+    )  # fmt: skip
+    return cases, Scales(*columns[-len(Scales._fields) :])
+
+
+def _list_numbers(model: Model) -> tuple:
+    """Return the parameters, law, memory, reference stiffness and scales of a model."""
+    rig, friction = model.rig, model.friction
+    load = model.point.load
+    law = make_point_law(friction, load)
+    cycles = int(rig.drive.cycles)
+    stiffness = 0.0
+    if friction.law == "elastic-plastic" or law_has_trait(friction.law, "bonds"):
+        stiffness = friction.static * load / friction.bond_length
+    elif friction.law not in ("coulomb", "tanh"):
+        stiffness = friction.stiffness
+    return (
+        *list_parameters(rig.modes, rig.drive.signal, load, cycles, min(10, cycles // 10), rig.start),
+        *law.numbers,
+        *law.memory,
+        rig.first_mode.stiffness,
+        model.accuracy.tolerance,
+        rig.displacement_scale,
+        find_max_acceleration(rig.drive.signal),
+        find_min_decay_rate(rig.modes),
+        stiffness,
+    )  # fmt: skip
+
+
+def refine(cases: Cases, scales: Scales, steps: Sequence[int] = STEPS) -> Refined:
+    """March cases, and double the steps of those that miss their tolerance.
+
+    The errors follow from the marches with a half and a quarter of the steps.
+    """
+    left = np.arange(len(cases.parameters))
+    quarter, half = march_cases(cases, steps[0] // 4), march_cases(cases, steps[0] // 2)
+    refined = None
+    for count in steps:
+        fine = march_cases(cases.select(left), count)
+        part = _select(scales, left)
+        values = [march.values for march in (fine, half, quarter)]
+        errors = estimate_errors(values, part.tolerance)
+        is_met = np.ones(left.size, bool)
+        for name, value in values[0].items():
+            allowed = part.tolerance * np.abs(value) + find_floor(name, values[0], part)
+            # A measure that only one of the two finest marches has shows an event that the other missed.
+            is_absent = np.isnan(value) & np.isnan(values[1][name])
+            with np.errstate(invalid="ignore"):
+                is_met &= (errors[name] <= allowed) | is_absent
+        done = Refined(fine, errors, np.full(left.size, count), is_met)
+        refined = done if refined is None else _insert(refined, left, done)
+        left = left[~is_met]
+        if not left.size:
+            break
+        quarter, half = _select(half, ~is_met), _select(fine, ~is_met)
+    return refined
+
+
+def estimate_errors(values: Sequence[dict], tolerance) -> dict[str, np.ndarray]:
+    """Return the errors (n,) by name from marches with all, a half and a quarter of the steps."""
+    amplitude = values[0][AMPLITUDE]
+    errors = {}
+    with np.errstate(all="ignore"):
+        for name, error in convergence_errors(*values).items():
+            value = values[0][name]
+            parts = [error, UNSEEN_FRACTION * tolerance * np.abs(value)]
+            errors[name] = total_error(name, value, parts, 0.0, amplitude)
+    return errors
+
+
+def find_floor(name: str, values: dict, scales: Scales) -> np.ndarray:
+    """Return the floor (n,) of the error of a measure, at least the tolerance of its larger terms."""
+    floor = error_floor(name, scales.displacement)
+    return np.fmax(floor, scales.tolerance * larger_term(name, values))
+
+
+def _select(record, rows):
+    """Return some of the rows of all arrays of a record or dict."""
+    if isinstance(record, dict):
+        return {name: value[rows] for name, value in record.items()}
+    return type(record)(
+        *(_select(one, rows) if isinstance(one, dict) else one[rows] for one in record)
+    )
+
+
+def _insert(record, rows, part):
+    """Replace rows of all arrays of a record or dict; return the record."""
+    pairs = record.items() if isinstance(record, dict) else zip(record._fields, record)
+    for name, one in pairs:
+        new = part[name] if isinstance(record, dict) else getattr(part, name)
+        if isinstance(one, np.ndarray):
+            one[rows] = new
+        else:
+            _insert(one, rows, new)
+    return record
+
+
+def make_results(
+    models: Sequence[Model], cases: Cases, scales: Scales, refined: Refined
+) -> CaseResults:
+    """Return the measures, errors, outcomes and reasons that single runs have."""
+    values, errors = dict(refined.march.values), dict(refined.errors)
+    results = CaseResults.blank(len(scales.tolerance))
+    window = int(cases.parameters[0, Number.WINDOW])
+    classes, steady, steady_error = _judge_motions(cases, scales, refined)
+    is_stuck = values["slip_amplitude"] <= _stick_tolerance(cases, scales)
+    outcomes = [
+        Outcome.STUCK if stuck else CLASSES[number] for number, stuck in zip(classes, is_stuck)
+    ]
+    results.outcome[:] = list(map(str, outcomes))
+
+    # The steady amplitude is a measure if the motion still changes.
+    is_transient = results.outcome == str(Outcome.TRANSIENT)
+    with np.errstate(invalid="ignore"):
+        is_changing = (results.outcome == str(Outcome.STEADY)) & is_still_changing(
+            steady, steady_error, values[AMPLITUDE], scales.tolerance
+        )
+    values[STEADY_AMPLITUDE] = np.where(is_changing | is_transient, steady, np.nan)
+    errors[STEADY_AMPLITUDE] = steady_estimate_error(
+        steady, steady_error, values[AMPLITUDE], errors[AMPLITUDE]
+    )
+    grows = results.outcome == str(Outcome.GROWS)
+    for name, value in values.items():
+        is_known = ~np.isnan(value)
+        if name not in INTERNAL_VALUES and is_known.any():
+            results.units[name] = TABLE[name].unit
+            results.values[name] = value
+            results.errors[name] = np.where(is_known & ~grows, errors[name], np.nan)
+            results.floors[name] = np.where(is_known, find_floor(name, values, scales), np.nan)
+
+    unresolved = np.flatnonzero(is_transient & np.isnan(values[STEADY_AMPLITUDE]))
+    _put_reason(results, STEADY_AMPLITUDE, unresolved, CHANGE_NOT_RESOLVED_REASON)
+    first = models[0]
+    if first.sticks_rigidly and RIGID_SECANT in results.values:
+        sticks = values["stick_fraction"] > TABLE["stick_fraction"].floor + errors["stick_fraction"]
+        has_secant = np.flatnonzero(sticks & ~np.isnan(values[RIGID_SECANT]))
+        _put_reason(results, RIGID_SECANT, has_secant, STICKS_AT_REVERSAL_REASON)
+    drive = first.rig.drive.signal
+    last_cycles = SimpleNamespace(time=np.array([0.0, window * drive.period]), extra={})
+    for case in range(len(results)):
+        known = {
+            name: column[case] for name, column in results.values.items() if results.has(name, case)
+        }
+        for name, measure in find_missing(known, last_cycles, drive, True).items():
+            results.fill(case, {name: measure})
+    for case, n_steps in enumerate(refined.steps.tolist()):
+        results.numerics[case] = {
+            "engine": ENGINE, "steps_per_cycle": n_steps, "window_cycles": window,
+        }  # fmt: skip
+    return results
+
+
+def _put_reason(results: CaseResults, name: str, cases: np.ndarray, reason: str) -> None:
+    """Replace values of a measure by a reason."""
+    if not cases.size:
+        return
+    results.add_measure(name, TABLE[name].unit)
+    for column in (results.values[name], results.errors[name]):
+        column[cases] = np.nan
+    results.floors[name][cases] = TABLE[name].floor
+    results.reasons.setdefault(name, {}).update(dict.fromkeys(cases.tolist(), reason))
+
+
+def _stick_tolerance(cases: Cases, scales: Scales) -> np.ndarray:
+    """Return the largest slip amplitude (n,) [m] of a sticking interface; -1 of a law that never sticks."""
+    stiffness = scales.stick_stiffness
+    if not stiffness.any():
+        return np.where(cases.numbers[0] == 0, 0.0, -1.0)
+    static = cases.numbers[1] * cases.parameters[:, Number.LOAD]
+    return MAX_STICK_SLIP * static / stiffness
+
+
+def _judge_motions(cases: Cases, scales: Scales, refined: Refined) -> tuple:
+    """Return the indices of CLASSES (n,), and the steady amplitudes with errors (n,) [m]."""
+    march, values = refined.march, refined.march.values
+    omega = cases.parameters[:, Number.OMEGA]
+    cycles = march.extremes.shape[1]
+    window = int(cases.parameters[0, Number.WINDOW])
+    ends = np.arange(cycles - 1, -1, -window)[::-1][-N_FINAL_WINDOWS:]
+    with np.errstate(all="ignore"):
+        steady = extrapolate_steady_amplitudes(
+            np.ptp(march.extremes[:, ends], axis=2) / 2, march.phasors[:, ends]
+        )
+        classes, *steady = classify_periodic(
+            window_amplitude_means(march.extremes, window)[0],
+            march.extremes,
+            window,
+            steady,
+            (
+                scales.tolerance,
+                AMPLITUDE_ROUND_OFF * scales.acceleration / omega**2,
+                scales.decay * window * 2 * np.pi / omega,
+            ),
+        )
+    drifts = is_drifting(
+        values["drift_per_cycle"],
+        refined.errors["drift_per_cycle"],
+        values[AMPLITUDE],
+        scales.tolerance,
+        error_floor("drift_per_cycle", scales.displacement),
+    )
+    is_steady = classes == CLASSES.index(Outcome.STEADY)
+    return np.where(is_steady & drifts, 0, classes), *steady
+
+
+def needs_single_run(
+    cases: Cases, scales: Scales, refined: Refined, results: CaseResults
+) -> np.ndarray:
+    """Return a mask (n,) of the cases that only a single run can compute."""
+    values, parameters = refined.march.values, cases.parameters.T
+    is_alone = ~refined.is_met | (results.outcome == str(Outcome.GROWS))
+    is_alone |= (
+        ~(parameters[Number.LOAD] > 0) | ~(cases.numbers[1] > 0) | (scales.acceleration == 0)
+    )
+    with np.errstate(invalid="ignore"):
+        is_alone |= ~(values["work_check"] <= MAX_WORK_CHECK)
+
+    # While an elastic interface sticks for longer than a period, a transient rings, and a single run measures it.
+    stiffness = parameters[Number.STIFFNESS] + scales.stick_stiffness * parameters[Number.MOBILITY]
+    phase = np.sqrt(stiffness) * refined.march.longest_stick
+    is_long = phase >= 2 * np.pi * MIN_REFINED_FRACTION * MIN_PERIODS
+    may_ring = is_long & (scales.stick_stiffness > 0)
+    sticks_always = values["stick_fraction"] == 1
+    is_alone |= may_ring & ~(refined.march.repeats & sticks_always)
+    return is_alone
+
+
+def _insert_texts(models: Sequence[Model], results: CaseResults) -> None:
+    """Store the warnings and notes that follow from the models."""
+    first = models[0]
+    is_similar = isinstance(models, SimilarModels)
+    for case in range(len(models)):
+        model = first if is_similar else models[case]
+        if warnings := [*model.source.remarks, *model.rig.structure.notes]:
+            model = models[case] if is_similar else model
+            warnings = [*model.source.remarks, *model.rig.structure.notes]
+            results.warnings[case] = shorten_file_names(warnings, model.source.path)
+    if law_has_trait(first.friction.law, "creeps"):
+        speeds = collect_columns(models, lambda model: (model.friction.reference_speed,))[0]
+        for case, speed in enumerate(speeds.tolist()):
+            law = first.friction.model_copy(update={"reference_speed": speed})
+            results.notes[case] = note_on_creep(law)
