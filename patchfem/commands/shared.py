@@ -154,7 +154,9 @@ def present(answer, output: Output, draw_page: Callable[[], None] = lambda: None
 def print_remarks(answer) -> None:
     """Print the warnings and notes of an answer on stderr."""
     for text in answer.remarks.warnings:
-        print_message(make_printable(f"warning: {text}"))
+        # some remarks are followed by tables for the scene file
+        for line in f"warning: {text}".split("\n"):
+            print_message(make_printable(line))
     for text in answer.remarks.notes:
         note(text)
 
@@ -220,7 +222,8 @@ def print_message(text: str) -> None:
 
 def note(text: str) -> None:
     """Print a note on stderr, without control characters that could move the cursor."""
-    print_message(make_printable(f"note: {text}"))
+    for line in f"note: {text}".split("\n"):
+        print_message(make_printable(line))
 
 
 def load_scene(path: Path, sets, faults=None, prepare=None):

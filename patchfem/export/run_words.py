@@ -154,8 +154,14 @@ def describe_outcome(result: Result, measures: dict[str, Quantity], details: dic
     """
     outcome = result.outcome
     if outcome is Outcome.NOT_CONVERGED and (unknown := find_unknown_measures(result.measures)):
-        names = " and of ".join(unknown)
-        return f"The error of {names} is as large as the value; use the other measures with their errors."
+        *first, last = unknown
+        names = f"{', '.join(first)} and {last}" if first else last
+        error = (
+            "errors of {} are as large as the values"
+            if first
+            else "error of {} is as large as the value"
+        )
+        return f"The {error.format(names)}; use the other measures with their errors."
     if result.plan.kind == "bench" and outcome is Outcome.DONE:
         return _bench_outcome(measures, details)
     if run_away := details.get("run_away"):

@@ -50,12 +50,13 @@ def _group_by_units(answers: dict[str, Answer], chart: Chart) -> list[dict[str, 
 def _repeat_for_interfaces(chart: Chart, data: dict[str, Variable]) -> list[Chart]:
     """Return a chart over x for each interface that has a patch of its own, with the variables x_1, x_2, ..."""
     numbers = [number for number in range(1, MAX_INTERFACES + 1) if f"x_{number}" in data]
+    names = data["interface"].values if "interface" in data else ()
     if chart.x != "x" or "x" in data or not numbers:
         return [chart]
     return [
         replace(
             chart,
-            title=f"{chart.title} {number}" if len(numbers) > 1 else chart.title,
+            title=f"{chart.title} ({names[number - 1]})" if len(numbers) > 1 else chart.title,
             x=f"x_{number}",
             y=tuple(f"{name}_{number}" for name in chart.y),
         )

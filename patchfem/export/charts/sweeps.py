@@ -187,7 +187,10 @@ def make_measure_panel(answers: dict[str, Answer], name: str) -> Panel:
         for line in lines:
             keep = thin(values[line], MAX_DRAWN_CASES // (2 * len(lines)))
             y, error, marks = (array[line][keep] for array in (values, errors, symbols))
-            band = (None, None) if np.isnan(error).all() else (y - error, y + error)
+            # the interval of a quantity without negative values does not reach below zero
+            least = 0.0 if np.nanmin(values, initial=0.0) >= 0 else -np.inf
+            has_band = not np.isnan(error).all()
+            band = (np.maximum(y - error, least), y + error) if has_band else (None, None)
             is_plain = (marks == SYMBOLS[0]).all()
             label = join_names(title, texts[line])
             curves.append(Curve(label, x[keep], y, *band, symbols=None if is_plain else marks))

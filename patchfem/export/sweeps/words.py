@@ -160,7 +160,7 @@ def _describe_cases(table: SweepTable, analysis: SweepAnalysis) -> str:
     clauses = [f"{count} {text}" for text, count in counts.items() if count]
     if not clauses:
         return f"All {len(table)} cases settled and meet the tolerance."
-    return f"{len(table)} cases: {', '.join(clauses)}."
+    return f"{len(table)} case{'s' * (len(table) > 1)}: {', '.join(clauses)}."
 
 
 def _describe_unsettled(table: SweepTable) -> str:
