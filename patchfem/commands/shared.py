@@ -129,7 +129,13 @@ def describe_command() -> str:
 def present(answer, output: Output, draw_page: Callable[[], None] = lambda: None) -> None:
     """Print an answer, draw its page and its picture, and print the names of its files.
 
-    draw_page: function that is called after the numbers are printed, because they do not need the page.
+    Parameters
+    ----------
+    answer : Answer
+    output : Output
+        Where and how the answer is printed.
+    draw_page : callable
+        Function that is called after the numbers are printed, because they do not need the page.
     """
     if output.as_json:
         content = store.make_summary(answer) if answer.is_run else answer.details

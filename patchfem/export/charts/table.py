@@ -336,11 +336,12 @@ SWEEP = (
         "its interactions (total index), with the interval of the latter.",
     ),
 )
+# Methods of a backbone; the first one with a curve is recommended.
 BACKBONE_METHODS = (
     "balance",
     "quasi-static",
     "decay",
-)  # of a backbone; the first one with a curve is recommended
+)
 _METHOD_CURVES = {
     name: tuple(
         f"{method}_{name}@{method}_amplitude".replace("-", "_") for method in BACKBONE_METHODS
