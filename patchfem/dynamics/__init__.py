@@ -17,12 +17,11 @@ entry of this list and the entries before it:
 12. `periodic`        periodic motions by Newton's method on the map of a period (shooting)
 13. `interfaces`      contacts of a march: solution of a step and update of their memory
 14. `events`          exact motion from event to event: rigid and elastic-plastic elements, or no friction
-15. `lanes`           many cases of one mode under sinusoidal drive, side by side
-16. `march`           any law in time, under the path-mean forces of each step
-17. `smooth`          smooth laws by a Runge-Kutta method of order 8 from reversal to reversal
-18. `harmonic`        steady motions by harmonic balance, branches and stability
-19. `limit_cycles`    limit cycles of modes with negative damping and friction
-20. `grooves`         interfaces of matched grooves, whose load climbs the flanks
+15. `march`           any law in time, under the path-mean forces of each step
+16. `smooth`          smooth laws by a Runge-Kutta method of order 8 from reversal to reversal
+17. `harmonic`        steady motions by harmonic balance, branches and stability
+18. `limit_cycles`    limit cycles of modes with negative damping and friction
+19. `grooves`         interfaces of matched grooves, whose load climbs the flanks
 
 Read `events` first for motion from event to event, `propagator` and `interfaces` for steps of a march.
 """
@@ -108,23 +107,6 @@ PUBLIC = {
         "EngineResult",
         "mean_slip_phase",
     ),
-    "lanes.reading": (
-        "measure_runs",
-        "run_energies",
-    ),
-    "lanes.rows_kernels": ("Row",),
-    "lanes.run": (
-        "Cases",
-        "LANES_PACKAGE",
-        "MASING_LAWS",
-        "LaneResults",
-        "continue_march",
-        "make_curve_tables",
-        "has_one_stretch",
-        "law_state",
-        "law_number_scales",
-        "output_accelerations",
-    ),
     "limit_cycles": (
         "MAX_AMPLITUDE_RATIO",
         "MIN_AMPLITUDE_RATIO",
@@ -146,16 +128,6 @@ PUBLIC = {
         "make_cubic_spring",
         "make_interlocking_spring",
         "pair_plane_joints",
-    ),
-    "march.lane_rows": (
-        "LANES",
-        "N_PIECE_MODES",
-        "N_POINTS",
-    ),
-    "march.lanes": (
-        "MarchedCases",
-        "PointsCase",
-        "can_march",
     ),
     "march.march": (
         "start_run",

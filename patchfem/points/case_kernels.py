@@ -19,7 +19,7 @@ LEVELS = 5  # halvings of a step that contains an event
 TICKS = 1 << LEVELS  # shortest steps in a step
 TAYLOR_TERMS = 12  # of the exponential of a shortest step, whose product with any rate is below 0.1
 MAX_ITERATIONS = 60  # Newton steps and bisections for the increment of a step
-RESIDUAL = 1e-11  # residual of a step relative to its increments
+RESIDUAL = 1e-10  # residual of a step relative to its increments
 SAME_CYCLE = (
     1e-8  # change between two cycles relative to the range of the motion, below which it repeats
 )
@@ -76,8 +76,7 @@ def solve_step(free, response, h, case, now, numbers, memory, j):
 
     Over the step F(t) is linear with the time mean F_m and the change D from its value at the start. As the slide is
     nearly the parabola through its ends with the velocities v0 and v1, F_m is the path mean plus K h (v0 - v1)/12 with
-    the secant K = D/dq of the law; so steps without a kink of the law are of order 4. The LuGre law has a constant force, of
-    order 2.
+    the secant K = D/dq of the elastic force; so steps without a kink of the law are of order 4.
 
     Returns
     -------
@@ -92,7 +91,7 @@ def solve_step(free, response, h, case, now, numbers, memory, j):
     velocity_tilt = (response[1, 3] / h - 0.5 * response[1, 2]) * mobility
     load = case[Number.LOAD]
     start = now[Now.VELOCITY]
-    follows_path = numbers[0, j] != Law.TANH and numbers[0, j] != Law.LUGRE
+    follows_path = numbers[0, j] != Law.TANH
     # The mean force is extrapolated from that of the last step and the force at its end.
     force = 2 * now[Now.FORCE] - now[Now.MEAN]
     dq = free[0] - beta * force
@@ -105,13 +104,14 @@ def solve_step(free, response, h, case, now, numbers, memory, j):
         mean = mean_force(numbers, memory, j, load, Step(dq, h, start, end, gamma))
         force = mean.force
         time_mean = force
-        change = mean.end - now[Now.FORCE] if numbers[0, j] != Law.LUGRE else 0.0
+        change = mean.end - now[Now.FORCE]
+        elastic = mean.bend if numbers[0, j] == Law.LUGRE else change
         if follows_path and dq != 0 and start != end:
             bend = h / 12 * (start - end)
             if start * end < 0:
                 # The part of the path that is not retraced, as the secant loses its meaning at a reversal.
                 bend *= abs((start + end) / (start - end))
-            time_mean += change / dq * bend
+            time_mean += elastic / dq * bend
         residual = dq - free[0] + beta * time_mean + tilt * change
         if abs(residual) <= RESIDUAL * (abs(free[0]) + abs(dq)):
             break
@@ -119,7 +119,10 @@ def solve_step(free, response, h, case, now, numbers, memory, j):
             high = dq
         else:
             low = dq
-        slope = 1 + beta * mean.by_increment + gamma * mean.by_velocity
+        # The force at the end changes twice as much as the mean, the time mean two thirds as much if it follows the path.
+        slope = mean.by_increment + gamma / beta * mean.by_velocity
+        weight = beta * (2 / 3 if time_mean != force else 1.0)
+        slope = 1 + slope * (weight + (2 * tilt if mean.by_increment != 0 else 0.0))
         dq -= residual / slope if slope > 0 else residual
         if not low < dq < high:
             dq = 0.5 * (low + high) if high - low < inf else free[0] - beta * force

@@ -146,13 +146,11 @@ def _compute_energies(cases: Cases, now, mass) -> dict:
     )
     gap = now[:, Now.WORK_IN] + first - stored - now[:, Now.VISCOUS] - now[:, Now.FRICTION]
     size = now[:, Now.POWER] + now[:, Now.STORED]
-    elastic = _stored_in_law(cases, now)
     work = mass * now[:, Now.FRICTION]
     return {
         "energy_balance": np.divide(np.abs(gap), size, out=np.zeros_like(gap), where=size > 0),
         "friction_work": work,
-        "energy_stored": elastic,
-        "energy_dissipated": work - elastic,
+        "energy_dissipated": work - _stored_in_law(cases, now),
         "energy_created": np.zeros_like(work),
     }
 

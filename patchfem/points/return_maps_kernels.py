@@ -28,7 +28,7 @@ INTERLOCK     k [N/m], wavelength [m]                              slide [m]
 """
 
 from enum import IntEnum
-from math import exp, inf, sin, tanh
+from math import exp, inf, log1p, sin, sqrt, tanh
 from typing import NamedTuple
 
 from ..compiled.jit import njit
@@ -49,8 +49,10 @@ LIMIT_FRACTION = 1e-9  # smallest Stribeck limit relative to the static one, bec
 PIECE = (
     0.25  # longest piece of a path in relaxation lengths that the Bouc-Wen law integrates at once
 )
-MAX_PIECES = 400  # pieces of a path; z has saturated long before
-SATURATED = 1e-10  # distance of |z| from 1 below which the Bouc-Wen law slips freely
+NEARLY_SATURATED = (
+    1e-3  # distance of z from 1 below which any exponent of the Bouc-Wen law has a closed form
+)
+SATURATED = 1e-14  # distance of |z| from 1 that is round-off
 DIFFERENCE = 1e-6  # relative increment of the numerical tangent of the LuGre law
 
 
@@ -98,8 +100,9 @@ class Step(NamedTuple):
 class MeanForce(NamedTuple):
     """Path-mean force [N], its derivatives by increment [N/m] and end velocity [N s/m], and the force at the end [N].
 
-    For a step that is long for the law the force at the end is that at the start, as if it did not change. For laws of
-    the velocity `bend` [N] is the mean force less the mean of the forces at both ends.
+    For a step that is long for the law "tanh" the force at the end is that at the start, as if it did not change. `bend`
+    [N] is the mean force less the mean of the forces at both ends, for the law "tanh", and the change of the elastic
+    force, for the LuGre law.
     """
 
     force: float
@@ -143,14 +146,16 @@ def mean_force(numbers, memory, j, load, step):
     if law == Law.TANH:
         return _mean_tanh(numbers[1, j] * load, numbers[2, j], step)
     if law == Law.LUGRE:
-        relaxed = _mean_lugre(numbers, memory[0, j], j, load, dq, step.duration)
+        relaxed = _mean_lugre(numbers, memory[0, j], j, load, step)
         force = relaxed.mean
         last = _lugre_force(numbers, j, load, relaxed.end, step.end_velocity)
+        # A change of the increment changes the velocity at the end by about twice the mean velocity.
         change = DIFFERENCE * (abs(dq) + numbers[3, j] / numbers[1, j])
-        other = _mean_lugre(numbers, memory[0, j], j, load, dq + change, step.duration).mean
-        return MeanForce(
-            force, (other - force) / change, 0.0, force, force - 0.5 * (memory[1, j] + last)
-        )
+        velocity = step.end_velocity + 2 * change / step.duration
+        other = Step(dq + change, step.duration, step.start_velocity, velocity, step.mobility)
+        slope = (_mean_lugre(numbers, memory[0, j], j, load, other).mean - force) / change
+        elastic = load * numbers[1, j] * (relaxed.end - memory[0, j])
+        return MeanForce(force, slope, 0.0, last, elastic)
     if law == Law.CUBIC or law == Law.INTERLOCK:
         force, slope = _mean_spring(numbers, memory[0, j], j, dq)
         return _end_path(force, slope, dq)
@@ -230,21 +235,30 @@ def _mean_tanh(limit, speed, step):
 
 
 @njit(**NJIT_KERNEL)
-def _relax(start, end, path):
-    """Return the value of a variable that relaxes to `end` over a path in relaxation lengths."""
-    shapes = shape_functions(path)
-    return Relaxed(end + (start - end) * shapes.decay, end + (start - end) * shapes.f1)
+def _mean_lugre(numbers, stretch, j, load, step):
+    """Return the stretch after a step, and the mean force of the LuGre law.
 
-
-@njit(**NJIT_KERNEL)
-def _mean_lugre(numbers, stretch, j, load, dq, duration):
-    """Return the stretch after a step at constant velocity, and the mean force of the LuGre law."""
-    velocity = dq / duration
+    The stretch z relaxes to the steady one, z_s = g(v)/k in the direction of slip, over a path x = integral of
+    |v|/|z_s|. With x by Simpson's rule and z_s linear in the path between both ends the law is solved exactly, so that
+    a stiff law ends in its steady state.
+    """
+    dq = step.increment
+    duration = step.duration
     direction = 1.0 if dq > 0 else -1.0
-    length = _stribeck_limit(numbers, j, velocity) / numbers[1, j]
-    relaxed = _relax(stretch, direction * length, abs(dq) / length)
-    damping = numbers[5, j] * (relaxed.end - stretch) / duration + numbers[6, j] * velocity
-    return Relaxed(relaxed.end, load * (numbers[1, j] * relaxed.mean + damping))
+    first = step.start_velocity
+    last = step.end_velocity
+    middle = 1.5 * dq / duration - 0.25 * (first + last)
+    begin = _stribeck_limit(numbers, j, first) / numbers[1, j]
+    centre = _stribeck_limit(numbers, j, middle) / numbers[1, j]
+    end = _stribeck_limit(numbers, j, last) / numbers[1, j]
+    path = duration / 6 * (abs(first) / begin + 4 * abs(middle) / centre + abs(last) / end)
+    shapes = shape_functions(path)
+    start = direction * begin
+    change = direction * (end - begin)
+    z = start + (stretch - start) * shapes.decay + change * (1 - shapes.f1)
+    mean = start + (stretch - start) * shapes.f1 + change * (0.5 - shapes.f2)
+    damping = numbers[5, j] * (z - stretch) / duration + numbers[6, j] * dq / duration
+    return Relaxed(z, load * (numbers[1, j] * mean + damping))
 
 
 @njit(**NJIT_KERNEL)
@@ -292,10 +306,14 @@ def _walk_bouc_wen(numbers, z, j, load, dq):
     left = abs(dq) / numbers[2, j]
     whole = left
     longest = PIECE / max(1.0, power)
+    nearly = 1.0 if power == 1.0 or power == 2.0 else NEARLY_SATURATED
     y = direction * z
     area = 0.0
-    for _ in range(MAX_PIECES):
-        if 1 - y < SATURATED:
+    while left > 0:
+        if 1 - y <= nearly:
+            rest = _saturate(1 - y, power, left)
+            area += left - left * rest.mean
+            y = 1 - rest.end
             break
         # A piece ends where loading begins, at y = 0.
         piece = min(left, longest)
@@ -308,17 +326,32 @@ def _walk_bouc_wen(numbers, z, j, load, dq):
         area += piece * (y + piece * (first + second + third) / 6)
         y += piece * (first + 2 * second + 2 * third + fourth) / 6
         left -= piece
-        if left <= 0:
-            break
-    area += left * y
     limit = direction * numbers[1, j] * load
     return Relaxed(limit * y, limit * area / whole if whole > 0 else limit * y)
 
 
 @njit(**NJIT_KERNEL)
+def _saturate(distance, power, path):
+    """Return the distance e of z from 1 after a path in lengths, and its mean over the path.
+
+    To order e^3, de/dx = -n e + n (n - 1) e^2/2, which is Bernoulli's equation; it is exact for n = 1 and 2.
+    """
+    bend = 0.5 * (power - 1)
+    if distance < SATURATED:
+        return Relaxed(0.0, 0.0)
+    decay = exp(-power * path)
+    end = distance * decay / (1 - bend * distance * (1 - decay))
+    # The integral is ln((1 - bend e_end)/(1 - bend e))/(n bend).
+    fall = (distance - end) / (1 - bend * distance)
+    x = bend * fall
+    ratio = log1p(x) / x if x > SMALL_RATE else 1 - 0.5 * x
+    return Relaxed(end, fall / power * ratio / path)
+
+
+@njit(**NJIT_KERNEL)
 def _bouc_wen_rate(y, power, unloading):
     """Return dy/dx of the Bouc-Wen law."""
-    size = abs(y) ** power
+    size = y * y if power == 2.0 else abs(y) ** power
     return 1 - size if y > 0 else 1 - unloading * size
 
 
@@ -330,9 +363,9 @@ def _first_loading(numbers, j, x):
     order = numbers[3, j]
     ratio = min(x / phi, 1.0)
     scale = numbers[1, j] / (beta + order / (order + 1))
-    power = 0.0
-    if ratio > 0:
-        power = ratio if order == 1.0 else ratio**order
+    power = ratio
+    if 0 < ratio < 1 and order != 1.0:
+        power = sqrt(ratio) if order == 0.5 else ratio**order
     force = scale * ratio * (beta + 1 - power / (order + 1))
     area = scale * phi * ratio * ratio * (0.5 * (beta + 1) - power / ((order + 1) * (order + 2)))
     return Relaxed(force, area + numbers[1, j] * max(x - phi, 0.0))
@@ -453,7 +486,7 @@ def advance(numbers, memory, j, load, step):
     elif law == Law.TANH:
         memory[0, j] = numbers[1, j] * load * tanh(step.end_velocity / numbers[2, j])
     elif law == Law.LUGRE:
-        memory[0, j] = _mean_lugre(numbers, memory[0, j], j, load, dq, step.duration).end
+        memory[0, j] = _mean_lugre(numbers, memory[0, j], j, load, step).end
         memory[1, j] = _lugre_force(numbers, j, load, memory[0, j], step.end_velocity)
     elif law == Law.MASING:
         _walk(numbers, memory, j, dq, True)

@@ -20,7 +20,6 @@ several elements, or elements and contact `faces_kernels`              block des
 set-valued Coulomb elements               `stops_kernels`              stops and releases inside the step
 a load that changes                       `pressing_kernels`           path mean of the contact, secant for the coupling
 coupled bond points, many cycles          `passing_kernels`            the same, sums instead of samples
-the same, many cases                      `lanes_kernels`              the same, 32 cases side by side
 ========================================= ============================ ==============================================
 
 Events. Smooth laws have none. A set-valued element stops and is released inside a step: the force that would hold it
@@ -34,8 +33,8 @@ few ns per point of a contact, so a cycle of 200 steps takes 20 to 60 us, and 15
 
 Modules. `march` marches a model over its cycles with a `run.Run`, which holds the state and calls the compiled loop;
 `recording` keeps its samples, and `cycle_sums` (arrays in `cycle_sum_arrays`) stores sums instead. `models`, `joints` and
-`varying_load` describe contacts, elements and loads; `faces` and `element_arrays` have the arrays of the elements. `lanes`
-marches many cases, whose array rows `lane_rows` names. `instances` compiles one loop per contact, set of laws and load from
-the source of `loop_kernels`, with the flags of `parts_kernels`. Read `march` first, then `run`, then `loop_kernels`, then
-`faces_kernels` or `pressing_kernels` if a rig needs them.
+`varying_load` describe contacts, elements and loads; `faces` and `element_arrays` have the arrays of the elements.
+`instances` compiles one loop per contact, set of laws and load from the source of `loop_kernels`, with the flags of
+`parts_kernels`. Read `march` first, then `run`, then `loop_kernels`, then `faces_kernels` or `pressing_kernels` if a rig
+needs them.
 """

@@ -52,7 +52,14 @@ from . import one_by_one
 from .case_results import CaseResults, has_unreadable_measurements, solve_in_parts
 
 ENGINE = "points"  # name of the engine in the settings of a case
-STEPS = (32, 64, 128, 256, 512, 1024)  # steps per cycle, after two marches with a half and a quarter
+STEPS = (
+    32,
+    64,
+    128,
+    256,
+    512,
+    1024,
+)  # steps per cycle, after two marches with a half and a quarter
 MAX_CASES_PER_CALL = 1024  # cases whose cycles are held in memory
 MIN_CYCLES = 20  # smallest number of cycles of a run
 MAX_CYCLES = 4000  # largest number of cycles of a run, limited by the memory of the extremes
@@ -62,6 +69,9 @@ UNSEEN_FRACTION = 0.01
 N_FINAL_WINDOWS = 5  # windows from which the steady motion is extrapolated (response.settling)
 # Largest slip amplitude of a sticking interface, relative to the stretch at the friction limit
 MAX_STICK_SLIP = 1e-3
+# Largest product of micro-damping and a typical speed relative to the kinetic friction, with which the power of the LuGre
+# law is not negative
+MAX_MICRO_DAMPING = 4.0
 AMPLITUDE = "relative_displacement_amplitude"
 RIGID_SECANT = "secant_stiffness"
 
@@ -74,6 +84,7 @@ class Scales(NamedTuple):
     - acceleration: largest acceleration of the drive [m s-2]
     - decay: smallest decay rate of the mode [1/s]
     - stick_stiffness: stiffness of the law during stick [N/m]; 0 of rigid and of viscous laws
+    - may_create: whether the law may create energy
     """
 
     tolerance: np.ndarray
@@ -81,6 +92,7 @@ class Scales(NamedTuple):
     acceleration: np.ndarray
     decay: np.ndarray
     stick_stiffness: np.ndarray
+    may_create: np.ndarray
 
 
 class Refined(NamedTuple):
@@ -205,7 +217,18 @@ def _list_numbers(model: Model) -> tuple:
         find_max_acceleration(rig.drive.signal),
         find_min_decay_rate(rig.modes),
         stiffness,
+        _may_create_energy(model),
     )  # fmt: skip
+
+
+def _may_create_energy(model: Model):
+    """Return whether the force of the law may have the direction of the motion."""
+    friction = model.friction
+    if friction.law == "lugre":
+        kinetic = friction.static if friction.kinetic is None else friction.kinetic
+        power = friction.micro_damping * model.rig.speed_scale
+        return np.greater(power, MAX_MICRO_DAMPING * kinetic * model.point.load)
+    return np.less(friction.shape, 0.5) if friction.law == "bouc-wen" else False
 
 
 def refine(cases: Cases, scales: Scales, steps: Sequence[int] = STEPS) -> Refined:
@@ -312,10 +335,12 @@ def make_results(
     unresolved = np.flatnonzero(is_transient & np.isnan(values[STEADY_AMPLITUDE]))
     _put_reason(results, STEADY_AMPLITUDE, unresolved, CHANGE_NOT_RESOLVED_REASON)
     first = models[0]
-    if first.sticks_rigidly and RIGID_SECANT in results.values:
+    if first.sticks_rigidly:
         sticks = values["stick_fraction"] > TABLE["stick_fraction"].floor + errors["stick_fraction"]
-        has_secant = np.flatnonzero(sticks & ~np.isnan(values[RIGID_SECANT]))
-        _put_reason(results, RIGID_SECANT, has_secant, STICKS_AT_REVERSAL_REASON)
+        moves = values[AMPLITUDE] > 0
+        _put_reason(
+            results, RIGID_SECANT, np.flatnonzero(sticks & moves), STICKS_AT_REVERSAL_REASON
+        )
     drive = first.rig.drive.signal
     last_cycles = SimpleNamespace(time=np.array([0.0, window * drive.period]), extra={})
     for case in range(len(results)):
@@ -390,6 +415,7 @@ def needs_single_run(
     """Return a mask (n,) of the cases that only a single run can compute."""
     values, parameters = refined.march.values, cases.parameters.T
     is_alone = ~refined.is_met | (results.outcome == str(Outcome.GROWS))
+    is_alone |= scales.may_create > 0
     is_alone |= (
         ~(parameters[Number.LOAD] > 0) | ~(cases.numbers[1] > 0) | (scales.acceleration == 0)
     )

@@ -16,7 +16,7 @@ class StubBatch(batches.Batch):
     """Batch with functions that a test provides."""
 
     def __init__(self, name, refuses, group, solve):
-        super().__init__(name, "")
+        super().__init__(name)
         for key, function in (("refusal_reason", refuses), ("group_key", group), ("solve", solve)):
             object.__setattr__(self, key, function)
 

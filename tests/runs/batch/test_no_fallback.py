@@ -1,17 +1,13 @@
 """Every kind of batch solves its cases together; no kind falls back to single runs."""
 
-from functools import partial
-from pathlib import Path
-
 import pytest
-from lane_cases import PATCH, draw_patches, draw_points
+from point_cases import draw_points
 from scene_texts import SMALL_PATCH
 
 import patchfem as pf
 from patchfem.runs import with_shared_meshes
 from patchfem.runs.batch import batches, one_by_one
 
-STUDIES = Path(__file__).parents[3] / "studies"
 SHEARED_BENCH = """[contact]
 length = "12 mm"
 width = "10 mm"
@@ -39,34 +35,13 @@ def build_variants(text: str, key: str, values) -> list:
 
 MODELS = {  # Name of the batch: function that builds its models.
     "patches": lambda: build_variants(SMALL_PATCH, "contact.load", (50.0, 60.0, 70.0)),
-    "benches": lambda: build_variants(SHEARED_BENCH, "slide.amplitude", (2e-6, 3e-6)),
-    "lumped.lanes": lambda: draw_points("coulomb", 7, 64),
-    "lumped.lumped": lambda: draw_points("coulomb", 7, 4),
-    # The pressure is the same in all cases, so one patch is solved for all.
-    "lumped.tabled": lambda: build_variants(
-        PATCH, "friction.static", [0.1 + 0.008 * case for case in range(64)]
-    ),
-    "lumped.sheared": lambda: draw_patches("tilt x friction", 7, 4),
-    "gathered": lambda: build_variants(
-        (STUDIES / "rig" / "rig.toml").read_text("utf-8"),
-        "friction.static",
-        [0.2 + 0.005 * case for case in range(32)],
-    ),
+    "lumped": lambda: draw_points("coulomb", 7, 64),
+    "pressed": lambda: build_variants(SHEARED_BENCH, "slide.amplitude", (2e-6, 3e-6)),
 }
-# Batches that solve some of their cases with the exact engine.
-LANE_BATCHES = {"lumped.lanes", "lumped.tabled"}
 
 
 @pytest.fixture
-def replace_single_runs(monkeypatch):
-    """Return a function that replaces the runs of one case; the working directory is that of the
-    shipped rig."""
-    monkeypatch.chdir(STUDIES / "rig")
-    return partial(monkeypatch.setattr, one_by_one, "run")
-
-
-@pytest.fixture
-def single_runs(replace_single_runs) -> list:
+def single_runs(monkeypatch) -> list:
     """Return the list of plans that run one by one."""
     plans = []
     run = one_by_one.run
@@ -75,7 +50,7 @@ def single_runs(replace_single_runs) -> list:
         plans.append(plan)
         return run(plan, *arguments, **options)
 
-    replace_single_runs(record)
+    monkeypatch.setattr(one_by_one, "run", record)
     return plans
 
 
@@ -93,13 +68,10 @@ def test_always_batch_solves_its_cases_together(name, single_runs):
     messages = []
     results = batches.solve_models(models, report=messages.append)
     assert not [line for line in messages if "one by one" in line]
-    if name == "benches":
+    if name == "pressed":
         assert all(plan.model.patch.solved is not None for plan in single_runs)
     else:
         assert len(single_runs) <= 0.25 * len(models)
-    if name in LANE_BATCHES:
-        engines = [numerics["engine"] for numerics in results.numerics.values()]
-        assert engines.count("lanes") > 0.7 * len(models)
     assert not results.messages
     assert not [
         note for notes in results.notes.values() for note in notes if "internal fault" in note

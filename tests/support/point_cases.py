@@ -1,8 +1,14 @@
-"""Random cases of sweeps that are integrated together, in lanes, against single runs.
+"""Random cases of sweeps that are marched together, against single runs of each case.
 
-The uncertainty of a single run is its stated error, so a row holds if the two results agree within
-the sum of both errors.
+    python tests/support/point_cases.py SEED COUNT [LAW ...]
+
+draws COUNT cases of each law with one seed, computes them together and one by one with the tolerance TRUTH, and prints
+the share of stated errors that hold, by measure, with the largest ratios. Scenes have the tolerance 1e-3; the single
+run's stated error is the uncertainty of the truth. Cases that a single run computed are left out.
 """
+
+import sys
+from collections import defaultdict
 
 import numpy as np
 from campaigns import Row, strip_number
@@ -12,9 +18,11 @@ import patchfem as pf
 from patchfem.api import get_base_scene
 from patchfem.response import TABLE as MOTION
 from patchfem.runs import TABLE as STATIC
-from patchfem.runs.batch.lumped import lane_ringing, lanes
+from patchfem.runs.batch import lumped, one_by_one
 from patchfem.scene import format_assignments
 
+TRUTH = 1e-6  # tolerance of the single runs that are the truth
+MANY = 64  # number of cases of a study of which points are marched together
 SCENE = (
     '[normal]\nload = "30 N"\n[friction]\n{law}\n'
     + MODE
@@ -31,52 +39,10 @@ LAWS = {
     "lugre": 'law = "lugre"\nstatic = 0.3\nstiffness = "1e6 N/m"\nstribeck_speed = "1 mm/s"',
 }
 FLOORS = {name: row.floor for table in (STATIC, MOTION) for name, row in table.items()}
-PATCH = """[contact]
-length = "12.7 mm"
-width = "12.7 mm"
-height = "6.35 mm"
-load = "26 lbf"
-substrate = "Ti-8Al-1Mo-1V"
-[contact.tilt]
-angle = "0.1 mrad"
-[contact.shear]
-[friction]
-law = "coulomb"
-static = 0.30
-[structure]
-moving_mass = "0.884 kg"
-[[structure.mode]]
-name = "axial"
-frequency = "143 Hz"
-damping = 0.003
-slide = 1.0
-[drive]
-kind = "base"
-frequency = "143 Hz"
-acceleration = "5 g"
-cycles = 200
-[accuracy]
-tolerance = 1e-3
-"""
-# Keys that vary in a sweep of rigs with a patch -> function that draws a value in SI units.
-FAMILIES = {
-    "tilt x friction": {
-        "contact.tilt.angle": lambda r: 10 ** r.uniform(-6, -3.3),
-        "friction.static": lambda r: r.uniform(0.1, 0.6),
-    },
-    "amplitude x friction": {
-        "drive.acceleration": lambda r: 10 ** r.uniform(0, 2.3),
-        "friction.static": lambda r: r.uniform(0.1, 0.6),
-    },
-    "frequency x load": {
-        "drive.frequency": lambda r: r.uniform(100, 200),
-        "contact.load": lambda r: 10 ** r.uniform(1.3, 2.5),
-    },
-}
 
 
-def draw_points(law: str, seed: int, count: int) -> list:
-    """Draw models of a law that lanes can integrate.
+def draw_points(law: str, seed: int, count: int, tolerance: float = 1e-3) -> list:
+    """Draw models of a law that can be marched together.
 
     They range from permanent sliding to sticking, near resonance and away from it.
     """
@@ -92,22 +58,13 @@ def draw_points(law: str, seed: int, count: int) -> list:
             "drive.acceleration": push,
             "structure.mode.axial.slide": float(r.choice([1, -0.7])),
             "structure.mode.axial.output": float(r.choice([1, -1.3])),
+            "accuracy.tolerance": tolerance,
         }
         sets |= draw_law_keys(
             law, r, sets["normal.load"], push / (2 * np.pi * sets["drive.frequency"])
         )
-        model = pf.build(base.override(format_assignments(sets)))
-        if not lanes.refusal_reason(model):
-            out.append(model)
+        out.append(pf.build(base.override(format_assignments(sets))))
     return out
-
-
-def draw_patches(family: str, seed: int, count: int) -> list:
-    """Draw models of a family of rigs with a patch."""
-    r = np.random.default_rng(seed)
-    base = get_base_scene(pf.load(PATCH))
-    sets = [{key: float(draw(r)) for key, draw in FAMILIES[family].items()} for _ in range(count)]
-    return [pf.build(base.override(format_assignments(values))) for values in sets]
 
 
 def draw_law_keys(law: str, r, load: float, speed: float) -> dict:
@@ -144,9 +101,7 @@ def draw_law_keys(law: str, r, load: float, speed: float) -> dict:
 def compare_answers(sweep_answers, singles) -> list[list]:
     """Return the rows of each case of two Answers: values and errors of the first beside those of the second.
 
-    A value that only one of them has is NaN in the other and does not hold. A ringing measure that
-    the second lacks is left out: a single run has none if the law has more cells that yield than
-    the run has samples.
+    A value that only one of them has is NaN in the other and does not hold.
     """
     out = []
     for case in range(len(sweep_answers)):
@@ -162,9 +117,43 @@ def compare_answers(sweep_answers, singles) -> list[list]:
                 float(answers.errors[name][case]) if name in answers.errors else np.nan
                 for answers in (sweep_answers, singles)
             )
-            if np.isnan(truth) and (np.isnan(value) or name in lane_ringing.RINGING_MEASURES):
+            if np.isnan(truth) and np.isnan(value):
                 continue
             error, doubt = np.nan_to_num([error, doubt]).tolist()
             case_rows.append(Row(name, value, error, FLOORS[strip_number(name)], truth, doubt))
         out.append(case_rows)
     return out
+
+
+def compare_with_truth(law: str, seed: int, count: int) -> tuple[dict, list]:
+    """Return by measure the ratios of true to stated error of cases marched together, and the cases with other outcomes."""
+    results = lumped.solve(draw_points(law, seed, count))
+    marched = [case for case in range(count) if results.numerics[case]["engine"] == lumped.ENGINE]
+    truths = draw_points(law, seed, count, TRUTH)
+    truth = one_by_one.solve([truths[case] for case in marched])
+    results = results.select(np.array(marched))
+    ratios = defaultdict(list)
+    for rows in compare_answers(results, truth):
+        for row in rows:
+            missing = np.isnan(row.value) or np.isnan(row.truth)
+            size = max(row.error + row.doubt, 1e-3 * row.floor, 1e-9 * abs(row.value), 1e-300)
+            ratios[row.name].append(np.inf if missing else row.true_error / size)
+    differs = np.flatnonzero(results.outcome != truth.outcome)
+    return ratios, [(marched[k], results.outcome[k], truth.outcome[k]) for k in differs]
+
+
+def main(seed: int, count: int, laws) -> None:
+    """Print the shares of errors that hold for each law."""
+    for law in laws:
+        ratios, outcomes = compare_with_truth(law, seed, count)
+        print(
+            f"{law}: {len(ratios[lumped.AMPLITUDE])} of {count} marched, other outcomes {outcomes}"
+        )
+        for name, column in ratios.items():
+            share = np.mean(np.array(column) <= 1)
+            largest = ", ".join(f"{one:.3g}" for one in sorted(column)[-3:])
+            print(f"  {name:40} {100 * share:6.1f} %  largest {largest}", flush=True)
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]), int(sys.argv[2]), sys.argv[3:] or LAWS)
