@@ -525,7 +525,7 @@ def march_cases(steps, waves, parameters, numbers, memory, nows, seens, historie
         Sines and cosines of the drive at half steps of a cycle, and at half of the shortest steps of a step.
     parameters, numbers, memory
         See `case_rows.Cases`; the memory is changed.
-    nows : (c, 18), seens : (c, 30), histories : (c, n, 4) array
+    nows : (c, 19), seens : (c, 30), histories : (c, n, 4) array
         State, observations, and extremes and phasor of every cycle; output.
     table : (LEVELS + 1, 2, 5) array
         Workspace.
@@ -573,6 +573,7 @@ def march_cases(steps, waves, parameters, numbers, memory, nows, seens, historie
                 now[Now.FRICTION] += n_skipped * (now[Now.FRICTION] - sums[3])
                 cycle += n_skipped
                 first = cycle
+        now[Now.ELASTIC] = read(numbers, memory, j, case[Number.LOAD]).energy
         if seen[Seen.EXCESS] < 0:
             # The second half of the last step
             seen[Seen.STUCK] += 2 * np.pi / omega - seen[Seen.MIDDLE]

@@ -34,7 +34,7 @@ class Now(IntEnum):
     Slide, velocity, mean force of the last step, force, irreversible slide; extremes, cosine and sine integrals of the
     slide in the cycle; slide, velocity and force at the last cycle end; work of the drive, its magnitude, loss of the
     damper, friction work per mass, largest energy; fraction of the last step at which a rigid point stops, turns or is
-    released, -1 without such an event.
+    released, -1 without such an event; elastic energy of the law at the end.
     """
 
     SLIDE = 0
@@ -55,6 +55,7 @@ class Now(IntEnum):
     FRICTION = 15
     STORED = 16
     EVENT = 17
+    ELASTIC = 18
 
 
 class Seen(IntEnum):

@@ -8,7 +8,6 @@ from .. import compiled
 from ..core import ModalBasis, SineDrive
 from .case_kernels import LEVELS, TICKS
 from .case_rows import Cases, Now, Number, Seen
-from .return_maps_kernels import Law
 
 FULL_STICK = 1e-12  # fraction of the time below which slip is round-off
 MIN_ALIGNMENT = 0.95  # resultant of the phases of slip starts below which they have no common phase
@@ -106,7 +105,7 @@ def compute_measures(cases: Cases, now, seen, history) -> dict:
     Parameters
     ----------
     cases : Cases
-    now : (c, 18), seen : (c, 30), history : (c, n, 4) array
+    now : (c, 19), seen : (c, 30), history : (c, n, 4) array
         State at the end and observations, see `case_rows`.
     """
     columns = cases.parameters.T
@@ -150,16 +149,9 @@ def _compute_energies(cases: Cases, now, mass) -> dict:
     return {
         "energy_balance": np.divide(np.abs(gap), size, out=np.zeros_like(gap), where=size > 0),
         "friction_work": work,
-        "energy_dissipated": work - _stored_in_law(cases, now),
+        "energy_dissipated": work - now[:, Now.ELASTIC],
         "energy_created": np.zeros_like(work),
     }
-
-
-def _stored_in_law(cases: Cases, now) -> np.ndarray:
-    """Return the elastic energy (c,) [J] of the law at the end: half of force times stretch."""
-    stretch = now[:, Now.SLIDE] - now[:, Now.SLIP]
-    rigid = cases.numbers[0] == Law.COULOMB
-    return np.where(rigid, 0.0, 0.5 * now[:, Now.FORCE] * stretch)
 
 
 def _mean_phase(seen) -> np.ndarray:
@@ -202,6 +194,7 @@ def _compute_harmonics(cases: Cases, now, seen, area, slide_range) -> dict:
         "acceleration_distortion": np.where(
             fundamental > MIN_ACCELERATION, np.abs(ratio * third) * 2 / span / fundamental, np.nan
         ),
+        "harmonic_force_ratio": np.abs(force / slide),
         "equivalent_stiffness": np.where(moves, (force / slide).real, np.nan),
         "equivalent_damping": np.where(is_known, damping, np.nan),
         "secant_stiffness": np.where(

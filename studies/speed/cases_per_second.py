@@ -1,8 +1,8 @@
 """How many friction cases does a second of one processor answer, and to what error?
 
-Lanes 7000 with error bars, wrong by 2e-9 in the middle and 9e-7 rms (no bar of 2000 missed); the exact engine 790; a
-loop of thirty lines 22 000, 11 000, 5400, 2750 at 100 to 800 steps a cycle, wrong by 5e-5 to 7e-8 in the middle and
-5e-3 to 8e-5 rms; DOP853 3 and CVODE 4 to 6, on a machine that did much else.
+Cases marched together have error bars, and so has the exact engine, one by one; a loop of thirty lines 22 000, 11 000,
+5400, 2750 at 100 to 800 steps a cycle, wrong by 5e-5 to 7e-8 in the middle and 5e-3 to 8e-5 rms; DOP853 3 and CVODE 4
+to 6, on a machine that did much else.
 
 Whole sweeps (--laws 903, medians of three goes, on one of two cores while the other computed too), cases a second:
 Coulomb 8290, elastic-plastic 2950, Iwan 1030, tanh 1230, bonds 1360, Bouc-Wen 158 and LuGre 7 of soft contacts; a patch
@@ -11,10 +11,10 @@ but 9 % and 37 % of those of the patch and 4 % of the static ones.
 
 Random blocks on a spring (m = k = 1, damping ratio .003 to .1, friction .1 to .9 of the push) under 200 cycles of a
 base acceleration at their own frequency, from rest; the amplitude in the last cycle beside that of the exact engine.
-Lanes and the exact engine are timed from the values of the keys to columns of some 20 measures with error bars; the
-loop of thirty lines gives an amplitude alone, and no error; SciPy's DOP853 and SUNDIALS' CVODE go from event to event,
-in Python, no step longer than an eighth of a cycle, on the first few of the same cases. CPU seconds of one thread, all
-in one run, compiled code made before.
+The marched cases and the exact engine are timed from the values of the keys to columns of some 20 measures with
+error bars; the loop of thirty lines gives an amplitude alone, and no error; SciPy's DOP853 and SUNDIALS' CVODE go from
+event to event, in Python, no step longer than an eighth of a cycle, on the first few of the same cases. CPU seconds of
+one thread, all in one run, compiled code made before.
 
 Run: python studies/speed/cases_per_second.py            (2000 cases, 3 by DOP853 and CVODE)
      python studies/speed/cases_per_second.py --laws     (whole sweeps of all laws and of patches)
@@ -46,7 +46,7 @@ from patchfem.scene import loads, make_axis
 
 CYCLES = 200  # cycles of a run
 POINTS = 200  # samples of a cycle of the loop in NumPy
-LANES = 64  # cases that are integrated together
+LANES = 64  # cases that the loop integrates together
 AMPLITUDE = "relative_displacement_amplitude"
 SCENE = f"""[normal]
 load = "1 N"
@@ -176,7 +176,7 @@ def compute(sweep_scene: SweepScene, cases: Cases) -> SweepTable:
 
 
 def by_patchfem(cases: np.ndarray):
-    """Compute the results of the cases from the values of their keys in this process; many cases are computed in lanes."""
+    """Compute the results of the cases from the values of their keys in this process; many cases are marched together."""
     axes = [
         make_axis(key, map(repr, column), distinct=False)
         for key, column in zip(
@@ -187,13 +187,13 @@ def by_patchfem(cases: np.ndarray):
 
 
 def by_exact(cases: np.ndarray):
-    """Compute the results by the exact engine alone, in its batch."""
-    lanes = batches.BATCHES
-    batches.BATCHES = tuple(lane for lane in lanes if lane.name != "lumped.lanes")
+    """Compute the results by the exact engine, case by case."""
+    with_points = batches.BATCHES
+    batches.BATCHES = ()
     try:
         return by_patchfem(cases)
     finally:
-        batches.BATCHES = lanes
+        batches.BATCHES = with_points
 
 
 def top(slide: np.ndarray) -> float:
@@ -406,9 +406,11 @@ def main(
         way(warm)
     found, seconds = measure_seconds(lambda: by_exact(cases))
     exact = found.measures[AMPLITUDE].values.copy()
-    rows = [row("exact engine, in a batch", "", seconds, exact, exact)]
+    rows = [row("exact engine, one by one", "", seconds, exact, exact)]
     found, seconds = measure_seconds(lambda: by_patchfem(cases))
-    rows.append(row("lanes, with bars", "1e-3", seconds, found.measures[AMPLITUDE].values, exact))
+    rows.append(
+        row("together, with bars", "1e-3", seconds, found.measures[AMPLITUDE].values, exact)
+    )
     miss = (
         np.abs(found.measures[AMPLITUDE].values - exact)
         > found.measures[AMPLITUDE].errors + 1e-12 * exact

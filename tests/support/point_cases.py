@@ -125,30 +125,30 @@ def compare_answers(sweep_answers, singles) -> list[list]:
     return out
 
 
-def compare_with_truth(law: str, seed: int, count: int) -> tuple[dict, list]:
-    """Return by measure the ratios of true to stated error of cases marched together, and the cases with other outcomes."""
+def compare_with_truth(law: str, seed: int, count: int) -> dict:
+    """Return by measure the ratios of true to stated error of cases marched together.
+
+    The outcome, and with it the steady amplitude, depends on the tolerance; both are not compared.
+    """
     results = lumped.solve(draw_points(law, seed, count))
     marched = [case for case in range(count) if results.numerics[case]["engine"] == lumped.ENGINE]
     truths = draw_points(law, seed, count, TRUTH)
     truth = one_by_one.solve([truths[case] for case in marched])
-    results = results.select(np.array(marched))
     ratios = defaultdict(list)
-    for rows in compare_answers(results, truth):
+    for rows in compare_answers(results.select(np.array(marched)), truth):
         for row in rows:
             missing = np.isnan(row.value) or np.isnan(row.truth)
             size = max(row.error + row.doubt, 1e-3 * row.floor, 1e-9 * abs(row.value), 1e-300)
             ratios[row.name].append(np.inf if missing else row.true_error / size)
-    differs = np.flatnonzero(results.outcome != truth.outcome)
-    return ratios, [(marched[k], results.outcome[k], truth.outcome[k]) for k in differs]
+    ratios.pop(lumped.STEADY_AMPLITUDE, None)
+    return ratios
 
 
 def main(seed: int, count: int, laws) -> None:
     """Print the shares of errors that hold for each law."""
     for law in laws:
-        ratios, outcomes = compare_with_truth(law, seed, count)
-        print(
-            f"{law}: {len(ratios[lumped.AMPLITUDE])} of {count} marched, other outcomes {outcomes}"
-        )
+        ratios = compare_with_truth(law, seed, count)
+        print(f"{law}: {len(ratios[lumped.AMPLITUDE])} of {count} marched")
         for name, column in ratios.items():
             share = np.mean(np.array(column) <= 1)
             largest = ", ".join(f"{one:.3g}" for one in sorted(column)[-3:])

@@ -21,7 +21,7 @@ from scene_texts import (
 from patchfem.campaigns import SweepScene
 from patchfem.core import PatchfemError
 from patchfem.model import collect_columns
-from patchfem.runs.batch.lumped import columns, lane_numbers
+from patchfem.runs.batch import lumped
 from patchfem.scene.overrides import PLAIN_KEYS
 
 PLASTIC = '[friction]\nlaw = "elastic-plastic"\nstatic = 0.3\nbond_length = "10 um"\n'
@@ -248,19 +248,13 @@ def collect_contact_numbers(model) -> tuple:
     return (model.point.load, *model.friction_limits(model.point.load))
 
 
-def collect_stretch_numbers(model) -> list:
-    """Return the numbers of a law whose force follows from a single stretch."""
-    law = lane_numbers.stretch_law_parameters(model)
-    return [*law.numbers, law.length]
-
-
 @pytest.mark.share(0, 2, 4, 6)
 @pytest.mark.parametrize("name", LUMPED)
 def test_exact_columns_of_similar_models_agree_with_each_model(name):
     """The columns of similar models contain the numbers of each single model.
 
-    Similar models are stored as a single model with an array for each number that differs; lanes
-    and measures use these columns.
+    Similar models are stored as a single model with an array for each number that differs; the
+    march of many cases uses these columns.
     """
     r = np.random.default_rng(len(name))
     sweep_scene = SweepScene(Path("a.toml"), LUMPED[name])
@@ -274,19 +268,15 @@ def test_exact_columns_of_similar_models_agree_with_each_model(name):
             keys, values, partial(format_case, keys, values), np.arange(7)
         )
         single_models = list(models)
-        smooth = name in ("tanh", "nonlocal", "bouc-wen", "lugre")
-        for collect in (
-            collect_rig_numbers,
-            collect_contact_numbers,
-            *([collect_stretch_numbers] if smooth else []),
-        ):
+        for collect in (collect_rig_numbers, collect_contact_numbers):
             np.testing.assert_array_equal(
                 collect_columns(models, collect), collect_columns(single_models, collect)
             )
-        for scales, single_scales in zip(
-            columns.collect_case_scales(models), columns.collect_case_scales(single_models)
+        for part, single_part in zip(
+            lumped.collect_cases(models), lumped.collect_cases(single_models)
         ):
-            np.testing.assert_array_equal(scales, single_scales)
+            for column, single_column in zip(part, single_part):
+                np.testing.assert_array_equal(column, single_column)
         selected = collect_columns(models.select([4, 2]), collect_contact_numbers)
         np.testing.assert_array_equal(
             selected, collect_columns(single_models, collect_contact_numbers)[:, [4, 2]]

@@ -19,7 +19,7 @@ def test_always_95_of_100_measures_lie_within_both_errors(law):
     """Outcomes are those of single runs, and at least 95 % of the measures agree within the sum of both errors."""
     cases = draw_points(law, 11, 12)
     results = batches.solve_models(cases, n_study_cases=MANY)
-    assert count_marched(results) >= 8 and not results.notes
+    assert count_marched(results) >= 4 and not results.notes
     singles = one_by_one.solve(cases)
     assert (results.outcome == singles.outcome).all()
     rows = [row for case_rows in compare_answers(results, singles) for row in case_rows]
