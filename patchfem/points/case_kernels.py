@@ -265,7 +265,7 @@ def add_energies(waves, h, case, start, now):
 
 
 @njit(**NJIT_KERNEL)
-def observe_extremes(h, start, now, seen, observes):
+def observe_extremes(h, law, start, now, seen, observes):
     """Update the extremes of the slide in the cycle, and the friction forces there."""
     q = now[Now.SLIDE]
     force = now[Now.FORCE]
@@ -274,7 +274,9 @@ def observe_extremes(h, start, now, seen, observes):
         fraction = start[1] / (start[1] - now[Now.VELOCITY])
         q = start[0] + 0.5 * start[1] * fraction * h
         force = start[2] + fraction * (now[Now.FORCE] - start[2])
-        if now[Now.FORCE] * start[2] < 0:
+        if law == Law.TANH:
+            force = 0.0
+        elif now[Now.FORCE] * start[2] < 0:
             force = 0.5 * (start[2] + now[Now.FORCE])
         elif now[Now.VELOCITY] == 0:
             force = nan  # rigid friction at rest takes many values
@@ -502,7 +504,7 @@ def march_cycle(steps, table, waves, observes, case, now, numbers, memory, j, se
         add_energies(drive, h, case, start, now)
         now[Now.COS] += 0.5 * h * (start[0] * cosines[0] + now[Now.SLIDE] * cosines[1])
         now[Now.SIN] += 0.5 * h * (start[0] * drive[0] + now[Now.SLIDE] * drive[2])
-        observe_extremes(h, start, now, seen, observes)
+        observe_extremes(h, numbers[0, j], start, now, seen, observes)
         if observes:
             observe_forces(start, now, seen)
             observe_acceleration(drive, h, case, start, now, seen)
