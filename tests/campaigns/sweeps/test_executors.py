@@ -108,7 +108,7 @@ def test_exact_chunk_size_follows_time_per_case():
 
 def test_exact_batched_cases_are_given_in_full_batches():
     """Cases that can be marched together are given to a worker in full batches."""
-    few = make_work(RIG, 40)
+    few = make_work(RIG, 20)
     many = make_work(RIG, 300)
     with_kept_runs = replace(make_work(RIG, 300), keep=print)
     assert [
