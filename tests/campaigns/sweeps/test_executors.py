@@ -114,7 +114,7 @@ def test_exact_batched_cases_are_given_in_full_batches():
     assert [
         len(next(iterate_chunks(one, range(len(one.cases)), IdleExecutor()))[0])
         for one in (few, many, with_kept_runs)
-    ] == [1, 300, 1]
+    ] == [1, 256, 1]
     chunks = ChunkQueue(range(200), 1, 64)
     chunks.take_chunk()
     chunks.record_time(range(64), 640.0)
