@@ -46,21 +46,13 @@ PUBLIC = {
     ),
     "events.event_list": ("DRIVE_CHANGE",),
     "events.histories": (
-        "announce_runs",
         "is_loop_cached",
         "load_event_kernels",
-        "simulate_batch",
     ),
     "events.modal_system": ("make_modal_system",),
     "events.orbits": ("PeriodicMotionFinder",),
-    "events.positions_kernels": (
-        "InterfaceMeasure",
-        "RunMeasure",
-    ),
-    "events.reading": (
-        "Reading",
-        "join_readings",
-    ),
+    "events.positions_kernels": ("InterfaceMeasure",),
+    "events.reading": ("Reading",),
     "events.steady": ("continue_to_steady_state",),
     "grooves.climbing": ("with_shear_modes",),
     "harmonic.backbone": ("FreeBalance",),

@@ -100,7 +100,6 @@ PUBLIC = {
         "state_rates",
     ),
     "laws.tanh": ("TanhLaw",),
-    "laws.tanh_kernels": ("HAS_SPEED_LAYER",),
     "path_work": ("sampled_work",),
     "protocol": (
         "Element",

@@ -16,13 +16,7 @@ A law is a number in `return_maps_kernels.Law` with a branch in each of five fun
 PUBLIC = {
     "case_rows": ("Cases", "Number"),
     "cases": ("CaseMarch", "list_parameters", "march_cases"),
-    "contacts": (
-        "Contact",
-        "PointSet",
-        "convert_element",
-        "make_bond_points",
-        "make_pressed_points",
-    ),
+    "contacts": ("Contact",),
     "laws": ("make_point_law",),
-    "march": ("Motion", "march"),
+    "march": ("Motion",),
 }
