@@ -72,7 +72,7 @@ def write_scene(tmp_path):
 
 
 PHYSICS = set(
-    "closed_forms contact dynamics elasticity friction identify inputs mesh response slip structure surface wear "
+    "closed_forms contact dynamics elasticity friction hybrid identify inputs mesh response slip structure surface wear "
     "runs.bench runs.batch runs.patch runs.rig runs.wear".split()
 )
 PIECES = "contact elasticity mesh runs.patch "  # folders needed to solve a static patch
