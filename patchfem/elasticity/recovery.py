@@ -341,33 +341,3 @@ def estimate_error(recovery: Recovery, u, stress, gauss_points: list) -> StressE
             first_cell = cells.stop
             first_corner = corners.stop
     return StressError(frozen_array(error), frozen_array(energy))
-
-
-def choose_rounding_step(
-    recovery: Recovery, error: StressError, gauss_points: list, fraction: float
-) -> float:
-    """Choose a rounding step for stresses that is small compared with their estimated error.
-
-    Rounding to multiples of q changes xx, yy and xy by q / sqrt(12) in the root mean square, whose
-    complementary energy is at most q^2 / (6 mu) per volume.
-
-    Parameters
-    ----------
-    recovery : Recovery
-    error : StressError
-    gauss_points : list of CellPoints
-    fraction : float
-        Change by rounding over the estimated error of any loaded frame, in the energy norm [1].
-
-    Returns
-    -------
-    float
-        Step [Pa]; 0 if no frame has an estimated error.
-    """
-    total = error.error.sum(axis=1)
-    if not total.any():
-        return 0.0
-    area = np.concatenate([points.weight.sum(axis=0) for points in gauss_points])
-    _, mu = recovery.cells.layers.lame(recovery.cells.is_coating)
-    smallest = total[total > 0].min()
-    return float(fraction * np.sqrt(6 * smallest / (area / mu).sum()))
