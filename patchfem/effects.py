@@ -344,7 +344,8 @@ EFFECTS = {
     ),
     "structure.stiffening": Effect("patchfem.dynamics.march.joints", "F = k_3 x^3 at the output"),
     "accuracy.method=exact": Effect(
-        "patchfem.dynamics.events.histories", "closed form or series between events"
+        "patchfem.hybrid.runs",
+        "Runge-Kutta steps of order 8 that end where a law changes its regime, with a step error of 1e-12",
     ),
     "accuracy.method=march": Effect(
         "patchfem.dynamics.march.loop_kernels",

@@ -8,8 +8,7 @@ import numpy as np
 from ..core import ModalBasis
 from ..structure.drive_sizes import find_max_acceleration
 from .drives import Signal, make_signal, make_slide
-from .laws import LAWS, MIN_LOAD, is_rigid, make_law
-from .laws.grooves import make_grooves
+from .laws import LAWS, MIN_LOAD, is_rigid
 from .laws.springs import make_cubic, make_interlocking
 from .records import (
     N_INTEGRALS,
@@ -32,9 +31,10 @@ MIN_STEPS = 12  # steps per shortest period of drive and load, so that no short 
 MIN_SCALE = 1e-3  # smallest magnitudes of a motion relative to those expected
 REVERSALS = 48  # reversal points that a law keeps
 MAX_STEPS = 3e6  # steps of a run; with the comparison run they take up to 50 CPU seconds
+MAX_CYCLE_STEPS = 100  # further steps per cycle that a run may take
 DEFAULT_RTOL = 1e-7  # tolerance of a step
 EXACT_RTOL = 1e-12  # the same for accuracy.method = "exact"
-CYCLE_TOL = 1e-6  # fraction of a cycle by which a run may miss a whole number of cycles
+MIN_COMPUTED = 3  # cycles at the end of which each is computed
 N_ROWS = 30  # rows of `State.rows`
 
 
@@ -96,16 +96,6 @@ class Case:
         settings[Setting.LONGEST_STEP] *= step_ratio
         return replace(self, rig=self.rig._replace(settings=settings))
 
-    def until(self, time: float) -> "Case":
-        """Return the case up to a time [s], without a largest travel; its cycles are counted from the end."""
-        settings = self.rig.settings.copy()
-        settings[Setting.TRAVEL] = np.inf
-        period = settings[Setting.PERIOD]
-        ends = time - period * np.arange(max(1, int(time / period)))[::-1]
-        windows = np.full(ends.size, -1.0)
-        windows[-count_window_cycles(ends.size) :] = 0.0
-        return replace(self, rig=self.rig._replace(settings=settings), ends=ends, windows=windows)
-
 
 class Options(NamedTuple):
     """What a rig has besides modes, drive and interfaces.
@@ -113,12 +103,14 @@ class Options(NamedTuple):
     - moves_base: whether the drive is the acceleration of the base
     - travel: largest output [m]
     - rtol, max_steps: tolerance of a step, largest number of steps
+    - n_steps: smallest number of steps per shortest period of drive and load
     """
 
     moves_base: bool = False
     travel: float = np.inf
     rtol: float = DEFAULT_RTOL
     max_steps: float = MAX_STEPS
+    n_steps: float = MIN_STEPS
 
 
 def make_rig(
@@ -178,7 +170,7 @@ def make_rig(
 
     settings = np.zeros(len(Setting))
     settings[Setting.MASS] = 1.0 if modes is None else modes.mass
-    settings[Setting.LONGEST_STEP] = shortest / MIN_STEPS
+    settings[Setting.LONGEST_STEP] = shortest / options.n_steps
     settings[Setting.TRAVEL] = options.travel
     settings[Setting.OMEGA] = 2 * np.pi / signal.period
     settings[Setting.PERIOD] = signal.period
@@ -229,8 +221,11 @@ def make_start(rig: Rig, interfaces, start=None) -> np.ndarray:
     return y
 
 
-def make_schedule(cycles: float, period: float, window: int, groups: int = 1) -> tuple:
-    """Return the ends of the cycles [s] and their windows: the last cycles of each of equally long groups (levels).
+def make_schedule(cycles: float, period: float, window: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the ends of the cycles [s], and their windows.
+
+    The window is 0 for the last cycles, -1 for the others, and -2 for the cycles before the window of which each is
+    computed, even if the motion repeats.
 
     Parameters
     ----------
@@ -239,95 +234,84 @@ def make_schedule(cycles: float, period: float, window: int, groups: int = 1) ->
     period : float
         Duration of a cycle [s].
     window : int
-        Cycles of a window.
-    groups : int
-        Number of groups (levels).
+        Cycles of the window.
     """
     count = max(1, int(np.ceil(cycles - 1e-9)))
     number = np.arange(count)
     # Whole cycles are counted from the end of the run, so that the first one may be a part.
     ends = period * (cycles - (count - 1 - number))
-    per_group = count // groups
-    group = np.minimum(number // per_group, groups - 1)
-    group_end = np.where(group == groups - 1, count, (group + 1) * per_group)
-    windows = np.where(number >= group_end - min(window, per_group), group, -1)
-    return ends, windows.astype(float)
+    windows = np.where(number >= count - MIN_COMPUTED, -2.0, -1.0)
+    windows[max(0, count - window) :] = 0.0
+    return ends, windows
 
 
-def count_window_cycles(cycles: float, beat: float = 1.0) -> int:
-    """Return the number of cycles of the last window: ten, or a tenth of the run where that is shorter.
+class Schedule(NamedTuple):
+    """Cycles of a run.
 
-    Under a drive that repeats after `beat` cycles, it has whole beats.
+    - cycles: number of drive cycles, which may be fractional
+    - window: cycles at the end whose measures are recorded
+    - samples (S,): rising times [s] at which the motion is stored
+    - travel: largest output [m]
     """
-    if not 1 < beat <= cycles:
-        beat = 1.0
-    return int(beat * max(1, min(10, (cycles + CYCLE_TOL) // (10 * beat))) + CYCLE_TOL)
+
+    cycles: float
+    window: int
+    samples: np.ndarray
+    travel: float = np.inf
 
 
 def make_rig_case(
-    rig, load: Load | None = None, *, grooves=None, laws=None, samples=(), rtol=DEFAULT_RTOL
+    rig, joints, schedule: Schedule, *, signal=None, rtol: float = DEFAULT_RTOL, n_steps=MIN_STEPS
 ) -> Case:
     """Return the case of the records of a rig.
 
     Parameters
     ----------
     rig : model.rig.Rig
-    load : Load, optional
-        Load of the only interface; default: the loads that the interfaces state.
-    grooves : friction.grooves.Grooves, optional
-    laws : sequence of LawNumbers, optional
-        Laws in place of those of the keys, such as the elements of a patch.
-    samples : (S,) array_like
-        Times [s] at which the motion is stored.
+    joints : sequence of (LawNumbers, Load)
+        Law and load of each interface.
+    schedule : Schedule
+    signal : optional
+        Drive in place of that of the rig.
     rtol : float
         Tolerance of a step.
+    n_steps : float
+        Smallest number of steps per shortest period of drive and load.
     """
     modes = rig.modes
-    drive = rig.drive
-    signal = make_signal(drive.signal)
-    interfaces = []
-    for k, interface in enumerate(rig.friction.interfaces):
-        own_load = Load(interface.load) if load is None else load
-        keys = interface.numbers
-        if laws is not None:
-            law = laws[k]
-        elif grooves is not None:
-            law = make_grooves(keys, grooves)
-        else:
-            law = make_law(keys, own_load.mean, rig.speed_scale, varies=own_load.varies)
-        interfaces.append(Interface(law, own_load, modes.interfaces[k]))
+    drive = rig.drive.signal if signal is None else signal
+    signal = make_signal(drive)
+    interfaces = [Interface(*joint, row) for joint, row in zip(joints, modes.interfaces)]
     n_friction = len(interfaces)
 
     # Springs act before rigid friction on grooves, which needs the acceleration without it.
-    springs = []
     if rig.springs.cubic is not None:
-        springs.append(Interface(make_cubic(rig.springs.cubic), Load(1.0), modes.output))
+        interfaces.append(Interface(make_cubic(rig.springs.cubic), Load(1.0), modes.output))
     if rig.springs.interlock is not None:
         spring = make_interlocking(*rig.springs.interlock)
-        springs.append(Interface(spring, Load(1.0), modes.interfaces[0]))
-    interfaces += springs
+        interfaces.append(Interface(spring, Load(1.0), modes.interfaces[0]))
 
-    # Levels are groups of cycles, each with a window of its own.
-    options = Options(drive.signal.moving, rig.springs.travel, rtol)
-    arrays = make_rig(modes, signal, interfaces, find_sizes(rig, signal), options)
-    levels = max(1, len(drive.levels.amplitudes))
-    window = count_window_cycles(drive.cycles, getattr(drive.signal, "beat", 1.0))
-    window = min(window, int(drive.cycles / levels + CYCLE_TOL)) or 1
-    schedule = make_schedule(drive.cycles, signal.period, window, levels)
+    max_steps = MAX_STEPS + MAX_CYCLE_STEPS * schedule.cycles
+    options = Options(drive.moving, schedule.travel, rtol, max_steps, n_steps)
+    arrays = make_rig(modes, signal, interfaces, find_sizes(rig, signal, drive), options)
+    ends = make_schedule(schedule.cycles, signal.period, schedule.window)
     return Case(
-        arrays, make_start(arrays, interfaces, rig.start), *schedule, np.asarray(samples, float),
+        arrays, make_start(arrays, interfaces, rig.start), *ends, np.asarray(schedule.samples, float),
         n_friction, rig.first_mode.stiffness,
     )  # fmt: skip
 
 
-def find_sizes(rig, signal: Signal) -> tuple[float, float]:
-    """Return the displacement [m] and speed [m/s] that drive and start alone give to slides and output."""
+def find_sizes(rig, signal: Signal, drive) -> tuple[float, float]:
+    """Return the displacement [m] and speed [m/s] that drive and start alone give to slides and output.
+
+    A mode above the frequency of the drive follows it by its stiffness, one below by its inertia.
+    """
     modes = rig.modes
     rows = np.vstack([modes.interfaces, modes.output])
     omega = 2 * np.pi / signal.period
-    speed = (
-        find_max_acceleration(rig.drive.signal) / omega * np.abs(rows @ modes.base).max(initial=0.0)
-    )
+    response = np.abs(modes.base) / np.maximum(omega, modes.omega) ** 2
+    size = find_max_acceleration(drive) * (np.abs(rows) @ response).max(initial=0.0)
+    speed = omega * size
     if rig.start is not None:
         speeds = np.append(rows @ np.asarray(rig.start.v), omega * (rows @ np.asarray(rig.start.z)))
         speed = max(speed, np.abs(speeds).max())
@@ -405,7 +389,7 @@ def make_batch(cases, n_events: int = 0) -> tuple[Rig, State, Record]:
     cycles = np.zeros((n_cases, n_cycles, len(Cycle)))
     cycles[..., Cycle.END] = [case.ends for case in cases]
     cycles[..., Cycle.WINDOW] = [case.windows for case in cases]
-    width = 1 + n + 2 * n_faces + 2
+    width = 1 + n + 3 * n_faces + 2
     samples = np.zeros((n_cases, cases[0].samples.size, width))
     samples[..., 0] = [case.samples for case in cases]
     record = Record(

@@ -39,6 +39,8 @@ def make_signal(drive) -> Signal:
         return Signal(np.array(pieces), np.zeros((0, 3)), drive.period, drive.period, 1)
     if hasattr(drive, "low"):
         return make_sweep(drive)
+    if hasattr(drive, "tones"):
+        return make_tones(drive.tones, drive.period, repeat=0)
     return make_record(drive.time, drive.value, drive.period)
 
 

@@ -16,7 +16,7 @@ from .event_kernels import (
     hold_or_release,
     start_directions,
 )
-from .motion_kernels import find_integrals, project
+from .motion_kernels import find_integrals, look, project
 from .records import (
     N_FACE_INTEGRALS,
     Clock,
@@ -39,10 +39,15 @@ from .window_kernels import (
     find_output,
     observe_cycle,
     observe_window,
+    write_directions,
     write_event,
     write_samples,
 )
 
+MIN_CUT_SPEED = (
+    1e-6  # speed, relative to the largest one, above which an interface does not reverse
+)
+SAME_SLIDE_TOL = 1e-9  # difference of slides that are equal, relative to their range
 MIN_SEEN = 1e-6  # fraction of a cycle before which an end of motion belongs to the cycle before
 MAX_EMPTY_STEPS = 100  # events in a row without progress
 MIN_PROGRESS = 1e-13  # fraction of a step that counts as progress
@@ -243,6 +248,9 @@ def advance(rig, state, record, t_end, cycle):
             write_event(rig, state, record, face, event.which)
             if change_regime(rig, state, face, event.which):
                 return Status.LEAVES_GROOVES
+            number = int(clock[Clock.N_EVENTS]) - 1
+            if number < record.events.shape[0]:
+                write_directions(state, record.events[number])
         elif h == clock[Clock.STEP] or h == longest:
             clock[Clock.STEP] = h * step_factor(norm)
     return Status.DONE
@@ -311,6 +319,7 @@ def skip_cycles(rig, state, record, cycle, count):
     for c in range(cycle + 1, cycle + 1 + count):
         for k in range(Cycle.MIN, columns):
             record.cycles[c, k] = record.cycles[cycle, k]
+        record.cycles[c, Cycle.REPEATS] = 1.0
     for k in range(find_integrals(rig, state.y), state.y.size):
         state.y[k] += count * (state.y[k] - state.rows[CYCLE, k])
     clock = state.clock
@@ -345,7 +354,7 @@ def count_repeated(rig, state, record, cycle):
         end = rig.pieces[int(state.clock[Clock.PIECE]) + 1, Piece.START]
     while cycle + count + 1 < record.cycles.shape[0]:
         row = record.cycles[cycle + count + 1]
-        if row[Cycle.WINDOW] >= 0 or row[Cycle.END] > end:
+        if row[Cycle.WINDOW] != -1 or row[Cycle.END] > end:
             break
         count += 1
     return count
@@ -401,6 +410,25 @@ def end_window(rig, state, record, cycle):
 
 
 @njit(**NJIT_KERNEL)
+def drop_cut_extremes(cycle, point):
+    """Remove the friction force at an extreme slide that lies at an end of a cycle, but is no reversal.
+
+    Parameters
+    ----------
+    cycle : (12,) array
+        Row of `records.Record.cycles`.
+    point : Point
+        Motion of the first interface at this end.
+    """
+    if abs(point.velocity) <= MIN_CUT_SPEED * point.speed_scale:
+        return
+    size = SAME_SLIDE_TOL * (cycle[Cycle.MAX_SLIDE] - cycle[Cycle.MIN_SLIDE])
+    for k in (Cycle.MIN_SLIDE, Cycle.MAX_SLIDE):
+        if abs(point.slide - cycle[k]) <= size:
+            cycle[k + 1] = np.nan
+
+
+@njit(**NJIT_KERNEL)
 def run_case(rig, state, record):
     """Run the cycles of a case; return its `Status`.
 
@@ -438,6 +466,8 @@ def run_case(rig, state, record):
             for k in range(state.y.size):
                 state.rows[CYCLE, k] = state.y[k]
         clock[Clock.EXCHANGED_BEFORE] = clock[Clock.EXCHANGED]
+        if rig.faces.shape[0]:
+            start = look(rig, state, 0, clock[Clock.TIME], state.y)
         cosine = state.y[state.y.size - 2]
         sine = state.y[state.y.size - 1]
 
@@ -445,6 +475,9 @@ def run_case(rig, state, record):
         for i in range(rig.faces.shape[0]):
             if state.memory[i, Memory.SIZE] > MAX_STIFFNESS * rig.faces[i, Face.LENGTH]:
                 status = Status.TOO_STIFF
+        if rig.faces.shape[0]:
+            drop_cut_extremes(row, start)
+            drop_cut_extremes(row, look(rig, state, 0, clock[Clock.TIME], state.y))
         row[Cycle.COS] = state.y[state.y.size - 2] - cosine
         row[Cycle.SIN] = state.y[state.y.size - 1] - sine
         clock[Clock.N_CYCLES] = cycle + 1

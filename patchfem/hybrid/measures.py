@@ -106,7 +106,7 @@ def _compute_energies(rigs, states, first, n_friction: int) -> dict:
     n_faces, n = rigs.faces.shape[1], rigs.modes.shape[2]
     y = states.y
     integrals = y.shape[1] - N_INTEGRALS - N_FACE_INTEGRALS * n_faces
-    faces = y[:, integrals : y.shape[1] - N_INTEGRALS].reshape(-1, n_faces, N_FACE_INTEGRALS)
+    faces = y[:, integrals : y.shape[1] - N_INTEGRALS].reshape(len(y), n_faces, N_FACE_INTEGRALS)
 
     def find_stored(state):
         """Return the energy (c,) of the modes [J]."""
@@ -138,11 +138,14 @@ def _compute_loop(rigs, records, window: int, span, values: dict, stiffness: flo
     ranges = cycles[..., Cycle.MAX_SLIDE] - cycles[..., Cycle.MIN_SLIDE]
     jumps = cycles[..., Cycle.FORCE_AT_MAX] - cycles[..., Cycle.FORCE_AT_MIN]
     with np.errstate(divide="ignore", invalid="ignore"):
-        secant = (jumps / ranges).mean(axis=1)
+        slopes = jumps / ranges
+        count = np.isfinite(slopes).sum(axis=1)
+        secant = np.where(np.isfinite(slopes), slopes, 0.0).sum(axis=1) / count
         half_range = ranges.mean(axis=1) / 2
         damping = values["loop_area"] / (2 * np.pi * stiffness * half_range**2)
         found = {
             "equivalent_stiffness": (force / slide).real,
+            "harmonic_force_ratio": np.abs(force / slide),
             "secant_stiffness": secant,
             "equivalent_damping": damping if stiffness else np.full_like(damping, np.nan),
         }

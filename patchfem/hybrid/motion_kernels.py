@@ -7,7 +7,8 @@ from ..friction.flags_kernels import NJIT_KERNEL
 from .records import N_FACE_INTEGRALS, N_INTEGRALS, Clock, Face, Memory, Mode, Piece, Point, Setting
 from .table_kernels import force_and_rates
 
-SHARED_GRIP = 1e-13  # relative compliance by which interfaces with the same slide share their force
+SHARED_GRIP = 1e-7  # relative compliance by which more interfaces than modes share their forces
+N_GRIP_PASSES = 3  # each pass removes the acceleration that this compliance leaves
 
 
 @njit(**NJIT_KERNEL)
@@ -253,7 +254,7 @@ def add_friction(rig, state, i, t, y, rates):
 def hold(rig, state, acceleration):
     """Add the forces that keep the resting interfaces at rest.
 
-    The second pass removes the acceleration that the small compliance SHARED_GRIP leaves.
+    Further passes remove the acceleration that the small compliance SHARED_GRIP leaves.
 
     Parameters
     ----------
@@ -268,7 +269,7 @@ def hold(rig, state, acceleration):
     for i in range(n_faces):
         if rests(state.memory[i]):
             state.memory[i, Memory.FORCE] = 0.0
-    for _ in range(2):
+    for _ in range(N_GRIP_PASSES):
         for i in range(n_faces):
             state.memory[i, Memory.PULL] = project(rig.rows[0, i], acceleration)
         for i in range(n_faces):

@@ -228,10 +228,11 @@ class Probe(IntEnum):
 
 
 class Cycle(IntEnum):
-    """Columns of `Record.cycles`: end [s] and window (-1: none) of each cycle, then what was measured.
+    """Columns of `Record.cycles`: end [s] and window (below 0: none) of each cycle, then what was measured.
 
     Smallest and largest output, integrals of the output times cosine and sine, integral of the slide of the first
-    interface over time, and its smallest and largest slide with the friction forces there.
+    interface over time, its smallest and largest slide with the friction forces there, and 1 for a cycle that was not
+    computed, because it repeats the one before.
     """
 
     END = 0
@@ -245,6 +246,7 @@ class Cycle(IntEnum):
     FORCE_AT_MIN = 8
     MAX_SLIDE = 9
     FORCE_AT_MAX = 10
+    REPEATS = 11
 
 
 class Whole(IntEnum):
@@ -293,10 +295,11 @@ class Window(IntEnum):
 class Record(NamedTuple):
     """What a run records.
 
-    - cycles (C, 11): see `Cycle`
+    - cycles (C, 12): see `Cycle`
     - whole (W, 9), faces (W, M, 19): measures of the windows, see `Whole` and `Window`
-    - samples (S, m), events (E, m): time, state y, forces and loads of the interfaces, interface and margin of an event;
-      the first column of the samples is given
+    - samples (S, m), events (E, m): time, state y, forces, loads and directions of the interfaces, interface and margin
+      of an event; the first column of the samples is given. Force and load of an event are those before it, the
+      directions those after it
     """
 
     cycles: np.ndarray

@@ -4,7 +4,7 @@ The error of a measure is ERROR_FACTOR times its change in a run whose steps hav
 may be twice as long, plus ERROR_FLOOR times the tolerance of the step times the value.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +20,7 @@ from .records import (
     Cycle,
     Face,
     Margin,
+    Mode,
     Record,
     Rig,
     Setting,
@@ -31,7 +32,9 @@ COARSE = 30.0  # ratio of the step tolerances of the comparison run and of the r
 COARSE_STEP = 2.0  # ratio of their longest steps
 ERROR_FACTOR = 3.0  # safety; on 150 random rigs 97 % of the errors of each measure hold, with 1 instead of 3 94 %
 ERROR_FLOOR = 10.0  # smallest error of a value, relative to the step tolerance
-N_EVENTS = 20_000  # events that a single run stores
+N_EVENTS = 200_000  # events that a single run stores
+MAX_REPEATED = 1000  # cycles whose events are repeated where the motion repeats
+SAME_PHASE_TOL = 1e-6  # in cycles
 EVENT_NAMES = {
     Margin.MOTION: "stop or reversal",
     Margin.BRANCH: "change of branch",
@@ -76,10 +79,12 @@ class Motion:
     - case: the case
     - status, message: how the run ended, and in words if it ended early
     - values, errors: measures of the last window by name, and their errors
-    - levels: values and errors of every window
     - extremes (c, 2), phasors (c,): smallest and largest output [m] and phasor of the output [m] of each cycle
-    - rows (k, m): stored samples and events in the order of time, see `records.Record`
-    - event_rows (e, m): the events
+    - rows (k, m): stored samples and events in the order of time, see `records.Record`; an event follows a sample at
+      its time
+    - event_rows (e, m): the first N_EVENTS events
+    - time: end of the motion [s]
+    - repeats: whether the motion repeats after each cycle before the last ones
     - final: arrays of the engine at the end
     - n_steps: number of steps
     """
@@ -89,13 +94,14 @@ class Motion:
     message: str
     values: dict
     errors: dict
-    levels: tuple
     extremes: np.ndarray
     phasors: np.ndarray
     rows: np.ndarray
     event_rows: np.ndarray
     final: State
     n_steps: int
+    time: float
+    repeats: bool
 
     @property
     def events(self) -> list[Event]:
@@ -118,6 +124,52 @@ class Motion:
         n = self.case.rig.modes.shape[1]
         return rows[:, 1 : 1 + n] @ self.case.rig.rows[0].T
 
+    def _columns(self, rows, number: int) -> np.ndarray:
+        """Return forces (0), loads (1) or directions (2) of the friction interfaces (k, i) at rows."""
+        first = 1 + self.case.y.size + number * self.case.rig.faces.shape[0]
+        return rows[:, first : first + self.case.n_friction]
+
+    def find_directions(self) -> np.ndarray:
+        """Return the directions (e + 1, i) of slip of the friction interfaces at the start and after each event.
+
+        They are 0 while a rigid interface rests.
+        """
+        return self._columns(np.concatenate([self.rows[:1], self.event_rows]), 2)
+
+    def list_reversals(self, interface: int) -> np.ndarray:
+        """Return times [s] and slides [m] (k, 2) at which the motion of an interface starts and reverses."""
+        is_own = (self.event_rows[:, -2] == interface) & (self.event_rows[:, -1] == Margin.MOTION)
+        rows = np.concatenate([self.rows[:1], self.event_rows[is_own]])
+        return np.stack([rows[:, 0], self._slides(rows)[:, interface]], axis=1)
+
+    def find_energies(self) -> dict:
+        """Return the energies [J] of the whole motion.
+
+        - "work_in", "power": work of the drive and the sum of its magnitudes over the steps
+        - "viscous", "friction": energies that dampers and friction dissipate
+        - "stored", "peak_stored": change of the stored energy, and the largest energy of the modes
+        """
+        n_faces = self.case.rig.faces.shape[0]
+        y = self.final.y[0]
+        first = y.size - N_INTEGRALS - N_FACE_INTEGRALS * n_faces
+        work, _, loss = y[first : y.size - N_INTEGRALS].reshape(n_faces, N_FACE_INTEGRALS).T
+        clock = self.final.clock[0]
+        change = self._find_modal_energy(y) - self._find_modal_energy(self.case.y)
+        return {
+            "work_in": float(y[-4]),
+            "viscous": float(y[-3]),
+            "power": float(clock[Clock.EXCHANGED]),
+            "friction": float(loss.sum()),
+            "stored": float(change + (work - loss).sum()),
+            "peak_stored": float(clock[Clock.STORED]),
+        }
+
+    def _find_modal_energy(self, y) -> float:
+        """Return the energy of the modes [J] in a state."""
+        n = self.case.rig.modes.shape[1]
+        squares = y[n : 2 * n] ** 2 + self.case.rig.modes[Mode.STIFFNESS] * y[:n] ** 2
+        return 0.5 * self.case.rig.settings[Setting.MASS] * float(squares.sum())
+
     def make_response(self, modes: ModalBasis, drive) -> Response:
         """Return the stored samples as histories.
 
@@ -130,10 +182,9 @@ class Motion:
         time, z, rate = rows[:, 0], rows[:, 1 : 1 + n], rows[:, 1 + n : 1 + 2 * n]
         first = 1 + self.case.y.size - N_INTEGRALS - N_FACE_INTEGRALS * n_faces
         integrals = rows[:, first : first + N_FACE_INTEGRALS * n_faces].reshape(
-            -1, n_faces, N_FACE_INTEGRALS
+            len(rows), n_faces, N_FACE_INTEGRALS
         )
         forces = rows[:, 1 + self.case.y.size :][:, :n_faces]
-        loads = rows[:, 1 + self.case.y.size + n_faces :][:, :n_faces]
 
         # Accelerations follow from eq. 3.4, relative to the base.
         push = drive.values(time)
@@ -151,7 +202,7 @@ class Motion:
             )
         }
         if m and rig.faces[0, Face.SWING]:
-            extra["normal_load"] = loads[:, 0]
+            extra["normal_load"] = self._columns(rows, 1)[:, 0]
         if m > 1:
             extra |= {
                 "slides": slides,
@@ -227,45 +278,112 @@ def _compare(cases, fine: Batch) -> list[dict]:
     ]
 
 
-def run_case(case: Case, *, has_errors: bool = True) -> Motion:
-    """Run a single case as a batch of one; a run that ends early has the measures of its last cycles."""
-    batch = run_batch([case], N_EVENTS)
-    status = Status(int(batch.states.clock[0, Clock.STATUS]))
-    if status in (Status.EXCEEDS_TRAVEL, Status.LEAVES_GROOVES):
-        case = case.until(batch.states.clock[0, Clock.TIME])
-        batch = run_batch([case], N_EVENTS)
+def run_case(
+    case: Case,
+    *,
+    has_errors: bool = True,
+    start: State | None = None,
+    fills_histories: bool = True,
+) -> Motion:
+    """Run a single case as a batch of one; a run that ends early has no errors.
 
-    # Errors from a run with larger steps, for the window of every level.
+    Parameters
+    ----------
+    case : Case
+    has_errors : bool
+        Whether errors are estimated by a run with larger steps.
+    start : State, optional
+        End of another motion of the same rig, from which the case goes on at t = 0; default: the start of the case.
+    fills_histories : bool
+        Whether samples and events of cycles are added that repeat an earlier one and are not computed.
+    """
+    batch = run_batch([case], N_EVENTS, None if start is None else _restart(case, start))
     _, states, records = batch[:3]
     clock = states.clock[0]
+    status = Status(int(clock[Clock.STATUS]))
     n_cycles = int(clock[Clock.N_CYCLES])
-    errors = [{} for _ in batch.windows]
-    if has_errors and clock[Clock.STATUS] == Status.DONE:
-        errors = _compare([case], batch)
-    values = [{name: float(value[0]) for name, value in window.items()} for window in batch.windows]
-    errors = [{name: float(error[0]) for name, error in window.items()} for window in errors]
-    levels = tuple(zip(values, errors))
-
-    samples = records.samples[0]
-    samples = samples[: int(clock[Clock.SAMPLE])]
-    samples = samples[~np.isnan(samples[:, 0])]
-    event_rows = records.events[0][: min(int(clock[Clock.N_EVENTS]), N_EVENTS)]
-    rows = np.concatenate([samples, event_rows])
+    errors = {}
+    if has_errors and status == Status.DONE:
+        errors = {name: float(error[0]) for name, error in _compare([case], batch)[0].items()}
 
     cycles = records.cycles[0, :n_cycles]
+    samples = records.samples[0][: int(clock[Clock.SAMPLE])]
+    event_rows = records.events[0][: min(int(clock[Clock.N_EVENTS]), N_EVENTS)]
+    repeats = bool(cycles[:, Cycle.REPEATS].any())
+    if repeats and fills_histories and len(samples):
+        samples, event_rows = _fill_repeated_cycles(case, cycles, samples, event_rows)
+    samples = samples[~np.isnan(samples[:, 0])]
+    rows = np.concatenate([samples, event_rows])
+
     duration = np.diff(cycles[:, Cycle.END], prepend=0.0)
-    message = MESSAGES.get(status, "").format(steps=case.rig.settings[Setting.MAX_STEPS])
     return Motion(
-        case=case,
+        case=case if start is None else replace(case, y=batch.start[0]),
         status=status,
-        message=message,
-        values=values[-1],
-        errors=errors[-1],
-        levels=levels,
+        message=MESSAGES.get(status, "").format(steps=case.rig.settings[Setting.MAX_STEPS]),
+        values={name: float(value[0]) for name, value in batch.windows[0].items()},
+        errors=errors,
         extremes=cycles[:, [Cycle.MIN, Cycle.MAX]],
         phasors=2 / duration * (cycles[:, Cycle.COS] - 1j * cycles[:, Cycle.SIN]),
         rows=rows[np.argsort(rows[:, 0], kind="stable")],
         event_rows=event_rows,
         final=states,
         n_steps=int(clock[Clock.N_STEPS]),
+        time=float(clock[Clock.TIME]),
+        repeats=repeats,
     )
+
+
+def _fill_repeated_cycles(case: Case, cycles, samples, event_rows) -> tuple:
+    """Return samples and events with those of the cycles that repeat an earlier one and were not computed.
+
+    Parameters
+    ----------
+    case : Case
+    cycles : (C, 12) array
+    samples : (S, m) array
+        NaN at times of these cycles.
+    event_rows : (e, m) array
+    """
+    skipped = np.flatnonzero(cycles[:, Cycle.REPEATS])
+    last = skipped[0] - 1
+    end = cycles[last, Cycle.END]
+    period = float(case.rig.settings[Setting.PERIOD])
+
+    # Integrals grow by the same amount in each of these cycles and in the last one.
+    n_faces = case.rig.faces.shape[0]
+    integrals = slice(1 + case.y.size - N_INTEGRALS - N_FACE_INTEGRALS * n_faces, 1 + case.y.size)
+    known = samples[~np.isnan(samples[:, 0])]
+    before = np.argmin(np.abs(known[:, 0] - (known[-1, 0] - period)))
+    gain = known[-1, integrals] - known[before, integrals]
+
+    def repeat(rows, sources, counts) -> np.ndarray:
+        """Return rows that are repeated after a number of periods."""
+        repeated = rows[sources]
+        repeated[:, 0] += counts * period
+        repeated[:, integrals] += counts[:, None] * gain
+        return repeated
+
+    # Samples have the same phases in all cycles; the last computed cycle has all of them.
+    missing = case.samples[: len(samples)][np.isnan(samples[:, 0])]
+    counts = np.ceil((missing - end) / period - SAME_PHASE_TOL)
+    sources = np.searchsorted(known[:, 0], missing - counts * period - SAME_PHASE_TOL * period)
+    filled = np.concatenate([known, repeat(known, sources, counts)])
+
+    in_last = np.flatnonzero((event_rows[:, 0] > end - period) & (event_rows[:, 0] <= end))
+    kept = np.unique(np.linspace(1, skipped.size, min(skipped.size, MAX_REPEATED)).round())
+    events = repeat(event_rows, np.tile(in_last, kept.size), np.repeat(kept, in_last.size))
+    events = np.concatenate([event_rows, events])
+    return filled[np.argsort(filled[:, 0])], events[np.argsort(events[:, 0], kind="stable")]
+
+
+def _restart(case: Case, end: State) -> State:
+    """Return the state at the end of a motion as the start of another one, with integrals and clock at 0."""
+    state = State(*(array.copy() for array in end))
+    n_faces = case.rig.faces.shape[0]
+    state.y[:, case.y.size - N_INTEGRALS - N_FACE_INTEGRALS * n_faces :] = 0.0
+    step = state.clock[:, Clock.STEP].copy()
+    sizes = state.clock[:, [Clock.OUTPUT_SIZE, Clock.OUTPUT_SPEED]].copy()
+    state.clock[:] = 0.0
+    state.clock[:, Clock.STEP] = step
+    state.clock[:, [Clock.OUTPUT_SIZE, Clock.OUTPUT_SPEED]] = sizes
+    return state

@@ -453,7 +453,7 @@ def add_start(rig, clock, t, row):
 
 @njit(**NJIT_KERNEL)
 def write_row(rig, state, t, y, row):
-    """Write a sample: time, state, forces and loads.
+    """Write a sample: time, state, forces, loads and directions.
 
     Parameters
     ----------
@@ -477,6 +477,23 @@ def write_row(rig, state, t, y, row):
         point = look(rig, state, i, t, y)
         row[1 + y.size + i] = state.memory[i, Memory.FORCE]
         row[1 + y.size + n_faces + i] = max(point.load, 0.0)
+    write_directions(state, row)
+
+
+@njit(**NJIT_KERNEL)
+def write_directions(state, row):
+    """Write the directions of the interfaces into a sample.
+
+    Parameters
+    ----------
+    state : State
+        Motion.
+    row : (m,) array
+        Sample, which is changed.
+    """
+    n_faces = state.memory.shape[0]
+    for i in range(n_faces):
+        row[1 + state.y.size + 2 * n_faces + i] = state.memory[i, Memory.DIRECTION]
 
 
 @njit(**NJIT_KERNEL)

@@ -97,9 +97,9 @@ PUBLIC = {
     ),
     "rig.engines": (
         "ENGINES",
-        "PIECES",
-        "SMOOTH",
+        "HYBRID",
         "collect_motion_features",
+        "find_obstacle_of_map",
     ),
     "rig.numerics": ("choose_numerics",),
     "rig.event_driven": ("YieldingElements",),

@@ -31,8 +31,7 @@ PACKAGE_BYTES = 80e6  # Memory of the packages that every run imports [bytes].
 MAX_CPU_SECONDS = 1e6  # Largest predicted CPU time [s] of a run that is started; twelve days.
 SKIPPING_ENGINES = (
     "march",
-    "exact",
-    "piecewise",
+    "hybrid",
 )  # Engines that skip cycles once the motion is periodic.
 # Smallest number of cycles at which a plan mentions that cycles may be skipped.
 MIN_SKIPPED_CYCLES = 100

@@ -1,5 +1,7 @@
 """Batches of `hybrid`, errors, histories, samples and early ends."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from hybrid_cases import coulomb, make_modes, make_oscillator
@@ -8,8 +10,9 @@ from hybrid_rigs import draw_spec, make_case
 from patchfem.core import SineDrive
 from patchfem.hybrid import cases, drives, runs
 from patchfem.hybrid.laws import masing
-from patchfem.hybrid.records import Status
-from patchfem.structure.drives import RecordedDrive, SweepDrive, make_levels
+from patchfem.hybrid.laws.masing import from_elements
+from patchfem.hybrid.records import Setting, Status
+from patchfem.structure.drives import RecordedDrive, SweepDrive
 
 AMPLITUDE = "relative_displacement_amplitude"
 
@@ -75,30 +78,33 @@ def test_energy_is_balanced(seed):
     assert motion.values["energy_balance"] < 1e-9
 
 
-def test_levels_carry_their_state_and_have_measures_of_their_own():
-    """A drive in levels equals runs of the same levels one after the other; each level has its window."""
-    levels = make_levels([0.9, 1.2, 0.7], 1.0, 20.0)
-    signal = drives.make_signal(levels)
-    modes = make_modes(zeta=0.01)
-    interface = cases.Interface(coulomb(), cases.Load(0.8), np.ones(1))
-    rig = cases.make_rig(
-        modes, signal, [interface], (1.0, 1.0), cases.Options(moves_base=True, rtol=1e-10)
-    )
-    schedule = cases.make_schedule(60, signal.period, 2, 3)
-    case = cases.Case(rig, cases.make_start(rig, [interface]), *schedule, np.zeros(0), 1)
-    motion = runs.run_case(case)
-    found = [values[AMPLITUDE] for values, _ in motion.levels]
+@pytest.mark.parametrize("law", [coulomb(), from_elements([0.5, 1.0], [0.3, 0.6])])
+def test_a_motion_goes_on_from_the_end_of_another(law):
+    """Two runs of 20 cycles, the second from the end of the first, equal a run of 40 cycles."""
+    options = {"acceleration": 0.9, "zeta": 0.01, "rtol": 1e-11, "load": 0.5}
+    whole = runs.run_case(make_oscillator(law, cycles=40, **options), has_errors=False)
+    half = make_oscillator(law, cycles=20, **options)
+    first = runs.run_case(half, has_errors=False)
+    second = runs.run_case(half, has_errors=False, start=first.final)
+    extremes = np.concatenate([first.extremes, second.extremes])
+    assert extremes == pytest.approx(whole.extremes, rel=1e-7)
+    work = [motion.values["friction_work"] for motion in (first, second, whole)]
+    assert work[0] + work[1] == pytest.approx(work[2], rel=1e-7)
+    assert second.values["energy_balance"] < 1e-8
 
-    def range_of(cycles):
-        """Return half the range of the output in the last two of some cycles."""
-        part = motion.extremes[cycles - 2 : cycles]
-        return (part[:, 1].max() - part[:, 0].min()) / 2
 
-    assert found == pytest.approx([range_of(20), range_of(40), range_of(60)], rel=1e-9)
-    first = runs.run_case(
-        make_oscillator(coulomb(), acceleration=0.9, zeta=0.01, cycles=20, rtol=1e-10)
-    )
-    assert motion.extremes[:20] == pytest.approx(first.extremes, rel=1e-8)
+def test_cycles_that_are_not_computed_have_the_samples_of_all_cycles():
+    """A motion that repeats early has samples, works and events as if each cycle had been computed."""
+    samples = np.arange(0, 60.5, 0.25) * 2 * np.pi
+    case = make_oscillator(coulomb(), cycles=60, zeta=0.2, rtol=1e-9, load=0.6, samples=samples)
+    whole = case.rig.settings.copy()
+    whole[Setting.REPEAT] = 0
+    every = dataclasses.replace(case, rig=case.rig._replace(settings=whole))
+    short, full = (runs.run_case(one, has_errors=False) for one in (case, every))
+    assert short.repeats and not full.repeats
+    assert short.rows.shape == full.rows.shape
+    n = 1 + case.y.size
+    assert short.rows[:, :n] == pytest.approx(full.rows[:, :n], rel=1e-6, abs=1e-7)
 
 
 def test_drives_have_the_values_of_their_records():

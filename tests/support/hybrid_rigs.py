@@ -180,7 +180,7 @@ def make_case(spec: dict, rtol: float = cases.DEFAULT_RTOL, samples=()) -> cases
     size = spec["length"]
     options = cases.Options(spec["kind"] != "release", rtol=rtol)
     rig = cases.make_rig(modes, signal, interfaces, (size, size * spec["omega"][0]), options)
-    window = cases.count_window_cycles(spec["cycles"])
+    window = int(max(1, min(10, spec["cycles"] // 10)))
     schedule = cases.make_schedule(spec["cycles"], spec["period"], window)
     start = cases.make_start(rig, interfaces, SimpleNamespace(z=spec["z"], v=spec["v"]))
     return cases.Case(rig, start, *schedule, np.asarray(samples, float), len(interfaces))

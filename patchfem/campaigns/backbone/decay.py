@@ -9,7 +9,7 @@ from ...core import NotConverged
 from ...formatting import format_length
 from ...response.decay_curve import find_reversals_by_extrapolation
 from ...runs.rig import decays, solve
-from ...runs.rig.engines import ENGINES, SMOOTH
+from ...runs.rig.engines import ENGINES, HYBRID
 from .decay_identification import identify_decay, measure_other_modes
 from .joint import JointMode
 from .records import ROUND_OFF_ERROR, Curve, make_curve
@@ -203,7 +203,7 @@ def _identify_with_errors(joint: JointMode, release: Release, amplitudes) -> Ide
     """Identify frequency and damping at amplitudes (k,) [m] from a release, with errors."""
     model, choice, solution = release
     decay = identify_decay(joint, solution.response)
-    if choice.engine == SMOOTH.name:
+    if choice.engine == HYBRID.name:
         other = identify_decay(joint, solution.response, find_reversals_by_extrapolation)
         decay = decay.add_sampling_error(other)
     decay = decay.interpolate(amplitudes)

@@ -6,13 +6,13 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import InitialState, NotConverged, PatchfemError, Response
-from ...effects import NO_WAVEFORM
+from ...effects import NO_WAVEFORM, law_has_trait
 from ...formatting import format_length
 from ...model.model import Model
 from ...model.rig import DriveLevels
 from ...response.decay_curve import locate_reversals
 from ...runs.rig import decays, numerics, solve
-from ...runs.rig.engines import PIECES
+from ...runs.rig.engines import HYBRID
 from ...structure import drives
 from ...structure.drive_sizes import find_decay_rate
 from .balance import HARMONIC_COUNTS, find_free_motions
@@ -177,7 +177,7 @@ def _max_cycles(joint: JointMode, engine: str) -> int:
     """Return the largest number of cycles that a release may take."""
     if joint.modes.omega.size > 1:
         return MAX_CYCLES
-    return MAX_CYCLES_TURNS if engine == PIECES.name else MAX_CYCLES_ONE_MODE
+    return MAX_CYCLES_TURNS if engine == HYBRID.name else MAX_CYCLES_ONE_MODE
 
 
 def _prepare_release(joint: JointMode, amplitude: float, cycles: int) -> tuple:
@@ -186,7 +186,8 @@ def _prepare_release(joint: JointMode, amplitude: float, cycles: int) -> tuple:
     drive = replace(model.rig.drive, cycles=float(cycles))
     model = replace(model, rig=replace(model.rig, drive=drive))
     choice = numerics.choose_numerics(model)
-    stores_reversals = joint.is_rigid or choice.engine == PIECES.name
+    is_timeless = model.friction is not None and law_has_trait(model.friction.law, "timeless")
+    stores_reversals = joint.is_rigid or (choice.engine == HYBRID.name and is_timeless)
     if joint.modes.omega.size > 1 or not stores_reversals:
         choice = replace(choice, window=int(cycles))
     return model, choice

@@ -141,7 +141,7 @@ def _refuse_unsupported(model: Model) -> None:
         features = engines.collect_motion_features(model, steady=True)
         reason = methods.find_unsupported_feature(SPEED_LAW_SUPPORT, features)
     else:
-        reason = engines.PIECES.find_unsupported_feature(model, steady=True)
+        reason = engines.find_obstacle_of_map("piecewise", model)
     if reason.startswith("for law"):
         raise PatchfemError(
             f"{reason.removeprefix('for ')} cannot be written as friction elements that stretch and slip; "

@@ -1,8 +1,7 @@
-"""Runs of a rig by engines that are exact between events.
+"""Measures of the steady motions that `steady.maps` finds, and of the batches of `batch.lumped.pieces`.
 
-In: a Model, its Numerics and its Patch. Out: a Solution whose measures come from the power series
-of the time intervals between events (`dynamics.events`). The interfaces have Coulomb friction,
-elastic-plastic elements or no friction.
+In: a run of `dynamics.events`, whose interfaces have Coulomb friction, elastic-plastic elements or no friction. Out: a
+Solution whose measures come from the power series of the time intervals between events.
 """
 
 from dataclasses import replace
@@ -20,12 +19,11 @@ from ...response import run_events
 from ...response.loops import interface_loops
 from ...response.measures import MIN_SLIDE_RANGE, compute_harmonic, relative_gap
 from ...response.ringing import compute_stuck_vibration, make_ringing_measures, select_strongest
-from ...response.rows import ROWS_NEEDING_RUN, stick_fraction
+from ...response.rows import stick_fraction
 from ...response.spectrum import distortion_ratio
 from ...structure.drive_sizes import (
     find_drive_omega,
     find_max_acceleration,
-    find_min_decay_rate,
     has_full_cycle,
     is_periodic,
     is_sinusoidal,
@@ -33,8 +31,7 @@ from ...structure.drive_sizes import (
 from ..bench import averaged_law
 from . import interface, strips
 from .evaluation import RunEvaluator
-from .levels import remove_incomplete_cycle, run_levels
-from .solution import Solution, first_interface_load, first_mode_stiffness
+from .solution import first_interface_load, first_mode_stiffness
 
 # Measures of the motion that also exist without an interface.
 MOTION_MEASURES = (
@@ -49,74 +46,6 @@ N_CHANGE_WINDOWS = 3
 # Smallest relative decay of a free motion over the last windows that is assumed; less damping counts
 # as this decay.
 MIN_RELATIVE_DECAY = 1e-6
-
-
-def run_event_driven(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
-    """Compute the motion of a rig from event to event, for one drive level after another.
-
-    Rigid elements (Coulomb friction or none) store no snapshots.
-
-    Parameters
-    ----------
-    model : Model
-    numerics : Numerics
-    patch : Patch or None
-        None under [normal] or between masses.
-    frames : int
-        Number of snapshots of the interface in the last cycle.
-    say, progress : callable, optional
-        Callbacks for a line of text and for the completed fraction.
-
-    Returns
-    -------
-    Solution
-    """
-    contact_elements = RigidElements if numerics.engine == "exact" else YieldingElements
-    evaluator = EventEvaluator(model, numerics, patch, contact_elements(model, numerics, patch))
-    rig = model.rig
-    begin = perf_counter()
-    solution_fields = {}
-    histories.load_event_kernels(say)
-    prepare = {"reduce": evaluator.reduction_seconds, "compiled_code": perf_counter() - begin}
-    begin = perf_counter()
-
-    def integrate(drive, state, watch, is_last, cycles: float = rig.drive.levels.cycles):
-        """Integrate the motion under a drive from a given initial state.
-
-        Parameters
-        ----------
-        drive
-        state : tuple
-            Initial state of the rig, and initial memory of the elements.
-        watch : callable or None
-            Callback for the completed fraction.
-        is_last : bool
-            Whether this is the last run, which stores snapshots of the interface.
-        cycles : float
-        """
-        run = histories.simulate(
-            rig.modes,
-            drive,
-            evaluator.groups,
-            cycles,
-            numerics.window,
-            rig.springs.travel,
-            frames * (is_last and not evaluator.is_rigid),
-            watch,
-            *state,
-            even=bool(ROWS_NEEDING_RUN),
-        )
-        return evaluator.average_over_strips(run)
-
-    if rig.drive.levels.amplitudes:
-        run, solution_fields = run_levels(
-            evaluator, integrate, (rig.start, None), lambda run: run.end, progress
-        )
-    else:
-        run = integrate(rig.drive.signal, (rig.start, None), progress, True, numerics.cycles)
-        run = remove_incomplete_cycle(run)
-    solution_fields |= {} if evaluator.is_rigid else {"prepare": prepare}
-    return evaluator.make_solution(run, perf_counter() - begin, **solution_fields)
 
 
 class EventEvaluator(RunEvaluator):
@@ -255,19 +184,6 @@ class EventEvaluator(RunEvaluator):
             return []
         return compute_stuck_vibration(self.model.rig.modes, np.concatenate(springs), motion)
 
-    def find_remaining_vibration(self, run, drive) -> dict:
-        """Return a dict with the dominant vibration mode that remains after the last slip of a release."""
-        if (
-            self.model.rig.drive.kind != "free"
-            or run.response is None
-            or run.log is None
-            or not run.log.time.size
-        ):
-            return {}
-        after = run.response.select(run.response.time > run.log.time[-1])
-        vibration = self.compute_stuck_vibration(run, after, drive)
-        return {"tail": select_strongest(vibration, "displacement")} if vibration else {}
-
     def estimate_run_errors(self, run, drive, values: dict) -> dict:
         """Estimate the errors due to sampling, and the error of the drift of rigid elements.
 
@@ -297,26 +213,6 @@ class EventEvaluator(RunEvaluator):
             }
         faster = max(1.0, float(modes.omega.max()) / find_drive_omega(drive)) ** 2
         return errors | {"drift_per_cycle": 1e-13 * faster * float(np.ptp(window.slide))}
-
-    def collect_solution_fields(self, run, drive) -> dict:
-        """Return the vibration after a release, and the steady amplitude of an unsteady run."""
-        fields = {}
-        if tail := self.find_remaining_vibration(run, drive):
-            fields["extra"] = tail
-        numerics = self.numerics
-        modes = self.model.rig.modes
-        unsettled = may_still_change(
-            run.extremes,
-            numerics.window,
-            self.model.accuracy.tolerance,
-            find_min_decay_rate(modes) * drive.period,
-        )
-        may_settle = numerics.whole and run.outcome is None and not self.is_rigid
-        if may_settle and unsettled and not self.is_stuck(run):
-            steady = find_steady_motion(modes, drive, self.groups, run)
-            if steady is not None:
-                fields |= {"steady": steady, "bounded": True}
-        return fields
 
 
 def _compute_strips_loop(run, drive) -> InterfaceLoop:

@@ -22,8 +22,8 @@ from ..results.notes import (
 )
 from ..results.travel import warn_of_large_slide
 from . import event_driven, strips
-from .costs import explain_time_steps_over_element_events
-from .engines import ENGINES, PIECES
+from .costs import explain_time_steps
+from .engines import ENGINES, find_obstacle_of_map
 from .solution import first_interface_load
 
 # The motion after a release counts as still decaying if its largest amplitude in the window exceeds
@@ -282,7 +282,7 @@ def _note_on_bond_growth(model, patch, solution) -> list:
 
 def _note_on_elements(run) -> list:
     """Return a list with a note on the method that computes the motion of friction elements."""
-    if PIECES.find_unsupported_feature(run.model):
+    if find_obstacle_of_map("piecewise", run.model):
         return []
     if run.numerics.engine == "march":
         return _note_on_marched_elements(run)
@@ -298,7 +298,7 @@ def _note_on_marched_elements(run) -> list:
         return []
     pinned = run.patch is not None and not model.patch.mesh.is_automatic
     return [
-        f"time stepping is used, because {explain_time_steps_over_element_events(model)}; "
+        f"time stepping is used, because {explain_time_steps(model)}; "
         f'{"on a coarser mesh, or " * pinned}with accuracy.method = "exact" the motion is computed exactly'
     ]
 

@@ -11,6 +11,7 @@ from ...effects import (
     find_waveform,
     law_has_trait,
     law_supports,
+    needs_bond_list,
     suggest_laws,
 )
 from ..keys.tables import Interface, Tables
@@ -94,16 +95,20 @@ FEATURE_FINDERS = {
     "plane": lambda motion: "with structure.interface.lateral" if motion.is_plane else "",
     "faces": lambda motion: "with several interfaces" if len(motion.joints) > 1 else "",
     "levels": lambda motion: "with waveform 'levels'" if motion.waveform.has_levels else "",
+    "pressed": lambda motion: motion.load_change if _is_pressed_by_motion(motion) else "",
 }
-# Features that each engine of a rig supports; `runs.rig.engines` refers to these names.
+# Laws of the engine `hybrid` under a load that varies in time.
+VARYING_LAWS = ("coulomb", "tanh", "elastic-plastic")
+# Features that each engine of a rig supports; `runs.rig.engines` refers to these names. The rows "exact" and "piecewise"
+# are the maps of a period by which a steady motion is found.
 ENGINE_SUPPORT = {
+    "hybrid": EngineSupport("events", "no-law yaw faces levels parts spring load"),
     "exact": EngineSupport("exact", "no-law yaw faces levels"),
     "piecewise": EngineSupport("pieces", "parts faces levels"),
-    "smooth": EngineSupport("", ""),
     "march": EngineSupport("", " ".join(FEATURE_FINDERS)),
     "harmonic": EngineSupport("", "no-law parts grooves spring faces levels"),
 }
-# Support of the engines of accuracy.method = "exact".
+# Support of the maps of a period by which method "harmonic" finds steady motions exactly.
 EXACT_SUPPORTS = (ENGINE_SUPPORT["exact"], ENGINE_SUPPORT["piecewise"])
 METHOD_KEY = "accuracy.method"
 
@@ -136,11 +141,15 @@ def find_unsupported_feature(support: EngineSupport, motion: MotionFeatures) -> 
 def _find_unsupported_joint(support: EngineSupport, motion: MotionFeatures) -> Joint | None:
     """Return the first interface whose friction law is not supported, or None if all are supported.
 
-    The event-driven solution ("exact") needs patches that slip as a whole. A law that sticks without
-    displacement becomes spring-slider elements ("pieces") only with a compliance in series.
+    The map of events ("exact") needs patches that slip as a whole. A law that sticks without displacement becomes
+    spring-slider elements ("pieces") only with a compliance in series. Motions from event to event ("events") exist for
+    all laws with a finite number of states, and for the elements of a patch that slips part by part.
     """
     for joint in motion.joints:
-        is_supported = not support.law or law_supports(joint.law, support.law)
+        if support.law == "events":
+            is_supported = _has_finite_state(joint, motion)
+        else:
+            is_supported = not support.law or law_supports(joint.law, support.law)
         if support.law == "exact":
             is_supported &= not joint.compliance
         elif support.law == "pieces" and not joint.compliance:
@@ -148,6 +157,24 @@ def _find_unsupported_joint(support: EngineSupport, motion: MotionFeatures) -> J
         if not is_supported:
             return joint
     return None
+
+
+def _has_finite_state(joint: Joint, motion: MotionFeatures) -> bool:
+    """Return whether the engine `hybrid` has the law of an interface."""
+    law = joint.law.law
+    if joint.compliance:
+        return law_supports(joint.law, "pieces")
+    if motion.load_change:
+        return law in VARYING_LAWS
+    if law_has_trait(law, "bonds"):
+        moves = bool(motion.lower_shape)
+        return not (needs_bond_list(joint.law) or joint.law.breakaway or moves)
+    return True
+
+
+def _is_pressed_by_motion(motion: MotionFeatures) -> bool:
+    """Return whether the pressure of a patch changes with the motion."""
+    return bool(motion.load_change) and "normal.amplitude" not in motion.load_change
 
 
 def check_method(draft: SceneDraft, kind: str) -> None:
@@ -246,17 +273,11 @@ def describe_load_change(key: str) -> str:
 
 
 def _find_exact_obstacle(motion: MotionFeatures) -> str:
-    """Return why no exact solution of a motion exists, or "" if there is one."""
-    reasons = [find_unsupported_feature(support, motion) for support in EXACT_SUPPORTS]
-    if not all(reasons):
+    """Return why a motion cannot be computed from event to event, or "" if it can."""
+    why = find_unsupported_feature(ENGINE_SUPPORT["hybrid"], motion)
+    if not why:
         return ""
-    carried = [
-        reason
-        for support, reason in zip(EXACT_SUPPORTS, reasons)
-        if _find_unsupported_joint(support, motion) is None
-    ]
-    why = (carried or reasons)[0]
-    return f"no exact solution exists {why}; use 'march' or leave `method` out"
+    return f"the motion cannot be computed from event to event {why}; use 'march' or leave `method` out"
 
 
 def _find_harmonic_obstacle(motion: MotionFeatures) -> str:

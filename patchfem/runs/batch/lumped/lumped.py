@@ -10,10 +10,10 @@ import numpy as np
 
 from ....core import SineDrive
 from ....model.model import Model
-from ...rig.engines import choose_engine
 from .. import one_by_one
 from ..case_results import CaseResults, has_unreadable_measurements
 from . import pieces
+from .case_engines import choose_engine
 from .columns import assemble_results
 
 # Largest number of cases in one compiled call, limited by the memory of the histories.

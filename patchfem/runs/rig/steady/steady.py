@@ -7,7 +7,7 @@ by harmonic balance (`balance`).
 """
 
 from ....core import NotConverged, SineDrive
-from ..engines import PIECES, choose_steady_method
+from ..engines import choose_steady_method
 from ..solution import Solution
 from . import balance, maps, periodic_march
 from .curves import solve_drive_levels
@@ -48,7 +48,7 @@ def solve_steady_motion(
     try:
         return _solve_drive(finder_class(model, numerics, patch, frames, say), model)
     except NotConverged:
-        if method.engine != PIECES.name or len(model.rig.friction.interfaces) > 1:
+        if method.name != "yields" or len(model.rig.friction.interfaces) > 1:
             raise
     return _solve_drive(balance.BalanceFinder(model, numerics, patch, frames, say), model)
 
