@@ -6,7 +6,6 @@ entry of this list and the entries before it:
 1. `ledger`           positions in the energy sums and samples of a march
 2. `modal_kernels`    motion of the modes over a step of a march, and its energies
 3. `dense_kernels`    small dense linear systems
-4. `tableau_kernels`  coefficients of the Runge-Kutta step of order 8
 5. `doubling`         step of stiff modes by repeated doubling of a short step
 6. `propagator`       exact modal steps under any drive
 7. `checkpoint`       checkpoints of a long march on disk
@@ -19,10 +18,9 @@ entry of this list and the entries before it:
 14. `events`          exact motion from event to event: rigid and elastic-plastic elements, or no friction
 15. `lanes`           many cases of one mode under sinusoidal drive, side by side
 16. `march`           any law in time, under the path-mean forces of each step
-17. `smooth`          smooth laws by a Runge-Kutta method of order 8 from reversal to reversal
-18. `harmonic`        steady motions by harmonic balance, branches and stability
-19. `limit_cycles`    limit cycles of modes with negative damping and friction
-20. `grooves`         interfaces of matched grooves, whose load climbs the flanks
+17. `harmonic`        steady motions by harmonic balance, branches and stability
+18. `limit_cycles`    limit cycles of modes with negative damping and friction
+19. `grooves`         interfaces of matched grooves, whose load climbs the flanks
 
 Read `events` first for motion from event to event, `propagator` and `interfaces` for steps of a march.
 """
@@ -184,5 +182,4 @@ PUBLIC = {
         "make_tanh_law",
     ),
     "periodic": ("is_stable",),
-    "smooth.run": ("load_loop",),
 }

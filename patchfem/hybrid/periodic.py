@@ -47,7 +47,7 @@ class PeriodicMotion(NamedTuple):
 
 
 def find_periodic_motion(
-    case: Case, *, is_free: bool = False, n_first: int = N_FIRST_CYCLES
+    case: Case, *, is_free: bool = False, n_first: int = N_FIRST_CYCLES, start: State | None = None
 ) -> PeriodicMotion:
     """Find the periodic motion that follows some first cycles of a case.
 
@@ -59,8 +59,12 @@ def find_periodic_motion(
         Whether there is no drive, so that the period is unknown; that of the case is the first estimate.
     n_first : int
         Number of first cycles.
+    start : State, optional
+        State of another motion of the same rig at the start of a period, from which the first cycles begin.
     """
     shooting = _Shooting(case, is_free=is_free)
+    if start is not None:
+        shooting.state = _copy(start)
     shooting.relax(n_first)
     best = np.inf
     tolerance = MAX_CHANGE * float(case.rig.settings[Setting.RTOL])

@@ -30,6 +30,7 @@ LAWS = (
     "lugre",
     "bonds",
     "grooves",
+    "smooth_grooves",
     "springs",
 )
 LAW_OF_NAME = {

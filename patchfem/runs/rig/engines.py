@@ -160,6 +160,7 @@ STEADY_METHODS = {
             "a time integration whose initial state is corrected until the motion repeats",
             "march",
         ),
+        SteadyMethod("shooting", "Newton's method on the map of a period", "hybrid"),
         SteadyMethod("balance", "harmonic balance", "harmonic"),
     )
 }
@@ -175,7 +176,8 @@ def choose_steady_method(model: Model) -> SteadyMethod:
     if not find_obstacle_of_map("exact", model):
         return STEADY_METHODS["events"]
     if model.grooves is not None:
-        return STEADY_METHODS["march"]
+        is_shot = not HYBRID.find_unsupported_feature(model, steady=True)
+        return STEADY_METHODS["shooting" if is_shot else "march"]
     has_harmonics = model.accuracy.harmonics is not None
     if (
         has_harmonics
@@ -439,9 +441,10 @@ def choose_engine(model: Model) -> Engine:
     for engine in ENGINES.values():
         if engine.method == model.accuracy.method:
             return engine
-    if HYBRID.find_unsupported_feature(model) or explain_time_steps(model):
+    if HYBRID.find_unsupported_feature(model):
         return MARCH
-    return HYBRID
+    is_only_engine = model.grooves is not None
+    return HYBRID if is_only_engine or not explain_time_steps(model) else MARCH
 
 
 def describe_unused_settings(model: Model, engine: str) -> list:

@@ -12,6 +12,7 @@ import numpy as np
 from ... import compiled
 from ...core import IntegratedMeasures, InterfaceLoop, NotConverged, Outcome, Response
 from ...dynamics.events.event_list import DRIVE_CHANGE, RELEASE, REVERSAL, STOP, EventLog
+from ...dynamics.integrated import find_accelerations
 from ...hybrid import cases
 from ...hybrid import runs as engine
 from ...hybrid.laws import is_rigid
@@ -227,6 +228,8 @@ class LumpedEvaluator(RunEvaluator):
             is_kept = np.append(is_late, True)
         motion = replace(motion, rows=motion.rows[is_kept])
         response = motion.make_response(self.model.rig.modes, drive)
+        if self.model.grooves is not None and self.model.grooves.lifted_mass:
+            response = self._add_vertical_force(response, drive)
         window = response.select(response.time >= times[3] * (1 - 1e-15))
         run = LumpedRun(
             values=dict(motion.values),
@@ -253,6 +256,23 @@ class LumpedEvaluator(RunEvaluator):
             response=strips.average_histories_over_strips(response, loads, offsets),
             window=strips.average_histories_over_strips(window, loads, offsets),
         )
+
+    def _add_vertical_force(self, response: Response, drive) -> Response:
+        """Return histories with the vertical force on the flanks, which carries load and lifted mass, as normal load."""
+        grooves = self.model.grooves
+        modes = self.model.rig.modes
+        accelerations = find_accelerations(
+            modes,
+            drive.values(response.time),
+            response.modal,
+            response.modal_rate,
+            np.outer(response.force, modes.slide),
+        )
+        slope = grooves.slope(response.slide)
+        bend = grooves.slope_derivative(response.slide)
+        rise = slope * (accelerations @ modes.slide) + bend * response.slide_rate**2
+        force = self.joints.laws[0][1].mean + grooves.lifted_mass * rise
+        return replace(response, extra=response.extra | {"normal_load": force})
 
     def _make_log(self, motion, drive) -> EventLog:
         """Return stops, releases and reversals of rigid interfaces, and the changes of the drive."""

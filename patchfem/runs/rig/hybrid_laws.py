@@ -8,10 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...dynamics.grooves.climbing import check_lifted_mass
 from ...effects import law_has_trait
 from ...friction import record
 from ...hybrid.cases import Load
-from ...hybrid.laws import make_law
+from ...hybrid.laws import make_law, smooth_grooves
 from ...hybrid.laws.grooves import make_grooves
 from ...hybrid.laws.masing import from_elements
 from ...hybrid.records import LawNumbers
@@ -86,7 +87,10 @@ def _list_laws(model: Model, patch) -> list[tuple[LawNumbers, Load]]:
 
     load = _make_load(model, patch)
     if model.grooves is not None:
-        return [(make_grooves(friction, model.grooves), load)]
+        check_lifted_mass(model.grooves, friction.static, rig.modes)
+        is_rigid = law_has_trait(friction.law, "set-valued")
+        make = make_grooves if is_rigid else smooth_grooves.make_grooves
+        return [(make(friction, model.grooves), load)]
     if law_has_trait(friction.law, "averaged"):
         static = friction.static * averaged_law.slip_force_ratio(model, patch)
         return [(LawNumbers("coulomb", (static, static)), load)]

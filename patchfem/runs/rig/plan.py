@@ -50,6 +50,7 @@ DRIVE_ROW_BYTES = 400.0  # Memory per row of a recorded drive [bytes].
 STEADY_CODES = {
     "exact": HYBRID_CODE,
     "piecewise": HYBRID_CODE,
+    "hybrid": HYBRID_CODE,
     "harmonic": BALANCE_CODE,
     "march": None,
 }
@@ -483,7 +484,7 @@ def _estimate_point_seconds(model: Model, method_name: str) -> float:
             + cost_model.BALANCE_UNKNOWN_SECONDS * size**3
             + _estimate_smooth_law_seconds(rig)
         )
-    if method_name == "march":
+    if method_name in ("march", "shooting"):
         return N_MARCHED_CYCLES * steps_per_cycle(model) * cost_model.GROOVE_STEP_SECONDS
     if not rig.friction.interfaces:
         return cost_model.CLOSED_POINT_SECONDS

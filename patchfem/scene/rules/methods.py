@@ -102,7 +102,7 @@ VARYING_LAWS = ("coulomb", "tanh", "elastic-plastic")
 # Features that each engine of a rig supports; `runs.rig.engines` refers to these names. The rows "exact" and "piecewise"
 # are the maps of a period by which a steady motion is found.
 ENGINE_SUPPORT = {
-    "hybrid": EngineSupport("events", "no-law yaw faces levels parts spring load"),
+    "hybrid": EngineSupport("events", "no-law yaw faces levels parts spring load grooves"),
     "exact": EngineSupport("exact", "no-law yaw faces levels"),
     "piecewise": EngineSupport("pieces", "parts faces levels"),
     "march": EngineSupport("", " ".join(FEATURE_FINDERS)),
@@ -162,6 +162,8 @@ def _find_unsupported_joint(support: EngineSupport, motion: MotionFeatures) -> J
 def _has_finite_state(joint: Joint, motion: MotionFeatures) -> bool:
     """Return whether the engine `hybrid` has the law of an interface."""
     law = joint.law.law
+    if motion.has_grooves:
+        return law_has_trait(law, "memoryless") and not joint.compliance
     if joint.compliance:
         return law_supports(joint.law, "pieces")
     if motion.load_change:
@@ -184,7 +186,11 @@ def check_method(draft: SceneDraft, kind: str) -> None:
         draft.add_remark(
             METHOD_KEY, f"= '{method}' has no meaning in a {kind} scene and is not used"
         )
-    check = {"exact": _find_exact_obstacle, "harmonic": _find_harmonic_obstacle}.get(method)
+    check = {
+        "exact": _find_exact_obstacle,
+        "march": _find_march_obstacle,
+        "harmonic": _find_harmonic_obstacle,
+    }.get(method)
     if check and kind in ("rig", "linear"):
         reason = check(find_motion_features(draft.tables, kind))
         if reason:
@@ -278,6 +284,19 @@ def _find_exact_obstacle(motion: MotionFeatures) -> str:
     if not why:
         return ""
     return f"the motion cannot be computed from event to event {why}; use 'march' or leave `method` out"
+
+
+def _find_march_obstacle(motion: MotionFeatures) -> str:
+    """Return why a motion cannot be computed in time steps, or "" if it can."""
+    laws = [joint.law.law for joint in motion.joints]
+    if not motion.has_grooves or not laws or not law_has_trait(laws[0], "memoryless"):
+        return ""
+    if motion.compliance:
+        return ""
+    return (
+        f"the motion over grooves under law '{laws[0]}' is computed from event to event since 2.0; use 'exact' or leave "
+        "`method` out"
+    )
 
 
 def _find_harmonic_obstacle(motion: MotionFeatures) -> str:

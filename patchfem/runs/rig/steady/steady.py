@@ -9,7 +9,7 @@ by harmonic balance (`balance`).
 from ....core import NotConverged, SineDrive
 from ..engines import choose_steady_method
 from ..solution import Solution
-from . import balance, maps, periodic_march
+from . import balance, maps, periodic_march, shooting
 from .curves import solve_drive_levels
 from .peak import solve_peak
 
@@ -41,6 +41,8 @@ def solve_steady_motion(
         finder_class = maps.EventFinder
     elif method.name == "yields":
         finder_class = maps.YieldFinder
+    elif method.name == "shooting":
+        finder_class = shooting.ShootingFinder
     elif method.name == "march":
         finder_class = periodic_march.MarchFinder
     else:
