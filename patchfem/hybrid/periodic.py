@@ -20,6 +20,17 @@ MAX_ITERATIONS = 30
 N_FIRST_CYCLES = 8  # cycles before the first correction
 N_RELAXED = 6  # cycles without a correction after one that did not help
 MAX_CHANGE = 100.0  # largest change over a periodic motion, relative to the step tolerance
+MAX_STABLE_MULTIPLIER = (
+    1 + 1e-3
+)  # of a stable motion, because the derivatives of the map are differences
+UNDAMPED_TOL = 1e-5  # distance of a multiplier from 1 below which a motion may grow for ever
+N_GROWTH_CYCLES = (
+    60  # cycles of each of two runs, in which a growing motion increases by the same amount
+)
+MIN_GROWTH = (
+    1e-6  # increase in these cycles, relative to the motion, and ratio of the second to the first
+)
+MIN_GROWTH_RATIO = 0.99
 
 
 class PeriodicMotion(NamedTuple):
@@ -31,6 +42,7 @@ class PeriodicMotion(NamedTuple):
     - multipliers: Floquet multipliers; without those of states that a period determines alone
     - period: [s]
     - n_periods: number of periods that were computed
+    - grows: whether the motion from the start grows for ever, so that none is periodic
     """
 
     batch: Batch
@@ -39,11 +51,12 @@ class PeriodicMotion(NamedTuple):
     multipliers: np.ndarray
     period: float
     n_periods: int
+    grows: bool = False
 
     @property
     def is_stable(self) -> bool:
         """Whether all multipliers are within the unit circle; that of the phase of a limit cycle is 1."""
-        return bool(np.abs(self.multipliers).max(initial=0.0) < 1 + 1e-3)
+        return bool(np.abs(self.multipliers).max(initial=0.0) < MAX_STABLE_MULTIPLIER)
 
 
 def find_periodic_motion(
@@ -81,9 +94,22 @@ def find_periodic_motion(
         best = change
         shooting.correct(before)
     multipliers = shooting.find_multipliers(before)
+    largest = np.abs(multipliers).max(initial=0.0)
+    grows = not is_free and largest > 1 - UNDAMPED_TOL and _grows_for_ever(case)
     return PeriodicMotion(
-        batch, change, tolerance, multipliers, shooting.period, shooting.n_periods
+        batch, change, tolerance, multipliers, shooting.period, shooting.n_periods, grows
     )
+
+
+def _grows_for_ever(case: Case) -> bool:
+    """Return whether the motion from the start of a case increases by equal amounts."""
+    shooting = _Shooting(case, is_free=False)
+    sizes = []
+    for _ in range(3):
+        shooting.relax(N_GROWTH_CYCLES)
+        sizes.append(float(np.abs(shooting.state.y[0, : 2 * case.rig.modes.shape[1]]).max()))
+    first, second = np.diff(sizes)
+    return bool(first > MIN_GROWTH * sizes[0] and second > MIN_GROWTH_RATIO * first)
 
 
 class _Shooting:

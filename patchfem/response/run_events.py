@@ -6,7 +6,7 @@ In: the window of a run, its drive, and the EventLog if an event-driven engine r
 
 import numpy as np
 
-from ..dynamics.events import event_list as listed
+from ..dynamics import event_list as listed
 from . import ringing
 from .events import (
     MAX_EVENTS,

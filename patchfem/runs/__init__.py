@@ -102,7 +102,6 @@ PUBLIC = {
         "find_obstacle_of_map",
     ),
     "rig.numerics": ("choose_numerics",),
-    "rig.event_driven": ("YieldingElements",),
     "rig.plan": (
         "find_drive_and_knee",
         "stuck_stiffnesses",

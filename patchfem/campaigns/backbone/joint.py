@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import PatchfemError
-from ...dynamics.events.elements import CELL_MERGES, join_cells
 from ...dynamics.harmonic.forces import LawGroup
 from ...effects import describe_unsupported, law_has_trait
+from ...friction.cells import CELL_MERGES, join_cells
 from ...model.model import Model
 from ...response.errors import convergence_error
 from ...runs.joint import FreeRig, solve_without_joint

@@ -16,7 +16,6 @@ import numpy as np
 from ... import cost_model
 from ...core import Missing
 from ...dynamics import checkpoint
-from ...dynamics.events import modal_system
 from ...effects import law_has_trait
 from ...model import patch as patch_model
 from ...model.model import Model
@@ -180,12 +179,12 @@ def count_intervals_by_cause(model: Model) -> tuple:
     modes = model.rig.modes
     drive = model.rig.drive.signal
     count, stiff = estimate_element_count_and_stiffness(model)
-    modal = modal_system.make_modal_system(modes)
-    n_interfaces = len(modal.interfaces)
-    damping = modal.damping_norm
-    rate = damping / 2 + sqrt(
-        damping**2 / 4 + modal.max_omega_squared + stiff * max(modal.inverse_mass, default=0.0)
+    n_interfaces = len(modes.interfaces)
+    damping = float(np.linalg.norm(modes.damping_matrix, 2))
+    inverse_mass = (
+        float((np.asarray(modes.interfaces) ** 2).sum(axis=1).max(initial=0.0)) / modes.mass
     )
+    rate = damping / 2 + sqrt(damping**2 / 4 + float(modes.omega.max()) ** 2 + stiff * inverse_mass)
     n_rows = 0 if drive.segments else len(drive.breaks) / model.rig.drive.cycles
     vibration = (
         max(rate * drive.period, 2 * pi * find_max_frequency_ratio(drive)) / MAX_INTERVAL_PHASE

@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...dynamics.events.elements import CELL_MERGES
 from ...effects import NO_WAVEFORM, law_has_trait
 from ...hybrid import runs as hybrid_runs
 from ...model.model import Model
@@ -22,13 +21,12 @@ from ...response.errors import (
     convergence_errors,
     finer_errors,
     friction_errors,
-    merged_cell_errors,
 )
 from ...scene.rules import methods
 from ...scene.rules.accuracy import has_effect, list_fixed_settings
 from ...slip import shear_modes
 from ..patch import faces
-from .costs import explain_time_steps, intervals_per_cycle
+from .costs import explain_time_steps
 
 # Ratio of the width within which bonds are merged in the comparison run to that in the run itself.
 MERGE_WIDTH_FACTOR = 0.5
@@ -36,10 +34,6 @@ MERGE_WIDTH_FACTOR = 0.5
 # smaller tail is made; the automatic tail is a tenth of this.
 MAX_UNCHECKED_TAIL_RATIO = 1e-2
 TAIL_FACTOR = 0.1  # Ratio of the neglected tail in the comparison run to that in the run itself.
-# Largest number of time intervals per period at which the map of yield events is used.
-MAX_MAPPED_INTERVALS = 1e5
-
-
 # Largest relative error of an energy balance due to round-off; a billion steps have less.
 BALANCE_ROUND_OFF = 1e-8
 
@@ -153,8 +147,6 @@ class SteadyMethod(NamedTuple):
 STEADY_METHODS = {
     finder.name: finder
     for finder in (
-        SteadyMethod("events", "the exact solution from event to event", "exact"),
-        SteadyMethod("yields", "the exact solution between yield events", "piecewise"),
         SteadyMethod(
             "march",
             "a time integration whose initial state is corrected until the motion repeats",
@@ -169,23 +161,17 @@ STEADY_METHODS = {
 def choose_steady_method(model: Model) -> SteadyMethod:
     """Choose the method that computes the steady motion of a model.
 
-    The maps of events or of yield events are exact. Grooves need a time integration whose initial
-    state is corrected to be periodic. Harmonic balance is used for all other models, for scenes that set
-    `harmonics`, and if the map of yield events would need too many time intervals.
+    Coulomb friction, elastic-plastic elements and grooves need Newton's method on the map of a period, because their
+    forces change their slope or jump. Harmonic balance is used for all other models, and for elements in scenes that set
+    `harmonics`. A law with memory on grooves needs a time integration.
     """
-    if not find_obstacle_of_map("exact", model):
-        return STEADY_METHODS["events"]
     if model.grooves is not None:
         is_shot = not HYBRID.find_unsupported_feature(model, steady=True)
         return STEADY_METHODS["shooting" if is_shot else "march"]
-    has_harmonics = model.accuracy.harmonics is not None
-    if (
-        has_harmonics
-        or find_obstacle_of_map("piecewise", model)
-        or intervals_per_cycle(model) > MAX_MAPPED_INTERVALS
-    ):
-        return STEADY_METHODS["balance"]
-    return STEADY_METHODS["yields"]
+    is_shot = not find_obstacle_of_map("exact", model)
+    if model.accuracy.harmonics is None:
+        is_shot |= not find_obstacle_of_map("piecewise", model)
+    return STEADY_METHODS["shooting" if is_shot else "balance"]
 
 
 def _no_comparison_runs(*_) -> list:
@@ -218,19 +204,6 @@ def estimate_sampling_errors(values: dict) -> dict:
         else:
             errors[name] = MOTION_SAMPLING_ERROR * abs(value)
     return errors
-
-
-def _list_element_space_runs(model: Model, numerics, patch, coarse, solution) -> list:
-    """List the comparison runs of elastic-plastic elements with coarser meshes and slider cells."""
-    meshes = _list_coarse_mesh_numerics(model, numerics)
-    if coarse is not None and model.partial_slip:
-        meshes = [replace(numerics, coarse_patch=True), *meshes]
-    coarser_runs = [CoarserRuns((mesh,), convergence_errors, source="mesh") for mesh in meshes]
-    laws = [interface.numbers.law for interface in model.rig.friction.interfaces]
-    if any(law_has_trait(law, "cells") for law in laws):
-        merged = tuple(replace(numerics, joined=cells) for cells in CELL_MERGES)
-        coarser_runs.append(CoarserRuns(merged, merged_cell_errors, source="cells"))
-    return coarser_runs
 
 
 def _list_coarse_mesh_numerics(model: Model, numerics) -> list:
@@ -341,8 +314,8 @@ def _list_engine_errors(model: Model, numerics, patch, coarse, solution) -> list
 def _list_steady_space_runs(model: Model, numerics, patch, coarse, solution) -> list:
     """List the comparison runs of a steady motion on coarser meshes, and the errors by its engine."""
     coarser_runs = _list_engine_errors(model, numerics, patch, coarse, solution)
-    if choose_steady_method(model).engine == "piecewise":
-        coarser_runs += _list_element_space_runs(model, numerics, patch, coarse, solution)
+    if choose_steady_method(model).name == "shooting":
+        coarser_runs += _list_hybrid_space_runs(model, numerics, patch, coarse, solution)
     return coarser_runs
 
 

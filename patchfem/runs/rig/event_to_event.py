@@ -11,12 +11,12 @@ import numpy as np
 
 from ... import compiled
 from ...core import IntegratedMeasures, InterfaceLoop, NotConverged, Outcome, Response
-from ...dynamics.events.event_list import DRIVE_CHANGE, RELEASE, REVERSAL, STOP, EventLog
+from ...dynamics.event_list import DRIVE_CHANGE, RELEASE, REVERSAL, STOP, EventLog
 from ...dynamics.integrated import find_accelerations
 from ...hybrid import cases
 from ...hybrid import runs as engine
 from ...hybrid.laws import is_rigid
-from ...hybrid.records import State, Status
+from ...hybrid.records import Memory, State, Status
 from ...response import run_events
 from ...response.measures import MIN_SLIDE_RANGE, compute_harmonic, relative_gap
 from ...response.ringing import compute_stuck_vibration, make_ringing_measures, select_strongest
@@ -174,7 +174,7 @@ class LumpedEvaluator(RunEvaluator):
             cycles = motion.time / drive.period
             times = self._choose_times(drive, cycles, 0)
             motion = self._run(drive, cycles, np.concatenate(times[:2]), np.inf, state)
-        run = self._make_run(motion, drive, cycles, times)
+        run = self._make_run(motion, drive, cycles, times, state)
         return replace(run, outcome=outcome, message=message)
 
     def _run(self, drive, cycles: float, times, travel: float, state: State | None):
@@ -216,7 +216,9 @@ class LumpedEvaluator(RunEvaluator):
         nearest = np.abs(late[:, None] - at).argmin(axis=0)
         return early, late, late[nearest], window_start
 
-    def _make_run(self, motion, drive, cycles: float, times: tuple) -> LumpedRun:
+    def _make_run(
+        self, motion, drive, cycles: float, times: tuple, start: State | None
+    ) -> LumpedRun:
         """Return the histories, energies and events of a motion."""
         time = motion.rows[:, 0]
         if hasattr(drive, "band"):
@@ -244,7 +246,7 @@ class LumpedEvaluator(RunEvaluator):
             cycles_done=cycles,
             events=len(motion.event_rows),
             log=self._make_log(motion, drive) if self.is_rigid else None,
-            snapshots=self._list_snapshots(motion, response, times[2]),
+            snapshots=self._list_snapshots(motion, response, times[2], start),
             repeats=motion.repeats,
         )
         if not self.strips_slide_apart:
@@ -295,8 +297,11 @@ class LumpedEvaluator(RunEvaluator):
         phase = find_drive_omega(drive) * time % (2 * np.pi)
         return EventLog(time, phase, number.astype(int), kind.astype(int), slide, time.size)
 
-    def _list_snapshots(self, motion, response: Response, times) -> list[dict]:
-        """Return the stretches of the elements of patches at given times, from all reversals before."""
+    def _list_snapshots(self, motion, response: Response, times, start) -> list[dict]:
+        """Return the stretches of the elements of patches at given times, from all reversals before.
+
+        Those before the start of the motion are in the memory of its `State`, if it does not start from rest.
+        """
         if not len(times) or self.is_rigid or not self.joints.elements:
             return []
         slides = response.extra.get("slides", response.slide[:, None])
@@ -304,6 +309,8 @@ class LumpedEvaluator(RunEvaluator):
         stretches = []
         for i, (_, limit) in enumerate(self.joints.elements):
             reversals = motion.list_reversals(i)
+            if start is not None:
+                reversals = np.concatenate([_list_remembered_reversals(start, i), reversals])
             stretches.append(_find_stretches(reversals, (times, slides[at, i]), limit))
         return [
             {
@@ -446,6 +453,14 @@ def _divide(begin: float, end: float, period: float, minimum: int) -> np.ndarray
     """Return times (k,) [s] of equal distances from begin to end, SAMPLES_PER_CYCLE in a period."""
     count = round((end - begin) / period * SAMPLES_PER_CYCLE) + 1
     return np.linspace(begin, end, max(minimum, count))
+
+
+def _list_remembered_reversals(state: State, interface: int) -> np.ndarray:
+    """Return the time 0 and the slides [m] (k, 2) of the origin and of the reversals that a law remembers."""
+    memory = state.memory[0, interface]
+    stack = memory[Memory.STACK :: 2][: int(memory[Memory.COUNT])]
+    slides = memory[Memory.ORIGIN] + np.append(0.0, stack)
+    return np.stack([np.zeros(slides.size), slides], axis=1)
 
 
 def _find_stretches(reversals, points, limit) -> list[np.ndarray]:

@@ -115,8 +115,7 @@ def _make_soft_joints(model: Model, numerics: Numerics, patch) -> Joints:
         strip_elements = jenkins_elements.strip_elements(patch, model.friction.static, length)
         elements = [strip[:2] for strip in strip_elements]
     elif len(rig.modes.interfaces) > 1:
-        parts = interface.make_interface_elements(model, numerics.meshed)
-        elements = [_read_elements(part) for part in parts]
+        elements = list_elements(model, numerics, patch)
     else:
         contact = interface.make_single_contact(model, numerics, patch)
         elements = [_read_elements(contact.element)]
@@ -138,6 +137,23 @@ def _make_soft_joints(model: Model, numerics: Numerics, patch) -> Joints:
         contact,
         _find_stick_tolerance(model, [law for law, _ in laws]),
     )
+
+
+def list_elements(model: Model, numerics: Numerics, patch) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return stiffness [N/m] and yield displacement [m] (e,) of the elements of each interface.
+
+    Parameters
+    ----------
+    model : Model
+    numerics : Numerics
+    patch : Patch or None
+        None without [contact].
+    """
+    if len(model.rig.modes.interfaces) > 1:
+        parts = interface.make_interface_elements(model, numerics.meshed)
+    else:
+        parts = [interface.make_single_contact(model, numerics, patch).element]
+    return [_read_elements(part) for part in parts]
 
 
 def _read_elements(element) -> tuple[np.ndarray, np.ndarray]:

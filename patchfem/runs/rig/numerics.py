@@ -37,8 +37,6 @@ class Numerics:
     - choice: method of bond summation; None: set by the tolerance and the steps.
     - whole: whether the run stores the histories before the window; coarse runs may omit them.
     - local: largest relative error per step of the engine `hybrid`.
-    - pairs: how many times neighbouring slider cells are merged in pairs.
-    - joined: (number of cells that are merged into one, index of the first merged cell), or ().
     - other_rig: index of the rig with other modes of a reduced structure, or None.
     - meshed: indices of the interfaces whose patches have a coarser mesh.
     - coarse_patch: whether the patch of [contact] has a coarser mesh.
@@ -55,8 +53,6 @@ class Numerics:
     choice: object = None
     whole: bool = True
     local: float = 0.0
-    pairs: int = 0
-    joined: tuple = ()
     other_rig: int | None = None
     meshed: tuple = ()
     coarse_patch: bool = False
@@ -65,11 +61,8 @@ class Numerics:
     def finer(self):
         """Return finer settings for the next run.
 
-        If cells are merged, there are four times as many cells. Otherwise, the engine `hybrid` has a hundredth of the
-        step error, and other engines have twice as many steps.
+        The engine `hybrid` has a hundredth of the step error, and other engines have twice as many steps.
         """
-        if self.pairs:
-            return replace(self, pairs=max(0, self.pairs - 2))
         if self.local:
             return replace(self, local=0.01 * self.local)
         return replace(self, steps=2 * self.steps)

@@ -9,7 +9,7 @@ from scene_texts import COULOMB, MODE, POINT
 
 from patchfem import plan
 from patchfem.core import SineDrive
-from patchfem.dynamics.events import event_list
+from patchfem.dynamics import event_list
 from patchfem.response.run_events import convert_event_log
 from patchfem.runs.run import run
 from patchfem.structure.drives import PiecewiseDrive

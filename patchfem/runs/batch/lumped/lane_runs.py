@@ -17,8 +17,8 @@ from ....model.similar_models import collect_columns
 from ....response.errors import SUM_ROUND_OFF, convergence_errors
 from ....response.measures import energy_balance
 from ....response.settling import window_amplitude_means
-from ...rig.event_driven import compute_event_measures
 from .columns import N_FINAL_WINDOWS, Runs
+from .event_driven import compute_event_measures
 from .lane_numbers import Scales, count_evaluated_cycles, find_lane_law
 from .lane_ringing import find_ringing
 from .lane_settling import SETTLING_LAWS, march_until_settled

@@ -10,7 +10,7 @@ import numpy as np
 from ....dynamics.lanes import run as march
 from ....dynamics.lanes.rows_kernels import Row
 from ....response.settling import extrapolate_steady_amplitudes
-from ...rig.event_driven import MAX_CHANGE_RATIO
+from .event_driven import MAX_CHANGE_RATIO
 from .lane_numbers import count_evaluated_cycles, select_rows
 
 SETTLING_LAWS = (

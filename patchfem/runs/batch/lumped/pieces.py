@@ -10,10 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ....dynamics.events import histories
-from ....dynamics.events.elements import CELL_MERGES, merge_elements
+from ....dynamics.events.elements import merge_elements
 from ....dynamics.events.positions_kernels import InterfaceMeasure, RunMeasure
 from ....dynamics.events.reading import join_readings
 from ....effects import law_has_trait
+from ....friction.cells import CELL_MERGES
 from ....friction.record import make_law
 from ....response import run_events
 from ....response.errors import merged_cell_errors
@@ -21,15 +22,15 @@ from ....response.measures import COORDINATE_ROUND_OFF, energy_balance
 from ....response.ringing import make_ringing_measures
 from ....structure.drive_sizes import find_max_acceleration, find_min_decay_rate
 from ...rig.costs import count_cell_merges
-from ...rig.event_driven import (
+from .case_engines import EXACT, PIECES, choose_engine
+from .columns import N_FINAL_WINDOWS, Runs
+from .event_driven import (
     RigidElements,
     compute_event_measures,
     convert_to_elements,
     find_steady_motion,
     may_still_change,
 )
-from .case_engines import EXACT, PIECES, choose_engine
-from .columns import N_FINAL_WINDOWS, Runs
 from .threads import apply_in_threads
 
 # Number of computed cycles of a periodic motion, such that they contain each of its stick intervals

@@ -12,12 +12,12 @@ import numpy as np
 
 from ....model.model import Model
 from ....response.errors import convergence_errors
-from ...rig.event_driven import YieldingElements
 from .. import solved_patches
 from ..case_results import CaseResults, has_unreadable_measurements
 from . import pieces
 from .case_engines import PIECES, choose_engine
 from .columns import assemble_results
+from .event_driven import YieldingElements
 from .lumped import reason_not_single_sine
 
 # Largest number of cases in one compiled call, limited by the memory of elements and cycle extremes.

@@ -13,11 +13,11 @@ import numpy as np
 from ....compiled import load
 from ....dynamics.lanes import run as march
 from ....model.model import Model
-from ...rig.event_driven import YieldingElements
 from .. import one_by_one, solved_patches
 from ..case_results import CaseResults
 from . import lane_check, lane_numbers, lane_steps, lanes, sheared
 from .case_engines import PIECES
+from .event_driven import YieldingElements
 
 # Largest number of cases in one compiled call, limited by the memory of the tables.
 MAX_CASES_PER_CALL = 512

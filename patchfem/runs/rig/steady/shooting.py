@@ -1,53 +1,90 @@
-"""Steady motion of a rig over grooves, by shooting with the map of a period of the engine `hybrid`.
+"""Steady motion of a rig by shooting with the map of a period of the engine `hybrid`.
 
-In: a Model, its Numerics and its Patch. Out: the Solution under a sine, and the response curve over frequency
-(`hybrid.periodic`).
+In: a Model, its Numerics and its Patch. Out: the Solution under a sine, and the response curve over frequency or drive
+level (`hybrid.periodic`).
 """
 
 from dataclasses import replace
+from functools import cached_property
 from time import perf_counter
 
 import numpy as np
 
 from .... import compiled
-from ....core import NotConverged, Outcome
+from ....core import NotConverged, Outcome, PatchfemError
 from ....hybrid import cases, periodic
 from ....hybrid import runs as hybrid_runs
-from ....hybrid.records import Clock, Status
+from ....hybrid.laws import is_rigid
+from ....hybrid.records import Clock, Status, Whole, Window
+from ....response.spectrum import harmonic_measures
+from ....structure.response import compute_receptance
 from ..event_to_event import LumpedEvaluator
 from ..hybrid_laws import make_joints
 from ..solution import Solution
 from .curves import (
+    COLUMN_MEASURES,
     CurvePoint,
     TracedCurve,
     compute_response_curve,
     describe_instability,
-    make_curve_point,
+    estimate_exact_errors,
 )
 
 # Cycles from rest within which a lifted mass leaves its grooves, if it leaves them at all.
 N_CYCLES_IN_GROOVES = 30
-RTOL = 1e-9  # tolerance of a step, so that the change over a period is far below the motion
-# Largest multiplier that counts as 1, because the derivatives of the map are differences.
-MAX_STABLE_MULTIPLIER = 1 + 1e-3
+RTOL = 1e-11  # tolerance of a step, so that the change over a period is far below the motion
 MIN_DISTANCE = 1e-6  # smallest distance of a multiplier from 1 that is assumed for the error
+N_CYCLES = 2.0  # computed cycles of a periodic motion, so that each stick is complete
+N_NEAR_CYCLES = 2  # cycles before the first correction of a motion that starts from a similar one
+FULL_SLIP_TOL = (
+    1e-9  # relative distance from its friction limit at which an interface slips as a whole
+)
 
 
 class ShootingFinder(TracedCurve):
     """Solver for steady motions by Newton's method on the map of a period."""
 
-    has_fallback = True
-
     def __init__(self, model, numerics, patch, frames: int = 0, say=None):
         compiled.load("hybrid.engine_kernels", say)
         self.model = model
+        self.modes = model.rig.modes
         self.patch = patch
         self.frames = frames
         self.numerics = replace(
-            numerics, cycles=1.0, window=1, local=RTOL, steps=cases.MIN_STEPS, whole=True
+            numerics, cycles=N_CYCLES, window=1, local=RTOL, steps=cases.MIN_STEPS, whole=True
         )
         self.joints = make_joints(model, self.numerics, patch)
         self.evaluator = LumpedEvaluator(model, self.numerics, patch, self.joints)
+
+    def find_periodic_motion(self, drive, guess=None) -> periodic.PeriodicMotion:
+        """Find the periodic motion under sinusoidal drive, from rest or from a similar motion.
+
+        Parameters
+        ----------
+        drive : SineDrive
+        guess : hybrid.records.State, optional
+            State of a similar motion at phase 0 of the drive.
+
+        Raises
+        ------
+        NotConverged
+            If no motion is found that repeats after each cycle.
+        """
+        schedule = cases.Schedule(1.0, 1, np.zeros(0), np.inf)
+        case = cases.make_rig_case(
+            self.model.rig, self.joints.laws, schedule, signal=drive, rtol=RTOL
+        )
+        n_first = periodic.N_FIRST_CYCLES if guess is None else N_NEAR_CYCLES
+        motion = periodic.find_periodic_motion(case, start=guess, n_first=n_first)
+        if motion.grows:
+            return motion
+        status = Status(int(motion.batch.states.clock[0, Clock.STATUS]))
+        if status != Status.DONE or not motion.change <= motion.tolerance:
+            raise NotConverged(
+                f"no periodic motion was found: the motion still changes by {motion.change:.2g} of its amplitude from "
+                'one cycle to the next; use accuracy.method = "auto"'
+            )
+        return motion
 
     def compute_steady_motion(self, drive, guess=None) -> tuple:
         """Compute the steady motion under sinusoidal drive, and the guess for a neighbouring drive.
@@ -56,58 +93,51 @@ class ShootingFinder(TracedCurve):
         leaves them, and the guess is None.
         """
         begin = perf_counter()
-        if self.model.grooves.lifted_mass:
-            run = self.evaluator.integrate(drive, N_CYCLES_IN_GROOVES, None, 0)
-            if run.outcome is Outcome.LEAVES_GROOVES:
-                return self._make_solution(run, drive, begin, "leaves its grooves"), None
-
-        schedule = cases.Schedule(1.0, 1, np.zeros(0), np.inf)
-        case = cases.make_rig_case(
-            self.model.rig, self.joints.laws, schedule, signal=drive, rtol=RTOL
-        )
-        motion = periodic.find_periodic_motion(case, start=guess)
-        status = Status(int(motion.batch.states.clock[0, Clock.STATUS]))
-        if status != Status.DONE or motion.change > motion.tolerance:
-            raise NotConverged(
-                f"no periodic motion was found: the motion still changes by {motion.change:.2g} of its amplitude from "
-                'one cycle to the next; use accuracy.method = "auto"'
-            )
+        run = self._leave_grooves(drive)
+        if run is not None:
+            return self._make_solution(run, drive, begin, "leaves its grooves"), None
+        motion = self.find_periodic_motion(drive, guess)
         state = motion.batch.states
-        run = self.evaluator.integrate(drive, 1.0, state, self.frames)
+        run = self.evaluator.integrate(drive, N_CYCLES, state, self.frames)
         return self._make_periodic_solution(run, motion, drive, begin), state
+
+    def _leave_grooves(self, drive):
+        """Return the run from rest that leaves the grooves, or None if there is none."""
+        if self.model.grooves is None or not self.model.grooves.lifted_mass:
+            return None
+        run = self.evaluator.integrate(drive, N_CYCLES_IN_GROOVES, None, 0)
+        return run if run.outcome is Outcome.LEAVES_GROOVES else None
 
     def _make_periodic_solution(self, run, motion, drive, begin: float) -> Solution:
         """Return the Solution of a periodic motion with its stability and errors."""
-        regime = "stick-slip" if run.values.get("stick_fraction") else "sliding"
         is_stuck = self.evaluator.is_stuck(run)
-        if is_stuck:
-            regime = "stuck"
-        largest = np.abs(motion.multipliers).max(initial=0.0)
-        is_stable = is_stuck or largest <= MAX_STABLE_MULTIPLIER
-        if not is_stable:
-            regime = f"{regime}, unstable"
-        solution = self._make_solution(run, drive, begin, regime)
+        regime = self._name_regime(motion, is_stuck=is_stuck)
+        is_stable = is_stuck or motion.grows or motion.is_stable
+        solution = self._make_solution(
+            run, drive, begin, regime if is_stable else f"{regime}, unstable"
+        )
         reach = float(np.abs(run.extremes).max())
-        outcome = Outcome.STUCK if is_stuck else Outcome.STEADY
-        if reach > self.model.rig.springs.travel:
+        outcome = Outcome.STUCK if is_stuck else solution.outcome or Outcome.STEADY
+        if motion.grows:
+            outcome = Outcome.GROWS
+        elif reach > self.model.rig.springs.travel:
             outcome = Outcome.EXCEEDS_TRAVEL
         if not is_stable:
             outcome = Outcome.NOT_CONVERGED
             solution = replace(solution, message=describe_instability(motion.multipliers))
 
-        # The error of the fixed point is its change over a period over the distance of a multiplier from 1.
-        distance = np.abs(1 - motion.multipliers).min(initial=1.0)
-        relative = max(motion.change, RTOL) / max(distance, MIN_DISTANCE)
+        # The error of the fixed point adds to that of the steps.
         coarse = replace(
             self.evaluator.numerics,
             local=hybrid_runs.COARSE * RTOL,
             steps=cases.MIN_STEPS / hybrid_runs.COARSE_STEP,
         )
         other = LumpedEvaluator(self.model, coarse, self.patch, self.joints)
-        other_run = other.integrate(drive, 1.0, motion.batch.states, 0)
+        other_run = other.integrate(drive, N_CYCLES, motion.batch.states, 0)
         coarse_values = other.evaluate_measures(other_run, drive, stuck=is_stuck)
         shared = {name: value for name, value in solution.values.items() if name in coarse_values}
         errors = hybrid_runs.estimate_errors(shared, coarse_values, RTOL)
+        relative = find_relative_error(motion)
         errors = {
             name: errors.get(name, abs(value)) + relative * abs(value)
             for name, value in solution.values.items()
@@ -121,6 +151,24 @@ class ShootingFinder(TracedCurve):
             extra=solution.extra | extra,
         )
 
+    def _name_regime(self, motion, *, is_stuck: bool) -> str:
+        """Return the name of the regime of a periodic motion, such as "2 stops" or "partial slip"."""
+        if motion.grows:
+            return "unbounded"
+        if is_stuck:
+            return "stuck"
+        laws = [law for law, _ in self.joints.laws]
+        faces = motion.batch.records.faces[0, 0, : len(laws)]
+        if laws and all(law.law == "masing" for law in laws):
+            limits = np.array([law.numbers[2] for law in laws])
+            forces = np.maximum(faces[:, Window.MAX_FORCE], -faces[:, Window.MIN_FORCE])
+            slides = (forces >= limits * (1 - FULL_SLIP_TOL)).all()
+            return "slides" if slides else "partial slip"
+        if not any(is_rigid(law.law) for law in laws):
+            return "sliding"
+        n_stops = int(faces[:, Window.STARTS].max())
+        return f"{n_stops} stop{'s' * (n_stops != 1)}" if n_stops else "sliding"
+
     def _make_solution(self, run, drive, begin: float, regime: str) -> Solution:
         """Return the Solution of a run with a regime."""
         solution = self.evaluator.make_solution(run, perf_counter() - begin, drive)
@@ -129,17 +177,114 @@ class ShootingFinder(TracedCurve):
         return replace(solution, steady=(None, None), errors=errors, extra=extra)
 
     def compute_curve_point(self, drive, guess=None) -> CurvePoint:
-        """Compute one point of a response curve, starting from a neighbouring motion or from rest."""
+        """Compute one point of a response curve, starting from a neighbouring motion or from rest.
+
+        Without friction it has a closed form, except for an undamped resonance.
+        """
+        point = None if self.joints.laws else self._compute_linear_point(drive)
+        if point is not None:
+            return point
+        if self._leave_grooves(drive) is not None:
+            regime = "leaves its grooves"
+            return CurvePoint(drive, {}, {}, regime, np.nan, False, Outcome.LEAVES_GROOVES)
         try:
-            return make_curve_point(drive, *self.compute_steady_motion(drive, guess))
+            motion = self.find_periodic_motion(drive, guess)
         except NotConverged:
             if guess is None:
                 raise
-        return make_curve_point(drive, *self.compute_steady_motion(drive))
+            motion = self.find_periodic_motion(drive)
+        if motion.grows:
+            return CurvePoint(drive, {}, {}, "unbounded", 1.0, False, Outcome.GROWS)
+
+        windows = motion.batch.windows[0]
+        values = {name: float(windows[name][0]) for name in COLUMN_MEASURES.values()}
+        faces = motion.batch.records.faces[0, 0, : len(self.joints.laws)]
+        slips = faces[:, Window.MAX_SLIP] - faces[:, Window.MIN_SLIP]
+        is_stuck = bool((slips <= self.joints.stick_tolerance).all()) and not self.evaluator.creeps
+        regime = self._name_regime(motion, is_stuck=is_stuck)
+        is_stable = is_stuck or motion.is_stable
+        return CurvePoint(
+            drive=drive,
+            values={name: value for name, value in values.items() if np.isfinite(value)},
+            errors=estimate_exact_errors(values, find_relative_error(motion)),
+            regime=regime if is_stable else f"{regime}, unstable",
+            multiplier=float(np.abs(motion.multipliers).max(initial=0.0)),
+            stable=is_stable,
+            outcome=Outcome.STUCK if is_stuck else Outcome.STEADY,
+            guess=motion.batch.states,
+        )
+
+    def observe(self, drive, guess=None, *, needs_histories: bool = True) -> tuple | None:
+        """Return what sensors see of the periodic motion under a drive, without errors; None if it is unbounded.
+
+        Parameters
+        ----------
+        drive : SineDrive
+        guess : hybrid.records.State, optional
+            State of a similar motion at phase 0 of the drive.
+        needs_histories : bool
+            Whether the first value is needed.
+
+        Returns
+        -------
+        tuple
+            Histories of a cycle or None; peak of the absolute acceleration [m s-2]; displacement amplitude [m]; guess
+            for a similar drive; first harmonic of the acceleration (complex) [m s-2].
+        """
+        motion = self.find_periodic_motion(drive, guess)
+        if motion.grows or self._leave_grooves(drive) is not None:
+            return None
+        state = motion.batch.states
+        window = None
+        if needs_histories:
+            window = self.evaluator.integrate(drive, N_CYCLES, state, 0).window
+        values = motion.batch.windows[0]
+        whole = motion.batch.records.whole[0, 0]
+        fundamental = 2 / whole[Whole.SPAN] * complex(whole[Whole.COS_1], -whole[Whole.SIN_1])
+        peak = float(values["absolute_acceleration_peak"][0])
+        return window, peak, float(values[COLUMN_MEASURES["amplitude"]][0]), state, fundamental
+
+    def _compute_linear_point(self, drive) -> CurvePoint | None:
+        """Return the point of a response curve of a linear rig in closed form, or None at an undamped resonance."""
+        modes = self.modes
+        gauge = modes.output if modes.gauge is None else modes.gauge
+        try:
+            receptance = compute_receptance(modes, drive.omega, [gauge, modes.output], modes.base)
+        except PatchfemError:
+            return None
+        at_gauge, at_output = receptance[0, :, 0] * modes.mass
+        acceleration = drive.acceleration * float(abs(drive.moving + drive.omega**2 * at_output))
+        values = {
+            COLUMN_MEASURES["amplitude"]: drive.acceleration * float(abs(at_gauge)),
+            COLUMN_MEASURES["acceleration_peak"]: acceleration,
+            **harmonic_measures(acceleration, 0.0),
+        }
+        values = {name: value for name, value in values.items() if value is not None}
+        multiplier = float(np.exp(self._max_growth_rate * drive.period))
+        errors = estimate_exact_errors(values, 0.0)
+        return CurvePoint(drive, values, errors, "sliding", multiplier, True, Outcome.STEADY)
+
+    @cached_property
+    def _max_growth_rate(self) -> float:
+        """Largest growth rate [1/s] of the free motions without friction; negative if all of them decay."""
+        n = self.modes.omega.size
+        state = np.block(
+            [
+                [np.zeros((n, n)), np.eye(n)],
+                [-np.diag(self.modes.omega**2), -self.modes.damping_matrix],
+            ]
+        )
+        return float(np.linalg.eigvals(state).real.max())
 
     def trace_curve(self, drive) -> tuple:
         """Compute the response curve over frequency, which has no folds.
 
         Each point starts from the motion at the previous one.
         """
-        return compute_response_curve(self.model.rig.modes, drive, self.compute_curve_point), ()
+        return compute_response_curve(self.modes, drive, self.compute_curve_point), ()
+
+
+def find_relative_error(motion: periodic.PeriodicMotion) -> float:
+    """Return the error of a fixed point relative to the motion: its change over the distance of a multiplier from 1."""
+    distance = np.abs(1 - motion.multipliers).min(initial=1.0)
+    return max(motion.change, RTOL) / max(float(distance), MIN_DISTANCE)
