@@ -13,7 +13,7 @@ entry of this list and the entries before it:
 9. `integrated`       time histories of a run from its modal coordinates
 10. `cycles`           extremes, phasors and selected samples of the cycles of a march
 11. `curve_points`    adaptive points of a curve, denser where its curvature is larger
-12. `periodic`        periodic motions by Newton's method on the map of a period (shooting)
+12. `periodic`        linear systems and Floquet multipliers of periodic motions
 13. `interfaces`      contacts of a march: solution of a step and update of their memory
 14. `events`          exact motion from event to event: rigid and elastic-plastic elements, or no friction
 15. `lanes`           many cases of one mode under sinusoidal drive, side by side
@@ -54,7 +54,6 @@ PUBLIC = {
         "simulate_batch",
     ),
     "events.modal_system": ("make_modal_system",),
-    "events.orbits": ("PeriodicMotionFinder",),
     "events.positions_kernels": (
         "InterfaceMeasure",
         "RunMeasure",
@@ -63,7 +62,6 @@ PUBLIC = {
         "Reading",
         "join_readings",
     ),
-    "events.steady": ("continue_to_steady_state",),
     "grooves.climbing": ("with_shear_modes",),
     "harmonic.backbone": ("FreeBalance",),
     "harmonic.balance": (
@@ -184,5 +182,4 @@ PUBLIC = {
         "make_elastic_plastic_law",
         "make_tanh_law",
     ),
-    "periodic": ("is_stable",),
 }

@@ -2,12 +2,9 @@
 
 import numpy as np
 import pytest
-from event_run import collect_rows
 
 import patchfem as pf
 from patchfem.core import Missing
-from patchfem.runs.rig import costs
-from patchfem.runs.rig.event_driven import coulomb_limits
 
 CHAIN = """[structure]
 masses = ["1 kg", "2 kg"]
@@ -47,35 +44,6 @@ SWEEP = (
     '[drive]\nkind = "base"\nwaveform = "sweep"\nfrom = "120 Hz"\nto = "150 Hz"\nrate = "60 Hz/s"\n'
     'acceleration = "7 g"\n'
 )
-
-
-def count_pieces(model) -> int:
-    """Return the number of linear pieces that the exact engine computes."""
-    rig = model.rig
-    return len(
-        collect_rows(
-            rig.modes,
-            rig.drive.signal,
-            *np.transpose(coulomb_limits(model, None)),
-            rig.drive.cycles,
-            rig.start,
-        )[1]
-    )
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        CHAIN.format(40),
-        MODES + COULOMB_POINT + SWEEP,
-    ],
-)
-def test_always_piece_count_is_estimated_within_factor_four(text):
-    """The estimated number of linear pieces is within a factor of four of the actual number."""
-    model = pf.plan(text).model
-    expected = costs.intervals_per_cycle(model) * model.rig.drive.cycles
-    actual = count_pieces(model)
-    assert actual / 4 < expected < 4 * actual
 
 
 @pytest.mark.parametrize("kinetic", [None, 0.2])

@@ -8,9 +8,7 @@ from time import perf_counter
 
 import numpy as np
 
-from ....core import NotConverged, SineDrive
 from ....dynamics.events import elements
-from ....dynamics.events import steady as steady_events
 from ....dynamics.events.positions_kernels import InterfaceMeasure
 from ....dynamics.events.reading import Reading
 from ....effects import law_has_trait
@@ -18,9 +16,6 @@ from ....response.loops import interface_loops
 from ....response.measures import MIN_SLIDE_RANGE, relative_gap
 from ....response.rows import stick_fraction
 from ....response.spectrum import distortion_ratio
-from ....structure.drive_sizes import (
-    is_sinusoidal,
-)
 from ...bench import averaged_law
 from ...rig import interface, strips
 from ...rig.solution import first_interface_load
@@ -56,65 +51,6 @@ def may_still_change(extremes, window: int, tolerance: float, decay: float) -> b
     decayed = max(-np.expm1(-decay * len(last)), MIN_RELATIVE_DECAY)
     limit = MAX_CHANGE_RATIO * tolerance * decayed * np.ptp(last[-window:]) / 2
     return np.ptp(last, axis=0).max() > limit
-
-
-def find_steady_motion(modes, drive, groups, run) -> tuple | None:
-    """Compute the amplitude [m] of the steady motion to which a run converges, and its error.
-
-    It is the fixed point of the map over a drive period, which is linear between yield events.
-
-    Parameters
-    ----------
-    modes
-        Modal basis.
-    drive
-        Drive.
-    groups : tuple
-        Elements of each interface.
-    run : EventRunResult
-
-    Returns
-    -------
-    tuple or None
-        None if the run does not end with a complete period of a sine, or if no stable motion was
-        found.
-    """
-    last = drive.segments[-1] if drive.segments else None
-    if (
-        last is None
-        or not is_sinusoidal(drive)
-        or last.constant != 0
-        or abs(run.cycles_done - round(run.cycles_done)) > 1e-9
-    ):
-        return None
-    sine = SineDrive(last.amplitude, last.omega, drive.moving)
-    try:
-        motion = steady_events.continue_to_steady_state(modes, sine, groups, *run.end)
-    except NotConverged:
-        return None
-    amplitude, error = find_stable_amplitude(motion.amplitude, motion.residual, motion.multipliers)
-    return None if np.isnan(amplitude) else (amplitude, error)
-
-
-def find_stable_amplitude(amplitude: float, residual: float, multipliers) -> tuple:
-    """Return the amplitude [m] of a periodic motion and its error; NaN if it is unstable.
-
-    Parameters
-    ----------
-    amplitude : float
-        [m].
-    residual : float
-        Change of the state over a period, relative to the motion.
-    multipliers : (m,)
-        Floquet multipliers of the period. The error of the motion is the residual divided by the
-        smallest distance of a multiplier from 1.
-    """
-    if np.abs(multipliers).max(initial=0.0) >= 1:
-        return np.nan, np.nan
-    strips_slide_independently = max(float(np.abs(1 - multipliers).min(initial=1.0)), 1e-12)
-    return float(amplitude), float(
-        amplitude * max(1e-9, 10 * residual / strips_slide_independently)
-    )
 
 
 class YieldingElements:

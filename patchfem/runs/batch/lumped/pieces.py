@@ -28,7 +28,6 @@ from .event_driven import (
     RigidElements,
     compute_event_measures,
     convert_to_elements,
-    find_steady_motion,
     may_still_change,
 )
 from .threads import apply_in_threads
@@ -201,10 +200,7 @@ def _evaluate_runs(cases: list, finished: list, cycles: int, window: int, steady
             and not is_stuck[k]
             and may_still_change(run.extremes, window, tolerance[k], decay)
         ):
-            motion = find_steady_motion(rig.modes, rig.drive.signal, case.groups, run)
-            needs_single_run[k] |= motion is None
-            if motion is not None:
-                steady_motions[:, k] = motion
+            needs_single_run[k] = True
     stiffness = np.array([model.rig.first_mode.stiffness for model in models])
     acceleration = np.array([find_max_acceleration(model.rig.drive.signal) for model in models])
     with np.errstate(all="ignore"):

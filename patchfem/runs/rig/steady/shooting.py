@@ -35,6 +35,7 @@ N_CYCLES_IN_GROOVES = 30
 RTOL = 1e-11  # tolerance of a step, so that the change over a period is far below the motion
 MIN_DISTANCE = 1e-6  # smallest distance of a multiplier from 1 that is assumed for the error
 N_CYCLES = 2.0  # computed cycles of a periodic motion, so that each stick is complete
+MIN_STOP = 1e-9  # shortest stop that is counted, in periods
 N_NEAR_CYCLES = 2  # cycles before the first correction of a motion that starts from a similar one
 FULL_SLIP_TOL = (
     1e-9  # relative distance from its friction limit at which an interface slips as a whole
@@ -166,7 +167,8 @@ class ShootingFinder(TracedCurve):
             return "slides" if slides else "partial slip"
         if not any(is_rigid(law.law) for law in laws):
             return "sliding"
-        n_stops = int(faces[:, Window.STARTS].max())
+        lasts = faces[:, Window.STUCK] > MIN_STOP * motion.period
+        n_stops = int((faces[:, Window.STARTS] * lasts).max())
         return f"{n_stops} stop{'s' * (n_stops != 1)}" if n_stops else "sliding"
 
     def _make_solution(self, run, drive, begin: float, regime: str) -> Solution:
