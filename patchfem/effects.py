@@ -10,8 +10,8 @@ interface under a constant load. Optional features are:
 - `shear`: elastic pieces ([contact.shear]);
 - `joints`: several interfaces, stiffening springs and strips that yaw;
 - `varying-load`: a normal load that changes with the motion;
-- `exact`: the event-driven engine with the whole interface as one element;
-- `pieces`: the event-driven engine with several elements that stick or slip;
+- `exact`: steady motions of the whole interface as one rigid element;
+- `pieces`: elements that stick or slip, for patches that slip part by part;
 - `harmonic`: harmonic balance;
 - `grooves`: grooves whose flanks the surfaces climb;
 - `plane`: an interface of a rig that slides in two directions;

@@ -93,12 +93,7 @@ PUBLIC = {
         "points_element",
         "unpack_bonds",
     ),
-    "laws.stretch_kernels": (
-        "end_motion",
-        "relax_stretch",
-        "start_motion",
-        "state_rates",
-    ),
+    "laws.stretch_kernels": ("relax_stretch",),
     "laws.tanh": ("TanhLaw",),
     "laws.tanh_kernels": ("HAS_SPEED_LAYER",),
     "path_work": ("sampled_work",),

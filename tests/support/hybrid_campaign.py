@@ -36,7 +36,7 @@ def compare(seed: int) -> dict:
     begin = process_time()
     motion = runs.run_case(case)
     seconds = process_time() - begin
-    classes = sorted({face["keys"]["law"] for face in spec["faces"]}) + [spec["kind"]]
+    classes = [*sorted({face["keys"]["law"] for face in spec["faces"]}), spec["kind"]]
     row = {"seed": seed, "classes": classes, "seconds": seconds, "message": motion.message}
     if motion.status is not Status.DONE:
         return row | {"measures": {}}
