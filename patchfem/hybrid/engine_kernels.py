@@ -55,7 +55,7 @@ MIN_STEP = 1e-15  # relative to the end of the run
 REJECTED_FACTOR = 0.1  # ratio of steps after one without a finite error
 MAX_LENGTHS = 100.0  # lengths of a law to which the error of a slide is relative at most
 MAX_STIFFNESS = (
-    1e6  # slide over the length of a law, above which round-off of the slide moves its force
+    1e8  # slide over the length of a law, above which round-off of the slide moves its force
 )
 MIN_PARTICIPATION = (
     1e-150  # of a mode in a slide or in the output, so that a mode without any has no error

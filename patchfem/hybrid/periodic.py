@@ -25,8 +25,12 @@ MAX_STABLE_MULTIPLIER = (
 )  # of a stable motion, because the derivatives of the map are differences
 # Distance of a multiplier from 1 that differences do not resolve; a mode with a damping ratio of 3e-7 has it.
 UNDAMPED_TOL = 2e-6
+NEUTRAL_TOL = 1e-9  # distance of a multiplier from 1, relative to the largest, that counts as none
 N_GROWTH_CYCLES = (
     60  # cycles of each of three runs, in which a growing motion increases by similar amounts
+)
+MIN_SIZE_RATIO = (
+    1e3  # smallest ratio of a periodic motion that is never reached to the motion after these runs
 )
 MIN_GROWTH = 1e-6  # increase in these cycles, relative to the motion
 MIN_GROWTH_RATIO = 0.5  # ratio of the increases in the last and in the second of these runs
@@ -37,6 +41,7 @@ class PeriodicMotion(NamedTuple):
 
     - batch: its measures (c = 1) over a period; energies are those of this period
     - change: largest change of the state over a period, relative to its scale; it has converged below `tolerance`
+    - error: distance of the state from that of the periodic motion, relative to its scale
     - tolerance: largest change at which the motion counts as periodic
     - multipliers: Floquet multipliers; without those of states that a period determines alone
     - period: [s]
@@ -46,6 +51,7 @@ class PeriodicMotion(NamedTuple):
 
     batch: Batch
     change: float
+    error: float
     tolerance: float
     multipliers: np.ndarray
     period: float
@@ -94,23 +100,39 @@ def find_periodic_motion(
             continue
         best = change
         shooting.correct(before)
-    multipliers = shooting.find_multipliers(before)
+    multipliers, error = shooting.find_multipliers(before)
     largest = np.abs(multipliers).max(initial=0.0)
-    grows = not is_free and largest > 1 - UNDAMPED_TOL and _grows_for_ever(case)
+    has_converged = change < tolerance
+    may_grow = not has_converged or largest > 1 - UNDAMPED_TOL
+    size = np.abs(before.y[0, : 2 * case.rig.modes.shape[1]]).max() if has_converged else np.inf
     return PeriodicMotion(
-        batch, change, tolerance, multipliers, shooting.period, shooting.n_periods, grows
+        batch,
+        change,
+        error,
+        tolerance,
+        multipliers,
+        shooting.period,
+        shooting.n_periods,
+        grows=not is_free and may_grow and _grows_for_ever(case, size),
     )
 
 
-def _grows_for_ever(case: Case) -> bool:
-    """Return whether the motion from the start of a case increases by similar amounts in equal times."""
+def _grows_for_ever(case: Case, size: float) -> bool:
+    """Return whether the motion from the start of a case increases by similar amounts in equal times.
+
+    `size` is the largest coordinate or velocity of the periodic motion that was found, which a motion that grows for ever
+    does not come near; inf if none was found.
+    """
     shooting = _Shooting(case, is_free=False)
     sizes = []
     for _ in range(3):
         shooting.relax(N_GROWTH_CYCLES)
         sizes.append(float(np.abs(shooting.state.y[0, : 2 * case.rig.modes.shape[1]]).max()))
     first, second = np.diff(sizes)
-    return bool(first > MIN_GROWTH * sizes[0] and second > MIN_GROWTH_RATIO * first)
+    is_moving = sizes[0] > case.rig.scales[0]
+    is_far = size > MIN_SIZE_RATIO * sizes[-1]
+    is_growing = first > MIN_GROWTH * sizes[0] and second > MIN_GROWTH_RATIO * first
+    return bool(is_moving and is_far and is_growing)
 
 
 class _Shooting:
@@ -202,11 +224,15 @@ class _Shooting:
             slopes[:, -1] /= self.difference * self.period
         return columns, (end - start)[0, columns], slopes, scale
 
-    def find_multipliers(self, before: State) -> np.ndarray:
-        """Return the eigenvalues of the map of a period from a state."""
-        columns, _, slopes, scale = self._differentiate(before)
+    def find_multipliers(self, before: State) -> tuple[np.ndarray, float]:
+        """Return the eigenvalues of the map of a period from a state, and the largest part of the next Newton step."""
+        columns, change, slopes, scale = self._differentiate(before)
         square = slopes[:, : columns.size] * scale / scale[:, None]
-        return np.linalg.eigvals(square)
+        if not np.isfinite(square).all():
+            return np.full(columns.size, np.nan), np.inf
+        # A state that nothing determines, such as that of an interface at rest, has no error.
+        step = np.linalg.lstsq(np.eye(columns.size) - square, change / scale, rcond=NEUTRAL_TOL)[0]
+        return np.linalg.eigvals(square), float(np.abs(step).max(initial=0.0))
 
     def correct(self, before: State) -> None:
         """Replace the state by a Newton step from another one, which a period takes to it."""

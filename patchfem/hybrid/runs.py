@@ -47,7 +47,7 @@ MESSAGES = {
     Status.TOO_MANY_STEPS: "the motion needs more than {steps:.1g} steps, because a law or a mode is much faster "
     "than the drive; use a law of lower stiffness or larger reference speed",
     Status.STEP_TOO_SMALL: "the steps become smaller than round-off, so that the motion cannot be continued",
-    Status.TOO_STIFF: "a law stretches by less than a millionth of its slide before it slips; use law 'coulomb' instead",
+    Status.TOO_STIFF: "a law stretches by less than 1e-8 of its slide before it slips; use law 'coulomb' instead",
     Status.NO_PROGRESS: "the laws change their regime again and again without progress in time",
 }
 
@@ -195,6 +195,8 @@ class Motion:
         acceleration -= forces @ rig.rows[0] / modes.mass
 
         slides, slide_rates = z @ rig.rows[0, :m].T, rate @ rig.rows[0, :m].T
+        rests = (self._columns(rows, 2) == 0) & (rig.faces[:m, Face.RIGID] > 0)
+        slide_rates[rests] = 0.0
         work, slips, loss = integrals[:, :m, 0], integrals[:, :m, 1], integrals[:, :m, 2]
         extra = {
             "ledger": np.stack(

@@ -88,7 +88,7 @@ def test_exact_coulomb_steady_state_closes_to_round_off():
     """The residual of the cycle is below 1e-8, its energy balance closes within 1e-9, and it agrees
     with a march within 1e-7."""
     result = pf.run(load_rig("coulomb"))
-    assert result.extra["residual"] < 1e-8 and result.extra["map"] == "march"
+    assert result.extra["residual"] < 1e-8 and result.extra["map"] == "shooting"
     assert result.measures["energy_balance"].value < 1e-9
     reference = march_last_cycle(load_rig("coulomb"), 40)
     for name, value in list(zip(MAIN_MEASURES, reference))[:2]:

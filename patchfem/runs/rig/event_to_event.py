@@ -10,10 +10,19 @@ from time import perf_counter
 import numpy as np
 
 from ... import compiled
-from ...core import IntegratedMeasures, InterfaceLoop, NotConverged, Outcome, Response
+from ...core import (
+    IntegratedMeasures,
+    InterfaceLoop,
+    NotConverged,
+    Outcome,
+    Response,
+    SineDrive,
+)
 from ...dynamics.event_list import DRIVE_CHANGE, RELEASE, REVERSAL, STOP, EventLog
+from ...dynamics.grooves.climbing import lift_message
 from ...dynamics.integrated import find_accelerations
-from ...hybrid import cases
+from ...formatting import format_length
+from ...hybrid import cases, periodic
 from ...hybrid import runs as engine
 from ...hybrid.laws import is_rigid
 from ...hybrid.records import Memory, State, Status
@@ -24,6 +33,7 @@ from ...response.rows import ROWS_NEEDING_RUN
 from ...structure.drive_sizes import (
     choose_samples_per_cycle,
     find_drive_omega,
+    find_min_decay_rate,
     is_periodic,
     is_sinusoidal,
 )
@@ -38,6 +48,15 @@ MIN_SAMPLES = 101  # samples of the last cycles of a run shorter than a cycle
 MAX_EARLY_SAMPLES = 8_000  # samples of equal distances before the last cycles
 EARLY_SAMPLES_PER_CYCLE = 40
 SAME_TIME_TOL = 1e-9  # distance of samples that are one, in cycles
+# Displacement at which a motion has left the range of a softening spring, relative to that without restoring force.
+ESCAPE_RATIO = 2.0
+MAX_CHANGE_RATIO = 1e-2  # largest ratio of the change of a steady motion to the tolerance
+N_CHANGE_WINDOWS = (
+    3  # windows at the end of a run from which the change of the motion is determined
+)
+# Smallest relative decay of a free motion over the last windows that is assumed; less damping counts as this decay.
+MIN_RELATIVE_DECAY = 1e-6
+STEADY_RTOL = 1e-10  # step tolerance of the steady motion that follows a run
 MIN_SAMPLED_CYCLES = 2.0  # cycles at the end that have as many samples as the window
 MOTION_MEASURES = (
     "relative_displacement_amplitude",
@@ -132,6 +151,8 @@ def run_from_event_to_event(
         run, fields = run_levels(evaluator, integrate, None, lambda run: run.end, progress)
     else:
         run = integrate(rig.drive.signal, None, progress, True, numerics.cycles)
+        steady = evaluator.find_steady_amplitude(run)
+        fields |= {} if steady is None else {"steady": steady}
         run = remove_incomplete_cycle(run)
     if progress is not None:
         progress(1.0)
@@ -162,11 +183,11 @@ class LumpedEvaluator(RunEvaluator):
         frames : int
             Number of snapshots of the elements in the last cycle.
         """
-        travel = self.model.rig.springs.travel
+        travel = min(self.model.rig.springs.travel, self._find_escape())
         times = self._choose_times(drive, cycles, frames)
         motion = self._run(drive, cycles, np.concatenate(times[:2]), travel, state)
         outcome = EARLY_ENDS.get(motion.status)
-        message = motion.message if outcome is Outcome.LEAVES_GROOVES else ""
+        message = self._explain_end(motion, travel) if outcome is not None else ""
         if motion.status not in (Status.DONE, *EARLY_ENDS):
             raise NotConverged(motion.message)
         if outcome is not None:
@@ -176,6 +197,26 @@ class LumpedEvaluator(RunEvaluator):
             motion = self._run(drive, cycles, np.concatenate(times[:2]), np.inf, state)
         run = self._make_run(motion, drive, cycles, times, state)
         return replace(run, outcome=outcome, message=message)
+
+    def _find_escape(self) -> float:
+        """Return the displacement [m] beyond which a softening spring no longer pulls the output back; inf without one."""
+        cubic = self.model.rig.springs.cubic
+        if cubic is None or cubic >= 0:
+            return np.inf
+        modes = self.model.rig.modes
+        stiffness = modes.mass * modes.omega[0] ** 2 / max(modes.output[0] ** 2, 1e-300)
+        return ESCAPE_RATIO * np.sqrt(stiffness / -cubic)
+
+    def _explain_end(self, motion, travel: float) -> str:
+        """Return why a motion ended early, "" if it reached the travel of the scene."""
+        if motion.status == Status.LEAVES_GROOVES:
+            return lift_message(self.model.grooves, motion.time)
+        if travel >= self.model.rig.springs.travel:
+            return ""
+        return (
+            f"beyond a displacement of {format_length(travel, 3)} the motion grows without limit, because the force of the "
+            "softening spring no longer pulls the block back; the run ended there"
+        )
 
     def _run(self, drive, cycles: float, times, travel: float, state: State | None):
         """Return the `hybrid.runs.Motion` of a drive."""
@@ -190,6 +231,31 @@ class LumpedEvaluator(RunEvaluator):
             n_steps=numerics.steps,
         )
         return engine.run_case(case, has_errors=False, start=state, fills_histories=numerics.whole)
+
+    def find_steady_amplitude(self, run: LumpedRun) -> tuple | None:
+        """Return amplitude [m] and error of the steady motion of elements that a run under a sine approaches.
+
+        The result is None if the motion changes no more, or if it approaches none that is stable.
+        """
+        drive = self.model.rig.drive.signal
+        laws = [law.law for law, _ in self.joints.laws]
+        if run.outcome is not None or not laws or set(laws) != {"masing"} or self.is_stuck(run):
+            return None
+        decay = find_min_decay_rate(self.model.rig.modes) * drive.period
+        tolerance = self.model.accuracy.tolerance
+        if (
+            not isinstance(drive, SineDrive)
+            or run.cycles_done % 1
+            or not may_still_change(run.extremes, self.numerics.window, tolerance, decay)
+        ):
+            return None
+        schedule = cases.Schedule(1.0, 1, np.zeros(0), np.inf)
+        case = cases.make_rig_case(self.model.rig, self.joints.laws, schedule, rtol=STEADY_RTOL)
+        motion = periodic.find_periodic_motion(case, start=run.end, n_first=0)
+        if motion.grows or not motion.change <= motion.tolerance or not motion.is_stable:
+            return None
+        amplitude = float(motion.batch.windows[0][MOTION_MEASURES[0]][0])
+        return amplitude, amplitude * (10 * motion.error + 1e2 * STEADY_RTOL)
 
     def _choose_times(self, drive, cycles: float, frames: int) -> tuple:
         """Return the times [s] of samples before the last cycles, in the last cycles, and of snapshots."""
@@ -447,6 +513,31 @@ class LumpedEvaluator(RunEvaluator):
             See `RunEvaluator.estimate_run_errors`.
         """
         return self.estimate_sampling_errors(run, drive, values) if hasattr(drive, "band") else {}
+
+
+def may_still_change(extremes, window: int, tolerance: float, decay: float) -> bool:
+    """Return whether a motion may still change by more than a fraction of the tolerance.
+
+    This is the case if the run is too short. Otherwise, the change of the extremes in the last
+    N_CHANGE_WINDOWS windows is divided by the fraction by which the slowest free motion decays in
+    this time, because the extremes of a slow beat hardly change near its maximum.
+
+    Parameters
+    ----------
+    extremes : (c, 2)
+        Minimum and maximum output of each cycle [m].
+    window : int
+        Number of cycles in a window.
+    tolerance : float
+    decay : float
+        Exponent of the decay of the slowest free motion per cycle [1].
+    """
+    last = np.asarray(extremes, float)[-N_CHANGE_WINDOWS * window :]
+    if len(last) < N_CHANGE_WINDOWS * window:
+        return True
+    decayed = max(-np.expm1(-decay * len(last)), MIN_RELATIVE_DECAY)
+    limit = MAX_CHANGE_RATIO * tolerance * decayed * np.ptp(last[-window:]) / 2
+    return np.ptp(last, axis=0).max() > limit
 
 
 def _divide(begin: float, end: float, period: float, minimum: int) -> np.ndarray:

@@ -21,36 +21,6 @@ from ...rig import interface, strips
 from ...rig.solution import first_interface_load
 
 MAX_CHANGE_RATIO = 1e-2  # Largest ratio of the change of a steady motion to the tolerance.
-# Number of windows at the end of a run from which the change of the motion is determined.
-N_CHANGE_WINDOWS = 3
-# Smallest relative decay of a free motion over the last windows that is assumed; less damping counts
-# as this decay.
-MIN_RELATIVE_DECAY = 1e-6
-
-
-def may_still_change(extremes, window: int, tolerance: float, decay: float) -> bool:
-    """Return whether a motion may still change by more than a fraction of the tolerance.
-
-    This is the case if the run is too short. Otherwise, the change of the extremes in the last
-    N_CHANGE_WINDOWS windows is divided by the fraction by which the slowest free motion decays in
-    this time, because the extremes of a slow beat hardly change near its maximum.
-
-    Parameters
-    ----------
-    extremes : (c, 2)
-        Minimum and maximum output of each cycle [m].
-    window : int
-        Number of cycles in a window.
-    tolerance : float
-    decay : float
-        Exponent of the decay of the slowest free motion per cycle [1].
-    """
-    last = np.asarray(extremes, float)[-N_CHANGE_WINDOWS * window :]
-    if len(last) < N_CHANGE_WINDOWS * window:
-        return True
-    decayed = max(-np.expm1(-decay * len(last)), MIN_RELATIVE_DECAY)
-    limit = MAX_CHANGE_RATIO * tolerance * decayed * np.ptp(last[-window:]) / 2
-    return np.ptp(last, axis=0).max() > limit
 
 
 class YieldingElements:

@@ -22,13 +22,13 @@ from ....response.measures import COORDINATE_ROUND_OFF, energy_balance
 from ....response.ringing import make_ringing_measures
 from ....structure.drive_sizes import find_max_acceleration, find_min_decay_rate
 from ...rig.costs import count_cell_merges
+from ...rig.event_to_event import may_still_change
 from .case_engines import EXACT, PIECES, choose_engine
 from .columns import N_FINAL_WINDOWS, Runs
 from .event_driven import (
     RigidElements,
     compute_event_measures,
     convert_to_elements,
-    may_still_change,
 )
 from .threads import apply_in_threads
 

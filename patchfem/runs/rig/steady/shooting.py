@@ -33,7 +33,7 @@ from .curves import (
 # Cycles from rest within which a lifted mass leaves its grooves, if it leaves them at all.
 N_CYCLES_IN_GROOVES = 30
 RTOL = 1e-11  # tolerance of a step, so that the change over a period is far below the motion
-MIN_DISTANCE = 1e-6  # smallest distance of a multiplier from 1 that is assumed for the error
+STEPS_ERROR = 100.0  # error of a periodic motion that is due to its steps, relative to RTOL
 N_CYCLES = 2.0  # computed cycles of a periodic motion, so that each stick is complete
 MIN_STOP = 1e-9  # shortest stop that is counted, in periods
 N_NEAR_CYCLES = 2  # cycles before the first correction of a motion that starts from a similar one
@@ -98,8 +98,9 @@ class ShootingFinder(TracedCurve):
         if run is not None:
             return self._make_solution(run, drive, begin, "leaves its grooves"), None
         motion = self.find_periodic_motion(drive, guess)
-        state = motion.batch.states
-        run = self.evaluator.integrate(drive, N_CYCLES, state, self.frames)
+        state = None if motion.grows else motion.batch.states
+        cycles = periodic.N_GROWTH_CYCLES if motion.grows else N_CYCLES
+        run = self.evaluator.integrate(drive, cycles, state, self.frames)
         return self._make_periodic_solution(run, motion, drive, begin), state
 
     def _leave_grooves(self, drive):
@@ -134,7 +135,8 @@ class ShootingFinder(TracedCurve):
             steps=cases.MIN_STEPS / hybrid_runs.COARSE_STEP,
         )
         other = LumpedEvaluator(self.model, coarse, self.patch, self.joints)
-        other_run = other.integrate(drive, N_CYCLES, motion.batch.states, 0)
+        start = None if motion.grows else motion.batch.states
+        other_run = other.integrate(drive, run.cycles_done, start, 0)
         coarse_values = other.evaluate_measures(other_run, drive, stuck=is_stuck)
         shared = {name: value for name, value in solution.values.items() if name in coarse_values}
         errors = hybrid_runs.estimate_errors(shared, coarse_values, RTOL)
@@ -208,13 +210,20 @@ class ShootingFinder(TracedCurve):
         return CurvePoint(
             drive=drive,
             values={name: value for name, value in values.items() if np.isfinite(value)},
-            errors=estimate_exact_errors(values, find_relative_error(motion)),
+            errors=self._estimate_point_errors(values, motion),
             regime=regime if is_stable else f"{regime}, unstable",
             multiplier=float(np.abs(motion.multipliers).max(initial=0.0)),
             stable=is_stable,
             outcome=Outcome.STUCK if is_stuck else Outcome.STEADY,
             guess=motion.batch.states,
         )
+
+    def _estimate_point_errors(self, values: dict, motion) -> dict:
+        """Return the errors of the measures of a point of a response curve."""
+        relative = find_relative_error(motion)
+        errors = estimate_exact_errors(values, relative)
+        # The ratio of two harmonics has the error of the first.
+        return errors | {"acceleration_distortion": errors["acceleration_distortion"] + relative}
 
     def observe(self, drive, guess=None, *, needs_histories: bool = True) -> tuple | None:
         """Return what sensors see of the periodic motion under a drive, without errors; None if it is unbounded.
@@ -287,6 +296,5 @@ class ShootingFinder(TracedCurve):
 
 
 def find_relative_error(motion: periodic.PeriodicMotion) -> float:
-    """Return the error of a fixed point relative to the motion: its change over the distance of a multiplier from 1."""
-    distance = np.abs(1 - motion.multipliers).min(initial=1.0)
-    return max(motion.change, RTOL) / max(float(distance), MIN_DISTANCE)
+    """Return the error of a periodic motion relative to its size, from the fixed point and from the steps of a period."""
+    return motion.error + STEPS_ERROR * RTOL
