@@ -6,13 +6,14 @@ entry of this list and the entries before it:
 1. `ledger`           positions in the energy sums and samples of a march
 2. `modal_kernels`    motion of the modes over a step of a march, and its energies
 3. `dense_kernels`    small dense linear systems
-5. `doubling`         step of stiff modes by repeated doubling of a short step
-6. `propagator`       exact modal steps under any drive
-7. `checkpoint`       checkpoints of a long march on disk
-8. `periodicity`      schedule and error bound of the check for a periodic motion
-9. `integrated`       time histories of a run from its modal coordinates
-10. `cycles`           extremes, phasors and selected samples of the cycles of a march
-11. `curve_points`    adaptive points of a curve, denser where its curvature is larger
+4. `doubling`         step of stiff modes by repeated doubling of a short step
+5. `propagator`       exact modal steps under any drive
+6. `checkpoint`       checkpoints of a long march on disk
+7. `periodicity`      schedule and error bound of the check for a periodic motion
+8. `integrated`       time histories of a run from its modal coordinates
+9. `cycles`           extremes, phasors and selected samples of the cycles of a march
+10. `curve_points`    adaptive points of a curve, denser where its curvature is larger
+11. `event_list`      log of the events of a run
 12. `periodic`        linear systems and Floquet multipliers of periodic motions
 13. `interfaces`      contacts of a march: solution of a step and update of their memory
 14. `events`          exact motion from event to event: rigid and elastic-plastic elements, or no friction
@@ -45,15 +46,12 @@ PUBLIC = {
         "make_coulomb_elements",
         "make_elements",
         "merge_elements",
-        "reset_work",
     ),
     "events.histories": (
         "announce_runs",
-        "is_loop_cached",
         "load_event_kernels",
         "simulate_batch",
     ),
-    "events.modal_system": ("make_modal_system",),
     "events.positions_kernels": (
         "InterfaceMeasure",
         "RunMeasure",

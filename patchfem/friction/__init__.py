@@ -12,7 +12,6 @@ PUBLIC = {
         "RECURSION",
         "RequestedEngine",
         "choose_engine",
-        "unsupported_reason",
     ),
     "bonds.list_forms_kernels": (
         "FORM_MOMENTS",
