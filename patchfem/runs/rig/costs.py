@@ -185,7 +185,7 @@ def count_intervals_by_cause(model: Model) -> tuple:
         float((np.asarray(modes.interfaces) ** 2).sum(axis=1).max(initial=0.0)) / modes.mass
     )
     rate = damping / 2 + sqrt(damping**2 / 4 + float(modes.omega.max()) ** 2 + stiff * inverse_mass)
-    n_rows = 0 if drive.segments else len(drive.breaks) / model.rig.drive.cycles
+    n_rows = _count_rows_per_cycle(model)
     vibration = (
         max(rate * drive.period, 2 * pi * find_max_frequency_ratio(drive)) / MAX_INTERVAL_PHASE
     )
@@ -194,12 +194,20 @@ def count_intervals_by_cause(model: Model) -> tuple:
     return vibration, events
 
 
+def _count_rows_per_cycle(model: Model) -> float:
+    """Return the number of rows of a recorded drive per cycle, 0 for other drives."""
+    drive = model.rig.drive.signal
+    return 0.0 if drive.segments else len(drive.breaks) / model.rig.drive.cycles
+
+
 def estimate_hybrid_steps(model: Model) -> float:
     """Estimate the number of steps per cycle of the engine `hybrid`."""
     rig = model.rig
     modes = rig.modes
     period = rig.drive.signal.period
     vibration, events = count_intervals_by_cause(model)
+    n_rows = _count_rows_per_cycle(model)
+    events = events - n_rows if rig.friction.interfaces else 0.0
     damping = float(np.abs(modes.damping_matrix).sum(axis=1).max())
     shortest = find_max_frequency_ratio(rig.drive.signal)
     if model.load_varies:
@@ -221,7 +229,7 @@ def estimate_hybrid_steps(model: Model) -> float:
             rate = max(rate, speed / min(length, keys.slip_growth or inf))
         rate = max(rate, ((keys.micro_damping or 0.0) + (keys.viscous or 0.0)) * inverse_mass)
     return (
-        max(MIN_STEPS * shortest, STEPS_PER_PHASE * (vibration * MAX_INTERVAL_PHASE))
+        max(n_rows or MIN_STEPS * shortest, STEPS_PER_PHASE * (vibration * MAX_INTERVAL_PHASE))
         + (rate + damping) * period / MAX_STEP_RELAXATION_TIMES
         + STEPS_PER_EVENT * events
     )
