@@ -6,7 +6,6 @@ NaN.
 
 import numpy as np
 
-from .laws import LAWS, is_rigid
 from .records import (
     N_FACE_INTEGRALS,
     N_INTEGRALS,
@@ -73,6 +72,8 @@ def compute_measures(
         row = records.faces[:, window, i]
         suffix = f"_{i + 1}" if i else ""
         stuck = row[:, Window.STUCK]
+        # A reversal without stick takes a time of the size of round-off.
+        stuck = np.where(stuck <= span * FULL_STICK, 0.0, stuck)
         found = (
             (row[:, Window.MAX_SLIP] - row[:, Window.MIN_SLIP]) / 2,
             np.where(stuck >= span * (1 - FULL_STICK), 1.0, stuck / span),
@@ -149,9 +150,6 @@ def _compute_loop(rigs, records, window: int, span, values: dict, stiffness: flo
             "secant_stiffness": secant,
             "equivalent_damping": damping if stiffness else np.full_like(damping, np.nan),
         }
-    if is_rigid(LAWS[int(rigs.faces[0, 0, Face.LAW])]):
-        # Rigid friction at rest takes many values.
-        found["secant_stiffness"] = np.where(values["stick_fraction"] > 0, np.nan, secant)
     if numbers.size > 1:
         means = cycles[..., Cycle.SLIDE] / rigs.settings[:, Setting.PERIOD, None]
         found["drift_per_cycle"] = (means[:, -1] - means[:, 0]) / (numbers.size - 1)

@@ -118,7 +118,7 @@ def _solve_patch_of_case(model: Model, batch: PatchBatch) -> SolvedCase | None:
                     return None
             warnings = [
                 *model.source.remarks,
-                *describe_unused_settings(model, batch.engine),
+                *describe_unused_settings(model, "hybrid"),
                 *patch_result.patch_warnings(model.patch, patch),
             ]
             return SolvedCase(

@@ -300,7 +300,7 @@ def _list_model_warnings(model, engine: str) -> list:
     """Return the warnings that follow from a model alone."""
     return [
         *model.source.remarks,
-        *describe_unused_settings(model, engine),
+        *describe_unused_settings(model, "hybrid"),
         *model.rig.structure.notes,
     ]
 
