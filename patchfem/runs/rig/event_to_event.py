@@ -251,11 +251,7 @@ class LumpedEvaluator(RunEvaluator):
             return None
         schedule = cases.Schedule(1.0, 1, np.zeros(0), np.inf)
         case = cases.make_rig_case(self.model.rig, self.joints.laws, schedule, rtol=STEADY_RTOL)
-        motion = periodic.find_periodic_motion(case, start=run.end, n_first=0)
-        if motion.grows or not motion.change <= motion.tolerance or not motion.is_stable:
-            return None
-        amplitude = float(motion.batch.windows[0][MOTION_MEASURES[0]][0])
-        return amplitude, amplitude * (10 * motion.error + 1e2 * STEADY_RTOL)
+        return find_stable_amplitude(periodic.find_periodic_motion(case, start=run.end, n_first=0))
 
     def _choose_times(self, drive, cycles: float, frames: int) -> tuple:
         """Return the times [s] of samples before the last cycles, in the last cycles, and of snapshots."""
@@ -513,6 +509,14 @@ class LumpedEvaluator(RunEvaluator):
             See `RunEvaluator.estimate_run_errors`.
         """
         return self.estimate_sampling_errors(run, drive, values) if hasattr(drive, "band") else {}
+
+
+def find_stable_amplitude(motion: periodic.PeriodicMotion) -> tuple[float, float] | None:
+    """Return the amplitude [m] of a periodic motion and its error; None if it is not known or not stable."""
+    if motion.grows or not motion.change <= motion.tolerance or not motion.is_stable:
+        return None
+    amplitude = float(motion.batch.windows[0][MOTION_MEASURES[0]][0])
+    return amplitude, amplitude * (10 * motion.error + 1e2 * STEADY_RTOL)
 
 
 def may_still_change(extremes, window: int, tolerance: float, decay: float) -> bool:

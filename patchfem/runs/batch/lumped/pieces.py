@@ -16,13 +16,16 @@ from ....dynamics.events.reading import join_readings
 from ....effects import law_has_trait
 from ....friction.cells import CELL_MERGES
 from ....friction.record import make_law
+from ....hybrid import cases as hybrid_cases
+from ....hybrid import periodic
+from ....hybrid.laws import masing
 from ....response import run_events
 from ....response.errors import merged_cell_errors
 from ....response.measures import COORDINATE_ROUND_OFF, energy_balance
 from ....response.ringing import make_ringing_measures
 from ....structure.drive_sizes import find_max_acceleration, find_min_decay_rate
 from ...rig.costs import count_cell_merges
-from ...rig.event_to_event import may_still_change
+from ...rig.event_to_event import STEADY_RTOL, find_stable_amplitude, may_still_change
 from .case_engines import EXACT, PIECES, choose_engine
 from .columns import N_FINAL_WINDOWS, Runs
 from .event_driven import (
@@ -200,7 +203,10 @@ def _evaluate_runs(cases: list, finished: list, cycles: int, window: int, steady
             and not is_stuck[k]
             and may_still_change(run.extremes, window, tolerance[k], decay)
         ):
-            needs_single_run[k] = True
+            motion = _find_steady_motion(case)
+            needs_single_run[k] |= motion is None
+            if motion is not None:
+                steady_motions[:, k] = motion
     stiffness = np.array([model.rig.first_mode.stiffness for model in models])
     acceleration = np.array([find_max_acceleration(model.rig.drive.signal) for model in models])
     with np.errstate(all="ignore"):
@@ -246,6 +252,20 @@ def _evaluate_runs(cases: list, finished: list, cycles: int, window: int, steady
         is_stuck & (reading.force_increase > max_rise),
         tuple(steady_motions),
     )
+
+
+def _find_steady_motion(case: Case) -> tuple[float, float] | None:
+    """Return the amplitude [m] of the steady motion of a case and its error, or None if no stable one is found."""
+    laws = [
+        (
+            masing.from_elements(group.stiffness, group.yield_displacement),
+            hybrid_cases.Load(case.load),
+        )
+        for group in case.groups
+    ]
+    schedule = hybrid_cases.Schedule(1.0, 1, np.zeros(0))
+    start = hybrid_cases.make_rig_case(case.model.rig, laws, schedule, rtol=STEADY_RTOL)
+    return find_stable_amplitude(periodic.find_periodic_motion(start))
 
 
 def _find_ringing(case: Case, run, steady: bool) -> dict | None:
