@@ -74,6 +74,8 @@ SINE_MEASURES = (
     "secant_stiffness",
     "harmonic_force_ratio",
 )
+# Sums over all drive levels.
+WHOLE_RUN_MEASURES = ("friction_work", "energy_dissipated")
 EARLY_ENDS = {
     Status.EXCEEDS_TRAVEL: Outcome.EXCEEDS_TRAVEL,
     Status.LEAVES_GROOVES: Outcome.LEAVES_GROOVES,
@@ -141,14 +143,19 @@ def run_from_event_to_event(
     evaluator = LumpedEvaluator(model, numerics, patch, joints)
     rig = model.rig
 
-    def integrate(drive, state, watch, is_last, cycles: float = rig.drive.levels.cycles):
-        """Integrate the motion under a drive from a state, None for the start of the rig."""
-        return evaluator.integrate(drive, cycles, state, frames if is_last else 0)
+    def integrate(drive, before, watch, is_last, cycles: float = rig.drive.levels.cycles):
+        """Integrate the motion under a drive from the end of another run, None for the start of the rig."""
+        state = None if before is None else before.end
+        run = evaluator.integrate(drive, cycles, state, frames if is_last else 0)
+        for name in WHOLE_RUN_MEASURES:
+            if before is not None and name in before.values:
+                run.values[name] += before.values[name]
+        return run
 
     fields = {}
     begin = perf_counter()
     if rig.drive.levels.amplitudes:
-        run, fields = run_levels(evaluator, integrate, None, lambda run: run.end, progress)
+        run, fields = run_levels(evaluator, integrate, None, lambda run: run, progress)
     else:
         run = integrate(rig.drive.signal, None, progress, True, numerics.cycles)
         steady = evaluator.find_steady_amplitude(run)

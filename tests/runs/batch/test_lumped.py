@@ -1,13 +1,10 @@
 """Lumped cases in one compiled call agree with the same cases solved one by one."""
 
 import numpy as np
-import pytest
-from batch_beside import assert_equal_to_single_runs
 from scene_texts import MODE
 
 from patchfem.api import build, get_base_scene, load
 from patchfem.runs import CaseResults
-from patchfem.runs.batch import one_by_one
 from patchfem.runs.batch.lumped import lumped
 from patchfem.scene import format_assignments
 
@@ -64,11 +61,3 @@ def solve_by_group(cases) -> CaseResults:
     for places in groups.values():
         results.insert(places, lumped.solve([cases[case] for case in places]))
     return results
-
-
-@pytest.mark.share(0, 1, 2, 3, 5, 6, 7)
-@pytest.mark.parametrize(("law", "count"), [(law, 4 if law == "iwan" else 8) for law in LAWS])
-def test_exact_batch_agrees_with_single_runs(law, count):
-    """The exact batch of lumped cases agrees with single runs in values, errors and texts."""
-    cases = draw_models(law, 1, count)
-    assert_equal_to_single_runs(cases, one_by_one.solve(cases), solve_by_group(cases))
