@@ -103,7 +103,7 @@ def test_exact_levels_agree_with_long_exact_run(law):
         == pytest.approx(G * np.array([3, 5, 7, 5]))
     )
     assert [level.stuck for level in steady_levels] == [level.stuck for level in run_levels]
-    round_off = {"equivalent_damping": 1e-14, "loop_area": 1e-17}
+    round_off = {"equivalent_damping": 1e-11, "loop_area": 1e-17}
     for a, b in zip(steady_levels, run_levels):
         assert (
             set(a.errors)
