@@ -150,8 +150,7 @@ def _read_matlab(path: Path, requests: list) -> Records:
     Only real arrays are read; nothing in the file is executed.
     """
     check_file(path, "save fewer variables or a part of the record")
-    variables = matlab.read_variables(path)
-    arrays = {name: array for name, array in variables.items() if array.kind == "number"}
+    arrays = matlab.read_real_arrays(path)
     described = [
         f"{name} {_format_shape(arrays[name])}" for name in list(arrays)[:MAX_LISTED_ARRAYS]
     ]
@@ -181,7 +180,7 @@ def _select_values(path, arrays: dict, request: RequestedChannel, contents: str)
             f"--map {request.quantity}={request.source}: a .mat file has no units; write the unit, such "
             f'as "{request.quantity}={request.source} [unit]"'
         )
-    values = arrays[name].values()
+    values = arrays[name]
     if match is None:
         if values.ndim != 2 or min(values.shape) != 1:
             raise PatchfemError(

@@ -117,17 +117,6 @@ def test_refuses_oversized_array_before_unpacking(tmp_path, shape):
     assert peak < 2e6
 
 
-def test_refuses_oversized_matlab_matrix_before_unpacking(tmp_path):
-    """An oversized MATLAB matrix is refused by its header, before it is unpacked."""
-    import scipy.io
-
-    scipy.io.savemat(
-        tmp_path / "a.mat", {"K": np.ones((2001, 2000), np.uint8)}, do_compression=True
-    )
-    error_message, peak = measure_peak_memory(lambda: arrays.read_arrays(tmp_path / "a.mat"))
-    assert "K of shape 2001x2000" in error_message and peak < 1e6
-
-
 def test_refuses_empty_matrices():
     """Matrices without coordinates are refused."""
     empty = np.zeros((0, 0))
@@ -159,7 +148,7 @@ def test_exact_array_file_round_trip(tmp_path):
         ("a.csv", measured.read_table, "more than 64 MiB of text"),
         ("a.msh", meshes.read_pieces, "more than 256 MiB"),
         ("a.uff", universal.read_universal, "more than 256 MiB"),
-        ("a.mat", arrays.read_arrays, "is damaged or of version 4"),
+        ("a.mat", arrays.read_arrays, "more than 512 MiB"),
         ("a.csv", read_path_table, "more than 64 MiB of text"),
     ],
 )

@@ -24,6 +24,7 @@ REMOVED_KEYS["wear.scheme"] = (
 REMOVED_KEYS["structure.mode.lateral"] = (
     "this key was removed in patchfem 1.1, because no run could use it; leave it out: the patch slides along x alone"
 )
+REMOVED_NASTRAN = "reading files of Nastran was removed in patchfem 2.0; convert the matrix, with pyNastran for example"
 REMOVED_OPTIONS = {  # advice for each removed (verb, option)
     (
         "profile",

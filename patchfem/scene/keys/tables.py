@@ -348,7 +348,7 @@ class Reduced(Table):
     stiffness: key(
         Text,
         "file of the stiffness matrix: Matrix Market or Abaqus text (.mtx), MATLAB (.mat), NumPy or "
-        "SciPy (.npz), Nastran (.op4, .pch)",
+        "SciPy (.npz)",
     )
     mass: key(Text, "file of the mass matrix; may be the same file as for the stiffness matrix")
     damping: key(

@@ -7,6 +7,7 @@ from math import pi, sqrt
 from typing import Any, NamedTuple
 
 from ...effects import describe_unsupported, find_waveform
+from ..keys.removed import REMOVED_NASTRAN
 from ..keys.tables import Tables
 from ..keys.types import advise_on_name
 from .rule_table import MissingKeyRule, MistakeRule, RemarkRule, TableFacts, apply_rules
@@ -15,14 +16,11 @@ from .scene_draft import SceneDraft
 ARRAY_EXTENSIONS = (".npz", ".mat")
 UNIVERSAL_EXTENSIONS = (".uff", ".unv")
 # File extensions of matrices from finite-element programs, for [structure.reduced].
+NASTRAN_EXTENSIONS = (".op4", ".pch", ".bdf", ".dat")  # files that are no longer read
 MATRIX_EXTENSIONS = (
     ".mtx",
     ".mat",
     ".npz",
-    ".op4",
-    ".pch",
-    ".bdf",
-    ".dat",
 )
 # Largest plausible damping ratio, at which a free oscillation decays to a few per cent within one
 # cycle; a larger value probably has a wrong unit, because 1 % is 0.01.
@@ -554,9 +552,11 @@ def _check_matrix_files(draft: SceneDraft) -> None:
         file = getattr(reduced, key)
         if isinstance(file, str) and find_file_extension(file) not in MATRIX_EXTENSIONS:
             extension = find_file_extension(file)
+            advice = advise_on_name(extension, MATRIX_EXTENSIONS)
+            if extension in NASTRAN_EXTENSIONS:
+                advice = f"{REMOVED_NASTRAN}; {advice}"
             draft.add_mistake(
-                f"structure.reduced.{key}",
-                f"the name ends in '{extension}'; {advise_on_name(extension, MATRIX_EXTENSIONS)}",
+                f"structure.reduced.{key}", f"the name ends in '{extension}'; {advice}"
             )
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.lib import format as npy_format
 
 from ...core import PatchfemError
-from ...inputs.matlab import read_variables
+from ...inputs.matlab import read_real_arrays
 from ..areal import Areal
 from ..profile import Profile
 from ..samples import GIVEN_UNITS_NOTE, make_trace
@@ -64,17 +64,13 @@ def read_npy(raw: RawFile, units: tuple | None) -> Profile | Areal:
 
 def read_mat(raw: RawFile, units: tuple | None) -> Profile | Areal:
     """Read a MATLAB file: variables x, (y,) and z or gap, or one matrix of two or three columns."""
-    numbers = {
-        name: array
-        for name, array in read_variables(raw.path, raw.data).items()
-        if array.kind == "number"
-    }
+    numbers = read_real_arrays(raw.path, raw.data)
     factors = length_factors(raw, units)
     by_name = {name.lower(): array for name, array in numbers.items()}
     height = next((by_name[name] for name in HEIGHT_NAMES if name in by_name), None)
     if height is not None and "x" in by_name:
-        places = [by_name[name].values() for name in ("x", "y") if name in by_name]
-        return _read_variables(raw, places, height.values(), factors)
+        places = [by_name[name] for name in ("x", "y") if name in by_name]
+        return _read_variables(raw, places, height, factors)
     tables = [
         array for array in numbers.values() if len(array.shape) == 2 and array.shape[1] in (2, 3)
     ]
@@ -87,7 +83,7 @@ def read_mat(raw: RawFile, units: tuple | None) -> Profile | Areal:
             f"{raw.path}: holds {listed or 'no array'}; variables x, z or x, y, z, or one matrix "
             "of these columns, are needed"
         )
-    return _read_table(raw, tables[0].values(), factors)
+    return _read_table(raw, tables[0], factors)
 
 
 def length_factors(raw: RawFile, units: tuple | None) -> LengthFactors:

@@ -215,8 +215,8 @@ REFUSED = {  # bytes, file name, given units, and the expected message
     "mat of other sizes": (write.make_mat(x=np.arange(6.0), y=np.arange(3.0), z=Z), "a.mat", UM,
                            r"of shapes .* do not fit"),
     "mat of version 7.3": (b"MATLAB 7.3 MAT-file, HDF5" + bytes(600), "a.mat", UM,
-                           "version 7.3 is damaged .*; save it anew"),
-    "mat cut off": (write.make_mat(points=POINTS)[:-9], "a.mat", UM, "cut off or damaged; save it anew"),
+                           "no readable MATLAB file .*; save it anew"),
+    "mat cut off": (write.make_mat(points=POINTS)[:-9], "a.mat", UM, "no readable MATLAB file .*; save it anew"),
     "dektak without its columns": (
         write.make_dektak(Z.ravel()).replace(b"Lateral", b"Time"), "a.csv", None,
         "without the columns `Lateral um,Raw Micrometer`"),
