@@ -18,7 +18,7 @@ PUBLIC = {
         "NUMBER_PATTERN",
         "TableFormat",
         "parse_header",
-        "read_text",
+        "read_lines",
         "split_cells",
     ),
     "columns": ("read_columns",),

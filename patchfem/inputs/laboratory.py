@@ -13,7 +13,7 @@ import numpy as np
 
 from ..core import PatchfemError
 from . import matlab, universal
-from .cells import NUMBER_PATTERN, read_text
+from .cells import NUMBER_PATTERN, read_lines
 from .loops import EXPORTED_NAMES, find_standard_name
 from .measured import UNIVERSAL_EXTENSIONS
 from .records import (
@@ -94,7 +94,9 @@ def _find_quantity(name: str, names: list, exported_names: Mapping) -> str:
 
 def _read_table(path: Path, exported_names: Mapping) -> list:
     """Read the numeric columns of a table as channels; columns that contain text are left out."""
-    header, *lines = read_text(path, "a measured table").rstrip("\n").split("\n")
+    header, *lines = read_lines(path, "a measured table")
+    while lines and not lines[-1]:
+        lines.pop()
     separator = max(",;\t", key=header.count)
     heads = [_HEADER_CELL_PATTERN.fullmatch(_strip_cell(cell)) for cell in header.split(separator)]
     names = [head[1] for head in heads]
