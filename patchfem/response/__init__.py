@@ -20,7 +20,6 @@ PUBLIC = {
         "MIN_HALF_CYCLE",
         "fit_decay_curve",
         "locate_reversals",
-        "find_reversals_by_extrapolation",
         "make_half_cycles",
         "measure_last_cycle_amplitude",
         "smooth_slopes",
