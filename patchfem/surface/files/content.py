@@ -105,8 +105,8 @@ def _read_limited(path, name: Path, file) -> Content:
     data = bytearray(file.read(HEAD_BYTES))
     kind = _detect_format(bytes(data))
     suffix = name.suffix.lower()
-    if kind == "instrument" and suffix in TEXT_SUFFIXES and not data.startswith(b"Wyko"):
-        kind = "text"  # the reader of text files names the line that is not text
+    if kind == "instrument" and suffix in (".csv", ".txt") and not data.startswith(b"Wyko"):
+        kind = "text"  # a damaged text
     limit = MAX_TEXT_BYTES if kind == "text" else MAX_BYTES
     while len(data) <= limit and (block := file.read(BLOCK_BYTES)):
         data += block

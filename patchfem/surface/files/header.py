@@ -173,7 +173,7 @@ def has_column_names(cells: list[str]) -> bool:
 def parse_column(cell: str) -> Column:
     """Parse the heading of a column with its unit, such as `x [um]`, `height (nm)` or `x in mm`."""
     match = _COLUMN.fullmatch(cell) if len(cell) <= MAX_NAME else None
-    name = (match[1] if match else cell).strip().lower()
+    name = (match[1] if match else cell).strip(" _").lower()
     unit = (
         next((part.strip() for part in match.groups()[1:] if part is not None), None)
         if match

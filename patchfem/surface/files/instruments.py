@@ -1,4 +1,9 @@
-"""Files in formats of instruments, which the optional package SurfaceTopography reads."""
+"""Files in formats of instruments, which the optional package SurfaceTopography reads.
+
+The examples of its version 1.27.1 were compared with texts of the same scans: steps and units agree, but a
+scan of Digital Surf (.mnt) is longer by one step than its .bcrf, scans of Igor (.ibw) have no units, so the
+user states them, and the Nikon reader (.nms) states lengths in a wrong unit, which are refused as too long.
+"""
 
 import io
 

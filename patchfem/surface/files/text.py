@@ -160,8 +160,9 @@ def _is_matrix(count: int, names: list[str], facts: dict[str, Fact]) -> bool:
     """Return whether rows of `count` numbers are a matrix of heights instead of columns of points."""
     if has_column_names(names):
         return False
-    has_size = "width" in facts or "step_x" in facts
-    return count > 3 or (count == 1 and has_size) or facts.get("columns", UNKNOWN).number == count
+    has_size = {"width", "height"} <= facts.keys()
+    is_column = count == 1 and ("width" in facts or "step_x" in facts)
+    return count > 3 or has_size or is_column or facts.get("columns", UNKNOWN).number == count
 
 
 def _read_matrix(

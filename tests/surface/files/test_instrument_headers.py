@@ -159,6 +159,15 @@ def test_exact_headers_agree_with_surface_topography(tmp_path):
         ), name
 
 
+@pytest.mark.parametrize("count", [2, 3])
+def test_exact_matrix_of_few_columns(tmp_path, count):
+    """Two or three numbers in a row are a matrix if the header states width and height."""
+    rows = "".join(" ".join(map(str, row[:count])) + "\n" for row in Z.tolist())
+    header = f"# Width: {count} µm\n# Height: 6 µm\n# Value units: nm\n"
+    found = read_text(tmp_path, header + rows)
+    assert_scan_equal(found, (1e-6, 2e-6), Z[:, :count] * 1e-9)
+
+
 def test_exact_line_scan_in_column_or_row(tmp_path):
     """A line scan with one height per line, or with a single row, gives a trace."""
     heights_per_line = "# Value units: nm\n1\n2\n5\n3\n"
@@ -205,6 +214,7 @@ PAIRS = "".join(f"{a}\t{b}\n" for a, b in zip(X, H))
 COUNTED = "".join(f"{k}\t{a}\t{b}\n" for k, (a, b) in enumerate(zip(X, H), 1))
 QUOTED = "".join(f'"{a}","{b}"\n'.replace(".", ",") for a, b in zip(X, H))
 TRACES = {
+    "underscores and brackets": (f"X_(mm)\tHeight_(um)\n{PAIRS}", None),
     "x in um": (f"x in mm\tz in um\n{PAIRS}", None),
     "words and in": (f"Distance in mm\tHeight in µm\n{PAIRS}", None),
     "blanks and in": (f"x in mm z in um\n{PAIRS}".replace("\t", " "), None),
