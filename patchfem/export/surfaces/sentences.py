@@ -87,6 +87,8 @@ REASONS = {
     "holes": "missing heights prevent it",
     "band": "the surface is too short, or its step too long, for the waves of the band",
     "strips": "the patch is in strips",
+    "sections": "no interval from fewer than five sections",
+    "few_files": "no interval from so few files",
 }
 
 # SI units of the numbers of findings other than lengths; of areas between traces, and of volumes between scans
