@@ -1,6 +1,7 @@
 """Score of the comparison on pairs of traces with known wear, from eight generators.
 
     python tests/support/trace_scores.py SEED COUNT NAME=MODULE.py:FUNCTION ...
+    python tests/support/trace_scores.py SEED COUNT ratios
 
 Four generators belong to the tests: `known_pairs`, `worn_kinds`, `track_pairs` (kinds in turn), and tracks of 0.3 to 8
 standard deviations of the depth noise over the middle third. The others are functions `FUNCTION(seed, count)` of
@@ -315,6 +316,42 @@ def score_pair(pair: ScoredPair, judge: Callable = judge) -> dict:
     return row
 
 
+def score_ratios(seed: int, count: int) -> dict[str, list[int]]:
+    """Score the intervals of the ratios of waves: {quantity: [held, stated]}.
+
+    The second trace shows the same or another place of a polished surface. A true ratio is that of the whole surface,
+    which is 20 times longer than the traces.
+    """
+    from patchfem.surface.compare.compare import compare_surfaces
+    from patchfem.surface.compare.waves import compare_waves
+
+    scores = {"amplitude_ratio": [0, 0], "slope_ratio": [0, 0]}
+    for k in range(count):
+        draw = np.random.default_rng([seed, k])
+        length, step = draw.uniform(2e-3, 6e-3), 0.5e-6
+        x, new = known_pairs.draw_surface(
+            draw, 20 * length, ("self-affine", "turned", "plateau")[k % 3]
+        )
+        x, new = x[::2], new[::2]
+        old = new - draw.uniform(0, 0.6) * (new - gaussian_filter1d(new, draw.uniform(5, 60)))
+        part = slice(0, int(20 * length / step))
+        truths = compare_waves([z[None, part] for z in (new, old)], step, 0.0)
+        n = int(length / step)
+        starts = draw.integers(0, part.stop - n, 2)
+        starts[1] = starts[draw.integers(2)]
+        traces = []
+        for name, z, start in zip(("before", "after"), (new, old), starts, strict=True):
+            noise = draw.normal(0, 3e-9, n)
+            traces.append(_make_profile(x[:n], np.round(z[start : start + n] + noise, 9), name))
+        values = compare_surfaces(*traces).values
+        for name, score in scores.items():
+            bounds = values[name]
+            if bounds.value is not None:
+                score[1] += 1
+                score[0] += bounds.low <= truths[name].value <= bounds.high
+    return scores
+
+
 def draw_generators(seed: int, count: int, others: list[str]) -> Iterator[tuple[str, Iterator]]:
     """Yield the name of each generator with its pairs."""
     own = {"known": draw_known, "kinds": draw_kinds, "tracks": draw_tracks, "shallow": draw_shallow}
@@ -362,4 +399,7 @@ def score_all(seed: int, count: int, others: list[str], judge: Callable = judge)
 
 
 if __name__ == "__main__":
-    score_all(int(sys.argv[1]), int(sys.argv[2]), sys.argv[3:])
+    if sys.argv[3:] == ["ratios"]:
+        print(score_ratios(int(sys.argv[1]), int(sys.argv[2])))
+    else:
+        score_all(int(sys.argv[1]), int(sys.argv[2]), sys.argv[3:])
