@@ -393,7 +393,7 @@ def score_all(seed: int, count: int, others: list[str], judge: Callable = judge)
                 print(f"   {row['name']} | {row['code']} | {' '.join(words)}")
             for fault in faults:
                 value, low, high, *true = row[f"{fault}_interval"]
-                print(f"      {fault} {value:.6g} ({low:.6g}..{high:.6g}), true {true}")
+                print(f"      {fault} {value} ({low}..{high}), true {true}")
     print(format_scores("all", every))
     return every
 

@@ -34,7 +34,7 @@ ADVICE = {
     "no_wear": "A track over the middle third with unworn flanks is found from a mean depth of {detection_limit} on.",
     "elsewhere": "Measure the same place again, or across the whole track with unworn surface on both sides.",
     "no_datum": "Measure a longer part, so that more of the unworn surface is on both traces.",
-    "mirror_finish": "Mark the start of the traces on the part, and give the known shift of the second one.",
+    "mirror_finish": "Measure with less noise; for traces, the start may be marked on the part and its shift given.",
     "growth_at_ends": "Traces that end on unworn surface on both sides would decide.",
 }
 

@@ -30,9 +30,9 @@ from .records import (
     name_unknown,
 )
 from .section import Section, make_section, measure_hidden_area, measure_largest
-from .statistics import UNWORN_LIMIT
+from .statistics import UNWORN_LIMIT, find_mirror_finish
 from .track import cover_spans, find_spans, measure_track
-from .verdict import judge_change
+from .verdict import judge_change, limit_wear
 
 END_SAMPLES = 5  # number of samples from an end at which growth includes it
 MAX_TRACK_FRACTION = (
@@ -247,6 +247,8 @@ def _compose_unplaced(
         numbers = {}
         if aligned.reason == "no_datum":
             numbers["unworn"] = float(aligned.fit.unworn.mean())
+        if aligned.reason == "mirror_finish":
+            numbers = find_mirror_finish([trace.z for trace in traces])
         return Comparison(*traces, Finding(aligned.reason, numbers), values)
     placement = {name: name_unknown(name, "elsewhere") for name in ("shift", "scale", "tilt")}
     noise = float(section.noise[0])
@@ -293,7 +295,7 @@ def _compose(
     if placement.basis == "flanks" and code != "worn":
         code = "elsewhere"
     numbers = {"lost": area, "grown": grown, "basis": placement.basis}
-    numbers |= {"detection_limit": evidence.datum.detection_limit, "at_most": bounds[2] / length}
+    numbers |= limit_wear(bounds[2] / length, evidence.datum.detection_limit)
 
     values = _name_unknowns("no_wear") | placement.values
     low = max(grown - SIDE * grown_error, 0.0)

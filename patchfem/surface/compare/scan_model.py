@@ -18,6 +18,7 @@ from .statistics import (
     compute_threshold,
     estimate_one_sided_scale,
     find_mode,
+    remove_long_waves,
     solve_biweight_step,
 )
 
@@ -53,11 +54,6 @@ class ScanPlace(NamedTuple):
     shift_y: float
     rotation: float
     significance: float
-
-
-def remove_long_waves(z, part: float = WAVES_PER_SIDE) -> np.ndarray:
-    """Subtract the Gaussian mean surface from heights (m, n) without gaps."""
-    return z - ndimage.gaussian_filter(z, np.array(z.shape) / part)
 
 
 def find_scan_place(before: Areal, after: Areal) -> ScanPlace:
@@ -168,7 +164,8 @@ class ScanModel:
     def compute_depth(self, state) -> np.ndarray:
         """Return the depth (n,) [m] of the known points."""
         pixels = self._map_pixels(state)[:, self.known]
-        second = ndimage.map_coordinates(self.spline, pixels, prefilter=False, mode="nearest")
+        # The coefficients of a spline are those of a mirrored border.
+        second = ndimage.map_coordinates(self.spline, pixels, prefilter=False, mode="mirror")
         return self.z[self.known] + state[3:] @ self.plane[:, self.known] - second
 
     def compute_jacobian(self, state) -> np.ndarray:
@@ -191,7 +188,7 @@ class ScanModel:
         """Return the points (n,) bool whose mean depth over a square noise does not explain."""
         relative = np.full(self.shape, np.nan)
         relative[self.known] = depth / noise
-        return find_changed_points(relative, self.known)[self.known]
+        return find_changed_points(relative, self.known).points[self.known]
 
     def refine_place(self, state) -> np.ndarray:
         """Improve shift and rotation by biweight steps on the short waves, smoothed less and less."""
@@ -211,7 +208,8 @@ class ScanModel:
     def _remove_waves(self, values, width: float) -> np.ndarray:
         image = np.full(self.shape, np.nan)
         image[self.known] = values
-        return remove_long_waves(ndimage.gaussian_filter(fill_nearest(image), width))[self.known]
+        smooth = ndimage.gaussian_filter(fill_nearest(image), width)
+        return remove_long_waves(smooth, WAVES_PER_SIDE)[self.known]
 
     @cached_property
     def tiles(self) -> list[tuple[slice, slice]]:
@@ -254,8 +252,15 @@ class ScanModel:
         return state
 
 
-def find_changed_points(relative, known) -> np.ndarray:
-    """Return the points (m, n) bool whose mean relative depth over squares exceeds their scatter.
+class ChangedPoints(NamedTuple):
+    """Changed points (m, n) bool, and the mean depth, in standard deviations, from which on a large square is found."""
+
+    points: np.ndarray
+    limit: float
+
+
+def find_changed_points(relative, known) -> ChangedPoints:
+    """Find the points whose mean relative depth over squares exceeds their scatter.
 
     Parameters
     ----------
@@ -277,8 +282,10 @@ def find_changed_points(relative, known) -> np.ndarray:
         )
         scatter = max(estimate_one_sided_scale(mean[use & (weight > 0.5)]), 1 / side)
         high = (mean > limit * scatter) & (weight > 0.25)
+        lowest = limit * scatter
         if side == 1:
             changed |= ndimage.binary_opening(high, np.ones((3, 3)))
         else:
             changed |= ndimage.binary_dilation(high, np.ones((side, side)))
-    return ndimage.binary_opening(changed, np.ones((4, 4))) & known
+    points = ndimage.binary_opening(changed, np.ones((4, 4))) & known
+    return ChangedPoints(points, float(lowest))
