@@ -167,7 +167,7 @@ def test_refuses_to_resume_from_other_or_damaged_state(tmp_path, save_counter):
     answer = run_cli(*command, "--set", "friction.static=0.31")
     assert (
         answer.code == 2
-        and "out: this folder contains no interrupted run but a complete run of" in answer.err
+        and "out: this folder has no interrupted run but the complete run of" in answer.err
     )
     scene.write_text(BENCH, "utf-8")
     answer = run_cli(*command)

@@ -43,7 +43,7 @@ def write_advice(joint: JointMode, band: Band | None, curves: dict, missing: dic
         *_describe_slip(joint, curve),
         _describe_band_width(band, curve),
         *_describe_agreement(band, curves),
-        *_describe_ring_down(joint, band, curves, "decay" in missing),
+        *_describe_ring_down(joint, band, curves, has_failed="decay" in missing),
         *_describe_static_curve(band, curves),
         *_describe_coupling(joint, band, curve),
     ]
@@ -118,7 +118,7 @@ def _describe_agreement(band: Band, curves: dict) -> list:
     return [f"Up to {edge} the computed methods and the predicted ring-down agree {within}."]
 
 
-def _describe_ring_down(joint: JointMode, band: Band, curves: dict, has_failed: bool) -> list:
+def _describe_ring_down(joint: JointMode, band: Band, curves: dict, *, has_failed: bool) -> list:
     """Describe how the damping of a ring-down differs from that of the curve, and why.
 
     has_failed: whether method decay was tried and has no curve.
