@@ -10,6 +10,7 @@ from ..profile import Profile, remove_spikes
 from . import changes
 from .fit import Fit, fit_unworn
 from .statistics import (
+    MAX_GAINS,
     UNWORN_LIMIT,
     WAVES_PER_TRACE,
     estimate_gain,
@@ -41,6 +42,9 @@ MAX_STRETCH = 0.015  # largest error of length of a place
 N_OTHER_PLACES = 15  # number of other places that show how many heights agree by chance
 MIN_NOISE = 1e-15  # smallest standard deviation of a depth [m]; flat traces have none
 EVEN_DEVIATION = 1 / np.sqrt(12)  # standard deviation of a uniform error of one digit
+MAX_MORE_CHANGED = (
+    1.1  # changed heights with a gain relative to those without it; less noise shows more
+)
 MAX_GAIN_ERROR = 0.01  # standard deviation of the gain of two calibrated measurements
 
 
@@ -121,12 +125,10 @@ def align_traces(
     digit = EVEN_DEVIATION * float(np.hypot(_find_digit(first.z), _find_digit(second.z)))
     digit = max(digit, MIN_NOISE)
     fit = _fit_datum(model, state, digit, is_straight=is_straight)
-    gain, gain_error = _measure_gain(model, fit)
-    if is_other_gain(gain, gain_error):
-        scaled = _fit_scaled(model, fit, gain, digit, is_straight=is_straight)
-        if scaled is not None:
-            error = min(gain_error, MAX_GAIN_ERROR)
-            return Aligned(model, scaled, "", place.is_mirrored, gain, error)
+    gain, calibrated, gain_error = _calibrate(model, fit, digit, is_straight=is_straight)
+    if gain != 1.0:
+        error = min(gain_error, MAX_GAIN_ERROR)
+        return Aligned(model, calibrated, "", place.is_mirrored, gain, error)
     is_speck = changes.find_specks(
         model.x, model.second + fit.depth, model.second, fit.worn, fit.grown
     )
@@ -139,7 +141,7 @@ def align_traces(
         reason = "mirror_finish" if find_mirror_finish((first.z, second.z)) else "elsewhere"
         return Aligned(model, fit, reason, place.is_mirrored)
     reason = "" if agreeing > MIN_AGREEING else "no_datum"
-    error = min(float(np.hypot(gain_error, gain - 1)), MAX_GAIN_ERROR)
+    error = min(gain_error, MAX_GAIN_ERROR)
     return Aligned(model, fit, reason, place.is_mirrored, gain_error=error)
 
 
@@ -208,22 +210,31 @@ def _measure_gain(model: TraceModel, fit: Fit) -> tuple[float, float]:
     return estimate_gain(first[use], second[use], noise)
 
 
-def _fit_scaled(
-    model: TraceModel, fit: Fit, gain: float, digit: float, *, is_straight: bool
-) -> Fit | None:
-    """Divide the second trace by its gain; return the fit if it explains the depths better, else None."""
-    second = model.second
-    mean = second.mean()
-    model.second = mean + (second - mean) / gain
-    scaled = _fit_datum(
-        model, np.append(fit.state[:2], [0.0, 0.0, 0.0]), digit, is_straight=is_straight
-    )
-    is_quieter = np.median(scaled.noise) < np.median(fit.noise)
-    changed, before = ((each.worn | each.grown).sum() for each in (scaled, fit))
-    if is_quieter and changed <= before:
-        return scaled
-    model.second = second
-    return None
+def _calibrate(
+    model: TraceModel, fit: Fit, digit: float, *, is_straight: bool
+) -> tuple[float, Fit, float]:
+    """Divide the second trace by its gain, if that explains the depths better; return gain, fit and error of the gain.
+
+    Heights that agree show only a part of a large gain, so gains are measured in turn until none is left.
+    """
+    uncalibrated = model.second, fit
+    total = 1.0
+    for _ in range(MAX_GAINS):
+        gain, error = _measure_gain(model, fit)
+        if not is_other_gain(gain, error):
+            return total, fit, float(np.hypot(error, gain - 1))
+        total *= gain
+        mean = model.second.mean()
+        model.second = mean + (model.second - mean) / gain
+        state = np.append(fit.state[:2], [0.0, 0.0, 0.0])
+        scaled = _fit_datum(model, state, digit, is_straight=is_straight)
+        is_quieter = np.median(scaled.noise) < np.median(fit.noise)
+        changed, before = ((each.worn | each.grown).sum() for each in (scaled, fit))
+        fit = scaled
+        if not is_quieter or changed > MAX_MORE_CHANGED * before:
+            break
+    model.second, fit = uncalibrated
+    return 1.0, fit, float(np.hypot(error, gain - 1))
 
 
 def _find_digit(z) -> float:

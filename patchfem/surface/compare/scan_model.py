@@ -34,6 +34,7 @@ N_TILES = 8  # number of tiles along each side, whose modes span the planes
 MAX_PLANES = 3000  # number of planes through three tiles that are compared
 MIN_TILE_POINTS = 20  # smallest number of known heights in a tile
 SQUARES = (1, 3, 9, 25)  # sides of the squares whose mean depth is tested
+UNCHANGED_FRACTION = 0.25  # fraction of the squares above or below zero that are unchanged at least
 MAX_PULL = 8.0  # standard deviations to which a single depth counts in a mean
 REFINE_WIDTHS = (
     4,
@@ -280,7 +281,8 @@ def find_changed_points(relative, known) -> ChangedPoints:
         mean = ndimage.uniform_filter(np.where(use, remainder, 0.0), side) / np.maximum(
             weight, 0.25
         )
-        scatter = max(estimate_one_sided_scale(mean[use & (weight > 0.5)]), 1 / side)
+        scatter = estimate_one_sided_scale(mean[use & (weight > 0.5)], UNCHANGED_FRACTION)
+        scatter = max(scatter, 1 / side)
         high = (mean > limit * scatter) & (weight > 0.25)
         lowest = limit * scatter
         if side == 1:

@@ -31,6 +31,7 @@ from .scan_model import (
 )
 from .section import make_section
 from .statistics import (
+    MAX_GAINS,
     UNWORN_LIMIT,
     estimate_correlation,
     estimate_gain,
@@ -55,9 +56,6 @@ MIN_TILE_FRACTION = 0.3  # fraction of unworn points in a tile whose mean shows 
 MIN_TILES = 6  # smallest number of such tiles
 MIN_ELONGATION = 2.0  # length of a worn place relative to its width, from which on it is a track
 MIN_GROWN_BORDER = 0.5  # fraction of a line near a border that grew, from which on the border grew
-MAX_GAINS = (
-    4  # number of gains that are tried, because unworn heights show only a part of a large one
-)
 MIN_SECTIONS = 8  # smallest number of sections across a track
 MODEL_ERROR = 0.01  # relative standard deviation of a volume: gain of two calibrated instruments
 VARIANTS = (("", False), ("x", False), ("", True), ("x", True))  # mirrored along, heights inverted

@@ -177,9 +177,10 @@ def _find_change_point(x, relative, worn: int, section: Section) -> End:
     # The level of the unworn heights is uncertain, so the change point is sought for three levels.
     level = SIDE * float(section.draws.mean(axis=1).std() / np.median(section.noise))
     stride = max(part.size // MAX_CANDIDATES, 1)
-    places = part[2:-1:stride]
+    # A flank begins between two samples.
+    places = part[2:-1:stride] - step / 2
     levels = np.array([depths, depths + level, depths - level])
-    deviance = _fit_flanks(part, levels, places - step / 2, section.correlation)
+    deviance = _fit_flanks(part, levels, places, section.correlation)
     lowest = deviance.min(axis=2, keepdims=True)
     is_likely = deviance < lowest + SIDE**2
     is_likely &= lowest < lowest.min(axis=1, keepdims=True) + CLEAR_DEVIANCE
