@@ -200,6 +200,10 @@ def draw_made(make: Callable, seed: int, count: int) -> Iterator[ScoredPair]:
         pair = make(seed + k)
         truth = pair["truth"]
         area = truth["removed_area"]
+        # What traces show of the loss, with the radius of the tip, is a right answer too.
+        means = [area / truth["common_length"]]
+        if truth.get("depth_mean_traced") is not None and not truth["built_up_area"]:
+            means.append(truth["depth_mean_traced"])
         is_single = truth["ends"] is not None and len(truth["tracks"]) == 1
         # A loss below the noise of a single point cannot be decided.
         is_hidden = truth["worn"] and area < 1.5 * truth["noise"] * max(truth["width"], 1e-12)
@@ -211,8 +215,8 @@ def draw_made(make: Callable, seed: int, count: int) -> Iterator[ScoredPair]:
             has_grown=truth["built_up_area"] > 0,
             noise=np.sqrt(2) * truth["noise"],
             truths={
-                "mean": (area / truth["common_length"],),
-                "area": (area,),
+                "mean": tuple(means),
+                "area": tuple(mean * truth["common_length"] for mean in means),
                 "largest": (truth["largest_depth"],),
             },
             ends=tuple((end, end) for end in truth["ends"]) if is_single else None,

@@ -30,6 +30,10 @@ WAVES_PER_SIDE = (
     20  # side of a scan relative to the deviation of the Gaussian that removes long waves
 )
 MIN_OVERLAP = 0.3  # smallest common region relative to the smaller scan
+BORDER_POINTS = (
+    3  # distance from the border of a scan, in points, from which on its spline is accurate
+)
+KINK_POINTS = 5  # side of the square over which an error of interpolation at a kink spreads
 N_TILES = 8  # number of tiles along each side, whose modes span the planes
 MAX_PLANES = 3000  # number of planes through three tiles that are compared
 MIN_TILE_POINTS = 20  # smallest number of known heights in a tile
@@ -143,10 +147,13 @@ class ScanModel:
         self.keep_common(state, np.isfinite(after.z))
 
     def keep_common(self, state, is_measured) -> None:
-        """Keep the points that both scans show at a state."""
+        """Keep the points that both scans show at a state; `common` has those at the border of the second one too."""
         pixels = self._map_pixels(state)
         weights = ndimage.map_coordinates(is_measured.astype(float), pixels, order=1, cval=0.0)
-        self.known = np.isfinite(self.z) & (weights > 0.99)
+        self.common = np.isfinite(self.z) & (weights > 0.99)
+        # The spline has larger errors of interpolation at its border.
+        last = np.array(is_measured.shape)[:, None, None] - 1 - BORDER_POINTS
+        self.known = self.common & ((pixels >= BORDER_POINTS) & (pixels <= last)).all(axis=0)
 
     def _map_pixels(self, state) -> np.ndarray:
         """Return the rows and columns (2, m, n) of the points in the second scan."""
@@ -182,8 +189,9 @@ class ScanModel:
         return np.column_stack((-gx, -gy, -turn, *self.plane[:, self.known]))
 
     def compute_noise_terms(self, jacobian) -> np.ndarray:
-        """Return terms (n, 2) of the variance: of the instrument, and of positions on slopes."""
-        return np.column_stack((np.ones(len(jacobian)), jacobian[:, 0] ** 2 + jacobian[:, 1] ** 2))
+        """Return terms (n, 3) of the variance: of the instrument, of positions on slopes, at kinks."""
+        slopes = jacobian[:, 0] ** 2 + jacobian[:, 1] ** 2
+        return np.column_stack((np.ones(len(jacobian)), slopes, self.kinks[self.known] ** 2))
 
     def find_changed(self, depth, noise) -> np.ndarray:
         """Return the points (n,) bool whose mean depth over a square noise does not explain."""
@@ -211,6 +219,12 @@ class ScanModel:
         image[self.known] = values
         smooth = ndimage.gaussian_filter(fill_nearest(image), width)
         return remove_long_waves(smooth, WAVES_PER_SIDE)[self.known]
+
+    @cached_property
+    def kinks(self) -> np.ndarray:
+        """Largest second difference (m, n) [m] of the first scan near each point."""
+        bend = np.abs(ndimage.laplace(fill_nearest(self.z)))
+        return ndimage.maximum_filter(bend, KINK_POINTS)
 
     @cached_property
     def tiles(self) -> list[tuple[slice, slice]]:
@@ -271,16 +285,16 @@ def find_changed_points(relative, known) -> ChangedPoints:
         Points whose depth is known.
     """
     limit = compute_threshold(len(SQUARES) * relative.size)
-    remainder = np.where(known, np.clip(relative, -MAX_PULL, MAX_PULL), 0.0)
+    single = np.where(known, relative, 0.0)
+    remainder = np.clip(single, -MAX_PULL, MAX_PULL)
     changed = np.zeros(relative.shape, bool)
     for side in SQUARES:
         if side > min(relative.shape) / 4:
             break
         use = known & ~changed
         weight = ndimage.uniform_filter(use.astype(float), side)
-        mean = ndimage.uniform_filter(np.where(use, remainder, 0.0), side) / np.maximum(
-            weight, 0.25
-        )
+        values = single if side == 1 else remainder
+        mean = ndimage.uniform_filter(np.where(use, values, 0.0), side) / np.maximum(weight, 0.25)
         scatter = estimate_one_sided_scale(mean[use & (weight > 0.5)], UNCHANGED_FRACTION)
         scatter = max(scatter, 1 / side)
         high = (mean > limit * scatter) & (weight > 0.25)

@@ -178,9 +178,8 @@ def _measure(
     """Measure volumes and the track of aligned scans, and find the verdict."""
     maps = _draw_maps(scans[0], model, fit)
     cell = float(np.diff(model.x).mean() * np.diff(model.y).mean())
-    inside = (
-        ndimage.binary_closing(np.pad(model.known, 8), np.ones((9, 9)))[8:-8, 8:-8] | model.known
-    )
+    closed = ndimage.binary_closing(np.pad(model.common, 8), np.ones((9, 9)))[8:-8, 8:-8]
+    inside = closed | model.common
     volumes = []
     for part, sign in ((maps.worn, 1.0), (maps.grown, -1.0)):
         near = ndimage.binary_dilation(part, np.ones((MARGIN, MARGIN))) & inside

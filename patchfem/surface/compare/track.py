@@ -36,6 +36,7 @@ MIN_FLANK_SAMPLES = 12  # smallest number of samples of a flank, and of the surf
 MAX_FLANK_SAMPLES = 400  # largest number of samples in which a flank reaches FLANK_HEIGHT
 SHALLOW_SAMPLES = 60  # number of samples of a flank that stays below FLANK_HEIGHT
 MAX_CANDIDATES = 80  # number of places that are tried as an end
+END_STEPS = 2  # number of samples beyond the likely places that belong to the interval of an end
 MAX_SQUARE = 16.0  # squared residual of a single depth beyond which it counts no more
 N_FIFTHS = 5  # number of parts of a track, of which the deepest is the floor
 
@@ -186,7 +187,7 @@ def _find_change_point(x, relative, worn: int, section: Section) -> End:
     is_likely &= lowest < lowest.min(axis=1, keepdims=True) + CLEAR_DEVIANCE
     ends = np.flatnonzero(is_likely.any(axis=(0, 1)))
     best = int(np.argmin(deviance[0].min(axis=0)))
-    margin = stride * step
+    margin = END_STEPS * stride * step
     return End(
         float(places[best]), float(places[ends[0]] - margin), float(places[ends[-1]] + margin)
     )
@@ -214,8 +215,9 @@ def measure_track(section: Section, span: tuple[int, int]) -> Track:
     start, end = find_ends(section, span)
     x = section.x
     width = max(end.value - start.value, float(np.median(section.widths)))
-    shorter = np.hypot(start.high - start.value, end.value - end.low)
-    longer = np.hypot(start.value - start.low, end.high - end.value)
+    # An error of the level of the datum moves both ends outwards, or both inwards.
+    shorter = start.high - start.value + end.value - end.low
+    longer = start.value - start.low + end.high - end.value
     widths = name_quantity("width", width, max(width - shorter, 0.0), width + longer)
 
     # The ends are uncertain by the area between the bounds of their intervals.
