@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy import ndimage, signal
+from scipy import signal
 
 from ..quantity import SIDE, Quantity
 from .fit import Fit
@@ -190,12 +190,3 @@ def measure_largest(section: Section, name: str) -> Quantity:
     raw = depth[max(top - 2, 0) : top + 3].max()
     low = value - bias - SIDE * sigma
     return name_quantity(name, value, max(low, 0.0), max(raw, value) + SIDE * sigma)
-
-
-def close_gaps(mask, count: int) -> np.ndarray:
-    """Join runs of true values that are at most `count` samples apart."""
-    if count < 1:
-        return mask
-    padded = np.pad(mask, count + 1)
-    closed = ndimage.binary_closing(padded, np.ones(count + 1))
-    return closed[count + 1 : -count - 1]

@@ -103,8 +103,9 @@ def cover_spans(section: Section, spans: list[tuple[int, int]]) -> np.ndarray:
 
 def find_ends(section: Section, span: tuple[int, int]) -> tuple[End, End]:
     """Find where a track begins and ends."""
-    # Pile-up beside a track is no flank.
-    relative = np.where(section.grown, 0.0, section.depth / section.noise)
+    # Pile-up beside a track is no flank; the windows that found the worn samples may reach into it.
+    relative = section.depth / section.noise
+    relative = np.where(section.grown | (relative < -UNWORN_LIMIT), 0.0, relative)
     first, last = span
     middle = (first + last) // 2 + 1
     start = _find_change_point(section.x[:middle], relative[:middle], first, section)

@@ -219,6 +219,8 @@ def test_exact_pile_up_is_measured_beside_the_track():
     ridges = make_parabola(0.5 * UM, 1400, 1600) + make_parabola(0.5 * UM, 2400, 2600)
     track = compare_surfaces(*make_pair(worn - ridges)).track.values
     assert track["pile_up"].value == pytest.approx(ridges.sum() * UM, rel=0.15)
+    for name, place in (("from", 1600 * UM), ("to", 2400 * UM)):
+        assert track[name].low <= place <= track[name].high
     net = track["area_gross"].value - track["pile_up"].value
     assert track["area_net"].value == pytest.approx(net, rel=1e-9)
 
