@@ -17,6 +17,7 @@ from . import surface_definitions
 from .answer import Definition, Quantity
 
 MAX_TILES = 10  # largest number of key quantities on a page and on the screen
+MEASURED_DIGITS = 4  # of quantities of measured surfaces without an error; traces have no more
 # words at the end of a name that mark a fraction (in percent) or a phase (in degrees)
 PERCENT_WORDS = ("fraction", "share")
 # display units of areas of sections and of wear coefficients
@@ -237,8 +238,11 @@ def format_quantity(name: str, quantity: Quantity) -> str:
     error = quantity.error
     ends = [abs(end) for end in (quantity.low, quantity.high) if end is not None]
     unit, scale = choose_scale(name, quantity.unit, max([abs(value), *ends]))
-    if error is None and not ends and name in QUANTITIES:
-        return f"{format_number(value * scale, QUANTITIES[name].digits)} {unit}".strip()
+    digits = QUANTITIES[name].digits if name in QUANTITIES else None
+    if digits is None and surface_definitions.find(name) is not None:
+        digits = MEASURED_DIGITS
+    if error is None and not ends and digits is not None:
+        return f"{format_number(value * scale, digits)} {unit}".strip()
     if error is not None or not ends:
         texts = round_to_error(
             value * scale,
