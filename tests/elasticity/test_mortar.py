@@ -15,10 +15,10 @@ from pieces import HEIGHT, LENGTH, TITANIUM, make_bare_layers, make_refined_grid
 from patchfem.contact import press
 from patchfem.contact.gaps import crown
 from patchfem.core import Compliance, Interface, PatchfemError
-from patchfem.elasticity import PieceInterface, elasticity, mortar, recovery, substructure
+from patchfem.elasticity import PieceInterface, elasticity, mortar, recovery
 from patchfem.elasticity.mortar import clip_nodes, transfer_matrix
 from patchfem.mesh import TensorGrid, tributary_lengths
-from patchfem.mesh.tensor import graded_rows
+from patchfem.mesh.grid import graded_rows
 
 HALF_WIDTH = 0.1e-3  # half-width of the Hertz contact [m]
 LOAD = 9107.0  # per metre of width [N/m]
@@ -102,7 +102,7 @@ def distorted_pair(poisson=0.0, stiff=100.0):
     """Return two distorted blocks of 12 and 9 columns, the upper one `stiff` times as stiff, and their compliances."""
     rng = np.random.default_rng(4)
     pair = [
-        substructure.Substructure(
+        elasticity.Piece(
             distorted_mesh(rng.uniform(0.5, 1.0, count), count), make_bare_layers((young, poisson))
         )
         for count, young in ((12, YOUNG), (9, stiff * YOUNG))

@@ -15,7 +15,7 @@ from patchfem.closed_forms.contact import rounded_punch_pressure
 from patchfem.core import PatchfemError, frozen_array
 from patchfem.elasticity import compute_coating_traction, compute_displacement, get_cells
 from patchfem.mesh import TensorGrid, write_mesh
-from patchfem.mesh.tensor import graded_rows
+from patchfem.mesh.grid import graded_rows
 from patchfem.model import extend_grid, find_file_faults, find_rounded_edges, make_piece_meshes
 from patchfem.runs import solve_with_coarser
 from patchfem.runs.patch.press import solve

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ...elasticity import coating_traction
-from ...elasticity.elasticity import Piece, compute_displacement, von_mises
+from ...elasticity.elasticity import compute_displacement, von_mises
 from ...elasticity.recovery import (
     Cells,
     Recovery,
@@ -20,6 +20,7 @@ from ...elasticity.recovery import (
     get_cells,
     make_points,
 )
+from ...mesh.grid import TensorGrid
 from ...runs.results.result import patch_surface
 from .blocks import build_blocks
 from .strength import find_yielding
@@ -94,7 +95,10 @@ def write_fields(result, path: Path) -> dict:
         UNITS,
         steps,
     )
-    if not isinstance(patch.pair.piece, Piece):
+    if not all(
+        isinstance(g, TensorGrid) and g.is_rectangle
+        for g in (patch.pair.grid, patch.pair.upper_grid)
+    ):
         return {}
     shape = (patch.x.size - 1, -1)
     n_worn_states = result.extra.get("wear_shown", {"states": 0})["states"]
@@ -170,12 +174,8 @@ class _PieceFields:
 def _mesh_and_stress(piece, grid) -> _PieceFields:
     """Return the mesh, the stress and the stress recovery of a piece."""
     cells = get_cells(piece)
-    if isinstance(piece, Piece):
-        interface = np.arange(0, len(cells.points), grid.depth.size)
-    else:
-        interface = grid.interface
     return _PieceFields(
-        interface,
+        grid.interface,
         partial(centre_stress, cells),
         cells,
         make_points(cells, "gauss"),

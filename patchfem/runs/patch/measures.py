@@ -15,6 +15,7 @@ import numpy as np
 from ...contact import edges
 from ...core import Measure, PatchfemError, compute_allowed_error
 from ...formatting import format_length
+from ...mesh.grid import TensorGrid
 from ...response import errors
 from ...scene.keys.contact import compute_outermost_strip_distance
 from ..results import patch_rows
@@ -365,10 +366,8 @@ def _reason_for_unbounded_pressure(patch: Patch) -> str:
 def are_cells_halved(fine, coarse) -> bool:
     """Return whether the finer of two Pairs halves every cell of the coarser one."""
     bodies = ((fine.grid, coarse.grid), (fine.upper_grid, coarse.upper_grid))
-    for fine_body, coarse_body in bodies:
-        halved = fine_body.base_grid
-        grid = coarse_body.base_grid
-        if halved is None or grid is None:
+    for halved, grid in bodies:
+        if not (isinstance(halved, TensorGrid) and isinstance(grid, TensorGrid)):
             return False
         if halved.x.size != 2 * grid.x.size - 1 or halved.depth.size != 2 * grid.depth.size - 1:
             return False

@@ -187,7 +187,7 @@ class Patch:
         return self.pressure.sigma_n > 0
 
 
-def solve(patch_model, grid, upper_grid=None, ignore_cache: bool = False) -> Patch:
+def solve(patch_model, grid, upper_grid=None) -> Patch:
     """Assemble and condense the pieces of a `PatchModel`, and solve its contact problem.
 
     Parameters
@@ -195,8 +195,6 @@ def solve(patch_model, grid, upper_grid=None, ignore_cache: bool = False) -> Pat
     patch_model : PatchModel
     grid, upper_grid : TensorGrid or PieceMesh
         Meshes from `make_piece_meshes`; the upper one is None if the pieces are identical.
-    ignore_cache : bool
-        Whether to ignore compliance matrices cached on disk.
 
     Returns
     -------
@@ -207,7 +205,7 @@ def solve(patch_model, grid, upper_grid=None, ignore_cache: bool = False) -> Pat
     PatchfemError
         See `solve_patch_contact` and the contact solver.
     """
-    return solve_patch_contact(patch_model, condense(patch_model, grid, upper_grid, ignore_cache))
+    return solve_patch_contact(patch_model, condense(patch_model, grid, upper_grid))
 
 
 def solve_patch_contact(patch_model, pair: CondensedPair, worn=None) -> Patch:

@@ -25,7 +25,7 @@ from ...core import NotConverged
 from ...elasticity.elasticity import Piece
 from ...elasticity.lapack import use_one_blas_thread
 from ...mesh.grading import Layout, divide_into_columns, divide_into_rows
-from ...mesh.tensor import TensorGrid
+from ...mesh.grid import TensorGrid
 from ...model import profile
 from ...model.pieces import make_elastic_layers
 from .edge_values import EdgeValues

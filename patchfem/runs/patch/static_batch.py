@@ -18,7 +18,7 @@ from ...contact.batch.intervals import ContactBatch, Intervals
 from ...contact.unilateral import RESIDUAL_TOL
 from ...core import ContactState, Outcome, frozen_array
 from ...elasticity.lapack import use_one_blas_thread
-from ...mesh.tensor import TensorGrid
+from ...mesh.grid import TensorGrid
 from .condensed import CondensedPair, condense_on_shared_level, condense_on_shared_meshes
 from .edge_values import EdgeValues
 from .measures import (
@@ -148,7 +148,7 @@ def reason_not_batched(patch_model) -> str:
     if patch_model.mesh.shared is None:
         return "the case has a mesh of its own"
     bodies = chain.from_iterable(patch_model.mesh.shared.levels)
-    if not all(isinstance(body, TensorGrid | None) for body in bodies):
+    if not all(body is None or _is_rectangle(body) for body in bodies):
         return "the meshes of the pieces are not plain grids"
     if patch_model.gap.profile is not None:
         return "a profile has its own averaging length"
@@ -243,7 +243,12 @@ def solve_patches_on_pair(patch_models, pair: CondensedPair) -> list:
 
 def _has_plain_grids(pair: CondensedPair) -> bool:
     """Return whether the meshes of both pieces are tensor grids."""
-    return isinstance(pair.grid, TensorGrid) and isinstance(pair.upper_grid, TensorGrid)
+    return _is_rectangle(pair.grid) and _is_rectangle(pair.upper_grid)
+
+
+def _is_rectangle(mesh) -> bool:
+    """Return whether a mesh is a grid of a rectangle as long as the interface."""
+    return isinstance(mesh, TensorGrid) and mesh.is_rectangle
 
 
 def _group_batches(patch_models) -> list:

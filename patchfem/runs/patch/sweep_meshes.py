@@ -14,7 +14,6 @@ import numpy as np
 
 from ...core import PatchfemError
 from ...mesh.grading import Layout
-from ...mesh.tensor import TensorGrid
 from ...model.patch import SharedMeshes
 from . import grids, mesh_levels
 from .condensed import cache_condensed_pairs, condense
@@ -132,16 +131,12 @@ def name_shared_meshes(levels) -> SharedMeshes:
     """Return SharedMeshes whose name is the hash of their contents."""
     digest = sha256()
     for body in chain.from_iterable(levels):
-        if body is None:
-            arrays = ()
-        elif isinstance(body, TensorGrid):
-            arrays = (body.x, body.depth)
-        else:
-            mesh = (body.points, body.triangles, body.quads, body.is_coating)
-            arrays = (*mesh, body.interface, body.far)
+        arrays = ()
+        if body is not None:
+            nodes = (body.interface, body.far, *body.blocks.values())
+            arrays = (body.points, body.is_coating, *nodes)
         for array in arrays:
             digest.update(repr(array.shape).encode() + np.ascontiguousarray(array).tobytes())
-        digest.update(repr(getattr(body, "coating_rows", None)).encode())
     return SharedMeshes(tuple(levels), digest.hexdigest()[:32])
 
 

@@ -10,6 +10,7 @@ from ...closed_forms import contact
 from ...contact import edges, stiffness
 from ...core import Outcome
 from ...elasticity.lapack import use_one_blas_thread
+from ...mesh.grid import TensorGrid
 from . import strips
 from .edge_values import EdgeValues
 from .press import Patch
@@ -319,7 +320,7 @@ def _rounded_bodies(pair) -> list:
     """Return the meshes of the pieces whose interface ends are rounded."""
     bodies = []
     for body in (pair.grid, pair.upper_grid):
-        end = getattr(body, "end", None)
-        if end is not None and end.kind == "radius" and body.interface_depths[-1] > 0:
+        is_rounded = isinstance(body, TensorGrid) and body.end.kind == "radius"
+        if is_rounded and body.interface_depths[-1] > 0:
             bodies.append(body)
     return bodies
