@@ -219,12 +219,12 @@ class Piece:
 
 
 def spread_matrix(mesh) -> np.ndarray:
-    """Return the matrix T (m, m) that converts forces f at interface nodes into nodal forces T^T f of the elements.
+    """Return the matrix T that converts forces f at m pressure nodes into forces T^T f on the n interface nodes.
 
-    The pressure is linear between the interface nodes, and f_i is its value at a node times the tributary length of
-    the node. On elements of first order T = 1, because the lumped forces do not ripple. On elements of second order,
-    T_ij = int phi_i N_j / tributary length with the hat functions phi and the shape functions N, so a pressure that is
-    linear along the interface gives its consistent nodal forces.
+    f_i is the pressure at a node times the tributary length of the node. On elements of first order T = 1. On elements
+    of second order T_ij = int psi_i N_j / tributary length with the shape functions N and the dual functions psi of the
+    hat functions between corners (`mortar`), for which T = 1 on elements of first order, too. A pressure for each node,
+    or one that is linear between corners, would ripple beside free ends.
 
     Parameters
     ----------
@@ -232,18 +232,16 @@ def spread_matrix(mesh) -> np.ndarray:
 
     Returns
     -------
-    (m, m) ndarray [1]
+    (m, n) ndarray [1]
     """
     m = mesh.x.size
-    out = np.eye(m)
-    if not getattr(mesh, "is_quadratic", False):
-        return out
-    # int phi_i N_j over an edge of length 1 with its nodes at 0, 1/2 and 1
-    integrals = np.array([[7, 6, -1], [2, 20, 2], [-1, 6, 7]]) / 48
-    out[:] = 0.0
-    for first in range(0, m - 2, 2):
-        nodes = slice(first, first + 3)
-        out[nodes, nodes] += integrals * (mesh.x[first + 2] - mesh.x[first])
+    if mesh.interface.size == m:
+        return np.eye(m)
+    out = np.zeros((m, mesh.interface.size))
+    # int psi_i N_j over an edge of length 1 with its nodes at 0, 1/2 and 1
+    integrals = np.array([[1 / 3, 1 / 3, -1 / 6], [-1 / 6, 1 / 3, 1 / 3]])
+    for edge, length in enumerate(np.diff(mesh.x)):
+        out[edge : edge + 2, 2 * edge : 2 * edge + 3] += integrals * length
     return out / mesh.tributary_lengths()[:, None]
 
 
@@ -316,7 +314,7 @@ def interface_compliance(piece: Piece) -> InterfaceCompliance:
     along = slice(0, None, 2)
     inward = slice(1, None, 2)
     blocks = (both[inward, inward], both[along, along], both[inward, along])
-    if getattr(piece.mesh, "is_quadratic", False):
-        spread = spread_matrix(piece.mesh)
+    spread = spread_matrix(piece.mesh)
+    if spread.shape[0] < spread.shape[1]:
         blocks = [spread @ block @ spread.T for block in blocks]
     return InterfaceCompliance(*(frozen_array(block) for block in blocks))

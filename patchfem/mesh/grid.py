@@ -97,6 +97,11 @@ class TensorGrid:
         return (np.arange(self.x.size) + self.outer.size - 1) * self.depth.size
 
     @property
+    def pressure_nodes(self) -> np.ndarray:
+        """Nodes (m,) between which the pressure is linear: those of the interface."""
+        return self.interface
+
+    @property
     def far(self) -> np.ndarray:
         """Fixed nodes (nx,) of the far face."""
         return np.arange(1, self.columns.size + 1) * self.depth.size - 1

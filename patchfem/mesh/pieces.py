@@ -46,7 +46,7 @@ class PieceMesh:
     - ``points``: (N, 2) x and depth >= 0 [m]
     - ``blocks``: cells (t, k) by the name of their element (`elements.ELEMENTS`), counterclockwise in (x, depth)
     - ``is_coating``: (t,) bool, in the order of the blocks
-    - ``interface``: (m,) nodes by increasing x
+    - ``interface``: (n,) nodes by increasing x
     - ``far``: (f,) fixed nodes
     """
 
@@ -57,14 +57,19 @@ class PieceMesh:
     far: np.ndarray
 
     @property
+    def pressure_nodes(self) -> np.ndarray:
+        """Nodes (m,) between which the pressure is linear: those of the interface that are corners of cells."""
+        return self.interface[:: 1 + self.is_quadratic]
+
+    @property
     def x(self) -> np.ndarray:
-        """Coordinates of the interface nodes (m,) [m], in ascending order."""
-        return self.points[self.interface, 0]
+        """Coordinates of the pressure nodes (m,) [m], in ascending order."""
+        return self.points[self.pressure_nodes, 0]
 
     @property
     def interface_depths(self) -> np.ndarray:
-        """Depth of the interface nodes (m,) [m], >= 0, which is added to the gap at rounded edges."""
-        return self.points[self.interface, 1]
+        """Depth of the pressure nodes (m,) [m], >= 0, which is added to the gap at rounded edges."""
+        return self.points[self.pressure_nodes, 1]
 
     @property
     def is_quadratic(self) -> bool:
@@ -121,7 +126,7 @@ class PieceMesh:
         return np.concatenate(parts)
 
     def tributary_lengths(self) -> np.ndarray:
-        """Return the tributary length (m,) [m] of each interface node."""
+        """Return the tributary length (m,) [m] of each pressure node."""
         return tributary_lengths(self.x)
 
     def refine(self) -> "PieceMesh":

@@ -99,7 +99,7 @@ def test_exact_displacements_equal_those_of_skfem(kind):
     """The displacements under nodal forces equal those of scikit-fem on the same mesh for every element."""
     mesh = make_mesh(kind)
     piece = Piece(mesh, COATED)
-    shear, normal = np.random.default_rng(1).normal(size=(2, mesh.x.size))
+    shear, normal = np.random.default_rng(1).normal(size=(2, mesh.interface.size))
     load = np.zeros((len(mesh.points), 2, 1))
     load[mesh.interface] = np.stack([shear, normal], axis=1)[..., None]
     u = piece.factor.solve(load)[mesh.interface, :, 0]

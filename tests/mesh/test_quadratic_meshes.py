@@ -96,7 +96,8 @@ def test_exact_same_mesh_in_every_format_gives_equal_compliance(kind, tmp_path):
     pairs.append(read_pieces(write_pair(tmp_path, kind, ".inp", surfaces=True)))
     first = interface_compliance(Piece(pairs[0].upper, LAYERS))
     for pair in pairs:
-        assert pair.lower.x.size == 2 * GRID.x.size - 1 and pair.lower.is_quadratic
+        assert pair.lower.x.size == GRID.x.size and pair.lower.is_quadratic
+        assert pair.lower.interface.size == 2 * GRID.x.size - 1
         assert pair.upper.coating_thickness == pytest.approx(GRID.coating_thickness, rel=1e-12)
         for mine, other in zip(interface_compliance(Piece(pair.upper, LAYERS)), first):
             assert np.abs(mine - other).max() <= 1e-12 * np.abs(first.nn).max()

@@ -175,7 +175,7 @@ def _mesh_and_stress(piece, grid) -> _PieceFields:
     """Return the mesh, the stress and the stress recovery of a piece."""
     cells = get_cells(piece)
     return _PieceFields(
-        grid.interface,
+        grid.pressure_nodes,
         partial(centre_stress, cells),
         cells,
         make_points(cells, "gauss"),

@@ -18,7 +18,6 @@ from ...elasticity.elasticity import (
 from ...model.pieces import make_elastic_layers
 from . import store
 
-
 # Largest coupling of equal pieces, relative to their compliance, that is round-off of the coordinates in a mesh file
 COUPLING_ROUND_OFF = 1e-7
 

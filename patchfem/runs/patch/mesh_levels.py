@@ -14,7 +14,7 @@ from . import profile_points, slip_zones, store
 from .condensed import condense, condense_on_shared_meshes
 from .grids import MAX_CONDENSING_SECONDS, MIN_LEVELS, make_base_grids, predict_condensing_seconds
 from .measures import estimate_static_measures, max_mesh_error_ratio, with_static_measures
-from .press import solve, solve_patch_contact
+from .press import solve_patch_contact
 
 # Tolerance at which a patch with prescribed partial slip may take as much CPU time as a patch in a
 # rig. The allowed time is proportional to tolerance^-0.5: a tenth of the tolerance allows 3.2 times
@@ -74,8 +74,6 @@ def solve_with_coarser(patch_model, tolerance: float, estimate: bool = True) -> 
         Patches from fine to coarse, at least two; None for each mesh that is not solved. The first
         has the static measures with the errors that follow from all of them (`Patch.measures`).
     """
-    if patch_model.solved is not None:
-        return patch_model.solved.patches
     mesh = patch_model.mesh
     tolerance = mesh.tolerance or tolerance
     if mesh.shared is None:
@@ -114,8 +112,10 @@ def solve_on_pairs(patch_model, pairs, tolerance: float, estimate: bool = True) 
     tuple
         Patches as in `solve_with_coarser`.
     """
-    needed_pairs = pairs if estimate else pairs[:1]
-    patches = [solve_patch_contact(patch_model, pair) for pair in needed_pairs]
+    patches = []
+    for pair in reversed(pairs if estimate else pairs[:1]):
+        coarse = patches[0] if patches else None
+        patches.insert(0, solve_patch_contact(patch_model, pair, coarse=coarse))
     return with_static_measures((*patches, *(3 - len(patches)) * [None]), tolerance)
 
 
@@ -185,7 +185,9 @@ def solve_on_refined_meshes(patch_model, tolerance: float, estimate: bool = True
         patch = None
         if estimate or len(patches) == MIN_LEVELS - 1:
             try:
-                patch = solve(patch_model, *grids)
+                coarse = patches[0] if patches else None
+                pair = condense(patch_model, *grids)
+                patch = solve_patch_contact(patch_model, pair, coarse=coarse)
             # The cells are too short for double precision, so that the finest mesh is left out.
             except NotConverged:
                 if not patches or patches[0] is None:
@@ -258,7 +260,6 @@ def solve_on_static_meshes(patch_model, tolerance: float, estimate: bool = True)
     """
     if (
         not patch_model.interface.partial_slip
-        or patch_model.solved is not None
         or patch_model.mesh.shared is not None
         or not patch_model.mesh.is_automatic
     ):

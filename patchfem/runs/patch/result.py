@@ -206,26 +206,6 @@ def strain_warnings(
     return out
 
 
-def exceeds_small_strains(patch_model, largest_pressure, approach):
-    """Return whether the strains of one patch, or of each of q patches, may cause a warning.
-
-    Parameters
-    ----------
-    patch_model : PatchModel
-    largest_pressure, approach : float or (q,)
-        Largest pressure [Pa] and approach [m].
-
-    Returns
-    -------
-    bool or (q,) of bool
-    """
-    if not patch_model.mesh.is_automatic:
-        return np.ones(np.shape(largest_pressure), bool)
-    return (
-        np.maximum(*_estimate_strains(patch_model, largest_pressure, approach)) > MAX_SMALL_STRAIN
-    )
-
-
 def _estimate_strains(patch_model, largest_pressure, approach) -> tuple:
     """Return two estimates of the strain: peak pressure/modulus and approach/height."""
     young = min(material.young for material in _list_materials(patch_model))
@@ -288,14 +268,11 @@ def notes_on_neglected_effects(model, patch, coarse) -> list:
     if coarse[0] is not None and patch.pressure.outcome is not Outcome.NO_CONTACT:
         # An unstructured mesh has no coarser one: its second mesh is finer than its first.
         other = patch if coarse[-1] is None else coarse[0]
-        if patch_model.solved is not None:
-            out += patch_model.solved.plane_sentences
-        else:
-            out += store.get_or_compute_in_sweep(
-                patch_model,
-                ("plane band", other),
-                lambda: note_on_plane_state(patch_model, other),
-            )
+        out += store.get_or_compute_in_sweep(
+            patch_model,
+            ("plane band", other),
+            lambda: note_on_plane_state(patch_model, other),
+        )
     return out
 
 

@@ -19,7 +19,6 @@ from . import grids, mesh_levels
 from .condensed import cache_condensed_pairs, condense
 from .measures import max_mesh_error_ratio
 from .press import solve_patch_contact
-from .static_batch import max_mesh_error_ratios, solve_patches_on_pair
 
 # Largest number of cases that determine the mesh; of more cases, the most different ones are
 # selected.
@@ -230,8 +229,8 @@ def _make_common_layout(
         pair = condense(first, *grids.make_grids(first, layout))
         layouts = []
         largest_ratio = 0.0
-        for case, patch in zip(cases, solve_patches_on_pair(cases, pair)):
-            extent = _find_contact_extent(case, pair, patch)
+        for case in cases:
+            extent = _find_contact_extent(case, pair)
             if extent is not None:
                 n_halvings = halvings_by_case.get(_load_and_shape_parameters(case), 0)
                 case_layout = grids.make_column_layout(case, [extent])
@@ -245,15 +244,14 @@ def _make_common_layout(
     return layout
 
 
-def _find_contact_extent(patch_model, pair, patch):
+def _find_contact_extent(patch_model, pair):
     """Return the contact region of a patch, which is solved first if needed; None on failure.
 
     In that case the single run reports the error.
     """
     try:
-        return grids.find_contact_extent(
-            patch or solve_patch_contact(patch_model, pair), patch_model.mesh.slip
-        )
+        patch = solve_patch_contact(patch_model, pair)
+        return grids.find_contact_extent(patch, patch_model.mesh.slip)
     except PatchfemError:
         return None
 
@@ -338,15 +336,12 @@ def _refine_until_tolerance_is_met(
         bodies = [body.refine() for body in bodies]
         if len(pairs) < min_levels:
             continue
-        batch_ratios = max_mesh_error_ratios(cases, pairs, tolerance)
-        largest_ratio = max((ratio for ratio in batch_ratios if ratio is not None), default=0.0)
-        if largest_ratio <= 1:
-            for case, batch_ratio in zip(cases, batch_ratios):
-                if batch_ratio is None:
-                    ratio = _max_mesh_error_ratio(case, pairs, tolerance)
-                    if ratio > 1:
-                        largest_ratio = ratio
-                        break
+        # The refinement goes on as soon as one case misses the tolerance.
+        largest_ratio = 0.0
+        for case in cases:
+            largest_ratio = max(largest_ratio, _max_mesh_error_ratio(case, pairs, tolerance))
+            if largest_ratio > 1:
+                break
         n_nodes = bodies[0].x.size
         seconds = grids.predict_condensing_seconds(bodies)
         max_seconds = mesh_levels.max_condensing_seconds(cases[0], tolerance)
