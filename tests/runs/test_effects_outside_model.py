@@ -3,12 +3,9 @@ off the piece."""
 
 import numpy as np
 import pytest
-from any_mesh_cases import FORMATS, make_pair
 from scene_texts import COATED, COULOMB, MODE, NONLOCAL, PIECE
 
 from patchfem import plan
-from patchfem.mesh import graded_grid
-from patchfem.mesh.files import EDGE_TAGS
 from patchfem.runs.run import run
 from patchfem.scene import loads
 
@@ -33,29 +30,6 @@ def run_text(text, estimate=True):
 
 
 # ---- mesh files, tall pieces
-def test_exact_partially_fixed_face_gives_note_in_two_formats(tmp_path):
-    """A mesh whose face `lower_far` is fixed on 2 of its 16 edges (1.6 of 12.8 mm) gives a note, in
-    two file formats."""
-    m = make_pair("quads", graded_grid(12.8e-3, 6.4e-3, 0.8e-3))
-    fixed_edges = np.flatnonzero(m.edge_tags == EDGE_TAGS["lower_far"])
-    removed = fixed_edges[np.argsort(m.points[m.edges[fixed_edges], 0].mean(axis=1))][2:]
-    m.edges, m.edge_tags = np.delete(m.edges, removed, axis=0), np.delete(m.edge_tags, removed)
-    approaches = []
-    for form in ("gmsh 2.2 binary", "inp lines"):
-        path = tmp_path / f"pair{FORMATS[form][0]}"
-        FORMATS[form][1](m, path)
-        result = run_text(FIXED_FACE.format(path))
-        approaches.append(result.measures["approach"].value)
-        notes = [text for text in result.extra["notes"] if "lower_far" in text]
-        assert notes == [
-            "contact.mesh: the held nodes `lower_far` cover 0.0016 m of a face "
-            "of 0.0128 m, 0.125 of the length of this face; the rest of the face is "
-            "free"
-        ]
-    assert approaches[1] == pytest.approx(approaches[0], rel=1e-9)
-    # Approach [m] of both pieces as bars.
-    flat = 115.654 / (12.8e-3 * 12.7e-3) * 2 * 6.4e-3 / 121e9
-    assert approaches[0] > 3 * flat
 
 
 def test_exact_note_states_fraction_of_buckling_load():
