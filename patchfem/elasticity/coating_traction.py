@@ -51,15 +51,19 @@ def compute_coating_traction(cells: Cells, u) -> CoatingTraction | None:
     is_bonded = is_coating & (n_coating == 1) & ~edges.is_border
     if not is_bonded.any():
         return None
-    ends, middles = edges.ends[is_bonded], edges.middles[is_bonded]
-    edge_nodes, fractions = ends, np.array([1 / 2, 1 / 2])
+    ends = edges.ends[is_bonded]
+    middles = edges.middles[is_bonded]
+    edge_nodes = ends
+    fractions = np.array([1 / 2, 1 / 2])
     if (middles >= 0).all():
-        edge_nodes, fractions = np.column_stack([ends, middles]), np.array([1 / 6, 1 / 6, 2 / 3])
+        edge_nodes = np.column_stack([ends, middles])
+        fractions = np.array([1 / 6, 1 / 6, 2 / 3])
 
     # Each normal points into the substrate and has the length of its edge.
     along_x, inward = (cells.points[ends[:, 1]] - cells.points[ends[:, 0]]).T
     edge_normals = np.stack([inward, -along_x], axis=1)
-    across, length = np.zeros(cells.points.shape), np.zeros(len(cells.points))
+    across = np.zeros(cells.points.shape)
+    length = np.zeros(len(cells.points))
     for nodes, fraction in zip(edge_nodes.T, fractions):
         np.add.at(across, nodes, edge_normals)
         np.add.at(length, nodes, fraction * np.hypot(*edge_normals.T))

@@ -120,11 +120,13 @@ def compute_stiffness(points, cells, element: Element, lam, mu) -> np.ndarray:
     """
     _, gradients, weights = evaluate_cells(points, cells, element, element.gauss, element.weights)
     along, inward = np.moveaxis(gradients, 2, 0)
-    weighted_along, weighted_inward = along * weights[..., None], inward * weights[..., None]
+    weighted_along = along * weights[..., None]
+    weighted_inward = inward * weights[..., None]
     xx = weighted_along.swapaxes(1, 2) @ along
     yy = weighted_inward.swapaxes(1, 2) @ inward
     xy = weighted_along.swapaxes(1, 2) @ inward
-    lam, mu = lam[:, None, None], mu[:, None, None]
+    lam = lam[:, None, None]
+    mu = mu[:, None, None]
     n_cells, k = cells.shape
     out = np.empty((n_cells, k, 2, k, 2))
     out[:, :, 0, :, 0] = (lam + 2 * mu) * xx + mu * yy
@@ -203,7 +205,8 @@ class Piece:
 
     def _describe_remedy(self) -> str:
         """Return a sentence that says what to change if the stiffness is singular."""
-        mesh, layers = self.mesh, self.layers
+        mesh = self.mesh
+        layers = self.layers
         ratio = layers.coating[0] / layers.substrate[0]
         if mesh.coating_thickness and not 1e-3 < ratio < 1e3:
             return (

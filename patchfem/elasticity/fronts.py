@@ -213,7 +213,8 @@ def condense(blocks: list[CellBlock], positions, interface, is_fixed) -> Fronts:
                 terms = [_assemble_leaf(blocks, leaves[part.begin], place)]
             nodes = np.unique(np.concatenate([term.nodes for term in terms]))
             is_own = (first[nodes] >= part.begin) & (last[nodes] < part.end)
-            own, ring = nodes[is_own], nodes[~is_own]
+            own = nodes[is_own]
+            ring = nodes[~is_own]
             front, stiffnesses[number] = _eliminate(own, ring, terms, place)
             fronts.append(front)
         nodes, schur = stiffnesses[len(parts) - 1]
@@ -288,12 +289,14 @@ def _eliminate(own, ring, terms, place) -> tuple[Front, _Stiffness]:
         # Nodes that the term does not contain take the zeros in its last rows and columns.
         place[own] = place[ring] = nodes.size
         place[nodes] = np.arange(nodes.size)
-        of_own, of_ring = _number_unknowns(place[own]), _number_unknowns(place[ring])
+        of_own = _number_unknowns(place[own])
+        of_ring = _number_unknowns(place[ring])
         rows = matrix.take(of_own, 0)
         own_own += rows.take(of_own, 1)
         own_ring += rows.take(of_ring, 1)
         ring_ring += matrix.take(of_ring, 0).take(of_ring, 1)
-    factor, smallest_pivot = own_own, 1.0
+    factor = own_own
+    smallest_pivot = 1.0
     if own.size:
         factor, smallest_pivot = _factorise(own_own)
         # The arrays are passed transposed, because LAPACK stores columns.

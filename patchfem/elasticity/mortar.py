@@ -101,7 +101,8 @@ def transfer_matrix(x, piece_x) -> np.ndarray:
     (m, n) ndarray [1]
     """
     cuts = np.union1d(x, piece_x)
-    left, right = cuts[:-1], cuts[1:]
+    left = cuts[:-1]
+    right = cuts[1:]
     middle = (left + right) / 2
     cell = np.clip(np.searchsorted(x, middle) - 1, 0, x.size - 2)
     piece_cell = np.clip(np.searchsorted(piece_x, middle) - 1, 0, piece_x.size - 2)
@@ -128,7 +129,8 @@ def _hat_functions(x, cell, positions) -> np.ndarray:
 
 def _choose_grid(lower: PieceInterface, upper: PieceInterface) -> np.ndarray:
     """Choose the nodes (m,) [m] of the pressure: at each place those of the coarser or of the much softer piece."""
-    node, end = lower.x[0], lower.x[-1]
+    node = lower.x[0]
+    end = lower.x[-1]
     tolerance = LENGTH_TOL * (end - node)
     grid = [node]
     while node < end - tolerance:
@@ -150,9 +152,11 @@ def _choose_grid(lower: PieceInterface, upper: PieceInterface) -> np.ndarray:
 
 def _interpolate_softness(piece: PieceInterface, position: float) -> float:
     """Return the compliance [m2/N] of a piece to a force at a node that its neighbours balance."""
-    x, compliance = piece.x, piece.compliance.nn
+    x = piece.x
+    compliance = piece.compliance.nn
     node = int(np.clip(np.searchsorted(x, position), 1, x.size - 2))
-    left, right = x[node] - x[node - 1], x[node + 1] - x[node]
+    left = x[node] - x[node - 1]
+    right = x[node + 1] - x[node]
     forces = np.array([-right, left + right, -left]) / (left + right)
     three = slice(node - 1, node + 2)
     return float(forces @ compliance[three, three] @ forces)

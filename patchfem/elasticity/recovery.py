@@ -18,7 +18,8 @@ from .elasticity import CellPoints, Layers, Piece, evaluate_cells, hooke
 # Smallest determinant of the correlations of (1, x, y) for which a patch determines a plane; a
 # patch with a smaller one is extended by the neighbouring cells
 MIN_PLANE_DETERMINANT = 0.1
-LINEAR_ELEMENTS = {3: ELEMENTS["triangle"], 4: ELEMENTS["quad"]}  # by their number of corners
+# Elements of first order by the number of their corners, by which recovered stresses are interpolated
+LINEAR_ELEMENTS = {3: ELEMENTS["triangle"], 4: ELEMENTS["quad"]}
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -62,9 +63,11 @@ def make_points(cells: Cells, kind: str) -> list[CellPoints]:
     out = []
     for name, nodes in cells.groups.items():
         element = ELEMENTS[name]
-        local_points, weights = element.gauss, element.weights
+        local_points = element.gauss
+        weights = element.weights
         if kind == "centre":
-            local_points, weights = element.centre, np.array([element.weights.sum()])
+            local_points = element.centre
+            weights = np.array([element.weights.sum()])
         out.append(evaluate_cells(cells.points, nodes, element, local_points, weights))
     return out
 
@@ -275,7 +278,8 @@ def estimate_error(recovery: Recovery, u, stress, gauss_points: list) -> StressE
     cells = recovery.cells
     lam, mu = cells.layers.lame(cells.is_coating)
     # The energy is (lam + mu) (exx + eyy)^2 + mu (exx - eyy)^2 + 4 mu exy^2, in components whose squares add up.
-    bulk, shear = np.sqrt(lam + mu), np.sqrt(mu)
+    bulk = np.sqrt(lam + mu)
+    shear = np.sqrt(mu)
     error = np.zeros((len(u), mu.size))
     energy = np.zeros(len(u))
     for frame, motion in enumerate(u):
@@ -287,7 +291,8 @@ def estimate_error(recovery: Recovery, u, stress, gauss_points: list) -> StressE
             n_corners = ELEMENTS[kind].n_corners
             part = slice(first_cell, first_cell + len(nodes))
             at_corners = recovered[first_corner : first_corner + n_corners * len(nodes)]
-            first_cell, first_corner = part.stop, first_corner + len(at_corners)
+            first_cell = part.stop
+            first_corner = first_corner + len(at_corners)
             shape = LINEAR_ELEMENTS[n_corners].evaluate(ELEMENTS[kind].gauss).values
             at_points = shape @ at_corners.reshape(len(nodes), n_corners, 3)
             exx, eyy, exy = points.strain(motion[nodes])

@@ -139,7 +139,8 @@ class Deck:
                 )
             numbers += self.lines.get(element, ())
         for words in self.surfaces.get(tag, ()):
-            member, side = words[0], int(words[1].upper().removeprefix("S"))
+            member = words[0]
+            side = int(words[1].upper().removeprefix("S"))
             elements = (
                 [int(member)] if member.isdigit() else self.sets["ELSET"].get(member.lower(), ())
             )
@@ -171,7 +172,9 @@ def read_deck(text: str) -> TaggedMesh:
 
 def _split_blocks(text: str):
     """Yield (keyword, parameters, data lines) of the keyword blocks in a deck; skip comments and empty lines."""
-    keyword, parameters, lines = "", {}, []
+    keyword = ""
+    parameters = {}
+    lines = []
     for line in text.splitlines():
         if not line.strip() or line.startswith("**"):
             continue
@@ -180,7 +183,9 @@ def _split_blocks(text: str):
             lines.append(words)
             continue
         yield keyword, parameters, lines
-        keyword, parameters, lines = words[0].lstrip("*").strip().upper(), {}, []
+        keyword = words[0].lstrip("*").strip().upper()
+        parameters = {}
+        lines = []
         for word in words[1:]:
             key, _, value = word.partition("=")
             parameters[key.strip().upper()] = value.strip().strip('"')

@@ -169,7 +169,9 @@ class PieceMesh:
 
 def find_edges(blocks: dict, n_points: int) -> CellEdges:
     """Return the edges of cells (t, k) by the names of their elements."""
-    ends, owners, middles = [], [], []
+    ends = []
+    owners = []
+    middles = []
     n_cells = 0
     for kind, cells in blocks.items():
         n = ELEMENTS[kind].n_corners

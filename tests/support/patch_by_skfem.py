@@ -26,7 +26,7 @@ from skfem.helpers import ddot, eye, sym_grad, trace
 
 FAMILIES = ("plain", "step", "overhang", "linear layer", "smooth trace")
 # Shortest columns at the contact edges over the length of the contact, and growth of the columns, of both levels
-LEVELS = ((1 / 60, 0.9), (1 / 240, 0.7))
+LEVELS = ((1 / 30, 1.2), (1 / 120, 0.9))
 
 
 @BilinearForm
@@ -50,7 +50,9 @@ def bisect(low, high, marks, sizes, growth, largest):
     """Return columns between two ends, bisected until they are short enough for their distance from marks."""
     inner = [mark for mark in marks if low < mark < high]
     x = np.unique([low, *inner, high])
-    x = np.sort(np.concatenate([x, *(np.linspace(a, b, 5)[1:-1] for a, b in itertools.pairwise(x))]))
+    x = np.sort(
+        np.concatenate([x, *(np.linspace(a, b, 5)[1:-1] for a, b in itertools.pairwise(x))])
+    )
     while True:
         left, right = x[:-1, None], x[1:, None]
         distance = np.maximum(0, np.maximum(left - marks, marks - right))
@@ -181,10 +183,7 @@ def solve_level(contact: dict, trace_points, finest: float, growth: float) -> di
         weight = (np.append(h, 0) + np.append(0, h)) / 2
         gap = tilt * x
         if "crown" in contact:
-            # means over the hat functions
-            third = np.append(h**2, 0) + np.append(0, h**2)
-            gap = gap + (x**2) / (2 * read_number(contact["crown"]["radius"]))
-            del third
+            gap = gap + x**2 / (2 * read_number(contact["crown"]["radius"]))
         if trace_points is not None:
             gap = gap + np.interp(x, *trace_points)
         if step:

@@ -117,10 +117,8 @@ def end_compliance(piece: Piece) -> WaveCompliance:
     compliance. Then the piece responds to waves by the closed form.
     """
     free = piece.factor.compliance
-    normal, shear = (
-        (free - replace(piece, guided=component, computed={}).factor.compliance)[
-            inward::2, inward::2
-        ]
-        for component, inward in ((0, 1), (1, 0))
-    )
-    return WaveCompliance(normal, shear)
+    parts = []
+    for guided, moved in ((0, 1), (1, 0)):
+        held = replace(piece, guided=guided, computed={}).factor.compliance
+        parts.append((free - held)[moved::2, moved::2])
+    return WaveCompliance(*parts)

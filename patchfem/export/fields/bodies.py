@@ -95,11 +95,9 @@ def write_fields(result, path: Path) -> dict:
         UNITS,
         steps,
     )
-    if not all(
-        isinstance(g, TensorGrid) and g.is_rectangle
-        for g in (patch.pair.grid, patch.pair.upper_grid)
-    ):
-        return {}
+    for grid in (patch.pair.grid, patch.pair.upper_grid):
+        if not (isinstance(grid, TensorGrid) and grid.is_rectangle):
+            return {}
     shape = (patch.x.size - 1, -1)
     n_worn_states = result.extra.get("wear_shown", {"states": 0})["states"]
     return {

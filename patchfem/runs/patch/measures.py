@@ -400,7 +400,9 @@ def _compute_resolution(patch: Patch, missed_peak: float) -> Resolution:
 
     missed_peak: `unresolved_edge_rounding_pressure` [Pa].
     """
-    pair, pieces, active = patch.pair, patch.pieces, patch.active
+    pair = patch.pair
+    pieces = patch.pieces
+    active = patch.active
     interface = pieces.interface
     sigma = patch.pressure.sigma_n
     all_cells = np.diff(interface.x)

@@ -58,7 +58,8 @@ def _vertex_height(x, sigma, node: int) -> float:
 
     def fit_parabola(middle: int) -> tuple[float, float]:
         """Return the slope at the middle of three nodes, and half the second derivative."""
-        left, right = x[middle] - x[middle - 1], x[middle + 1] - x[middle]
+        left = x[middle] - x[middle - 1]
+        right = x[middle + 1] - x[middle]
         slope_left = (sigma[middle] - sigma[middle - 1]) / left
         slope_right = (sigma[middle + 1] - sigma[middle]) / right
         slope = (slope_left * right + slope_right * left) / (left + right)
