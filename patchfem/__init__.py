@@ -77,7 +77,7 @@ if TYPE_CHECKING:
         view,
     )
 
-__version__ = "1.1.0"
+__version__ = "1.2.0"
 __all__ = [
     "FitOptions",
     "Measure",

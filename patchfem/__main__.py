@@ -109,7 +109,7 @@ VERB_GROUPS = {
     "Files": {
         "report": (view_export, "several runs on one page", "out/a out/b -o both.html"),
         "view": (view_export, "image or animation of the pieces", "out/joint -o joint.png"),
-        "export": (view_export, "fields for ParaView; histories", "out/joint -o play.py"),
+        "export": (view_export, "fields for ParaView; histories", "out/joint -o fields.pvd"),
         "import": (import_, "convert laboratory records", "shaker.uff -o record.csv"),
         "mesh": (scene, "the mesh of the pieces", "joint.toml -o pieces.vtu"),
     },

@@ -17,36 +17,40 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields, replace
 from difflib import get_close_matches
 from functools import wraps
+from html import escape
 from numbers import Integral
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 from .campaigns import cost as cost_curves
-from .campaigns.backbone import curves as backbones
+from .campaigns.backbone import curves as backbone_curves
 from .campaigns.backbone import given_modes
+from .campaigns.fits import request as fit_requests
+from .campaigns.fits.request import FitOptions
 from .campaigns.sweeps import case_models as case_models
 from .campaigns.sweeps import executors, parse_request
 from .core import Measure, Missing, NotConverged, Outcome, PatchfemError
-from .export import backbone as backbone_files
-from .export import convert, histories
-from .export import cost as cost_files
-from .export import folder as results_folder
-from .export import report as run_page
-from .export import reports as comparison_page
-from .export import summary as summaries
-from .export.drawing import pictures
-from .export.drawing import swept as sweep_charts
-from .export.fields import multiblock
-from .export.fits import request as fits
-from .export.fits.options import FitOptions
-from .export.pages import headline, released, sentences
-from .export.surfaces import compare as compared_data
-from .export.surfaces import pairs as pairs_data
-from .export.surfaces import predicted as predicted_wear
-from .export.surfaces import roughness, worn, worn_runs
-from .export.sweeps import folder, page, tables
+from .export import (
+    backbones,
+    convert,
+    costs,
+    fits,
+    netcdf,
+    page,
+    pieces,
+    run_folder,
+    runs,
+    show,
+    store,
+)
+from .export.charts import axes as chart_axes
+from .export.fields import grids
+from .export.folder import Folder
+from .export.surfaces import compare as compared
+from .export.surfaces import pairs as compared_pairs
+from .export.surfaces import roughness, worn
+from .export.sweeps import dataset as sweep_datasets
 from .export.sweeps import run as sweep_run
 from .mesh import files as mesh_files
 from .model.model import Model, build_without_sweep
@@ -73,10 +77,7 @@ from .scene.sets import (
     require_units,
 )
 from .scene.toml_text import read_text
-from .surface.compare import pairs as pairs_tables
-from .surface.compare import verdict
-from .surface.files import read as surfaces
-from .surface.roughness import report as roughness_report
+from .surface.compare import compare as surface_comparison
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -431,7 +432,7 @@ def cost(
     over : str, optional
         Setting to vary instead of the tolerance: "element_size", "steps_per_cycle", "shear_modes" or "jumps".
     out : path, optional
-        Folder for cost.csv and the picture. Default: no files are written.
+        Folder for cost.csv and the page. Default: no files are written.
     say : callable, optional
         Function that is called with a line of text for each run. Default: print to stderr.
     **sets
@@ -463,15 +464,20 @@ def cost(
     True
     """
     model = build(scene, **sets)
-    tolerance = model.accuracy.tolerance
     setting = _require_string(over, "cost: over") or cost_curves.TOLERANCE
-    curve = cost_curves.compute_setting_costs(
-        model, setting, _print_to_stderr if say is None else say
-    )
+    report = _print_to_stderr if say is None else say
+    curve = cost_curves.compute_setting_costs(model, setting, report)
+    answer = costs.make_answer({setting: curve}, model)
     if out is not None:
-        cost_files.write(Path(out), {setting: curve})
-        cost_files.write_picture(Path(out), setting, curve, tolerance)
-    return {setting: cost_files.cost_data(setting, curve, tolerance)}
+        _save(answer, Path(out))
+    return answer.details
+
+
+def _save(answer: Any, folder: Path) -> None:
+    """Write an answer with its page into a results folder."""
+    with Folder(folder) as claimed:
+        store.write(answer, claimed.path)
+        page.write_page(claimed.path)
 
 
 def backbone(
@@ -530,7 +536,7 @@ def backbone(
     >>> curves["quasi_static_frequency"].size
     5
     """
-    methods = backbones.choose_methods(_require_string(method, "backbone: method"))
+    methods = backbone_curves.choose_methods(_require_string(method, "backbone: method"))
 
     def build_with(tables: BackboneTables, *, is_written: bool) -> Model:
         """Build the model of the scene, or of the scene as written, with the tables of a backbone."""
@@ -549,11 +555,9 @@ def backbone(
     lengths = None
     if amplitudes is not None:
         lengths = axes.read_lengths(_format_lengths(amplitudes), "amplitudes")
-    curves = backbones.compute_backbone(
-        model, _require_string(mode, "backbone: mode"), lengths, methods
-    )
-    curves = curves.add_notes(notes)
-    return backbone_files.backbone_contents(curves, model.source.title).to_xarray()
+    name = _require_string(mode, "backbone: mode")
+    curves = backbone_curves.compute_backbone(model, name, lengths, methods)
+    return netcdf.to_dataset(backbones.make_answer(curves.add_notes(notes), model.source))
 
 
 @_strip_file_and_line_from_errors
@@ -633,18 +637,11 @@ def sweep(
     cases = parse_request.read_cases(sweep_scene, request)
     pool = executors.make_executor(executor, jobs)
     if out is None:
-        results = sweep_run.compute_in_memory(sweep_scene, cases, pool, _print_to_stderr)
-        case_hashes = []
+        answer = sweep_run.compute_in_memory(sweep_scene, cases, pool, _print_to_stderr)
     else:
         target = sweep_run.SweepTarget(Path(out), resume)
-        results = sweep_run.sweep_into(sweep_scene, cases, target, pool, _print_to_stderr)
-        case_hashes = (
-            [] if target.kept_files(len(cases)) == "none" else cases.compute_hashes(sweep_scene)
-        )
-    keys = [folder.case_folder_name(name) for name in case_hashes]
-    table = page.sweep_table(sweep_scene, cases, results, (), Path(out or ""))
-    answer = headline.summarise_sweep(table).answer()
-    return tables.table_contents(sweep_scene, cases, results, keys, answer).to_xarray()
+        answer = sweep_run.sweep_into(sweep_scene, cases, target, pool, _print_to_stderr)
+    return sweep_datasets.to_dataset(answer)
 
 
 def _is_empty(values: Any) -> bool:
@@ -693,21 +690,13 @@ class SweepPlots:
         >>> axes = pf.plot.sweep(dataset, "loop_area")
         >>> axes.figure.savefig("loop_area.png")
         """
-        is_dataset = hasattr(dataset, "coords")
-        if not is_dataset or not any(str(name).endswith("_error") for name in dataset):
-            raise PatchfemError(
-                "plot.sweep: a Dataset returned by pf.sweep is needed, with measures and their errors"
-            )
-        figure = pictures.draw_charts.figure(
-            [sweep_charts.sweep_chart(dataset, measure)], axes_to_use=ax
-        )
-        return figure.axes[0] if ax is None else ax
+        return sweep_datasets.sweep_axes(dataset, measure, ax)
 
     @staticmethod
     def backbone(dataset: Dataset, ax: Axes | None = None) -> Axes:
         """Plot frequency and damping ratio of a mode against its amplitude, for each method.
 
-        The recommended curve is bold, on top, and lies in its band. Without a band all curves have error bars.
+        The recommended curve is the first one, with its band.
 
         Parameters
         ----------
@@ -732,30 +721,7 @@ class SweepPlots:
         >>> curves = pf.backbone(pf.new("rig"), amplitudes="0.1 um..10 um:5", method="quasi-static", **law)
         >>> pf.plot.backbone(curves).figure.savefig("backbone.png")
         """
-        coordinates = getattr(dataset, "coords", ())
-        curves = {}
-        for method in backbones.METHODS:
-            prefix = method.replace("-", "_")
-            if f"{prefix}_amplitude" in coordinates:
-                names = backbone_files.COLUMNS
-                columns = {name: dataset[f"{prefix}_{name}"].values for name in names}
-                curves[method] = SimpleNamespace(**columns)
-        if not curves:
-            reason = getattr(dataset, "attrs", {}).get("missing")
-            raise PatchfemError(
-                "plot.backbone: a Dataset returned by pf.backbone is needed, with at least one curve"
-                + (f"; {reason}" if reason else "")
-            )
-        band = None
-        if "band_amplitude" in coordinates:
-            band = SimpleNamespace(
-                method=dataset.attrs["method"], amplitude=dataset["band_amplitude"].values
-            )
-            for name in backbone_files.BAND_VARIABLES:
-                setattr(band, name, dataset[f"band_{name}"].values)
-        drawn_charts = backbone_files.backbone_charts(curves, band)
-        figure = pictures.draw_charts.figure(drawn_charts, axes_to_use=ax)
-        return figure.axes[0] if ax is None else ax
+        return backbones.backbone_axes(dataset, ax)
 
 
 plot = SweepPlots()
@@ -821,12 +787,11 @@ def fit(
         As for `load`.
     data : path
         File of the measurements: a friction loop for a bench; a table of responses, or frequency and damping against
-        amplitude, for a rig; a worn depth for a scene with [wear]. Not used with ``options.from_patch``.
+        amplitude, for a rig; a worn depth for a scene with [wear].
     options : FitOptions, optional
         Validation rows, offsets of a loop, and settings of the search.
     free : dict
-        Range of each free parameter by its key: (low, high), or a string such as "0.1..0.6". Not used with
-        ``options.from_patch``.
+        Range of each free parameter by its key: (low, high), or a string such as "0.1..0.6".
     out : path, optional
         Output folder, as for `patchfem fit -o`. Default: no files are written.
     say : callable, optional
@@ -871,10 +836,13 @@ def fit(
     options = _check_fit_options(FitOptions() if options is None else options, changes)
     data = keywords.get("to", data)
     data_path = "" if isinstance(data, str) and not data else str(_require_path(data, "fit: to"))
+    listener = fit_requests.Listener(_print_to_stderr if say is None else say)
     with TemporaryDirectory() as temporary_folder:
-        output_folder = Path(temporary_folder) / "fit" if out is None else Path(out)
-        listener = fits.Listener(_print_to_stderr if say is None else say)
-        return fits.fit_into(loaded, data_path, ranges, options, output_folder, listener).answer
+        target = Path(temporary_folder) / "fit" if out is None else Path(out)
+        answer = fits.fit_into(
+            loaded, data_path, ranges, options, target, listener, with_page=out is not None
+        )
+        return answer.details
 
 
 def _check_fit_options(options: Any, changes: dict) -> FitOptions:
@@ -885,13 +853,10 @@ def _check_fit_options(options: Any, changes: dict) -> FitOptions:
     if not isinstance(options, FitOptions):
         raise PatchfemError(f"fit: options: FitOptions are needed, not {options!r:.60}")
     options = replace(options, **changes)
-    amplitudes = options.amplitudes
     return replace(
         options,
         hold=_require_strings(options.hold, "fit: hold"),
         offset=_require_strings(options.offset, "fit: offset"),
-        placebo=_require_strings(options.placebo, "fit: placebo"),
-        amplitudes="" if amplitudes is None else _format_lengths(amplitudes),
     )
 
 
@@ -958,6 +923,7 @@ def profile(
     >>> len(roughness["profiles"])
     1
     """
+
     length = _parse_length(cutoff, "profile: cutoff")
     limits = None
     if window is not None:
@@ -969,26 +935,20 @@ def profile(
         limits = tuple(_parse_length(position, "profile: window") for position in positions)
     if length is not None and not 0 < length < float("inf"):
         raise PatchfemError(f"profile: cutoff: a length above zero is needed, not {length:g} m")
-    reports = []
-    for file in files:
-        surface = surfaces.read_surface(_require_path(file, "profile"), units)
-        reports.append(roughness_report.make_report(surface, cutoff=length, window=limits))
-    return {
-        "profiles": [roughness.roughness_data(trace_report) for trace_report in reports],
-        "means": roughness.means_data(reports),
-    }
+    paths = [_require_path(file, "profile") for file in files]
+    return roughness.answer_files(paths, units, cutoff=length, window=limits).details
 
 
 @_reject_removed_options
 def report(folders: str | Path | Iterable[str | Path], /, out: str | Path | None = None) -> Path:
-    """Write a page that compares results folders, or rebuild the page of a single sweep.
+    """Make the page of a results folder again, or a page that shows several folders side by side.
 
     Parameters
     ----------
     folders : path or list of path
         Results folders.
     out : path, optional
-        File of the page. Default: report.html.
+        File of the page. Default: report.html in the folder, or in the current folder for several.
 
     Returns
     -------
@@ -1009,7 +969,7 @@ def report(folders: str | Path | Iterable[str | Path], /, out: str | Path | None
     'both.html'
     """
     target = None if out is None else _require_path(out, "report: out")
-    return Path(comparison_page.write_report(_require_paths(folders, "report"), target))
+    return Path(page.write_report(_require_paths(folders, "report"), target))
 
 
 def export(
@@ -1019,7 +979,6 @@ def export(
     *,
     frame: int | None = None,
     histories: bool = False,
-    of: str = "",
 ) -> Path:
     """Convert a results folder, or the structure of a scene (.toml), to another file format.
 
@@ -1029,15 +988,12 @@ def export(
         Results folder, or a scene file.
     out : path
         Output file, whose extension determines the format. Fields: .pvd, .vtu, .vtkhdf or .csv (interface only). Time
-        histories and loops: .uff, .mat, or .csv with `histories` or if the folder has no fields. ParaView script that
-        animates the last cycle (the whole slide of a bench): .py. Matrices and friction elements of a scene: .mat for
-        NLvib, .npz for TMDSimPy and pyHarm.
+        histories and loops: .uff, .mat, or .csv with `histories` or if the folder has no fields. Matrices and friction
+        elements of a scene: .mat.
     frame : int, optional
         Index of the frame of a .vtu or .csv file. Default: the last frame.
     histories : bool
         Whether to write time histories to a .csv file even if the folder has fields.
-    of : str
-        Stress that a ParaView script shows, such as "sigma_yy".
 
     Returns
     -------
@@ -1059,11 +1015,10 @@ def export(
     folder = _require_path(folder, "export")
     out = _require_path(out, "export: out")
     if folder.suffix != ".toml":
-        convert.export_results(folder, out, frame, histories, of)
-    elif frame is not None or histories or of:
+        convert.export_results(folder, out, frame, histories)
+    elif frame is not None or histories:
         raise PatchfemError(
-            "the options `frame`, `histories` and `of` can be used only with a results folder; from a "
-            "scene only the structure is exported"
+            "the options `frame` and `histories` can be used only with a results folder"
         )
     else:
         from .export.lab import structures
@@ -1225,10 +1180,10 @@ def compare(
     Parameters
     ----------
     *files : path
-        Surface before and after wear, as two traces or two areal scans, optionally followed by a second pair of traces in
-        the other direction. Alternatively the results folders of two runs, the second one with [wear].
+        Surface before and after wear, as two traces or two areal scans. Alternatively the results folders of two runs, the
+        second one with [wear].
     direction : str
-        Direction of the first two traces, "x" or "y".
+        Direction of the traces, "x" or "y".
     units : tuple of str, optional
         Units of x and z for files without units, such as ("mm", "um").
     shift : float or str, optional
@@ -1272,47 +1227,31 @@ def compare(
     >>> comparison["amplitude_ratio"]["value"] < 1
     True
     """
-    settings = {
-        "units": units,
-        "shift": _parse_length(shift, "compare: shift"),
-        "keep_spikes": keep_spikes,
-        "datum": datum,
-    }
+    options = surface_comparison.Options(
+        units=units,
+        direction=_require_string(direction, "compare: direction"),
+        shift=_parse_length(shift, "compare: shift"),
+        datum=_require_string(datum, "compare: datum"),
+        keep_spikes=keep_spikes,
+    )
     files = [_require_path(file, "compare") for file in files]
-    _require_string(direction, "compare: direction")
-    _require_string(datum, "compare: datum")
     _require_string(piece, "compare: piece")
-    if predicted is not None:
-        predicted = _require_path(predicted, "compare: predicted")
-    elif piece:
-        raise PatchfemError("compare: piece needs predicted")
-    if pairs is None and len(files) > 1 and any(file.is_dir() for file in files):
-        has_setting = units is not None or shift is not None or keep_spikes or datum or direction
-        has_setting = has_setting or predicted is not None
-        if len(files) > 2 or has_setting:
+    if pairs is not None:
+        if files or predicted is not None:
             raise PatchfemError(
-                "compare: give two results folders alone, without other files or settings of traces"
+                "compare: give the table of pairs alone, without files or predicted"
             )
-        wear_change = worn_runs.compare_runs(*files)
-        return worn.wear_data(wear_change, worn.wear_verdict(wear_change))
-    if pairs is None:
-        comparison = verdict.judge_files(files, direction, **settings)
-        if predicted is None:
-            return compared_data.comparison_data(*comparison)
-        worn_prediction = predicted_wear.predict_wear(comparison.parts, predicted, piece)
-        sentences = compared_data.add_predicted_sentence(comparison.verdict, worn_prediction)
-        return compared_data.comparison_data(
-            comparison.parts,
-            sentences,
-            comparison.directions,
-            compared_data.ComputedParts(predicted=worn_prediction),
-        )
-    if predicted is not None:
-        raise PatchfemError("compare: give either predicted or a table of pairs, not both")
-    if files:
-        raise PatchfemError("compare: give either files or a table of pairs, not both")
-    table = pairs_tables.read_pairs(_require_path(pairs, "compare: pairs"))
-    return pairs_data.pairs_data(pairs_data.compare_pairs(table, direction, **settings))
+        return compared_pairs.answer_pairs(_require_path(pairs, "compare: pairs"), options).details
+    if len(files) != 2:
+        raise PatchfemError("compare: give two files, before and after wear, or a table of pairs")
+    if any(file.is_dir() for file in files):
+        if options != surface_comparison.Options() or predicted is not None:
+            raise PatchfemError(
+                "compare: give two results folders alone, without settings of traces"
+            )
+        return worn.answer_runs(*files).details
+    folder = None if predicted is None else _require_path(predicted, "compare: predicted")
+    return compared.answer_files(*files, options, folder, piece).details
 
 
 def _read_sweep_scene(scene: str | Path | Scene, measure: str) -> case_models.SweepScene:
@@ -1453,9 +1392,7 @@ class Measures(Mapping):
         return list(self._measures)
 
     def __repr__(self) -> str:
-        measures = self._measures.items()
-        objects = {name: summaries.measure_object(measure) for name, measure in measures}
-        return "\n".join(sentences.format_measures(objects))
+        return "\n".join(show.format_quantities(runs.make_quantities(self._measures)))
 
 
 class Plots:
@@ -1482,19 +1419,21 @@ class Plots:
         """
         has_patch = self._result.patch is not None or self._result.extra.get("faces")
         reason = "the pieces do not touch" if has_patch else "the scene has no [contact]"
-        return self._draw_first_chart(ax, ("pressure", "faces"), reason)
+        titles = ("Pressure on the interface", "Shear stress on the interface")
+        return self._draw(ax, "pressure", titles, reason)
 
     def loop(self, ax: Axes | None = None) -> Axes:
         """Plot the friction force against the relative displacement of the interface."""
         reason = self._explain_missing_motion() or "no friction acted, or nothing slid"
-        return self._draw_first_chart(ax, ("loop",), reason)
+        return self._draw(ax, "loop", ("Friction loop",), reason)
 
     def history(self, ax: Axes | None = None) -> Axes:
         """Plot the displacement against time, and the last cycles or the friction force.
 
         With `ax`, only the displacement is drawn.
         """
-        return self._draw_first_chart(ax, ("history",), self._explain_missing_motion())
+        titles = ("Whole run", "Displacement", "Friction force")
+        return self._draw(ax, "history", titles, self._explain_missing_motion())
 
     def levels(self, ax: Axes | None = None) -> Axes:
         """Plot the amplitude for each level, or the steady-state amplitude against level or frequency."""
@@ -1502,9 +1441,8 @@ class Plots:
             'the drive has no levels; use drive.waveform = "levels", or a sweep with '
             'accuracy.method = "harmonic"'
         )
-        return self._draw_first_chart(
-            ax, ("levels", "curve"), self._explain_missing_motion() or no_levels
-        )
+        titles = ("Levels of the drive", "Steady motions")
+        return self._draw(ax, "levels", titles, self._explain_missing_motion() or no_levels)
 
     def accuracy(self, ax: Axes | None = None) -> Axes:
         """Plot the largest error of the motion against CPU time, for different numbers of time steps."""
@@ -1513,22 +1451,17 @@ class Plots:
             'accuracy.method = "march"'
         )
         reason = self._explain_missing_motion() or no_steps
-        return self._draw_first_chart(ax, ("accuracy",), reason)
+        return self._draw(ax, "accuracy", ("Accuracy against time",), reason)
 
     def stress(self, ax: Axes | None = None) -> Axes:
         """Plot the von Mises stress in both loaded pieces, and an enlarged view of the contact.
 
-        With `ax`, the enlarged view is omitted.
+        The stress along the interface is shown too. With `ax`, only the picture of both pieces is drawn.
         """
         if self._result.patch is None:
             raise PatchfemError("plot.stress: nothing to draw: the scene has no [contact]")
-        from .export.fields import bodies
-
-        with TemporaryDirectory() as temporary_folder:
-            path = Path(temporary_folder) / "fields.vtkhdf"
-            fields_of_bodies = bodies.write_fields(self._result, path)
-        reason = "the pieces do not touch, or their mesh is not a grid"
-        return self._draw_first_chart(ax, ("bodies",), reason, fields_of_bodies)
+        chart_axes.check_axes(ax, "plot.stress")
+        return pieces.draw_result(self._result, ax)
 
     def _explain_missing_motion(self) -> str:
         """Return why a run has no motion; "" if it has motion."""
@@ -1538,21 +1471,15 @@ class Plots:
             return "a static patch does not move; add [friction] with [slide], or with [structure] and [drive]"
         return "no motion was computed"
 
-    def _draw_first_chart(
-        self, ax: Axes | None, chart_names: tuple, reason: str, bodies: dict | None = None
-    ) -> Axes:
-        """Plot the first of several named charts for which the run has data.
+    def _draw(self, ax: Axes | None, name: str, titles: tuple[str, ...], reason: str) -> Axes:
+        """Plot the charts with some titles for which the run has data, and return the first Axes.
 
-        Raises PatchfemError with `reason` if the run has no data for any of them. `bodies` contains the fields of the
-        pieces.
+        With `ax`, only the first chart is drawn. Raises PatchfemError with `reason` if the run has no data for any of them.
         """
-        if ax is not None and not hasattr(ax, "errorbar"):
-            raise PatchfemError(
-                f"plot.{chart_names[0]}: matplotlib Axes are needed as ax, not {ax!r:.60}"
-            )
-        axes_of_chart = run_page.draw_axes(self._result, chart_names, ax, bodies)
+        answer = runs.make_answer(self._result)
+        axes_of_chart = chart_axes.draw_charts(answer, titles, ax, f"plot.{name}")
         if axes_of_chart is None:
-            raise PatchfemError(f"plot.{chart_names[0]}: nothing to draw: {reason}")
+            raise PatchfemError(f"plot.{name}: nothing to draw: {reason}")
         return axes_of_chart
 
 
@@ -1575,13 +1502,15 @@ class Result(run_result.Result):
 
     def _repr_html_(self) -> str:
         """Return the HTML representation for notebooks: outcome, headline, measures and warnings."""
-        summary = summaries.summarise_run(self)
-        return sentences.notebook_html(
-            summary,
-            sentences.verdict_sentence(summary),
-            summaries.count_cycles(self),
-            released.describe_release(self),
+        answer = runs.make_answer(self)
+        rows = "".join(
+            f"<tr><td>{escape(name)}</td><td style='text-align:right'>{escape(text)}</td></tr>"
+            for name, text in show.list_quantities(answer.quantities)
         )
+        sentences = escape(" ".join(answer.verdict))
+        warnings = "".join(f"<p>&#9888; {escape(text)}</p>" for text in self.warnings)
+        title = f"<b>{escape(answer.title)}</b><br>" if answer.title else ""
+        return f"<div>{title}{sentences}{warnings}<table>{rows}</table></div>"
 
     @property
     def notes(self) -> list[str]:
@@ -1613,12 +1542,12 @@ class Result(run_result.Result):
 
     def to_xarray(self) -> Dataset:
         """Return the time histories and fields of the run with units and scene, as in result.nc."""
-        return histories.result_contents(self).to_xarray()
+        return netcdf.to_dataset(runs.make_answer(self))
 
     def to_pyvista(self, frame: int | None = -1) -> Any:
         """Return both pieces and their interface as PyVista grids, with the fields of fields.vtkhdf.
 
-        The blocks are `lower`, `upper` and `interface`, and also `strips` for a patch that wears in strips. The pieces
+        The blocks are `lower`, `upper` and `interface`; over strips a field has its mean there. The pieces
         have the arrays `displacement`, `stress` (xx, yy, zz, xy, 0, 0; tension positive), `von_mises` and `material`. The
         interface has `normal_stress` (compression positive), `gap` and, after a motion, `shear_stress`, `slip` and
         `status`. Stresses are in MPa and lengths in m. The field array `units` of each grid lists the unit of each array,
@@ -1651,12 +1580,12 @@ class Result(run_result.Result):
             raise PatchfemError(f"to_pyvista: {self._explain_missing_pieces()}")
         count = len(self.fields["time"])
         if frame is None:
-            return multiblock.read_multiblocks(self, range(count))
+            return grids.make_result_grids(self, range(count))
         if not isinstance(frame, Integral) or not -count <= frame < count:
             raise PatchfemError(
                 f"to_pyvista: there is no frame {frame}; the run has frames 0 to {count - 1}"
             )
-        return multiblock.read_multiblocks(self, [frame])[0]
+        return grids.make_result_grids(self, [frame])[0]
 
     def _explain_missing_pieces(self) -> str:
         """Return why a run has no single pair of pieces, and what to use instead."""
@@ -1696,5 +1625,5 @@ class Result(run_result.Result):
         True
         """
         folder = _require_path(folder, "save")
-        results_folder.save_run(self, folder)
+        run_folder.save_run(self, folder)
         return folder

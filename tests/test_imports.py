@@ -23,7 +23,7 @@ from command_line import (
 from scene_texts import BENCH, COATED, COULOMB, PLASTIC, POINT, SHEAR, STRUCTURE, TRIANGLE
 
 import patchfem as pf
-from patchfem.export.summary import PACKAGES, package_versions
+from patchfem.export.runs import PACKAGES, list_versions
 
 RIG = Path(__file__).parents[1] / "studies" / "rig" / "rig.toml"
 PATCH = COATED + '[contact.tilt]\nangle = "0.1 mrad"\n'
@@ -172,7 +172,7 @@ def rig_without_files() -> str:
 
 HEAVY = "numpy scipy skfem numba matplotlib xarray h5py pyvista meshio"
 OUT = ("-o", "OUT", "-q", "--no-page")
-NO_PATCH = "contact mesh skfem export.report export.drawing"
+NO_PATCH = "contact mesh skfem export.page export.charts.panels"
 COMMANDS = {  # command -> scene, arguments, modules of patchfem and packages that are not loaded
     **{
         f"run of a {name}": (
@@ -203,7 +203,7 @@ COMMANDS = {  # command -> scene, arguments, modules of patchfem and packages th
     "sweep": (
         BENCH,
         ("sweep", "SCENE", "--over", "friction.static=0.1,0.2", "-o", "OUT", "-q"),
-        "contact mesh export.report export.drawing export.fields",
+        "contact mesh export.fields",
         "matplotlib pandas xarray dask distributed",
     ),
     "run of the rig with its page": (
@@ -287,7 +287,7 @@ def test_always_help_and_check_are_fast(write_scene, words):
 
 def test_exact_versions_of_installed_packages():
     """The listed versions are those of the installed packages, also with importlib.metadata loaded lazily."""
-    found = package_versions()
+    found = list_versions()
     assert set(found) == {"python", *PACKAGES}
     assert all(found[name] == version(name) for name in PACKAGES)
     for use in (

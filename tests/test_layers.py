@@ -35,15 +35,13 @@ SCENE = ("", "__main__", "api", "commands.*", "scene", "scene.*", "model", "mode
 # modules that run one scene repeatedly with other values of its keys
 SCENE_ALSO = (
     "campaigns.fits.*",  # a scene with other values of its keys or with another patch
-    "export.fits.request",
-    "export.fits.wear",
-    "export.fits.patch",  # they write the fitted scene
+    "export.fits",  # it writes the fitted scene
     "campaigns.sweeps.case_models",
     "campaigns.rows.condition_models",
 )
 OUTSIDE = {
     "numba": ("*kernels", "compiled", "compiled.*"),
-    "pyvista": ("export.drawing.view", "export.fields.multiblock"),
+    "pyvista": ("export.convert", "export.fields.grids"),
     "meshio": ("mesh.files", "export.*"),
 }
 # folders of the physics in their reading order
@@ -210,7 +208,7 @@ SMALL = {  # a small package without a fault, into which each test inserts one
     "dynamics.events": "def f():\n    compiled.load('dynamics.event_kernels')\n    from .drives import Sine",
     "model.build": "from ..scene.reader import Scene\ndef build(scene: Scene): pass",
     "runs": "from . import run", "runs.run": "from ..model.build import build\nfrom ..dynamics import events",
-    "export.drawing.view": "import pyvista", "export.vtk": "import meshio", "export.page": "from ..runs import run",
+    "export.convert": "import pyvista", "export.vtk": "import meshio", "export.page": "from ..runs import run",
 }  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Each feature removed in patchfem 1.0 or 1.1 is refused with one sentence that names its replacement."""
+"""Each feature removed in patchfem 1.0, 1.1 or 2.0 is refused with one sentence that names its replacement."""
 
 import re
 from functools import partial
@@ -44,6 +44,24 @@ def read_file(reader, name: str, folder) -> None:
     path = folder / name
     path.write_text("    -1\n", "utf-8")
     reader(path)
+
+
+def export_structure(folder) -> None:
+    """Export the matrices of a rig as .npz."""
+    pf.export(write_rig(folder), folder / "rig.npz")
+
+
+def export_script(folder) -> None:
+    """Export the results of a patch as a script for ParaView."""
+    results = pf.run(COATED, **{"accuracy.tolerance": 0.05}).save(folder / "out")
+    pf.export(results, folder / "play.py")
+
+
+def write_rig(folder):
+    """Write the scene of a rig, and return its path."""
+    path = folder / "rig.toml"
+    path.write_text(RIG, "utf-8")
+    return path
 
 
 TRIED = {  # removed feature -> (function that uses it, replacement that the message names)
@@ -107,6 +125,28 @@ TRIED = {  # removed feature -> (function that uses it, replacement that the mes
         partial(run_failing_command, ("sweep", "a.toml", "--device=cuda")),
         "-j N or --executor dask",
     ),
+    "fit --placebo": (
+        partial(run_failing_command, ("fit", "a.toml", "--placebo", "friction.static=0.3")),
+        "set another value of the key with --set",
+    ),
+    "fit --from-patch": (
+        partial(run_failing_command, ("fit", "a.toml", "--from-patch")),
+        "run the scene with its patch",
+    ),
+    "fit --amplitudes": (
+        partial(run_failing_command, ("fit", "a.toml", "--amplitudes", "1 um,2 um")),
+        "leave it out",
+    ),
+    "export --of": (
+        partial(run_failing_command, ("export", "out", "-o", "a.vtu", "--of", "sigma_yy")),
+        "choose the field in ParaView",
+    ),
+    "compare with four files": (
+        partial(run_failing_command, ("compare", "a.csv", "b.csv", "c.csv", "d.csv")),
+        "compare each direction by itself",
+    ),
+    "export of a structure as .npz": (export_structure, "exported as .mat"),
+    "export of a script for ParaView": (export_script, "write .pvd for older versions"),
     "profile(tip=)": (partial(call, pf.profile, "tip"), "compare the tip radius with"),
     "report(measured=)": (partial(call, pf.report, "measured"), "`patchfem import FILE"),
     ".unv mesh": (partial(read_file, read_pieces, "pair.unv"), "use .med or .msh"),
@@ -120,15 +160,15 @@ def test_refuses_removed_feature(tmp_path, name):
     with pytest.raises(pf.PatchfemError) as refused:
         attempt(tmp_path)
     sentence = str(refused.value)
-    assert re.search(r"removed in patchfem 1\.[01]\b", sentence) and instead in sentence
+    assert re.search(r"removed in patchfem (1\.[01]|2\.0)\b", sentence) and instead in sentence
     assert len(sentence.strip().splitlines()) == 1
 
 
 def test_always_all_removed_features_are_tested():
     """Every removed option, key and quadrature rule is among the tested features."""
-    assert {" ".join(pair) for pair in removed.REMOVED_OPTIONS} | set(removed.REMOVED_KEYS) <= set(
-        TRIED
-    )
+    assert {
+        " ".join(pair) for pair in (*removed.REMOVED_OPTIONS, *removed.REMOVED_OPTIONS_2)
+    } | set(removed.REMOVED_KEYS) <= set(TRIED)
     assert {f"quadrature {name}" for name in removed.REMOVED_QUADRATURES} <= set(TRIED)
 
 

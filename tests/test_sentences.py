@@ -4,6 +4,7 @@ Other tests ask what a sentence must contain. Here its words are compared, with 
 change of words, `python tests/test_sentences.py` writes the list anew; read the difference before you commit it.
 """
 
+import json
 import re
 import sys
 import tempfile
@@ -29,7 +30,7 @@ STATIC = ("--over", "friction.static=0.1,0.2")
 TILTS = ("--over", "contact.tilt.angle=0.001 mrad,0.003 mrad,0.01 mrad,0.03 mrad,0.1 mrad")
 DRAWN = ("--over", "friction.static=0.2..0.4", "--over", "normal.load=90 N..110 N", "--sobol", "64")
 
-SCREENS = {  # runs and sweeps whose first lines are compared
+SCREENS = {  # runs and sweeps whose verdicts are compared
     "patch": ("run", "patch.toml"),
     "bench": ("run", "bench.toml"),
     "block_steady": ("run", "block.toml"),
@@ -86,9 +87,10 @@ def collect_sentences(folder: Path) -> dict:
     out["warning"] = {}
     for name, words in SCREENS.items():
         answer = run_cli(*words, "-o", folder / name, "--no-page")
-        out["answer"][name] = (
-            answer.out.partition("\n\n")[0] if words[0] == "sweep" else first_lines(answer.out)
-        )
+        verdict = json.loads((folder / name / "summary.json").read_text("utf-8"))["verdict"]
+        out["answer"][name] = "\n".join(verdict)
+        # the screen shows the same sentences, below the title
+        assert out["answer"][name] in answer.out
     for name, words in REFUSALS.items():
         out["refusal"][name] = run_cli(*words).err
     for name, (text, sets) in WARNINGS.items():
@@ -100,14 +102,6 @@ def collect_sentences(folder: Path) -> dict:
         for name, text in texts.items():
             texts[name] = replace_numbers(text, folder)
     return out
-
-
-def first_lines(text: str) -> str:
-    """Return the lines of a run's output between the title and the table."""
-    lines = text.splitlines()
-    begin = next(k for k, line in enumerate(lines) if re.match(r"[a-z_]+: ", line))
-    end = next(k for k, line in enumerate(lines) if k > begin and re.fullmatch(r"\w+", line))
-    return "\n".join(lines[begin:end])
 
 
 def replace_numbers(text: str, folder: Path) -> str:

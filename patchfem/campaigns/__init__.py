@@ -14,11 +14,11 @@ PUBLIC = {
         "SurfaceRuns",
         "run_both_surfaces",
         "surface_runs_to_dict",
+        "write_common_traces",
     ),
     "cost": (
         "Cost",
         "TOLERANCE",
-        "find_affected_measures",
         "describe_fastest_setting",
         "find_fastest_settings",
         "find_measures_with_error",
@@ -26,28 +26,13 @@ PUBLIC = {
         "find_worst_error",
         "find_worst_run_error",
     ),
-    "fits.curve": (
-        "DEFAULT_STARTS",
-        "FittedCurve",
-        "fit_curve",
-    ),
-    "fits.loop": (
-        "FittedLoop",
-        "fit_hysteresis_loop",
-    ),
-    "fits.loop_path": ("LoopOptions",),
-    "fits.patch": (
-        "FittedPatch",
-        "fit_patch",
-        "check_amplitudes",
-    ),
-    "fits.patch_laws": (
-        "FITTED_LAWS",
-        "FittedLaw",
-    ),
-    "fits.problem": (
-        "FittedKeys",
-        "parse_ranges",
+    "fits.curve": ("FittedCurve",),
+    "fits.loop": ("FittedLoop",),
+    "fits.request": (
+        "FitOptions",
+        "Listener",
+        "choose_kind",
+        "fit_measurement",
     ),
     "fits.wear": (
         "FittedCoefficient",
@@ -58,41 +43,26 @@ PUBLIC = {
         "NUMERICAL_SETTINGS",
         "find_applicable_settings",
     ),
-    "rows.cells": ("compute_rms_scores",),
-    "rows.condition_models": (
-        "FitRequest",
-        "GAIN_KEYS",
-    ),
     "rows.fit": (
         "FittedRows",
-        "RowsOptions",
         "SAME_SCORE",
-        "fit_rows",
     ),
-    "rows.null_models": ("NULL_MODELS",),
-    "rows.search": (
-        "SearchSettings",
-        "UNSTABLE",
+    "surface_pairs": (
+        "average_pairs",
+        "find_group",
+        "read_pairs",
     ),
     "sweeps.case_models": ("SweepScene",),
     "sweeps.cases": ("Cases",),
-    "sweeps.estimate": (
-        "MAX_CASES_WITH_SUMMARY",
-        "MAX_CASES_WITH_TABLES",
-        "estimate_sweep",
-    ),
-    "sweeps.executors.cluster": ("environment_versions",),
     "sweeps.parse_request": (
         "Request",
         "warn_of_invalid_cases",
         "read_cases",
         "read_sweep",
     ),
-    "sweeps.ranking": ("compute_sobol_indices",),
+    "sweeps.plan": ("plan_sweep",),
     "sweeps.sweep": (
-        "RemainingTime",
         "WorkerData",
-        "format_duration",
         "iterate_chunks",
     ),
 }

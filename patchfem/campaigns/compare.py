@@ -5,15 +5,19 @@ In: two models that differ only in their gap. Out: the measures of both runs wit
 """
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from ..core import Measure, NotConverged, PatchfemError
+from ..disk.atomic_write import write_text
 from ..model.model import Model
 from ..runs.plan import plan
 from ..runs.results.result import patch_surface
 from ..runs.run import run
+from ..surface.compare.records import Comparison
+from ..surface.profile import Profile, level, resample_evenly
 
 # Description of each compared measure, and the tables that a scene requires for it.
 COMPARED_MEASURES = {
@@ -148,6 +152,36 @@ def _run_surface(model: Model, say) -> SurfaceResult:
         np.array(result.fields["normal_stress"][0]),
         [*result.warnings, *result.extra["notes"]],
     )
+
+
+def write_common_traces(comparison: Comparison, folder: Path) -> list[Path]:
+    """Write the common part of two compared traces as surface_before.csv and surface_after.csv.
+
+    A scene reads them with heights = "surface": x counts from their middle, and the heights are levelled. Without a common
+    part the whole traces are written.
+
+    Raises
+    ------
+    PatchfemError
+        If scans were compared.
+    """
+    if comparison.is_areal:
+        raise PatchfemError(
+            "compare --scene: the contact can be computed only for traces; write one line of heights of each scan to a "
+            "file of its own"
+        )
+    curves = comparison.evidence.curves
+    traces = [comparison.before, comparison.after]
+    if curves is not None and np.isfinite(curves.before).any():
+        traces = [Profile(curves.x, z, "trace") for z in (curves.before, curves.after)]
+    paths = []
+    for name, trace in zip(("before", "after"), traces, strict=True):
+        flat = level(resample_evenly(trace))
+        x = 1e6 * (flat.x - (flat.x[0] + flat.x[-1]) / 2)
+        rows = [f"{place:.6f},{height:.6f}" for place, height in zip(x, 1e6 * flat.z, strict=True)]
+        paths.append(folder / f"surface_{name}.csv")
+        write_text(paths[-1], "\n".join(["x [um],z [um]", *rows, ""]))
+    return paths
 
 
 def surface_runs_to_dict(runs: SurfaceRuns) -> dict:

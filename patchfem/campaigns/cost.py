@@ -91,6 +91,8 @@ class Cost:
         Advice from the warnings of a run that misses its tolerance.
     steps : int or None
         Number of time steps per cycle; None if the method takes no time steps.
+    nodes : int or None
+        Number of nodes of the interface; None without a patch.
     """
 
     label: str
@@ -106,6 +108,7 @@ class Cost:
     tolerance: float = 0.0
     remedies: tuple = ()
     steps: int | None = None
+    nodes: int | None = None
 
     def meets_tolerance(self) -> bool:
         """Return whether every error estimate is within the tolerance of the run."""
@@ -369,14 +372,15 @@ def _time_setting(
 
 
 class _FinishedRun(NamedTuple):
-    """Measures, warnings and number of steps per cycle of a finished run.
+    """Measures, warnings, number of steps per cycle and number of interface nodes of a finished run.
 
-    The number of steps is None if the method takes no time steps.
+    The number of steps is None if the method takes no time steps, and that of nodes without a patch.
     """
 
     measures: dict
     warnings: Sequence
-    steps: int | None
+    steps: int | None = None
+    nodes: int | None = None
 
 
 def _make_cost(setting: Setting, timings: list, finished: _FinishedRun) -> Cost:
@@ -406,6 +410,7 @@ def _make_cost(setting: Setting, timings: list, finished: _FinishedRun) -> Cost:
         tolerance=setting.model.accuracy.tolerance,
         remedies=tuple(remedies),
         steps=finished.steps,
+        nodes=finished.nodes,
     )
 
 
@@ -437,10 +442,11 @@ def _run_setting(
     try:
         if setting.level:
             fine, *_ = solve_on_split_mesh(setting.model.patch, setting.level, can_split)
-            return _FinishedRun(fine.measures, (), None)
+            return _FinishedRun(fine.measures, ())
         result = run_plan(plan(setting.model), fresh=True)
         steps = result.extra.get("steps_per_cycle") or result.extra.get("steps")
-        return _FinishedRun(result.measures, result.warnings, steps)
+        nodes = None if result.patch is None else int(result.patch.x.size)
+        return _FinishedRun(result.measures, result.warnings, steps, nodes)
     except (NotConverged, MemoryError) as error:
         if say is not None:
             say(f"{label}: left out ({error or 'out of memory'})")

@@ -1,38 +1,35 @@
-"""The command that compares two measured surfaces, before and after wear."""
+"""The command that compares two measured surfaces, before and after wear, or two runs."""
 
-import json
 from pathlib import Path
-from typing import Annotated, NamedTuple
-
-from cyclopts import Parameter
 
 from ..campaigns import compare as pressing
-from ..export import results, summary
-from ..export.surfaces import compare as paper
-from ..export.surfaces import pairs as pairs_paper
-from ..export.surfaces import predicted as predicted_paper
-from ..export.surfaces import worn, worn_runs
-from ..surface import profile
-from ..surface.compare import pairs as tables
-from ..surface.compare import verdict
+from ..export.surfaces import compare as compared
+from ..export.surfaces import pairs as compared_pairs
+from ..export.surfaces import worn
+from ..surface.compare.compare import Options
 from .shared import (
+    NOT_CONVERGED,
     CommandExit,
     Json,
-    NotConvergedExit,
+    NoPage,
     Out,
+    Output,
+    Plot,
+    Progress,
     Quiet,
     Sets,
     Units,
     UsageError,
+    Verbose,
     choose_folder,
     flag_option,
     load_model,
     load_scene,
-    note,
     parse_quantity,
     parse_units,
+    path_option,
     print_message,
-    progress_bar,
+    save,
     text_option,
 )
 from .streams import make_printable
@@ -43,17 +40,12 @@ def compare(
     after: Path | None = None,
     /,
     *other: Path,
-    pairs: Annotated[
-        Path | None,
-        Parameter(
-            help="table of pairs in place of BEFORE and AFTER, such as "
-            "pairs.csv: each line names two files or two results folders "
-            "in the columns `before` and `after`"
-        ),
-    ] = None,
+    pairs: path_option(
+        "table of pairs in place of BEFORE and AFTER, such as pairs.csv: each line names two files in the columns "
+        "`before` and `after`"
+    ) = None,
     direction: text_option(
-        "axis along which the traces run, x or y; it names the direction in the answer and "
-        "may be left out"
+        "axis along which the traces run, x or y; it names the direction in the answer and may be left out"
     ) = "",
     units: Units = "",
     shift: text_option(
@@ -61,237 +53,106 @@ def compare(
         "start at the same mark"
     ) = "",
     keep_spikes: flag_option(
-        "keep spikes, dropouts and dust; without this option they are removed from traces"
+        "keep spikes, dropouts and dust; without this option they are removed"
     ) = False,
     datum: text_option(
-        "what is known of the datum of the instrument, such as straight; then no bow is subtracted "
-        "from traces"
+        "what is known of the datum of the instrument, such as straight; then no bow is subtracted from traces"
     ) = "",
-    scene: Annotated[
-        Path | None,
-        Parameter(
-            name="--scene",
-            help="scene with a patch, such as rig.toml; the "
-            "patch is pressed with each of the two "
-            "surfaces in turn",
-        ),
-    ] = None,
+    scene: path_option(
+        "scene with a patch, such as rig.toml; the patch is pressed with each of the two surfaces in turn",
+        "--scene",
+    ) = None,
     set_: Sets = (),
-    predicted: Annotated[
-        Path | None,
-        Parameter(
-            help="results folder of a run with [wear], such as out/wear; its worn depth is laid "
-            "over that of the traces, and the wear coefficient is fitted"
-        ),
-    ] = None,
+    predicted: path_option(
+        "results folder of a run with [wear], such as out/wear; its worn depth is drawn over that of the traces, and the "
+        "wear coefficient is fitted"
+    ) = None,
     piece: text_option(
         "piece of which the traces are, such as upper (or lower), for --predicted; it may be left out if "
         "both pieces wear alike (wear.upper_share = 0.5)"
     ) = "",
     out: Out = None,
+    no_page: NoPage = False,
+    plot: Plot = None,
     json_: Json = False,
     quiet: Quiet = False,
+    verbose: Verbose = False,
 ):
-    """Compare the surfaces measured in the files BEFORE and AFTER. The results are the shift between the surfaces, the
-    worn depth, ratios of roughness parameters, a verdict and a page. Areal scans also give the worn volume, maps, and
-    the levelled difference as X3P and text. To compare the perpendicular direction too, append its two traces. With
-    --pairs, all pairs of a table are compared; the results are then mean, scatter and interval over the pairs. BEFORE
-    and AFTER may also be two results folders. AFTER must then belong to a run with [wear], and the page shows the wear
-    between the two runs. With --predicted, the worn depth of a run is overlaid on that of the traces, and the wear
-    coefficient is fitted with its interval.
+    """Compare the surfaces measured in the files BEFORE and AFTER: worn depth, volume or area with intervals, a verdict
+    and a page. With --pairs, all pairs of a table are compared; the results are then mean, scatter and interval over the
+    pairs. BEFORE and AFTER may also be results folders of two runs, the second one with [wear]. With --predicted, the worn
+    depth of a run is drawn over that of the traces, and the wear coefficient is fitted with its interval.
 
     Example: patchfem compare before.csv after.csv --direction x -o out/worn
     """
-    if direction not in ("", "x", "y"):
-        raise UsageError(f"compare --direction {direction}: the direction must be x or y")
-    if datum not in ("", "straight"):
-        raise UsageError(
-            f"compare --datum {datum}: give --datum straight, or leave it out if the datum may be bent"
-        )
-    settings = {
-        "units": parse_units(units),
-        "shift": parse_quantity(shift, "length", "compare --shift"),
-        "keep_spikes": keep_spikes,
-        "datum": datum,
-    }
+    length = parse_quantity(shift, "length", "compare --shift")
+    options = Options(parse_units(units), direction, length, datum, keep_spikes)
+    given = {"--scene": scene, "--predicted": predicted, "--piece": piece}
     files = [path for path in (before, after, *other) if path is not None]
-    if piece and predicted is None:
-        raise UsageError(f"compare --piece {piece}: this option needs --predicted")
     if pairs is not None:
-        if files or scene is not None or predicted is not None:
-            other_option = "--scene" if scene is not None else "--predicted"
-            raise UsageError(
-                f"compare --pairs {pairs}: give the table alone, without "
-                f"{'other files' if files else other_option}"
-            )
-        _compare_table(pairs, direction, settings, choose_folder(out, pairs.stem), json_, quiet)
+        _refuse_others({"another file": files, **given}, "a table of pairs")
+        output = Output(choose_folder(out, pairs.stem), json_, quiet, not no_page, plot, verbose)
+        _compare_pairs(pairs, options, output)
         return
-    if len(files) < 2:
+    if len(files) != 2:
+        removed = ""
+        if len(files) == 4:
+            removed = "; four files were removed in patchfem 2.0, compare each direction by itself"
         raise UsageError(
-            "compare: give two files BEFORE and AFTER, or a table of pairs with --pairs"
+            f"compare: give two files BEFORE and AFTER, or a table of pairs with --pairs{removed}"
         )
-    folders = before.is_dir(), after.is_dir()
-    if any(folders) and len(files) == 2 and not all(folders):
-        worn_runs.compare_runs(before, after)  # raises the error for a file and a folder
-    if any(folders):
-        _refuse_surface_options(
-            {
-                "a third file": other,
-                "--direction": direction,
-                "--units": units,
-                "--shift": shift,
-                "--keep-spikes": keep_spikes,
-                "--datum": datum,
-                "--scene": scene,
-                "--set": set_,
-                "--predicted": predicted,
-            }
-        )
-        return _compare_runs(before, after, out, json_)
-    request = _RunRequest(scene, set_, predicted, piece)
-    target = choose_folder(out, f"{before.stem}-{after.stem}")
-    judgement = verdict.judge_files(tuple(files), direction, **settings)
-    data = _write_comparison(judgement, request, target, json_=json_, quiet=quiet)
-    for text in data["notes"]:
-        note(text)
-    if json_:
-        print(json.dumps(data, ensure_ascii=False, allow_nan=False))
+    name = f"{before.resolve().stem}-{after.resolve().stem}"
+    output = Output(choose_folder(out, name), json_, quiet, not no_page, plot, verbose)
+    if before.is_dir() or after.is_dir():
+        set_options = {"--set": set_, "--units": units, "--shift": shift, "--datum": datum}
+        set_options |= {"--direction": direction, "--keep-spikes": keep_spikes}
+        _refuse_others({**set_options, **given}, "results folders")
+        save(lambda _: worn.answer_runs(before, after), output)
+    elif scene is not None:
+        _compare_in_scene(before, after, options, (scene, set_), output)
+    else:
+        save(lambda _: compared.answer_files(before, after, options, predicted, piece), output)
 
 
-class _RunRequest(NamedTuple):
-    """Additional requests of a comparison: a scene to run, and a run whose computed wear is overlaid."""
-
-    scene: Path | None
-    sets: tuple
-    predicted: Path | None
-    piece: str
+def _refuse_others(given: dict, subject: str) -> None:
+    """Raise UsageError for the first option that has a value but does not apply to what is compared."""
+    for name, value in given.items():
+        if value:
+            raise UsageError(f"compare: {name} cannot be used with {subject}; leave it out")
 
 
-def _write_comparison(
-    judgement: "verdict.Judgement", request: _RunRequest, target: Path, *, json_: bool, quiet: bool
-) -> dict:
-    """Write the files of a comparison into a folder, and print it as text unless `json_`.
-
-    Parameters
-    ----------
-    judgement : Judgement
-    request : _RunRequest
-    target : Path
-    json_, quiet : bool
-
-    Returns
-    -------
-    dict
-        The content of compare.json.
-    """
-    parts, comparison, directions = judgement
-    worn_prediction = None
-    if request.predicted is not None:
-        worn_prediction = predicted_paper.predict_wear(parts, request.predicted, request.piece)
-        comparison = paper.add_predicted_sentence(comparison, worn_prediction)
-    with results.Folder(target) as folder:
-        pressing = None
-        if request.scene is not None:
-            pressing = _press_surfaces(request.scene, request.sets, parts[0], folder.path, quiet)
-        computed = paper.ComputedParts(pressing, worn_prediction)
-        data = paper.comparison_data(parts, comparison, directions, computed)
-        summary.write_json(data, folder.path / "compare.json")
-        paper.write_page(folder.path / "report.html", parts, comparison, directions, computed)
-        paper.write_difference(folder.path, parts[0])
-        if worn_prediction is not None:
-            predicted_paper.write_csv(folder.path / "predicted.csv", worn_prediction)
-    if not json_:
-        print("\n".join(paper.format_comparison(parts, comparison, computed)))
-        print(f"results: {target}")
-    return data
-
-
-def _compare_table(
-    path: Path, direction: str, settings: dict, target: Path, json_: bool, quiet: bool
-) -> None:
-    """Compare all pairs in a table; the exit code is 3 if some pairs fail and 2 if all pairs fail.
-
-    Parameters
-    ----------
-    path : Path
-        The table.
-    direction : str
-        Axis of the traces whose line in the table states none.
-    settings : dict
-        Settings of `verdict.judge_files`.
-    target : Path
-        Folder of the results.
-    json_, quiet : bool
-    """
-    requests = tables.read_pairs(path)
-    with results.Folder(target) as folder:
-        with progress_bar(quiet) as report_progress:
-            rows = pairs_paper.compare_pairs(requests, direction, report_progress, **settings)
-        data = pairs_paper.pairs_data(rows)
-        summary.write_json(data, folder.path / "pairs.json")
-        pairs_paper.write_csv(rows, folder.path / "pairs.csv")
-        pairs_paper.write_page(folder.path / "report.html", rows, path.name)
-    for text in data["notes"]:
-        note(text)
-    print(
-        json.dumps(rows, ensure_ascii=False, allow_nan=False)
-        if json_
-        else "\n".join([*pairs_paper.format_pairs(rows), f"results: {target}"])
-    )
+def _compare_pairs(table: Path, options, output: Output) -> None:
+    """Compare all pairs in a table; the exit code is 3 if some pairs fail and 2 if all pairs fail."""
+    with Progress(output.is_quiet or output.as_json) as progress:
+        answer = save(lambda _: compared_pairs.answer_pairs(table, options, progress), output)
+    rows = answer.details["pairs"]
     failed = [row for row in rows if row["outcome"] == "failed"]
     for row in failed:
-        print_message(make_printable(f"{path}:{row['line']}: {row['message']}"))
-    if len(failed) == len(rows):
-        raise CommandExit(2)
+        print_message(make_printable(f"{table}:{row['line']}: {row['message']}"))
     if failed:
-        raise NotConvergedExit
+        raise CommandExit(2 if len(failed) == len(rows) else NOT_CONVERGED)
 
 
-def _refuse_surface_options(options: dict):
-    """Raise UsageError for options for measured surfaces if results folders are compared."""
-    for name, value in options.items():
-        if value:
-            raise UsageError(
-                f"compare: {name} can only be used for measured surfaces, not for results folders; "
-                "leave it out"
-            )
-
-
-def _compare_runs(before: Path, after: Path, out, json_: bool):
-    """Compare the wear between the runs in two results folders."""
-    wear = worn_runs.compare_runs(before, after)
-    wear_verdict = worn.wear_verdict(wear)
-    data = worn.wear_data(wear, wear_verdict)
-    target = choose_folder(out, f"{before.resolve().name}-{after.resolve().name}")
-    with results.Folder(target) as folder:
-        summary.write_json(data, folder.path / "compare.json")
-        worn.write_page(folder.path / "report.html", wear, wear_verdict)
-    for text in data["notes"]:
-        note(text)
-    print(
-        json.dumps(data, ensure_ascii=False, allow_nan=False)
-        if json_
-        else "\n".join([*worn.format_wear(wear, wear_verdict), f"results: {target}"])
-    )
-
-
-def _press_surfaces(scene: Path, sets, part, target: Path, quiet: bool):
-    """Run a scene with each surface as its profile; write the traces into the folder."""
-    if not isinstance(part.before, profile.Profile):
-        raise UsageError(
-            "compare --scene: the contact can be computed only for traces; write one line of heights of "
-            "each scan to a file of its own"
-        )
+def _compare_in_scene(before: Path, after: Path, options, base: tuple, output: Output) -> None:
+    """Compare two traces, and run a scene with each of them as the profile of its patch."""
+    scene, sets = base
     if load_scene(scene, sets).contact is None:
         raise UsageError(
             f"compare --scene {scene}: the scene has no [contact], so it has no patch to press"
         )
-    models = []
-    for name, trace in zip(("before", "after"), paper.pressed_traces(part)):
-        path = paper.write_trace(target / f"surface_{name}.csv", trace).resolve()
-        models.append(
+
+    def run_surfaces(*paths: Path):
+        """Run the scene with each trace."""
+        profile = "contact.profile"
+        models = [
             load_model(
-                scene, (*sets, f"contact.profile.file={path}", "contact.profile.heights=surface")
+                scene, (*sets, f"{profile}.file={path.resolve()}", f"{profile}.heights=surface")
             )
-        )
-    return pressing.run_both_surfaces(*models, scene.name, None if quiet else print_message)
+            for path in paths
+        ]
+        return pressing.run_both_surfaces(*models, scene.name, output.report)
+
+    save(
+        lambda folder: compared.compare_with_scene(before, after, options, run_surfaces, folder),
+        output,
+    )

@@ -33,6 +33,7 @@ REQUIRED_PACKAGES = (
     "xarray",
     "h5netcdf",
     "h5py",
+    "jinja2",
     "threadpoolctl",
     "contourpy",
 )

@@ -6,32 +6,30 @@ import re
 import tomllib
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
-
-from cyclopts import Parameter
 
 from .. import __version__
 from ..disk.atomic_write import write_text
-from ..export import results, summary
 from ..export.surfaces import roughness
 from ..model import model
 from ..model.source import locate_errors
 from ..runs.patch import trace_split
 from ..scene import scene, toml_text
 from ..scene.files import require_files
-from ..surface.files import read
 from ..surface.roughness import form as forms
-from ..surface.roughness import report as roughness_report
 from .shared import (
     Json,
+    Output,
+    Plot,
     Units,
     UsageError,
-    flag_option,
-    note,
+    Verbose,
     out_option,
     parse_quantity,
     parse_units,
+    path_option,
+    present,
     refuse_existing,
+    save,
     text_option,
 )
 
@@ -51,8 +49,7 @@ def profile(
         'wavelength that separates roughness from waviness (L-filter), such as "0.25 mm"'
     ) = "",
     form: text_option(
-        "form to subtract first: a polynomial, given by its degree from 1 (line or plane) to 9, such "
-        "as 2; or `cylinder`"
+        "form to subtract first, such as 1 (a line or a plane), or circle for a trace over a cylinder or a ball"
     ) = "1",
     s_filter: text_option(
         'wavelength of the S-filter, such as "2.5 um"; shorter waves are removed first'
@@ -62,18 +59,16 @@ def profile(
         "positions, first the two in x, then the two in y"
     ) = "",
     units: Units = "",
-    split: Annotated[
-        Path | None,
-        Parameter(
-            help="scene with a patch, such as scene.toml: print the tables that divide FILE between its mesh and a layer "
-            "of asperities, at --cutoff or at the shortest wave that mesh and load resolve; -o names the new scene"
-        ),
-    ] = None,
+    split: path_option(
+        "scene with a patch, such as scene.toml: print the tables that divide FILE between its mesh and a layer "
+        "of asperities, at --cutoff or at the shortest wave that mesh and load resolve; -o names the new scene"
+    ) = None,
     out: out_option(
         "folder for a page, a table of the parameters and the levelled heights, such as out/trace"
     ) = None,
+    plot: Plot = None,
     json_: Json = False,
-    verbose: flag_option("print the definition of each parameter", "-v", "--verbose") = False,
+    verbose: Verbose = False,
 ):
     """Print the roughness parameters of each FILE, with intervals estimated from this one file. For several files,
     print also the mean of each parameter.
@@ -93,32 +88,12 @@ def profile(
         _print_split(file, split, options["cutoff"], out, json_=json_)
         return
     options["form"] = forms.parse_form_option(form)
-    reports = [
-        roughness_report.make_report(read.read_surface(path, parse_units(units)), **options)
-        for path in (file, *more)
-    ]
-    for report in reports:
-        if not json_:
-            print("\n".join(roughness.format_roughness(report, verbose=verbose)))
-        for text in report.notes:
-            note(text)
-    if not json_ and len(reports) > 1:
-        print("\n".join(roughness.means_lines(reports)))
-    data = {
-        "patchfem": __version__,
-        "profiles": [roughness.roughness_data(one) for one in reports],
-        "means": roughness.means_data(reports),
-    }
+    paths = (file, *more)
+    output = Output(out, json_, plot=plot, is_verbose=verbose)
     if out is not None:
-        with results.Folder(out) as folder:
-            roughness.write_page(folder.path / "report.html", reports)
-            summary.write_json(data, folder.path / "profile.json")
-            roughness.write_csv(folder.path / "profile.csv", reports)
-            roughness.write_surfaces(folder.path, reports)
-    if json_:
-        print(json.dumps(data, ensure_ascii=False, allow_nan=False))
-    elif out is not None:
-        print(f"results: {out}")
+        save(lambda _: roughness.answer_files(paths, parse_units(units), **options), output)
+    else:
+        present(roughness.answer_files(paths, parse_units(units), **options), output)
 
 
 def _print_split(

@@ -7,9 +7,9 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from .. import cost_model
-from ..campaigns.sweeps import estimate, parse_request
+from ..campaigns.sweeps import parse_request
+from ..campaigns.sweeps import plan as sweep_plan
 from ..effects import law_has_trait, list_displayed_absent_effects
-from ..export.written import shorten_number
 from ..formatting import format_quantity, rewrite_powers_of_ten
 from ..mesh import files as mesh_files
 from ..model import files as model_files
@@ -120,7 +120,7 @@ def plan(
 def _plan_sweep(scene: Path, sets, what: CaseOptions, json_: bool, verbose: bool) -> None:
     """Print the plan of a sweep."""
     sweep_scene, cases = _read_sweep(scene, sets, what)
-    plan_data = estimate.estimate_sweep(sweep_scene, cases)
+    plan_data = sweep_plan.plan_sweep(sweep_scene, cases)
     if wrong := parse_request.warn_of_invalid_cases(sweep_scene, cases):
         note(wrong)
     if json_:
@@ -128,33 +128,33 @@ def _plan_sweep(scene: Path, sets, what: CaseOptions, json_: bool, verbose: bool
         return
     print(
         "case     "
-        + ", ".join(f"{key} {shorten_number(text)}" for key, text in plan_data["case"].items())
-        + " (the first case); the lines below describe this case, except that `cost` and `sweep` are for the whole "
-        "sweep"
+        + ", ".join(f"{key} {text}" for key, text in plan_data["case"].items())
+        + " (the first case), which the lines below describe"
     )
     _print_plan(plan_data, False, verbose)
     print(
         f"sweep    {plan_data['cases']} cases of "
         + ", ".join(f"{n} {key}" for key, n in plan_data["values"].items())
-        + f"; about {plan_data['seconds_per_case']:.2g} s for each case on one core, {plan_data['disk_bytes'] / 1e6:.2g} "
-        f"MB on disk for all cases"
     )
 
 
 def _print_plan(plan_data: dict, is_solved: bool, verbose: bool) -> None:
-    """Print a plan: effects, cost, sentences, stiffnesses and groups.
+    """Print a plan: effects, cost, sentences, stiffnesses and groups; the plan of a sweep has no cost.
 
     is_solved: whether the stiffness of the pieces is that of a solved patch.
     verbose: whether to list the effects that the scene does not have.
     """
     print(f"kind     {plan_data['kind']}, engine {plan_data['engine']}")
-    compiles = plans.describe_compile_time(plan_data["compile_seconds"])
-    print(
-        f"cost     about {plan_data['seconds']:.1f} s of computing time{compiles}, "
-        f"{plan_data['bytes'] / 1e6:.0f} MB of memory"
-    )
     sizes = [f"{count} {_format_size_name(name)}" for name, count in plan_data["unknowns"].items()]
-    print("sizes    " + ", ".join([*sizes, f"{plan_data['steps']} steps in all"]))
+    if plan_data["seconds"] is not None:
+        compiles = plans.describe_compile_time(plan_data["compile_seconds"])
+        print(
+            f"cost     about {plan_data['seconds']:.1f} s of computing time{compiles}, "
+            f"{plan_data['bytes'] / 1e6:.0f} MB of memory"
+        )
+        sizes.append(f"{plan_data['steps']} steps in all")
+    if sizes:
+        print("sizes    " + ", ".join(sizes))
     for effect in plan_data["effects"]:
         print(f"  runs   {effect['effect']:<28} {effect['equations']}")
     for sentence in plan_data["verdict"]:

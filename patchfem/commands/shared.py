@@ -1,16 +1,26 @@
-"""Common parts of the commands: options, loading of a scene, progress, and exit codes."""
+"""Common parts of the commands: options, loading of a scene, progress, output of an answer, and exit codes."""
 
+import json
+import shlex
 import sys
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from threading import Event, Thread
 from time import monotonic
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 from cyclopts import Parameter
 
+from ..export import folder as folders
+from ..export import page, runs, show, store
+from ..export.charts import axes
 from ..model import model
 from ..scene import scene
 from ..scene.keys import quantities
 from .streams import make_printable
+
+NOT_CONVERGED = 3  # exit code if a numerical method did not converge, or if some cases failed
 
 
 def flag_option(text: str, *names: str) -> type:
@@ -37,9 +47,14 @@ def text_option(text: str, name: str | None = None) -> type:
     ]
 
 
+def path_option(text: str, *names: str) -> type:
+    """Return the type of an option that names a file or a folder; `text` is its help text."""
+    return Annotated[Path | None, Parameter(name=names or None, help=text)]
+
+
 def out_option(text: str) -> type:
     """Return the type of the option -o of a command; `text` is its help text."""
-    return Annotated[Path | None, Parameter(name=["-o", "--out"], help=text)]
+    return path_option(text, "-o", "--out")
 
 
 Sets = repeated_option(
@@ -53,6 +68,95 @@ Units = text_option(
     'size and unit of z, such as "0.8 um,nm"'
 )
 NoPage = flag_option("leave out report.html", "--no-page")
+Plot = path_option(
+    "write also the first picture, such as -o loop.png (.png, .svg or .pdf)", "--plot"
+)
+Verbose = flag_option("print all numbers", "-v", "--verbose")
+
+
+class Output(NamedTuple):
+    """Options of the output of a command.
+
+    target: folder of the results, or None if no files are written; as_json, is_quiet, is_verbose: what is printed;
+    has_page: whether report.html is written; plot: file of a picture, or None.
+    """
+
+    target: Path | None
+    as_json: bool = False
+    is_quiet: bool = False
+    has_page: bool = True
+    plot: Path | None = None
+    is_verbose: bool = False
+
+    @property
+    def report(self) -> Callable[[str], None] | None:
+        """Function that prints a line on the progress of the work, or None if nothing is printed."""
+        return None if self.is_quiet or self.as_json else print_message
+
+
+def save(make_answer: Callable, output: Output):
+    """Make an answer, write it with its page into its folder, print it and return it.
+
+    Parameters
+    ----------
+    make_answer : callable
+        Function that takes the folder, which is locked meanwhile, and returns the Answer.
+    output : Output
+    """
+    with folders.Folder(output.target) as folder:
+        answer = make_answer(folder.path)
+        known = {"command": describe_command(), "versions": runs.list_versions()}
+        answer = replace(answer, origin=known | answer.origin)
+        store.write(answer, folder.path)
+        if output.has_page:
+            page.write_page(folder.path)
+    present(answer, output)
+    return answer
+
+
+def describe_command() -> str:
+    """Return the command line of this process without the folder of its results."""
+    words = sys.argv[1:]
+    for option in ("-o", "--out"):
+        if option in words:
+            place = words.index(option)
+            del words[place : place + 2]
+    return shlex.join(
+        ["patchfem", *(Path(word).name if Path(word).is_absolute() else word for word in words)]
+    )
+
+
+def present(answer, output: Output, draw_page: Callable[[], None] = lambda: None) -> None:
+    """Print an answer, draw its page and its picture, and print the names of its files.
+
+    draw_page: function that is called after the numbers are printed, because they do not need the page.
+    """
+    if output.as_json:
+        content = store.make_summary(answer) if answer.is_run else answer.details
+        if answer.kind == "pairs":
+            content = answer.details["pairs"]
+        print(json.dumps(content, ensure_ascii=False, allow_nan=False), flush=True)
+    elif not output.is_quiet:
+        for line in show.make_lines(answer, output.is_verbose):
+            print(line)
+        sys.stdout.flush()
+    if not output.is_quiet:
+        print_remarks(answer)
+    draw_page()
+    if output.plot is not None:
+        axes.write_plot(answer, output.plot)
+    if output.target is not None and not (output.as_json or output.is_quiet):
+        for line in show.list_files(output.target, output.has_page):
+            print(line)
+        sys.stdout.flush()
+
+
+def print_remarks(answer) -> None:
+    """Print the warnings and notes of an answer on stderr."""
+    for text in answer.remarks.warnings:
+        print_message(make_printable(f"warning: {text}"))
+    for text in answer.remarks.notes:
+        note(text)
 
 
 def choose_folder(out: Path | None, name: str) -> Path:
@@ -89,7 +193,7 @@ def parse_quantity(text: str, kind: str, option: str) -> float | None:
         raise UsageError(f"{option}: {error}") from None
 
 
-def parse_units(units: str) -> tuple | None:
+def parse_units(units: str) -> tuple[str, ...] | None:
     """Return the units of x and z in --units, or None if the option is not given."""
     return tuple(word.strip() for word in units.split(",")) if units else None
 
@@ -100,13 +204,6 @@ class CommandExit(Exception):
     def __init__(self, code: int):
         super().__init__(f"exit code {code}")
         self.code = code
-
-
-class NotConvergedExit(CommandExit):
-    """Raised if the results are written but have the outcome not_converged: exit code 3."""
-
-    def __init__(self):
-        super().__init__(3)
 
 
 class UsageError(Exception):
@@ -149,66 +246,84 @@ def load_model(path: Path, sets):
 
 def load_model_without_sweep(path: Path, sets):
     """Build the model of a scene without its [sweep] table, and print a note on this."""
-    scene = load_scene(path, sets)
-    if scene.sweep:
-        note(
-            f"[sweep] is left out: {', '.join(axis.key for axis in scene.sweep)} as the scene gives "
-            f"{'it' if len(scene.sweep) == 1 else 'them'} (a key that only [sweep] has: its first value)"
-        )
-    return model.build_without_sweep(scene)
+    loaded = load_scene(path, sets)
+    if loaded.sweep:
+        keys = ", ".join(axis.key for axis in loaded.sweep)
+        note(f"[sweep] is left out: {keys} as the scene gives it, or its first value in [sweep]")
+    return model.build_without_sweep(loaded)
 
 
-class progress_bar:
-    """Context of a progress bar on a terminal, or of a line every ten seconds elsewhere.
+class Progress:
+    """Progress of a command on stderr, as a context manager.
 
-    Its value is a function that takes the completed fraction; None if `silent`.
+    On a terminal one line is updated; elsewhere a line is printed every INTERVAL seconds. The remaining time follows from
+    the speed since the first call, because compilation before this call says nothing about the work. While nothing is
+    complete, the elapsed time is shown after INTERVAL seconds and then after intervals of twice the length each.
     """
 
-    def __init__(self, silent: bool):
-        self.bar = None
-        self.silent = silent
-        if not silent and sys.stderr.isatty():
-            from rich.console import Console
-            from rich.progress import Progress
+    INTERVAL = 10.0  # [s]
+    TERMINAL_INTERVAL = 0.2  # [s]
 
-            self.bar = Progress(console=Console(stderr=True), transient=True)
-            self.task = self.bar.add_task("running", total=1.0)
+    def __init__(self, is_silent: bool, clock: Callable[[], float] = monotonic):
+        self.clock = clock
+        self.is_silent = is_silent
+        self.on_terminal = sys.stderr.isatty()
+        self.start = self.shown_at = clock()
+        self.first: tuple[float, float] | None = None
+        self.done = 0
+        self.over = Event()
 
-    def __enter__(self):
-        if self.silent:
-            return None
-        if self.bar is None:
-            return ProgressLines()
-        self.bar.start()
-        return lambda fraction: self.bar.update(self.task, completed=fraction)
+    def __enter__(self) -> "Progress":
+        if not self.is_silent:
+            Thread(target=self._show_elapsed_time, daemon=True).start()
+        return self
 
-    def __exit__(self, *_):
-        if self.bar is not None:
-            self.bar.stop()
+    def __exit__(self, *_) -> None:
+        self.over.set()
+        if self.on_terminal and not self.is_silent:
+            print("\r\x1b[K", end="", file=sys.stderr, flush=True)
 
+    def __call__(self, fraction: float, text: str = "") -> None:
+        """Show the completed fraction, from 0 to 1, or a text on it, and the remaining time.
 
-class ProgressLines:
-    """Progress as lines that state the completed fraction and the remaining time, at most one per SECONDS.
-
-    The speed is measured from the first call, because compilation before this call says nothing
-    about the work.
-    """
-
-    SECONDS = 10.0
-
-    def __init__(self, clock=monotonic):
-        self.clock, self.first, self.next = clock, None, clock() + self.SECONDS
-
-    def __call__(self, fraction: float) -> None:
+        Nothing is shown if the last line is too recent.
+        """
         now = self.clock()
         self.first = self.first or (now, fraction)
-        if now < self.next:
-            return
-        self.next = now + self.SECONDS
         first_time, first_fraction = self.first
-        time_left = (
-            f", about {(now - first_time) * (1 - fraction) / (fraction - first_fraction):.0f} s left"
-            if fraction > first_fraction
-            else ""
-        )
-        print_message(f"{fraction:.0%} done{time_left}")
+        interval = self.TERMINAL_INTERVAL if self.on_terminal else self.INTERVAL
+        if self.is_silent or self.clock() - self.shown_at < interval:
+            return
+        text = text or f"{fraction:.0%} done"
+        if fraction > first_fraction:
+            left = (now - first_time) * (1 - fraction) / (fraction - first_fraction)
+            text += f", about {format_duration(left)} left"
+        self._print(text)
+
+    def count(self, done: int, total: int) -> None:
+        """Show the number of completed cases, and the remaining time; the first call may count stored cases."""
+        if done > self.done:
+            self(done / total, f"{done}/{total} cases")
+        self.done = done
+
+    def _show_elapsed_time(self) -> None:
+        """Show the elapsed time while nothing is complete."""
+        wait = self.INTERVAL
+        while not self.over.wait(wait) and self.first is None:
+            self._print(f"{format_duration(self.clock() - self.start)} so far")
+            wait *= 2
+
+    def _print(self, text: str) -> None:
+        """Print a line; on a terminal in place of the last one."""
+        self.shown_at = self.clock()
+        if self.on_terminal:
+            print(f"\r\x1b[K{text}", end="", file=sys.stderr, flush=True)
+        else:
+            print_message(text)
+
+
+def format_duration(seconds: float) -> str:
+    """Return a duration as text, such as "40 s", "12 min" or "3.1 h"."""
+    if seconds < 100:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"

@@ -1,6 +1,5 @@
 """Commands that run a scene many times: error against time, backbone of a mode, fits."""
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -9,31 +8,35 @@ from cyclopts import Parameter
 
 from ..campaigns import cost as cost_curves
 from ..campaigns import numerical_settings
-from ..campaigns.backbone import curves as backbones
+from ..campaigns.backbone import curves as backbone_curves
 from ..campaigns.backbone import given_modes
-from ..export import backbone as backbone_files
-from ..export import cost as cost_files
-from ..export import results
-from ..export.fits import request as fits
-from ..export.fits.options import FitOptions
+from ..campaigns.fits import request as fit_requests
+from ..export import backbones, costs, fits
 from ..model import model
 from ..scene import axes
 from ..scene.scene import remember_written
 from .shared import (
+    NOT_CONVERGED,
+    CommandExit,
     Json,
     NoPage,
-    NotConvergedExit,
     Out,
+    Output,
+    Plot,
+    Progress,
     Quiet,
     Sets,
     UsageError,
+    Verbose,
     choose_folder,
+    describe_command,
     flag_option,
     load_model,
     load_scene,
+    present,
     print_message,
-    progress_bar,
     repeated_option,
+    save,
     text_option,
 )
 
@@ -46,10 +49,12 @@ def cost(
         "vary only one setting, where the scene uses it: element_size, steps_per_cycle, shear_modes or jumps"
     ) = "",
     verbose: flag_option(
-        "vary also each setting alone, and print the errors of several measures", "-v", "--verbose"
+        "vary also each setting alone, and print all numbers", "-v", "--verbose"
     ) = False,
     out: Out = None,
     set_: Sets = (),
+    no_page: NoPage = False,
+    plot: Plot = None,
     json_: Json = False,
     quiet: Quiet = False,
 ):
@@ -59,30 +64,24 @@ def cost(
     Example: patchfem cost rig.toml --over steps_per_cycle
     """
     scene_model = load_model(scene, set_)
-    if over and over not in numerical_settings.NUMERICAL_SETTINGS:
-        raise UsageError(
-            f"cost --over {over}: unknown key; use one of {', '.join(numerical_settings.NUMERICAL_SETTINGS)}"
-        )
-    knobs = [over or cost_curves.TOLERANCE]
+    settings = numerical_settings.NUMERICAL_SETTINGS
+    if over and over not in settings:
+        raise UsageError(f"cost --over {over}: unknown key; use one of {', '.join(settings)}")
+    names = [over or cost_curves.TOLERANCE]
     if verbose and not over:
-        knobs += numerical_settings.find_applicable_settings(scene_model)
+        names += numerical_settings.find_applicable_settings(scene_model)
     target = choose_folder(out, f"{scene_model.source.path.stem}-cost")
-    curves = {}
-    data = {}
-    for knob in knobs:
-        runs = curves[knob] = cost_curves.compute_setting_costs(
-            scene_model, knob, None if quiet else print_message
-        )
-        table = cost_files.write(target, curves)
-        picture = cost_files.write_picture(target, knob, runs, scene_model.accuracy.tolerance)
-        data[knob] = cost_files.cost_data(knob, runs, scene_model.accuracy.tolerance)
-        if not json_:
-            tabled = verbose and knob != cost_curves.TOLERANCE
-            lines = cost_files.format_details if tabled else cost_files.format_cost
-            print("\n".join(lines(knob, runs, scene_model.accuracy.tolerance)))
-            print(f"results: {table} {picture}")
-    if json_:
-        print(json.dumps(data))
+    output = Output(target, json_, quiet, not no_page, plot, verbose)
+
+    def measure_costs(_):
+        """Run the scene with all settings."""
+        report = None if quiet else print_message
+        curves = {
+            name: cost_curves.compute_setting_costs(scene_model, name, report) for name in names
+        }
+        return costs.make_answer(curves, scene_model)
+
+    save(measure_costs, output)
 
 
 def backbone(
@@ -110,8 +109,10 @@ def backbone(
     out: Out = None,
     set_: Sets = (),
     no_page: NoPage = False,
+    plot: Plot = None,
     json_: Json = False,
     quiet: Quiet = False,
+    verbose: Verbose = False,
 ):
     """Compute frequency and damping ratio of a mode of SCENE against its amplitude: a curve with a band of what tests
     measure, and which method holds where. The contact is included; [drive] and [slide] are ignored.
@@ -125,34 +126,22 @@ def backbone(
         return model.build(remember_written(loaded_scene, prepare=tables))
 
     free_model, notes = given_modes.prepare_model(build_model, modes)
-    methods = backbones.choose_methods(method)
+    methods = backbone_curves.choose_methods(method)
     lengths = axes.read_lengths(amplitudes, "--amplitudes") if amplitudes else None
     target = choose_folder(out, f"{free_model.source.path.stem}-backbone")
-    with results.Folder(target) as folder:
-        backbone_result = backbones.compute_backbone(
-            free_model,
-            mode,
-            lengths,
-            methods,
-            None if quiet or json_ else lambda method_name: print_message(f"{method_name} ..."),
-        )
-        backbone_result = backbone_result.add_notes(notes)
-        data = backbone_files.write_backbone(
-            backbone_result,
-            free_model.source.title,
-            free_model.source.resolved,
-            folder,
-            not no_page,
-        )
-    if json_:
-        print(json.dumps(data, ensure_ascii=False))
-    else:
-        print("\n".join(backbone_files.format_backbone(backbone_result)))
-        for text in backbone_result.notes:
-            print(f"note: {text}")
-        print(f"results: {target}")
-    if not backbone_result.curves:
-        raise NotConvergedExit
+    output = Output(target, json_, quiet, not no_page, plot, verbose)
+
+    def compute_curves(_):
+        """Compute the curves of all methods."""
+        report = None
+        if output.report is not None:
+            report = lambda name: print_message(f"{name} ...")  # noqa: E731
+        curves = backbone_curves.compute_backbone(free_model, mode, lengths, methods, report)
+        return backbones.make_answer(curves.add_notes(notes), free_model.source)
+
+    answer = save(compute_curves, output)
+    if not answer.details["curves"]:
+        raise CommandExit(NOT_CONVERGED)
 
 
 @dataclass(frozen=True)
@@ -179,10 +168,6 @@ class RowFitOptions:
             "rows)"
         ),
     ] = "bound"
-    placebo: repeated_option(
-        'repeat the fit with each of these values, such as "structure.mode.yaw.frequency=110 Hz,138 Hz", to '
-        "check whether the value in the scene fits the measured rows best"
-    ) = ()
     resume: flag_option("continue an interrupted fit; starts already finished are not repeated") = (
         False
     )
@@ -202,14 +187,6 @@ def fit(
     free: repeated_option(
         'key to fit and its range, such as "friction.static=0.1..0.6"; may be repeated'
     ) = (),
-    from_patch: flag_option(
-        "in place of --to and --free: fit lumped Iwan, Bouc-Wen and elastic-plastic laws to the loops "
-        "of the scene's own patch; each law is written as a scene, with the error of the law"
-    ) = False,
-    amplitudes: text_option(
-        'with --from-patch: amplitudes of the slide (half peak-to-peak), such as "0.1 um..10 um:25"; '
-        "default: amplitudes from the onset of slip upwards"
-    ) = "",
     hold: repeated_option(
         'rows to hold out: the fit predicts them but does not use them, such as "frequency=135 Hz,150 '
         'Hz"'
@@ -225,35 +202,39 @@ def fit(
     rows: Annotated[RowFitOptions, Parameter(name="*")] = RowFitOptions(),
     out: Out = None,
     set_: Sets = (),
+    no_page: NoPage = False,
+    plot: Plot = None,
     json_: Json = False,
     quiet: Quiet = False,
+    verbose: Verbose = False,
 ):
     """Fit values of keys of SCENE to measurements. A bench is fitted to a friction loop. A rig is fitted to rows of
     frequency, input, acceleration and displacement, or to frequency and damping against amplitude. For a scene with
-    [wear], the wear coefficient is fitted to a measured wear depth. With --from-patch, lumped laws are fitted to the
-    loops of the scene's own patch.
+    [wear], the wear coefficient is fitted to a measured wear depth.
 
     Example: patchfem fit bench.toml --to loop.csv --free "friction.static=0.1..0.6"
     """
     loaded_scene = remember_written(load_scene(scene, set_))
     target = choose_folder(out, f"{scene.stem}-fit")
-    options = FitOptions(
-        hold, offset, warm_up, from_patch=from_patch, amplitudes=amplitudes, **vars(rows)
-    )
-    with progress_bar(
-        quiet or json_ or from_patch or fits.choose_kind(loaded_scene, to) in ("loop", "curve")
-    ) as progress:
-        listener = fits.Listener(
-            None if quiet else print_message, progress, lambda name: f"--{name.replace('_', '-')}"
+    output = Output(target, json_, quiet, not no_page, plot, verbose)
+    options = fit_requests.FitOptions(hold, offset, warm_up, **vars(rows))
+    # the fits to a loop and to a curve are too short for a progress line
+    is_short = fit_requests.choose_kind(loaded_scene, to) in ("loop", "curve")
+    with Progress(quiet or json_ or is_short) as progress:
+        report = None if quiet else print_message
+        listener = fit_requests.Listener(
+            report, progress, lambda name: f"--{name.replace('_', '-')}"
         )
-        files = fits.fit_into(loaded_scene, to, free, options, target, listener)
-    if json_:
-        print(json.dumps(files.answer, ensure_ascii=False))
-    else:
-        print("\n".join(files.lines))
-        for text in files.answer["warnings"]:
-            print_message(f"warning: {text}")
-        print(f"page: {target / 'report.html'}")
-        print(f"results: {target}")
-    if files.answer["outcome"] == "not_converged":
-        raise NotConvergedExit
+        answer = fits.fit_into(
+            loaded_scene,
+            to,
+            free,
+            options,
+            target,
+            listener,
+            with_page=not no_page,
+            command=describe_command(),
+        )
+    present(answer, output)
+    if answer.details["outcome"] == "not_converged":
+        raise CommandExit(NOT_CONVERGED)

@@ -5,36 +5,36 @@ import shlex
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from threading import Event, Thread
 from time import perf_counter
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
 from .. import core
 from ..campaigns.sweeps import executors, parse_request
-from ..campaigns.sweeps import sweep as sweeping
-from ..export.sweeps import manifest, run
+from ..export.sweeps import run
 from ..scene import axes
 from .shared import (
+    NOT_CONVERGED,
     CommandExit,
     Json,
     NoPage,
-    NotConvergedExit,
     Out,
+    Output,
+    Plot,
+    Progress,
     Quiet,
     Sets,
     UsageError,
+    Verbose,
     choose_folder,
     flag_option,
     note,
+    present,
     print_message,
     repeated_option,
     text_option,
 )
-
-MAX_PRINTED_MESSAGES = 5  # largest number of messages of failed cases that are printed
-BYTES_PER_CASE = 1000  # size of a lumped case in sweep.csv and sweep.nc [bytes]
 
 
 @Parameter(name="*")
@@ -82,17 +82,6 @@ class CaseOptions:
     def selects_cases(self) -> bool:
         """Return whether any option selects cases."""
         return bool(self.over or self.cases or self.random or self.sobol)
-
-    def words(self, *more: str) -> tuple:
-        """Return the options that select the cases, as strings that identify the selection."""
-        random_options = f"draw={self.random},{self.sobol},{self.seed}"
-        return (
-            *self.over,
-            "" if self.cases is None else str(self.cases),
-            random_options,
-            f"of={self.of}",
-            *more,
-        )
 
     def request(self):
         """Return the request for cases; raise UsageError if the options are incompatible."""
@@ -159,8 +148,10 @@ def sweep(
         ),
     ] = None,
     no_page: NoPage = False,
+    plot: Plot = None,
     json_: Json = False,
     quiet: Quiet = False,
+    verbose: Verbose = False,
 ):
     """Run SCENE for all combinations of the values in --over, or of the values in its table [sweep]. Write sweep.csv,
     sweep.nc and report.html; the default folder is out/<scene name>-sweep.
@@ -169,212 +160,88 @@ def sweep(
     """
     if no_page and keep == "pages":
         raise UsageError(
-            "sweep: --no-page leaves out every report.html, but --keep pages writes one for each case; use "
-            "only one of these options"
+            "sweep: --no-page and --keep pages contradict each other; use only one of them"
         )
-    by = by or WorkerOptions()
     start_time = perf_counter()
+    by = by or WorkerOptions()
     part = by.part()
     target = choose_folder(out, f"{scene.stem}-sweep")
-    printed = "faults" if quiet else "words"
-    if json_:
-        printed = "json"
-    output = OutputOptions(target, not no_page, printed, start_time)
-    request_hash = ""
-    if not (by.collect or part or keep not in (None, "none")):
-        request_words = (what or CaseOptions()).words(*set_, f"page={not no_page}")
-        request_hash = manifest.hash_request(scene, request_words, what and what.cases)
-    if resume and (answer := manifest.read_manifest(target, request_hash)):  # the sweep is complete
-        _print_results(answer["cases"]["count"], {}, answer, output)
-        return
+    output = Output(target, json_, quiet, not no_page, plot, verbose)
     sweep_scene, cases = parse_request.read_sweep(scene, set_, (what or CaseOptions()).request())
     if by.collect:
-        _print_stored_results(run.collect_shards(sweep_scene, cases, target, not no_page), output)
-        return
-    if not quiet:
-        for text in axes.describe_ranges(what.over if what else ()):
-            note(text)
-        for text in (
-            parse_request.warn_of_invalid_cases(sweep_scene, cases),
-            sweep_scene.note_bolted_joint(),
-        ):
-            if text:
-                note(text)
-    line = Progress(quiet)
-    try:
+        answer = run.collect_shards(sweep_scene, cases, target, not no_page)
+    else:
+        if not quiet:
+            _print_notes(sweep_scene, cases, what)
         place = run.SweepTarget(target, resume, keep or "", part, not no_page)
-        results = run.sweep_into(
-            sweep_scene,
-            cases,
-            place,
-            executors.make_executor(by.executor, by.jobs),
-            None if quiet else print_message,
-            line,
-        )
+        answer = _run_cases(sweep_scene, cases, place, by, is_quiet=quiet)
+    if answer is None:
+        _print_shard(by.shard, len(cases), output)
+    else:
+        _print_sweep(answer, output, perf_counter() - start_time)
+
+
+def _print_notes(sweep_scene, cases, what: CaseOptions | None) -> None:
+    """Print notes on the ranges of the keys, on invalid cases and on a bolted joint."""
+    texts = [
+        *axes.describe_ranges(what.over if what else ()),
+        parse_request.warn_of_invalid_cases(sweep_scene, cases),
+        sweep_scene.note_bolted_joint(),
+    ]
+    for text in texts:
+        if text:
+            note(text)
+
+
+def _run_cases(sweep_scene, cases, place, by: WorkerOptions, *, is_quiet: bool):
+    """Run the cases of a sweep, and return its Answer, or None for a shard.
+
+    If it is interrupted, the folder has the tables of the cases that are done, and the command that continues is printed.
+    """
+    executor = executors.make_executor(by.executor, by.jobs)
+    report = None if is_quiet else print_message
+    progress = Progress(is_quiet)
+    try:
+        with progress:
+            return run.sweep_into(sweep_scene, cases, place, executor, report, progress.count)
     except (KeyboardInterrupt, core.Missing) as why:
-        line.end()
-        if isinstance(why, core.Missing) and not line.done:
+        if isinstance(why, core.Missing) and not progress.done:
             raise
+        words = [word for word in sys.argv[1:] if word != "--resume"]
         print_message(
-            f"{str(why) or 'interrupted'}; {line.done} of {len(cases)} cases are kept; continue with: patchfem "
-            f"{shlex.join([word for word in sys.argv[1:] if word != '--resume'])} --resume"
+            f"{str(why) or 'interrupted'}; {progress.done} of {len(cases)} cases are kept; continue with: patchfem "
+            f"{shlex.join(words)} --resume"
         )
         raise CommandExit(getattr(why, "code", 130)) from None
-    finally:
-        line.end()
-    if part is not None:
-        if json_ or not quiet:
-            print(
-                json.dumps({"cases": line.done, "folder": str(target)})
-                if json_
-                else f"shard {by.shard}: {line.done} cases are in {target}; when all shards are done, run the sweep with "
-                "--collect"
-            )
-        return
-    if request_hash and not results.messages and place.kept_files(len(cases)) == "none":
-        manifest.write_manifest(target, request_hash)
-    _print_stored_results(results, output)
 
 
-class OutputOptions(NamedTuple):
-    """Options for printing the results of a sweep.
-
-    target: its folder; page: whether it has one; tells: "json", "words", or only its "faults";
-    begin: time at its start [s].
-    """
-
-    target: Path
-    page: bool
-    tells: str
-    begin: float
-
-
-class Progress:
-    """Display of the completed cases and the remaining time on stderr.
-
-    On a terminal it is a line that is updated, elsewhere a line every WAIT seconds. While no case
-    is complete, the elapsed time is shown after WAIT seconds and then after intervals of twice the
-    length each.
-    """
-
-    WAIT = 10.0
-
-    def __init__(self, silent: bool):
-        self.silent = silent
-        self.done = 0
-        self.begin = perf_counter()
-        self.text = ""
-        self.over = Event()
-        self.shown_at = self.begin
-        self.open = sys.stderr.isatty()
-
-    def __call__(self, done: int, total: int, seconds_left: float | None) -> None:
-        if not self.text and not self.silent:
-            Thread(target=self._show_waiting_time, daemon=True).start()
-        self.text = f"{done}/{total} cases"
-        self.done = done
-        if not self.silent and perf_counter() - self.shown_at >= (0.2 if self.open else self.WAIT):
-            self._show(
-                f"{self.text}, {sweeping.format_duration(seconds_left)} left"
-                if seconds_left is not None
-                else self.text
-            )
-
-    def _show_waiting_time(self) -> None:
-        """Show the elapsed time while no case is complete."""
-        wait = self.WAIT
-        while not self.over.wait(wait):
-            if perf_counter() - self.shown_at >= wait:
-                self._show(
-                    f"{self.text}, {sweeping.format_duration(perf_counter() - self.begin)} so far"
-                )
-                wait *= 2
-
-    def _show(self, text: str) -> None:
-        """Show a line on stderr."""
-        self.shown_at = perf_counter()
+def _print_shard(shard: str, count: int, output: Output) -> None:
+    """Print that a shard is done."""
+    if output.as_json:
+        print(json.dumps({"cases": count, "folder": str(output.target)}))
+    elif not output.is_quiet:
         print(
-            f"\r\x1b[K{text}" if self.open else text,
-            end="" if self.open else "\n",
-            file=sys.stderr,
-            flush=True,
+            f"shard {shard} is in {output.target}; when all shards are done, run the sweep with --collect"
         )
 
-    def end(self) -> None:
-        """Clear the line and stop the display."""
-        self.over.set()
-        if self.open and not self.silent:
-            print("\r\x1b[K", end="", file=sys.stderr, flush=True)
 
-
-def _print_stored_results(results, output: OutputOptions) -> None:
-    """Print the results of a sweep that are stored in its folder."""
-    _print_results(
-        len(results),
-        results.messages,
-        json.loads((output.target / "sweep.json").read_bytes()),
-        output,
-    )
-
-
-def _print_results(number: int, messages: dict, answer: dict, output: OutputOptions) -> None:
-    """Print the results of a sweep, beginning with its main result.
-
-    Parameters
-    ----------
-    number : int
-        Number of cases.
-    messages : dict
-        Messages of failed cases.
-    answer : dict
-        Content of sweep.json.
-    output : OutputOptions
-    """
-    target = output.target
-    failed = sorted(messages)
-    counts = answer["cases"]["outcomes"]
-    if output.tells == "json":
-        print(
-            json.dumps(
-                {
-                    "cases": number,
-                    "outcomes": counts,
-                    "failed": len(failed),
-                    "answer": answer["answer"],
-                    "over_tolerance": answer["cases"]["over_tolerance"],
-                    "folder": str(target),
-                    "seconds": round(perf_counter() - output.begin, 3),
-                },
-                ensure_ascii=False,
-            )
-        )
-    elif output.tells == "words":
-        outcome_counts = ", ".join(f"{count} {name}" for name, count in counts.items())
-        first, *others = answer["sentences"] or [""]
-        for sentence in (first, f"{number} case{'s' * (number != 1)}: {outcome_counts}", *others):
-            if sentence:
-                print(sentence)
-        if output.page:
-            print(f"page: {target / 'report.html'}")
-        tables = [target / name for name in ("sweep.csv", "sweep.nc")]
-        if tables[0].is_file():
-            print(f"results: {tables[0]} {tables[1]}")
-        else:
-            print(
-                f"results: {target / 'sweep.json'}; sweep.csv and sweep.nc are not written, because they would take "
-                f"about {1e-6 * BYTES_PER_CASE * number:.0f} MB; to write them, run the same command with --collect"
-            )
-    sys.stdout.flush()
-    cases_by_message = {}
-    for case in failed:
-        cases_by_message.setdefault(messages[case], []).append(case + 1)
-    for text, numbers in list(cases_by_message.items())[:MAX_PRINTED_MESSAGES]:
-        print_message(
-            f"case {numbers[0]}{f' and {len(numbers) - 1} more' * (len(numbers) > 1)}: {text}"
-        )
-    if len(cases_by_message) > MAX_PRINTED_MESSAGES:
-        print_message("the messages of all failed cases are in sweep.csv")
-    if len(failed) == number:
+def _print_sweep(answer, output: Output, seconds: float) -> None:
+    """Print the answer of a sweep; the exit code is 2 if all cases failed and 3 if some did or did not converge."""
+    cases = answer.details["cases"]
+    if output.as_json:
+        content = {
+            "cases": cases["count"],
+            "outcomes": cases["outcomes"],
+            "failed": cases["failed"],
+            "answer": answer.details["answer"],
+            "over_tolerance": cases["over_tolerance"],
+            "folder": str(output.target),
+            "seconds": round(seconds, 3),
+        }
+        print(json.dumps(content, ensure_ascii=False), flush=True)
+        output = output._replace(is_quiet=True, as_json=False)
+    present(answer, output)
+    if cases["failed"] == cases["count"]:
         raise UsageError("sweep: no case could be run")
-    if failed or "not_converged" in counts:
-        raise NotConvergedExit
+    if cases["failed"] or "not_converged" in cases["outcomes"]:
+        raise CommandExit(NOT_CONVERGED)

@@ -5,9 +5,9 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from ..export import convert, reports
+from ..export import convert, page
 from ..export.lab import structures
-from .shared import Sets, UsageError, flag_option, load_model_without_sweep, out_option, text_option
+from .shared import Sets, UsageError, flag_option, load_model_without_sweep, out_option
 
 Frame = Annotated[
     int | None,
@@ -23,10 +23,8 @@ def export(
         Path,
         Parameter(
             name=["-o", "--out"],
-            help="file to write; fields: fields.pvd (all frames, for any version of ParaView), "
-            ".vtu, .csv or .vtkhdf; script that plays the last cycle (of a bench: the whole slide) in ParaView: cycle.py; "
-            "histories: histories.uff, .mat or .csv; matrices and friction elements of a "
-            "scene: .mat (NLvib) or .npz (TMDSimPy, pyHarm)",
+            help="file to write; fields: fields.pvd (all frames, for any version of ParaView), .vtu, .csv or .vtkhdf; "
+            "histories: histories.uff, .mat or .csv; matrices and friction elements of a scene: .mat",
         ),
     ],
     frame: Frame = None,
@@ -34,27 +32,19 @@ def export(
     histories: flag_option(
         "write histories and loops as .csv, instead of the fields along the interface"
     ) = False,
-    of: text_option(
-        "stress that the script for ParaView shows in colour, such as sigma_yy or tau_xy (default: "
-        "von_mises); 'status' shows where the interface sticks and slips",
-        "--of",
-    ) = "",
 ):
     """Write the fields, or the histories and loops, of a results folder in another format. From the folder of a fit,
-    write the measured and the fitted loop. From a scene, write the structure for other programs.
+    write the measured and the fitted loop. From a scene, write the matrices of the structure.
 
     Example: patchfem export out/rig -o histories.uff
     """
     if folder.suffix != ".toml":
         if sets:
             raise UsageError("--set can be used only with a scene, not with a results folder")
-        print(convert.export_results(folder, out, frame, histories, of))
+        print(convert.export_results(folder, out, frame, histories))
         return
-    if frame is not None or histories or of:
-        raise UsageError(
-            "--frame, --histories and --of can be used only with a results folder; from a scene only the "
-            "structure is exported"
-        )
+    if frame is not None or histories:
+        raise UsageError("--frame and --histories can be used only with a results folder")
     print(structures.export_structure(load_model_without_sweep(folder, sets), out))
 
 
@@ -63,8 +53,8 @@ def view(
     /,
     *,
     out: out_option(
-        "file to write instead of opening a window: picture.png for one frame; .gif, "
-        ".mp4 or .html for the last cycle (of a bench: the whole slide)"
+        "file to write instead of opening a window: picture.png for one frame; .gif or .mp4 for the last cycle (of a "
+        "bench: the whole slide)"
     ) = None,
     frame: Frame = None,
     magnify: Annotated[
@@ -81,11 +71,12 @@ def view(
 
 def report(
     *folders: Path,
-    out: out_option("page to write; default: report.html in the current folder") = None,
+    out: out_option(
+        "page to write; default: report.html in the folder, or in the current folder for several"
+    ) = None,
 ):
-    """Show the results folders of several runs, or of several sweeps over the same keys, side by side on one page. For
-    a single sweep, rebuild its page.
+    """Make the page of a results folder again from its files, or show several folders of the same kind side by side.
 
     Example: patchfem report out/rig out/six -o both.html
     """
-    print(reports.write_report(list(folders), out))
+    print(page.write_report(list(folders), out))

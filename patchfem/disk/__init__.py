@@ -18,7 +18,6 @@ PUBLIC = {
         "open_lossy",
         "write_atomically",
         "write_bytes",
-        "write_in_partial_folder",
         "write_rows",
         "write_text",
     ),

@@ -43,10 +43,8 @@ PUBLIC = {
     ),
     "recovery": (
         "Cells",
-        "Recovery",
         "StressError",
         "centre_stress",
-        "choose_rounding_step",
         "estimate_error",
         "fit_recovery",
         "get_cells",

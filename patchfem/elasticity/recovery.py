@@ -309,29 +309,3 @@ def estimate_error(recovery: Recovery, u, stress, gauss_points: list) -> StressE
                 axis=(1, 2)
             )
     return StressError(frozen_array(error), frozen_array(energy))
-
-
-def choose_rounding_step(
-    recovery: Recovery, error: StressError, gauss_points: list, fraction: float
-) -> float:
-    """Choose a rounding step for stresses that is small compared with their estimated error.
-
-    Parameters
-    ----------
-    recovery : Recovery
-    error : StressError
-    gauss_points : list of CellPoints
-    fraction : float
-        Ratio of the energy norm of the rounding error to that of the smallest estimated error.
-
-    Returns
-    -------
-    float [Pa]
-    """
-    total = error.error.sum(axis=1)
-    if not total.any():
-        return 0.0
-    area = np.concatenate([points.weights.sum(axis=1) for points in gauss_points])
-    _, mu = recovery.cells.layers.lame(recovery.cells.is_coating)
-    smallest = total[total > 0].min()
-    return float(fraction * np.sqrt(6 * smallest / (area / mu).sum()))

@@ -1,132 +1,37 @@
-"""Output of a run: results folder, netCDF, VTK, report page and pictures.
+"""Output of a verb: its answer, and the screen, files, pages and pictures that are made from it.
 
-In: a `Result`. Out: files. A module imports only entries of this list that come before it:
+In: results of `runs` and `campaigns`. Out: an `Answer`, files, and lines of text. A module imports only entries of this
+list that come before it:
 
-1. `written`: values of swept keys as text
-2. `read_results`: files of results that are read again, with one error that says what is wrong
-3. `results`: the results folder, complete at every moment
-4. `summary`: summary.json
-5. `netcdf`: result.nc
-6. `histories`: content of result.nc from a run
-7. `tolerance_misses`: cases of a sweep that miss their tolerance
-8. `fields`: fields of the pieces as VTKHDF, VTU and PVD, and as objects of PyVista
-9. `lab`: histories and loops in the formats of laboratories
-10. `drawing`: drawings as SVG, films, a script for ParaView
-11. `pages`: pages whose figures the browser draws
-12. `page_data`: data of the page and the pictures of a run
-13. `report`: report.html of a run, and its pictures
-14. `folder`: a finished run on disk
-15. `sweeps`: a sweep on disk
-16. `reports`: one page over runs or sweeps
-17. `surfaces`: pages on measured surfaces
-18. `cost`: error against time of the numerical settings of a scene
-19. `fits`: fits of any kind, from their options to their folder
-20. `backbone`: frequency and damping over the amplitude on disk
-21. `convert`: a results folder in another format, chosen by the suffix of a file
+1. `answer`: the record that every verb returns
+2. `surface_definitions`: definitions of the quantities of measured surfaces
+3. `quantities`: definitions of all quantities, the key quantities, and how numbers are displayed
+4. `charts`: tables of charts, curves and tables, and their drawing for pages and pictures
+5. `netcdf`: arrays of an answer as a netCDF file
+6. `store`: files of an answer, written and read
+7. `fields`: fields of the pieces as VTKHDF, VTU and PVD, as grids of PyVista, and on a grid for a page
+8. `several`: what differs between several runs
+9. `page`: report.html, made from the other files
+10. `folder`: the results folder, complete at every moment
+11. `show`: an answer as lines on the screen
+12. `driven`: the drive of a run in words
+13. `run_data`: arrays of a run
+14. `run_words`: verdict of a run
+15. `runs`: answer of a run
+16. `run_folder`: a run that writes its folder
+17. `sweeps`: answer of a sweep, and its folder
+18. `surfaces`: answers on measured surfaces
+19. `costs`: answer on error against time
+20. `backbones`: answer on frequency and damping over the amplitude
+21. `fits`: answer of a fit
+22. `lab`: histories and loops in the formats of laboratories
+23. `pieces`: pictures and films of the pieces
+24. `convert`: a results folder in another format, chosen by the suffix of a file
 
-Read `folder` first.
+Read `answer` first.
 """
 
 # Names that other folders use, by module.
 PUBLIC = {
-    "backbone": (
-        "COLUMNS",
-        "backbone_charts",
-        "backbone_contents",
-        "format_backbone",
-        "write_backbone",
-    ),
-    "convert": (
-        "export_results",
-        "view_results",
-    ),
-    "cost": (
-        "cost_data",
-        "format_cost",
-        "format_details",
-        "write",
-        "write_picture",
-    ),
-    "drawing.pictures": ("draw_charts",),
-    "drawing.swept": ("sweep_chart",),
-    "fields.bodies": ("write_fields",),
-    "fits.options": ("FitOptions",),
-    "fits.request": (
-        "Listener",
-        "choose_kind",
-        "fit_into",
-    ),
-    "folder": (
-        "is_complete",
-        "run_into",
-        "save_run",
-        "saves_state",
-        "write_run_page",
-    ),
-    "histories": ("result_contents",),
-    "lab.imported": (
-        "EstimateOptions",
-        "convert_file",
-    ),
-    "lab.structures": ("export_structure",),
-    "pages.driven": ("list_changed_keys",),
-    "pages.headline": ("summarise_sweep",),
-    "pages.released": ("describe_release",),
-    "pages.sentences": (
-        "format_measures",
-        "headline_sentence",
-        "notebook_html",
-        "tolerance_sentence",
-        "verdict_sentence",
-    ),
-    "report": ("draw_axes",),
-    "reports": ("write_report",),
-    "results": ("Folder",),
-    "summary": (
-        "count_cycles",
-        "measure_object",
-        "read_summary",
-        "summarise_run",
-        "write_json",
-    ),
-    "surfaces.compare": (
-        "comparison_data",
-        "format_comparison",
-        "pressed_traces",
-        "write_difference",
-        "write_trace",
-    ),
-    "surfaces.pairs": (
-        "compare_pairs",
-        "format_pairs",
-        "pairs_data",
-    ),
-    "surfaces.roughness": (
-        "format_roughness",
-        "means_data",
-        "means_lines",
-        "roughness_data",
-        "write_surfaces",
-    ),
-    "surfaces.worn": (
-        "format_wear",
-        "wear_data",
-        "wear_verdict",
-    ),
-    "surfaces.worn_runs": ("compare_runs",),
-    "sweeps.folder": ("case_folder_name",),
-    "sweeps.manifest": (
-        "hash_request",
-        "read_manifest",
-        "write_manifest",
-    ),
-    "sweeps.page": ("sweep_table",),
-    "sweeps.run": (
-        "SweepTarget",
-        "collect_shards",
-        "compute_in_memory",
-        "sweep_into",
-    ),
-    "sweeps.tables": ("table_contents",),
-    "written": ("shorten_number",),
+    "folder": ("Folder",),
 }

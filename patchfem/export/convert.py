@@ -1,21 +1,23 @@
-"""Conversion of a results folder: another format, a picture or a page, chosen by the suffix."""
+"""Conversion of a results folder: another format, a picture, a film or a window."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+import os
+import sys
 from pathlib import Path
 
+import numpy as np
+
 from ..core import Missing, PatchfemError
-from ..disk.atomic_write import explain_mkdir_error
-from . import lab
-from .drawing import paraview
-from .drawing import view as viewer
-from .fields import vtu
+from . import lab, pieces, store
+from .fields import grids
+from .fields.vtkhdf import NAME, Frames, find_fields, read_frames
 from .lab import write
-from .pages import player
+
+SERIES_FORMATS = (".pvd", ".vtkhdf")
+FIELD_FORMATS = (*SERIES_FORMATS, ".vtu", ".csv")
 
 
 def export_results(
-    folder: Path, out: Path, frame: int | None = None, histories: bool = False, of: str = ""
+    folder: Path, out: Path, frame: int | None = None, histories: bool = False
 ) -> str:
     """Write the fields, or the histories and loops, of a results folder in another format.
 
@@ -26,11 +28,9 @@ def export_results(
         File whose suffix chooses the format. A .csv contains the interface, or the histories if
         `histories` is set or the folder has no fields.
     frame : int, optional
-        Number of the frame, for fields at a single time.
+        Number of the frame of a .vtu or .csv; by default the last.
     histories : bool
         Whether a .csv contains the histories.
-    of : str
-        Stress that the script for ParaView colours; by default the von Mises stress.
 
     Returns
     -------
@@ -42,34 +42,42 @@ def export_results(
     PatchfemError
         If suffix, frame and histories do not fit together.
     """
-    fields = (folder / lab.FIELDS).is_file() or not folder.is_dir()
-    if out.suffix.lower() in lab.ENDINGS and (out.suffix != ".csv" or histories or not fields):
+    has_fields = (folder / NAME).is_file() or not folder.is_dir()
+    is_lab_format = out.suffix.lower() in lab.ENDINGS
+    if is_lab_format and (out.suffix != ".csv" or histories or not has_fields):
         if frame is not None:
             raise PatchfemError(
-                "--frame can be used only with fields (.vtu, .csv); a file of histories contains all "
-                "times"
+                "--frame can be used only with fields (.vtu, .csv); a file of histories contains "
+                "all times"
             )
-        with _create_parent_folder(out):
-            return write.export_histories(folder, out)
+        grids.create_folder(out.parent)
+        return write.export_histories(folder, out)
     if histories:
         raise PatchfemError(
             f"--histories: histories are written as {', '.join(lab.ENDINGS)}, not as "
             f"{out.suffix or out}"
         )
-    if of and out.suffix != ".py":
-        raise PatchfemError(
-            "--of can be used only with a ParaView script, -o play.py; other files contain every "
-            "component"
-        )
     if out.suffix == ".py":
-        if frame is not None:
-            raise PatchfemError(
-                "--frame: cannot be used with a script, which plays all frames of the motion"
-            )
-        with _create_parent_folder(out):
-            return paraview.write_script(folder, out, of or "von_mises")
-    with _create_parent_folder(out):
-        return vtu.export_fields(folder, out, frame)
+        raise PatchfemError(
+            f"{out}: the script for ParaView was removed in patchfem 2.0; open {NAME} in ParaView 5.13 or "
+            "newer, or write .pvd for older versions"
+        )
+    if out.suffix not in FIELD_FORMATS:
+        raise PatchfemError(
+            f"{out}: fields are exported as {', '.join(FIELD_FORMATS)}; histories and loops as .uff, "
+            ".mat, .csv --histories"
+        )
+    if frame is not None and out.suffix in SERIES_FORMATS:
+        raise PatchfemError(
+            f"--frame: {out.suffix} contains all frames; use a .vtu or .csv for one frame"
+        )
+    frames = read_frames(find_fields(folder))
+    number = grids.find_frame(frames, frame)
+    grids.create_folder(out.parent)
+    grids.export_frames(frames, out, number)
+    if out.suffix in SERIES_FORMATS:
+        return f"{out}: {len(frames.times)} frames"
+    return f"{out}: frame {number} of 0 to {len(frames.times) - 1}, {frames.times[number]:.6g} s"
 
 
 def view_results(
@@ -90,43 +98,55 @@ def view_results(
     Returns
     -------
     str
-        A line about the page; "" for anything else.
+        A line about the file; "" for a window.
+
+    Raises
+    ------
+    Missing
+        If there are no fields or no screen for the window.
+    PatchfemError
+        For an impossible suffix, frame or factor.
     """
-    if out is None or out.suffix != ".html":
-        with _create_parent_folder(out):
-            viewer.view(folder, out, frame, magnify)
-        return ""
-    if frame is not None or magnify is not None:
+    if magnify is not None and not (np.isfinite(magnify) and magnify >= 0):
+        raise PatchfemError(f"--magnify: {magnify} must be 0 or more")
+    if out is not None and out.suffix not in pieces.PICTURES + pieces.FILMS:
         raise PatchfemError(
-            "--frame, --magnify: cannot be used with a page, which shows the motion and has "
-            "sliders for frame and magnification"
+            f"{out}: pictures are written as {', '.join(pieces.PICTURES)}, films as "
+            f"{', '.join(pieces.FILMS)}"
         )
-    with _create_parent_folder(out):
-        return player.write_page(folder, out)
+    is_film = out is not None and out.suffix in pieces.FILMS
+    if is_film and frame is not None:
+        raise PatchfemError(
+            f"--frame: {out.suffix} shows all frames of the motion; use a .png for one frame"
+        )
+    frames = read_frames(find_fields(folder))
+    number = grids.find_frame(frames, frame)
+    has_summary = (folder / store.SUMMARY).is_file()
+    title = store.read_summary(folder)["title"] if has_summary else ""
+    title = title or folder.resolve().name
+    if out is None:
+        _open_window(frames, number, title)
+        return ""
+    grids.create_folder(out.parent)
+    if is_film:
+        return pieces.write_film(frames, title, magnify, out)
+    return pieces.write_picture(frames, number, title, magnify, out)
 
 
-@contextmanager
-def _create_parent_folder(out: Path | None) -> Iterator[None]:
-    """Create the folder of an output file; remove it again if nothing was written into it.
-
-    Missing if it cannot be created.
-    """
-    new_folders = [] if out is None else [parent for parent in out.parents if not parent.exists()]
-    try:
-        if new_folders:
-            _make_folder(new_folders[0], out)
-        yield
-    finally:
-        with suppress(OSError):  # folders with files are kept
-            for folder in new_folders:
-                folder.rmdir()
-
-
-def _make_folder(folder: Path, out: Path) -> None:
-    """Create a folder; raise Missing if this fails."""
-    try:
-        folder.mkdir(parents=True)
-    except OSError as error:
+def _open_window(frames: Frames, number: int, title: str) -> None:
+    """Open a window with the von Mises stress in both pieces; Missing if there is no screen."""
+    has_screen = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    if sys.platform.startswith("linux") and not has_screen:
         raise Missing(
-            f"{out}: the folder of this file cannot be made ({explain_mkdir_error(error)})"
-        ) from None
+            "view: there is no screen for a window (DISPLAY is not set); write a picture with "
+            "-o FILE.png"
+        )
+    import pyvista as pv
+
+    parts = grids.make_grids(frames.blocks, number, float(frames.times[number]))
+    plotter = pv.Plotter(title=f"patchfem: {title}")
+    for side in ("lower", "upper"):
+        bar = {"title": "von Mises stress [Pa]"}
+        plotter.add_mesh(parts[side], scalars="von_mises", scalar_bar_args=bar)
+    plotter.view_xy()
+    plotter.show()

@@ -1,192 +1,208 @@
-"""A finished run on disk: summary, netCDF, fields, resolved scene and page in one folder."""
+"""The results folder: files are written into DIR.partial, which replaces DIR when complete.
+
+Only folders that contain nothing but results of patchfem are ever replaced; any other folder is
+refused before a run starts.
+"""
 
 import os
-from dataclasses import replace
+import re
+import shutil
 from pathlib import Path
-from time import perf_counter
-from typing import NamedTuple
 
-from .. import __version__
-from ..core import Missing, NotConverged, PatchfemError
-from ..disk.atomic_write import write_text
-from ..runs.results.result import Result, shorten_file_names
-from ..runs.run import StateFile, is_march, run
-from . import netcdf, report
-from .fields import bodies as body_fields
-from .histories import result_contents
-from .pages import player
-from .results import INTERFACES_FOLDER, MAX_INTERFACES, PAGE, STATE, Folder, is_state
-from .summary import read_summary, summarise_run, write_json
+from ..core import Missing, PatchfemError
+from ..disk.atomic_write import RESUMABLE_FOLDERS, explain_mkdir_error, is_partial_name
+from ..disk.exchange import defer_signals, make_old_folder_path, replace_folder, restore_folder
+from ..disk.lock import FolderLock
+from . import store
+from .charts.table import CURVES
 
-SCENE = "scene.resolved.toml"
+# files of all verbs; a folder that contains any other file is never replaced
+FILES = frozenset(
+    {
+        store.SUMMARY,
+        store.SCENE,
+        store.PAGE,
+        store.FIELDS,
+        "result.nc",
+        *store.DATA_FILES.values(),
+        *store.DETAIL_FILES.values(),
+        *(name for files in CURVES.values() for name in files),
+        "interfaces",
+        "fields.pvd",
+        "fields_frames",
+        "pairs.csv",
+        "scene.fitted.toml",
+        "starts.json",
+        "wear.npz",
+    }
+)
+LOCK = ".writer"
+# files with the state from which an interrupted run or fit continues
+STATE = "wear.npz"
+STARTS = "starts.json"
+STATES = re.compile(r"wear\.npz|starts\.json|march_\d+\.npz")
 
 
-class WrittenRun(NamedTuple):
-    """Finished run whose results are on disk.
+class Folder:
+    """Results folder as a context manager, which is locked while files are written.
 
-    summary: content of summary.json; result: the run; bodies: the pressed pieces for a picture, or
-    {}; folder_id: device and inode of the folder, which identify it after it has been renamed.
-    """
-
-    summary: dict
-    result: Result
-    bodies: dict
-    folder_id: tuple
-
-
-def run_into(
-    run_plan, target: Path, say=None, progress=None, fresh: bool = False, resume: bool = False
-) -> WrittenRun:
-    """Run a plan and write its results into a folder, without the page.
-
-    The folder is locked first. An older results folder is replaced only when the new one is
-    complete, and a folder with other files is refused before anything runs. A run with [wear] and a
-    long march save their state in the folder. If the motion does not converge, the patch that was
-    pressed before is written, with the outcome not_converged.
+    `path` is the partial folder into which files are written. At exit without an error it replaces
+    an older folder; at exit with an error it is removed except for saved STATES. The next entry
+    keeps these states if `resume` is set; otherwise it deletes them and says so in the sentence
+    `dropped`.
 
     Parameters
     ----------
-    run_plan : Plan
     target : Path
-        Results folder.
-    say, progress : callable, optional
-        Take a line of text and the completed fraction.
-    fresh : bool
-        Whether the pieces are condensed again.
     resume : bool
-        Whether to continue from the saved state.
-
-    Returns
-    -------
-    WrittenRun
+        Whether saved states are kept.
 
     Raises
     ------
     PatchfemError
-        If there is no state to continue from.
-    NotConverged
-        If the motion does not converge and there is no pressed patch.
+        If the target contains other files.
+    Missing
+        If it is in use or cannot be written.
     """
-    with Folder(target, resume) as folder:
-        if folder.dropped and say is not None:
-            say(folder.dropped)
-        state_file = (
-            StateFile(folder.path / STATE, __version__, resume) if saves_state(run_plan) else None
-        )
+
+    def __init__(self, target: Path, resume: bool = False):
+        self.target = Path(os.path.abspath(target)).resolve()
+        self.path = self.target.parent / (self.target.name + ".partial")
+        self.shown = target
+        self.resume = resume
+        self.dropped = ""
+        self.new_parents = [path for path in self.target.parents if not path.exists()]
+        self.claim = FolderLock(self.target.parent / f".{self.target.name}{LOCK}", target, "run")
+
+    def __enter__(self) -> "Folder":
+        if not self.target.name:
+            raise PatchfemError(
+                f"{self.shown}: the root of the file system cannot be replaced; choose another -o"
+            )
+        if Path.cwd().is_relative_to(self.target):
+            raise PatchfemError(
+                f"{self.shown}: the working folder cannot be replaced by results; choose another -o"
+            )
+        self._refuse_others()
         try:
-            result = run(run_plan, say, progress, fresh=fresh, state_file=state_file)
-        except NotConverged as error:
-            if error.partial_result is None:
-                raise NotConverged(
-                    f"{error}; the run stopped before any result, so there is no results folder"
+            self.target.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise Missing(
+                f"{self.shown}: the results folder cannot be made ({explain_mkdir_error(error)})"
+            ) from None
+        self.claim.acquire()
+        try:
+            restore_folder(self.target)
+            self._refuse_others()
+            if self.path.exists() and not self.resume:
+                self.dropped = self._dropped_note()
+                shutil.rmtree(self.path)
+            self.path.mkdir(exist_ok=True)
+        except BaseException as error:
+            self.claim.release()
+            if isinstance(error, OSError):
+                raise Missing(
+                    f"{self.shown}: the results folder cannot be made ({explain_mkdir_error(error)})"
                 ) from None
-            result = _partial_result(error)
-        return write_results(result, folder.path)
+            raise
+        return self
 
+    def __exit__(self, kind, value, trace) -> None:
+        with defer_signals():
+            try:
+                if kind is not None:
+                    self._abandon()
+                    return
+                for part in self.path.iterdir():
+                    if is_state(part.name) or part.name == LOCK:
+                        part.unlink()
+                replace_folder(self.path, self.target)
+            except OSError as error:
+                raise Missing(
+                    f"{self.shown}: the results cannot be put in place ({error.strerror}); they are in "
+                    f"{self.path.name} beside it"
+                ) from None
+            finally:
+                self.claim.release()
+                if kind is not None:
+                    self._remove_new_parents()
 
-def _partial_result(error: NotConverged) -> Result:
-    """Return the partial results of a run that did not converge, with the reason as a warning."""
-    result = error.partial_result
-    return replace(
-        result,
-        warnings=[
-            *shorten_file_names([str(error)], result.plan.model.source.path),
-            *result.warnings,
-        ],
-    )
+    def _remove_new_parents(self) -> None:
+        """Remove the parents that were made for the folder, unless they contain other files."""
+        for path in self.new_parents:
+            try:
+                path.rmdir()
+            except OSError:
+                return
 
+    def _refuse_others(self) -> None:
+        """Raise PatchfemError if the target, or its partial or old folder, contains other files."""
+        for place in (self.target, self.path, make_old_folder_path(self.target)):
+            refuse_others(place, self.shown, (*FILES, LOCK), "patchfem results")
 
-def saves_state(run_plan) -> bool:
-    """Return whether the run of a plan saves its state for a later resume."""
-    return (run_plan.model.wear is not None and run_plan.model.patch is not None) or is_march(
-        run_plan
-    )
-
-
-def is_complete(run_plan, target: Path) -> bool:
-    """Return whether a folder contains the complete run of a plan, with nothing left to resume.
-
-    It is False for an incomplete folder, or one with the state of an interrupted run. PatchfemError
-    if it contains the complete run of another scene.
-    """
-    state = target.parent / f"{target.name}.partial"
-    try:
-        if state.is_dir() and any(is_state(path.name) for path in state.iterdir()):
-            return False
-        version = read_summary(target / "summary.json")["patchfem"]
-        text = (target / SCENE).read_text("utf-8")
-    except (OSError, ValueError):
-        return False
-    if (version, text) == (__version__, run_plan.model.source.resolved):
-        return True
-    raise PatchfemError(
-        f"{target}: this folder contains no interrupted run but a complete run of another scene or of "
-        "another version of patchfem; name another folder with -o, or run without --resume to replace "
-        "that run"
-    )
-
-
-def write_results(result: Result, path: Path) -> WrittenRun:
-    """Write all files of a run, except its page, into a folder."""
-    start_time = perf_counter()
-    bodies = {}
-    text = result.plan.model.source.resolved
-    write_text(path / SCENE, text)
-    netcdf.write_netcdf(result_contents(result), path / "result.nc")
-    if result.patch is not None:
-        bodies = body_fields.write_fields(result, path / "fields.vtkhdf")
-    for face in result.extra.get("faces", ())[:MAX_INTERFACES]:
-        face_folder = path / INTERFACES_FOLDER / face.folder
-        face_folder.mkdir(parents=True, exist_ok=True)
-        face_result = replace(
-            result,
-            plan=replace(result.plan, model=face.model),
-            patch=face.patch,
-            fields=face.fields,
-            extra={},
+    def _dropped_note(self) -> str:
+        """Return a note that the saved states of an earlier run are deleted, or "" if there are none."""
+        if not any(is_state(part.name) for part in self.path.iterdir()):
+            return ""
+        return (
+            f"note: {self.path.name} held the state of an interrupted run, which is now discarded; use --resume to "
+            "continue such a run"
         )
-        body_fields.write_fields(face_result, face_folder / "fields.vtkhdf")
-        result.extra["notes"] += [
-            f"interface {face.name}: {text}" for text in face_result.extra["notes"]
-        ]
-    result.seconds["files"] = perf_counter() - start_time
-    summary = summarise_run(result)
-    write_json(summary, path / "summary.json")
-    return WrittenRun(summary, result, bodies, _folder_identity(path))
+
+    def _abandon(self) -> None:
+        """Remove an incomplete results folder, but keep a saved state."""
+        if not any(is_state(part.name) for part in self.path.iterdir()):
+            shutil.rmtree(self.path, ignore_errors=True)
+            return
+        RESUMABLE_FOLDERS.append(self.path)
+        for part in self.path.iterdir():
+            if not is_state(part.name):
+                shutil.rmtree(part, ignore_errors=True) if part.is_dir() else part.unlink(
+                    missing_ok=True
+                )
 
 
-def write_run_page(stored_run: WrittenRun, folder: Path) -> Path:
-    """Write the page of a run into its complete results folder, and return the path of the page.
-
-    Missing if another run has replaced the folder in the meantime.
-    """
-    text = report.run_page(stored_run.result, stored_run.bodies, player.player_data(folder))
-    path = Path(folder) / PAGE
-    if not path.parent.is_dir() or _folder_identity(path.parent) != stored_run.folder_id:
-        raise Missing(f"{folder}: replaced by another run while the page was drawn")
-    write_text(path, text)
-    return path
+def is_state(name: str) -> bool:
+    """Return whether a file with this name contains the saved state of an interrupted run."""
+    return STATES.fullmatch(name) is not None
 
 
-def _folder_identity(folder: Path) -> tuple:
-    """Return the device and inode numbers that identify a folder."""
-    status = os.stat(folder)
-    return status.st_dev, status.st_ino
-
-
-def save_run(result: Result, folder: Path, page: bool = True) -> None:
-    """Write the results folder of a finished run, by default with its page.
-
-    An older results folder is replaced.
+def refuse_others(folder: Path, user_path, allowed, kind: str, dots: bool = False) -> None:
+    """Raise PatchfemError if a path is not a folder, or if the folder contains files of another kind.
 
     Parameters
     ----------
-    result : Result
     folder : Path
-    page : bool
-        Whether report.html is written.
+    user_path : Path
+        The path as the user named it.
+    allowed : container of str
+        Names of files that are allowed, also with .partial at the end.
+    kind : str
+        What these files are, in words.
+    dots : bool
+        Whether names that start with a dot are allowed.
     """
-    with Folder(folder) as claimed:
-        stored_run = write_results(result, claimed.path)
-    if page:
-        write_run_page(stored_run, claimed.target)
+    if not folder.exists():
+        return
+    if not folder.is_dir():
+        raise PatchfemError(
+            f"{user_path}: {folder.name} is a file, but a folder is needed; choose another -o"
+        )
+    others = sorted(
+        path.name
+        for path in folder.iterdir()
+        if path.name.removesuffix(".partial") not in allowed
+        and not (is_partial_name(path.name) or is_state(path.name))
+        and not (dots and path.name.startswith("."))
+    )
+    if others:
+        raise PatchfemError(
+            f"{user_path}: {folder.name} contains files that are not {kind} "
+            f"({', '.join(others[:3])}{', ...' if len(others) > 3 else ''}); choose another -o"
+        )
+
+
+def identify_folder(folder: Path) -> tuple[int, int]:
+    """Return the device and inode numbers that identify a folder."""
+    status = os.stat(folder)
+    return status.st_dev, status.st_ino

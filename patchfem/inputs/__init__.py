@@ -50,9 +50,7 @@ PUBLIC = {
     "slides": ("read_slide",),
     "units": (
         "CHANNEL_UNITS",
-        "FORCE_UNITS",
         "SI_UNITS",
-        "SLIDE_UNITS",
     ),
     "universal": (
         "FunctionType",

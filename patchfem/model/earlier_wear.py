@@ -162,7 +162,7 @@ def _read_state(path: Path) -> EarlierWear:
             gap=np.array(file["unloaded_gap"], float) - depth,
             cycles=float(np.array(file["wear_cycle"], float)[-1]),
             scene=tomllib.loads(file.attrs["scene"]),
-            measures=json.loads(file.attrs["summary"])["measures"],
+            measures=json.loads(file.attrs["measures"]),
         )
 
 

@@ -18,14 +18,14 @@ it:
 12. `plan`  what would run: engine, sizes, cost
 13. `self_checks`  comparison of results with a second computation
 14. `run`  from a plan to its result
-15. `batch`  many models in one batch
+15. `pieces`  displacement and stress inside both pieces, and where they yield
+16. `batch`  many models in one batch
 """
 
 # names that other folders use, by module
 PUBLIC = {
     "accuracy_curve": ("compute_accuracy_curve",),
     "batch.batches": (
-        "batch_compile_seconds",
         "choose_batch",
         "solve_models",
     ),
@@ -50,25 +50,22 @@ PUBLIC = {
         "has_error_meshes",
         "static_measures_without_errors",
     ),
-    "patch.jenkins_elements": (
-        "elements",
-        "strip_elements",
-    ),
+    "patch.jenkins_elements": ("elements",),
     "patch.mesh_levels": (
         "solve_with_coarser",
         "solve_on_split_mesh",
     ),
-    "patch.sweep_meshes": ("geometry_key",),
     "patch.press": ("nodal_areas",),
     "patch.result": ("make_piece_meshes_of_run",),
-    "patch.strength": (
-        "Strength",
-        "YIELDING_NEGLECTED",
-        "yield_strength",
-    ),
     "patch.values": (
         "contact_ends",
         "contact_intervals",
+    ),
+    "pieces": (
+        "PieceFields",
+        "Pieces",
+        "add_yielding_notes",
+        "compute_pieces",
     ),
     "plan": (
         "GROUPS",
@@ -77,7 +74,6 @@ PUBLIC = {
     ),
     "results.patch_rows": (
         "TABLE",
-        "minimum_value",
         "find_unknown_measures",
     ),
     "results.result": (

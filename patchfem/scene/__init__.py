@@ -9,7 +9,6 @@ Read `scene` first, then `keys/tables`. README.md in this folder explains every 
 PUBLIC = {
     "axes": (
         "Axis",
-        "FormattedNumbers",
         "LENGTH_KEY",
         "SampledRange",
         "describe_ranges",

@@ -11,8 +11,6 @@ PUBLIC = {
     "arrays": ("read_arrays",),
     "drive_sizes": (
         "DriveKeys",
-        "MAX_STORED_SAMPLES",
-        "MIN_SAMPLES_PER_CYCLE",
         "choose_samples_per_cycle",
         "count_cycles_per_level",
         "count_repeat_cycles",

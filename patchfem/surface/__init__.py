@@ -1,34 +1,20 @@
 """Measured surfaces: read, levelled and cleaned, their roughness, and their wear.
 
 In: files of traces and areal scans (`files`). Out: levelled heights averaged over the cells of the
-interface nodes (`nodes`), roughness with intervals (`roughness`), and what changed between two
-traces (`compare`) or two scans (`scans`). Read `profile` first, then `nodes`.
+interface nodes (`nodes`), roughness (`roughness`), and what changed between two traces or two scans
+(`compare`). Read `profile` first, then `compare.records` and `compare.compare`.
 """
 
 # Names that other folders use, by module.
 PUBLIC = {
-    "areal": ("level_plane",),
-    "compare.compare": (
-        "AMPLITUDE",
+    "areal": ("level_plane"),
+    "compare.compare": ("Options", "compare_files", "compare_surfaces"),
+    "compare.records": (
         "Comparison",
-        "SLOPE",
+        "Finding",
+        "ScanMaps",
+        "Track",
     ),
-    "compare.pairs": (
-        "average_pairs",
-        "collect_quantities",
-        "compare_pairs",
-        "find_group",
-        "parse_quantity",
-        "read_pairs",
-    ),
-    "compare.ratios": (
-        "correlate_traces",
-        "divide_sizes",
-        "measure_size",
-        "resample",
-    ),
-    "compare.reference": ("NO_LIMIT",),
-    "compare.verdict": ("judge_files",),
     "files.read": (
         "read_profile",
         "read_surface",
@@ -52,18 +38,11 @@ PUBLIC = {
     "quantity": (
         "LEVEL",
         "Quantity",
-        "make_unknown",
+        "average_quantities",
     ),
     "roughness.filter": ("mean_line",),
     "roughness.form": ("parse_form_option",),
-    "roughness.means": (
-        "Means",
-        "average_reports",
-    ),
-    "roughness.parameters": (
-        "Heights",
-        "abbott_curve",
-    ),
+    "roughness.parameters": ("abbott_curve",),
     "roughness.peaks": (
         "Moments",
         "PERSSON",
@@ -81,9 +60,5 @@ PUBLIC = {
     "roughness.spectrum": (
         "BAND",
         "Spectrum",
-    ),
-    "scans.change": (
-        "Change",
-        "refuse_hidden_wear",
     ),
 }

@@ -5,13 +5,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..core import PatchfemError, frozen_array
-from .profile import Profile
+from .profile import Profile, robust_deviation
 
-# Number of relaxation sweeps with each operator; the heights of
-# single holes have converged by then.
-N_SWEEPS = 20
-# Fraction of each correction that is applied; relaxation of the bi-Laplacian diverges from 5/8 on.
-DAMPING = 0.6
+SPIKE_THRESHOLDS = (10.0, 40.0, 160.0)  # |height - median of 5 x 5| in standard deviations
+MAX_SPIKE_POINTS = 12  # number of points of a spike; a larger group is a feature of the surface
+SPIKE_WINDOW = 5  # side of the square of the median
 # Singular value of the normal equations per height, at or below which it counts as round-off.
 RANK_TOL = 1e-12
 
@@ -54,29 +52,35 @@ class Areal:
         )
 
 
-def fill_missing(z, missing) -> np.ndarray:
-    """Fill missing heights (m, n) of a scan with a smooth surface.
+def fill_nearest(z) -> np.ndarray:
+    """Give missing heights (NaN) of a map (m, n) the value of the nearest measured point."""
+    from scipy.ndimage import distance_transform_edt
 
-    The height of the nearest measured point is relaxed by the Laplace equation first and then by the
-    biharmonic equation, which reproduces a single missing height to the fourth order of the step.
-    """
-    from scipy.ndimage import convolve, distance_transform_edt
-
+    missing = np.isnan(z)
     if not missing.any():
         return z
     nearest = distance_transform_edt(missing, return_distances=False, return_indices=True)
-    padded = np.pad(z[tuple(nearest)], 2, "reflect", reflect_type="odd")
-    heights = padded.ravel()
-    rows, columns = np.nonzero(missing)
-    holes = (rows + 2) * padded.shape[1] + columns + 2
-    laplacian = np.pad([[0, -1, 0], [-1, 4, -1], [0, -1, 0]], 1)
-    for stencil in (laplacian, convolve(laplacian, laplacian, mode="constant")):
-        down, right = np.nonzero(stencil)
-        offsets = (down - 2) * padded.shape[1] + right - 2
-        terms = list(zip(offsets, stencil[down, right] * (DAMPING / stencil[2, 2])))
-        for _ in range(N_SWEEPS):
-            heights[holes] -= sum(weight * heights[holes + offset] for offset, weight in terms)
-    return padded[2:-2, 2:-2]
+    return z[tuple(nearest)]
+
+
+def find_scan_spikes(scan: Areal) -> np.ndarray:
+    """Return a mask (m, n) of heights far from the median of the 5 x 5 around them, in small groups.
+
+    A larger group is a feature of the surface; the threshold rises until the groups are small.
+    """
+    from scipy import ndimage
+
+    filled = fill_nearest(scan.z)
+    distance = np.abs(filled - ndimage.median_filter(filled, SPIKE_WINDOW))
+    deviation = robust_deviation(distance[distance > 0]) if (distance > 0).any() else 0.0
+    spikes = np.zeros(filled.shape, bool)
+    if not deviation > 0:
+        return spikes
+    for threshold in SPIKE_THRESHOLDS:
+        groups, count = ndimage.label(distance > threshold * deviation, np.ones((3, 3)))
+        sizes = np.bincount(groups.ravel(), minlength=count + 1)
+        spikes |= (sizes <= MAX_SPIKE_POINTS)[groups] & (groups > 0)
+    return spikes & ~scan.missing
 
 
 def level_plane(scan: Areal) -> Areal:

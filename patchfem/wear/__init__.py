@@ -3,17 +3,27 @@
 In: contact forces of the worn pieces, slip path of every interface point in one cycle, wear coefficient. Out: the depth
 that wear adds to the gap. Archard's law is dh = kappa p ds, its energy form dh = alpha tau ds, for both pieces
 together. `depth` solves one jump over many cycles together with the contact; `jumps` chooses the lengths of the jumps.
+`between_runs` measures the wear between two states of a patch, and `predicted` fits the depth of a run to a measured one.
 Read `depth` first.
 """
 
 # Names that other folders use, by module
 PUBLIC = {
     "depth": ("wear_rates",),
+    "between_runs": (
+        "PatchState",
+        "measure_wear",
+    ),
     "jumps": (
         "WearProblem",
         "WearState",
         "replay_jumps",
         "make_initial_wear_state",
         "take_jump",
+    ),
+    "predicted": (
+        "MeasuredDepth",
+        "WearHistory",
+        "fit_wear",
     ),
 }

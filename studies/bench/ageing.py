@@ -17,10 +17,9 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
-from drawing import drawing
+from drawing import BLUE, GREY, ORANGE, drawing
 from friction_forms import steady_bond_length
 
-from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.model import build
 from patchfem.runs.bench import bench as law_bench
 from patchfem.scene import scene

@@ -9,7 +9,12 @@ from matplotlib import rc_context
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
-from patchfem.export.drawing.pictures import STYLE
+from patchfem.export.charts.axes import STYLE
+
+# colours of two curves that are compared, and of what is beside them
+BLUE = "#1f5f99"
+ORANGE = "#c8551b"
+GREY = "#8a8a8a"
 
 
 @contextmanager

@@ -22,8 +22,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 
-from patchfem.campaigns import LoopOptions, fit_hysteresis_loop
-from patchfem.campaigns.fits.loop import LOAD_UNITS
+from patchfem.campaigns.fits.loop import LOAD_UNITS, fit_hysteresis_loop
+from patchfem.campaigns.fits.loop_path import LoopOptions
 from patchfem.inputs import read_loop
 from patchfem.scene import loads
 

@@ -11,12 +11,11 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
-from drawing import drawing
+from drawing import BLUE, GREY, ORANGE, drawing
 from drift_laws import LENGTH, PERIOD, SHARES, ladder
 from force_control import OutOfReach, drift
 from friction_forms import dither_drift, stretch_loop
 
-from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.friction import FirstOrderBonds
 
 FOLDER = Path(__file__).parent

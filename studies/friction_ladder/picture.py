@@ -12,9 +12,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 import ladder
-from drawing import drawing
-
-from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
+from drawing import BLUE, GREY, ORANGE, drawing
 
 FOLDER = Path(__file__).parent
 AMPLITUDES = 10.0 ** np.linspace(-1, 1.75, 12)

@@ -29,12 +29,10 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
-from drawing import drawing
+from drawing import BLUE, GREY, ORANGE, drawing
 from failure_cases import CASES, SLIDES, STEPS, peak_errors, solve
 from problems import TWO, exact
 from study_text import read_answer
-
-from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
 FOLDER = Path(__file__).parent
 ANSWER = read_answer(__doc__)

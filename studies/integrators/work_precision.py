@@ -34,14 +34,12 @@ from threadpoolctl import threadpool_limits
 
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
-from drawing import drawing
+from drawing import BLUE, GREY, ORANGE, drawing
 from engine_peers import PEERS
 from engine_problems import ALL
 from engines import OURS
 from peer import run
 from precision_rows import EQUAL, FLOOR, curve, measure, ratios
-
-from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
 FOLDER = Path(__file__).parent
 TABLE = FOLDER / "work_precision.json"

@@ -76,8 +76,8 @@ def sweep_measures(tilts=TILTS, loads=LOADS, levels=LEVELS, **more):
 
 
 def allowed_tilt(load: float, level: float, tilts=TILTS) -> str:
-    """Return the sentence of `patchfem sweep` on the tilt that is allowed under a load [lbf] at a level [g]."""
-    return sweep_measures(tilts, (load,), (level,)).attrs["answer"]
+    """Return the verdict of `patchfem sweep`, with the tilt that is allowed under a load [lbf] at a level [g]."""
+    return sweep_measures(tilts, (load,), (level,)).attrs["verdict"]
 
 
 def onsets(load: float, tilts=TILTS):

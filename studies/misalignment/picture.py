@@ -12,9 +12,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 import fixtures
 import tilted
-from drawing import drawing
+from drawing import BLUE, GREY, ORANGE, drawing
 
-from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.runs.patch.press import solve_patch_contact
 
 FOLDER = Path(__file__).parent

@@ -32,12 +32,10 @@ from scipy import signal
 
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
-from drawing import drawing
+from drawing import BLUE, GREY, ORANGE, drawing
 from figure_27 import scene
 from modal_test import RATE, G, fit_mode, h1, run_random_test
 from study_text import read_answer
-
-from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
 FOLDER = Path(__file__).parent
 ANSWER = read_answer(__doc__)

@@ -18,11 +18,9 @@ import numpy as np
 from scipy.special import gammaincinv
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
-from drawing import drawing
+from drawing import BLUE, GREY, ORANGE, drawing
 from friction_forms import weight_along
 from study_text import read_answer
-
-from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
 FOLDER = Path(__file__).parent
 ANSWER = read_answer(__doc__)

@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
-from drawing import drawing
+from drawing import BLUE, GREY, ORANGE, drawing
 from problems import UNDAMPED_MASS
 from report_methods import coulomb, solve_duhamel
 from study_text import read_answer
@@ -31,7 +31,6 @@ from vibration_forms import decay
 
 import patchfem as pf
 from patchfem.core import DriveSegment, InitialState
-from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.structure.drives import PiecewiseDrive
 
 FOLDER = Path(__file__).parent

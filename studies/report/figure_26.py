@@ -23,12 +23,11 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
-from drawing import drawing
+from drawing import BLUE, GREY, ORANGE, drawing
 from modal_test import Estimate, fit_mode, h1, run_random_test
 from study_text import read_answer
 
 import patchfem as pf
-from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.structure import compute_receptance
 
 FOLDER = Path(__file__).parent

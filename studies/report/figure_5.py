@@ -24,13 +24,12 @@ from typing import NamedTuple
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
-from drawing import drawing
+from drawing import BLUE, GREY, ORANGE, drawing
 from report_methods import solve_euler
 from study_text import read_answer
 
 import patchfem as pf
 from patchfem.dynamics.cycles import find_hermite_extremes
-from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.model import build
 from patchfem.scene import load as load_scene
 
@@ -75,13 +74,13 @@ def motion(step: float | None = None) -> Motion:
     found = pf.run(FOLDER / "figure_5.toml")
     kept = found.to_xarray()
     kept = kept.isel(time=kept.time.values >= 7 * period - 1e-6)
-    block = -kept.output_displacement.values
-    slide = -kept.relative_displacement.values[0]
+    block = -kept.relative_displacement.values
+    slide = -kept.slide.values
     return Motion(
         kept.time.values - 7 * period,
         block,
         block - slide,
-        kept.friction_force.values[0],
+        kept.friction_force.values,
         found.measures["relative_displacement_amplitude"].value,
     )
 

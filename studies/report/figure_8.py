@@ -29,12 +29,12 @@ from typing import NamedTuple
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
-from drawing import drawing
+from drawing import BLUE, GREY, ORANGE, drawing
 from study_text import read_answer
 
 import patchfem as pf
-from patchfem.campaigns import LoopOptions, fit_hysteresis_loop
-from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
+from patchfem.campaigns.fits.loop import fit_hysteresis_loop
+from patchfem.campaigns.fits.loop_path import LoopOptions
 from patchfem.scene import loads
 
 FOLDER = Path(__file__).parent
@@ -104,10 +104,10 @@ def loop(frequency: float = 10.0, static: float = 0.3) -> Loop:
     time = np.linspace(5 * period, 6 * period, 4001)
     column = {
         name: np.interp(time, kept.time.values, np.squeeze(kept[name].values))
-        for name in ("output_displacement", "relative_displacement", "friction_force")
+        for name in ("relative_displacement", "slide", "friction_force")
     }
-    block = column["output_displacement"]
-    slip = column["relative_displacement"]
+    block = column["relative_displacement"]
+    slip = column["slide"]
     cell = STIFFNESS * block
     slider = block + slip
     turns = np.count_nonzero(np.diff(np.sign(np.diff(cell))))

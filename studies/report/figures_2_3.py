@@ -26,13 +26,12 @@ from typing import NamedTuple
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
-from drawing import drawing
+from drawing import BLUE, GREY, ORANGE, drawing
 from problems import SDOF, SDOF_DRIVE, sample_motion
 from report_methods import coulomb, solve_newmark
 from study_text import read_answer
 
 import patchfem as pf
-from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
 FOLDER = Path(__file__).parent
 ANSWER = read_answer(__doc__)

@@ -35,7 +35,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from study_text import read_answer
 
-from patchfem.export import histories, netcdf
+from patchfem.export import netcdf, runs
 from patchfem.inputs import read_table
 from patchfem.inputs.measured import MeasuredRow
 from patchfem.runs.run import run
@@ -127,7 +127,7 @@ def series(
             ),
             estimate=False,
         )
-        netcdf.write_netcdf(histories.result_contents(found), place / f"{number}.nc")
+        netcdf.write_netcdf(runs.make_answer(found), place / f"{number}.nc")
         start = [f"wear.start={number}.nc"]
         area = float(found.patch.pieces.interface.weight.sum())
         before, depth = (

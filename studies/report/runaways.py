@@ -32,11 +32,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
-from drawing import drawing
+from drawing import BLUE, GREY, ORANGE, drawing
 from study_text import read_answer
 
 import patchfem as pf
-from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
 FOLDER = Path(__file__).parent
 ANSWER = read_answer(__doc__)

@@ -27,14 +27,13 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
-from drawing import drawing
+from drawing import BLUE, GREY, ORANGE, drawing
 from figure_27 import POINT
 from modal_test import march_samples
 from study_text import read_answer
 
-from patchfem.campaigns import FitRequest, RowsOptions, fit_rows
-from patchfem.campaigns.rows.fit import SearchSettings
-from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
+from patchfem.campaigns.rows.condition_models import FitRequest
+from patchfem.campaigns.rows.fit import RowsOptions, SearchSettings, fit_rows
 from patchfem.inputs import read_table
 from patchfem.scene import loads, read_ranges
 
@@ -222,7 +221,7 @@ def main(path: Path | None = FOLDER / "steps.svg", fits: bool = True) -> tuple:
             )
         )
         best = int((one.search.rms < 1.01 * np.nanmin(one.search.rms)).sum())
-        scored = one.compute_scores(one.logs, one.left_out_logs)
+        scored = one.compute_scores()
         print(
             f"{values}; fitted {format_score(scored['fitted'])}, predicted {format_score(scored['held_out'])}; "
             f"{best} of {STARTS} starts end there"

@@ -9,10 +9,9 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
-from drawing import drawing
+from drawing import BLUE, GREY, ORANGE, drawing
 
 from patchfem.core import G_N
-from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.inputs import read_table
 from patchfem.runs import run as runner
 from patchfem.scene import scene

@@ -17,9 +17,8 @@ from pathlib import Path
 from time import process_time
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
-from drawing import drawing
+from drawing import BLUE, ORANGE, drawing
 
-from patchfem.export.drawing.pictures import BLUE, ORANGE
 from patchfem.runs import run as runner
 from patchfem.scene import scene
 

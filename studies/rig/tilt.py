@@ -76,8 +76,8 @@ def main(tilts=TILTS, cycles: float = 200) -> list:
 
 
 def allowed_tilt(tilts="1e-6 rad..1e-3 rad:7") -> str:
-    """Return the sentence of `patchfem sweep` on the tilt that is allowed."""
-    return pf.sweep(FOLDER / "rig.toml", {"contact.tilt.angle": tilts}).attrs["answer"]
+    """Return the verdict of `patchfem sweep`, with the tilt that is allowed."""
+    return pf.sweep(FOLDER / "rig.toml", {"contact.tilt.angle": tilts}).attrs["verdict"]
 
 
 if __name__ == "__main__":

@@ -201,7 +201,7 @@ def answer(name: str, folder: Path) -> list:
     if name == "sweep":
         found = pf.sweep(scene)
         save(pf.plot.sweep(found, "contact_fraction"), picture)
-        return [str(found.attrs["answer"]), f"![Contact fraction against tilt]({picture.name})"]
+        return [found.attrs["verdict"], f"![Contact fraction against tilt]({picture.name})"]
     result = pf.run(scene, say=lambda text: None)
     kind = "levels" if "levels" in name else KINDS[result.plan.kind]
     save(getattr(result.plot, kind)(), picture)

@@ -8,6 +8,7 @@ comparison, which takes about 20 CPU seconds. No browser is needed.
 
 import json
 import os
+import re
 import sys
 from collections.abc import Iterator
 from hashlib import sha256
@@ -16,20 +17,21 @@ from tempfile import TemporaryDirectory
 
 import matplotlib
 import numpy as np
-from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))
 
 import patchfem as pf  # noqa: E402
-from patchfem.export.drawing.film import make_film  # noqa: E402
-from patchfem.export.drawing.panels import outer_edges  # noqa: E402
-from patchfem.export.drawing.paraview import get_stress  # noqa: E402
-from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE, STYLE  # noqa: E402
-from patchfem.export.fields.series import Frame, Series  # noqa: E402
+from patchfem.export.charts.axes import STYLE  # noqa: E402
+from patchfem.export.fields.film import contact_window, last_frames  # noqa: E402
+from patchfem.export.fields.vtkhdf import NAME, Frames, read_frames  # noqa: E402
+from patchfem.export.pieces import draw_cells, magnify_pieces  # noqa: E402
 
 FOLDER = Path(__file__).parent / "pictures"
+BLUE = "#1f5f99"
+ORANGE = "#c8551b"
+GREY = "#8a8a8a"
 WIDTH = 4.4  # inch; letters of 11 points stay 12 pixels high on a screen 360 pixels wide
 DPI = 190  # dots per inch: 836 pixels, the column of a README on a code host
 MAX_BYTES = 1_000_000  # bytes; with larger pictures a page is slow to load on a telephone
@@ -91,84 +93,51 @@ def draw_loop(result) -> Figure:
     return figure
 
 
-def draw_cells(axis, frame: Frame, panel, values, limits: tuple, colours: str):
-    """Draw the cells of a panel of both pieces, coloured by a stress.
-
-    Parameters
-    ----------
-    axis : matplotlib Axes
-    frame : Frame
-    panel : Panel
-        Which cells are drawn, and where.
-    values : (cells,) array
-        Stress of all cells of the frame [MPa].
-    limits : tuple
-        Stresses at both ends of the colours [MPa].
-    colours : str
-        Name of a colour map of matplotlib.
-
-    Returns
-    -------
-    PolyCollection
-        The drawn cells, for a colour bar.
-    """
-    sizes = np.diff(frame.offsets)
-    drawn = None
-    for count in np.unique(sizes[panel.cells]):
-        chosen = panel.cells & (sizes == count)
-        corners = frame.connectivity[frame.offsets[:-1][chosen][:, None] + np.arange(count)]
-        drawn = PolyCollection(
-            panel.places[corners],
-            array=values[chosen],
-            cmap=colours,
-            edgecolors="none",
-            antialiaseds=False,
-        )
-        drawn.set_clim(*limits)
-        axis.add_collection(drawn)
-    for edges, colour in zip(outer_edges(frame, panel.cells), ("black", "white")):
-        axis.add_collection(LineCollection(panel.places[edges], colors=colour, linewidths=1))
-    left, right, bottom, top = panel.window
-    axis.set(xlim=(left, right), ylim=(bottom, top), aspect="equal", ylabel="y [mm]")
-    axis.grid(False)
-    return drawn
+def read_stress(frames: Frames, name: str) -> np.ndarray:
+    """Return a stress (f, c, ...) [MPa] of the cells of both pieces in the frames of the last cycle."""
+    numbers = last_frames(frames.times)
+    parts = [frames.blocks[side].cell_data[name][numbers] for side in ("lower", "upper")]
+    return MPA * np.concatenate(parts, axis=1)
 
 
-def draw_pieces(series: Series, film) -> Figure:
+def draw_pieces(frames: Frames) -> Figure:
     """Draw normal and shear stress inside both pieces at the largest shear stress."""
-    figure, axes = new_figure(4.9, 2, sharex=True)
-    frames = [series.frame(number) for number in film.numbers]
-    frame = max(frames, key=lambda frame: np.abs(get_stress(frame.cell_data, "tau_xy")).max())
-    panel = film.panels(frame)[1]
-    stresses = {
-        "normal stress −σyy": -get_stress(frame.cell_data, "sigma_yy") * MPA,
-        "shear stress τxy": get_stress(frame.cell_data, "tau_xy") * MPA,
-    }
+    figure, axes = new_figure(5.2, 2, sharex=True)
+    drawn = magnify_pieces(frames, last_frames(frames.times), contact_window(frames))
+    stress = read_stress(frames, "stress")
+    index = int(np.argmax(np.abs(stress[..., 3]).max(axis=1)))
+    stresses = {"normal stress −σyy": -stress[..., 1], "shear stress τxy": stress[..., 3]}
     for axis, (name, values), colours in zip(axes, stresses.items(), ("Blues", "RdBu_r")):
-        top = np.quantile(np.abs(values[panel.cells]), 0.995)
+        top = np.quantile(np.abs(values[index, drawn.is_inside]), 0.995)
         limits = (0, top) if colours == "Blues" else (-top, top)
-        drawn = draw_cells(axis, frame, panel, values, limits, colours)
-        figure.colorbar(drawn, ax=axis, label="MPa", shrink=0.8, aspect=14)
+        cells, show = draw_cells(axis, drawn, values, cmap=colours, clim=limits)
+        show(index)
+        figure.colorbar(cells, ax=axis, label="MPa", shrink=0.8, aspect=14)
         axis.set_title(f"{name} inside both pieces")
-    axes[-1].set_xlabel(f"x [mm]  (gap magnified {panel.factor:g} times)")
+        axis.grid(False)
+    axes[0].set_xlabel("")
+    axes[1].set_xlabel(f"x [mm]  ({drawn.captions[index].partition(',')[0]})")
     return figure
 
 
-def draw_film(series: Series, film) -> Figure:
+def draw_film(frames: Frames) -> Figure:
     """Draw two frames of the film of a cycle: upper piece farthest to the left and to the right."""
-    figure, axes = new_figure(4.9, 2, sharex=True)
-    frames = [series.frame(number) for number in film.numbers]
-    slides = [film.panels(frame)[1].slide for frame in frames]
-    for axis, number in zip(axes, (int(np.argmin(slides)), int(np.argmax(slides)))):
-        frame = frames[number]
-        panel = film.panels(frame)[1]
-        values = frame.cell_data["von_mises"] * MPA
-        drawn = draw_cells(axis, frame, panel, values, (0, film.tops[1] * MPA), "viridis")
-        figure.colorbar(drawn, ax=axis, label="von Mises [MPa]", shrink=0.8, aspect=14)
+    figure, axes = new_figure(5.2, 2, sharex=True)
+    numbers = last_frames(frames.times)
+    drawn = magnify_pieces(frames, numbers, contact_window(frames))
+    stress = read_stress(frames, "von_mises")
+    top = np.quantile(stress[:, drawn.is_inside], 0.998)
+    slides = frames.blocks["interface"].point_data["holder_slide"][numbers, 0]
+    for axis, index in zip(axes, (int(np.argmin(slides)), int(np.argmax(slides)))):
+        cells, show = draw_cells(axis, drawn, stress, cmap="viridis", clim=(0, top))
+        show(index)
+        figure.colorbar(cells, ax=axis, label="von Mises [MPa]", shrink=0.8, aspect=14)
         axis.set_title(
-            f"frame {number + 1} of {len(frames)}: upper piece at {slides[number] * MM:.1f} um"
+            f"frame {index + 1} of {len(slides)}: upper piece at {slides[index] * UM:.1f} um"
         )
-    axes[-1].set_xlabel(f"x [mm]  (displacement magnified {film.slide_factor:g} times)")
+        axis.grid(False)
+    axes[0].set_xlabel("")
+    axes[1].set_xlabel(f"x [mm]  (slide{drawn.captions[0].partition('um')[2]})")
     return figure
 
 
@@ -187,8 +156,13 @@ def draw_sweep(swept) -> Figure:
     axis.axhspan(
         -TILT_LIMIT, TILT_LIMIT, color=BLUE, alpha=0.1, lw=0, label=f"within {TILT_LIMIT:g} %"
     )
-    allowed = swept.attrs["answer"].partition(";")[0].partition(")")[0].replace(" (", ",\n")
-    axis.set(xscale="log", xlabel="tilt [mrad]", ylabel="change [%]", title=allowed)
+    (allowed,) = re.findall(r"[\w.]+ may reach .*? changes by 5 %", swept.attrs["verdict"])
+    axis.set(
+        xscale="log",
+        xlabel="tilt [mrad]",
+        ylabel="change [%]",
+        title=allowed.replace(" before", "\nbefore"),
+    )
     axis.xaxis.set_major_formatter("{x:g}")
     axis.legend(loc="lower left")
     return figure
@@ -231,10 +205,9 @@ def figures() -> Iterator[tuple[str, Figure]]:
         yield "interface", draw_interface(result)
         yield "loop", draw_loop(result)
         result.save(place)
-        with Series(Path(place)) as series:
-            film = make_film(series)
-            yield "pieces", draw_pieces(series, film)
-            yield "film", draw_film(series, film)
+        frames = read_frames(Path(place) / NAME)
+        yield "pieces", draw_pieces(frames)
+        yield "film", draw_film(frames)
         os.chdir(place)  # a sweep writes its folder into the current directory
         yield "sweep", draw_sweep(pf.sweep(pf.new("misalignment")))
         os.chdir(ROOT)

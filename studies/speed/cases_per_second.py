@@ -38,8 +38,9 @@ from switched import PROBLEMS, follow
 
 from patchfem.campaigns import Cases, SweepScene
 from patchfem.campaigns.sweeps.executors import LocalExecutor
+from patchfem.campaigns.sweeps.sweep import WorkerData, iterate_chunks
+from patchfem.campaigns.sweeps.sweep_table import SweepTable
 from patchfem.core import Missing
-from patchfem.export import compute_in_memory
 from patchfem.runs.batch import batches
 from patchfem.scene import loads, make_axis
 
@@ -165,6 +166,15 @@ def by_loop(cases: np.ndarray, steps: int) -> np.ndarray:
     return out[: len(cases)]
 
 
+def compute(sweep_scene: SweepScene, cases: Cases) -> SweepTable:
+    """Compute the cases in this process, and return their table."""
+    table = SweepTable.blank(cases, None)
+    work = WorkerData(sweep_scene, cases)
+    for numbers, results, *_ in iterate_chunks(work, range(len(cases)), LocalExecutor(), None):
+        table.insert(numbers, results)
+    return table
+
+
 def by_patchfem(cases: np.ndarray):
     """Compute the results of the cases from the values of their keys in this process; many cases are computed in lanes."""
     axes = [
@@ -173,9 +183,7 @@ def by_patchfem(cases: np.ndarray):
             ("friction.static", "structure.mode.block.damping"), cases.T.tolist()
         )
     ]
-    return compute_in_memory(
-        SweepScene(Path("block.toml"), SCENE), Cases(tuple(axes), True), LocalExecutor()
-    )
+    return compute(SweepScene(Path("block.toml"), SCENE), Cases(tuple(axes), True))
 
 
 def by_exact(cases: np.ndarray):
@@ -339,7 +347,7 @@ def _answer_family(name: str, count: int, seed: int):
         )
         for key, draw in keys.items()
     ]
-    return compute_in_memory(SweepScene(RIG, text), Cases(tuple(axes), True), LocalExecutor())
+    return compute(SweepScene(RIG, text), Cases(tuple(axes), True))
 
 
 def families(seed: int = 1, names=tuple(FAMILIES), goes: int = 3, share: float = 1.0) -> list[dict]:
@@ -366,10 +374,10 @@ def families(seed: int = 1, names=tuple(FAMILIES), goes: int = 3, share: float =
         tolerance = loads(FAMILIES[name][0], RIG).accuracy.tolerance
         for go in range(goes):
             found, seconds = measure_seconds(partial(_answer_family, name, count, seed + go))
-            measure = AMPLITUDE if AMPLITUDE in found.values else "pressure_peak"
-            error = found.errors[measure]
-            value = found.values[measure]
-            good.append(np.mean(error <= tolerance * np.abs(value) + found.floors[measure]))
+            measure = AMPLITUDE if AMPLITUDE in found.measures else "pressure_peak"
+            column = found.measures[measure]
+            allowed = tolerance * np.abs(column.values) + column.floors
+            good.append(np.mean(column.errors <= allowed))
             took.append(seconds)
         rows.append(
             {
@@ -397,11 +405,14 @@ def main(
     for way in (by_patchfem, by_exact, lambda some: by_loop(some, 20)):
         way(warm)
     found, seconds = measure_seconds(lambda: by_exact(cases))
-    exact = found.values[AMPLITUDE].copy()
+    exact = found.measures[AMPLITUDE].values.copy()
     rows = [row("exact engine, in a batch", "", seconds, exact, exact)]
     found, seconds = measure_seconds(lambda: by_patchfem(cases))
-    rows.append(row("lanes, with bars", "1e-3", seconds, found.values[AMPLITUDE], exact))
-    miss = np.abs(found.values[AMPLITUDE] - exact) > found.errors[AMPLITUDE] + 1e-12 * exact
+    rows.append(row("lanes, with bars", "1e-3", seconds, found.measures[AMPLITUDE].values, exact))
+    miss = (
+        np.abs(found.measures[AMPLITUDE].values - exact)
+        > found.measures[AMPLITUDE].errors + 1e-12 * exact
+    )
     rows[-1]["outside"] = int(miss.sum())
     print(f"  outside their bars: {miss.sum()} of {count}")
     for one in steps:

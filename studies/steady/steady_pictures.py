@@ -6,9 +6,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
-from drawing import drawing
-
-from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
+from drawing import BLUE, GREY, ORANGE, drawing
 
 
 def against_march(table: dict, measure: str, path: Path) -> Path:

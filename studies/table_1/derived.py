@@ -9,8 +9,7 @@ from math import pi
 
 import numpy as np
 
-from patchfem.campaigns import FitRequest
-from patchfem.campaigns.rows.condition_models import ConditionModels
+from patchfem.campaigns.rows.condition_models import ConditionModels, FitRequest
 from patchfem.campaigns.rows.model_readings import ModelReadings
 from patchfem.core import frozen_array
 from patchfem.model import build

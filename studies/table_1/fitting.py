@@ -9,6 +9,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 from derived import Worn, by_row
+from null_models import fit_null_model
 from rungs import (
     CONTAINED_READINGS,
     CONTAINS,
@@ -22,10 +23,8 @@ from rungs import (
     TABLE,
 )
 
-from patchfem.campaigns import compute_rms_scores
-from patchfem.campaigns.rows.cells import read_response_table
+from patchfem.campaigns.rows.cells import compute_rms_scores, read_response_table
 from patchfem.campaigns.rows.model_readings import ModelReadings
-from patchfem.campaigns.rows.null_models import fit_null_model
 from patchfem.campaigns.rows.search import make_residual
 from patchfem.core import G_N
 from patchfem.identify import UnitCubeResidual, run_descents

@@ -11,13 +11,12 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
-from drawing import drawing
+from drawing import BLUE, GREY, ORANGE, drawing
 from fitting import read_records
 from rungs import FOLDER, ROOT2, STUCK_READING, TABLE
 
 from patchfem.campaigns.rows.cells import read_response_table
 from patchfem.core import G_N
-from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
 MIL = 25.4e-6
 SHOWN_MODELS = {  # {(model, kind of reading): (name, colour, line style)}

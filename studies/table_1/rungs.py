@@ -27,7 +27,7 @@ from pathlib import Path
 
 from derived import Derived, Number, rods
 
-from patchfem.campaigns import FitRequest
+from patchfem.campaigns.rows.condition_models import FitRequest
 from patchfem.scene import Scene, load, loads, read_ranges
 
 FOLDER = Path(__file__).parent

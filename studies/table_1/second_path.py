@@ -16,9 +16,12 @@ from pathlib import Path
 
 import numpy as np
 
-from patchfem.campaigns import FitRequest, RowsOptions, compute_rms_scores, fit_rows
-from patchfem.campaigns.rows.cells import read_response_table
-from patchfem.campaigns.rows.fit import SearchSettings
+sys.path.insert(0, str(Path(__file__).parent))
+from null_models import fit_null_model
+
+from patchfem.campaigns.rows.cells import compute_rms_scores, read_response_table
+from patchfem.campaigns.rows.condition_models import FitRequest
+from patchfem.campaigns.rows.fit import RowsOptions, SearchSettings, fit_rows
 from patchfem.campaigns.rows.model_readings import ModelReadings
 from patchfem.scene import load, loads, read_ranges
 
@@ -86,9 +89,14 @@ def main(starts: int = 8) -> dict:
         begin = time.process_time()
         found = fit_path(name == "point", starts)
         seconds = time.process_time() - begin
+        cells = found.cells
+        constant = fit_null_model(cells, "constant", ~found.held_out)[0]
         each = {
-            "model": found.compute_scores(found.logs, found.left_out_logs),
-            "constant": found.compute_scores(*found.nulls["constant"][:2]),
+            "model": found.compute_scores(),
+            "constant": {
+                "fitted": compute_rms_scores(cells, constant, ~found.held_out),
+                "held_out": compute_rms_scores(cells, constant, found.held_out),
+            },
         }
         for what, scored in each.items():
             for part in ("fitted", "held_out"):

@@ -14,11 +14,10 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 from fitting import KIND, better, intervals, read_records, training
 from fitting import NULLS as RIVALS
+from null_models import NULL_MODELS, fit_null_model
 from rungs import FOLDER, PROTOCOLS, ROOT2, RUNGS, STUCK_READING, TABLE, variants
 
-from patchfem.campaigns import NULL_MODELS, compute_rms_scores
-from patchfem.campaigns.rows.cells import read_response_table
-from patchfem.campaigns.rows.null_models import fit_null_model
+from patchfem.campaigns.rows.cells import compute_rms_scores, read_response_table
 
 UNITS = {
     "static": "",

@@ -17,8 +17,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from rig_texts import TEXTS
 
-from patchfem.campaigns import compute_rms_scores
-from patchfem.campaigns.rows.cells import read_response_table
+from patchfem.campaigns.rows.cells import compute_rms_scores, read_response_table
 from patchfem.core import G_N
 from patchfem.runs import run as runner
 from patchfem.scene import scene

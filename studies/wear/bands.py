@@ -24,11 +24,9 @@ from typing import NamedTuple
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
-from drawing import drawing
+from drawing import BLUE, GREY, ORANGE, drawing
 from rubbing import periodic_amplitude, rub
 from synthetic import report_area
-
-from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
 FOLDER = Path(__file__).parent
 STEP = 3.2e-6  # [m] spacing of the surface

@@ -23,10 +23,9 @@ from typing import NamedTuple
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
-from drawing import drawing
+from drawing import BLUE, GREY, ORANGE, drawing
 
 from patchfem.core import G_N
-from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.model import build
 from patchfem.runs import choose_numerics
 from patchfem.runs import run as runner

@@ -230,7 +230,7 @@ def test_new_joint_scene_has_a_backbone(tmp_path, monkeypatch, capsys):
     }  # fmt: skip
     assert answer["stuck_frequency"] == pytest.approx(120, rel=1e-4)
     assert set(answer["curves"]) == {"balance", "quasi-static"}
-    assert answer["advice"].startswith("Use method balance, the bold curve of the page")
+    assert answer["advice"].startswith("Use the curve of method balance")
     # A patch in partial slip dissipates energy at each amplitude.
     assert "dissipates nothing" not in answer["advice"]
     for text in ("[slide] is ignored", "`slide` is assumed such", "assumed `slide` is positive"):

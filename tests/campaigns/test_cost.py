@@ -120,7 +120,7 @@ def test_exact_table_contains_values_errors_and_distances(tmp_path):
             if name.startswith("error_")
         }
         assert row["setting"] == one["label"] and found == one["errors"]
-    assert "<svg" in (tmp_path / "out" / "cost_element_size.svg").read_text("utf-8")
+    assert json.loads((tmp_path / "out" / "cost.json").read_text("utf-8"))["element_size"] == answer
 
 
 def test_exact_summary_states_fastest_run_or_worst_measure():
@@ -176,19 +176,14 @@ def test_exact_proposed_steps_meet_the_tolerance_in_a_run(
     text += "[accuracy]\nsteps_per_cycle = 100\n" if "[accuracy]" not in text else ""
     scene = tmp_path / "bench.toml"
     scene.write_text(text, "utf-8")
-    process = run_cli("cost", scene, "-o", tmp_path / "out", "-q")
+    process = run_cli("cost", scene, "-o", tmp_path / "out", "-q", "--json")
     assert process.code == 0, process.err
-    head, *rows = process.out.splitlines()
-    assert head.split() == ["tolerance", "CPU", "s", "error", "worst", "measure"]
-    proposed_steps = re.findall(
-        r"not with 100 steps per cycle, but with (\d+) steps per cycle", process.out
-    )
-    assert [row.split()[0] for row in rows[:4]] == [
-        "0.1",
-        "0.01",
-        "0.001",
-        "0.0001",
-    ] and proposed_steps
+    runs = json.loads(process.out)["tolerance"]["runs"]
+    assert list(dict.fromkeys(run["tolerance"] for run in runs)) == [0.1, 0.01, 0.001, 0.0001]
+    labels = [run["label"] for run in runs if run["meets_tolerance"]]
+    proposed_steps = [re.search(r", (\d+) steps per cycle", label) for label in labels]
+    proposed_steps = [match[1] for match in proposed_steps if match]
+    assert proposed_steps
     result = pf.run(
         text, **{"accuracy.tolerance": 1e-4, "accuracy.steps_per_cycle": int(proposed_steps[-1])}
     )
@@ -196,7 +191,6 @@ def test_exact_proposed_steps_meet_the_tolerance_in_a_run(
     with open(tmp_path / "out" / "cost.csv", encoding="utf-8") as file:
         settings = [(row["knob"], row["setting"]) for row in csv.DictReader(file)]
     assert ("tolerance", f"0.0001, {proposed_steps[-1]} steps per cycle") in settings
-    assert "<svg" in (tmp_path / "out" / "cost.svg").read_text("utf-8")
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,8 @@ from test_fit import (
     write_loop,
 )
 
-from patchfem.campaigns import LoopOptions, fit_hysteresis_loop
+from patchfem.campaigns.fits.loop import fit_hysteresis_loop
+from patchfem.campaigns.fits.loop_path import LoopOptions
 from patchfem.core import PatchfemError
 
 TRUTH = [0.31, 2.3e-6]

@@ -63,7 +63,7 @@ def run_and_list_warnings(path: Path, out: Path, *words) -> list:
         for line in answer.err.splitlines()
         if line.startswith("warning: ")
     ]
-    assert ("<div class='verdict warn'>" in page) == bool(found)
+    assert ('<div class="box warn">' in page) == bool(found)
     return found
 
 

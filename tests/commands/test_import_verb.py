@@ -71,8 +71,6 @@ def test_exact_imported_table_is_read_by_all_readers(tmp_path):
     options = [word for name in table for word in ("--map", f"{name.split()[0]}={name.split()[0]}")]
     plain = run_cli("import", source, "-o", out, *options)
     assert plain.code == 0
-    assert "time starts at 2 s, displacement starts at 3.89" in plain.err
-    assert "--zero" in plain.err
     with pytest.raises(
         PatchfemError, match=r"table\.csv:2: time starts at 2: .*patchfem import --zero"
     ):

@@ -2,7 +2,6 @@
 
 import csv
 import json
-import re
 
 import numpy as np
 import pytest
@@ -11,7 +10,8 @@ from pairs import UM, make_track_pair
 from scipy.stats import t
 
 import patchfem as pf
-from patchfem.surface import Quantity, read_pairs
+from patchfem.campaigns import read_pairs
+from patchfem.surface import Quantity
 from patchfem.surface.quantity import average_quantities
 
 COUNT = 1201
@@ -64,7 +64,7 @@ def test_exact_pair_equals_single_comparison(pairs_table, pairs_answer):
     assert "nowhere.csv: there is no such file" in rows[2]["message"]
     assert [row["direction"] for row in rows] == ["y", "y", "x"]
     assert f"{pairs_table}:5: " in answer.err
-    assert "<b>3 pairs, 2 with detected wear, 1 failed.</b>" in (out / "report.html").read_text()
+    assert "3 pairs: 2 worn, 0 not, 1 failed." in (out / "report.html").read_text()
 
 
 def test_exact_mean_of_pairs_uses_student_t(pairs_table, pairs_answer):
@@ -88,14 +88,6 @@ def test_exact_mean_of_pairs_uses_student_t(pairs_table, pairs_answer):
         (max(values.mean() - half_width, 0.0), values.mean() + half_width)
     )
     assert json.loads(json.dumps(pf.compare(pairs=pairs_table))) == stored
-    picture = (out / "report.html").read_text()
-    bars = re.findall(
-        r'd="M ([\d.]+) ([\d.]+) \nL \1 ([\d.]+) \n" [^>]*stroke: var.--accent', picture
-    )
-    dots = re.findall(r'x="([\d.]+)" y="([\d.]+)" style="fill: var.--accent', picture)
-    assert len(bars) >= 2
-    for x, low, high in bars:
-        assert any(at == x and float(high) < float(y) < float(low) for at, y in dots)
 
 
 def test_always_interval_of_mean_covers_true_value():
@@ -148,5 +140,5 @@ def test_refuses_table_without_comparable_pair(tmp_path):
     (tmp_path / "pairs.csv").write_text("before,after\na.csv,b.csv\n")
     answer = run_cli("compare", "--pairs", tmp_path / "pairs.csv", "-o", tmp_path / "out")
     assert answer.code == 2 and (tmp_path / "out" / "pairs.csv").is_file()
-    with pytest.raises(pf.PatchfemError, match="not both"):
+    with pytest.raises(pf.PatchfemError, match="alone"):
         pf.compare("a.csv", "b.csv", pairs=tmp_path / "pairs.csv")

@@ -20,7 +20,6 @@ FILES = {
     "cases.csv": "normal.load [N],friction.static\n10,0.3\n",
     "pairs.csv": "before,after\na.csv,b.csv\n",
     "trace.csv": TRACE,
-    "short.csv": TRACE[: TRACE.index("150,")],
     "bare.csv": TRACE.partition("\n")[2],
 }
 STATIC = ("--over", "friction.static=0.1,0.2")
@@ -42,7 +41,7 @@ REFUSED = {  # command -> [(arguments, texts of the lines of the message)]; exit
         (("--random", "4"), ("give each range by --over",)),
         (("--random", "4", "--sobol", "4", "--over", "friction.static=0.1..0.2"), ("one of them",)),
         ((*STATIC, "--shard", "5/4"), ("--shard 5/4",)),
-        ((*STATIC, "--of", "damping"), ("did you mean 'equivalent_damping', ",)),
+        ((*STATIC, "--of", "damping"), ("'equivalent_damping'?",)),
         ((*STATIC, "--of", "zzz"), ("--of zzz: unknown measure; use a name that",)),
         ((*STATIC, "-o", "."), ("bare.csv",)),
         ((*STATIC, "--keep", "pages", "--no-page"), ("--no-page",)),
@@ -80,13 +79,13 @@ REFUSED = {  # command -> [(arguments, texts of the lines of the message)]; exit
     "compare": [
         (
             ("trace.csv", "trace.csv", "--direction", "z"),
-            ("--direction z: the direction must be x or y",),
+            ("direction 'z': x or y is needed",),
         ),
         (
             ("trace.csv", "trace.csv", "--datum", "bent"),
-            ("--datum bent: give --datum straight, or leave it out",),
+            ("datum 'bent': straight is needed, or nothing",),
         ),
-        (("trace.csv", "trace.csv", "bare.csv"), ("3 files; two files are needed, or four",)),
+        (("trace.csv", "trace.csv", "bare.csv"), ("give two files BEFORE and AFTER",)),
         (
             ("trace.csv", "trace.csv", "--scene", "point.toml", "-o", "result"),
             ("the scene has no [contact]",),
@@ -99,15 +98,14 @@ REFUSED = {  # command -> [(arguments, texts of the lines of the message)]; exit
             ("trace.csv", "trace.csv", "--shift", "0"),
             ("--shift: '0' is a bare number without a unit",),
         ),
-        (("short.csv", "short.csv"), ("but not the whole band 60 um to 110 um",)),
         (
             ("trace.csv", "bare.csv", "--pairs", "pairs.csv"),
-            ("give the table alone, without other files",),
+            ("another file cannot be used with a table of pairs",),
         ),
         (("trace.csv",), ("give two files BEFORE and AFTER, or a table of pairs with --pairs",)),
         (
             ("--pairs", "pairs.csv", "--scene", "rig.toml"),
-            ("give the table alone, without --scene",),
+            ("--scene cannot be used with a table of pairs",),
         ),
     ],
     "profile": [
@@ -117,7 +115,7 @@ REFUSED = {  # command -> [(arguments, texts of the lines of the message)]; exit
         (("trace.csv", "--window", "1 mm"), ("two positions are needed, such as '468 um,733 um'",)),
         (
             ("trace.csv", "--window", "1 mm,9 mm"),
-            ("from 1 mm to 9 mm, but the trace runs from 0 um to 2 mm",),
+            ("from 1 mm to 9 mm, but the surface along x from 0 um to 2 mm",),
         ),
         (("trace.csv", "--units", "mm"), ("give two units, of x and of z",)),
         (("bare.csv",), ("units are never guessed",)),

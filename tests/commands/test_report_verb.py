@@ -1,93 +1,54 @@
-"""`patchfem report` and the report of a sweep: the numbers of the files, from one or several folders."""
+"""`patchfem report`: pages made again from their folders, and several folders on one page."""
 
-import csv
-
-import numpy as np
 import pytest
 from command_line import run_cli
-from page_data import read_page_data
-from scene_texts import COULOMB, POINT, SHORT
+from page_data import read_charts, read_measures
+from scene_texts import BENCH
 
-LOADS = ("10 N", "26 lbf")
+SETS = {"low": "0.2", "high": "0.4"}
 
 
 @pytest.fixture(scope="module")
-def sweep_folders(tmp_path_factory):
-    """Return the folder of two sweeps over three levels and two loads; the second has less friction."""
+def folders(tmp_path_factory):
+    """Return a folder with the results of two runs and of a sweep of the same bench."""
     base = tmp_path_factory.mktemp("report")
-    scene = base / "rig.toml"
-    scene.write_text(POINT + COULOMB + SHORT, encoding="utf-8")
-    over = (
-        "--over",
-        f"normal.load={','.join(LOADS)}",
-        "--over",
-        "drive.acceleration=1 g..5 g:3lin",
-    )
-    for name, more in (("first", ()), ("second", ("--set", "friction.static=0.1"))):
-        answer = run_cli("sweep", scene, *over, *more, "-o", base / name, "-q")
-        assert answer.code == 0, answer.err
+    (base / "bench.toml").write_text(BENCH, encoding="utf-8")
+    for name, static in SETS.items():
+        words = ("--set", f"friction.static={static}", "-o", base / name, "-q")
+        assert run_cli("run", base / "bench.toml", *words).code == 0
+    over = ("--over", "friction.static=0.2,0.3", "-o", base / "sweep", "-q")
+    assert run_cli("sweep", base / "bench.toml", *over).code == 0
     return base
 
 
-def read_rows(folder) -> list:
-    """Return the rows of the table of a sweep."""
-    with open(folder / "sweep.csv", encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
+@pytest.mark.parametrize("name", ["low", "sweep"])
+def test_exact_page_is_made_again(folders, name):
+    """The page of a run and that of a sweep are made again with equal bytes."""
+    page = folders / name / "report.html"
+    before = page.read_bytes()
+    page.unlink()
+    answer = run_cli("report", folders / name)
+    assert answer.out.strip() == str(page) and page.read_bytes() == before
 
 
-def page_amplitudes(data: dict) -> np.ndarray:
-    """Return the displacement amplitudes [m] of the cases of a page."""
-    found = next(
-        measure
-        for measure in data["measures"]
-        if measure["name"] == "relative_displacement_amplitude"
-    )
-    return np.array(found["values"]) / {"mm": 1e3, "um": 1e6}[found["unit"]]
+def test_exact_two_runs_share_charts_and_measures(folders):
+    """The page of two runs has a curve and a column of measures for each; the forces are 0.2 and 0.4 of the load."""
+    page = folders / "both.html"
+    assert run_cli("report", folders / "low", folders / "high", "-o", page).code == 0
+    text = page.read_text("utf-8")
+    curves = read_charts(text)["Friction loop"]["data"]
+    names = {curve["name"]: curve for curve in curves}
+    assert names.keys() == SETS.keys()
+    for name, static in SETS.items():
+        assert max(names[name]["y"]) == pytest.approx(float(static) * 115.6543, rel=1e-4)
+    assert "friction_force_peak" in read_measures(text)
 
 
-def test_exact_report_is_reproduced_from_files(sweep_folders):
-    """`patchfem report` writes the same page from the files of a sweep."""
-    page = sweep_folders / "first" / "report.html"
-    before = read_page_data(page.read_text())
-    assert run_cli("report", sweep_folders / "first").out.strip() == str(page)
-    assert read_page_data(page.read_text()) == before
-
-
-def test_exact_report_joins_two_sweeps(sweep_folders):
-    """The report of two sweeps has one table with a column for the sweep."""
-    page = sweep_folders / "both.html"
-    assert (
-        run_cli("report", sweep_folders / "first", sweep_folders / "second", "-o", page).code == 0
-    )
-    data = read_page_data(page.read_text())
-    table = read_rows(sweep_folders / "first") + read_rows(sweep_folders / "second")
-    assert data["keys"][0]["name"] == "sweep"
-    assert data["keys"][0]["texts"] == ["first"] * 6 + ["second"] * 6
-    np.testing.assert_allclose(
-        page_amplitudes(data),
-        [float(row["relative_displacement_amplitude"]) for row in table],
-        rtol=1e-8,
-    )
-    assert all((sweep_folders / link).is_file() for link in data["links"])
-
-
-def test_refuses_incompatible_report_folders(sweep_folders, tmp_path):
-    """Folders without results, a sweep with a run, and sweeps over different keys are refused."""
+def test_refuses_folders_that_cannot_be_shown_together(folders, tmp_path):
+    """No folder, a folder without results, and a run beside a sweep are refused with code 2."""
     assert run_cli("report").code == 2
     (tmp_path / "empty").mkdir()
     answer = run_cli("report", tmp_path / "empty")
-    assert answer.code == 2 and "not a results folder: it has no summary.json" in answer.err
-    case = next((sweep_folders / "first" / "cases").iterdir())
-    answer = run_cli("report", sweep_folders / "first", case)
-    assert answer.code == 2 and "first is a sweep" in answer.err
-    (sweep_folders / "first" / "sweep.nc").rename(sweep_folders / "first" / "kept.nc")
-    answer = run_cli("report", sweep_folders / "first")
-    (sweep_folders / "first" / "kept.nc").rename(sweep_folders / "first" / "sweep.nc")
-    assert answer.code == 2 and "it has no sweep.nc" in answer.err
-    other = sweep_folders / "other"
-    answer = run_cli(
-        "sweep", sweep_folders / "rig.toml", "--over", "normal.load=10 N,20 N", "-o", other, "-q"
-    )
-    assert (answer.code, answer.out, answer.err) == (0, "", ""), "quiet, it says nothing but faults"
-    answer = run_cli("report", sweep_folders / "first", other)
-    assert answer.code == 2 and "over different keys" in answer.err
+    assert answer.code == 2 and "not a results folder" in answer.err
+    answer = run_cli("report", folders / "low", folders / "sweep", "-o", tmp_path / "a.html")
+    assert answer.code == 2 and "different kinds" in answer.err

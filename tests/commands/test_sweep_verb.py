@@ -1,29 +1,19 @@
-"""`patchfem sweep`: cases, tables, resumed and divided sweeps, reports and plans."""
+"""`patchfem sweep`: cases, tables, refusals, commands that repeat a sweep, and plans."""
 
 import csv
-import html
 import json
-import math
 import os
-import re
 import shlex
-import shutil
-from time import sleep
 
 import numpy as np
 import pytest
 import xarray as xr
 from command_line import run_cli
-from computed_cases import ComputedCases
-from page_data import read_page_data
 from scene_texts import COULOMB, POINT, SHORT
 
 import patchfem as pf
-from patchfem.campaigns.sweeps import sweep
-from patchfem.commands.sweep import Progress
-from patchfem.export import summarise_run
-from patchfem.export.sweeps.folder import TABLES, Folder
-from patchfem.export.sweeps.page import read_table
+from patchfem.export import runs, store
+from patchfem.export.sweeps.folder import Folder
 
 RIG = POINT + COULOMB + SHORT
 LOADS, LEVELS = ["10 N", "26 lbf", "-1 N"], ["1 g", "5 g"]
@@ -45,13 +35,13 @@ def whole_sweep(rig_scene):
     return out, sweep_into(out, rig_scene, *OVER)
 
 
-def assert_equals_single_run(found, measure, part="value") -> None:
-    """Assert that a cell equals a single run within 1e-12 of the value or its scale, and is empty where that is unknown."""
+def assert_equals_single_run(found, measure, part="value", tolerance=1e-12) -> None:
+    """Assert that a cell equals a single run within a tolerance, and is empty where that is unknown."""
     single = getattr(measure, part)
     # scale of the measures: 1 for a distortion, 1 mm for the drift of an amplitude
     size = {"1": 1.0, "m": 1e-3}.get(measure.unit, 0.0)
     assert (found in ("", None)) == (single is None)
-    assert single is None or float(found) == pytest.approx(single, rel=1e-12, abs=1e-12 * size)
+    assert single is None or float(found) == pytest.approx(single, rel=tolerance, abs=1e-12 * size)
 
 
 def sweep_into(out, rig_scene, *words):
@@ -95,7 +85,7 @@ def test_exact_sweep_case_equals_single_run(whole_sweep, rig_scene):
             and stored["outcome"] == single.outcome
         )
         assert stored["warnings"] == single.warnings and stored["notes"] == single.notes
-        expected = summarise_run(single)
+        expected = json.loads(json.dumps(store.make_summary(runs.make_answer(single))))
         # a case of a batch does not store the method of each measure
         del expected["numerics"]["measures"]
         for part in ("patchfem", "title", "not_in_scene", "numerics"):
@@ -108,7 +98,9 @@ def test_exact_sweep_case_equals_single_run(whole_sweep, rig_scene):
         for name, measure in single.measures.items():
             entry = stored["measures"][name]
             for column, part in ((name, "value"), (f"{name}_error", "error")):
-                assert_equals_single_run(row[column], measure, part)
+                # errors have six digits in the table
+                tolerance = 1e-12 if part == "value" else 1e-5
+                assert_equals_single_run(row[column], measure, part, tolerance)
                 assert_equals_single_run(entry[part], measure, part)
             assert entry.get("reason", "") == measure.reason
 
@@ -129,28 +121,6 @@ def test_exact_sweep_table_of_scene_equals_options(whole_sweep, tmp_path):
     assert answer.code == 2 and "use `patchfem sweep`" in answer.err
 
 
-def test_exact_resumed_sweep_computes_missing_cases(whole_sweep, rig_scene, tmp_path, monkeypatch):
-    """A resumed sweep computes only cases that are missing or damaged, and writes the same tables."""
-    computed = ComputedCases(monkeypatch)
-
-    def count_runs() -> int:
-        """Return the number of cases computed so far."""
-        return sum(isinstance(model, pf.Model) for model in computed.models)
-
-    out = tmp_path / "swept"
-    assert sweep_into(out, rig_scene, "--over", "normal.load=10 N,-1 N", *OVER[2:]).code == 3
-    assert count_runs() == 2
-    # a truncated file, as after a full disk
-    (out / "cases" / read_rows(out)[0]["case"] / "summary.json").write_text('{"patchf')
-    answer = sweep_into(out, rig_scene, *OVER, "--resume")
-    assert answer.code == 3 and count_runs() == 5
-    # valid JSON of another structure
-    (out / "cases" / read_rows(out)[0]["case"] / "summary.json").write_text("[]")
-    assert sweep_into(out, rig_scene, *OVER, "--resume").code == 3 and count_runs() == 6
-    assert_same_tables(out, whole_sweep[0])
-    assert sweep_into(out, rig_scene, *OVER).code == 3 and count_runs() == 10
-
-
 def test_refuses_to_resume_different_sweep(rig_scene, tmp_path):
     """A folder with a finished sweep of another scene or other keys is refused by --resume and stays unchanged."""
     out = tmp_path / "out"
@@ -160,82 +130,24 @@ def test_refuses_to_resume_different_sweep(rig_scene, tmp_path):
     for words, why in (
         (
             (*over, "--set", "friction.static=0.31"),
-            "a sweep of another scene or of another version of patchfem",
+            "a sweep of another scene or version",
         ),
-        (("--over", "drive.cycles=3,4"), "a sweep of other keys (normal.load)"),
+        (
+            ("--over", "drive.cycles=3,4"),
+            "a sweep of another scene or version, or of other keys (it has normal.load)",
+        ),
     ):
         answer = sweep_into(out, rig_scene, *words, "--resume")
         assert answer.code == 2
-        assert f"out: this folder contains {why}; name another folder with -o" in answer.err
+        assert f"out: this folder contains {why}" in answer.err
         assert {
             one.relative_to(out): one.read_bytes() for one in out.rglob("*") if one.is_file()
         } == before
     # sweeps over the same keys share a folder
     answer = sweep_into(out, rig_scene, "--over", "normal.load=20 N,30 N", "--resume")
-    assert answer.code == 0
-    assert "note: 1 case of this folder is not among the values of this sweep" in answer.err
+    assert answer.code == 0 and len(read_rows(out)) == 2
     answer = sweep_into(out, rig_scene, "--over", "normal.load=10 N,20 N,30 N", "--resume")
-    assert answer.code == 0 and "not among" not in answer.err and len(read_rows(out)) == 3
-
-
-def test_exact_interrupted_sweep_keeps_finished_cases(
-    whole_sweep, rig_scene, tmp_path, monkeypatch
-):
-    """An interrupted sweep keeps the finished cases, counts the missing ones, and can be resumed to the same tables."""
-    computed = ComputedCases(monkeypatch)
-    computed.chunks_before_interrupt = 2
-    # Each chunk has one case, which is computed before the sweep can be stopped within it.
-    monkeypatch.setattr(sweep, "CHUNK_SECONDS", 0.0)
-    out = tmp_path / "swept"
-    answer = sweep_into(out, rig_scene, *OVER)
-    assert answer.code == 130 and "--resume" in answer.err
-    n_finished = len(list((out / "cases").iterdir()))
-    # the tables contain the finished cases
-    assert 2 <= n_finished < 6 and sum(row["outcome"] != "" for row in read_rows(out)) == n_finished
-    summary = json.loads((out / "sweep.json").read_text())
-    assert summary["cases"]["unfinished"] == 6 - n_finished
-    assert (
-        f"({6 - n_finished} of 6 cases ha{'s' if n_finished == 5 else 've'} no result yet"
-        in summary["answer"]
-    )
-    assert (out / "report.html").is_file()
-    computed.chunks_before_interrupt = math.inf
-    text = "cases already have an answer from an interrupted sweep"
-    copied = tmp_path / "copied"
-    shutil.copytree(out, copied)
-    assert (
-        f"note: {n_finished} of 6 {text} but are run again"
-        in sweep_into(copied, rig_scene, *OVER).err
-    )
-    assert text not in sweep_into(copied, rig_scene, *OVER).err  # the sweep is complete now
-    answer = sweep_into(out, rig_scene, *OVER, "--resume")
-    assert answer.code == 3 and text not in answer.err
-    assert_same_tables(out, whole_sweep[0])
-
-
-def test_exact_old_tables_are_set_aside_during_sweep(rig_scene, tmp_path, monkeypatch):
-    """While a resumed sweep runs, tables contain only its own cases, or are renamed to .partial."""
-    out = tmp_path / "swept"
-    computed = ComputedCases(monkeypatch)
-    assert sweep_into(out, rig_scene, "--over", "friction.static=0.1,0.2").code == 0
-    computed.chunks_before_interrupt = 0
-    assert sweep_into(out, rig_scene, "--over", "friction.static=0.2,0.3", "--resume").code == 130
-    assert file_names(out) == {"cases", "chunks", *TABLES}
-    assert [(row["friction.static"], row["outcome"] != "") for row in read_rows(out)] == [
-        ("0.2", True),
-        ("0.3", False),
-    ]
-    # no case has a result
-    assert sweep_into(out, rig_scene, "--over", "friction.static=0.4", "--resume").code == 130
-    assert file_names(out) == {"cases", "chunks", *(f"{name}.partial" for name in TABLES)}
-    computed.chunks_before_interrupt = math.inf
-    assert sweep_into(out, rig_scene, "--over", "friction.static=0.2,0.3", "--resume").code == 0
-    assert [row["friction.static"] for row in read_rows(out)] == ["0.2", "0.3"]
-    assert file_names(out) == {"cases", "chunks", *TABLES}
-    # results of earlier cases are kept as long as the sweep is resumed
-    assert len(list((out / "cases").iterdir())) == 3
-    assert sweep_into(out, rig_scene, "--over", "friction.static=0.2,0.3").code == 0
-    assert len(list((out / "cases").iterdir())) == 2
+    assert answer.code == 0 and len(read_rows(out)) == 3
 
 
 def test_refuses_second_sweep_in_folder(rig_scene, tmp_path, monkeypatch):
@@ -255,89 +167,15 @@ def test_refuses_second_sweep_in_folder(rig_scene, tmp_path, monkeypatch):
     assert run_cli(*words).code == 0
 
 
-def test_exact_shards_give_same_tables(whole_sweep, rig_scene, tmp_path, monkeypatch):
-    """Four shards and --collect give the tables of a whole sweep byte for byte."""
-    out = tmp_path / "swept"
-    computed = ComputedCases(monkeypatch)
-    for part in ("2/4", "1/4", "4/4"):
-        assert sweep_into(out, rig_scene, *OVER, "--shard", part).code == 0
-    early = sweep_into(out, rig_scene, *OVER, "--collect")
-    assert early.code == 4
-    assert "1 of 6 cases have no answer" in early.err
-    assert not (out / "sweep.csv").exists()
-    count = len(computed)
-    # the second shard is finished
-    assert sweep_into(out, rig_scene, *OVER, "--shard", "2/4").code == 0 and len(computed) == count
-    assert sweep_into(out, rig_scene, *OVER, "--shard", "3/4").code == 0 and len(computed) == 6
-    (
-        out / "cases" / "0123456789abcdef"
-    ).mkdir()  # a case of another sweep, whose shards may still run
-    collected, quiet, told = (
-        sweep_into(out, rig_scene, *OVER, "--collect", *words)
-        for words in ((), ("-q",), ("--json",))
-    )
-    assert [one.code for one in (collected, quiet, told)] == [3] * 3
-    assert collected.out.splitlines()[1].startswith("6 cases: ")
-    assert f"results: {out / 'sweep.csv'}" in collected.out
-    assert quiet.out == "" and json.loads(told.out)["cases"] == 6
-    assert (out / "cases" / "0123456789abcdef").is_dir()
-    assert_same_tables(out, whole_sweep[0])
-
-
 def test_exact_tables_of_many_cases_need_collect(whole_sweep, rig_scene, tmp_path, monkeypatch):
-    """A sweep of many cases writes its tables only with --collect."""
+    """A sweep of many cases writes sweep.csv only with --collect."""
     out = tmp_path / "swept"
     with monkeypatch.context() as many:
         many.setattr("patchfem.export.sweeps.run.MAX_CASES_WITH_TABLES", 5)
         answer = sweep_into(out, rig_scene, *OVER)
-        assert not (out / "sweep.csv").exists() and not (out / "sweep.nc").exists()
-        assert "run the same command with --collect" in answer.out
-        assert "with --collect" in (out / "report.html").read_text("utf-8")
+        assert not (out / "sweep.csv").exists() and (out / "sweep.nc").exists()
         assert sweep_into(out, rig_scene, *OVER, "--collect").code == answer.code
     assert_same_tables(out, whole_sweep[0])
-
-
-@pytest.mark.slow
-def test_exact_keep_results_stores_result_folders(rig_scene, tmp_path):
-    """`--keep results` stores a whole results folder for each successful case."""
-    out = tmp_path / "swept"
-    over = ("--over", "friction.static=-1,0.1")
-    # a summary is not a results folder: --resume computes the folder
-    assert sweep_into(out, rig_scene, *over).code == 3
-    assert sweep_into(out, rig_scene, *over, "--resume", "--keep", "results").code == 3
-    bad, good = read_rows(out)
-    assert {"result.nc", "summary.json", "scene.resolved.toml"} <= {
-        one.name for one in (out / "cases" / good["case"]).iterdir()
-    }
-    assert [one.name for one in (out / "cases" / bad["case"]).iterdir()] == ["summary.json"]
-    before = (out / "sweep.csv").read_bytes()
-    assert sweep_into(out, rig_scene, *over, "--resume", "--keep", "results").code == 3
-    assert (out / "sweep.csv").read_bytes() == before
-
-
-@pytest.mark.slow
-def test_exact_reports_follow_page_options(rig_scene, tmp_path):
-    """Reports of the sweep and of its cases are written as --keep and --no-page say."""
-    out = tmp_path / "swept"
-    over = ("--over", "friction.static=0.1")
-    page = "report.html"
-    for words, own, each in (
-        ((), True, False),
-        (("--no-page",), False, False),
-        (("--keep", "results"), True, False),
-        (("--keep", "pages"), True, True),
-        (("--keep", "results", "--no-page"), False, False),
-    ):
-        assert sweep_into(out, rig_scene, *over, *words).code == 0
-        assert (out / page).is_file() == own and (out / "sweep.csv").is_file()
-        assert [one.is_file() for one in (out / "cases").glob(f"*/{page}")] == [True] * each
-        # the link of a case opens its report if there is one
-        assert not own or (page in (out / page).read_text("utf-8")) == each
-    answer = sweep_into(out, rig_scene, *over, "--keep", "pages", "--no-page")
-    assert answer.code == 2 and "--no-page" in answer.err
-    assert sweep_into(out, rig_scene, *over, "--collect").code == 0 and (out / page).is_file()
-    assert sweep_into(out, rig_scene, *over, "--collect", "--no-page").code == 0
-    assert not (out / page).exists()
 
 
 def test_exact_cases_file_gives_rows(rig_scene, tmp_path):
@@ -389,20 +227,11 @@ def test_exact_printed_command_repeats_random_cases(tmp_path, monkeypatch, words
     monkeypatch.chdir(tmp_path)
 
     def read_command(folder):
-        """Return the arguments of the command in the report of a sweep."""
-        return shlex.split(
-            html.unescape(
-                re.search(
-                    "its scene:</p><pre>(.*?)</pre>", (folder / "report.html").read_text("utf-8")
-                )[1]
-            )
-        )
+        """Return the arguments of the command in the answer of a sweep."""
+        return shlex.split(store.read(folder).origin["command"])
 
     command = read_command(first)
     assert command[:2] == ["patchfem", "sweep"] and run_cli(*command[1:], "-o", again).code == 0
-    assert read_table(first)["command"] == shlex.join(
-        command
-    )  # `patchfem report` prints this command
     assert (
         sweep_into(listed, scene, "--set", "normal.load=90 N", "--cases", first / "sweep.csv").code
         == 0
@@ -415,46 +244,29 @@ def test_exact_printed_command_repeats_random_cases(tmp_path, monkeypatch, words
 def test_exact_answer_begins_with_requested_measure(tmp_path):
     """With --of secant_stiffness, the answer begins with this measure; its quantiles agree with mu N/1 mm within 5e-3.
 
-    A measure that no case has is named as absent.
+    A note says that no case has another measure.
     """
     scene = tmp_path / "bench.toml"
-    data = tmp_path / "a/sweep.json"
     scene.write_text(BENCH, encoding="utf-8")
-    axes = (
-        "--over",
-        "friction.static=0.1..0.5",
-        "--over",
-        "normal.load=99.9 N..100.1 N",
-        "--sobol",
-        "64",
-    )
+    axes = ("--over", "friction.static=0.1..0.5", "--over", "normal.load=99.9 N..100.1 N")
+    axes += ("--sobol", "64")
     screen = sweep_into(tmp_path / "a", scene, *axes, "--of", "secant_stiffness")
-    answer = json.loads(data.read_text("utf-8"))["answer"]
+    answer = store.read(tmp_path / "a")
+    assert answer.verdict[0].startswith("Secant stiffness changes ")
+    assert "mainly with friction.static (100 % of its variance)" in answer.verdict[0]
+    assert answer.verdict[0] in screen.out and "--of secant_stiffness" in answer.origin["command"]
     with open(tmp_path / "a/sweep.csv", newline="", encoding="utf-8") as file:
         mu = [float(row["friction.static"]) for row in csv.DictReader(file)]
-    ends = re.search(
-        r"have a secant stiffness from (\S+) N/mm to (\S+) N/mm, a loop area", answer
-    ).groups()
-    assert [float(one) for one in ends] == pytest.approx(
-        1e2 * np.quantile(mu, [0.05, 0.95]), rel=5e-3
+    row = answer.details["quantiles"][0]
+    assert row["measure"] == "secant_stiffness"
+    assert [row["low"]["value"], row["high"]["value"]] == pytest.approx(
+        1e5 * np.quantile(mu, [0.05, 0.95]), rel=5e-3
     )
-    assert answer.startswith(
-        "Secant stiffness depends most on friction.static, which contributes to 100 %"
-    )
-    assert answer == screen.out.splitlines()[0]
-    page = (tmp_path / "a/report.html").read_text("utf-8")
-    assert read_page_data(page)["first"] == "secant_stiffness" and "--of secant_stiffness" in page
     again = sweep_into(tmp_path / "a", scene, *axes, "--of", "pressure_peak", "--resume")
-    assert json.loads(data.read_text("utf-8"))["answer"].endswith(
-        "(no case has a value of pressure peak, so this answer describes other measures)."
-    )
-    assert "no case has a value of pressure peak" in again.out
-    assert (
-        pf.sweep(scene, {"friction.static": [0.1, 0.2]}, of="secant_stiffness")
-        .attrs["answer"]
-        .startswith(
-            "Secant stiffness ranges from 10 N/mm (friction.static 0.1) to 20 N/mm (friction.static 0.2)."
-        )
+    assert "no case has a value of pressure peak" in again.out + again.err
+    swept = pf.sweep(scene, {"friction.static": [0.1, 0.2]}, of="secant_stiffness")
+    assert swept.attrs["answer"] == (
+        "With friction.static, secant stiffness changes most: from 10 N/mm at 0.1 to 20 N/mm at 0.2."
     )
 
 
@@ -465,43 +277,18 @@ def test_refuses_sweep_without_valid_case(rig_scene, tmp_path):
 
 
 def test_exact_sweep_plan_counts_cases(rig_scene):
-    """The plan of a sweep gives the number of cases, and a time in proportion to them."""
+    """The plan of a sweep gives the number of cases, but no time and no memory."""
     sweep_plan = json.loads(run_cli("plan", rig_scene, *OVER, "--json").out)
     single_plan = json.loads(run_cli("plan", rig_scene, "--json").out)
     assert sweep_plan["cases"] == 6 and sweep_plan["values"] == {
         "normal.load": 3,
         "drive.acceleration": 2,
     }
-    half, more = (
-        json.loads(
-            run_cli("plan", rig_scene, "--over", f"friction.static=0.1..0.6:{n}", "--json").out
-        )
-        for n in (1000, 2000)
-    )
-    assert more["seconds"] - half["seconds"] == pytest.approx(
-        1000 * more["seconds_per_case"], rel=0.05
-    )
+    assert sweep_plan["seconds"] is None and "disk_bytes" not in sweep_plan
     assert (sweep_plan["kind"], sweep_plan["engine"], sweep_plan["effects"]) == (
         single_plan["kind"],
         single_plan["engine"],
         single_plan["effects"],
     )
-    assert "6 cases of 3 normal.load, 2 drive.acceleration" in run_cli("plan", rig_scene, *OVER).out
-
-
-class QuickProgress(Progress):
-    """A progress line that does not wait for ten seconds."""
-
-    WAIT = 0.02
-
-
-def test_always_progress_is_printed_before_first_case(capsys):
-    """A sweep prints its elapsed time before the first case is finished."""
-    line = QuickProgress(False)
-    silent = QuickProgress(True)
-    for one in (line, silent):
-        one(0, 11, None)
-    sleep(0.4)
-    line.end()
-    said = capsys.readouterr().err.splitlines()
-    assert 2 <= len(said) <= 5 and set(said) == {"0/11 cases, 0 s so far"} and line.over.is_set()
+    screen = run_cli("plan", rig_scene, *OVER).out
+    assert "6 cases of 3 normal.load, 2 drive.acceleration\n" in screen and "cost" not in screen

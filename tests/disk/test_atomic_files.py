@@ -17,14 +17,13 @@ from limits import limit_file_size
 from scene_texts import BENCH, COATED
 
 from patchfem.core import Missing
-from patchfem.disk import (
-    is_partial_name,
-    open_lossy,
-    write_atomically,
+from patchfem.disk import is_partial_name, open_lossy, write_atomically, write_text
+from patchfem.disk.atomic_write import (
+    PLACED_PATHS,
+    find_free_space,
+    make_partial_path,
     write_in_partial_folder,
-    write_text,
 )
-from patchfem.disk.atomic_write import PLACED_PATHS, find_free_space, make_partial_path
 
 SIZES = [1 << 10, 1 << 16]
 

@@ -51,7 +51,7 @@ KILLED_CODE = """\
 import os, sys
 from pathlib import Path
 from patchfem.disk import exchange
-from patchfem.export.results import Folder
+from patchfem.export.folder import Folder
 exchange.exchange_folders = lambda *both: False  # a system that cannot
 real, moved = os.rename, []
 def rename(*both):
@@ -188,7 +188,8 @@ def test_refuses_second_sweep_without_removing_folder(tmp_path):
     with SweepFolder(tmp_path / "out", [1]) as first:
         with pytest.raises(Missing, match="another sweep"), SweepFolder(tmp_path / "out", [1]):
             pass
-        writer = Writer(tmp_path / "out", "out", first.chunks.names, "summaries", first.token)
+        names = first.chunks.names
+        writer = Writer((), tmp_path / "out", "out", names, "summaries", first.token)
         assert writer([0], CaseResults.blank(1), ["{}"])
     assert list_names(tmp_path / "out" / "cases" / f"{1:016x}") == {"summary.json"}
     assert len(list_names(tmp_path / "out" / "chunks")) == 1

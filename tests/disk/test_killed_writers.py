@@ -18,7 +18,7 @@ import os, signal, sys
 from pathlib import Path
 from patchfem.disk import exchange
 from patchfem.disk.atomic_write import write_text
-from patchfem.export.results import Folder
+from patchfem.export.folder import Folder
 
 place, kind = Path(sys.argv[1]), sys.argv[2]
 if kind == "in two":

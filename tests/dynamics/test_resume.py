@@ -29,7 +29,7 @@ from scene_texts import (
 
 from patchfem.dynamics import checkpoint
 from patchfem.dynamics.march import run as march_run
-from patchfem.export.results import is_state
+from patchfem.export.folder import is_state
 
 MARCH = '[accuracy]\nmethod = "march"\nsteps_per_cycle = 60\n'
 SHORT_DRIVE = DRIVE.replace("cycles = 30", "cycles = 16.3")

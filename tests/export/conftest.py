@@ -1,8 +1,9 @@
 """Results of one run, shared by the tests of exports."""
 
 import pytest
+from chromium import Chromium, find_chromium
 from command_line import run_cli
-from exported import CROWNED
+from scene_texts import CROWNED_BENCH as CROWNED
 
 
 @pytest.fixture(scope="session")
@@ -13,3 +14,13 @@ def bench_folder(tmp_path_factory):
     answer = run_cli("run", base / "bench.toml", "-o", base / "out", "-q")
     assert answer.code == 0, answer.err
     return base / "out"
+
+
+@pytest.fixture(scope="session")
+def chromium(tmp_path_factory):
+    """Return a headless browser; skip the test if none is installed."""
+    if find_chromium() is None:
+        pytest.skip("Chromium is not installed")
+    browser = Chromium(tmp_path_factory.mktemp("chromium"))
+    yield browser
+    browser.close()

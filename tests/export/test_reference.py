@@ -6,6 +6,7 @@ from scene_texts import SMALL_PATCH, STRUCTURE
 
 from patchfem import SceneError
 from patchfem.effects import EFFECTS, LAWS
+from patchfem.export.quantities import QUANTITIES
 from patchfem.response import INTERNAL_VALUES
 from patchfem.response import TABLE as MOTION
 from patchfem.runs import TABLE as STATIC
@@ -57,7 +58,7 @@ def test_exact_reference_is_complete():
     for page, names in (
         (format_effects(), [name for name in EFFECTS if "structure.interface." not in name]),
         (records.MaterialsPage.text(), MATERIALS),
-        (records.MeasuresPage.text(), [*STATIC, *(MOTION.keys() - INTERNAL_VALUES)]),
+        (records.MeasuresPage.text(), [*STATIC, *(MOTION.keys() - INTERNAL_VALUES), *QUANTITIES]),
     ):
         for name in names:
             assert f"| `{name}` |" in page, name

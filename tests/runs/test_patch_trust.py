@@ -7,7 +7,7 @@ import pytest
 from scene_texts import COATING, PIECE
 
 import patchfem as pf
-from patchfem.export import summarise_run
+from patchfem.export.runs import make_quantities
 
 RIG = PIECE + 'load = "26 lbf"\nsubstrate = "Ti-8Al-1Mo-1V"\n' + COATING
 STEP = RIG + '[contact.step]\nheight = "0.1 um"\nat = "2 mm"\n'
@@ -29,7 +29,7 @@ def test_always_peak_at_loaded_step_has_no_value():
     assert peak.value is None
     assert "edge of the step" in peak.reason
     assert result.measures["normal_stiffness"].value > 0
-    entry = summarise_run(result)["measures"]["pressure_peak"]
+    entry = make_quantities(result.measures)["pressure_peak"].as_json()
     assert entry["value"] is None and "edge of the step" in entry["reason"]
 
 

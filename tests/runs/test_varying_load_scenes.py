@@ -7,7 +7,7 @@ from scene_texts import BENCH, RIG, STRUCTURE, get_only_mistake
 
 from patchfem.contact.unilateral import solve_forces
 from patchfem.dynamics import make_contact_sets
-from patchfem.export.histories import collect_histories
+from patchfem.export.run_data import collect_data
 from patchfem.runs.run import run
 from patchfem.scene import loads
 
@@ -52,8 +52,7 @@ def test_exact_pitching_mode_balances_energy_and_fields(law):
     assert load.min() - 1e-9 <= sums.min() and sums.max() <= load.max() + 1e-9
     assert (fields["gap"] >= 0).all() and not (fields["gap"] * fields["normal_stress"]).any()
     assert (np.abs(fields["shear_stress"]) <= 0.3 * fields["normal_stress"] + 1e-6).all()
-    histories, _ = collect_histories(result)
-    assert histories["normal_load"] is load and np.ptp(load) > 1e-3 * load[0]
+    assert collect_data(result)["normal_load"].values is load and np.ptp(load) > 1e-3 * load[0]
 
 
 def test_exact_holder_spring_acts_in_series_with_pitch():

@@ -41,7 +41,7 @@ def test_table_1_point_contact_scores_like_the_patch():
 def test_table_1_fit_of_the_second_path_at_143_hz(point, wanted, values):
     """From 8 random starts, the fit reaches the optimum of an independent program."""
     fit = load_study("table_1/second_path.py").fit_path(point)
-    check_scores(fit.compute_scores(fit.logs, fit.left_out_logs), wanted)
+    check_scores(fit.compute_scores(), wanted)
     assert fit.keys.fit.values == pytest.approx(values, rel=2e-3)
 
 

@@ -38,10 +38,6 @@ def find_chromium() -> str | None:
     )
 
 
-# Script that runs once the page is unpacked.
-LATER = "document.addEventListener('unpacked', () => {{{}}})"
-
-
 class Chromium:
     """Browser with one page; `faults` collects the errors of the page's scripts."""
 
@@ -175,11 +171,10 @@ class Chromium:
         self.call_and_wait("Page.loadEventFired", "Page.navigate", url=path.as_uri())
 
     def wait_for_charts(self) -> None:
-        """Wait until the page is unpacked and every BokehJS chart is drawn."""
+        """Wait until every chart of the page is drawn."""
         self.evaluate("""new Promise((done) => {
-            const stands = () => !document.getElementById('library') &&
-                [...document.querySelectorAll('.chart')].every((one) => one.firstElementChild?.shadowRoot);
-           const look = () => stands() ? requestAnimationFrame(() => requestAnimationFrame(done)) : setTimeout(look, 9);
+            const stands = () => [...document.querySelectorAll('.chart')].every((one) => one.querySelector('.main-svg'));
+            const look = () => stands() ? requestAnimationFrame(() => requestAnimationFrame(done)) : setTimeout(look, 9);
             look(); setTimeout(done, 8000); })""")
 
     def broken_words(self) -> list:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from scene_texts import DRIVE, MODE
 
-from patchfem.campaigns import fit_hysteresis_loop
+from patchfem.campaigns.fits.loop import fit_hysteresis_loop
 from patchfem.model import build
 from patchfem.runs.bench import bench
 from patchfem.runs.run import run

@@ -1,31 +1,110 @@
-"""Contents of an HTML page besides its text: chart data, the page without scripts, and accessibility errors."""
+"""Contents of an HTML page: figures with their arrays, measures as numbers, the page without scripts, accessibility."""
 
 import gzip
 import json
 import re
 from base64 import b64decode
+from html import unescape
 from html.parser import HTMLParser
 
 import numpy as np
 
+from patchfem.formatting import UNIT_LADDERS
 
-def read_page_data(text: str) -> dict:
-    """Return the chart data of a page; {} if it has no charts."""
-    match = re.search(r"<script type=text/plain id=data>(.*?)</script>", text, re.S)
-    return json.loads(gzip.decompress(b64decode(match[1]))) if match else {}
+KINDS = {"f4": np.float32, "i1": np.int8}
+# value of each displayed unit in SI units
+UNITS = {name: 1 / scale for ladder in UNIT_LADDERS.values() for name, scale in ladder if name}
+UNITS |= {"%": 0.01, "deg": np.pi / 180, "Hz": 1.0}
 
 
-def read_charts(text: str) -> dict:
-    """Return the charts of a page by title and label of the vertical axis."""
-    return {
-        (chart["title"], chart["y"]["label"]): chart
-        for chart in read_page_data(text).get("charts", [])
-    }
+def read_figures(text: str) -> list[dict]:
+    """Return the figures of a page: the JSON of plotly.js with its packed arrays as ndarrays."""
+    match = re.search(r'<script type="text/plain" id="data">(.*?)</script>', text, re.S)
+    return [] if match is None else _unpack(json.loads(gzip.decompress(b64decode(match[1]))))
+
+
+def _unpack(content):
+    """Return JSON content in which packed arrays are ndarrays."""
+    if isinstance(content, list):
+        return [_unpack(item) for item in content]
+    if not isinstance(content, dict):
+        return content
+    if "bdata" in content:
+        values = np.frombuffer(b64decode(content["bdata"]), KINDS[content["dtype"]])
+        shape = content.get("shape")
+        return values.reshape([int(n) for n in shape.split(",")]) if shape else values
+    return {key: _unpack(value) for key, value in content.items()}
+
+
+def read_charts(text: str) -> dict[str, dict]:
+    """Return the figures of a page by title."""
+    titles = re.findall(r'<figure id="(\w+)"[^>]*><h2>(.*?)</h2>', text)
+    figures = {figure["anchor"]: figure for figure in read_figures(text)}
+    return {unescape(title): figures[anchor] for anchor, title in titles}
+
+
+def read_measures(text: str) -> dict[str, str]:
+    """Return the measures that a page lists, as text by name."""
+    rows = re.findall(r'<tr id="measure-(\w+)"><td>.*?</td><td class="v">(.*?)</td>', text, re.S)
+    return {name: unescape(value) for name, value in rows}
+
+
+def read_tiles(text: str) -> dict[str, str]:
+    """Return the tiles of a page, as text by label."""
+    tiles = re.findall(r'<span class="soft">([^<]*)</span><b>([^<]*)</b>', text)
+    return {label: unescape(value) for label, value in tiles}
+
+
+def parse_quantity(text: str) -> tuple[float, float | None]:
+    """Return value and error [SI] of a text such as "14.80 ± 0.05 um" or "(1.0 ± 0.5)e-8 m"; error None without one.
+
+    ValueError if the text has another form.
+    """
+    match = re.fullmatch(
+        r"\(?(-?[\d.]+(?:e-?\d+)?)(?: ± ([\d.]+(?:e-?\d+)?))?\)?(e-?\d+)?(?: (\S.*?))?(?: \(.*\))?",
+        text,
+    )
+    if match is None:
+        raise ValueError(f"{text!r} is not a quantity")
+    power = float(f"1{match[3]}") if match[3] else 1.0
+    unit = UNITS.get(match[4], 1.0) if match[4] else 1.0
+    error = None if match[2] is None else float(match[2]) * power * unit
+    return float(match[1]) * power * unit, error
+
+
+def find_wrong_numbers(texts: dict[str, str], measures: dict[str, dict]) -> list[str]:
+    """Return the displayed numbers that differ from those of summary.json by more than their last digit.
+
+    Parameters
+    ----------
+    texts : dict
+        Displayed quantities by name.
+    measures : dict
+        Entries of summary.json by name.
+    """
+    wrong = []
+    for name, text in texts.items():
+        entry = measures[name]
+        if entry["value"] is None:
+            wrong += [] if text.startswith("-") else [f"{name}: {text}, but null in the file"]
+            continue
+        value, error = parse_quantity(text)
+        tolerance = max(2e-3 * (entry["error"] or 0.0), 1e-5 * abs(entry["value"]))
+        tolerance = max(tolerance, 0.06 * (error or 0.0), entry["floor"])
+        if abs(value - entry["value"]) > tolerance:
+            wrong.append(f"{name}: {text}, but {entry['value']:g} in the file")
+        if error is not None and abs(error - entry["error"]) > 0.06 * entry["error"]:
+            wrong.append(f"{name}: error of {text}, but {entry['error']:g} in the file")
+    return wrong
 
 
 def strip_scripts(text: str) -> str:
     """Return the page without scripts."""
     return re.sub(r"<script.*?</script>", "", text, flags=re.S)
+
+
+# attribute that gives an element of each tag its accessible name
+ACCESSIBLE_NAMES = {"html": "lang", "img": "alt", "th": "scope", "svg": "aria-label"}
 
 
 class _AccessibilityParser(HTMLParser):
@@ -35,72 +114,35 @@ class _AccessibilityParser(HTMLParser):
         super().__init__()
         self.lacks = []
         self.levels = []
-        self.label = None
-        self.named = set()
+        self.ids = []
+        self.links = []
 
     def handle_starttag(self, tag, attrs):
-        """Check that an element has its accessible name.
-
-        A form control is named by an enclosing label, whose first control it is, by a label with
-        `for`, or by its own aria-label.
-        """
+        """Check that an element has its accessible name, and collect its id, its links and its level."""
         attributes = dict(attrs)
-        if tag == "label":
-            self.label = attributes.get("for", "")
-            self.named |= {self.label}
         self.levels += [int(tag[1])] if re.fullmatch("h[1-6]", tag) else []
-        is_control = tag in ("input", "select", "output", "textarea")
-        has_name = {
-            "html": attributes.get("lang"),
-            "img": attributes.get("alt"),
-            "th": attributes.get("scope"),
-            "svg": attributes.get("aria-label") or attributes.get("aria-hidden"),
-            "canvas": attributes.get("role") == "img",
-        }.get(tag, True)
-        if is_control and tag != "output":
-            has_name = (
-                attributes.get("aria-label")
-                or attributes.get("id") in self.named - {""}
-                or self.label == ""
-            )
-        self.lacks += [] if has_name else [self.get_starttag_text()]
-        if is_control and self.label == "":
-            self.label = None  # A label names only its first control.
-
-    def handle_endtag(self, tag):
-        """Note the end of a label."""
-        if tag == "label":
-            self.label = None
+        self.ids += [attributes["id"]] if "id" in attributes else []
+        self.links += [attributes[name] for name in ("href", "src") if name in attributes]
+        needed = ACCESSIBLE_NAMES.get(tag)
+        if needed and not attributes.get(needed):
+            self.lacks.append(self.get_starttag_text())
+        if attributes.get("role") == "img" and not attributes.get("aria-label"):
+            self.lacks.append(self.get_starttag_text())
 
 
-def find_accessibility_errors(text: str) -> list:
-    """Return tags without language, name, scope or alternative text, and headings that skip a level."""
+def parse_page(text: str) -> _AccessibilityParser:
+    """Return the parser of a page without its scripts."""
     parser = _AccessibilityParser()
     parser.feed(strip_scripts(text))
+    return parser
+
+
+def find_accessibility_errors(text: str) -> list[str]:
+    """Return tags without language, scope or alternative text, and headings that skip a level."""
+    parser = parse_page(text)
     skips = [
-        f"h{low} before h{high}"
-        for low, high in zip([0, *parser.levels], parser.levels)
+        f"<h{low}> before <h{high}>"
+        for low, high in zip(parser.levels, parser.levels[1:], strict=False)
         if high > low + 1
     ]
     return parser.lacks + skips
-
-
-def make_sweep_key(name: str, values, unit="1", texts=None, **more) -> dict:
-    """Return a key of a sweep in the form that its page takes; texts: its values as written."""
-    values = np.asarray(values, float)
-    texts = texts or [f"{value:g} {unit}" for value in values]
-    key = {"name": name, "unit": unit, "values": values, "log": False, "words": False}
-    return key | {"texts": texts} | more
-
-
-def make_sweep_measure(values, errors=0.0, unit="1", **more) -> dict:
-    """Return a measure of a sweep in the form that its page takes, with one error for all cases or one each."""
-    values = np.asarray(values, float)
-    return {"unit": unit, "means": "m", "values": values, "errors": 0 * values + errors} | more
-
-
-def make_sweep_table(keys: list, measures: dict, **more) -> dict:
-    """Return a sweep in the form that its page takes; all cases are steady unless `more` says otherwise."""
-    table = {"title": "t", "version": "0", "command": "c", "scene": "s", "grid": True}
-    table |= {"keys": keys, "measures": measures, "messages": {}, "folders": None}
-    return table | {"tolerance": 0.01, "outcome": ["steady"] * len(keys[0]["values"])} | more

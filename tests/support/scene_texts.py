@@ -165,6 +165,24 @@ law = "coulomb"
 static = 0.2
 """
 
+CROWNED_BENCH = (
+    COATED
+    + """\
+[contact.crown]
+radius = "80 m"
+[contact.shear]
+"""
+    + COULOMB
+    + """\
+[slide]
+kind = "triangle"
+amplitude = "0.4 um"
+speed = "0.2 mm/s"
+[accuracy]
+steps_per_cycle = 40
+"""
+)
+
 # Complete scenes.
 BENCH = POINT + COULOMB + SLIDE
 SMALL_PATCH = 'title = "a small patch"\n' + COATED + '[contact.tilt]\nangle = "0.02 mrad"\n'

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from patchfem.core import PatchfemError, frozen_array
-from patchfem.surface import level_plane
-from patchfem.surface.areal import Areal
+from patchfem.surface.areal import Areal, level_plane
 
 
 def make_scan(z, notes=("one",)) -> Areal:

@@ -10,12 +10,8 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
-from patchfem.surface import (
-    Profile,
-    describe_lost_waves,
-    level_plane,
-    read_surface,
-)
+from patchfem.surface import Profile, describe_lost_waves, read_surface
+from patchfem.surface.areal import level_plane
 from patchfem.surface.fine import wave_spectrum
 
 pytestmark = pytest.mark.skipif(

@@ -39,7 +39,7 @@ def write_advice(joint: JointMode, band: Band | None, curves: dict, missing: dic
         return ("All methods agree: no friction acts, so frequency and damping are constant.",)
     curve = curves[band.method]
     sentences = [
-        f"Use method {band.method}, the bold curve of the page: {PURPOSES[band.method]}.",
+        f"Use the curve of method {band.method}: {PURPOSES[band.method]}.",
         *_describe_slip(joint, curve),
         _describe_band_width(band, curve),
         *_describe_agreement(band, curves),

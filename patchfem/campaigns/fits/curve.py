@@ -55,6 +55,8 @@ PROGRESS_SECONDS = 10.0  # Time between two progress messages [s].
 MAX_LISTED_AMPLITUDES = 6  # Largest number of amplitudes that a message lists.
 # Number of cached curves; each step of the search evaluates some of the last ones again.
 N_CACHED_CURVES = 8
+N_CURVE_POINTS = 25  # number of amplitudes of the fitted curve
+EXTENT = 3.0  # ratio by which the fitted curve goes beyond the measured amplitudes on both sides
 NO_MODE_ERROR = "the intervals do not contain the error of the modes left out of the structure"
 
 
@@ -101,6 +103,8 @@ class FittedCurve:
         Notes about assumed errors, about the compared quantities and about neglected modes of a reduced structure.
     n_computed : int
         Number of computed curves of the model.
+    beyond : (3, j) array
+        Amplitude [m], frequency [Hz] and damping ratio of the fitted model beyond the measured amplitudes.
     """
 
     keys: FittedKeys
@@ -110,6 +114,7 @@ class FittedCurve:
     method: str
     notes: tuple
     n_computed: int
+    beyond: np.ndarray
 
 
 def read_damping_curve(path) -> MeasuredCurve:
@@ -349,7 +354,22 @@ def fit_curve(
             *widened.notes,
         ),
         n_computed=curves.n_computed,
+        beyond=_compute_beyond(curves, fit.values),
     )
+
+
+def _compute_beyond(curves: CurveModel, values) -> np.ndarray:
+    """Compute amplitude, frequency and damping (3, j) of the fitted model beyond the measured amplitudes.
+
+    Amplitudes at which the mode does not oscillate are left out.
+    """
+    ends = curves.amplitude[[0, -1]] * [1 / EXTENT, EXTENT]
+    amplitudes = np.geomspace(*ends, N_CURVE_POINTS)
+    try:
+        curve = _compute_backbone_curve(curves.build_model(values), amplitudes, curves.methods[0])
+    except PatchfemError:
+        return np.zeros((3, 0))
+    return np.array([amplitudes, *curve])[:, np.isfinite(curve).all(axis=0)]
 
 
 def _search_two_models(models: TwoModels, start, starts: int, amplitude) -> tuple:

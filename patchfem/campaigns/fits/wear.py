@@ -48,7 +48,7 @@ class MeasuredDepth:
     source: str
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, eq=False, slots=True)
 class FittedCoefficient:
     """Fitted wear coefficient with its interval.
 
@@ -63,6 +63,8 @@ class FittedCoefficient:
         Bounds of the search.
     runs : int
         Number of wear runs.
+    curve : (2, j) array
+        Coefficients up to the upper bound [m2/N], and the wear depths with them [m].
     """
 
     value: float
@@ -72,6 +74,7 @@ class FittedCoefficient:
     model: float
     bounds: Range
     runs: int
+    curve: np.ndarray
 
 
 class WearCurve(NamedTuple):
@@ -250,6 +253,7 @@ def fit_wear(
         model=computed_depth,
         bounds=bounds,
         runs=n_runs,
+        curve=np.array([bounds.high * curve.fraction, curve.depth]),
     )
 
 

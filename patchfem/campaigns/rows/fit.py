@@ -1,8 +1,7 @@
 """Fit of a rig to a table of measured responses, with hold-out and cross-validation.
 
 A score is the root mean square of ln(computed/measured). Scores are given for the fitted, the held-out
-and the left-out readings, for the rig and for power laws without mechanics that are fitted to the
-same readings (`nulls`). A search does not use the readings that are held out or left out; they are
+and the left-out readings. A search does not use the readings that are held out or left out; they are
 predicted after the fit.
 """
 
@@ -20,7 +19,6 @@ from ..fits.problem import FittedKeys, FreeKeys
 from .cells import MAX_LOG_RATIO, Readings, compute_rms_scores, read_response_table
 from .condition_models import ConditionModels, FitRequest
 from .model_readings import ModelReadings
-from .null_models import NULL_MODELS, fit_null_model
 from .search import BestFit, SearchSettings, make_residual, search_random_starts
 
 SAME_SCORE = 1.01  # Largest ratio of scores at which two descents count as the same fit.
@@ -32,44 +30,8 @@ UNSTABLE_MEANINGS = {
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Fold:
-    """Cross-validation fold: a fit that leaves out the readings with a given value in a column.
-
-    name: the value; readings: mask (n,) of the left-out readings; search: fit of all others.
-    """
-
-    name: str
-    readings: np.ndarray
-    search: BestFit
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Placebo:
-    """Placebo test: a refit with another value of a parameter that is not fitted.
-
-    text: "key=value" string of the other value; search: the refit; logs: log ratios (n,).
-    """
-
-    text: str
-    search: BestFit
-    logs: np.ndarray
-
-
-class NullPrediction(NamedTuple):
-    """Predictions of the readings by a power law without mechanics.
-
-    logs: log ratios ln(computed/measured) (n,); left_out_logs: log ratios (n,) from fits without
-    the reading; numbers: fitted factor and exponents by kind of reading.
-    """
-
-    logs: np.ndarray
-    left_out_logs: np.ndarray
-    numbers: dict
-
-
-@dataclass(frozen=True, eq=False, slots=True)
 class FittedRows:
-    """Fit of a rig to a table of measured responses, with cross-validation and placebo tests.
+    """Fit of a rig to a table of measured responses, with cross-validation.
 
     Attributes
     ----------
@@ -88,12 +50,8 @@ class FittedRows:
         Acceleration reading [m s-2] and displacement [m] of every condition.
     logs : (n,) array
         Log ratios ln(computed/measured).
-    folds : tuple of Fold
     left_out_logs : (n,) array
         Log ratios from the fit without the reading; NaN if every fit used it.
-    placebos : tuple of Placebo
-    nulls : dict of NullPrediction
-        Predictions of the power laws without mechanics by name.
     n_motions : int
         Number of computed motions.
     """
@@ -106,21 +64,14 @@ class FittedRows:
     search: BestFit
     computed: np.ndarray
     logs: np.ndarray
-    folds: tuple
     left_out_logs: np.ndarray
-    placebos: tuple
-    nulls: dict
     n_motions: int
 
-    def compute_scores(self, logs, left_out_logs, *, only_stable: bool = False) -> dict:
+    def compute_scores(self, *, only_stable: bool = False) -> dict[str, dict | None]:
         """Return the scores of the fitted, the held-out and the left-out readings.
 
         Parameters
         ----------
-        logs : (n,) array
-            Log ratios ln(computed/measured) of any prediction.
-        left_out_logs : (n,) array
-            Log ratios of the left-out readings from fits without them; NaN for others.
         only_stable : bool
             Whether to exclude the readings flagged U (unstable).
 
@@ -132,23 +83,24 @@ class FittedRows:
         is_eligible = ~self.cells.unstable if only_stable else np.ones(self.held_out.size, bool)
         is_left_out = ~np.isnan(self.left_out_logs)
         return {
-            "fitted": compute_rms_scores(self.cells, logs, is_eligible & ~self.held_out),
-            "held_out": compute_rms_scores(self.cells, logs, is_eligible & self.held_out),
-            "left_out": compute_rms_scores(self.cells, left_out_logs, is_eligible & is_left_out),
+            "fitted": compute_rms_scores(self.cells, self.logs, is_eligible & ~self.held_out),
+            "held_out": compute_rms_scores(self.cells, self.logs, is_eligible & self.held_out),
+            "left_out": compute_rms_scores(
+                self.cells, self.left_out_logs, is_eligible & is_left_out
+            ),
         }
 
 
 @dataclass(frozen=True, slots=True)
 class RowsOptions:
-    """Options of a fit to a response table: validation readings, placebo tests and search settings.
+    """Options of a fit to a response table: validation readings and search settings.
 
     hold: selectors "column=value,value" of held-out rows; leave_out: column for cross-validation,
-    whose values are left out one at a time; placebos: "key=value,value" strings; search: settings.
+    whose values are left out one at a time; search: settings.
     """
 
     hold: tuple = ()
     leave_out: str = ""
-    placebos: tuple = ()
     search: SearchSettings = field(default_factory=SearchSettings)
 
 
@@ -201,12 +153,7 @@ def fit_rows(
         )
     for group in groups.values():
         _require_enough_readings(cells, fitted & ~group, n_values, settings)
-    # The placebo strings are checked first, because the search can take hours.
-    placebo_models = {}
-    for placebo in options.placebos:
-        for text in _split_placebo(placebo, request.ranges):
-            placebo_models[text] = request.make_condition_models(cells.conditions, text)
-    n_searches = 1 + len(groups) + len(placebo_models)
+    n_searches = 1 + len(groups)
     report = None if progress is None else _StartCounter(progress, settings.starts * n_searches)
     keys = FreeKeys(models.scene, models.ranges, sets=models.sets, notes=models.notes)
     every_condition = range(len(cells.conditions))
@@ -216,19 +163,11 @@ def fit_rows(
     prediction = _predict_from_rest(computed, best.fit.values, every_condition)
     logs = cells.compute_log_ratios(*prediction)
     left_out_logs = np.full(held_out.size, np.nan)
-    folds = []
     for name, group in groups.items():
         fold = fitter.fit(computed, fitted & ~group, f"without {name}")
         conditions = sorted(set(cells.condition[group].tolist()))
         fold_prediction = _predict_from_rest(computed, fold.fit.values, conditions)
         left_out_logs[group] = cells.compute_log_ratios(*fold_prediction)[group]
-        folds.append(Fold(name, group, fold))
-    placebos = []
-    for text, other_models in placebo_models.items():
-        readings = ModelReadings(other_models, say)
-        refit = fitter.fit(readings, fitted, text)
-        refit_prediction = _predict_from_rest(readings, refit.fit.values, every_condition)
-        placebos.append(Placebo(text, refit, cells.compute_log_ratios(*refit_prediction)))
     return FittedRows(
         keys=keys.make_fitted_keys(
             best.fit, begin, _warn_of_doubtful_fit(cells, best, logs, settings)
@@ -240,10 +179,7 @@ def fit_rows(
         search=best,
         computed=prediction,
         logs=logs,
-        folds=tuple(folds),
         left_out_logs=left_out_logs,
-        placebos=tuple(placebos),
-        nulls={name: _predict_with_null_model(cells, name, fitted, groups) for name in NULL_MODELS},
         n_motions=computed.n_motions,
     )
 
@@ -311,38 +247,6 @@ class _StartCounter:
         """Add to the number of finished descents and report the fraction."""
         self.finished += count
         self.progress(self.finished / self.total)
-
-
-def _split_placebo(text: str, ranges) -> list:
-    """Split a placebo option "key=value,value" into a "key=value" string for each value.
-
-    Raises PatchfemError for a key that is fitted or that the response table sets.
-    """
-    key, equals, values = (part.strip() for part in text.partition("="))
-    if not equals or not values:
-        raise PatchfemError(
-            f"--placebo {text}: write table.key=value,value, for example "
-            "structure.mode.yaw.frequency=110 Hz,138 Hz"
-        )
-    if key in ("drive.frequency", "drive.acceleration"):
-        raise PatchfemError(
-            f"--placebo {text}: the rows of the file give the drive; choose a key of the rig"
-        )
-    if any(key == bound.key for bound in ranges):
-        raise PatchfemError(
-            f"--placebo {text}: --free already fits this key, so a placebo value would have no "
-            "effect; leave the key out of --free, or choose another key"
-        )
-    return [f"{key}={value.strip()}" for value in values.split(",")]
-
-
-def _predict_with_null_model(readings: Readings, name: str, fitted, groups: dict) -> NullPrediction:
-    """Predict all readings by a null model; left-out readings are predicted by fits without them."""
-    logs, numbers = fit_null_model(readings, name, fitted)
-    left_out_logs = np.full(fitted.size, np.nan)
-    for group in groups.values():
-        left_out_logs[group] = fit_null_model(readings, name, fitted & ~group)[0][group]
-    return NullPrediction(logs, left_out_logs, numbers)
 
 
 def _warn_of_doubtful_fit(

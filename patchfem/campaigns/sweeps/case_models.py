@@ -62,16 +62,13 @@ class SweepScene:
         scene = require_files(loads(self.text, self.path, (*self.sets, *sets)))
         return remember_written(replace(scene, sweep=()), self.n_written)
 
-    def build_model(self, sets: Sequence[str], values: Sequence[float | str] = ()) -> Model:
+    def build_model(self, sets: Sequence[str]) -> Model:
         """Build the model of a single case of the sweep.
 
         Parameters
         ----------
         sets : sequence of str
             ``table.key=value`` strings of the case.
-        values : sequence
-            Values of the same keys in SI, if they are known. They allow the model to be derived
-            from that of an earlier case that differs only in plain numbers.
 
         Raises
         ------
@@ -79,7 +76,7 @@ class SweepScene:
             With all validation errors of the scene.
         """
         try:
-            return self._derive_model(sets, values) or build(self.read_scene(sets))
+            return build(self.read_scene(sets))
         except SceneError as error:
             raise PatchfemError("; ".join(_format_case_errors(error))) from None
         except PatchfemError:
@@ -116,19 +113,6 @@ class SweepScene:
         if not models[keys] or not models[keys][0].are_plain(values):
             return None
         return SimilarModels(*models[keys], values, sets, cases)
-
-    def _derive_model(self, sets: Sequence[str], values: Sequence) -> Model | None:
-        """Derive the model of a case from an earlier model with the same keys.
-
-        Returns None if the case requires a validation of its scene.
-        """
-        if not values or not all(isinstance(value, float) for value in values):
-            return None
-        keys = [text.partition("=")[0] for text in sets]
-        models = self.make_similar_models(
-            keys, np.array([values]), lambda _: tuple(sets), np.zeros(1, int)
-        )
-        return models and models[0]
 
     def find_errors(self, sets: Sequence[str]) -> list[str]:
         """Return the validation errors of the scene of a case; [] if it is valid."""
@@ -185,17 +169,10 @@ class SweepScene:
 
         `keys` are the swept keys.
         """
-        set_keys = set(keys)
-        set_keys |= {text.partition("=")[0].strip() for text in self.sets}
-        for name, table in tomllib.loads(self.text).items():
-            if isinstance(table, dict):
-                set_keys |= {f"{name}.{key}" for key in table}
+        set_keys = {*keys, *(text.partition("=")[0].strip() for text in self.sets)}
+        set_keys |= {f"contact.{key}" for key in tomllib.loads(self.text).get("contact", ())}
         has_contact = any(key.startswith("contact.") for key in set_keys)
         return has_contact and not {"contact.element_size", "contact.mesh"} & set_keys
-
-    def hash_file_contents(self, text: str) -> str:
-        """Return the hashes of the files that a value names; "" if it names none."""
-        return " ".join(sign for _, sign in hash_named_files([text], self.path.parent))
 
 
 class _SweepBase(NamedTuple):

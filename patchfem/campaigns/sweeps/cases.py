@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from hashlib import sha256
 from itertools import chain
@@ -12,9 +12,11 @@ from math import isfinite, prod
 
 import numpy as np
 
+from ...disk.file_hashes import hash_named_files
 from ...scene.axes import Axis
 from .case_models import SweepScene
 
+MAX_CACHED_VALUES = 4096  # values of keys whose text is kept while the cases are named
 # Prefixes of the keys that change the pieces or their mesh.
 PIECE_KEYS = (
     "contact.length",
@@ -46,14 +48,14 @@ class Cases:
         the values, in which the last axis varies fastest.
     is_random : bool
         Whether the values of a table are random.
-    request_arguments : tuple of str
-        Command-line arguments that request the same table; () if they are unknown.
+    arguments : tuple of str
+        Command-line arguments that request the same cases; () for those of the table [sweep].
     """
 
     axes: tuple[Axis, ...]
     is_table: bool = False
     is_random: bool = False
-    request_arguments: tuple[str, ...] = ()
+    arguments: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.axes[0].texts) if self.is_table else prod(self.shape)
@@ -63,15 +65,11 @@ class Cases:
         """Number of values of each axis; the number of cases for a table."""
         return (len(self),) if self.is_table else tuple(len(axis.texts) for axis in self.axes)
 
-    def axis_indices(self, number: int) -> tuple:
-        """Return the index of the value of a case on each axis."""
+    def axis_indices(self, numbers: int | Sequence[int]) -> tuple:
+        """Return for each axis the index of the value of a case, or the indices of several cases."""
         if self.is_table:
-            return (number,) * len(self.axes)
-        out = []
-        for axis in reversed(self.axes):
-            number, index = divmod(number, len(axis.texts))
-            out.append(index)
-        return tuple(reversed(out))
+            return (np.asarray(numbers),) * len(self.axes)
+        return np.unravel_index(numbers, self.shape)
 
     def texts(self, number: int) -> tuple:
         """Return the values of a case as strings from the request, one per axis."""
@@ -81,25 +79,13 @@ class Cases:
         """Return the `table.key=value` strings of a case."""
         return tuple(f"{axis.key}={text}" for axis, text in zip(self.axes, self.texts(number)))
 
-    def values(self, number: int) -> tuple:
-        """Return the values of a case in SI units, one per axis.
-
-        They are floats, or strings for a key that is not numeric.
-        """
-        return tuple(axis.values[k] for axis, k in zip(self.axes, self.axis_indices(number)))
-
-    def value_matrix(self, numbers: Sequence[int]) -> np.ndarray | None:
-        """Return the values (n, k) of cases in SI units; None if a key is not numeric."""
-        if not all(isinstance(axis.values[0], float) for axis in self.axes):
-            return None
-        indices = [numbers] * len(self.axes)
-        if not self.is_table:
-            indices = np.unravel_index(numbers, self.shape)
+    def make_columns(self, numbers: Sequence[int]) -> list[np.ndarray]:
+        """Return the values (n,) of each axis in several cases: floats in SI, or strings."""
         columns = []
-        for axis, axis_indices in zip(self.axes, indices):
-            index_list = np.asarray(axis_indices).tolist()
-            columns.append(np.array([axis.values[index] for index in index_list]))
-        return np.array(columns).T
+        for axis, indices in zip(self.axes, self.axis_indices(numbers)):
+            kind = float if isinstance(axis.values[0], float) else str
+            columns.append(np.asarray(axis.values, kind)[indices])
+        return columns
 
     def spread_case_numbers(self, max_cases: int) -> list[int]:
         """Return the numbers of cases that are evenly spread over all axes, including their ends.
@@ -140,80 +126,54 @@ class Cases:
         if not contact_axes:
             return list(numbers)
         contact_axes.sort(key=lambda k: not self.axes[k].key.startswith(PIECE_KEYS))
-        # Repeated values of an axis have the index of their first occurrence.
-        first_indices = [{} for _ in self.axes]
-        for first, axis in zip(first_indices, self.axes):
-            for index, value in enumerate(axis.values):
-                first.setdefault(value, index)
+        columns = self.make_columns(numbers)
+        order = np.lexsort([columns[k] for k in reversed(contact_axes)])
+        return np.asarray(numbers)[order].tolist()
 
-        def patch_axis_indices(number: int) -> list:
-            """Return the axis indices of a case for the keys that change its patch."""
-            values = self.values(number)
-            return [first_indices[k][values[k]] for k in contact_axes]
-
-        return sorted(numbers, key=patch_axis_indices)
-
-    def compute_hashes(
-        self, sweep_scene: SweepScene, numbers: Sequence[int] | None = None
-    ) -> np.ndarray:
-        """Return hashes (n,) uint64 of cases, which identify them in any sweep of the scene.
+    def compute_hashes(self, sweep_scene: SweepScene) -> np.ndarray:
+        """Return hashes (n,) uint64 of the cases, which identify them in any sweep of the scene.
 
         A hash covers the keys and values of the case and the data common to all cases. It does not
         depend on units, on the order of keys or on the other cases of the sweep, unless the mesh is
         chosen for all cases together.
-
-        Parameters
-        ----------
-        sweep_scene : SweepScene
-        numbers : sequence of int, optional
-            Numbers of the cases; all by default.
         """
-        hasher = _CaseHasher(self, sweep_scene)
-        every_case = range(len(self))
-        common_text = sweep_scene.hash_common_data()
-        if sweep_scene.has_shared_meshes([axis.key for axis in self.axes]):
-            common_text = sha256(
-                np.sort(hasher.hash_cases(common_text, every_case)).tobytes()
-            ).hexdigest()
-        return hasher.hash_cases(common_text, every_case if numbers is None else numbers)
-
-
-class _CaseHasher:
-    """Hash function of the cases of a sweep.
-
-    Random values are not cached, because they hardly ever repeat.
-    """
-
-    def __init__(self, cases: Cases, sweep_scene: SweepScene):
-        self.cases = cases
-        self.sweep_scene = sweep_scene
-        keys = [json.dumps(axis.key) for axis in cases.axes]
-        self.keys = keys
+        keys = [json.dumps(axis.key) for axis in self.axes]
         # The order of the keys is the same for all cases.
-        self.order = sorted(range(len(keys)), key=keys.__getitem__)
-        self.cached_json = lru_cache(0 if cases.is_random else None)(self._value_json)
+        order = sorted(range(len(keys)), key=keys.__getitem__)
 
-    def hash_cases(self, common_text: str, numbers: Sequence[int]) -> np.ndarray:
-        """Return a hash (n,) uint64 of each case.
+        @lru_cache(MAX_CACHED_VALUES)
+        def describe_value(axis: int, index: int) -> str:
+            """Return a key and its value as JSON, with the hash of the files that the value names."""
+            value = self.axes[axis].values[index]
+            if isinstance(value, float) and isfinite(value):
+                return f'[{keys[axis]}, {value!r}, ""]'
+            files = hash_named_files([str(value)], sweep_scene.path.parent)
+            content = " ".join(sign for _, sign in files)
+            return f"[{keys[axis]}, {json.dumps(value)}, {json.dumps(content)}]"
 
-        `common_text` identifies the data common to all cases.
-        """
-        hashes = np.empty(len(numbers), np.uint64)
-        for k, number in enumerate(numbers):
-            indices = self.cases.axis_indices(number)
-            values = [self.cached_json(axis, indices[axis]) for axis in self.order]
-            digest = sha256("\n".join([common_text, *values]).encode()).hexdigest()
-            hashes[k] = int(digest[:16], 16)
+        common_text = sweep_scene.hash_common_data()
+        hashes = np.empty(len(self), np.uint64)
+        for number in range(len(self)):
+            indices = list(map(int, self.axis_indices(number)))
+            values = [describe_value(axis, indices[axis]) for axis in order]
+            hashes[number] = _hash_to_integer("\n".join([common_text, *values]).encode())
+        if sweep_scene.has_shared_meshes([axis.key for axis in self.axes]):
+            hashes ^= np.uint64(_hash_to_integer(np.sort(hashes).tobytes()))
         return hashes
 
-    def _value_json(self, axis: int, index: int) -> str:
-        """Return a key and its value as JSON, with the hash of the file that the value names."""
-        key = self.keys[axis]
-        value = self.cases.axes[axis].values[index]
-        if isinstance(value, float) and isfinite(value):
-            return f'[{key}, {value!r}, ""]'
-        content = self.sweep_scene.hash_file_contents(value) if isinstance(value, str) else ""
-        return f"[{key}, {json.dumps(value)}, {json.dumps(content)}]"
+
+def _hash_to_integer(content: bytes) -> int:
+    """Return the first 64 bits of the SHA-256 hash of a content."""
+    return int.from_bytes(sha256(content).digest()[:8], "big")
+
+
+def take_values(axis: Axis, indices: Sequence[int]) -> Axis:
+    """Return a swept key with the values at some indices."""
+    return replace(
+        axis,
+        texts=tuple(axis.texts[index] for index in indices),
+        values=tuple(axis.values[index] for index in indices),
+    )
 
 
 def combine_cases(parts: Sequence[Cases]) -> Cases:
@@ -225,15 +185,8 @@ def combine_cases(parts: Sequence[Cases]) -> Cases:
         return parts[0]
     if not any(part.is_table for part in parts):
         return Cases(tuple(chain.from_iterable(part.axes for part in parts)))
-    count = prod(map(len, parts))
+    sizes = [len(part) for part in parts]
     axes = []
-    n_inner = count
-    for part in parts:
-        n_inner //= len(part)
-        numbers = [number // n_inner % len(part) for number in range(count)]
-        indices = list(map(part.axis_indices, numbers))
-        for k, axis in enumerate(part.axes):
-            texts = tuple(axis.texts[place[k]] for place in indices)
-            values = tuple(axis.values[place[k]] for place in indices)
-            axes.append(Axis(axis.key, texts, values, axis.unit))
+    for part, numbers in zip(parts, np.unravel_index(np.arange(prod(sizes)), sizes)):
+        axes += map(take_values, part.axes, part.axis_indices(numbers))
     return Cases(tuple(axes), True, all(part.is_random for part in parts))

@@ -29,6 +29,7 @@ MAX_PRINTED = 12  # Largest number of validation errors that are printed.
 MAX_SUGGESTIONS = 4  # Largest number of measures that are suggested for an unknown name.
 # Largest number of cases; the hashes and columns of more cases take gigabytes.
 MAX_CASES = 3_000_000
+MAX_PRINTED_LENGTH = 2000  # Largest number of characters of the values in a printed command.
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,23 +156,21 @@ def read_cases(sweep_scene: SweepScene, request: Request) -> Cases:
     elif axes:
         parts.append(Cases(tuple(axes)))
     cases = combine_cases(parts)
-    if cases.is_table:
-        cases = replace(
-            cases, request_arguments=_format_request_arguments(request, sweep_scene.path.parent)
-        )
     _require_valid_case(sweep_scene, cases)
-    return cases
+    return replace(cases, arguments=_format_arguments(request, sweep_scene.path.parent))
 
 
-def _format_request_arguments(request: Request, folder: Path) -> tuple[str, ...]:
+def _format_arguments(request: Request, folder: Path) -> tuple[str, ...]:
     """Return the command-line arguments that request the same cases again, relative to a folder.
 
-    Returns () if the table of cases is a pipe, which cannot be read again.
+    They name the rows of sweep.csv if the values are a long list, or if the table of cases is a pipe,
+    which cannot be read again.
     """
     arguments = []
+    is_pipe = request.file is not None and not request.file.is_file()
+    if is_pipe or sum(map(len, request.over)) > MAX_PRINTED_LENGTH:
+        return ("--cases", "sweep.csv")
     if request.file is not None:
-        if not request.file.is_file():
-            return ()
         arguments += ["--cases", os.path.relpath(request.file, folder)]
     for text in request.over:
         arguments += ["--over", text]
@@ -182,20 +181,14 @@ def _format_request_arguments(request: Request, folder: Path) -> tuple[str, ...]
 
 
 def _validate_measure_name(measure: str) -> list[str]:
-    """Return a validation error for an unknown measure, with a suggestion; [] if it is known.
-
-    The suggestion contains the measures whose name contains the word, or else the most similar name.
-    """
+    """Return a validation error for an unknown measure, with the most similar names; [] if it is known."""
     known = [*rows.TABLE, *patch_rows.TABLE]
     if not measure or rows.remove_interface_number(measure) in known:
         return []
-    names = [name for name in known if measure in name.split("_") and not name.endswith("_scatter")]
-    if not 0 < len(names) <= MAX_SUGGESTIONS:
-        names = get_close_matches(measure, known, 1, 0.5)
-    advice = "use a name that `patchfem run` prints, such as loop_area"
+    advice = "use a name that `patchfem run -v` prints, such as loop_area"
+    names = get_close_matches(measure, known, MAX_SUGGESTIONS, 0.5)
     if names:
-        *others, last = map(repr, names)
-        advice = f"did you mean {', '.join(others)}{' or ' * bool(others)}{last}?"
+        advice = f"did you mean {' or '.join(map(repr, names))}?"
     return [f"--of {measure}: unknown measure; {advice}"]
 
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...scene.axes import Axis, SampledRange
-from .cases import Cases
+from .cases import Cases, take_values
 
 
 def draw_cases(
@@ -56,6 +56,4 @@ def _map_to_values(axis: Axis | SampledRange, fractions: np.ndarray) -> Axis:
         return axis.make_axis(fractions.tolist())
     n_values = len(axis.texts)
     indices = np.minimum((fractions * n_values).astype(int), n_values - 1)
-    texts = tuple(axis.texts[place] for place in indices)
-    values = tuple(axis.values[place] for place in indices)
-    return Axis(axis.key, texts, values, axis.unit)
+    return take_values(axis, indices)

@@ -9,8 +9,8 @@ from __future__ import annotations
 import csv
 import io
 import re
+from collections import Counter
 from pathlib import Path
-from typing import NamedTuple
 
 from ...disk.open_with_timeout import open_for_reading
 from ...inputs.cells import NUMBER_PATTERN
@@ -36,93 +36,73 @@ def read_case_table(path: Path) -> tuple[Cases | None, list[str]]:
             open_for_reading(path) as raw,
             io.TextIOWrapper(raw, encoding="utf-8-sig", newline="") as file,
         ):
-            lines = _read_nonempty_lines(file)
+            rows = enumerate(csv.reader(file), 1)
+            lines = [(number, [cell.strip() for cell in row]) for number, row in rows]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         return None, [f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}"]
+    lines = [(number, cells) for number, cells in lines if any(cells)]
     if len(lines) < 2:
         return None, [
             f"{path}: the first line must be a header such as `{HEADER}`, and each line after it must give "
             "one case"
         ]
-    header = lines.pop(0)
-    key_cells = header.cells
-    if OUTCOME_COLUMN in key_cells:
-        key_cells = key_cells[: key_cells.index(OUTCOME_COLUMN)]
-    header_matches = list(map(_HEAD.fullmatch, key_cells))
-    if not header_matches or not all(header_matches):
+    (header_number, heads), *lines = lines
+    key_cells = heads[: heads.index(OUTCOME_COLUMN)] if OUTCOME_COLUMN in heads else heads
+    matches = list(map(_HEAD.fullmatch, key_cells))
+    if not matches or not all(matches):
         return None, [
-            f"{path}:{header.number}: the first line must be a header such as `{HEADER}`, not "
-            f"'{','.join(header.cells)[:80]}'"
+            f"{path}:{header_number}: the first line must be a header such as `{HEADER}`, not "
+            f"'{','.join(heads)[:80]}'"
         ]
     errors = []
-    n_columns = len(header.cells)
-    for line in lines:
-        if len(line.cells) != n_columns:
+    for number, cells in lines:
+        if len(cells) != len(heads):
             errors.append(
-                f"{path}:{line.number}: the line must have {n_columns} cells, as the header has, not "
-                f"{len(line.cells)}"
+                f"{path}:{number}: the line must have {len(heads)} cells, as the header has, not {len(cells)}"
             )
-    keys = [head[1] for head in header_matches]
-    for key in dict.fromkeys(keys):
-        if keys.count(key) > 1:
+    for key, count in Counter(match[1] for match in matches).items():
+        if count > 1:
             errors.append(
-                f"{path}:{header.number}: {key}: two columns have this key; remove one of them"
+                f"{path}:{header_number}: {key}: two columns have this key; remove one of them"
             )
     if errors:
         return None, errors
+
     axes = []
-    for column, head in enumerate(header_matches):
-        key, unit = head.groups()
-        cells = [(line.number, line.cells[column]) for line in lines]
-        axis, wrong_cells = _parse_column(key, unit, cells)
+    for column, match in enumerate(matches):
+        key, unit = match.groups()
+        axis, wrong_cells = _parse_column(key, unit, [cells[column] for _, cells in lines])
         axes.append(axis)
-        for number, text in wrong_cells:
-            errors.append(f"{path}:{number or header.number}: {key}: {text}")
+        for row, text in wrong_cells:
+            number = header_number if row is None else lines[row][0]
+            errors.append(f"{path}:{number}: {key}: {text}")
     return (None, errors) if errors else (Cases(tuple(axes), True), [])
 
 
-class _TableLine(NamedTuple):
-    """Line of a CSV table: its number, counted from 1, and its cells."""
+def _parse_column(
+    key: str, unit: str | None, cells: list[str]
+) -> tuple[Axis | None, list[tuple[int | None, str]]]:
+    """Parse the cells of a column.
 
-    number: int
-    cells: list
-
-
-def _read_nonempty_lines(file) -> list:
-    """Return the lines of a CSV table that are not empty."""
-    lines = []
-    for number, row in enumerate(csv.reader(file), 1):
-        cells = [cell.strip() for cell in row]
-        if any(cells):
-            lines.append(_TableLine(number, cells))
-    return lines
-
-
-def _parse_column(key: str, unit: str | None, cells: list) -> tuple[Axis | None, list[tuple]]:
-    """Parse a column of (line number, cell) pairs to an axis, or return its validation errors."""
-    axes = {}
+    Returns
+    -------
+    tuple
+        Axis, or None if there are errors, and a list of the row of each wrong cell with its error; the
+        row is None if the key is wrong.
+    """
     errors = []
-    for number, cell in cells:
-        if cell in axes:
-            continue
-        if unit is not None and not NUMBER_PATTERN.fullmatch(cell):
-            errors.append(
-                (
-                    number,
-                    f"'{cell[:60]}' must be a number without a unit; write the unit in the header",
-                )
-            )
-            continue
+    for row, cell in enumerate(cells):
         try:
-            axes[cell] = make_axis(key, [f"{cell} {unit}" if unit else cell])
+            if unit is not None and not NUMBER_PATTERN.fullmatch(cell):
+                raise ValueError(
+                    f"'{cell[:60]}' must be a number without a unit; write the unit in the header"
+                )
+            make_axis(key, [f"{cell} {unit}" if unit else cell])
         except ValueError as error:
-            errors.append((number, str(error)))
             if str(error).startswith("not a key"):
-                return None, [(0, str(error))]
+                return None, [(None, str(error))]
+            errors.append((row, str(error)))
     if errors:
         return None, errors
-    values = [axes[cell] for _, cell in cells]
-    texts = tuple(value.texts[0] for value in values)
-    if not all(value.unit for value in values):
-        return Axis(key, texts, texts, ""), []
-    return Axis(key, texts, tuple(value.values[0] for value in values), values[0].unit), []
+    texts = [f"{cell} {unit}" if unit else cell for cell in cells]
+    return make_axis(key, texts, distinct=False), []

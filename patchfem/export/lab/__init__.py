@@ -1,12 +1,9 @@
-"""Histories and loops in the formats of laboratories, to compare a run with a measurement.
+"""Laboratory files: histories and loops of results out, records in, and the structure of a scene for other programs.
 
-In: a results folder (of a run or of a fit), or imported records. Out: universal files (dataset 58,
-with units in 164), .mat, and CSV with units. `series` reads the content of a folder; the other
-modules write.
+Universal files (dataset 58, with units in 164), .mat, and CSV with units. `write` and `universal` write, `imported` reads
+laboratory files as tables and modes, `structures` writes matrices and friction elements.
 
-Read `series` first.
+Read `write` first.
 """
 
-UNIVERSAL = (".uff", ".unv", ".uf", ".58")
-ENDINGS = (*UNIVERSAL, ".mat", ".csv")
-FIELDS = "fields.vtkhdf"  # name of the file that contains the fields in a results folder
+ENDINGS = (".uff", ".unv", ".uf", ".58", ".mat", ".csv")

@@ -1,23 +1,35 @@
-"""Import of laboratory files: as a table for scenes and fits, as modes, or as a response."""
+"""Import of laboratory files: as a table for scenes and fits, as modes of a scene, or as a frequency response."""
 
 from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+
 from ... import formatting
 from ...core import PatchfemError
-from ...disk import atomic_write
-from ...identify import measured_modes as measured
+from ...disk.atomic_write import write_text
+from ...identify import measured_modes
 from ...inputs import laboratory, records
 from ...inputs import universal as universal_files
 from ...inputs.units import CHANNEL_UNITS, SI_UNITS
 from ...scene.keys import quantities
 from ...structure import universal as universal_modes
-from . import modes as mode_lines
-from . import write
+from . import universal
+from .universal import Column
+from .write import format_columns
 
-# Columns of an exported file that can be its displacement, in order of preference.
-COLUMNS = {"displacement": ("output_displacement", "relative_displacement", "slide")}
+# columns of an exported file that can be its displacement, in order of preference; 1.x wrote the first one
+EXPORTED_NAMES = {"displacement": ("output_displacement", "relative_displacement", "slide")}
+# form of a file by its ending, and the options that each form uses
+FORMS = {".csv": "table", ".toml": "modes", ".uff": "response", ".unv": "response"}
+USED = {
+    "table": (),
+    "decay": ("decay", "begin"),
+    "modes": ("segment", "window", "band", "decay", "begin"),
+    "response": ("segment", "window"),
+}
+DECAY_UNITS = {"time": "s", "amplitude": "m", "frequency": "Hz", "damping": "1"}
 
 
 class EstimateOptions(NamedTuple):
@@ -69,77 +81,66 @@ def convert_file(
     PatchfemError
         If options do not fit together.
     """
-    suffix = out.suffix.lower()
-    if suffix not in (".csv", ".toml", ".uff", ".unv"):
+    form = FORMS.get(out.suffix.lower())
+    if form is None:
         raise PatchfemError(
             f"{out}: records are written as .csv, modes as .toml, a frequency response as .uff"
         )
-    if suffix == ".csv" and settings != EstimateOptions(
-        decay=settings.decay, begin=settings.begin if settings.decay else ""
-    ):
+    if form == "table" and settings.decay:
+        form = "decay"
+    if zero and form != "table":
         raise PatchfemError(
-            "--segment, --window, --band and, without --decay, --begin can be used only for modes (-o "
-            "modes.toml) and responses (-o response.uff)"
+            "--zero can be used only when importing a table of records (-o table.csv), not with --decay"
         )
-    if zero and settings.decay:
+    given = [name for name, value in settings._asdict().items() if value]
+    unused = [f"--{name}" for name in given if name not in USED[form]]
+    if unused:
         raise PatchfemError(
-            "--zero can be used only when importing a table of records, not with --decay"
+            f"{out}: {', '.join(unused)} can be used only for modes (-o modes.toml); --segment and --window also for "
+            "responses (-o response.uff), --begin with --decay also for a table of the decay"
         )
-    if zero and suffix != ".csv":
-        raise PatchfemError(
-            "--zero can be used only when importing a table of records (-o table.csv)"
-        )
-    if suffix == ".csv":
-        return (
-            _write_decay(file, out, requests, settings.begin)
-            if settings.decay
-            else _write_table(file, out, requests, zero)
-        )
-    return (_write_modes if suffix == ".toml" else _write_response)(file, out, requests, settings)
-
-
-def _write_table(file: Path, out: Path, requests, zero: bool) -> dict:
-    """Write measured records as a table."""
-    laboratory_records = laboratory.read_records(file, records.parse_requests(requests))
-    values = records.shift_to_zero(laboratory_records.values) if zero else laboratory_records.values
-    units = {name: SI_UNITS[name] for name in values}
-    write.write_table(out, values, units)
-    rows = len(next(iter(values.values())))
-    shifted_starts = [
-        f"{name} starts at {values[name][0]:g} {SI_UNITS[name]}"
-        for name in ("time", "displacement", "lateral")
-        if "displacement" in values and name in values and values[name][0] != 0
-    ]
-    notes = [
-        *laboratory_records.notes,
-        *(
-            [
-                f"{', '.join(shifted_starts)}: slide.file needs a table that starts at 0; use --zero to subtract "
-                "the first row"
-            ]
-            if shifted_starts
-            else []
-        ),
-    ]
-    return {
-        "rows": rows,
-        "units": units,
-        "notes": notes,
-        "told": f"{rows} rows of {', '.join(values)}",
-    }
-
-
-def _write_decay(file: Path, out: Path, requests, begin_text: str) -> dict:
-    """Write frequency and damping ratio of a measured decay as a table."""
+    if form == "table":
+        return _write_table(file, out, requests, zero)
+    if form == "modes" and (shapes := _read_shapes(file, requests, settings)):
+        return _write_modes(shapes, out, file.name, [])
     values, notes = _read_records(file, requests)
-    curve, curve_notes = measured.compute_decay_curve(
-        values, _parse_quantity(begin_text, "time", f"--begin {begin_text}")
-    )
-    write.write_table(
-        out,
-        {f"decay_{name}": values_of_name for name, values_of_name in curve._asdict().items()},
-        {f"decay_{name}": unit for name, unit in write.DECAY.items()},
-    )
+    if settings.window not in ("", "hann", "none"):
+        raise PatchfemError(f"--window {settings.window}: hann or none")
+    segment = _parse_quantity(settings.segment, "time", "--segment")
+    averaging = (segment, settings.window or None)
+    if form == "response":
+        return _write_response(values, out, averaging, notes)
+    begin = _parse_quantity(settings.begin, "time", "--begin")
+    if form == "decay":
+        return _write_decay(values, out, begin, notes)
+    if settings.decay:
+        modes = measured_modes.identify_decay_modes(values, begin)
+    else:
+        band = _parse_band(settings.band)
+        modes = measured_modes.identify_driven_modes(values, *averaging, band)
+    return _write_modes(modes, out, file.name, notes)
+
+
+def _write_table(file: Path, out: Path, requests: Iterable[str], zero: bool) -> dict:
+    """Write measured records as a table."""
+    found = laboratory.read_records(file, records.parse_requests(requests))
+    values = records.shift_to_zero(found.values) if zero else found.values
+    units = {name: SI_UNITS[name] for name in values}
+    columns = [Column(name, units[name], column) for name, column in values.items()]
+    write_text(out, format_columns(columns))
+    rows = columns[0].values.size
+    told = f"{rows} rows of {', '.join(values)}"
+    return {"rows": rows, "units": units, "notes": found.notes, "told": told}
+
+
+def _write_decay(values: dict, out: Path, begin: float | None, notes: list[str]) -> dict:
+    """Write frequency and damping ratio of a measured decay as a table."""
+    curve, curve_notes = measured_modes.compute_decay_curve(values, begin)
+    columns = [
+        Column(f"decay_{name}", DECAY_UNITS[name.removesuffix("_error")], column)
+        for name, column in curve._asdict().items()
+    ]
+    write_text(out, format_columns(columns))
     ends = [
         f"{formatting.format_value(curve.frequency[k], curve.frequency_error[k], unit='Hz')} with a damping ratio of "
         f"{formatting.format_value(curve.damping[k], curve.damping_error[k])} at "
@@ -148,64 +149,62 @@ def _write_decay(file: Path, out: Path, requests, begin_text: str) -> dict:
     ]
     return {
         "points": curve.time.size,
-        **{
-            f"decay_{name}": values_of_name.tolist()
-            for name, values_of_name in curve._asdict().items()
-        },
+        **{column.name: column.values.tolist() for column in columns},
         "notes": [*notes, *curve_notes],
         "told": f"{curve.time.size} amplitudes, from {ends[0]} to {ends[1]}",
     }
 
 
-def _write_modes(file: Path, out: Path, requests, settings: EstimateOptions) -> dict:
+def _write_modes(
+    modes: measured_modes.ListedModes, out: Path, source: str, notes: list[str]
+) -> dict:
     """Write identified modes as tables of a scene."""
-    shapes, notes = _read_shapes(file, requests, settings)
-    if shapes is not None:
-        modes = measured.list_shape_modes(*shapes)
-    else:
-        values, notes = _read_records(file, requests)
-        modes = (
-            measured.identify_decay_modes(
-                values, _parse_quantity(settings.begin, "time", f"--begin {settings.begin}")
-            )
-            if settings.decay
-            else measured.identify_driven_modes(
-                values,
-                _parse_segment(settings.segment),
-                _parse_window(settings.window),
-                _parse_band(settings.band),
-            )
-        )
-    atomic_write.write_text(out, mode_lines.structure_text(modes, file.name))
-    mode_entries = [
-        {"frequency": f, "damping": zeta, "about": about}
-        for f, zeta, about in zip(
-            modes.frequency.tolist(), modes.damping.tolist(), modes.descriptions
-        )
+    write_text(out, format_structure(modes, source))
+    columns = (modes.frequency.tolist(), modes.damping.tolist(), modes.descriptions)
+    entries = [
+        {"frequency": frequency, "damping": damping, "about": about}
+        for frequency, damping, about in zip(*columns, strict=True)
     ]
-    summary = "; ".join(
-        f"{entry['frequency']:.5g} Hz with a damping of {entry['damping']:.4g}"
-        for entry in mode_entries
-    )
+    texts = [f"{one['frequency']:.5g} Hz with a damping of {one['damping']:.4g}" for one in entries]
     return {
-        "modes": mode_entries,
+        "modes": entries,
         "moving_mass": modes.mass,
         "notes": [*notes, *modes.notes],
-        "told": summary,
+        "told": "; ".join(texts),
     }
 
 
-def _write_response(file: Path, out: Path, requests, settings: EstimateOptions) -> dict:
-    """Write an estimated frequency response as a universal file."""
-    if settings.decay or settings.begin or settings.band:
-        raise PatchfemError(
-            "--decay, --begin and --band can be used only for modes (-o modes.toml)"
-        )
-    values, notes = _read_records(file, requests)
-    estimate, step, drive, response = measured.estimate_record(
-        values, _parse_segment(settings.segment), _parse_window(settings.window)
-    )
-    write.write_response(out, estimate, drive, response)
+def format_structure(modes: measured_modes.ListedModes, source: str) -> str:
+    """Return the tables [structure] and [[structure.mode]] of a scene as text; `source` is the name of the measured file."""
+
+    def printable(text: str) -> str:
+        """Return a text as one line for a comment."""
+        return "".join(letter if letter.isprintable() else "?" for letter in text)
+
+    mass = 'moving_mass = "1 kg"  # assumed: not in the record'
+    if modes.mass is not None:
+        mass = f'moving_mass = "{modes.mass!r} kg"'
+    remarks = [f"modes of {source}, by {universal.PROGRAM}", *modes.notes]
+    lines = [*(f"# {printable(remark)}" for remark in remarks), "", "[structure]", mass]
+    for k, about in enumerate(modes.descriptions):
+        comment = f"  # {printable(about)}" if about else ""
+        lines += [
+            "",
+            "[[structure.mode]]",
+            f'name = "mode {k + 1}"',
+            f'frequency = "{float(modes.frequency[k])!r} Hz"',
+            f"damping = {float(modes.damping[k])!r}{comment}",
+        ]
+        for key, row in modes.rows.items():
+            value = repr(float(row[k]))
+            lines.append(f'{key} = "{value} rad/m"' if key == "pitch" else f"{key} = {value}")
+    return "\n".join(lines) + "\n"
+
+
+def _write_response(values: dict, out: Path, averaging: tuple, notes: list[str]) -> dict:
+    """Write a frequency response as a universal file, estimated with a length [s] and a window of the segments."""
+    estimate, step, drive, response = measured_modes.estimate_record(values, *averaging)
+    universal.write_response(out, estimate, drive, response)
     return {
         "lines": estimate.frequency.size,
         "segments": estimate.segments,
@@ -216,82 +215,53 @@ def _write_response(file: Path, out: Path, requests, settings: EstimateOptions) 
     }
 
 
-def _read_records(file: Path, requests) -> tuple:
-    """Read measured records, and check that one of them is a response."""
-    laboratory_records = laboratory.read_records(file, records.parse_requests(requests), COLUMNS)
-    if (
-        laboratory_records.channel_list
-        and not laboratory_records.values.keys() & measured.DERIVATIVE_ORDERS.keys()
-    ):
+def _read_records(file: Path, requests) -> tuple[dict[str, np.ndarray], list[str]]:
+    """Return measured records by quantity with notes; PatchfemError if none of them is a response."""
+    found = laboratory.read_records(file, records.parse_requests(requests), EXPORTED_NAMES)
+    responses = measured_modes.DERIVATIVE_ORDERS
+    if found.channel_list and not found.values.keys() & responses.keys():
         raise PatchfemError(
-            f"{file}: no channel is known as a response ({', '.join(measured.DERIVATIVE_ORDERS)}); choose one with "
-            f"--map {next(iter(measured.DERIVATIVE_ORDERS))}=CHANNEL among {laboratory_records.channel_list}"
+            f"{file}: no channel is known as a response ({', '.join(responses)}); choose one with --map "
+            f"{next(iter(responses))}=CHANNEL among {found.channel_list}"
         )
-    return laboratory_records.values, laboratory_records.notes
+    return found.values, found.notes
 
 
-def _read_shapes(file: Path, requests, settings: EstimateOptions) -> tuple:
-    """Read mode shapes or frequency responses of a universal file, with notes.
-
-    (None, ()) for any other file.
-    """
+def _read_shapes(
+    file: Path, requests: Iterable[str], settings: EstimateOptions
+) -> measured_modes.ListedModes | None:
+    """Return the modes of mode shapes or frequency responses in a universal file; None for a file of records."""
     names = {text.partition("=")[0].strip() for text in requests}
-    if (
-        file.suffix.lower() not in laboratory.UNIVERSAL_EXTENSIONS
-        or settings != EstimateOptions()
-        or names & set(CHANNEL_UNITS)
-    ):
-        return None, ()
-    if not any(
-        dataset["type"] == 55 or int(dataset.get("func_type", 0)) == 4
-        for dataset in universal_files.read_datasets(file)
-    ):
-        return None, ()
+    is_universal = file.suffix.lower() in laboratory.UNIVERSAL_EXTENSIONS
+    if not is_universal or settings != EstimateOptions() or names & set(CHANNEL_UNITS):
+        return None
+    datasets = universal_files.read_datasets(file)
+    if not any(one["type"] == 55 or int(one.get("func_type", 0)) == 4 for one in datasets):
+        return None
     try:
         shapes = universal_modes.read_universal(file)
     except PatchfemError as error:
         raise type(error)(str(error).removeprefix("structure.file: ")) from None
-    return (
-        shapes,
-        {
-            request.quantity: request.source
-            for request in records.parse_requests(requests, measured.SHAPE_QUANTITIES)
-        },
-    ), ()
+    places = records.parse_requests(requests, measured_modes.SHAPE_QUANTITIES)
+    sources = {request.quantity: request.source for request in places}
+    return measured_modes.list_shape_modes(shapes, sources)
 
 
 def _parse_quantity(text: str, kind: str, option: str) -> float | None:
-    """Convert the text of an option to SI, or return None if the text is ""."""
+    """Convert the text of an option to SI; None if it is ""."""
     try:
         return quantities.parse_quantity(text, kind) if text else None
     except ValueError as error:
-        raise PatchfemError(f"{option}: {error}") from None
+        raise PatchfemError(f"{option} {text}: {error}") from None
 
 
-def _parse_segment(text: str) -> float | None:
-    """Convert an option to the segment length [s]; None means the default."""
-    return _parse_quantity(text, "time", f"--segment {text}")
-
-
-def _parse_window(text: str) -> str | None:
-    """Convert an option to the name of a window function; None means the default."""
-    if text not in ("", "hann", "none"):
-        raise PatchfemError(f"--window {text}: hann or none")
-    return text or None
-
-
-def _parse_band(text: str) -> tuple:
-    """Convert an option to both ends of a frequency band [Hz]."""
+def _parse_band(text: str) -> tuple[float, float]:
+    """Return both ends of a frequency band [Hz]."""
     if not text:
-        return (0.0, float("inf"))
-    low, dots, high = text.partition("..")
-    ends = [
-        _parse_quantity(end, "frequency", f"--band {end}")
-        for end in (low.strip(), high.strip())
-        if dots
-    ]
-    if not ends or None in ends or not 0 <= ends[0] < ends[1]:
+        return 0.0, float("inf")
+    ends = [_parse_quantity(part.strip(), "frequency", "--band") for part in text.split("..")]
+    if len(ends) != 2 or None in ends or not 0 <= ends[0] < ends[1]:
         raise PatchfemError(
             f'--band {text}: two rising frequencies are needed, such as "20 Hz..400 Hz"'
         )
-    return tuple(ends)
+    return ends[0], ends[1]

@@ -1,19 +1,19 @@
-"""A rig as matrices and friction elements, for NLvib (.mat) and for Python programs (.npz).
+"""A rig as matrices and friction elements in a .mat file, for NLvib, TMDSimPy, pyHarm and own programs.
 
-The equations are M q'' + D q' + K q + sum_e w_e f_e(w_e' q) = Fex1 cos(omega t). The first
-coordinates q are the slides of the interfaces, because elements of pyHarm act on coordinates; the
-others are motions without slide. If the slides depend on one another, q are the modal coordinates.
+The equations are M q'' + C q' + K q + sum_e w_e f_e(w_e' q) = Fex1 cos(omega t). The first coordinates q are the slides of
+the interfaces, because elements of pyHarm act on coordinates; the others are motions without slide. If the slides depend
+on one another, q are the modal coordinates.
 
-NLvib takes M, D, K, Fex1 and the structures of `nonlinear_elements`: elasticDryFriction with
-stiffness and friction_limit_force, or tanhDryFriction with friction_limit_force and eps, its speed
-[m/s]. TMDSimPy takes M, K, C, and Q, T, kt, Fs of each JenkinsForce: one row of `direction`, its
-transpose, `stiffness` and `limit`. M, K, C, slide, output and force or base are those that
-structure.file reads. The guide has a table of all variables.
+Variables: M, C, K (n, n) [kg, N s/m, N/m]; Fex1 (n,) [N] and Omega [rad/s] of the drive; output (n,): the output is
+output'q; slide (i, n): row i gives the slide of interface i; base (n,) or force (n,): participation in the drive; form:
+"elements" or "tanh"; direction (e, n): rows w_e; limit (e,) [N]: friction limits; stiffness (e,) [N/m] of elements that
+stretch and slip; speed (e,) [m/s] of tanh elements. NLvib takes C as D, and each element as elasticDryFriction (stiffness,
+limit) or tanhDryFriction (limit, speed as eps). TMDSimPy takes one JenkinsForce for each element, with direction as Q and
+its transpose as T. `structure.file` reads M, C, K, slide, output and base or force.
 """
 
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -26,149 +26,107 @@ from ...runs.patch import result as patch_result
 from ...runs.rig import costs, engines, event_driven, numerics
 from ...scene.rules import methods
 
-ENDINGS = (".mat", ".npz")
-# Ratio of the smallest to the largest singular value of the slides below which the
-# slides are linearly dependent.
+# ratio of the smallest to the largest singular value of the slides below which they are linearly dependent
 DEPENDENCE_TOL = 1e-6
-# Features that the exported matrices support if the friction force depends on the speed only.
+# features that the exported matrices support if the friction force depends on the speed only
 SPEED_LAW_SUPPORT = methods.EngineSupport("", "no-law faces levels")
-NLVIB = {"elements": "elasticDryFriction", "tanh": "tanhDryFriction"}
-
-
-class Elements(NamedTuple):
-    """Friction elements of a rig as arrays for other programs.
-
-    Attributes
-    ----------
-    form : {"elements", "tanh"}
-    direction : (e, n) array
-    limit : (e,) array
-        Friction limit [N].
-    stiffness : (e,) array
-        [N/m], for elements that stretch.
-    speed : (e,) array
-        [m/s], for tanh.
-    """
-
-    form: str
-    direction: np.ndarray
-    limit: np.ndarray
-    stiffness: np.ndarray
-    speed: np.ndarray
 
 
 def export_structure(model: Model, out: Path) -> str:
-    """Write the rig of a Model as .mat or .npz, and return a line of text about the file.
+    """Write the rig of a Model as .mat, and return a line of text about the file.
 
     Raises
     ------
     PatchfemError
-        For another suffix, a scene without [structure], a law that is neither elements that stretch
+        For another ending, a scene without [structure], a law that is neither elements that stretch
         and slip nor tanh, a nonlinear spring, grooves, and a varying load.
     Missing
         If `out` cannot be written.
     """
+    from scipy.io import savemat
+
     out = Path(out)
-    if out.suffix.lower() not in ENDINGS:
-        raise PatchfemError(f"{out}: a structure is exported as {' or '.join(ENDINGS)}")
+    if out.suffix.lower() != ".mat":
+        removed = (
+            "; .npz was removed in patchfem 2.0, scipy.io.loadmat reads .mat in Python"
+            if out.suffix.lower() == ".npz"
+            else ""
+        )
+        raise PatchfemError(f"{out}: a structure is exported as .mat{removed}")
     with locate_errors(model.source):
         if model.rig is None:
             raise PatchfemError(
-                "only the structure of a scene can be exported, and this scene has none; export a "
-                "results folder",
+                "only the structure of a scene can be exported, and this scene has none; export a results folder",
                 "structure",
             )
         _refuse_unsupported(model)
-        arrays = rig_matrices(model)
-        elements = friction_elements(model)
+        basis = _find_coordinates(model)
+        arrays = make_matrices(model, basis) | make_elements(model, basis)
     with write_atomically(out) as partial, open(partial, "wb") as file:
-        if out.suffix.lower() == ".npz":
-            np.savez(file, **arrays, **elements._asdict())
-        else:
-            _write_nlvib(file, arrays, elements)
-    counts = (
-        f"{count} {name}{'s' * (count != 1)}"
-        for count, name in (
-            (len(arrays["M"]), "coordinate"),
-            (elements.limit.size, "friction element"),
-        )
-    )
-    name = "output" if out.suffix.lower() == ".npz" else "T_out"
-    rows = f"; in these coordinates x the output is {name}·x, Fex1 is the force on each of them"
-    slides = ", the slide of interface i is row i of slide·x" if "slide" in arrays else ""
-    return f"{out}: {', '.join(counts)}{rows}{slides}{_omitted_features(model)}"
+        savemat(file, arrays, oned_as="column", long_field_names=True)
+    counts = {"coordinate": len(basis), "friction element": arrays["limit"].size}
+    texts = [f"{count} {name}{'s' * (count != 1)}" for name, count in counts.items()]
+    return f"{out}: {', '.join(texts)}{_describe_omissions(model)}"
 
 
-def _omitted_features(model: Model) -> str:
-    """Return a clause that lists the features of the scene that the exported file lacks."""
+def _describe_omissions(model: Model) -> str:
+    """Return clauses on the size of the drive and on features of the scene that the file lacks."""
     rig = model.rig
-    out = ["[wear]"] * (model.wear is not None) + ["structure.travel"] * (
-        rig.springs.travel < MAX_TRAVEL
-    )
-    out += ["the initial motion"] * (rig.start is not None)
-    unit = ""
+    missing = {
+        "[wear]": model.wear is not None,
+        "structure.travel": rig.springs.travel < MAX_TRAVEL,
+        "the initial motion": rig.start is not None,
+    }
+    names = [name for name, is_missing in missing.items() if is_missing]
+    text = ""
     if not isinstance(rig.drive.signal, SineDrive) and rig.drive.kind != "free":
         amplitude = "1 N" if rig.drive.kind == "force" else "1 m/s^2"
-        unit = (
-            f"; Fex1 is the excitation for an amplitude of {amplitude}, not for waveform = "
-            f"'{rig.drive.waveform.name}'"
-        )
-    return unit + ("; not in the file: " + ", ".join(out) if out else "")
+        text = f"; Fex1 is the excitation for an amplitude of {amplitude}, not for waveform = '{rig.drive.waveform.name}'"
+    return text + ("; not in the file: " + ", ".join(names) if names else "")
 
 
-def rig_matrices(model: Model) -> dict:
-    """Return the matrices and vectors of a rig for other programs.
+def _find_coordinates(model: Model) -> np.ndarray:
+    """Return the matrix (n, n) that maps the exported coordinates to the modal coordinates."""
+    rig = model.rig
+    slides = rig.modes.interfaces
+    identity = np.eye(rig.modes.omega.size)
+    count = len(slides) if rig.friction.interfaces else 0
+    if not count or count > len(identity):
+        return identity
+    # pseudo-inverse of the slides, and the motions that they leave out (singular value decomposition)
+    left, sizes, right = np.linalg.svd(slides)
+    if sizes[-1] <= DEPENDENCE_TOL * sizes[0]:
+        return identity
+    return np.hstack([right[:count].T / sizes @ left.T, right[count:].T])
+
+
+def make_matrices(model: Model, basis: np.ndarray) -> dict[str, np.ndarray | float]:
+    """Return matrices and vectors of a rig by the names of the file.
 
     For a drive other than a sine, Fex1 is that of 1 N or 1 m/s^2; for a release it is 0.
 
-    Returns
-    -------
-    dict
-        M, C, K (n, n) [kg, N s/m, N/m]; output (n,); Fex1 (n,) [N]; force or base (n,); slide (i,
-        n); Omega [rad/s] for a sine and for levels.
+    Parameters
+    ----------
+    model : Model
+    basis : (n, n) ndarray
+        Exported coordinates to modal coordinates.
     """
     rig = model.rig
-    modes = model.rig.modes
-    basis = _coordinate_basis(
-        modes.interfaces if rig.friction.interfaces else np.zeros((0, modes.omega.size))
-    )
-    mass = modes.mass
-    sine = isinstance(rig.drive.signal, SineDrive)
-    size = rig.drive.signal.acceleration if sine else float(rig.drive.kind != "free")
-    vectors = {}
+    modes = rig.modes
+    is_sine = isinstance(rig.drive.signal, SineDrive)
+    size = rig.drive.signal.acceleration if is_sine else float(rig.drive.kind != "free")
+    modal = {"M": np.eye(len(basis)), "C": modes.damping_matrix, "K": np.diag(modes.omega**2)}
+    arrays = {name: modes.mass * basis.T @ matrix @ basis for name, matrix in modal.items()}
+    arrays |= {"output": modes.output @ basis, "Fex1": -size * modes.mass * modes.base @ basis}
     if rig.drive.kind == "base":
-        vectors["base"] = np.linalg.solve(basis, modes.base)
+        arrays["base"] = np.linalg.solve(basis, modes.base)
     elif rig.drive.kind == "force":
-        vectors["force"] = -modes.base @ basis
+        arrays["force"] = -modes.base @ basis
     if rig.friction.interfaces:
-        vectors["slide"] = modes.interfaces @ basis
-    if sine or rig.drive.levels.amplitudes:
-        vectors["Omega"] = 2 * np.pi * rig.drive.frequency
-    M, C, K = (
-        mass * basis.T @ modal_matrix @ basis
-        for modal_matrix in (np.eye(len(basis)), modes.damping_matrix, np.diag(modes.omega**2))
-    )
-    return {
-        "M": M,
-        "C": C,
-        "K": K,
-        "output": modes.output @ basis,
-        "Fex1": -size * mass * modes.base @ basis,
-        **vectors,
-    }
-
-
-def _coordinate_basis(slides) -> np.ndarray:
-    """Return the matrix (n, n) that maps the exported coordinates of a rig to its modal coordinates."""
-    i, n = slides.shape
-    if not i or i > n:
-        return np.eye(n)
-    left_vectors, singular_values, right_vectors = np.linalg.svd(slides)
-    return (
-        np.hstack([right_vectors[:i].T / singular_values @ left_vectors.T, right_vectors[i:].T])
-        if singular_values[-1] > DEPENDENCE_TOL * singular_values[0]
-        else np.eye(n)
-    )
+        arrays["slide"] = modes.interfaces @ basis
+    if is_sine or rig.drive.levels.amplitudes:
+        arrays["Omega"] = 2 * np.pi * rig.drive.frequency
+    return arrays
 
 
 def _is_speed_only(rig) -> bool:
@@ -179,9 +137,9 @@ def _is_speed_only(rig) -> bool:
 def _refuse_unsupported(model: Model) -> None:
     """Raise PatchfemError for features that matrices and friction elements cannot represent."""
     rig = model.rig
-    motion = engines.collect_motion_features(model, steady=True)
     if _is_speed_only(rig):
-        reason = methods.find_unsupported_feature(SPEED_LAW_SUPPORT, motion)
+        features = engines.collect_motion_features(model, steady=True)
+        reason = methods.find_unsupported_feature(SPEED_LAW_SUPPORT, features)
     else:
         reason = engines.PIECES.find_unsupported_feature(model, steady=True)
     if reason.startswith("for law"):
@@ -192,31 +150,33 @@ def _refuse_unsupported(model: Model) -> None:
         )
     if reason:
         raise PatchfemError(
-            f"matrices and friction elements cannot be written {reason}; remove this feature from the "
-            "scene",
+            f"matrices and friction elements cannot be written {reason}; remove this feature from the scene",
             "structure",
         )
 
 
-def friction_elements(model: Model) -> Elements:
-    """Return the friction elements of a rig, which are empty arrays if the rig has no friction."""
-    rig = model.rig
-    n = model.rig.modes.omega.size
-    no_values = np.zeros(0)
-    if not rig.friction.interfaces:
-        return Elements("elements", np.zeros((0, n)), no_values, no_values, no_values)
-    rows = rig.modes.interfaces @ _coordinate_basis(rig.modes.interfaces)
-    laws = [interface.numbers for interface in rig.friction.interfaces]
-    if _is_speed_only(rig):
-        limit = np.array(
-            [
-                law.static * (model.nominal_load if one.load is None else one.load)
-                for law, one in zip(laws, rig.friction.interfaces)
-            ]
-        )
-        return Elements(
-            "tanh", rows, limit, no_values, np.array([law.reference_speed for law in laws])
-        )
+def make_elements(model: Model, basis: np.ndarray) -> dict[str, np.ndarray | str]:
+    """Return the friction elements of a rig by the names of the file; the arrays are empty without friction.
+
+    Parameters
+    ----------
+    model : Model
+    basis : (n, n) ndarray
+        Exported coordinates to modal coordinates.
+    """
+    interfaces = model.rig.friction.interfaces
+    none = np.zeros(0)
+    elements = {"form": "elements", "limit": none, "stiffness": none, "speed": none}
+    if not interfaces:
+        return elements | {"direction": np.zeros((0, len(basis)))}
+    rows = model.rig.modes.interfaces @ basis
+    if _is_speed_only(model.rig):
+        loads = [model.nominal_load if one.load is None else one.load for one in interfaces]
+        limits = [one.numbers.static * load for one, load in zip(interfaces, loads, strict=True)]
+        speeds = [one.numbers.reference_speed for one in interfaces]
+        tanh = {"form": "tanh", "limit": np.array(limits), "speed": np.array(speeds)}
+        return elements | tanh | {"direction": rows}
+
     patch = None
     if model.patch is not None:
         patch = patch_result.solve_with_coarser(model.patch, model.accuracy.tolerance)[0]
@@ -225,40 +185,6 @@ def friction_elements(model: Model) -> Elements:
     settings = replace(numerics.choose_numerics(model), pairs=costs.count_cell_merges(model))
     groups = event_driven.YieldingElements(model, settings, patch).groups
     stiffness = np.concatenate([group.stiffness for group in groups])
-    limit = np.concatenate([group.stiffness * group.yield_displacement for group in groups])
+    yields = np.concatenate([group.yield_displacement for group in groups])
     direction = np.repeat(rows, [group.stiffness.size for group in groups], axis=0)
-    return Elements("elements", direction, limit, stiffness, no_values)
-
-
-def _write_nlvib(file, arrays: dict, elements: Elements) -> None:
-    """Write a rig as variables of the MATLAB tool NLvib."""
-    from scipy.io import savemat
-
-    cells = np.empty((1, elements.limit.size), dtype=object)
-    for k, limit in enumerate(elements.limit):
-        settings = (
-            {"stiffness": elements.stiffness[k], "ishysteretic": 1.0}
-            if elements.form == "elements"
-            else {"eps": elements.speed[k], "ishysteretic": 0.0}
-        )
-        cells[0, k] = {
-            "type": NLVIB[elements.form],
-            "force_direction": elements.direction[k][:, None],
-            "friction_limit_force": limit,
-            "islocal": 1.0,
-            **settings,
-        }
-    column = {
-        name: np.asarray(array)[:, None] if np.ndim(array) == 1 else array
-        for name, array in arrays.items()
-    }
-    savemat(
-        file,
-        {
-            **column,
-            "D": arrays["C"],
-            "T_out": arrays["output"][None, :],
-            "nonlinear_elements": cells,
-        },
-        long_field_names=True,
-    )
+    return elements | {"limit": stiffness * yields, "stiffness": stiffness, "direction": direction}

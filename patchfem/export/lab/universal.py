@@ -1,25 +1,28 @@
-"""Histories and loops as a universal file: dataset 164 (SI), and binary datasets 58.
+"""Histories, friction loops and frequency responses as a universal file: datasets 164 (SI) and binary datasets 58.
 
-The datasets are binary and unevenly spaced, because only then are time and value exact to the last
-bit: as text, a value has twelve digits and a time six. pyuff writes the file; it counts the bytes
-of a dataset without the abscissa, and this number is corrected.
+The datasets are binary and unevenly spaced, because only then are abscissa and value exact to the last bit. pyuff writes the
+file; it counts the bytes of a dataset without the abscissa, and this number is corrected.
 """
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
+from ... import __version__
 from ...core import Missing, PatchfemError
-from .series import Column, Histories, program_name
+from ...disk.atomic_write import write_atomically
 
-# Codes of the data types of universal dataset 58.
-GENERAL = 1
-DISPLACEMENT = 8
-TIME = 17
-TYPES = {"m": 8, "m s-1": 11, "m s-2": 12, "N": 13}  # data type by unit; GENERAL for other units
-HISTORY_FUNCTION = 1  # function type "time response"
-LOOP_FUNCTION = 0  # function type "general"
+PROGRAM = f"patchfem {__version__}"
+# type codes of dataset 58 by the unit of a quantity; 1 (general) for other units
+TYPES = {"m": 8, "m s-1": 11, "m s-2": 12, "N": 13, "s": 17, "Hz": 18}
 LABELS = {"m s-1": "m/s", "m s-2": "m/s^2"}
+# function types of dataset 58
+LOOP = 0
+HISTORY = 1
+RESPONSE = 4
+COHERENCE = 6
 SI_UNITS = {
     "type": 164,
     "units_code": 1,
@@ -32,126 +35,151 @@ SI_UNITS = {
 }
 
 
-def write_histories(path: Path, histories: Histories) -> int:
-    """Write histories and friction loops as universal datasets 58; return their number.
+class Column(NamedTuple):
+    """Values of a quantity along the rows of a file.
 
-    Identification line 1 is the name of the history (for a loop, "force over slide"), line 2 the
-    program, line 4 the title; the node is the number of the interface or mode, or 1, and the
-    direction is +x.
+    name; unit as in netCDF ("m s-2"); values (k,); number: of the interface or mode from 1, 0 if there is only one.
+    """
+
+    name: str
+    unit: str
+    values: np.ndarray
+    number: int = 0
+
+    @property
+    def label(self) -> str:
+        """Name of the column, followed by its number."""
+        return f"{self.name}_{self.number}" if self.number else self.name
+
+
+def make_dataset(
+    name: str, function: int, x: Column, y: Column, **entries: str | int
+) -> dict[str, str | int | np.ndarray]:
+    """Return a dataset 58 of one column against another.
+
+    Parameters
+    ----------
+    name : str
+        First line of identification.
+    function : int
+        LOOP, HISTORY, RESPONSE or COHERENCE.
+    x, y : Column
+    **entries
+        Further entries of the dataset; pyuff has default values.
+    """
+    return {
+        "type": 58,
+        "binary": 1,
+        "func_type": function,
+        "id1": name[:80],
+        "id2": PROGRAM,
+        "rsp_node": y.number or 1,
+        "rsp_dir": 1,
+        "ref_node": 0,
+        "ref_dir": 0,
+        "orddenom_spec_data_type": 0,
+        "abscissa_spec_data_type": TYPES[x.unit],
+        "abscissa_axis_units_lab": x.unit,
+        "ordinate_spec_data_type": TYPES.get(y.unit, 1),
+        "ordinate_axis_units_lab": LABELS.get(y.unit, y.unit),
+        "data": np.array(y.values),
+        "x": np.array(x.values, float),
+    } | entries
+
+
+def write_histories(
+    path: Path, columns: Sequence[Column], loops: Sequence[tuple[Column, Column]], title: str
+) -> None:
+    """Write histories and friction loops.
+
+    The first line of identification is the name of the history (of a loop, "force over slide"), the fourth the title; the
+    node is the number of the interface or mode, or 1, and the direction is +x.
+
+    Parameters
+    ----------
+    path : Path
+    columns : sequence of Column
+        The time comes first; without it there are only loops.
+    loops : sequence of (Column, Column)
+        Slide and force.
+    title : str
 
     Raises
     ------
     PatchfemError
-        If the folder has neither time nor loop.
+        If a value is not finite, or if there is neither time nor loop.
     Missing
         If pyuff is not installed.
     """
-    for column in histories.columns:
+    for column in columns:
         if not np.isfinite(column.values).all():  # pyuff would write these values as 0
             raise PatchfemError(
-                f"{path}: {column.label} has values that are not finite, which a universal file cannot "
-                "contain; export .mat or .csv instead"
+                f"{column.label} has values that are not finite, which a universal file cannot contain; export .mat or .csv"
             )
-    sets = (
-        []
-        if histories.time is None
-        else [
-            _function_dataset(
-                column.label,
-                Column("time", "s", histories.time, 0),
-                column,
-                HISTORY_FUNCTION,
-                histories.title,
-            )
-            for column in histories.columns
-        ]
-    )
-    sets += [
-        _function_dataset(
-            f"{force.label} over {slide.label}", slide, force, LOOP_FUNCTION, histories.title
-        )
-        for slide, force in histories.loops()
-    ]
-    if not sets:
-        raise PatchfemError(f"{path}: contains neither times nor a loop to write")
-    write_sets(path, [SI_UNITS, *sets])
-    return len(sets)
+    time, *histories = columns
+    curves = [(f"{force.label} over {slide.label}", LOOP, slide, force) for slide, force in loops]
+    if time.name == "time":
+        curves = [(column.label, HISTORY, time, column) for column in histories] + curves
+    if not curves:
+        raise PatchfemError("there is neither time nor loop to write")
+    line = "".join(letter if " " <= letter <= "~" else "?" for letter in title)[:80].strip()
+    write_datasets(path, [make_dataset(*curve, id4=line or "NONE") for curve in curves])
 
 
-def write_sets(path: Path, sets: list) -> None:
-    """Write universal datasets into a new file by pyuff, with correct byte counts.
+def write_response(path: Path, estimate, drive: str, response: str) -> None:
+    """Write an estimated frequency response and its coherence.
 
-    Datasets of type 58 are binary.
+    Response and reference are at point 1 in direction +x. If the input is a force, structure.file can read the file.
+
+    Parameters
+    ----------
+    path : Path
+    estimate : object
+        With frequency (k,) [Hz], complex value (k,) and coherence (k,) or None.
+    drive, response : str
+        Quantities of input and output, such as "force" and "acceleration".
     """
+    units = {"displacement": "m", "velocity": "m s-1", "force": "N"}
+    unit, drive_unit = (units.get(name, "m s-2") for name in (response, drive))
+    x = Column("frequency", "Hz", estimate.frequency)
+    y = Column(response, unit, estimate.value)
+    place = {"ref_node": 1, "ref_dir": 1}
+    denominator = {
+        "orddenom_spec_data_type": TYPES[drive_unit],
+        "orddenom_axis_units_lab": LABELS.get(drive_unit, drive_unit),
+    }
+    datasets = [make_dataset(f"{response} over {drive}", RESPONSE, x, y, **place, **denominator)]
+    if estimate.coherence is not None:
+        y = Column("coherence", "", estimate.coherence)
+        name = f"coherence of {response} and {drive}"
+        datasets.append(make_dataset(name, COHERENCE, x, y, ordinate_spec_data_type=0, **place))
+    write_datasets(path, datasets)
+
+
+def write_datasets(path: Path, datasets: list[dict]) -> None:
+    """Write the units and datasets 58 into a new file by pyuff, with correct byte counts; Missing without pyuff."""
     try:
         import pyuff
     except ImportError:
         raise Missing(
             "writing universal files needs the package pyuff; run pip install 'patchfem[lab]'"
         ) from None
-    path = Path(path)
-    path.write_bytes(b"")
-    file = pyuff.UFF(str(path))
-    for dataset in sets:
-        start = path.stat().st_size
-        file.write_sets(dataset, "add")
-        if dataset["type"] == 58:
-            values = 2 if dataset["data"].dtype.kind == "c" else 1
-            _write_byte_count(
-                path, start, 8 * dataset["data"].size * (values + 1 - dataset["abscissa_spacing"])
-            )
+    with write_atomically(path) as partial:
+        partial.write_bytes(b"")
+        file = pyuff.UFF(str(partial))
+        file.write_sets(SI_UNITS, "add")
+        for dataset in datasets:
+            start = partial.stat().st_size
+            file.write_sets(dataset, "add")
+            _correct_byte_count(partial, start, dataset["data"].nbytes + dataset["x"].nbytes)
 
 
-def _write_byte_count(path: Path, start: int, size: int) -> None:
-    """Correct the number of bytes in the header of a universal dataset 58.
-
-    Parameters
-    ----------
-    path : Path
-    start : int
-        Position of the dataset in the file.
-    size : int
-        Number of bytes.
-    """
+def _correct_byte_count(path: Path, start: int, size: int) -> None:
+    """Write the number of bytes of values into the header of the dataset 58 that begins at a position of the file."""
     with open(path, "r+b") as file:
         file.seek(start)
         head = file.read(200)
-        # The byte count follows the byte order, the float format and the number of text lines.
-        at = head.index(b"b", head.index(b"    58")) + 1 + 6 + 6 + 12
-        file.seek(start + at)
+        # the byte count follows the byte order, the float format and the number of text lines
+        position = head.index(b"b", head.index(b"    58")) + 1 + 6 + 6 + 12
+        file.seek(start + position)
         file.write(b"%12d" % size)
-
-
-def _function_dataset(name: str, abscissa: Column, ordinate: Column, kind: int, title: str) -> dict:
-    """Return a universal dataset 58 of one column as a function of another."""
-    line = "".join(letter if " " <= letter <= "~" else "?" for letter in title)[:80].strip()
-    return {
-        "type": 58,
-        "binary": 1,
-        "func_type": kind,
-        "func_id": 0,
-        "ver_num": 0,
-        "load_case_id": 0,
-        "id1": name[:80],
-        "id2": program_name(),
-        "id3": "NONE",
-        "id4": line or "NONE",
-        "id5": "NONE",
-        "rsp_ent_name": "NONE",
-        "rsp_node": ordinate.number or 1,
-        "rsp_dir": 1,
-        "ref_ent_name": "NONE",
-        "ref_node": 0,
-        "ref_dir": 0,
-        "abscissa_spacing": 0,
-        "abscissa_spec_data_type": TIME if abscissa.name == "time" else DISPLACEMENT,
-        "abscissa_axis_lab": "Time" if abscissa.name == "time" else "Displacement",
-        "abscissa_axis_units_lab": abscissa.unit,
-        "ordinate_spec_data_type": TYPES.get(ordinate.unit, GENERAL),
-        "ordinate_axis_lab": ordinate.label[:20],
-        "ordinate_axis_units_lab": LABELS.get(ordinate.unit, ordinate.unit)[:20],
-        "orddenom_spec_data_type": 0,
-        "z_axis_spec_data_type": 0,
-        "data": np.ascontiguousarray(ordinate.values, float),
-        "x": np.ascontiguousarray(abscissa.values, float),
-    }

@@ -1,113 +1,113 @@
-"""Histories of a results folder as a laboratory file, whose suffix chooses the format."""
+"""Histories and loops of a results folder as a laboratory file, whose ending chooses the format."""
 
 from pathlib import Path
 
 import numpy as np
 
-from ...core import PatchfemError
-from ...disk.atomic_write import write_atomically
-from ...formatting import format_quantity
-from ...structure.drive_sizes import MAX_STORED_SAMPLES, MIN_SAMPLES_PER_CYCLE
-from . import ENDINGS, matlab, modes, table, universal
-from .series import read_histories
+from ...core import Missing, PatchfemError
+from ...disk.atomic_write import write_atomically, write_text
+from .. import store
+from ..answer import Answer
+from . import universal
+from .universal import Column
 
-# Smallest number of rows between two reversals if all samples are stored; fewer rows show
-# that only reversals are stored.
-MIN_ROWS_PER_SWING = 5
-# Unit of each column of a decay, by the name of the variable without its prefix "decay_".
-DECAY = {
-    "time": "s",
-    "amplitude": "m",
-    "frequency": "Hz",
-    "frequency_error": "Hz",
-    "damping": "1",
-    "damping_error": "1",
-}
+# histories that form a friction loop with the slide of the same interface
+FORCES = ("friction_force", "force", "friction_ratio", "fitted")
+MAX_STEP_RATIO = 5.0  # largest ratio of a time step to the last one if all samples are stored
 
 
 def export_histories(folder: Path, out: Path) -> str:
     """Write the histories and loops of a results folder, and return a line of text about the file.
 
-    PatchfemError for another suffix and for a folder without histories; Missing if it does not
-    exist or `out` cannot be written.
+    Parameters
+    ----------
+    folder : Path
+        Of a run, or of a fit to a loop.
+    out : Path
+        File with one of the ENDINGS.
+
+    Raises
+    ------
+    PatchfemError
+        For a folder without histories.
+    Missing
+        If the folder does not exist, or if the file cannot be written.
     """
-    out = Path(out)
-    if out.suffix.lower() not in ENDINGS:
-        raise PatchfemError(f"{out}: histories are exported as {', '.join(ENDINGS)}")
-    histories = read_histories(folder)
-    rows = histories.columns[0].values.size
-    summary = (
-        f"{out}: {rows} rows of {', '.join(column.label for column in histories.columns[:8])}"
-        + (f" and {len(histories.columns) - 8} more" if len(histories.columns) > 8 else "")
-    )
-    summary += _thinning_note(histories)
-    with write_atomically(out) as partial:
-        if out.suffix.lower() == ".mat":
-            matlab.write_arrays(partial, histories)
-        elif out.suffix.lower() == ".csv":
-            table.write_columns(partial, histories.time, histories.columns)
-        else:
-            universal.write_histories(partial, histories)
-            summary += f"; {len(histories.loops())} loops"
-    return summary
+    if not folder.is_dir():
+        raise Missing(f"{folder}: no such results folder")
+    answer = store.read(folder)
+    columns = list_columns(answer)
+    histories = [column for column in columns if column.name != "time"]
+    if not histories:
+        raise PatchfemError(
+            f"{folder}: these results have no history; fields are exported as .pvd, .vtu, .vtkhdf, or .csv of the interface"
+        )
+    tail = ""
+    if out.suffix.lower() == ".csv":
+        write_text(out, format_columns(columns))
+    elif out.suffix.lower() == ".mat":
+        write_matlab(out, answer)
+    else:
+        slides = {column.number: column for column in histories if column.name == "slide"}
+        loops = [
+            (slides[force.number], force)
+            for force in histories
+            if force.name in FORCES and force.number in slides
+        ]
+        universal.write_histories(out, columns, loops, answer.title)
+        tail = f"; {len(loops)} loops"
+    names = ", ".join(dict.fromkeys(column.name for column in histories))
+    size = histories[0].values.size
+    return f"{out}: {size} rows of {names}{_note_thinning(answer)}{tail}"
 
 
-def _thinning_note(histories) -> str:
-    """Return a note that only the reversals of early histories are stored, or "" if all samples are stored."""
-    displacement = next(
-        (column.values for column in histories.columns if column.name.endswith("displacement")),
-        None,
-    )
-    if displacement is None or histories.time is None:
+def list_columns(answer: Answer) -> list[Column]:
+    """Return time and histories of a run, or the columns of a fitted loop, whose record may have no time."""
+    is_fit = answer.kind == "fit"
+    dimension = "row" if is_fit else "time"
+    columns = []
+    for name, variable in answer.data.items():
+        is_history = dimension in variable.dims and variable.values.dtype.kind == "f"
+        if not is_history or (is_fit and name not in ("time", "slide", *FORCES)):
+            continue
+        values = np.moveaxis(variable.values, variable.dims.index(dimension), -1)
+        if values.ndim == 1:
+            columns.append(Column(name, variable.unit, values))
+        elif values.ndim == 2:
+            columns += [Column(name, variable.unit, row, k) for k, row in enumerate(values, 1)]
+    return sorted(columns, key=lambda column: column.name != "time")
+
+
+def _note_thinning(answer: Answer) -> str:
+    """Return a note that only the reversals of early histories are stored, or "" if the rows are even all along."""
+    if "time" not in answer.data:
         return ""
-    reversals = np.flatnonzero(np.diff(np.sign(np.diff(displacement))) != 0) + 1
-    thinned = np.flatnonzero(np.diff(reversals) < MIN_ROWS_PER_SWING)
-    if thinned.size < MIN_ROWS_PER_SWING or thinned.size < (thinned[-1] + 1) / 2:
+    time = answer.data["time"].values
+    steps = np.diff(time)
+    (uneven,) = np.nonzero(steps > MAX_STEP_RATIO * steps[-1])
+    if not uneven.size:
         return ""
-    first_even = format_quantity(float(histories.time[reversals[thinned[-1] + 1]]), "s", 3)
     return (
-        f"; before {first_even} the rows are turning points, stops and starts of slip alone: a release of up to "
-        f"{MAX_STORED_SAMPLES // MIN_SAMPLES_PER_CYCLE} cycles (drive.cycles) has even rows all along, any other run "
-        "in its last cycles"
+        f"; before {time[uneven[-1] + 1]:.4g} s the rows are turning points, stops and starts of slip alone (fewer "
+        "drive.cycles give even rows)"
     )
 
 
-def write_table(out: Path, values: dict, units: dict) -> None:
-    """Write arrays of equal length as CSV with their units.
+def write_matlab(path: Path, answer: Answer) -> None:
+    """Write all arrays of numbers as variables of a MATLAB file of version 5; `units.NAME` is the unit of NAME."""
+    from scipy.io import savemat
 
-    Parameters
-    ----------
-    out : Path
-    values : dict
-        {name: (k,) array}
-    units : dict
-        {name: unit}
-
-    Raises
-    ------
-    Missing
-        If `out` cannot be written.
-    """
-    columns = [table.Column(name, units[name], column, 0) for name, column in values.items()]
-    with write_atomically(out) as partial:
-        table.write_columns(partial, None, columns)
+    arrays = {name: one for name, one in answer.data.items() if one.values.dtype.kind in "fiu"}
+    content = {name: one.values for name, one in arrays.items()}
+    units = {name: one.unit for name, one in arrays.items()}
+    content |= {"title": answer.title, "source": universal.PROGRAM, "units": units}
+    with write_atomically(path) as partial, open(partial, "wb") as file:
+        savemat(file, content, oned_as="column", long_field_names=True)
 
 
-def write_response(out: Path, estimate, drive: str, response: str) -> None:
-    """Write a frequency response as a universal file.
-
-    Parameters
-    ----------
-    out : Path
-    estimate : object
-        As for `modes.write_response`.
-    drive, response : str
-        Kinds of input and output.
-
-    Raises
-    ------
-    Missing
-        If `out` cannot be written.
-    """
-    with write_atomically(out) as partial:
-        modes.write_response(partial, estimate, drive, response)
+def format_columns(columns: list[Column]) -> str:
+    """Return columns of equal length as CSV with units in the header and all digits."""
+    lines = [",".join(f"{column.label} [{column.unit}]" for column in columns)]
+    rows = zip(*(column.values.tolist() for column in columns), strict=True)
+    lines += [",".join(map(repr, row)) for row in rows]
+    return "\n".join(lines) + "\n"

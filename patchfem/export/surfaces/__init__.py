@@ -1,8 +1,7 @@
-"""Pages, tables and files on measured surfaces: roughness and wear.
+"""Answers on measured surfaces: wear between two surfaces or two runs, tables of pairs, roughness.
 
-In: the records of `surface.roughness`, `surface.compare` and `surface.scans`, or two results
-folders of runs with wear (`worn_runs`). Out: lines for the screen, plain data for JSON, CSV and X3P
-files, and a self-contained page. `quantities` has the common table of quantities; `pictures` draws.
+In: the records of `surface.compare`, `surface.roughness` and `wear`. Out: an `Answer`. `sentences` has one table for each
+kind of code: verdicts, findings and reasons; `definitions` has the meaning of each quantity.
 
-Read `roughness` first.
+Read `compare` first.
 """

@@ -1,225 +1,197 @@
-"""Computed wear beside the measured one: results of the run, table, CSV and picture."""
+"""Computed wear of a run beside a measured one: results of the run, sentence, quantities and curves."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from ...core import Missing, PatchfemError
-from ...disk.atomic_write import write_text
-from ...formatting import choose_axis_unit
+from ...core import PatchfemError
+from ...formatting import format_length, format_number
 from ...scene.keys.quantities import parse_quantity
-from ...surface.compare.compare import Comparison
-from ...surface.compare.predicted import PredictedWear, WearHistory, fit_computed_wear
-from ...surface.profile import Profile
-from ..drawing.charts import make_axis, make_chart, make_line, make_mark
-from ..drawing.pictures import draw_charts
-from ..read_results import read_variables, reading_errors, require_valid
-from .pictures import MAX_POINTS, Picture, depth_axis
-from .quantities import QuantityTable, Row, format_quantity, quantity_data
-from .worn_runs import PatchRun, read_run
+from ...surface.compare.records import Comparison
+from ...surface.quantity import SIDE
+from ...wear import predicted
+from ...wear.predicted import MeasuredDepth, PredictedWear, WearHistory
+from ..answer import Answer, Quantity, Remarks
+from . import sentences
+from .patches import read_patch, worn_depths
+from .variables import along, band
 
-PIECES = ("upper", "lower")
-HEADS = ("value", "95 %", "unit")
-LABELS = {
-    "coefficient": "wear coefficient",
-    "patch_centre": "middle of the patch, x in the second trace",
-}
-COLUMNS = "x_patch [um],measured [um],computed [um],difference [um],noise [um]"
+MIN_DEPARTURE = (
+    0.01  # smallest relative difference of the proportional coefficient that is reported
+)
+COEFFICIENT_MARGIN = 1.2  # of the coefficient that a note proposes, above the fitted one
 
 
-def predict_wear(parts: list, folder: Path, piece: str = "") -> PredictedWear:
-    """Fit the computed wear of a run to the wear measured by traces along x.
+def add_predicted(answer: Answer, comparison: Comparison, folder: Path, piece: str) -> Answer:
+    """Add the computed wear of a run, fitted to the measured wear.
 
     Parameters
     ----------
-    parts : list of Comparison
-        One for each direction.
+    answer : Answer
+        Of the comparison.
+    comparison : Comparison
+        Two traces along x.
     folder : Path
-        Results folder of the run.
+        Results folder of a run with [wear].
     piece : str
-        "upper" or "lower", of which the traces are; "" if both wear alike.
+        "upper" or "lower"; "" if both pieces wear alike.
 
     Raises
     ------
     PatchfemError
-        If the run or the traces do not fit together.
+        If the traces show no depth or run along y, or if the run cannot be theirs.
     """
-    return fit_computed_wear(_choose_part(parts), read_history(folder, piece))
+    fitted = predicted.fit_wear(_measure_depth(comparison), read_history(folder, piece))
+    numbers = {"wear_coefficient": fitted.coefficient, "patch_centre": fitted.centre}
+    values = {name: sentences.to_answer(value) for name, value in numbers.items()}
+    sentence = describe(fitted)
+    notes = describe_reliability(fitted)
+    entry = {
+        "coefficient": values["wear_coefficient"].as_json(),
+        "patch_centre": values["patch_centre"].as_json(),
+        "difference_rms": fitted.difference_rms,
+        "sentence": sentence,
+        "run": fitted.history.source,
+        "piece": fitted.history.piece,
+        "run_coefficient": fitted.history.coefficient,
+        "proportional_coefficient": fitted.proportional,
+        "extrapolated": fitted.is_extrapolated,
+        "mirrored": fitted.is_mirrored,
+        "notes": notes,
+    }
+    details = answer.details | {"predicted": entry}
+    details["sentences"] = [*details["sentences"], sentence]
+    details["notes"] = [*details["notes"], *notes]
+
+    # the sentence belongs to the verdict, whose last sentence then becomes a note
+    kept = sentences.MAX_SENTENCES - 1
+    notes = (*answer.remarks.notes, *answer.verdict[kept:], *notes)
+    depths = fitted.depths
+    data = along(
+        "x_patch",
+        x_patch=depths.x,
+        computed_depth=depths.computed,
+        depth_difference=depths.measured - depths.computed,
+    )
+    data |= band("x_patch", "measured_depth", depths.measured, SIDE * depths.noise)
+    return replace(
+        answer,
+        verdict=(*answer.verdict[:kept], sentence),
+        quantities=answer.quantities
+        | values
+        | {"difference_rms": Quantity(fitted.difference_rms, "m")},
+        data=answer.data | data,
+        remarks=Remarks(answer.remarks.warnings, notes),
+        details=details,
+    )
 
 
-def _choose_part(parts: list) -> Comparison:
-    """Return the comparison of the traces that run along the sliding direction."""
-    if not isinstance(parts[0].before, Profile):
-        raise PatchfemError(
-            "compare --predicted: the computed wear can be laid over traces only; write one line of heights of each "
-            "scan to a file of its own"
-        )
-    for part in parts:
-        if part.direction != "y":
-            return part
-    raise PatchfemError(
-        "compare --predicted: the computed depth lies along x, the sliding direction, and the traces run along y; give "
-        "traces along x"
+def _measure_depth(comparison: Comparison) -> MeasuredDepth:
+    """Return the measured depth of two traces along x, or raise PatchfemError."""
+    curves = comparison.evidence.curves
+    area = comparison.values.get("worn_area")
+    reason = ""
+    if comparison.is_areal or comparison.direction == "y":
+        reason = "the computed depth lies along x, the sliding direction; give traces along x, not scans or traces along y"
+    elif curves is None or not sentences.is_known(area) or not area.low > 0:
+        reason = sentences.REASONS.get(getattr(area, "reason", ""), "no wear is shown")
+        reason = f"no worn depth was measured: {reason}"
+    if reason:
+        raise PatchfemError(f"compare --predicted: {reason}")
+
+    # what the interval of the lost area adds to all depths alike
+    known = np.isfinite(curves.depth)
+    x = curves.x[known]
+    datum_error = (area.high - area.low) / (2 * SIDE) / float(np.ptp(x))
+    track = comparison.track
+    width = None if track is None or any(track.cut) else track.values["width"].value
+    correlation = (
+        1.0 if comparison.evidence.datum is None else comparison.evidence.datum.correlation
+    )
+    return MeasuredDepth(
+        x, curves.depth[known], curves.noise[known], correlation, datum_error, width
     )
 
 
 def read_history(folder: Path, piece: str = "") -> WearHistory:
-    """Read the worn depth of a piece over the cycles of a run from its results folder."""
-    if not folder.exists():
-        raise Missing(f"compare --predicted {folder}: there is no such folder")
-    if piece not in ("", *PIECES):
-        raise PatchfemError(f"compare --piece {piece}: the piece must be upper or lower")
-    run = read_run(folder)
-    _require_wear(run, folder)
-    wear = run.run.resolved["wear"]
-    upper_share = float(wear["upper_share"])
-    if not piece and upper_share != 0.5:
-        raise PatchfemError(
-            f"compare --predicted {folder}: with wear.upper_share = {upper_share:g} the pieces wear differently; say "
-            "with --piece upper or --piece lower of which piece the traces are"
-        )
-    piece_fraction = 1 - upper_share if piece == "lower" else upper_share
-    if not piece_fraction > 0:
-        raise PatchfemError(
-            f"compare --piece {piece}: with wear.upper_share = {upper_share:g} this piece does not wear"
-        )
-    names = {"worn_depth", "weight", "wear_cycle", "wear_worn_volume"}
-    file = folder / "result.nc"
-    fields = {name: variable.values for name, variable in read_variables(file, names)[1].items()}
-    with reading_errors(file, "results of a run with [wear]"):
-        for name in names:
-            require_valid(name in fields, f"it contains no {name}; run the scene again")
-        volume = fields["worn_depth"] @ fields["weight"]
-        require_valid(volume[-1] > 0, "nothing wore off")
-        total = fields["wear_worn_volume"] / fields["wear_worn_volume"][-1]
-        cycle = np.interp(volume / volume[-1], total, fields["wear_cycle"])
-    work, first = np.unique(cycle / cycle[-1], return_index=True)
+    """Read the worn depth of a piece over the cycles of a run from its results folder.
+
+    Raises
+    ------
+    PatchfemError
+        If the folder is not that of a run from unworn pieces with [wear], without strips.
+    """
+    run = read_patch(folder)
+    wear = run.tables.get("wear", {})
+    upper_share = float(wear.get("upper_share", 0.0))
+    share = {"lower": 1 - upper_share, "upper": upper_share, "": 0.5}.get(piece, 0.0)
+    checks = (
+        (
+            not wear,
+            "this run has no [wear]; add [wear] with coefficient and cycles to its scene and run it again",
+        ),
+        (
+            "start" in wear,
+            "it starts from worn pieces (wear.start); give a run that starts from unworn pieces",
+        ),
+        (run.state.y is not None, "a trace shows one line; give a run without [contact.strips]"),
+        (
+            not piece and upper_share != share,
+            f"with wear.upper_share = {upper_share:g} the pieces wear differently; say with --piece upper or --piece "
+            "lower of which piece the traces are",
+        ),
+        (not share > 0, f"no piece '{piece}' wears; give --piece upper or --piece lower"),
+    )
+    for applies, text in checks:
+        if applies:
+            raise PatchfemError(f"compare --predicted {folder}: {text}")
+
+    depth = worn_depths(run.answer)
+    if not depth[-1].max() > 0:
+        raise PatchfemError(f"compare --predicted {folder}: nothing wore off in this run")
+    cycles = run.answer.data["wear_frame"].values
+    work, first = np.unique(cycles / cycles[-1], return_index=True)
+    errors = [(error or 0.0) / value for value, error in run.state.measures.values() if value]
     return WearHistory(
-        x=run.surface.x,
+        x=run.state.x,
         work=work,
-        depth=piece_fraction * fields["worn_depth"][first],
+        depth=share * depth[first],
         coefficient=parse_quantity(wear["coefficient"], "wear coefficient"),
-        error=_relative_error(run),
+        error=max(errors, default=0.0),
         source=str(folder),
         piece=piece or "worn",
     )
 
 
-def _require_wear(run: PatchRun, folder: Path) -> None:
-    """Raise PatchfemError unless the run gives the worn depth of a single trace since the unworn state."""
-    name = f"compare --predicted {folder}"
-    if not run.has_wear:
-        raise PatchfemError(
-            f"{name}: this run has no [wear], so it computed no worn depth; add [wear] with coefficient and cycles to "
-            "its scene and run it again"
-        )
-    if "start" in run.run.resolved["wear"]:
-        raise PatchfemError(
-            f"{name}: this run starts from worn pieces (wear.start); give a run that starts from unworn pieces"
-        )
-    if run.surface.y is not None:
-        raise PatchfemError(
-            f"{name}: the patch is in strips, and a trace shows one line; give a run without [contact.strips]"
-        )
-
-
-def _relative_error(run: PatchRun) -> float:
-    """Return the largest relative numerical error of the worn volume and the worn depth."""
-    errors = [0.0]
-    for name in ("worn_volume", "worn_depth_max"):
-        measure = run.measure(name)
-        if measure is not None and measure["error"] is not None and measure["value"] > 0:
-            errors.append(measure["error"] / measure["value"])
-    return max(errors)
-
-
-def predicted_table(predicted: PredictedWear) -> QuantityTable:
-    """Return the table of the fitted wear coefficient and position."""
-    rows = []
-    for name, quantity in _fit_values(predicted).items():
-        unit = ("m^2/N", 1.0) if name == "coefficient" else None
-        rows.append(Row(LABELS[name], quantity, unit, meaning=quantity.text))
-    name = f"computed wear of {predicted.history.source}"
-    if predicted.is_mirrored:
-        name += ", x of the patch against x of the traces"
-    return QuantityTable((name, *HEADS), rows)
-
-
-def _fit_values(predicted: PredictedWear) -> dict:
-    """Return the fitted wear coefficient and the position of the patch centre."""
-    return {"coefficient": predicted.coefficient, "patch_centre": predicted.centre}
-
-
-def predicted_data(predicted: PredictedWear) -> dict:
-    """Return the fitted wear as a dict in SI units."""
-    out = {name: quantity_data(quantity) for name, quantity in _fit_values(predicted).items()}
-    difference = predicted.difference
-    out |= {
-        "difference_rms": predicted.difference_rms,
-        "sentence": predicted.sentence,
-        "run": predicted.history.source,
-        "piece": predicted.history.piece,
-        "run_coefficient": predicted.history.coefficient,
-        "proportional_coefficient": predicted.proportional,
-        "extrapolated": predicted.is_extrapolated,
-        "mirrored": predicted.is_mirrored,
-        "largest_difference": None,
-        "notes": list(predicted.notes),
-    }
-    if difference is not None:
-        out["largest_difference"] = {
-            "from": difference.start,
-            "to": difference.end,
-            "value": difference.depth,
-            "computed": difference.computed,
-        }
-    return out
-
-
-def write_csv(path: Path, predicted: PredictedWear) -> None:
-    """Write measured and computed depth along the patch as text in micrometres."""
-    x, measured, computed, noise = predicted.depths
-    table = np.column_stack([x, measured, computed, predicted.depths.difference, noise]) * 1e6
-    rows = [",".join(f"{number:.6g}" for number in row) for row in table]
-    write_text(path, "\n".join([COLUMNS, *rows, ""]))
-
-
-def predicted_picture(predicted: PredictedWear) -> Picture:
-    """Draw the computed and the measured depth in one chart, and their difference in another."""
-    place, measured, computed, noise = predicted.depths
-    along, mm = choose_axis_unit(place, "m")
-    up, um = choose_axis_unit(measured, "m")
-    x = place * mm
-    low = (measured - 2 * noise) * um
-    high = (measured + 2 * noise) * um
-    difference = predicted.depths.difference * um
-    axis = make_axis("x of the patch", along) | {"range": [x[0], x[-1]]}
-    depths = np.concatenate([measured, computed])
-    marks = [
-        make_mark("band", "soft", "measured, 95 % noise", x=x, low=low, high=high),
-        make_line(x, measured * um, "soft", "measured", max_points=MAX_POINTS, width=1.0),
-        make_line(x, computed * um, "accent", "computed", max_points=MAX_POINTS, width=1.6),
-    ]
-    below = [
-        make_line(
-            x, difference, "warm", "measured less computed", max_points=MAX_POINTS, width=1.0
-        ),
-        make_line(x[[0, -1]], [0.0, 0.0], "soft", width=0.8),
-    ]
-    part = predicted.difference
-    if part is not None:
-        ends = {"left": part.start * mm, "right": part.end * mm}
-        below.append(make_mark("span", "soft", "largest difference", **ends))
-    coefficient = format_quantity(predicted.coefficient, ("m^2/N", 1.0)).long
-    return Picture(
-        draw_charts(
-            [
-                make_chart("Worn depth", axis, depth_axis(up, depths, um), marks),
-                make_chart("Difference", axis, make_axis("difference", up), below),
-            ],
-            height=3.4,
-        ),
-        "Left: worn depth of the measured traces and of the run with the fitted wear coefficient, over x of the patch "
-        "(0 in its middle). Right: measured less computed depth; above zero, more wore off than computed.",
-        f"Computed wear over the measured one: wear coefficient {coefficient}",
+def describe(fitted: PredictedWear) -> str:
+    """Return the sentence on the fitted coefficient and the difference between both depths."""
+    coefficient = sentences.format_value("wear_coefficient", fitted.coefficient)
+    percent = 100 * fitted.difference_rms / float(fitted.depths.computed[fitted.on_patch].mean())
+    return (
+        f"With a wear coefficient of {coefficient} the computed depth of the {fitted.history.piece} piece differs from the "
+        f"measured depth by {format_length(fitted.difference_rms, 3)} rms ({format_number(percent, 2)} % of its mean)."
     )
+
+
+def describe_reliability(fitted: PredictedWear) -> list[str]:
+    """Return the sentences on what the fitted coefficient rests on."""
+    notes = []
+    value = fitted.coefficient.value
+    if fitted.is_extrapolated:
+        notes.append(
+            "The measured depth is larger than that of the run, so that the coefficient is extrapolated from its "
+            f'last frames; run the scene again with wear.coefficient = "{COEFFICIENT_MARGIN * value:.2g} m^2/N" and compare '
+            "again."
+        )
+    if abs(fitted.proportional / value - 1) > MIN_DEPARTURE:
+        notes.append(
+            "The computed depth is not proportional to the coefficient, because the pressure changes with wear; the last "
+            f"depth of the run in proportion would give {format_number(fitted.proportional, 4)} m^2/N."
+        )
+    if fitted.is_mirrored is None:
+        notes.append(
+            "The computed wear fits as well with x of the patch against x of the traces; the interval of the coefficient "
+            "contains both."
+        )
+    return notes

@@ -1,6 +1,7 @@
-"""A sweep on disk: results as columns in `chunks/`, tables, and optional case folders.
+"""A sweep on disk: results as netCDF files in `chunks/`, tables, and optional case folders.
 
-In: the cases of a sweep and an executor. Out: files, complete at every moment.
+In: the cases of a sweep and an executor. Out: files that are complete at every moment, and the
+`Answer` of the sweep.
 
-Read `chunks`, `folder`, then `run`.
+Read `store`, `folder`, `run`, then `words` and `answer`. `charts.sweeps` draws it.
 """

@@ -1,76 +1,206 @@
-"""sweep.json: the summary of a sweep, in one sentence and in numbers."""
+"""The answer of a sweep: quantities, arrays and origin from its table and its analysis."""
 
 from __future__ import annotations
 
-import json
+import shlex
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from pathlib import Path
-from types import MappingProxyType
+from collections.abc import Sequence
+from contextlib import suppress
 
-from ...disk.atomic_write import write_text
-from ...runs.batch.case_results import FAILED_OUTCOME
-from ..pages.headline import SweepHeadline
-from ..pages.limits import limits_json
+import numpy as np
 
-NONE = MappingProxyType({})
+from ... import __version__
+from ...campaigns.sweeps.case_models import SweepScene
+from ...campaigns.sweeps.cases import Cases
+from ...campaigns.sweeps.changes import SweepAnalysis, analyse
+from ...campaigns.sweeps.peaks import PeakOnLine
+from ...campaigns.sweeps.sweep_table import SweepTable, SweptKey
+from ...core import PatchfemError
+from ...runs.results.result import describe_measure
+from ...scene.keys import types
+from ...scene.keys.lookup import find_key
+from ..answer import Answer, Quantity, Remarks, Variable
+from ..runs import list_versions
+from .tables import sort_measures
+from .words import describe_place, make_peak_quantities, make_verdict
+
+MAX_RANGES = 3  # measures whose largest and smallest values are quantities
+MAX_MESSAGES = 5  # messages of failed cases among the warnings
+MAX_CASES_TRIED = 3  # cases that are tried until one is valid, for the tolerance of all
 
 
-def sweep_summary(
-    lead: SweepHeadline, outcome: Sequence, sign: str = "", identity: Mapping = NONE
-) -> dict:
-    """Return the summary of a sweep as a dict that can be written as JSON.
-
-    `answer`: one sentence; `sentences`: all that is printed; `cases`: `count`, `failed`,
-    `unfinished` (without a result), `outcomes` {outcome: count} and `over_tolerance` {measure:
-    {`count`, `worst`: largest error/|value|}}; `ranking` {measure: [{`key`, `first`, `total`,
-    `low`, `high`}]}: Sobol indices of the keys, {} if the cases do not determine them; `limits`
-    [{`measure`, `key`, `value`, `unit`, `change`, `low`, `high`}]: limits of a key and the cases
-    between which they lie, in SI.
+def make_answer(
+    sweep_scene: SweepScene, cases: Cases, table: SweepTable, case_folders: Sequence[str] = ()
+) -> Answer:
+    """Make the answer of a sweep.
 
     Parameters
     ----------
-    lead : SweepHeadline
-    outcome : sequence of str
-        Outcome of each case.
-    sign : str
-        Hash of what the tables were written for (`run.hash_tables`).
-    identity : mapping
-        Scene and keys of the sweep (`run.sweep_identity`).
-
-    Returns
-    -------
-    dict
+    sweep_scene : SweepScene
+    cases : Cases
+    table : SweepTable
+    case_folders : sequence of str
+        Folders of the cases inside cases/; empty if there are none.
     """
-    counts = dict(Counter(map(str, outcome)).most_common())
+    analysis = analyse(table, sweep_scene.of)
+    verdict = make_verdict(table, analysis)
+    notes = [sweep_scene.note_bolted_joint()] if sweep_scene.note_bolted_joint() else []
+    if sweep_scene.of and sweep_scene.of not in table.measures:
+        notes.append(f"no case has a value of {sweep_scene.of.replace('_', ' ')}")
+    details = {"answer": verdict[0], "sentences": list(verdict)}
+    details |= _make_details(table, analysis) | {"of": identify_sweep(sweep_scene, cases)}
+    keys = " × ".join(key.key for key in table.keys)
+    return Answer(
+        kind="sweep",
+        title=f"Sweep of {keys} ({sweep_scene.path.stem})",
+        verdict=verdict,
+        quantities=_make_quantities(table, analysis),
+        data=_make_data(table, case_folders),
+        remarks=Remarks(_describe_failures(table), tuple(notes)),
+        details=details,
+        origin={
+            "patchfem": __version__,
+            "scene": sweep_scene.text,
+            "command": _make_command(sweep_scene, cases),
+            "versions": list_versions(),
+        },
+    )
+
+
+def identify_sweep(sweep_scene: SweepScene, cases: Cases) -> dict[str, str | list[str]]:
+    """Return hash of the `scene` and `keys` of a sweep, by which `--resume` identifies it."""
+    return {"scene": sweep_scene.hash_common_data(), "keys": [axis.key for axis in cases.axes]}
+
+
+def read_tolerance(sweep_scene: SweepScene, cases: Cases) -> float:
+    """Return the tolerance of the first valid case; NaN if none of the first cases is valid."""
+    for number in range(min(len(cases), MAX_CASES_TRIED)):
+        with suppress(PatchfemError):
+            return sweep_scene.read_scene(cases.assignments(number)).accuracy.tolerance
+    return np.nan
+
+
+def _make_command(sweep_scene: SweepScene, cases: Cases) -> str:
+    """Return the command line that computes the same cases."""
+    words = ["patchfem", "sweep", sweep_scene.path.name]
+    for assignment in sweep_scene.sets:
+        words += ["--set", assignment]
+    if sweep_scene.of:
+        words += ["--of", sweep_scene.of]
+    return shlex.join([*words, *cases.arguments])
+
+
+def _make_details(table: SweepTable, analysis: SweepAnalysis) -> dict:
+    """Return the numbers of sweep.json."""
+    ranking = {
+        name: [index._asdict() for index in indices] for name, indices in analysis.ranking.items()
+    }
+    tolerance = np.ravel(table.tolerance)
     return {
-        "answer": lead.answer(),
-        "sentences": lead.sentences(),
-        "cases": {
-            "count": len(outcome),
-            "failed": counts.get(FAILED_OUTCOME, 0),
-            "unfinished": counts.get("", 0),
-            "outcomes": counts,
-            "over_tolerance": lead.missed,
-        },
-        "ranking": {
-            name: [index._asdict() for index in indices] for name, indices in lead.ranks.items()
-        },
-        "limits": limits_json(lead.limits),
-        "of": dict(identity),
-        "sign": sign,
+        "cases": analysis.cases,
+        "ranking": ranking,
+        "limits": [limit._asdict() for limit in analysis.limits if np.isfinite(limit.value)],
+        "peaks": [_make_peak_row(table, entry) for entry in analysis.peaks],
+        "quantiles": [
+            {"measure": name} | _make_quantile_row(values, table.measures[name].unit)
+            for name, values in analysis.quantiles.items()
+        ],
+        "tolerance": float(tolerance[0]) if np.isfinite(tolerance).tolist() == [True] else None,
     }
 
 
-def write_answer(answer: dict, path: Path) -> None:
-    """Write sweep.json to `path`."""
-    write_text(path, json.dumps(answer, allow_nan=False, ensure_ascii=False, indent=1) + "\n")
+def _make_peak_row(table: SweepTable, entry: PeakOnLine) -> dict:
+    """Return a peak as a row of sweep.json."""
+    unit = table.measures[entry.measure].unit
+    row = {"measure": entry.measure, "case": describe_place(table, entry)}
+    quantities = make_peak_quantities(entry, unit)
+    return row | {name: quantity.as_json() for name, quantity in quantities.items()}
 
 
-def read_answer(path: Path) -> dict:
-    """Return the contents of sweep.json, or {} if it cannot be read."""
+def _make_quantile_row(values: np.ndarray, unit: str) -> dict:
+    """Return quantiles as objects of sweep.json."""
+    names = ("low", "median", "high")
+    return {name: Quantity(value, unit).as_json() for name, value in zip(names, values.tolist())}
+
+
+def _make_quantities(table: SweepTable, analysis: SweepAnalysis) -> dict[str, Quantity]:
+    """Return the peak if there is only one, the limits of the key, and the ends of the largest ranges."""
+    quantities = {}
+    if len(analysis.peaks) == 1:
+        unit = table.measures[analysis.peaks[0].measure].unit
+        quantities |= make_peak_quantities(analysis.peaks[0], unit)
+    for limit in analysis.limits:
+        reason = "" if np.isfinite(limit.value) else "the cases do not show where it lies"
+        quantities[f"limit_{limit.measure}"] = Quantity(
+            limit.value,
+            limit.unit,
+            low=limit.low,
+            high=limit.high,
+            reason="it is reached in no case" if limit.is_never_reached else reason,
+        )
+    for name, low, high, _ in analysis.ranges[:MAX_RANGES]:
+        column = table.measures[name]
+        for word, case in (("smallest", low), ("largest", high)):
+            quantities[f"{word}_{name}"] = Quantity(
+                column.values[case],
+                column.unit,
+                column.errors[case],
+                floor=float(column.floors[case]),
+            )
+    return quantities
+
+
+def _make_data(table: SweepTable, case_folders: Sequence[str]) -> dict[str, Variable]:
+    """Return the variables of sweep.nc: keys, measures with errors and floors, outcome, messages.
+
+    There is a dimension for each swept key, or the dimension `case` if the cases are rows.
+    """
+    dims = tuple(key.name for key in table.keys) if table.is_grid else ("case",)
+    data = {}
+    if not table.is_grid:
+        data["case"] = Variable(dims, np.arange(len(table)), "1", "number of the case")
+    for axis, key in enumerate(table.keys):
+        values = key.values[table.split_lines(axis)[0]] if table.is_grid else key.values
+        own_dims = (key.name,) if table.is_grid else dims
+        data[key.name] = Variable(own_dims, values, key.unit, _describe_key(key))
+
+    for name in sort_measures(table):
+        if name in data:  # normal.load is also the name of a measure
+            continue
+        column = table.measures[name]
+        texts = {
+            "": (column.values, describe_measure(name)),
+            "_error": (column.errors, f"estimated numerical half-width of {name}"),
+            "_floor": (column.floors, f"error of {name} that is allowed besides the tolerance"),
+        }
+        for ending, (values, text) in texts.items():
+            if ending != "_floor" or values.any():
+                variable = Variable(dims, values.reshape(table.shape), column.unit, text)
+                data[name + ending] = variable
+
+    words = {"outcome": (table.outcome, "how the case ended")}
+    if table.messages:
+        messages = [table.messages.get(number, "") for number in range(len(table))]
+        words["message"] = (messages, "why the case failed")
+    if len(case_folders):
+        words["folder"] = (case_folders, "folder of the case inside cases/")
+    for name, (values, text) in words.items():
+        data[name] = Variable(dims, np.array(values, str).reshape(table.shape), "", text)
+    return data
+
+
+def _describe_key(key: SweptKey) -> str:
+    """Return the dotted name of a key and its meaning."""
     try:
-        answer = json.loads(path.read_bytes())
-    except (OSError, ValueError):
-        return {}
-    return answer if isinstance(answer, dict) and isinstance(answer.get("cases"), dict) else {}
+        return f"{key.key}: {types.find_meaning(*find_key(key.key))}"
+    except KeyError:
+        return key.key
+
+
+def _describe_failures(table: SweepTable) -> tuple[str, ...]:
+    """Return the most frequent messages of failed cases, each with the number of cases."""
+    counts = Counter(table.messages[number] for number in sorted(table.messages))
+    return tuple(
+        f"{message} ({count} of {len(table)} cases)"
+        for message, count in counts.most_common(MAX_MESSAGES)
+    )

@@ -2,30 +2,30 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from hashlib import sha256
+from functools import partial
+from itertools import chain
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 from ...campaigns.sweeps.case_models import SweepScene
 from ...campaigns.sweeps.cases import Cases
-from ...campaigns.sweeps.estimate import MAX_CASES_WITH_SUMMARY, MAX_CASES_WITH_TABLES
-from ...campaigns.sweeps.executors.cluster import environment_versions
-from ...campaigns.sweeps.sweep import RemainingTime, WorkerData, iterate_chunks
+from ...campaigns.sweeps.sweep import WorkerData, iterate_chunks
+from ...campaigns.sweeps.sweep_table import SweepTable
 from ...core import Missing, PatchfemError
 from ...runs.batch.case_results import CaseResults
-from ...scene.axes import Axis, FormattedNumbers
-from .. import netcdf
-from ..pages.headline import summarise_sweep
-from .answer import read_answer, sweep_summary, write_answer
-from .folder import TABLES, Folder, ResultsWriter, SummaryWriter, Writer
-from .page import FULL_PAGE, case_link, sweep_command, sweep_table, write_page
-from .tables import table_contents, write_csv
+from .. import page as pages
+from .. import store as answers
+from ..answer import Answer
+from .answer import identify_sweep, make_answer, read_tolerance
+from .folder import Folder, Writer
+from .tables import write_csv
+
+MAX_CASES_WITH_SUMMARY = 1000  # cases whose summaries are stored by default
+MAX_CASES_WITH_TABLES = 200_000  # cases of which sweep.csv is written without --collect
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,10 +38,10 @@ class SweepTarget:
     resume : bool
         Whether existing results are used.
     keep : str
-        What is stored of each case besides its columns: "none", its "summaries", its folder of
+        What is stored of each case besides its numbers: "none", its "summaries", its folder of
         "results", or this with its "pages". A case that has less counts as missing. "" stores
         summaries if there are at most MAX_CASES_WITH_SUMMARY cases.
-    shard : tuple or None
+    shard : tuple of int or None
         (i, n) to compute only the i-th of n parts, into a folder that the parts share.
     page : bool
         Whether the sweep has a page.
@@ -50,12 +50,8 @@ class SweepTarget:
     target: Path
     resume: bool = False
     keep: str = ""
-    shard: tuple | None = None
+    shard: tuple[int, int] | None = None
     page: bool = True
-
-    def kept_files(self, count: int) -> str:
-        """Return what is stored for each case of a sweep with `count` cases."""
-        return self.keep or ("summaries" if count <= MAX_CASES_WITH_SUMMARY else "none")
 
 
 def sweep_into(
@@ -63,9 +59,9 @@ def sweep_into(
     cases: Cases,
     place: SweepTarget,
     executor,
-    say: Callable | None = None,
-    report_progress: Callable | None = None,
-) -> CaseResults:
+    say: Callable[[str], None] | None = None,
+    report_progress: Callable[[int, int], None] = lambda done, total: None,
+) -> Answer | None:
     """Compute the cases of a sweep into a folder and write its tables; a shard writes none.
 
     If an exception or an interrupt ends the sweep, the results so far are kept and written into its
@@ -81,161 +77,129 @@ def sweep_into(
     say : callable, optional
         Takes a line of text.
     report_progress : callable, optional
-        report_progress(done, total, seconds left or None) is called as cases are done, first with those that
-        existed.
+        report_progress(done, total) is called as cases are done, first with those that existed.
 
     Returns
     -------
-    CaseResults
+    Answer or None
+        None for a shard.
     """
+    keep = place.keep or ("summaries" if len(cases) <= MAX_CASES_WITH_SUMMARY else "none")
     is_shard = place.shard is not None
-    keep = place.kept_files(len(cases))
     with Folder(place.target, cases.compute_hashes(sweep_scene), is_shard) as folder:
         if place.resume:
-            folder.refuse_other_sweep(sweep_identity(sweep_scene, cases))
-            if folder.chunks.n_other_cases and folder.is_complete() and say is not None:
-                say(_omitted_values_note(folder.chunks.n_other_cases))
-        requested = _shard_cases(len(cases), place.shard)
-        complete = folder.find_complete_cases(requested, keep)
+            folder.refuse_other_sweep(identify_sweep(sweep_scene, cases))
+        # The cases of a shard are consecutive, because neighbours share most of their work.
+        i, n = place.shard or (1, 1)
+        requested = np.arange((i - 1) * len(cases) // n, i * len(cases) // n)
+        is_stored = folder.find_stored_cases(keep)[requested]
         if not (place.resume or is_shard):
-            if complete.size and not folder.is_complete() and say is not None:
+            is_interrupted = folder.read_details().get("cases", {}).get("unfinished") != 0
+            if say is not None and is_stored.any() and is_interrupted:
                 say(
-                    f"note: {complete.size} of {len(cases)} cases already have an answer from an interrupted sweep but "
-                    "are run again; use --resume to keep such answers"
+                    f"note: {is_stored.sum()} of {len(cases)} cases already have an answer from an interrupted "
+                    "sweep but are run again; use --resume to keep such answers"
                 )
-            complete = complete[:0]
-        remaining = np.setdiff1d(requested, complete)
-        if remaining.size:
-            folder.mark_tables_outdated()
-        if report_progress is not None:
-            report_progress(complete.size, requested.size, None)
-        total = CaseResults.blank(len(cases), folder.target)
+            is_stored[:] = False
+
+        abandoned = []
+        write = partial(write_tables, sweep_scene, cases, folder, place.page, abandoned)
+        writer = Writer(cases, folder.target, folder.shown, folder.chunks.names, keep, folder.token)
+        work = WorkerData(
+            sweep_scene,
+            cases,
+            None if keep == "none" else writer.make_summary,
+            writer.write_results if keep in ("results", "pages") else None,
+            writer,
+        )
+        n_done = int(is_stored.sum())
+        report_progress(n_done, requested.size)
         try:
-            dead_cases = _compute_cases(
-                Jobs(sweep_scene, cases, folder, keep),
-                remaining,
-                executor,
-                say,
-                report_progress
-                and (
-                    lambda done, seconds: report_progress(
-                        complete.size + done, requested.size, seconds
-                    )
-                ),
-            )
+            for chunk, results, texts in iterate_chunks(
+                work, requested[~is_stored].tolist(), executor, say
+            ):
+                if (
+                    texts is None
+                ):  # these cases are not stored, so that a resumed sweep tries them again
+                    abandoned.append((chunk, results))
+                elif results is not None:  # the worker cannot write them, or the disk is full
+                    writer.put(chunk, results, texts)
+                folder.remove_tables()  # they are outdated once a case is computed
+                n_done += len(chunk)
+                report_progress(n_done, requested.size)
         except (KeyboardInterrupt, PatchfemError):
             if not is_shard:
                 with suppress(PatchfemError):
-                    _write_partial_tables(
-                        sweep_scene, cases, folder, folder.fill_results(total), place.page
-                    )
+                    write()
             raise
         if is_shard:
-            return total
-        folder.fill_results(total)
-        for numbers, fault in dead_cases:
-            total.insert(numbers, fault)
-        sign = hash_tables(sweep_scene, cases, folder, place.page)
-        if remaining.size or not _tables_are_current(sign, folder, place.page):
-            write_tables(
-                sweep_scene, cases, total, folder, place.page, sign="" if dead_cases else sign
-            )
-        folder.remove_incomplete_files(not place.resume, keep)
-    return total
+            return None
+        answer = write()
+        folder.clean(removes_others=not place.resume, keep=keep)
+    return answer
 
 
-def sweep_identity(sweep_scene: SweepScene, cases: Cases) -> dict:
-    """Return the scene hash and the keys by which `--resume` identifies a sweep."""
-    return {"scene": sweep_scene.hash_common_data(), "keys": [axis.key for axis in cases.axes]}
-
-
-def _omitted_values_note(count: int) -> str:
-    """Return a note that the folder has results for more values than the resumed sweep."""
-    is_single = count == 1
-    verb = "is" if is_single else "are"
-    these = "this case" if is_single else "these cases"
-    return (
-        f"note: {count} case{'s' * (not is_single)} of this folder {verb} not among the values of this sweep and will "
-        f"not be in its tables; the results of {these} stay in chunks/; to include them, run again with --resume and "
-        "name all values"
-    )
-
-
-def _write_partial_tables(
-    sweep_scene: SweepScene, cases: Cases, folder: Folder, results: CaseResults, page: bool
-) -> None:
-    """Write the tables of an interrupted sweep, if it has any results."""
-    if any(results.outcome):
-        write_tables(sweep_scene, cases, results, folder, page)
-        folder.remove_outdated_tables()
-
-
-class Jobs(NamedTuple):
-    """Cases of a sweep, their folder, and what is stored for each case."""
-
-    sweep_scene: SweepScene
-    cases: Cases
-    folder: Folder
-    keep: str
-
-
-def _compute_cases(
-    jobs: Jobs,
-    numbers: np.ndarray,
-    executor,
-    say: Callable | None,
-    report_progress: Callable | None,
-) -> list:
-    """Compute cases into the folder; return (numbers, CaseResults) of those that crashed.
-
-    These are not written, so that a resumed sweep tries them again.
+def write_tables(
+    sweep_scene: SweepScene,
+    cases: Cases,
+    folder: Folder,
+    page: bool,
+    abandoned: Sequence[tuple[list[int], CaseResults]] = (),
+    is_collected: bool = False,
+) -> Answer | None:
+    """Write the tables and the page of a sweep from its chunks, and return the answer in them.
 
     Parameters
     ----------
-    jobs : Jobs
-    numbers : (n,) array
-        Numbers of the cases.
-    executor : object
-    say : callable or None
-    report_progress : callable or None
-        report_progress(done, seconds left or None) is called as cases are done.
+    sweep_scene : SweepScene
+    cases : Cases
+    folder : Folder
+    page : bool
+        Whether report.html is written.
+    abandoned : sequence
+        (numbers, CaseResults) of cases that are not in the chunks.
+    is_collected : bool
+        Whether every case must have a result, and sweep.csv is written for any number of cases.
+
+    Returns
+    -------
+    Answer or None
+        None, and no files, if no case has a result.
+
+    Raises
+    ------
+    Missing
+        If a case has no result although all must have one.
     """
-    keep = jobs.keep
-    folder = jobs.folder
-    names = jobs.folder.chunks.names
-    dead_cases = []
-    clock = RemainingTime(numbers.size, executor.workers)
-    writer = Writer(folder.target, folder.shown, names, keep, folder.token)
-    results_writer = (
-        ResultsWriter(folder.target, names, keep == "pages")
-        if keep in ("results", "pages")
-        else None
-    )
-    work = WorkerData(
-        jobs.sweep_scene,
-        jobs.cases,
-        None if keep == "none" else SummaryWriter(jobs.cases),
-        results_writer,
-        writer,
-    )
-    for chunk, results, texts, seconds in iterate_chunks(work, numbers.tolist(), executor, say):
-        if texts is None:
-            dead_cases.append((chunk, results))
-        elif results is not None:  # the worker has no access to the folder, or the disk is full
-            writer.put(chunk, results, texts)
-        seconds_left = clock(len(chunk), seconds)
-        if report_progress is not None:
-            report_progress(numbers.size - clock.n_remaining, seconds_left)
-    return dead_cases
+    table = SweepTable.blank(cases, read_tolerance(sweep_scene, cases))
+    for numbers, results in chain(folder.chunks.iterate_results(), abandoned):
+        table.insert(numbers, results)
+    n_missing = int(np.sum(table.outcome == ""))
+    if is_collected and n_missing:
+        raise Missing(
+            f"{folder.shown}: {n_missing} of {len(table)} cases have no answer; run their shards again, "
+            "or continue with --resume"
+        )
+    if n_missing == len(table):
+        return None
+
+    folder.remove_tables("sweep.csv", answers.PAGE)
+    names = folder.case_folder_names()
+    if is_collected or len(table) <= MAX_CASES_WITH_TABLES:
+        write_csv(cases, table, names, folder.target / "sweep.csv")
+    answers.write(make_answer(sweep_scene, cases, table, names), folder.target)
+    del table  # its memory is needed for the page, which is made from the files
+    if page:
+        pages.write_page(folder.target)
+    return answers.read(folder.target)
 
 
 def compute_in_memory(
     sweep_scene: SweepScene,
     cases: Cases,
     executor,
-    say: Callable | None = None,
-    estimate: bool = True,
-) -> CaseResults:
+    say: Callable[[str], None] | None = None,
+) -> Answer:
     """Compute the cases in memory only.
 
     Parameters
@@ -246,23 +210,17 @@ def compute_in_memory(
         From `campaigns.sweeps.executors`.
     say : callable, optional
         Takes a line of text.
-    estimate : bool
-        Whether errors are computed for cases that run one by one.
     """
-    total = CaseResults.blank(len(cases))
-    for numbers, results, *_ in iterate_chunks(
-        WorkerData(sweep_scene, cases, estimate=estimate), range(len(cases)), executor, say
-    ):
-        # These texts appear in no table.
-        for part in (results.warnings, results.notes, results.numerics):
-            part.clear()
-        total.insert(numbers, results)
-    return total
+    table = SweepTable.blank(cases, read_tolerance(sweep_scene, cases))
+    work = WorkerData(sweep_scene, cases)
+    for numbers, results, _ in iterate_chunks(work, range(len(cases)), executor, say):
+        table.insert(numbers, results)
+    return make_answer(sweep_scene, cases, table)
 
 
 def collect_shards(
     sweep_scene: SweepScene, cases: Cases, target: Path, page: bool = True
-) -> CaseResults:
+) -> Answer:
     """Write all tables of a sweep whose shards are complete, from its folder.
 
     Parameters
@@ -279,115 +237,6 @@ def collect_shards(
         If cases have no result yet.
     """
     with Folder(target, cases.compute_hashes(sweep_scene)) as folder:
-        results = folder.fill_results(CaseResults.blank(len(cases), folder.target))
-        missing = int(np.sum(results.outcome == ""))
-        if missing:
-            raise Missing(
-                f"{target}: {missing} of {len(cases)} cases have no answer; run their shards again, or "
-                "continue with --resume"
-            )
-        write_tables(sweep_scene, cases, results, folder, page, True)
-        folder.remove_incomplete_files(False)
-    return results
-
-
-def hash_tables(sweep_scene: SweepScene, cases: Cases, folder: Folder, page: bool) -> str:
-    """Return a hash of all data on which the tables of a complete sweep depend.
-
-    If sweep.json contains this hash, the tables exist.
-
-    Parameters
-    ----------
-    sweep_scene : SweepScene
-    cases : Cases
-    folder : Folder
-    page : bool
-        Whether report.html is written.
-    """
-    content = [
-        environment_versions()["patchfem"],
-        sweep_scene.text,
-        [(axis.key, *_axis_content(axis)) for axis in cases.axes],
-        sweep_command(sweep_scene, cases),
-        page,
-        [case_link(folder.target, key) for key in folder.case_folder_names()],
-    ]
-    return sha256(json.dumps(content).encode() + folder.chunks.names.tobytes()).hexdigest()
-
-
-def _axis_content(axis: Axis) -> tuple:
-    """Return the entries that identify an axis: its strings, or its unit and a hash of its numbers."""
-    texts = axis.texts
-    return (
-        (texts.unit, sha256(texts.numbers).hexdigest())
-        if isinstance(texts, FormattedNumbers)
-        else (texts,)
-    )
-
-
-def _tables_are_current(sign: str, folder: Folder, page: bool) -> bool:
-    """Return whether all tables of a sweep with this hash exist and are up to date."""
-    names = (
-        TABLES if len(folder.chunks.names) <= MAX_CASES_WITH_TABLES else ("sweep.json", FULL_PAGE)
-    )
-    return read_answer(folder.target / "sweep.json").get("sign") == sign and all(
-        (folder.target / name).is_file() for name in names if page or name != FULL_PAGE
-    )
-
-
-def write_tables(
-    sweep_scene: SweepScene,
-    cases: Cases,
-    results: CaseResults,
-    folder: Folder,
-    page: bool = True,
-    at_any_size: bool = False,
-    sign: str = "",
-) -> None:
-    """Write sweep.json, report.html, sweep.csv and sweep.nc.
-
-    Tables that are not written are removed, because they would be those of other cases.
-
-    Parameters
-    ----------
-    sweep_scene : SweepScene
-    cases : Cases
-    results : CaseResults
-    folder : Folder
-    page : bool
-        Whether report.html is written.
-    at_any_size : bool
-        Whether sweep.csv and sweep.nc are written for more than MAX_CASES_WITH_TABLES cases.
-    sign : str
-        From `hash_tables` if every case has a result that is stored; else "".
-    """
-    keys = folder.case_folder_names()
-    has_tables = at_any_size or len(cases) <= MAX_CASES_WITH_TABLES
-    table = sweep_table(sweep_scene, cases, results, keys, folder.target) | {"tabled": has_tables}
-    lead = summarise_sweep(table)
-    for name in () if has_tables else ("sweep.csv", "sweep.nc"):
-        (folder.target / name).unlink(missing_ok=True)
-    if has_tables:
-        write_csv(cases, results, keys, folder.target / "sweep.csv")
-        netcdf.write_netcdf(
-            table_contents(sweep_scene, cases, results, keys, lead.answer()),
-            folder.target / "sweep.nc",
-        )
-    if page:
-        write_page(table, lead, folder.target)
-    else:
-        (folder.target / FULL_PAGE).unlink(missing_ok=True)
-    # This file is written last, because it contains the hash of the others.
-    write_answer(
-        sweep_summary(lead, table["outcome"], sign, sweep_identity(sweep_scene, cases)),
-        folder.target / "sweep.json",
-    )
-
-
-def _shard_cases(count: int, shard: tuple | None) -> np.ndarray:
-    """Return the consecutive case numbers that belong to a shard (i, n).
-
-    Neighbours share most of the work.
-    """
-    i, n = shard or (1, 1)
-    return np.arange((i - 1) * count // n, i * count // n)
+        answer = write_tables(sweep_scene, cases, folder, page, is_collected=True)
+        folder.clean(removes_others=False)
+    return answer

@@ -45,6 +45,20 @@ REMOVED_OPTIONS = {  # advice for each removed (verb, option)
     ): "batches of cases run on the processor; share them by -j N or --executor dask",
 }
 
+# advice for each (verb, option) that 2.0 removed
+REMOVED_OPTIONS_2 = {
+    (
+        "fit",
+        "--placebo",
+    ): "set another value of the key with --set and compare the scores of the fits",
+    (
+        "fit",
+        "--from-patch",
+    ): "run the scene with its patch, or fit the law of a point to a loop that `run` and `export` wrote",
+    ("fit", "--amplitudes"): "leave it out: it belonged to --from-patch",
+    ("export", "--of"): "leave it out: choose the field in ParaView",
+}
+
 
 def describe_removed_option(verb: str, option: str, name: str) -> str:
     """State that an option was removed and what to do instead, or return "" if it was not removed.
@@ -56,6 +70,8 @@ def describe_removed_option(verb: str, option: str, name: str) -> str:
     name : str
         Option as the sentence calls it, such as "profile --tip" or, in Python, "profile: tip".
     """
+    if (verb, option) in REMOVED_OPTIONS_2:
+        return f"{name} was removed in patchfem 2.0; {REMOVED_OPTIONS_2[verb, option]}"
     if (verb, option) not in REMOVED_OPTIONS:
         return ""
     return f"{name} was removed in {REMOVING_VERSION}; {REMOVED_OPTIONS[verb, option]}"

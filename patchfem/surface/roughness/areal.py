@@ -3,18 +3,39 @@
 Missing heights give no point, no slope, no cell of the area and no pair of heights.
 """
 
-from dataclasses import dataclass
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from ...formatting import format_length
-from .parameters import Heights
+from .parameters import compute_core, compute_moments
 
 DECAY_LEVEL = 0.2  # autocorrelation at the autocorrelation length Sal (ISO 25178-3)
 # Smallest autocorrelation length in raster steps; the raster does not resolve a shorter one.
 MIN_LENGTH_STEPS = 2.0
+
+
+# Unit and definition of the parameters of a scan.
+AREAL = {
+    "Sa": ("m", "mean of the absolute heights about the reference surface"),
+    "Sq": ("m", "root mean square of the heights about the reference surface"),
+    "Ssk": ("1", "skewness: mean cube of the heights over Sq^3"),
+    "Sku": ("1", "kurtosis: mean fourth power of the heights over Sq^4, 3 for a Gaussian surface"),
+    "Sp": ("m", "height of the highest point above the reference surface"),
+    "Sv": ("m", "depth of the lowest point below the reference surface"),
+    "Sz": ("m", "height from the lowest to the highest point"),
+    "Sdq": ("1", "root mean square gradient, from the slopes along x and along y"),
+    "Sdr": ("1", "developed area divided by projected area, minus one"),
+    "Sal": ("m", "shortest distance at which the autocorrelation falls to 0.2"),
+    "Str": ("1", "Sal divided by the longest distance at which it falls to 0.2; 1 if isotropic"),
+    "Sk": ("m", "core height: drop of the line through the flattest 40 % of the Abbott curve"),
+    "Spk": ("m", "reduced peak height: triangle on the base Smr1 with the volume above the core"),
+    "Svk": (
+        "m",
+        "reduced valley depth: triangle on the base 1 - Smr2 with the volume below the core",
+    ),
+    "Smr1": ("1", "fraction of the area above the core"),
+    "Smr2": ("1", "fraction of the area above the bottom of the core"),
+}
 
 
 class Lobe(NamedTuple):
@@ -24,45 +45,42 @@ class Lobe(NamedTuple):
     longest: float | None
 
 
-@dataclass(frozen=True, eq=False)
-class Surface:
-    """Heights z (m, n) [m] of a scan about its reference surface, with the sample spacings [m]."""
+def compute_areal_parameters(z, steps: tuple[float, float]) -> dict[str, float | str]:
+    """Compute the parameters of a scan, by the names in AREAL; a code of the reason where there is none.
 
-    z: np.ndarray
-    steps: tuple
-
-    @cached_property
-    def heights(self) -> Heights:
-        """Measured heights as a flat array."""
-        return Heights(self.z[~np.isnan(self.z)], min(self.steps))
-
-    @cached_property
-    def slopes(self) -> tuple:
-        """Slopes between neighbouring points along y and along x; they are NaN where heights are missing."""
-        return tuple(np.diff(self.z, axis=axis) / step for axis, step in enumerate(self.steps))
-
-    @cached_property
-    def lobe(self) -> Lobe:
-        """Central lobe of the autocorrelation."""
-        return (
-            _measure_lobe(autocorrelation(self.z), self.steps)
-            if self.heights.power > 0
-            else Lobe(None, None)
-        )
-
-
-def rms_gradient(surface: Surface) -> float:
-    """Compute Sdq, the root mean square gradient [1] of the slopes along x and along y."""
-    return float(np.sqrt(sum(np.nanmean(slopes**2) for slopes in surface.slopes)))
-
-
-def developed_area_ratio(surface: Surface) -> float:
-    """Compute Sdr [1]: the area of the surface divided by that of its plane, minus one.
-
-    Each cell of four heights is cut into two triangles, along either diagonal; its area is the mean
-    of both.
+    Parameters
+    ----------
+    z : (m, n) array [m]
+        Heights about the reference surface, NaN where missing.
+    steps : tuple of float
+        Spacings along y and along x [m].
     """
-    along_y, along_x = (slopes**2 for slopes in surface.slopes)
+    heights = z[~np.isnan(z)]
+    values = {f"S{name}": value for name, value in compute_moments(heights).items()}
+    core = compute_core(heights)
+    values |= {f"S{name.lower()}": value for name, value in core.items()}
+    values |= {"Sp": float(heights.max()), "Sv": float(-heights.min())}
+    values["Sz"] = float(np.ptp(heights))
+    slopes = [np.diff(z, axis=axis) / step for axis, step in enumerate(steps)]
+    values["Sdq"] = float(np.sqrt(sum(np.nanmean(slope**2) for slope in slopes)))
+    values["Sdr"] = _compute_area_ratio(*(slope**2 for slope in slopes))
+
+    lobe = Lobe(None, None)
+    if values["Sq"] > 0:
+        lobe = _measure_lobe(autocorrelation(z), steps)
+    values |= {"Sal": lobe.shortest, "Str": "not_falling"}
+    if lobe.shortest is None:
+        values["Sal"] = "not_falling"
+    elif lobe.shortest < MIN_LENGTH_STEPS * max(steps):
+        values |= {"Sal": "too_short", "Str": "too_short"}
+    elif lobe.longest is not None:
+        values["Str"] = lobe.shortest / lobe.longest
+    unknown = "flat" if values["Sq"] == 0 else "undetermined"
+    return {name: unknown if values[name] is None else values[name] for name in AREAL}
+
+
+def _compute_area_ratio(along_y, along_x) -> float:
+    """Compute Sdr from squared slopes: cells of four heights are cut into triangles along either diagonal."""
     total = 0.0
     for left_or_right in (along_y[:, :-1], along_y[:, 1:]):
         for low_or_high in (along_x[:-1], along_x[1:]):
@@ -112,37 +130,3 @@ def _measure_lobe(rho, steps: tuple) -> Lobe:
         if abs(angle[-1] - angle[0]) > 6:  # the contour encircles the origin, by an angle of 2 pi
             closed.append((shortest[-1], float(np.hypot(*line.T).max())))
     return Lobe(min(shortest, default=None), min(closed)[1] if closed else None)
-
-
-def autocorrelation_length(surface: Surface) -> float | None:
-    """Compute Sal [m], or return None if it is below two steps or the autocorrelation never falls to 0.2."""
-    length = surface.lobe.shortest
-    return None if length is None or length < MIN_LENGTH_STEPS * max(surface.steps) else length
-
-
-def aspect_ratio(surface: Surface) -> float | None:
-    """Compute Str, the texture aspect ratio [1].
-
-    None if the autocorrelation stays above 0.2 in some direction.
-    """
-    if autocorrelation_length(surface) is None or surface.lobe.longest is None:
-        return None
-    return surface.lobe.shortest / surface.lobe.longest
-
-
-def missing_reason(surface: Surface, name: str) -> str:
-    """State why an areal roughness parameter has no value."""
-    shortest = surface.lobe.shortest
-    if surface.heights.power == 0:
-        return "the scan is flat"
-    if name not in ("Sal", "Str"):
-        return "the heights do not determine this parameter"
-    if shortest is None:
-        return "the autocorrelation stays above 0.2 over half of the scan"
-    if shortest < MIN_LENGTH_STEPS * max(surface.steps):
-        return "the autocorrelation falls to 0.2 within two steps"
-    half = min(step * (count // 2) for step, count in zip(surface.steps, surface.z.shape))
-    return (
-        f"along some direction the autocorrelation stays above 0.2 over {format_length(half)}, so Str is "
-        f"below {shortest / half:.2g}"
-    )

@@ -1,234 +1,137 @@
-"""Quantities of an evenly sampled profile that several roughness parameters share.
+"""Parameters of evenly sampled heights: ISO 21920-2 of profiles, ISO 13565-2 of the Abbott curve.
 
-These are the moments, the spacing of hills and dales (ISO 21920-2), the Abbott curve, its core (ISO
-13565-2) and its volumes (ISO 25178-2).
+Heights are measured from the mean line or surface. A parameter that the heights do not determine is
+None.
 """
-
-from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
 # Smallest number of samples in a trace; fewer give neither a spectrum nor a curvature.
 MIN_SAMPLES = 16
-# Largest heights of a straight line after levelling, relative to its heights before.
-ROUND_OFF = 1e-12
-# Smallest height of hills and dales that count, as a fraction of Rz (ISO 21920-2).
-MIN_HEIGHT_FRACTION = 0.10
-# Smallest width of hills and dales that count, as a fraction of the section.
-MIN_WIDTH_FRACTION = 0.01
+ROUND_OFF = 1e-12  # largest heights of a straight line after levelling, relative to those before
+MIN_HEIGHT_FRACTION = 0.10  # smallest height of hills and dales that count, relative to Rz
+MIN_WIDTH_FRACTION = 0.01  # smallest width of hills and dales that count, relative to the section
 CORE_FRACTION = 0.40  # fraction of the length under the secant of the core (ISO 13565-2)
 
+# Unit and definition of the parameters of a profile, whose names begin with P or R.
+PROFILE = {
+    "a": ("m", "mean of the absolute heights"),
+    "q": ("m", "root mean square of the heights"),
+    "p": ("m", "height of the highest peak"),
+    "v": ("m", "depth of the deepest valley"),
+    "z": ("m", "height from the deepest valley to the highest peak"),
+    "t": ("m", "height from the deepest valley to the highest peak of the whole trace"),
+    "sk": ("1", "skewness: mean cube of the heights over the cube of their root mean square"),
+    "ku": ("1", "kurtosis: mean fourth power of the heights over that of their root mean square"),
+    "Sm": (
+        "m",
+        "mean length of a hill with the neighbouring dale, without those lower than 10 % of the height "
+        "from the deepest valley to the highest peak, or narrower than 1 % of the cut-off",
+    ),
+    "dq": ("1", "root mean square of the slope between neighbouring samples"),
+    "k": ("m", "core height: drop of the line through the flattest 40 % of the Abbott curve"),
+    "pk": ("m", "reduced peak height: triangle on the base Mr1 with the area above the core"),
+    "vk": ("m", "reduced valley depth: triangle on the base 1 - Mr2 with the area below the core"),
+    "Mr1": ("1", "fraction of the surface above the core"),
+    "Mr2": ("1", "fraction of the surface above the bottom of the core"),
+    "c": ("m", "mean height difference between a hill and the neighbouring dale"),
+}
 
-@dataclass(frozen=True, eq=False)
-class Heights:
-    """Equally spaced heights z (n,) [m] of a trace about its mean line.
 
-    section: length [m] over which peaks, valleys and spacings are looked for, which is the cut-off;
-    None for the whole trace.
+def compute_parameters(z, step: float, section: float | None = None) -> dict[str, float | None]:
+    """Compute the parameters of a profile, by the names in PROFILE.
+
+    Parameters
+    ----------
+    z : (n,) array [m]
+        Heights.
+    step : float
+        Sampling interval [m].
+    section : float, optional
+        Length [m] over which peaks and valleys are sought, which is the cut-off; by default the whole
+        trace. Sections that do not lie wholly in the trace are left out.
     """
-
-    z: np.ndarray
-    step: float
-    section: float | None = None
-
-    @property
-    def length(self) -> float:
-        """Length [m] of the trace, one step for each sample."""
-        return self.z.size * self.step
-
-    @cached_property
-    def sections(self) -> np.ndarray:
-        """Heights (k, samples) [m] of the sections that lie wholly in the trace, from its start.
-
-        The remainder at the end is left out.
-        """
-        if self.section is None:
-            return self.z[None, :]
-        size = round(self.section / self.step)
-        count = self.z.size // size
-        return self.z[: count * size].reshape(count, size)
-
-    @cached_property
-    def descending(self) -> np.ndarray:
-        """Heights (n,) [m] from the highest to the lowest."""
-        return np.sort(self.z)[::-1]
-
-    @cached_property
-    def power(self) -> float:
-        """Mean square of the heights [m2]."""
-        return float(self.z @ self.z) / self.z.size
-
-    @cached_property
-    def core(self) -> "Core | None":
-        """Core of the Abbott curve, or None for a flat trace."""
-        return fit_core(self)
+    values = compute_moments(z)
+    size = z.size if section is None else round(section / step)
+    sections = z[: z.size // size * size].reshape(-1, size)
+    values |= dict.fromkeys(("p", "v", "z"))
+    if len(sections):
+        values["p"] = float(sections.max(axis=1).mean())
+        values["v"] = float(-sections.min(axis=1).mean())
+        values["z"] = float(np.ptp(sections, axis=1).mean())
+    values["t"] = float(np.ptp(z))
+    values["dq"] = float(np.sqrt(np.mean(np.diff(z) ** 2)) / step)
+    rough = values["t"] if values["z"] is None else values["z"]
+    values |= _compute_elements(z, step, rough, section or 0.0) | compute_core(z)
+    return {name: values[name] for name in PROFILE}
 
 
-def root_mean_square(heights: Heights) -> float:
-    """Compute Rq, the root mean square of the heights [m]."""
-    return float(np.sqrt(heights.power))
+def compute_moments(z) -> dict[str, float | None]:
+    """Compute the mean, root mean square, skewness and kurtosis of heights (n,) [m]."""
+    rms = np.sqrt(np.mean(z**2))
+    out = {"a": float(np.abs(z).mean()), "q": float(rms), "sk": None, "ku": None}
+    if rms > 0:
+        out |= {"sk": float(np.mean((z / rms) ** 3)), "ku": float(np.mean((z / rms) ** 4))}
+    return out
 
 
-def mean_absolute(heights: Heights) -> float:
-    """Compute Ra, the mean of the absolute heights [m]."""
-    return float(np.abs(heights.z).mean())
+def _compute_elements(z, step: float, rough: float, section: float) -> dict[str, float | None]:
+    """Compute Sm and c from hills and dales that are high and wide enough.
 
-
-def total_height(heights: Heights) -> float:
-    """Compute Rt, the distance from the lowest to the highest sample [m]."""
-    return float(np.ptp(heights.z))
-
-
-def skewness(heights: Heights) -> float | None:
-    """Compute the mean cube of the heights over Rq^3 [1], or return None for a flat trace."""
-    return _moment(heights, 3)
-
-
-def kurtosis(heights: Heights) -> float | None:
-    """Compute the mean fourth power of the heights over Rq^4 [1], or return None for a flat trace."""
-    return _moment(heights, 4)
-
-
-def _moment(heights: Heights, order: int) -> float | None:
-    rms = np.sqrt(heights.power)
-    if rms == 0:
-        return None
-    unit = heights.z / rms
-    square = unit * unit
-    return float(square @ (unit if order == 3 else square)) / unit.size
-
-
-def rms_slope(heights: Heights) -> float:
-    """Compute Rdq, the root mean square of the slope between neighbouring samples [1]."""
-    rise = np.diff(heights.z)
-    return float(np.sqrt(rise @ rise / rise.size) / heights.step)
-
-
-def mean_over_sections(heights: Heights, size: Callable) -> float | None:
-    """Return the mean of a parameter over the sections of a trace.
-
-    `size` maps the heights (k, samples) [m] of the sections to k values. The result is None if the
-    trace is shorter than one section.
+    An element reaches from a rise through the mean line to the next rise, or from a fall to the next
+    fall. Neighbours of one sign, between which others are left out, are one hill or dale.
     """
-    return float(size(heights.sections).mean()) if len(heights.sections) else None
-
-
-def peak_to_valley(heights: Heights) -> float | None:
-    """Compute Rz, the mean height [m] of the sections from the lowest to the highest sample."""
-    return mean_over_sections(heights, lambda z: np.ptp(z, axis=1))
-
-
-def mean_spacing(heights: Heights) -> float | None:
-    """Compute RSm, the mean length of an element: a hill with its neighbouring dale [m].
-
-    An element reaches from a rise through the mean line to the next rise, or from a fall to the
-    next fall; the mean is over both kinds. None if the trace holds no element.
-    """
-    places = find_crossings(heights)
-    if places.size < 3:
-        return None
-    spans = np.concatenate([np.diff(places[::2]), np.diff(places[1::2])])
-    return float(spans.sum()) / spans.size
-
-
-def mean_element_height(heights: Heights) -> float | None:
-    """Compute Rc, the mean height [m] of the elements of `mean_spacing`, or return None if there are none."""
-    places = find_crossings(heights)
-    if places.size < 3:
-        return None
-    starts = np.floor(places / heights.step).astype(int) + 1
-    parts = np.maximum.reduceat(np.abs(heights.z), starts)[:-1]
-    return float((parts[1:] + parts[:-1]).mean())
-
-
-def find_crossings(heights: Heights) -> np.ndarray:
-    """Find the positions [m] where a hill ends and a dale begins, or the reverse.
-
-    The mean line cuts the trace into hills and dales. Those lower than 10 % of Rz or narrower than
-    1 % of the section do not count, and neighbours of one sign become one. Without a section the
-    height alone decides.
-    """
-    z = heights.z
-    rough = peak_to_valley(heights)
-    if rough is None:
-        rough = total_height(heights)
+    unknown = {"Sm": None, "c": None}
     above = z > 0
     starts = np.flatnonzero(above[1:] != above[:-1])  # the last sample before each crossing
     if not starts.size or rough == 0:
-        return np.empty(0)
-    places = (starts + z[starts] / (z[starts] - z[starts + 1])) * heights.step
+        return unknown
+    places = (starts + z[starts] / (z[starts] - z[starts + 1])) * step
     first = np.concatenate([[0], starts + 1])
     extent = np.maximum.reduceat(np.abs(z), first)
-    width = np.diff(np.concatenate([[0.0], places, [(z.size - 1) * heights.step]]))
-    width[[0, -1]] = np.inf  # the ends of the trace cut these two, so their width is unknown
-    is_high = extent >= MIN_HEIGHT_FRACTION * rough
-    is_wide = width >= MIN_WIDTH_FRACTION * (heights.section or 0.0)
-    kept = np.flatnonzero(is_high & is_wide)
-    signs = above[first[kept]]
-    changes = np.flatnonzero(signs[1:] != signs[:-1]) + 1
-    return places[kept[changes] - 1]  # a hill or dale begins at the crossing before it
+    width = np.diff(places, prepend=-np.inf, append=np.inf)  # the ends of the trace cut two off
+    is_kept = (extent >= MIN_HEIGHT_FRACTION * rough) & (width >= MIN_WIDTH_FRACTION * section)
+    kept = np.flatnonzero(is_kept)
+    changes = np.flatnonzero(np.diff(above[first[kept]].astype(int))) + 1
+    ends = places[kept[changes] - 1]  # a hill or dale begins at the crossing before it
+    if ends.size < 3:
+        return unknown
+    parts = np.maximum.reduceat(np.abs(z), np.floor(ends / step).astype(int) + 1)[:-1]
+    return {"Sm": float((ends[2:] - ends[:-2]).mean()), "c": float((parts[1:] + parts[:-1]).mean())}
 
 
-class Core(NamedTuple):
-    """Core of an Abbott curve: Rk, Rpk, Rvk [m], material ratios Mr1 and Mr2 [1], top [m]."""
+def compute_core(z) -> dict[str, float | None]:
+    """Compute Rk, Rpk, Rvk, Mr1 and Mr2 from the Abbott curve of heights (n,) [m] (ISO 13565-2).
 
-    height: float
-    peak_height: float
-    valley_depth: float
-    first_ratio: float
-    second_ratio: float
-    top: float
-
-
-def abbott_curve(heights: Heights, count: int = 501) -> tuple[np.ndarray, np.ndarray]:
-    """Compute the Abbott curve: material ratio (count,) from 0 to 1 and height (count,) [m]."""
-    ratio = np.linspace(0.0, 1.0, count)
-    return ratio, np.interp(ratio, _material_ratios(heights.z.size), heights.descending)
-
-
-def _material_ratios(count: int) -> np.ndarray:
-    return (np.arange(count) + 0.5) / count
-
-
-def fit_core(heights: Heights) -> Core | None:
-    """Fit the straight core line of the Abbott curve (ISO 13565-2), or return None for a flat trace.
-
-    The line is the least-squares line of that 40 % of the curve whose secant falls least (the first
-    such part). It falls by Rk from ratio 0 to ratio 1. Rpk and Rvk are the heights of triangles
-    with the areas of the peaks above and the valleys below. The second filter stage of ISO 13565-1
-    is not used.
+    The core is the least-squares line of that 40 % of the curve whose secant falls least. The second
+    filter stage of ISO 13565-1 is not used.
     """
-    z = heights.descending
+    z = np.sort(z)[::-1]
     n = z.size
     if n < 5 or z[0] == z[-1]:
-        return None
+        return dict.fromkeys(("k", "pk", "vk", "Mr1", "Mr2"))
     size = max(round(CORE_FRACTION * n), 2)
     start = int(np.argmin(z[: n - size + 1] - z[size - 1 :]))
     part = z[start : start + size]
-    ratio = _material_ratios(n)[start : start + size]
+    ratio = (np.arange(start, start + size) + 0.5) / n
     centred = ratio - ratio.mean()
     slope = float(centred @ (part - part.mean()) / (centred @ centred))
     top = float(part.mean() - slope * ratio.mean())
     bottom = top + slope
-    first = _ratio_above(z, top)
-    second = _ratio_above(z, bottom)
+    first, second = (_find_ratio_above(z, level) for level in (top, bottom))
     peaks = 2 * float(np.maximum(z - top, 0.0).sum()) / n
     valleys = 2 * float(np.maximum(bottom - z, 0.0).sum()) / n
-    return Core(
-        height=-slope,
-        peak_height=peaks / first if first > 0 else 0.0,
-        valley_depth=valleys / (1 - second) if second < 1 else 0.0,
-        first_ratio=first,
-        second_ratio=second,
-        top=top,
-    )
+    return {
+        "k": -slope,
+        "pk": peaks / first if first > 0 else 0.0,
+        "vk": valleys / (1 - second) if second < 1 else 0.0,
+        "Mr1": first,
+        "Mr2": second,
+    }
 
 
-def _ratio_above(z, level: float) -> float:
-    """Return the fraction of a trace that lies above a level."""
+def _find_ratio_above(z, level: float) -> float:
+    """Return the fraction of descending heights (n,) above a level, linear between them."""
     n = z.size
     k = int(np.searchsorted(-z, -level))
     if k in (0, n):
@@ -237,15 +140,28 @@ def _ratio_above(z, level: float) -> float:
     return float((k - 0.5 + (z[k - 1] - level) / (fall if fall > 0 else 1.0)) / n)
 
 
-def material_volume(heights: Heights, ratio: float) -> float:
-    """Compute the volume of material above the height of a material ratio, per area [m3/m2]."""
-    return float(np.maximum(heights.descending - _height_at(heights, ratio), 0.0).mean())
+def abbott_curve(z, count: int = 501) -> tuple[np.ndarray, np.ndarray]:
+    """Compute the Abbott curve of heights (n,) [m]: material ratio (count,) from 0 to 1, and height [m]."""
+    ratio = np.linspace(0.0, 1.0, count)
+    return ratio, np.interp(ratio, (np.arange(z.size) + 0.5) / z.size, np.sort(z)[::-1])
 
 
-def void_volume(heights: Heights, ratio: float) -> float:
-    """Compute the volume of void below the height of a material ratio, per area [m3/m2]."""
-    return float(np.maximum(_height_at(heights, ratio) - heights.descending, 0.0).mean())
+def estimate_errors(z, step: float, section: float) -> dict[str, float]:
+    """Estimate the standard errors of the parameters by the jackknife over the sections.
 
-
-def _height_at(heights: Heights, ratio: float) -> float:
-    return float(np.interp(ratio, _material_ratios(heights.z.size), heights.descending))
+    It is {} for fewer than five sections.
+    """
+    size = round(section / step)
+    count = z.size // size
+    if count < 5:
+        return {}
+    sections = z[: count * size].reshape(count, size)
+    remainders = [
+        compute_parameters(np.delete(sections, k, 0).ravel(), step, section) for k in range(count)
+    ]
+    errors = {}
+    for name in PROFILE:
+        values = [values[name] for values in remainders]
+        if None not in values:
+            errors[name] = float(np.sqrt((count - 1) * np.var(values)))
+    return errors

@@ -1,4 +1,4 @@
-"""Roughness report: all parameters of a trace or of an areal scan, with their intervals."""
+"""Roughness parameters of one measured trace or scan, with the treatment that led to them."""
 
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -7,41 +7,28 @@ import numpy as np
 
 from ...core import PatchfemError, frozen_array
 from ...formatting import format_length
-from ..areal import Areal
+from ..areal import Areal, find_scan_spikes
 from ..profile import Profile, find_spikes, resample_evenly
-from ..quantity import Quantity, make_unknown
-from ..spikes import find_scan_spikes
-from . import rows
-from .areal import Surface, missing_reason
+from ..quantity import Quantity
+from .areal import AREAL, compute_areal_parameters
 from .filter import filter_scan, filter_trace
-from .form import form_degree, subtract_form
-from .intervals import LATERAL, SIZES, Intervals
-from .parameters import MIN_SAMPLES, ROUND_OFF, Heights
-from .rows import Parameter
-from .scan_intervals import scan_intervals
-from .spectrum import BAND, Spectrum, band_amplitude, refuse_band
+from .form import subtract_form
+from .parameters import MIN_SAMPLES, PROFILE, ROUND_OFF, compute_parameters, estimate_errors
+from .spectrum import BAND, Spectrum, band_amplitude, estimate_spectrum, refuse_band
 
 # Standard cut-offs [m]: those of ISO 21920-3 and one more at each end.
 STANDARD_CUTOFFS = (25e-6, 80e-6, 250e-6, 800e-6, 2.5e-3, 8e-3, 25e-3)
 # Smallest length of a trace in cut-offs: five are evaluated, and the filter trims one in total.
 SECTIONS_PER_TRACE = 6
-NO_INTERVAL = "a single trace gives no interval for this parameter"
-NOT_GAUSSIAN = (
-    "an interval from a single trace assumes Gaussian heights, but these heights are not Gaussian; "
-    "use the scatter of several traces"
-)
-TOO_SHORT = (
-    "the trace is shorter than four wavelengths of its strongest wave, so a longer trace would "
-    "give a different value"
-)
+CONFIDENCE_TAIL = 0.05  # probability of a true value below, and above, the interval of a parameter
 
 
 class Sampling(NamedTuple):
-    """Length, sample spacing and numbers of samples of a measured surface."""
+    """Length, step [m] and numbers of samples of a surface; measured: of a trace before resampling."""
 
     length: float
     step: float
-    shape: tuple
+    shape: tuple[int, ...]
     measured: int | None = None
 
 
@@ -50,17 +37,17 @@ class Treatment(NamedTuple):
 
     form: name of the least-squares form; short: nesting index of the S-filter; cutoff: between
     waviness and roughness, for a scan the nesting index of the L-filter; window: first and last
-    position, for a scan in x and then in y.
+    position, for a scan in x and then in y; all in m.
     """
 
     form: str
     short: float | None
     cutoff: float | None
-    window: tuple | None
+    window: tuple[float, ...] | None
 
 
 class TraceParts(NamedTuple):
-    """Waviness, roughness and spectrum of a trace after form removal."""
+    """Primary profile, waviness, roughness and spectrum of a trace after form removal."""
 
     primary: Profile
     waviness: Profile | None
@@ -72,18 +59,18 @@ class TraceParts(NamedTuple):
 class RoughnessReport:
     """Roughness parameters of one measured surface.
 
-    values: Quantity of each parameter, with its name; notes: sentences about the file and its
-    treatment; surface: what the parameters are read from, `TraceParts` or the filtered scan;
-    heights: those of the Abbott curve, of the roughness if there is a cut-off.
+    values: Quantity of each parameter, with its name, and the code of the reason where it has no
+    value; notes: sentences about the file and its treatment; surface: what the parameters are read
+    from; heights: those of the Abbott curve (n,) [m].
     """
 
     source: str
     sampling: Sampling
     treatment: Treatment
-    values: tuple
-    notes: tuple
+    values: tuple[Quantity, ...]
+    notes: tuple[str, ...]
     surface: TraceParts | Areal
-    heights: Heights
+    heights: np.ndarray
 
     @property
     def kind(self) -> str:
@@ -98,11 +85,11 @@ class RoughnessReport:
 def make_report(
     surface: Profile | Areal,
     cutoff: float | None = None,
-    window: tuple | None = None,
+    window: tuple[float, ...] | None = None,
     form: int | str = 1,
     short: float | None = None,
 ) -> RoughnessReport:
-    """Compute the roughness parameters of a trace or a scan with their intervals.
+    """Compute the roughness parameters of a trace or a scan.
 
     Parameters
     ----------
@@ -111,27 +98,19 @@ def make_report(
     cutoff : float, optional
         Cut-off or nesting index [m]; without it there is the primary profile or the S-F surface
         alone.
-    window : tuple, optional
-        Positions [m] of the first and the last sample, of a scan in x, then in y (`crop`).
+    window : tuple of float, optional
+        Positions [m] of the first and the last sample, of a scan in x, then in y.
     form : int or str
-        Form to subtract (`subtract_form`).
+        1 (a line or a plane) or "circle".
     short : float, optional
         Nesting index [m] of the S-filter.
-
-    Returns
-    -------
-    RoughnessReport
-        A trace of a million samples takes 1.2 s.
     """
     part = surface if window is None else crop(surface, *window)
-    if isinstance(surface, Areal):
-        return _report_scan(part, cutoff, window, form, short)
-    return _report_trace(part, cutoff, window, form, short)
+    report = _report_scan if isinstance(surface, Areal) else _report_trace
+    return report(part, cutoff, window, form, short)
 
 
-def _report_trace(
-    part: Profile, cutoff: float | None, window: tuple | None, form: int | str, short: float | None
-) -> RoughnessReport:
+def _report_trace(part: Profile, cutoff, window, form, short) -> RoughnessReport:
     trace = _require_samples(resample_evenly(_require_samples(part)))
     primary, form_name = subtract_form(trace, form)
     if short is not None:
@@ -139,47 +118,83 @@ def _report_trace(
         primary = subtract_form(filter_trace(primary, short)[0], form)[0]
     if np.ptp(primary.z) <= ROUND_OFF * np.abs(trace.z).max():
         primary = replace(primary, z=frozen_array(np.zeros(primary.z.size)))
-    heights = Heights(primary.z, trace.step)
-    intervals = Intervals(heights, form_degree(form))
-    values = [_make_quantity(row, row.compute(heights), intervals) for row in rows.PRIMARY]
-    dominant, band = rows.WAVES
-    values += [
-        _make_quantity(dominant, intervals.spectrum.dominant_wavelength, intervals),
-        _make_band_quantity(band, trace, intervals),
+    values = compute_parameters(primary.z, trace.step)
+    del values["z"]  # of one section, which is Pt
+    quantities = [
+        _name_value(f"P{name}", value, PROFILE[name], "the levelled trace")
+        for name, value in values.items()
     ]
+    spectrum = estimate_spectrum(primary.z, trace.step)
+    quantities += _measure_waves(primary, spectrum)
+
     waviness = None
     roughness = None
-    evaluated = heights
+    heights = primary.z
     if cutoff is not None:
         waviness, roughness = filter_trace(primary, cutoff)
-        evaluated = replace(heights, z=roughness.z, section=cutoff)
-        rough_intervals = Intervals(evaluated, None)
-        values += [
-            _make_quantity(row, row.compute(evaluated), rough_intervals) for row in rows.ROUGH
-        ]
-    if window is not None:
-        for row in rows.WINDOW:
-            value = float(trace.z[-1] - trace.z[0]) if row.compute is None else row.compute(heights)
-            values.append(_make_quantity(row, value, intervals))
+        heights = roughness.z
+        values = compute_parameters(heights, trace.step, cutoff)
+        errors = estimate_errors(heights, trace.step, cutoff)
+        n_sections = heights.size // round(cutoff / trace.step)
+        for name, value in values.items():
+            long_name = name if name.startswith("Mr") else f"R{name}"
+            quantity = _name_value(long_name, value, PROFILE[name], "the roughness profile")
+            quantities.append(_add_interval(quantity, errors.get(name), n_sections))
     notes = trace.notes + _describe_spikes(part)
-    if trace.x.size != part.x.size and short is None:
-        notes += _describe_resampling(part, trace, primary)
-    if roughness is not None:
-        notes += _describe_short_trace(roughness, cutoff)
+    if roughness is not None and roughness.length < cutoff * (1 - 1e-9):
+        notes += (
+            f"{trace.source}: half a cut-off is trimmed at each end, and the "
+            f"{format_length(roughness.length)} that remain are shorter than one section of "
+            f"{format_length(cutoff)}, the least that ISO 21920 needs; do not use these roughness "
+            "parameters: evaluate a longer part, or take a shorter cut-off",
+        )
     return RoughnessReport(
         source=trace.source,
-        sampling=Sampling(trace.length, heights.step, (trace.x.size,), part.x.size),
+        sampling=Sampling(trace.length, trace.step, (trace.x.size,), part.x.size),
         treatment=Treatment(form_name, short, cutoff, window),
-        values=tuple(values),
+        values=tuple(quantities),
         notes=notes,
-        surface=TraceParts(primary, waviness, roughness, intervals.spectrum),
-        heights=evaluated,
+        surface=TraceParts(primary, waviness, roughness, spectrum),
+        heights=heights,
     )
 
 
-def _report_scan(
-    scan: Areal, cutoff: float | None, window: tuple | None, form: int | str, short: float | None
-) -> RoughnessReport:
+def _measure_waves(primary: Profile, spectrum: Spectrum) -> list[Quantity]:
+    """Return the dominant wavelength, and the amplitude of the waves of the band."""
+    low, high = BAND
+    text = (
+        "amplitude of a sine with the mean square of the waves from {} to {}, of the levelled trace"
+    )
+    definition = ("m", text.format(format_length(low), format_length(high)))
+    wave = ("m", "wavelength of the octave with the largest mean square height")
+    out = [
+        _name_value("dominant_wavelength", spectrum.dominant_wavelength, wave, "the levelled trace")
+    ]
+    try:
+        refuse_band(primary.source, low, high, primary.length, primary.step)
+    except PatchfemError:
+        return [*out, Quantity(None, None, None, *definition, "band", "band_amplitude")]
+    amplitude = band_amplitude(spectrum, low, high)
+    return [*out, Quantity(amplitude, None, None, *definition, name="band_amplitude")]
+
+
+def _name_value(name: str, value, definition: tuple[str, str], of: str) -> Quantity:
+    unit, text = definition
+    reason = "" if value is not None else "undetermined"
+    return Quantity(value, None, None, unit, f"{text}, of {of}", reason, name)
+
+
+def _add_interval(quantity: Quantity, error: float | None, n_sections: int) -> Quantity:
+    """Add the 90 % interval of a mean over sections by Student's t."""
+    from scipy.special import stdtrit
+
+    if quantity.value is None or not error:
+        return quantity
+    width = float(stdtrit(n_sections - 1, 1 - CONFIDENCE_TAIL)) * error
+    return quantity._replace(low=quantity.value - width, high=quantity.value + width)
+
+
+def _report_scan(scan: Areal, cutoff, window, form, short) -> RoughnessReport:
     flat, form_name = subtract_form(scan, form)
     if short is not None:
         flat = subtract_form(filter_scan(flat, short)[0], form)[0]
@@ -192,18 +207,11 @@ def _report_scan(
     if np.nanmax(flat.z) - np.nanmin(flat.z) <= ROUND_OFF * np.nanmax(np.abs(scan.z)):
         flat = replace(flat, z=frozen_array(flat.z * 0.0))
     steps = tuple(float(axis[-1] - axis[0]) / (axis.size - 1) for axis in (flat.y, flat.x))
-    surface = Surface(flat.z, steps)
-    values = {row.name: row.compute(surface) for row in rows.AREAL}
-    intervals = scan_intervals(flat.z, values)
-    no_interval = (NOT_GAUSSIAN if intervals.is_uneven else NO_INTERVAL).replace("trace", "scan")
     quantities = []
-    for row in rows.AREAL:
-        value = values[row.name]
-        low, high = intervals.bounds.get(row.name, (None, None))
-        reason = no_interval if low is None and surface.heights.power else ""
-        if value is None:
-            reason = missing_reason(surface, row.name)
-        quantities.append(Quantity(value, low, high, row.unit, row.text, reason, row.name))
+    for name, value in compute_areal_parameters(flat.z, steps).items():
+        reason = value if isinstance(value, str) else ""
+        number = None if reason else value
+        quantities.append(Quantity(number, None, None, *AREAL[name], reason, name))
     notes = scan.notes + _describe_spikes(scan)
     missing = int(np.isnan(flat.z).sum())
     if missing:
@@ -217,7 +225,7 @@ def _report_scan(
         values=tuple(quantities),
         notes=notes,
         surface=flat,
-        heights=surface.heights,
+        heights=flat.z[~np.isnan(flat.z)],
     )
 
 
@@ -232,36 +240,33 @@ def fitting_cutoff(length: float, step: float) -> float | None:
 
 
 def crop(surface: Profile | Areal, *ends: float) -> Profile | Areal:
-    """Cut out the part of a surface between given positions.
+    """Cut out the part of a surface between given positions [m].
 
     As between the cursors of an instrument, it runs from the last sample at or before the first
     position to the last at or before the second. Raises PatchfemError for a window that is reversed
     or not within the surface.
     """
     source = surface.source
-    if isinstance(surface, Profile):
-        if len(ends) != 2:
-            raise PatchfemError(f"{source}: a window of a trace needs two positions: from and to")
-        part = _find_part(f"{source}: the window", "the trace runs", surface.x, ends)
-        return replace(surface, x=surface.x[part], z=surface.z[part])
-    if len(ends) != 4:
-        raise PatchfemError(
-            f"{source}: a window of an areal scan needs four positions: from and to in x, from and "
-            "to in y"
+    is_scan = isinstance(surface, Areal)
+    if len(ends) != (4 if is_scan else 2):
+        needed = (
+            "four positions: from and to in x, from and to in y" if is_scan else "two positions"
         )
-    columns = _find_part(f"{source}: the window", "the scan runs in x", surface.x, ends[:2])
-    lines = _find_part(f"{source}: the window", "the scan runs in y", surface.y, ends[2:])
-    return replace(surface, x=surface.x[columns], y=surface.y[lines], z=surface.z[lines, columns])
+        raise PatchfemError(f"{source}: a window of this surface needs {needed}")
+    columns = _find_part(source, "x", surface.x, ends[:2])
+    if not is_scan:
+        return replace(surface, x=surface.x[columns], z=surface.z[columns])
+    rows = _find_part(source, "y", surface.y, ends[2:])
+    return replace(surface, x=surface.x[columns], y=surface.y[rows], z=surface.z[rows, columns])
 
 
-def _find_part(window: str, extent: str, axis: np.ndarray, ends: tuple) -> slice:
+def _find_part(source: str, name: str, axis: np.ndarray, ends: tuple[float, ...]) -> slice:
     first, last = ends
     near = 1e-6 * float(axis[-1] - axis[0]) / (axis.size - 1)
     if not first < last or first < axis[0] - near or last > axis[-1] + near:
         raise PatchfemError(
-            f"{window} runs from {format_length(first)} to {format_length(last)}, but {extent} from "
-            f"{format_length(axis[0])} to "
-            f"{format_length(axis[-1])}"
+            f"{source}: the window runs from {format_length(first)} to {format_length(last)}, but the "
+            f"surface along {name} from {format_length(axis[0])} to {format_length(axis[-1])}"
         )
     low, high = (max(int(np.searchsorted(axis, end + near, "right")) - 1, 0) for end in ends)
     return slice(low, high + 1)
@@ -271,102 +276,21 @@ def _require_samples(trace: Profile) -> Profile:
     if trace.x.size < MIN_SAMPLES:
         plural = "s" * (trace.x.size != 1)
         raise PatchfemError(
-            f"{trace.source}: {trace.x.size} sample{plural}; the parameters need at least "
-            f"{MIN_SAMPLES}"
+            f"{trace.source}: {trace.x.size} sample{plural}; the parameters need at least {MIN_SAMPLES}"
         )
     return trace
 
 
-def _make_quantity(row: Parameter, value: float | None, intervals: Intervals) -> Quantity:
-    """Combine a value with its interval, or with the reason why there is none."""
-    heights = intervals.heights
-    if value is None:
-        reason = "the heights of the trace do not determine this parameter"
-        if heights.power == 0:
-            reason = "the trace is flat"
-        elif not len(heights.sections):
-            reason = "the trace is shorter than one cut-off"
-        return make_unknown(row.unit, row.text, reason)._replace(name=row.name)
-    low, high = intervals.confidence_interval(row, value)
-    if (
-        row.kind == "wave"
-        and low is not None
-        and not (heights.step <= low <= value <= high <= heights.length)
-    ):
-        low = None
-        high = None
-    reason = ""
-    if low is None and heights.power:
-        reason = NO_INTERVAL
-        if intervals.is_uneven and row.kind not in ("", *LATERAL):
-            reason = NOT_GAUSSIAN
-        elif row.kind in SIZES and intervals.is_short:
-            reason = TOO_SHORT
-    return Quantity(value, low, high, row.unit, row.text, reason, row.name)
-
-
-def _make_band_quantity(row: Parameter, trace: Profile, intervals: Intervals) -> Quantity:
-    low, high = BAND
-    heights = intervals.heights
-    text = row.text.replace("the band", f"{format_length(low)} to {format_length(high)}")
-    try:
-        refuse_band(trace.source, low, high, heights.length - heights.step, heights.step)
-    except PatchfemError as error:
-        return make_unknown(row.unit, text, str(error))._replace(name=row.name)
-    return _make_quantity(
-        row._replace(text=text), band_amplitude(intervals.spectrum, low, high), intervals
-    )
-
-
-def _describe_spikes(surface: Profile | Areal) -> tuple:
+def _describe_spikes(surface: Profile | Areal) -> tuple[str, ...]:
     """Describe the spikes of a surface in a sentence, or return () if there are none."""
     is_spike = find_scan_spikes(surface) if isinstance(surface, Areal) else find_spikes(surface)
     count = int(is_spike.sum())
     if not count:
         return ()
     *row, column = np.argwhere(is_spike)[0]
-    place = f"x = {format_length(surface.x[column])}" + "".join(
-        f", y = {format_length(surface.y[k])}" for k in row
-    )
+    place = f"x = {format_length(surface.x[column])}"
+    place += "".join(f", y = {format_length(surface.y[k])}" for k in row)
+    clause = f"are spikes (the first at {place}), which count"
     if count == 1:
         clause = f"is a spike (at {place}), which counts"
-    else:
-        clause = f"are spikes (the first at {place}), which count"
     return (f"{surface.source}: {count} of {is_spike.size} heights {clause} in every parameter",)
-
-
-def _describe_resampling(part: Profile, trace: Profile, primary: Profile) -> tuple:
-    """State by how much resampling changes Pa and Pq of an uneven trace.
-
-    Straight lines between samples cut peaks and valleys off. The reference are the heights of the
-    file about the same form, each weighted by the length that it represents.
-    """
-    known = ~part.missing
-    x = part.x[known]
-    weight = np.gradient(x) / np.gradient(x).sum()
-    z = part.z[known] - np.interp(x, trace.x, trace.z - primary.z)
-    z = z - weight @ z
-    weighted = {"Pa": weight @ np.abs(z), "Pq": np.sqrt(weight @ z**2)}
-    resampled = {"Pa": np.abs(primary.z).mean(), "Pq": np.sqrt(np.mean(primary.z**2))}
-    if min(weighted.values()) <= 0:
-        return ()
-    changes = [
-        f"{name} by {100 * abs(resampled[name] / value - 1):.2g} %"
-        for name, value in weighted.items()
-    ]
-    return (
-        f"{trace.source}: resampling changes {' and '.join(changes)}, compared with the heights of "
-        "the file weighted by the length that each stands for; no interval includes this error",
-    )
-
-
-def _describe_short_trace(roughness: Profile, cutoff: float) -> tuple:
-    """State that a roughness profile is shorter than one section, or return () if it is not."""
-    if roughness.length >= cutoff * (1 - 1e-9):
-        return ()
-    return (
-        f"{roughness.source}: half a cut-off is trimmed at each end, and the "
-        f"{format_length(roughness.length)} that remain are shorter than one section of {format_length(cutoff)}, the "
-        "least that ISO 21920 needs; do not use these roughness parameters: evaluate a longer "
-        "part, or take a shorter cut-off",
-    )

@@ -39,12 +39,6 @@ class Spectrum:
         """Spacing of the frequencies [1/m]."""
         return float(self.frequency[1] - self.frequency[0])
 
-    def band(self, probability: float = 0.95) -> tuple[np.ndarray, np.ndarray]:
-        """Return bounds (k,) [m3] that contain the true density with a given probability."""
-        freedom = 2 * self.tapers
-        low, high = (chi_square_factor(freedom, (1 + side * probability) / 2) for side in (1, -1))
-        return self.density * low, self.density * high
-
     @cached_property
     def dominant_wavelength(self) -> float | None:
         """Wavelength [m] whose octave contains most of the mean square, or None for a flat trace.
@@ -74,19 +68,6 @@ class Spectrum:
         total = np.concatenate([[0.0], np.cumsum(means * self.step)])
         ends = np.interp([1 / high, 1 / low], self.frequency, total)
         return float(ends[1] - ends[0])
-
-    def density_between(self, low: float, high: float) -> np.ndarray:
-        """Return the density (k,) [m3] of the waves from `low` to `high` [m]; it is 0 at other frequencies."""
-        return np.where(
-            (self.frequency >= 1 / high) & (self.frequency <= 1 / low), self.density, 0.0
-        )
-
-
-def chi_square_factor(freedom: float, probability: float) -> float:
-    """Return the factor from the estimate of a mean square to its bound."""
-    from scipy.special import chdtri
-
-    return float(freedom / chdtri(freedom, 1 - probability))
 
 
 def estimate_spectrum(z: np.ndarray, step: float, tapers: int | None = None) -> Spectrum:

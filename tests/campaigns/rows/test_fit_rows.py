@@ -9,14 +9,14 @@ from command_line import run_cli
 
 import patchfem as pf
 from patchfem import SceneError, run
-from patchfem.campaigns import FitRequest, RowsOptions, fit_rows
 from patchfem.campaigns.rows.cells import read_response_table
-from patchfem.campaigns.rows.condition_models import ConditionModels
-from patchfem.campaigns.rows.fit import SearchSettings
+from patchfem.campaigns.rows.checkpoint import SearchCheckpoint
+from patchfem.campaigns.rows.condition_models import ConditionModels, FitRequest
+from patchfem.campaigns.rows.fit import RowsOptions, SearchSettings, fit_rows
 from patchfem.campaigns.rows.model_readings import ModelReadings
 from patchfem.campaigns.rows.search import make_residual
 from patchfem.core import G_N, PatchfemError
-from patchfem.export.fits.rows import SearchCheckpoint, rows_fit_data
+from patchfem.export.fits import describe_rows_fit
 from patchfem.scene import load, loads, read_ranges
 
 MIL = 25.4e-6
@@ -132,13 +132,13 @@ def test_exact_linear_rig_is_recovered_from_closed_form(tmp_path):
         starts=3,
     )
     assert found.keys.fit.values == pytest.approx([141.0, 0.03, 1.3, 0.8], rel=1e-6)
-    assert rows_fit_data(found)["reading"] == {
+    assert describe_rows_fit(found).details["reading"] == {
         "reading": "peak",
         "reading_cutoff": None,
         "acceleration_gain": found.keys.fit.values[2],
         "displacement_gain": found.keys.fit.values[3],
     }
-    assert found.compute_scores(found.logs, found.left_out_logs)["fitted"]["all"] < 1e-6
+    assert found.compute_scores()["fitted"]["all"] < 1e-6
 
 
 RUBS_FREE = ("friction.static=0.3..0.6,structure.bonded.stiffness=1e6 N/m..6e6 N/m",)
@@ -206,14 +206,13 @@ def test_always_held_out_rows_do_not_affect_fit(tmp_path, friction_rows):
         fit_to_rows(scene, write_rows(tmp_path, each), wanted, leave_out="frequency", starts=1)
         for each in (rows, other)
     )
-    assert [fold.name for fold in one.folds] == ["135 Hz", "143 Hz", "150 Hz"]
-    assert np.array_equal(one.folds[2].search.fit.values, two.folds[2].search.fit.values)
-    assert not np.array_equal(one.folds[0].search.fit.values, two.folds[0].search.fit.values)
-    assert (
-        one.compute_scores(one.logs, one.left_out_logs)["left_out"]["all"]
-        < 1e-3
-        < two.compute_scores(two.logs, two.left_out_logs)["left_out"]["all"]
-    )
+    # the fit without 150 Hz does not see the changed readings, the other two fits do
+    is_changed = one.cells.conditions[one.cells.condition][:, 0] == 150
+    change = two.left_out_logs - one.left_out_logs
+    expected = np.where(one.cells.is_acceleration, -np.log(3), np.log(2))
+    assert change[is_changed] == pytest.approx(expected[is_changed], abs=1e-12)
+    assert np.abs(change[~is_changed]).min() > 0
+    assert one.compute_scores()["left_out"]["all"] < 1e-3 < two.compute_scores()["left_out"]["all"]
 
 
 def test_exact_fit_readings_equal_marched_rows(tmp_path, friction_rows):
@@ -256,10 +255,7 @@ def test_exact_rows_flagged_u_are_lower_bounds(tmp_path):
         assert np.all(logs[cells.unstable] > 0) == is_above
         assert np.array_equal(found["bound"], np.where(cells.unstable, np.minimum(logs, 0), logs))
     stable = fit_to_rows(scene, path, read_free_keys(*LINEAR_FREE), starts=1)
-    whole, without = (
-        stable.compute_scores(stable.logs, stable.left_out_logs, only_stable=part)["fitted"]
-        for part in (False, True)
-    )
+    whole, without = (stable.compute_scores(only_stable=part)["fitted"] for part in (False, True))
     assert without["all"] == pytest.approx(np.sqrt(np.mean(stable.logs[~cells.unstable] ** 2)))
     assert whole != without
 
@@ -310,7 +306,7 @@ def test_refuses_keys_that_rows_do_not_determine(tmp_path, sets, wanted, match):
 
 
 def test_exact_fit_command_writes_documented_json(tmp_path):
-    """`patchfem fit` writes values, intervals, scores, null models and folds in the documented form."""
+    """`patchfem fit` writes values, intervals and scores in the documented form."""
     out = tmp_path / "out"
     rows = make_linear_rows(0.02)
     given = [
@@ -334,19 +330,12 @@ def test_exact_fit_command_writes_documented_json(tmp_path):
     answer = json.loads((out / "fit.json").read_text())
     one = answer["values"]["structure.mode.axial.frequency"]
     assert one["low"] < one["value"] < one["high"] and one["unit"] == "Hz"
-    assert set(answer["nulls"]) == {"constant", "power_input", "power_input_frequency"}
-    for scores in (answer["scores"], answer["scores_stable"], *answer["nulls"].values()):
+    for scores in (answer["scores"], answer["scores_stable"]):
         assert all(
             set(scores[part]) == {"acceleration", "displacement", "all"}
             for part in ("fitted", "held_out", "left_out")
         )
-    assert [fold["left_out"] for fold in answer["folds"]] == [
-        "120 Hz",
-        "135 Hz",
-        "143 Hz",
-        "150 Hz",
-    ]
-    assert "null power_input_frequency" in text and "held out" in text
+    assert "left out" in text and "held out" in text
     assert "2 of 2 starts led to within 1 %" in text
     with open(out / "fit.csv", newline="", encoding="utf-8") as file:
         written = list(csv.DictReader(file))
@@ -395,32 +384,13 @@ def test_exact_invalid_stored_starts_are_ignored(tmp_path, text):
     assert SearchCheckpoint(tmp_path / "starts.json", "one", True).known == {}
 
 
-def test_exact_placebos_are_complete_fits(tmp_path):
-    """A placebo with the true damping gives the same fit, and one with another damping a large residual."""
-    scene = write_and_load(tmp_path, LINEAR, "structure.mode.axial.damping=0.03")
-    found = fit_to_rows(
-        scene,
-        write_rows(tmp_path, make_linear_rows()),
-        read_free_keys("structure.mode.axial.frequency=120 Hz..160 Hz"),
-        placebos=("structure.mode.axial.damping=0.03,0.1",),
-        starts=1,
-    )
-    own, other = found.placebos
-    assert own.text == "structure.mode.axial.damping=0.03"
-    assert other.text == "structure.mode.axial.damping=0.1"
-    assert own.search.fit.values == pytest.approx(found.keys.fit.values, rel=1e-12)
-    rms = [float(np.sqrt(np.mean(one.logs**2))) for one in (own, other)]
-    assert rms[0] < 1e-6 and rms[1] > 0.1
-
-
 @pytest.mark.parametrize(
     "words, message",
     [
         (["--offset", "force"], "applies only to fits to a loop"),
-        (["--placebo", "friction.static"], "table.key=value,value"),
+        (["--placebo", "friction.static=0.1"], "fit --placebo was removed"),
+        (["--from-patch"], "fit --from-patch was removed"),
         (["--leave-out", "displacement"], "no column"),
-        (["--placebo", "structure.mode.axial.damping=0.01,0.2"], "already fits this key"),
-        (["--placebo", "structure.mode.axial.slide=1,x"], "a plain number is needed"),
         (["--leave-out", "input"], "leaves no rows"),
         (["--unstable", "maybe"], "unstable"),
     ],

@@ -1,13 +1,11 @@
-"""Rows of measured responses as readings: conditions, repeats, flags, scores and null models."""
+"""Rows of measured responses as readings: conditions, repeats, flags and scores."""
 
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from patchfem.campaigns import NULL_MODELS, compute_rms_scores
 from patchfem.campaigns.rows.cells import MAX_LOG_RATIO, read_response_table
-from patchfem.campaigns.rows.null_models import fit_null_model
 from patchfem.core import G_N, PatchfemError
 
 TABLE_1 = Path(__file__).parents[3] / "studies" / "rig" / "table1.csv"
@@ -95,57 +93,3 @@ def test_refuses_rows_without_positive_values(tmp_path, row, wanted):
     """Rows with values that have no logarithm are refused."""
     with pytest.raises(PatchfemError, match=wanted):
         read_response_table(write_table(tmp_path, row))
-
-
-def test_exact_table_1_null_models_agree_with_closed_forms():
-    """Null models of table 1 agree with a mean of logarithms within 1e-12 and with normal equations within 1e-8."""
-    cells = read_response_table(TABLE_1)
-    f, a = cells.conditions[cells.condition].T
-    train = ~cells.select_readings("frequency=135 Hz,150 Hz,155 Hz")
-    every = np.ones(train.size, bool)
-    for kind in (cells.is_acceleration, ~cells.is_acceleration):
-        ratio = np.log(cells.measured / a)
-        logs, _ = fit_null_model(cells, "constant", train)
-        assert np.abs(logs - (ratio[kind & train].mean() - ratio))[kind].max() < 1e-12
-    table = np.stack([0 * f + 1, np.log(a), np.log(f)], axis=1)[cells.is_acceleration]
-    y = np.log(cells.measured)[cells.is_acceleration]
-    factor = np.linalg.solve(table.T @ table, table.T @ y)
-    logs, numbers = fit_null_model(cells, "power_input_frequency", every)
-    assert np.abs(logs[cells.is_acceleration] - (table @ factor - y)).max() < 1e-8
-    assert numbers["acceleration"] == pytest.approx(
-        {"factor": np.exp(factor[0]), "input": factor[1], "frequency": factor[2]}, rel=1e-6
-    )
-
-
-def test_exact_table_1_null_scores_with_frequency_left_out():
-    """The scores of null models of table 1 with one frequency left out agree with an independent program:
-
-    0.125 and 0.090.
-    """
-    cells = read_response_table(TABLE_1)
-    every = np.ones(cells.row.size, bool)
-    found = {}
-    for name in NULL_MODELS:
-        left = np.full(cells.row.size, np.nan)
-        for part in cells.group_by_column("frequency", every).values():
-            left[part] = fit_null_model(cells, name, ~part)[0][part]
-        found[name] = compute_rms_scores(cells, left, every)
-    assert found["constant"] == pytest.approx(
-        {"acceleration": 0.125, "displacement": 0.580, "all": 0.298}, abs=6e-4
-    )
-    assert found["power_input_frequency"]["acceleration"] == pytest.approx(0.090, abs=6e-4)
-
-
-def test_exact_null_model_keeps_undetermined_powers(tmp_path):
-    """A null model keeps a power of 0 for a single frequency, and of 1 for a single input."""
-    cells = read_response_table(write_table(tmp_path, "143,4,5,,", "143,5,7,,", "150,4,9,,"))
-    one = fit_null_model(cells, "power_input_frequency", np.array([True, True, False]))[1][
-        "acceleration"
-    ]
-    assert one["frequency"] == pytest.approx(0.0, abs=1e-12)
-    assert one["input"] == pytest.approx(np.log(7 / 5) / np.log(5 / 4), rel=1e-12)
-    two = fit_null_model(cells, "power_input_frequency", np.array([True, False, True]))[1][
-        "acceleration"
-    ]
-    assert two["input"] == pytest.approx(1.0, abs=1e-12)
-    assert two["frequency"] == pytest.approx(np.log(9 / 5) / np.log(150 / 143), rel=1e-12)

@@ -11,9 +11,13 @@ import pytest
 from command_line import run_cli
 from scene_texts import BENCH
 
-from patchfem.campaigns import Cases, SweepScene, WorkerData, environment_versions
+from patchfem.campaigns import Cases, SweepScene, WorkerData
 from patchfem.campaigns.sweeps.executors import cluster
-from patchfem.campaigns.sweeps.executors.cluster import Cluster, _compute_on_worker
+from patchfem.campaigns.sweeps.executors.cluster import (
+    Cluster,
+    _compute_on_worker,
+    environment_versions,
+)
 from patchfem.campaigns.sweeps.sweep import compute_chunk
 from patchfem.core import Missing
 from patchfem.scene import read_axes
@@ -50,7 +54,7 @@ def test_exact_worker_in_other_folder_uses_scene_files(scene_path, monkeypatch):
     """A worker in another folder reads the files of the scene, gives the same results, and stays in its folder."""
     monkeypatch.chdir(scene_path.parent)
     work = make_work(Path("bench.toml"), BY_FILE)
-    want, _ = compute_chunk(work, [0, 1, 2])
+    _, (want, _) = compute_chunk(work, [0, 1, 2])
     there = make_work(scene_path, BY_FILE)
     mine = environment_versions(work)
     monkeypatch.chdir(scene_path.parents[1] / "there")

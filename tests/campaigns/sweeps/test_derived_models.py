@@ -85,10 +85,23 @@ def are_identical(a, b) -> bool:
     return a == b and repr(a) == repr(b)
 
 
+def derive_model(sweep_scene: SweepScene, sets: tuple, values: tuple):
+    """Return the model of a case that is derived from the first model; None if this is not possible."""
+    keys = [text.partition("=")[0] for text in sets]
+    try:
+        models = sweep_scene.make_similar_models(
+            keys, np.array([values]), lambda _: tuple(sets), np.zeros(1, int)
+        )
+    except PatchfemError:
+        return None
+    return models and models[0]
+
+
 def model_or_reason(sweep_scene: SweepScene, sets: tuple, values: tuple):
     """Return the model of a case, or the message of the error that prevents it."""
     try:
-        return sweep_scene.build_model(sets, values)
+        derived = derive_model(sweep_scene, sets, values) if values else None
+        return derived or sweep_scene.build_model(sets)
     except PatchfemError as error:
         return str(error)
 
@@ -140,7 +153,7 @@ def test_exact_derived_models_equal_models_built_from_text(name):
         built = model_or_reason(sweep_scene, sets, ())
         assert are_identical(derived, built), sets
         n_derived += (
-            sweep_scene._derive_model(sets, values) is not None if not isinstance(built, str) else 0
+            derive_model(sweep_scene, sets, values) is not None if not isinstance(built, str) else 0
         )
     assert n_derived == 0 if name == "duration" else n_derived > 5
 
@@ -162,7 +175,7 @@ def test_exact_derived_patches_equal_patches_built_from_text(name):
         sets = format_case(chosen_keys, values, 0)
         values = tuple(values[0].tolist())
         is_derived = "friction.static" not in chosen_keys or "kinetic" not in PATCHES[name]
-        assert (sweep_scene._derive_model(sets, values) is not None) == is_derived
+        assert (derive_model(sweep_scene, sets, values) is not None) == is_derived
         assert are_identical(
             model_or_reason(sweep_scene, sets, values), model_or_reason(sweep_scene, sets, ())
         ), sets
@@ -172,11 +185,11 @@ def test_exact_derived_patches_equal_patches_built_from_text(name):
         (("contact.tilt.angle=0.2 rad",), (0.2,)),
         (("contact.load=1e12 N",), (1e12,)),
     ):
-        assert sweep_scene._derive_model(sets, values) is None and are_identical(
+        assert derive_model(sweep_scene, sets, values) is None and are_identical(
             model_or_reason(sweep_scene, sets, values), model_or_reason(sweep_scene, sets, ())
         )
     for text in (HELD, PATCHES["rigid"] + '[structure.bonded]\nstiffness = "1e5 N/m"\n'):
-        assert SweepScene(Path("b.toml"), text)._derive_model(("contact.load=3 N",), (3.0,)) is None
+        assert derive_model(SweepScene(Path("b.toml"), text), ("contact.load=3 N",), (3.0,)) is None
 
 
 ONE = POINT + "{}" + MODE + DRIVE

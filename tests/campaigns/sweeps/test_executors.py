@@ -15,7 +15,6 @@ from scene_texts import BENCH, COULOMB, POINT, SHORT
 
 from patchfem.campaigns import (
     Cases,
-    RemainingTime,
     Request,
     SweepScene,
     WorkerData,
@@ -28,7 +27,7 @@ from patchfem.campaigns.sweeps.executors.cluster import Cluster
 from patchfem.campaigns.sweeps.executors.pool import Pool
 from patchfem.campaigns.sweeps.sweep import MAX_DEATHS, ChunkQueue
 from patchfem.core import Missing, PatchfemError
-from patchfem.export import SweepTarget, sweep_into
+from patchfem.export.sweeps.run import SweepTarget, sweep_into
 from patchfem.runs import FAILED_OUTCOME, CaseResults
 from patchfem.runs.batch.case_results import join_case_results
 from patchfem.scene import read_axes
@@ -150,16 +149,6 @@ def test_exact_failed_chunk_is_bisected():
     assert len(completed) <= 10
 
 
-def test_exact_remaining_time_after_first_chunks():
-    """The remaining time is estimated from all chunks except the first of each worker, which load code."""
-    clock = RemainingTime(4000, 2)
-    assert (
-        clock(1, 7.0) is None and clock(1, 9.0) is None
-    )  # The first chunk of each worker also loads code.
-    assert clock(998, 9.98) == pytest.approx(15.0)  # 3000 cases of 10 ms on two workers
-    assert clock(1000, 2.0) < 2000 * 0.01 / 2 and clock.n_remaining == 2000
-
-
 @pytest.mark.slow
 def test_exact_cluster_equals_local_executor():
     """A Dask cluster gives the same results as a single process."""
@@ -214,7 +203,7 @@ def test_exact_progress_counts_stored_cases(tmp_path):
             cases,
             target,
             LocalExecutor(),
-            report_progress=lambda *state: progress.append(state[:2]),
+            report_progress=lambda *state: progress.append(state),
         )
 
     sweep("0.1,0.2", False)

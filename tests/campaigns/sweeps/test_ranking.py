@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 from scipy.stats import qmc
+from sweep_tables import make_random_table, make_table
 
-from patchfem.campaigns import compute_sobol_indices
+from patchfem.campaigns.sweeps.ranking import compute_quantiles, rank_keys
 
 # Closed forms for a = 7, b = 0.1 (Ishigami and Homma 1990).
 WHOLE = 0.1 * np.pi**4 / 5 + 0.01 * np.pi**8 / 18 + 0.5 + 49 / 8
@@ -28,12 +29,10 @@ def draw_points(count, keys, seed):
     return qmc.Sobol(keys, rng=np.random.default_rng(seed)).random(count)
 
 
-def compute_indices(x, values, errors=0.0, shape=None):
-    """Return the Sobol indices of a measure, or None if they cannot be determined."""
-    keys = [(f"k{k}", column) for k, column in enumerate(x.T)]
-    return compute_sobol_indices(
-        keys, {"loop_area": (values, np.broadcast_to(errors, values.shape))}, shape
-    ).get("loop_area")
+def compute_indices(x, values, errors=0.0):
+    """Return the Sobol indices of a measure of random cases, or None if they cannot be determined."""
+    table = make_random_table(x, {"loop_area": values}, errors=errors)
+    return rank_keys(table).get("loop_area")
 
 
 def collect_indices(indices):
@@ -85,15 +84,15 @@ def test_exact_indices_of_grid_agree_with_its_variances():
 
     For y = 2 a + b + a b with a and b of mean 0 the parts are 4 V(a), V(b) and V(a) V(b).
     """
-    a, b = np.meshgrid([-1.0, 0.0, 1.0], [-3.0, 1.0, 1.0, 1.0], indexing="ij")
-    x = np.stack([a.ravel(), b.ravel()], axis=1)
-    values = (2 * a + b + a * b).ravel()
+    keys = {"k0": [-1.0, 0.0, 1.0], "k1": [-3.0, 1.0, 1.0, 1.0]}
+    a, b = np.meshgrid(*keys.values(), indexing="ij")
+    values = 2 * a + b + a * b
     parts = np.array([4 * 2 / 3, 3.0, 2.0])
-    indices = collect_indices(compute_indices(x, values, shape=(3, 4)))
+    indices = collect_indices(rank_keys(make_table(keys, {"loop_area": values}))["loop_area"])
     np.testing.assert_allclose(indices["first"], parts[:2] / parts.sum(), rtol=1e-12)
     np.testing.assert_allclose(indices["total"], (parts[:2] + 2) / parts.sum(), rtol=1e-12)
-    values[3] = np.nan
-    assert compute_indices(x, values, shape=(3, 4)) is None  # a grid with a missing value
+    values[0, 3] = np.nan
+    assert rank_keys(make_table(keys, {"loop_area": values})) == {}
 
 
 def test_always_undetermined_indices_are_omitted():
@@ -114,3 +113,18 @@ def test_always_undetermined_indices_are_omitted():
     assert [one.key for one in indices] == ["k0", "k1", "k2"] and indices[0].total == pytest.approx(
         0.9, abs=0.01
     )
+
+
+def test_exact_quantiles_of_uniform_cases():
+    """The quantiles of a measure that is uniform in [0, 1] are 0.05, 0.5 and 0.95 within the spacing of 1024 cases.
+
+    If more than a tenth of the cases has not settled, they are not known.
+    """
+    x = draw_points(1024, 2, 3)
+    outcome = np.full(1024, "steady", object)
+    table = make_random_table(x, {"loop_area": x[:, 0]}, outcome=outcome)
+    np.testing.assert_allclose(
+        compute_quantiles(table)["loop_area"], [0.05, 0.5, 0.95], atol=2 / 1024
+    )
+    outcome[:200] = "transient"
+    assert compute_quantiles(table) == {}

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from command_line import run_cli
+from scipy.io import loadmat
 
 import patchfem as pf
 from patchfem.response import DecayCurve
@@ -124,7 +125,7 @@ def test_always_export_states_time_of_reduced_rows(decay_folders, tmp_path):
     assert run_cli("run", tmp_path / "long.toml", "-o", tmp_path / "long", "--no-page").code == 0
     answer = run_cli("export", tmp_path / "long", "-o", tmp_path / "long.csv", "--histories")
     assert "before 10.9 s the rows are turning points" in answer.out
-    assert "1000 cycles (drive.cycles)" in answer.out
+    assert "fewer drive.cycles give even rows" in answer.out
 
 
 def test_always_decay_import_reports_sparse_samples(tmp_path):
@@ -179,19 +180,18 @@ def test_exact_export_of_scene_ignores_its_sweep(tmp_path):
     text = read_template("damper")
     assert "[sweep]" in text
     (tmp_path / "damper.toml").write_text(text, "utf-8")
-    answer = run_cli("export", tmp_path / "damper.toml", "-o", tmp_path / "damper.npz")
+    answer = run_cli("export", tmp_path / "damper.toml", "-o", tmp_path / "damper.mat")
     assert answer.code == 0
     assert "[sweep] is left out: structure.interface[1].load as the scene gives it" in answer.err
-    assert "in these coordinates x the output is output·x" in answer.out
-    assert "row i of slide·x" in answer.out
     scene_without_sweep = "\n".join(
         line
         for line in text.splitlines()
         if not line.startswith(("[sweep]", '"structure.interface'))
     )
     (tmp_path / "alone.toml").write_text(scene_without_sweep, "utf-8")
-    pf.export(tmp_path / "alone.toml", tmp_path / "alone.npz")
-    with np.load(tmp_path / "damper.npz") as exported, np.load(tmp_path / "alone.npz") as reference:
-        assert set(exported.files) == set(reference.files)
-        assert all(np.array_equal(exported[name], reference[name]) for name in exported.files)
-        assert exported["limit"] == pytest.approx([0.3 * 1140.0], rel=1e-12)
+    pf.export(tmp_path / "alone.toml", tmp_path / "alone.mat")
+    exported, reference = (loadmat(tmp_path / f"{name}.mat") for name in ("damper", "alone"))
+    assert set(exported) == set(reference)
+    names = [name for name in exported if not name.startswith("__")]
+    assert all(np.array_equal(exported[name], reference[name]) for name in names)
+    assert exported["limit"].item() == pytest.approx(0.3 * 1140.0, rel=1e-12)

@@ -1,6 +1,7 @@
 """Histories and loops in laboratory formats agree to the last bit when other programs read them."""
 
 import json
+import shutil
 
 import h5netcdf
 import numpy as np
@@ -11,8 +12,9 @@ from lab_files import BOND, MU, SCENE, SI, elastic_plastic_loop, make_record, wr
 from scipy.io import loadmat
 
 from patchfem.core import PatchfemError
-from patchfem.export.lab.series import Column, Histories
-from patchfem.export.lab.universal import write_histories
+from patchfem.export import store
+from patchfem.export.answer import Answer, Variable
+from patchfem.export.lab.write import export_histories
 from patchfem.inputs import read_loop
 
 TWO_MODES = """\
@@ -78,17 +80,16 @@ def test_exact_universal_file_survives_import_fit_and_export(tmp_path):
     values = json.loads(answer.out)["values"]
     assert values["friction.static"]["value"] == pytest.approx(MU, rel=1e-6)
     assert values["friction.bond_length"]["value"] == pytest.approx(BOND, rel=1e-6)
-    assert "measured" in (tmp_path / "fit/fit.svg").read_text()
     assert run_cli("export", tmp_path / "fit", "-o", tmp_path / "back.uff").code == 0
     exported = read_uff_functions(tmp_path / "back.uff")
-    for name, expected, kind in (("displacement", slide, 8), ("force", force, 13)):
+    for name, expected, kind in (("slide", slide, 8), ("force", force, 13)):
         assert exported[name]["data"].tobytes() == expected.tobytes()
         assert exported[name]["x"].tobytes() == time.tobytes()
         assert (
             exported[name]["ordinate_spec_data_type"] == kind and exported[name]["func_type"] == 1
         )
-    measured = exported["force over displacement"]
-    fitted = exported["fitted over displacement"]
+    measured = exported["force over slide"]
+    fitted = exported["fitted over slide"]
     assert measured["x"].tobytes() == slide.tobytes()
     assert measured["data"].tobytes() == force.tobytes()
     assert fitted["data"] == pytest.approx(force, abs=1e-4)
@@ -98,7 +99,7 @@ def test_exact_universal_file_survives_import_fit_and_export(tmp_path):
         "-o",
         tmp_path / "again.csv",
         "--map",
-        "displacement=displacement",
+        "displacement=slide",
         "--map",
         "force=force",
     )
@@ -133,8 +134,8 @@ def test_exact_exported_histories_equal_result_file(bench_folder, tmp_path):
         assert np.array_equal(table[column[0]], histories[name]), name
     assert "relative_velocity [m s-1]" in header and mat["units"]["friction_force"] == "N"
     assert np.array_equal(mat["normal_stress"], stress)  # .mat holds arrays of any shape
-    loop = uff["friction_force over relative_displacement"]
-    assert np.array_equal(loop["x"], histories["relative_displacement"])
+    loop = uff["friction_force over slide"]
+    assert np.array_equal(loop["x"], histories["slide"])
     assert np.array_equal(loop["data"], histories["friction_force"]) and loop["func_type"] == 0
     units = next(
         one for one in pyuff.UFF(str(tmp_path / "a.uff")).read_sets() if one["type"] == 164
@@ -189,29 +190,36 @@ def test_refuses_history_export_with_wrong_options(
     assert not list(tmp_path.iterdir())
 
 
-def test_refuses_folder_without_histories(tmp_path):
+def test_refuses_folder_without_histories(bench_folder, tmp_path):
     """A folder that is absent, empty or has a damaged result.nc is refused with a message that states the cause."""
     for folder, out, code, message in (
         ("none", "a.uff", 4, "no such results folder"),
-        (".", "a.mat", 4, "neither"),
+        (".", "a.mat", 2, "it has no summary.json"),
     ):
         answer = run_cli("export", tmp_path / folder, "-o", tmp_path / out)
         assert answer.code == code and message in answer.err, answer.err
-    (tmp_path / "result.nc").write_bytes(b"\x89HDF\r\n\x1a\n spoilt")
-    assert "cannot be read as netCDF" in run_cli("export", tmp_path, "-o", tmp_path / "a.uff").err
+    shutil.copytree(bench_folder, tmp_path / "damaged")
+    (tmp_path / "damaged/result.nc").write_bytes(b"\x89HDF\r\n\x1a\n spoilt")
+    answer = run_cli("export", tmp_path / "damaged", "-o", tmp_path / "a.uff")
+    assert answer.code == 2 and "a file of this folder is damaged" in answer.err
 
 
 def test_refuses_non_finite_values_in_universal_file(tmp_path):
     """A value that is not finite is refused, because a universal file would store it as 0."""
-    (tmp_path / "fit.csv").write_text(
-        "time [s],displacement [m],force [N],fitted,held\n0,0,0,0,0\n1,1e-6,1,1,0\n"
-    )
-    histories = Histories(
-        "", np.arange(2.0), [Column("force", "N", np.array([0.0, np.nan]), 0)], {}
-    )
+    columns = {
+        name: Variable(("row",), np.array(values), unit)
+        for name, values, unit in (
+            ("time", [0.0, 1.0], "s"),
+            ("slide", [0.0, 1e-6], "m"),
+            ("force", [0.0, np.nan], "N"),
+        )
+    }
+    details = {"outcome": "done"}
+    store.write(Answer("fit", "", ("fitted",), data=columns, details=details), tmp_path)
     with pytest.raises(PatchfemError, match="force has values that are not finite"):
-        write_histories(tmp_path / "a.uff", histories)
-    assert run_cli("export", tmp_path, "-o", tmp_path / "a.uff").code == 0
+        export_histories(tmp_path, tmp_path / "a.uff")
+    assert not (tmp_path / "a.uff").exists()
+    assert "2 rows of slide, force" in export_histories(tmp_path, tmp_path / "a.mat")
 
 
 def test_exact_exported_run_is_readable_as_measured_loop(bench_folder, tmp_path):

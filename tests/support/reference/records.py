@@ -1,5 +1,9 @@
 """Pages of measures and of materials."""
 
+from collections.abc import Iterable
+
+from patchfem.export import quantities
+from patchfem.export import surface_definitions as definitions
 from patchfem.response.rows import ROWS as MOTION
 from patchfem.runs.results.patch_rows import ROWS as STATIC
 from patchfem.scene import MATERIALS
@@ -8,13 +12,31 @@ from .keys import FOLDER, format_table
 
 MADE = "`python tests/support/reference` generates this page from the program's own records."
 
+# parts of a worn track, whose names in an answer begin with track_
+TRACK_PARTS = (
+    "from",
+    "to",
+    "width",
+    "depth_mean",
+    "depth_floor",
+    "step",
+    "area_gross",
+    "area_net",
+    "pile_up",
+    "pile_up_left",
+    "pile_up_right",
+    "length",
+    "volume",
+    "direction",
+)
+
 
 class MeasuresPage:
-    """Page of the measures of `response.rows` and `runs.results.patch_rows`."""
+    """Page of the quantities of all verbs, from the tables that define them."""
 
     FILE = FOLDER / "MEASURES.md"
     HEAD = f"""\
-# Measures of a run
+# Measures
 
 {MADE}
 
@@ -36,6 +58,13 @@ separately: `slip_amplitude_2` is the slip amplitude of the second interface or 
 most 1e-5 of a/omega^2, the displacement amplitude of a drive with the acceleration amplitude a.
 """
 
+    STUDIES = """\
+A sweep has a `limit_` for each measure, such as `limit_loop_area`, and the `smallest_` and the `largest_` value of the
+measures that change most. A fit has a measure for each free key, such as `friction.static`, with its 95 % interval."""
+    SURFACES = """\
+A measure that begins with `track_` is that of the longest worn track. With `--pairs` a number at the end of a name is
+that of a group of pairs."""
+
     @classmethod
     def text(cls) -> str:
         """Return the page."""
@@ -44,6 +73,10 @@ most 1e-5 of a/omega^2, the displacement amplitude of a drive with the accelerat
             for rows in (STATIC, MOTION)
         )
         head = ("measure", "unit", "floor", "meaning")
+        surface_names = [
+            definitions.name_in_track(name) if name in TRACK_PARTS else name
+            for name in definitions.list_names()
+        ]
         return (
             "\n\n".join(
                 [
@@ -52,10 +85,25 @@ most 1e-5 of a/omega^2, the displacement amplitude of a drive with the accelerat
                     format_table(head, static_rows),
                     "## Of a motion",
                     format_table(head, motion_rows),
+                    "## Of a sweep, a backbone, a fit and a cost curve",
+                    cls.STUDIES,
+                    _format_definitions(quantities.QUANTITIES, ""),
+                    "## Of compare and profile",
+                    cls.SURFACES,
+                    _format_definitions(surface_names, "compare"),
                 ]
             )
             + "\n"
         )
+
+
+def _format_definitions(names: Iterable[str], kind: str) -> str:
+    """Return the table of the quantities with these names in an answer of this kind."""
+    rows = []
+    for name in names:
+        definition = quantities.find_definition(name, kind)
+        rows.append((f"`{name}`", definition.unit, definition.text))
+    return format_table(("measure", "unit", "meaning"), rows)
 
 
 def _format_floor(row) -> str:

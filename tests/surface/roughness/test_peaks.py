@@ -1,11 +1,9 @@
 """Peaks of a surface from mean squares of its traces, in a scene, and in the table that `profile` prints."""
 
 import re
-import tomllib
 
 import numpy as np
 import pytest
-from command_line import run_cli
 from scene_texts import PIECE
 from scipy.integrate import quad
 from scipy.ndimage import gaussian_filter1d
@@ -19,6 +17,7 @@ from patchfem.surface import (
     Profile,
     gaussian_peaks,
     persson_stiffness,
+    read_profile,
     trace_moments,
 )
 from patchfem.surface.roughness.peaks import rms_moments
@@ -131,20 +130,14 @@ def write_trace(folder, seed=1) -> str:
 
 
 def test_exact_three_ways_to_define_peaks_agree(tmp_path, monkeypatch):
-    """A trace file, its rms values as printed by `profile`, and its peaks give the same contact stiffness."""
+    """A trace file, its rms values, and its peaks give the same contact stiffness."""
     monkeypatch.chdir(tmp_path)
-    answer = run_cli("profile", write_trace(tmp_path))
-    block = answer.out[answer.out.index("[contact.asperities]") :].split("  At a pressure")[0]
-    found = tomllib.loads("\n".join(line.strip() for line in block.splitlines()))["contact"][
-        "asperities"
-    ]
-    rms = Moments(
-        float(found["rms_height"].split()[0]) * 1e-6,
-        found["rms_slope"],
-        float(found["rms_curvature"].split()[0]),
-    )
+    rms = trace_moments(read_profile(write_trace(tmp_path))).fine
     peaks = gaussian_peaks(rms)
-    pasted = PATCH + "".join(f"{key} = {value!r}\n" for key, value in found.items() if key != "law")
+    pasted = (
+        PATCH + f'rms_height = "{rms.height!r} m"\nrms_slope = {rms.slope!r}\n'
+        f'rms_curvature = "{rms.curvature!r} 1/m"\n'
+    )
     ways = [
         PATCH + 'from = "trace1.csv"\n',
         pasted,
@@ -208,15 +201,6 @@ def test_refuses_incomplete_peak_definition(keys, message, tmp_path):
     with pytest.raises(PatchfemError) as caught:
         pf.plan(tmp_path / "scene.toml")
     assert message in str(caught.value) and "asperities" in str(caught.value)
-
-
-def test_exact_profile_combines_two_faces(tmp_path):
-    """The command `profile` prints the rms height of two faces together, the root of the sum of squares."""
-    files = [write_trace(tmp_path, seed) for seed in (1, 2)]
-    profiles = pf.profile(*files)["profiles"]
-    combined = run_cli("profile", *files).out.partition("two faces")[2]
-    height = np.hypot(*(profile_data["asperities"]["rms_height"] for profile_data in profiles))
-    assert f'rms_height = "{height * 1e6:.5g} um"' in combined
 
 
 CUTOFF = 0.4e-3
@@ -283,48 +267,6 @@ def test_exact_cutoff_splits_trace_between_gap_and_asperities(tmp_path):
     ).fine
     # without the cut-off the long waves would count twice
     assert moments_of_all.height > 4 * skin.rms_height
-
-
-def test_exact_printed_peaks_give_same_patch(tmp_path, monkeypatch):
-    """The command `profile` prints the peaks below its cut-off, which in a scene give the same asperities.
-
-    Without the cut-off the verdict warns that long waves count twice.
-    """
-    monkeypatch.chdir(tmp_path)
-    rng = np.random.default_rng(11)
-    waves = [(2e-8 * n**-0.8, 12.7e-3 / n) for n in (5, *rng.integers(10, 900, 60).tolist())]
-    *_, skin, text = split_trace(tmp_path, waves)
-    answer = run_cli("profile", "trace.csv", "--cutoff", "0.4 mm")
-    profile_data = pf.profile("trace.csv", cutoff="0.4 mm")["profiles"][0]
-    assert profile_data["asperities"]["rms_height"] == pytest.approx(
-        profile_data["measures"]["Rq"]["value"], rel=1e-9
-    )
-    assert profile_data["asperities"]["cutoff"] == 0.4e-3
-    assert "only waves below the cut-off of 400 um" in answer.out
-    assert profile_data["asperities"]["rms_height"] == pytest.approx(skin.rms_height, rel=1e-9)
-    without_cutoff = run_cli("profile", "trace.csv").out
-    assert (
-        "cutoff =" not in without_cutoff
-        and "otherwise the long waves count twice" in without_cutoff
-    )
-    block = answer.out[answer.out.index("[contact.asperities]") :].split("  At a pressure")[0]
-    pasted = text.replace(
-        'from = "trace.csv"\ncutoff = "0.4 mm"\n',
-        "".join(f"{line.strip()}\n" for line in block.splitlines()[2:]),
-    )
-    pasted_skin = build(loads(pasted, tmp_path / "scene.toml")).patch.interface.skin
-    for name in ("radius", "density", "height_deviation"):
-        assert getattr(pasted_skin, name) == pytest.approx(getattr(skin, name), rel=1e-4), name
-    verdict_without_cutoff = pf.plan(
-        loads(pasted.replace('cutoff = "400 um"\n', ""), tmp_path / "scene.toml")
-    )
-    assert any(
-        "waves longer than 127 um" in sentence for sentence in verdict_without_cutoff.verdict
-    )
-    assert not any(
-        "longer than" in sentence
-        for sentence in pf.plan(loads(pasted, tmp_path / "scene.toml")).verdict
-    )
 
 
 def test_always_non_gaussian_heights_are_reported():

@@ -10,7 +10,7 @@ Read `LocalExecutor` first.
 from collections.abc import Callable, Iterator
 
 from ....core import PatchfemError
-from ..sweep import WorkerData, compute_chunk_with_time
+from ..sweep import WorkerData, compute_chunk
 from . import cluster, pool
 
 
@@ -38,7 +38,7 @@ class LocalExecutor:
             Chunk, seconds, and the result of `compute_chunk`.
         """
         while (chunk := next_chunk()) is not None:
-            yield chunk, *compute_chunk_with_time(work, chunk, say)
+            yield chunk, *compute_chunk(work, chunk, say)
 
 
 def make_executor(name: str = "", jobs: int = 1):

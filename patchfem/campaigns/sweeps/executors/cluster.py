@@ -18,7 +18,7 @@ import numpy as np
 
 from .... import __version__
 from ....core import Missing, PatchfemError
-from ..sweep import WorkerData, WorkerDeath, compute_chunk_with_time, output_results
+from ..sweep import WorkerData, WorkerDeath, compute_chunk
 
 _TLS = "DASK_DISTRIBUTED__COMM__TLS__"
 CERTIFICATES = f"{_TLS}CA_FILE, {_TLS}CLIENT__CERT and {_TLS}CLIENT__KEY"
@@ -246,9 +246,6 @@ def _compute_on_worker(work: WorkerData, chunk: list, origin: tuple) -> tuple | 
     worker_versions = environment_versions(work)
     if worker_versions != versions:
         return worker_versions
-    seconds, (results, extras) = compute_chunk_with_time(replace(work, write=None), chunk)
     folder = f"{work.sweep_scene.path.parent}{os.sep}"
     origin_folder = str(path.parent / "_")[:-1]
-    for case, text in results.messages.items():
-        results.messages[case] = text.replace(folder, origin_folder)
-    return seconds, output_results(work, chunk, results, extras)
+    return compute_chunk(work, chunk, rewrite=lambda text: text.replace(folder, origin_folder))

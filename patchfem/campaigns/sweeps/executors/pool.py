@@ -70,13 +70,6 @@ class Worker:
         self.chunk = None
         self.pipe.send(work)
 
-    def send_work(self, work: WorkerData) -> None:
-        """Send the data of the sweep with the shared meshes to the worker process."""
-        try:
-            self.pipe.send(work)
-        except OSError:
-            pass  # The process is dead, which `receive_result` detects once a chunk was sent.
-
     def send_chunk(self, chunk: list) -> None:
         """Send the case numbers of a chunk to the worker process."""
         self.chunk = chunk
@@ -110,28 +103,6 @@ class Pool:
 
     def __init__(self, workers: int):
         self.workers = workers
-        self.waiting_workers = []
-
-    def begin(self, work: WorkerData, count: int, say: Callable | None = None) -> None:
-        """Start worker processes early, so that they import their code while meshes are chosen.
-
-        Parameters
-        ----------
-        work : WorkerData
-            Data of the sweep without the shared meshes.
-        count : int
-            Number of cases.
-        say : callable, optional
-            Called with a line of text.
-        """
-        self.end()
-        for _ in range(min(self.workers, count)):
-            self.waiting_workers.append(_start_worker(work, silent=say is None))
-
-    def end(self) -> None:
-        """Kill the worker processes that have not received the shared meshes yet."""
-        while self.waiting_workers:
-            self.waiting_workers.pop().kill()
 
     def run(
         self, work: WorkerData, next_chunk: Callable, say: Callable | None = None
@@ -151,15 +122,20 @@ class Pool:
         ComputedChunk
             In the order in which the chunks finish.
         """
-        workers = self.waiting_workers
-        self.waiting_workers = []
+        workers: list[Worker] = []
         try:
-            for worker in workers:
-                worker.send_work(work)
             while True:
-                self._assign_chunks(
-                    workers, lambda: _start_worker(work, silent=say is None), next_chunk
-                )
+                # Idle processes continue, and processes are started while chunks remain.
+                idle = [worker for worker in workers if worker.chunk is None]
+                while idle or len(workers) < self.workers:
+                    chunk = next_chunk()
+                    if chunk is None:
+                        break
+                    if not idle:
+                        idle.append(_start_worker(work, silent=say is None))
+                        workers.append(idle[0])
+                    idle.pop().send_chunk(chunk)
+
                 busy = {worker.pipe: worker for worker in workers if worker.chunk is not None}
                 if not busy:
                     return
@@ -176,20 +152,6 @@ class Pool:
         finally:
             for worker in workers:
                 worker.kill()
-
-    def _assign_chunks(self, workers: list, start: Callable, next_chunk: Callable) -> None:
-        """Assign chunks to all idle processes, and start new processes while chunks remain."""
-        idle_workers = [worker for worker in workers if worker.chunk is None]
-        while idle_workers or len(workers) < self.workers:
-            chunk = next_chunk()
-            if chunk is None:
-                return
-            if idle_workers:
-                worker = idle_workers.pop(0)
-            else:
-                worker = start()
-                workers.append(worker)
-            worker.send_chunk(chunk)
 
 
 def _start_worker(work: WorkerData, *, silent: bool) -> Worker:

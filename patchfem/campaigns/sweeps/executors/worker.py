@@ -20,15 +20,9 @@ def main() -> None:
     pipe = Connection(int(sys.argv[1]))
     try:
         work = pipe.recv()
-        sweep.compile_for_first_case(work)
         say = None if sys.argv[2] else _print_to_stderr
         while True:
-            message = pipe.recv()
-            if isinstance(message, sweep.WorkerData):
-                # The data of the sweep arrive a second time, now with the shared meshes.
-                work = message
-            else:
-                pipe.send(sweep.compute_chunk_with_time(work, message, say))
+            pipe.send(sweep.compute_chunk(work, pipe.recv(), say))
     except (EOFError, BrokenPipeError, ConnectionResetError):
         # The pipe is closed because the process that started the sweep has ended.
         return

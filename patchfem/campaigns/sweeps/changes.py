@@ -1,0 +1,96 @@
+"""Change of measures over a sweep: the measure that changes most, and all results of an analysis."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from .limits import CHANGE_AT_LIMIT, KeyLimit, find_limits
+from .peaks import PeakOnLine, find_peaks
+from .ranking import SobolIndex, compute_quantiles, rank_keys
+from .sweep_table import SweepTable
+
+# Measures whose change over a sweep is compared, the most important first.
+MAIN_MEASURES = (*CHANGE_AT_LIMIT, "peak_frequency")
+
+
+class MeasureRange(NamedTuple):
+    """Smallest and largest value of a measure that count.
+
+    Attributes
+    ----------
+    measure : str
+    low_case, high_case : int
+        Their cases.
+    relative : float
+        Difference of both relative to the first case, or to the larger one if the first case does
+        not count; infinite if the first case has the value 0.
+    """
+
+    measure: str
+    low_case: int
+    high_case: int
+    relative: float
+
+
+@dataclass(frozen=True)
+class SweepAnalysis:
+    """What a sweep shows.
+
+    Attributes
+    ----------
+    cases : dict
+        Counts of `SweepTable.count_cases`.
+    ranges : list of MeasureRange
+        Ranges of the main measures that vary by more than their errors, largest change first; a
+        requested measure is the first one.
+    limits : list of KeyLimit
+    peaks : list of PeakOnLine
+    ranking : dict
+        List of SobolIndex by measure.
+    quantiles : dict
+        Quantiles of random cases by measure.
+    """
+
+    cases: dict[str, int | dict]
+    ranges: list[MeasureRange]
+    limits: list[KeyLimit]
+    peaks: list[PeakOnLine]
+    ranking: dict[str, list[SobolIndex]]
+    quantiles: dict[str, np.ndarray]
+
+
+def analyse(table: SweepTable, requested: str = "") -> SweepAnalysis:
+    """Analyse the results of a sweep; `requested` is the measure that comes first, "" for none."""
+    ranges = []
+    for name in dict.fromkeys((requested, *MAIN_MEASURES)):
+        if name in table.measures:
+            ranges += find_range(table, name)
+    ranges.sort(key=lambda entry: (entry.measure != requested, -entry.relative))
+    return SweepAnalysis(
+        cases=table.count_cases(),
+        ranges=ranges,
+        limits=find_limits(table),
+        peaks=find_peaks(table),
+        ranking=rank_keys(table, requested),
+        quantiles=compute_quantiles(table, requested),
+    )
+
+
+def find_range(table: SweepTable, name: str) -> list[MeasureRange]:
+    """Return the range of a measure; [] if it does not vary by more than its errors and floors."""
+    values = table.trusted(name)
+    if not np.isfinite(values).any():
+        return []
+    column = table.measures[name]
+    low = int(np.nanargmin(values))
+    high = int(np.nanargmax(values))
+    difference = values[high] - values[low]
+    unknown = np.nan_to_num(column.errors[[low, high]]).sum() + column.floors[[low, high]].max()
+    if difference <= unknown:
+        return []
+    reference = abs(values[0]) if np.isfinite(values[0]) else max(abs(values[low]), values[high])
+    relative = difference / reference if reference > column.floors[0] else np.inf
+    return [MeasureRange(name, low, high, float(relative))]

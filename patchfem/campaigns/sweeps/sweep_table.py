@@ -1,0 +1,209 @@
+"""Results of a sweep as columns: swept keys, measures with errors and floors, outcomes and messages.
+
+Values are float64. Errors and floors are float32, because they are estimates. A case takes 16 bytes
+for each measure.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ...core import Outcome, compute_allowed_error
+from ...runs.batch.case_results import FAILED_OUTCOME, CaseResults
+from .cases import Cases
+
+# Outcomes of cases whose motion no longer changes.
+FINAL_OUTCOMES = (Outcome.STEADY, Outcome.STUCK, Outcome.DONE, Outcome.NO_CONTACT)
+
+
+@dataclass(frozen=True)
+class SweptKey:
+    """Swept key with its value in every case.
+
+    Attributes
+    ----------
+    key : str
+        Dotted key of the scene.
+    unit : str
+        SI unit as in result files, such as "m s-2"; "" if the values are words.
+    values : (n,) array
+        Floats in SI, or strings.
+    """
+
+    key: str
+    unit: str
+    values: np.ndarray
+
+    @property
+    def name(self) -> str:
+        """Name of the key in netCDF files."""
+        return re.sub(r"\W", "_", self.key)
+
+    @property
+    def is_number(self) -> bool:
+        """Whether the values are numbers."""
+        return self.values.dtype.kind == "f"
+
+    @property
+    def count(self) -> int:
+        """Number of distinct values."""
+        return np.unique(self.values).size
+
+    @property
+    def is_logarithmic(self) -> bool:
+        """Whether all values are positive and the largest is at least ten times the smallest."""
+        if not self.is_number:
+            return False
+        return bool(self.values.min() > 0 and self.values.max() >= 10 * self.values.min())
+
+
+@dataclass(frozen=True)
+class MeasureColumn:
+    """Values, errors and absolute floors (n,) of a measure in SI; NaN where a case has none."""
+
+    unit: str
+    values: np.ndarray
+    errors: np.ndarray
+    floors: np.ndarray
+
+    @classmethod
+    def blank(cls, unit: str, count: int) -> MeasureColumn:
+        """Return the column of `count` cases without a value."""
+        unknown = np.full(count, np.nan, np.float32)
+        return cls(unit, np.full(count, np.nan), unknown, np.zeros(count, np.float32))
+
+    def misses(self, tolerance: float | np.ndarray) -> np.ndarray:
+        """Return whether the error of each case (n,) exceeds tolerance * |value| + floor."""
+        with np.errstate(invalid="ignore"):  # comparisons with NaN are false
+            return self.errors > compute_allowed_error(tolerance, self.values, self.floors)
+
+
+@dataclass(frozen=True)
+class SweepTable:
+    """Results of n cases of a sweep.
+
+    Attributes
+    ----------
+    keys : tuple of SweptKey
+    shape : tuple of int
+        Number of values of each key, of which the last one varies fastest; (n,) if the cases are
+        rows of a table.
+    outcome : (n,) array of str
+        Outcomes; "" for a case without a result.
+    tolerance : float or (n,) array
+        Relative tolerance; NaN if it is unknown.
+    is_random : bool
+        Whether the cases are drawn at random.
+    measures : dict
+        MeasureColumn by name.
+    messages : dict
+        Error message of each failed case, by its number.
+    """
+
+    keys: tuple[SweptKey, ...]
+    shape: tuple[int, ...]
+    outcome: np.ndarray
+    tolerance: float | np.ndarray = np.nan
+    is_random: bool = False
+    measures: dict[str, MeasureColumn] = field(default_factory=dict)
+    messages: dict[int, str] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.outcome)
+
+    @classmethod
+    def blank(cls, cases: Cases, tolerance: float = np.nan) -> SweepTable:
+        """Return the table of cases without results.
+
+        tolerance: that of all cases, unless it is swept.
+        """
+        keys = [
+            SweptKey(axis.key, convert_unit(axis.unit), values)
+            for axis, values in zip(cases.axes, cases.make_columns(range(len(cases))))
+        ]
+        swept = [key.values for key in keys if key.key == "accuracy.tolerance"]
+        tolerance = swept[0] if swept else tolerance
+        outcome = np.full(len(cases), "", object)
+        return cls(tuple(keys), cases.shape, outcome, tolerance, cases.is_random)
+
+    @property
+    def is_grid(self) -> bool:
+        """Whether the cases are all combinations of the values of the keys."""
+        return len(self.shape) == len(self.keys) and not self.is_random
+
+    def split_lines(self, axis: int) -> np.ndarray:
+        """Return the numbers of the cases of a grid as lines along one key, (lines, values of the key)."""
+        numbers = np.moveaxis(np.arange(len(self)).reshape(self.shape), axis, -1)
+        return numbers.reshape(-1, self.shape[axis])
+
+    @property
+    def settled(self) -> np.ndarray:
+        """Whether each case (n,) has a final outcome."""
+        return np.isin(self.outcome.astype(str), FINAL_OUTCOMES)
+
+    def insert(self, numbers: Sequence[int], part: CaseResults) -> None:
+        """Store the results of the cases with these numbers."""
+        numbers = np.asarray(numbers, int)
+        self.outcome[numbers] = part.outcome
+        for name, unit in part.units.items():
+            if name not in self.measures:
+                self.measures[name] = MeasureColumn.blank(unit, len(self))
+            column = self.measures[name]
+            column.values[numbers] = part.values[name]
+            column.errors[numbers] = part.errors[name]
+            column.floors[numbers] = np.nan_to_num(part.floors[name])
+        self.messages.update({int(numbers[k]): text for k, text in part.messages.items()})
+
+    def trusted(self, name: str) -> np.ndarray:
+        """Return the values (n,) of a measure that count for statements on it; NaN for others.
+
+        A value counts if it meets the tolerance and its case has settled. The case need not have
+        settled if no settled case has a value, or if the measure is a steady estimate.
+        """
+        column = self.measures[name]
+        settled = self.settled
+        needs_settling = not name.endswith("_steady") and np.isfinite(column.values[settled]).any()
+        counts = settled if needs_settling else np.ones(len(self), bool)
+        return np.where(counts & ~column.misses(self.tolerance), column.values, np.nan)
+
+    def count_cases(self) -> dict[str, int | dict]:
+        """Return the counts of cases in sweep.json.
+
+        Returns
+        -------
+        dict
+            `count`, `failed`, `unfinished` and by outcome `outcomes`, the most frequent first;
+            `over_tolerance` by measure whose tolerance is missed: the `count` of such cases and the
+            `worst` error/|value|, which is None if all these values are 0.
+        """
+        outcomes = Counter(map(str, self.outcome))
+        missed = {}
+        for name, column in self.measures.items():
+            cases = np.flatnonzero(column.misses(self.tolerance))
+            nonzero = cases[column.values[cases] != 0]
+            ratios = column.errors[nonzero] / np.abs(column.values[nonzero])
+            if cases.size:
+                worst = float(ratios.max()) if ratios.size else None
+                missed[name] = {"count": int(cases.size), "worst": worst}
+        return {
+            "count": len(self),
+            "failed": outcomes[FAILED_OUTCOME],
+            "unfinished": outcomes[""],
+            "outcomes": dict(outcomes.most_common()),
+            "over_tolerance": missed,
+        }
+
+
+def convert_unit(unit: str) -> str:
+    """Convert a unit of a scene to the notation of result files: "m/s^2" becomes "m s-2"."""
+    above, *below = unit.split("/")
+    parts = [factor.replace("^", "") for factor in above.split() if factor != "1" or not below]
+    for factor in " ".join(below).replace("(", "").replace(")", "").split():
+        name, _, power = factor.partition("^")
+        parts.append(f"{name}-{power or 1}")
+    return " ".join(parts)

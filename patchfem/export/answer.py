@@ -1,0 +1,170 @@
+"""The answer of a verb: what `run`, `sweep`, `backbone`, `compare`, `profile`, `fit` and `cost` return.
+
+In: numbers and sentences of the module that answers a verb. Out: one record, from which `store` writes files, `page` a
+page, `charts` pictures and `show` the lines on the screen.
+"""
+
+import math
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Definition(NamedTuple):
+    """Unit and meaning of a quantity, and the number of digits that are displayed without an error."""
+
+    unit: str
+    text: str
+    digits: int = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """Number with its unit, numerical error and interval.
+
+    Attributes
+    ----------
+    value : float or None
+        In SI units; None where it has no meaning, with the `reason`.
+    unit : str
+        SI unit; "1" for a ratio.
+    error : float or None
+        Half-width of the numerical error; None if it is unknown.
+    low, high : float or None
+        Ends of the interval that contains the true value; by default value minus and plus error.
+    floor : float
+        Smallest magnitude that is distinguished from 0.
+    reason : str
+        Reason for a missing value or interval.
+    """
+
+    value: float | None
+    unit: str = "1"
+    error: float | None = None
+    low: float | None = None
+    high: float | None = None
+    floor: float = 0.0
+    reason: str = ""
+
+    def __post_init__(self):
+        # numbers that are not finite have no JSON form
+        for name in ("value", "error", "low", "high"):
+            object.__setattr__(self, name, _finite_or_none(getattr(self, name)))
+        if self.low is None and self.high is None and None not in (self.value, self.error):
+            object.__setattr__(self, "low", self.value - self.error)
+            object.__setattr__(self, "high", self.value + self.error)
+
+    def as_json(self) -> dict[str, float | str | None]:
+        """Return the quantity as an object of a JSON file; without `reason` if there is none."""
+        names = ("value", "unit", "error", "low", "high", "floor")
+        content = {name: getattr(self, name) for name in names}
+        return content | ({"reason": self.reason} if self.reason else {})
+
+
+def _finite_or_none(number: float | None) -> float | None:
+    """Return a number as float, or None if it is missing, not finite, or too large for a float."""
+    if number is None:
+        return None
+    try:
+        return float(number) if math.isfinite(number) else None
+    except OverflowError:
+        return None
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Variable:
+    """Array with named dimensions.
+
+    Attributes
+    ----------
+    dims : tuple of str
+        A variable with the name of its only dimension is the coordinate of this dimension.
+    values : ndarray
+        Numbers in SI units, or strings.
+    unit : str
+        SI unit; "1" for a ratio, "" for strings and codes.
+    text : str
+        Description; `long_name` in the netCDF file.
+    meanings : tuple of str
+        Names of the codes 0, 1, ... for a variable that contains codes.
+    """
+
+    dims: tuple[str, ...]
+    values: np.ndarray
+    unit: str = "1"
+    text: str = ""
+    meanings: tuple[str, ...] = ()
+
+
+def make_columns(dimension: str, columns: dict[str, tuple]) -> dict[str, Variable]:
+    """Return variables over one dimension.
+
+    Parameters
+    ----------
+    dimension : str
+    columns : dict
+        Name -> (values, unit). A number that is None becomes NaN; the name in words is the description.
+    """
+    variables = {}
+    for name, (values, unit) in columns.items():
+        array = np.asarray(values)
+        if array.dtype == object:
+            array = array.astype(float)
+        variables[name] = Variable((dimension,), array, unit, name.replace("_", " "))
+    return variables
+
+
+def encode(dimension: str, texts: list[str]) -> Variable:
+    """Return texts over one dimension as codes with meanings."""
+    meanings, codes = np.unique(texts, return_inverse=True)
+    return Variable((dimension,), codes.astype(np.int8), "", meanings=tuple(meanings.tolist()))
+
+
+@dataclass(frozen=True, slots=True)
+class Remarks:
+    """Warnings about numerical trust, and notes about what the model leaves out."""
+
+    warnings: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Answer:
+    """Answer of a verb.
+
+    Attributes
+    ----------
+    kind : str
+        "patch", "bench", "rig" or "linear" for a run; "sweep", "backbone", "compare", "profile", "fit", "cost".
+    title : str
+    verdict : tuple of str
+        At most four sentences; the first one is the headline, with at most 30 words.
+    quantities : dict of str to Quantity
+        Measures by name.
+    data : dict of str to Variable
+        Arrays by name. NAME_error is the error band of NAME, NAME_low and NAME_high are the ends of its interval.
+    remarks : Remarks
+    details : dict
+        JSON keys of the verb: further keys of summary.json for a run; the content of NAME.json for another verb.
+    origin : dict
+        Where the answer comes from: `patchfem` (version), `scene` (text as written), `resolved` (scene with all defaults),
+        `command` (how to repeat it), `driven` (drive in words) and `versions` (package -> version), as far as they exist.
+    """
+
+    kind: str
+    title: str
+    verdict: tuple[str, ...]
+    quantities: dict[str, Quantity] = field(default_factory=dict)
+    data: dict[str, Variable] = field(default_factory=dict)
+    remarks: Remarks = Remarks()
+    details: dict = field(default_factory=dict)
+    origin: dict = field(default_factory=dict)
+
+    @property
+    def is_run(self) -> bool:
+        """Whether the answer is that of a single run."""
+        return self.kind in RUN_KINDS
+
+
+RUN_KINDS = ("patch", "bench", "rig", "linear")

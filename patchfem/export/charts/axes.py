@@ -1,0 +1,216 @@
+"""Panels as matplotlib Axes, for pictures and for `plot` in Python."""
+
+import io
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from ...core import PatchfemError
+from ...disk.atomic_write import write_atomically
+from ..answer import Answer
+from .panels import Panel, make_panels
+from .plotly import BAND_OPACITY, CODE_COLOURS, COLOURS, choose_colour
+from .table import CHARTS
+
+LINE_STYLES = ("-", "--", ":", "-.")
+PICTURE_ENDINGS = (".png", ".svg", ".pdf")
+
+# Marker and face of each symbol of a point; "" is the colour of the curve.
+MARKERS = {"circle": ("o", ""), "circle-open": ("o", "none"), "x": ("x", "")}
+# style of the pictures; two drawings of the same answer are equal files
+STYLE = {
+    "svg.hashsalt": "patchfem",
+    "svg.fonttype": "none",
+    "font.size": 10,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#e3e3e3",
+    "axes.axisbelow": True,
+    "axes.titlesize": 11,
+    "legend.frameon": False,
+    "legend.fontsize": 9,
+    "figure.constrained_layout.use": True,
+    "lines.linewidth": 1.4,
+}
+# metadata that leave out the date
+UNDATED = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
+PANEL_SIZE = (6.4, 4.2)  # width and height of a panel [inch]
+
+
+def draw(panel: Panel, axes):
+    """Draw a panel on matplotlib Axes and return them; of a menu, the first choice."""
+    if panel.choices:
+        return draw(panel.choices[0], axes)
+    if panel.style in ("map", "film"):
+        _draw_map(panel, axes)
+    elif panel.style == "bars":
+        _draw_bars(panel, axes)
+    else:
+        _draw_curves(panel, axes)
+    for position in panel.marks:
+        axes.axvline(position, color="0.5", lw=1, ls=":")
+    axes.set(title=panel.title, xlabel=panel.x.label, ylabel=panel.y.label)
+    if panel.x.is_log:
+        axes.set_xscale("log")
+    if panel.y.is_log:
+        axes.set_yscale("log")
+    if sum(bool(curve.name) for curve in panel.curves) > 1 and panel.style != "map":
+        axes.legend()
+    return axes
+
+
+def _draw_curves(panel: Panel, axes) -> None:
+    """Draw curves with error bars (points) or bands (lines)."""
+    second = axes.twinx() if panel.y2 is not None else axes
+    if panel.y2 is not None:
+        second.set_ylabel(panel.y2.label)
+    for number, curve in enumerate(panel.curves):
+        target = second if curve.on_second_axis else axes
+        colour = choose_colour(curve, number)
+        if panel.style not in ("points", "dots") or curve.is_line:
+            target.plot(
+                curve.x,
+                curve.y,
+                color=colour,
+                label=curve.name,
+                ls=":" if curve.on_second_axis else LINE_STYLES[curve.dash % len(LINE_STYLES)],
+            )
+            if curve.low is not None:
+                target.fill_between(
+                    curve.x, curve.low, curve.high, color=colour, alpha=BAND_OPACITY, lw=0
+                )
+            if panel.style == "area":
+                target.fill_between(curve.x, curve.y, color=colour, alpha=BAND_OPACITY, lw=0)
+            continue
+        if panel.style == "dots":
+            target.plot(curve.x, curve.y, color=colour, lw=1)
+        bars = None
+        if curve.low is not None:
+            bars = np.nan_to_num([curve.y - curve.low, curve.high - curve.y])
+        target.errorbar(curve.x, curve.y, bars, fmt="none", ecolor=colour)
+        symbols = np.full(curve.x.size, "circle") if curve.symbols is None else curve.symbols
+        # the first symbol has the entry of the legend, and is drawn above the others
+        for zorder, (symbol, (marker, face)) in zip((4, 3, 3), MARKERS.items()):
+            is_drawn = symbols == symbol
+            label = curve.name if symbol == "circle" else None
+            options = {"color": colour, "mfc": face or colour, "label": label, "zorder": zorder}
+            target.plot(curve.x[is_drawn], curve.y[is_drawn], marker, **options)
+
+
+def _draw_bars(panel: Panel, axes) -> None:
+    """Draw horizontal bars with their intervals."""
+    for number, curve in enumerate(panel.curves):
+        bars = None if curve.low is None else [curve.y - curve.low, curve.high - curve.y]
+        axes.barh(
+            [str(name) for name in curve.x],
+            curve.y,
+            xerr=bars,
+            color=COLOURS[number],
+            label=curve.name,
+        )
+
+
+def _draw_map(panel: Panel, axes) -> None:
+    """Draw a map with its colour bar; of a film, the last frame."""
+    from matplotlib.colors import BoundaryNorm, ListedColormap
+
+    curve = panel.curves[-1]
+    options = {"cmap": "viridis"}
+    if curve.meanings:
+        count = len(curve.meanings)
+        edges = np.arange(count + 1) - 0.5
+        options = {"cmap": ListedColormap(CODE_COLOURS[:count]), "norm": BoundaryNorm(edges, count)}
+    elif np.nanmin(curve.y) < 0 < np.nanmax(curve.y):
+        limit = np.nanmax(np.abs(curve.y))
+        options = {"cmap": "RdBu", "vmin": -limit, "vmax": limit}
+    mesh = axes.pcolormesh(curve.x, curve.rows, curve.y, shading="nearest", **options)
+    bar = axes.figure.colorbar(mesh, label="" if curve.meanings else panel.colour_label)
+    if curve.meanings:
+        bar.set_ticks(range(len(curve.meanings)), labels=curve.meanings)
+
+
+def make_figure(panels: list[Panel]):
+    """Return a matplotlib figure with the panels beside and below each other, at most two in a row."""
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    columns = min(len(panels), 2)
+    rows = -(-len(panels) // columns)
+    with rc_context(STYLE):
+        figure = Figure(figsize=(PANEL_SIZE[0] * columns, PANEL_SIZE[1] * rows))
+        grid = figure.subplots(rows, columns, squeeze=False).ravel()
+        for panel, axes in zip(panels, grid, strict=False):
+            draw(panel, axes)
+    for axes in grid[len(panels) :]:
+        axes.remove()
+    for element in (figure, *figure.axes):
+        element._repr_svg_ = partial(_to_svg, figure)
+    return figure
+
+
+def write_picture(panels: list[Panel], path) -> None:
+    """Write panels as .png, .svg or .pdf."""
+    with write_atomically(path) as partial:
+        _save(make_figure(panels), partial, Path(path).suffix[1:].lower())
+
+
+def _save(figure, target, ending: str) -> None:
+    """Write a figure into a file or a stream; equal figures give equal files."""
+    from matplotlib import rc_context
+
+    with rc_context(STYLE):
+        figure.savefig(target, dpi=150, format=ending, metadata=UNDATED.get(ending))
+
+
+def _to_svg(figure) -> str:
+    """Return a figure as SVG, the form in which a notebook shows it."""
+    text = io.StringIO()
+    _save(figure, text, "svg")
+    return text.getvalue()[text.getvalue().index("<svg") :]
+
+
+def write_plot(answer: Answer, path) -> None:
+    """Write the first chart of an answer as .png, .svg or .pdf.
+
+    Raises
+    ------
+    PatchfemError
+        For another ending, or if the answer has no chart.
+    Missing
+        If the file cannot be written.
+    """
+    if Path(path).suffix.lower() not in PICTURE_ENDINGS:
+        raise PatchfemError(f"{path}: a picture is written as {', '.join(PICTURE_ENDINGS)}")
+    panels = make_panels({"": answer}, CHARTS[answer.kind])
+    if not panels:
+        raise PatchfemError(f"{path}: this answer has no chart")
+    write_picture(panels[:1], path)
+
+
+def draw_charts(answer: Answer, titles: tuple[str, ...], axes=None, verb: str = "plot"):
+    """Draw the charts of an answer with some titles, and return the first Axes; None if it has none of them.
+
+    Parameters
+    ----------
+    answer : Answer
+    titles : tuple of str
+        Titles in the table of charts.
+    axes : matplotlib Axes, optional
+        Where to draw the first chart alone; by default a new figure has all of them.
+    verb : str
+        Function that the message about a wrong `axes` names.
+    """
+    charts = tuple(chart for chart in CHARTS[answer.kind] if chart.title in titles)
+    panels = make_panels({"": answer}, charts)
+    if not panels:
+        return None
+    check_axes(axes, verb)
+    return draw(panels[0], axes) if axes is not None else make_figure(panels).axes[0]
+
+
+def check_axes(axes, verb: str) -> None:
+    """Raise PatchfemError if the Axes for a picture are given but are not those of matplotlib."""
+    if axes is not None and not hasattr(axes, "errorbar"):
+        raise PatchfemError(f"{verb}: matplotlib Axes are needed as ax, not {axes!r:.60}")

@@ -1,0 +1,130 @@
+"""A chart with its data in display units, which plotly.js or matplotlib draws."""
+
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+
+from ...formatting import format_number
+from ..quantities import choose_scale
+
+MAX_CURVE_POINTS = 3000  # a longer curve keeps the extremes of as many intervals
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """Axis of a chart: label with unit, number of units in one SI unit, and whether it is logarithmic."""
+
+    label: str
+    scale: float = 1.0
+    is_log: bool = False
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Curve:
+    """Curve of a chart, in display units.
+
+    Attributes
+    ----------
+    name : str
+        Entry of the legend; "" for none.
+    x, y : (k,) ndarray
+        For a map, `y` (j, k) contains the colours and `rows` (j,) the vertical positions.
+    low, high : (k,) ndarray or None
+        Ends of the error band.
+    rows : (j,) ndarray or None
+        Vertical positions of a map.
+    meanings : tuple of str
+        Names of the codes of a map.
+    on_second_axis : bool
+    is_line : bool
+        Whether the curve is a line in a chart of points.
+    colour, dash : int
+        Numbers of the colour and of the dash pattern; -1 for the colour of its place among the curves.
+    symbols : (k,) ndarray of str or None
+        Symbols of the points: "circle", "circle-open" or "x".
+    """
+
+    name: str
+    x: np.ndarray
+    y: np.ndarray
+    low: np.ndarray | None = None
+    high: np.ndarray | None = None
+    rows: np.ndarray | None = None
+    meanings: tuple[str, ...] = ()
+    on_second_axis: bool = False
+    is_line: bool = False
+    colour: int = -1
+    dash: int = 0
+    symbols: np.ndarray | None = None
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Panel:
+    """Chart with its data.
+
+    Attributes
+    ----------
+    title, style, caption : str
+    x, y : Axis
+    curves : list of Curve
+    y2 : Axis or None
+        Second vertical axis.
+    marks : list of float
+        Positions of vertical lines.
+    choices : list of Panel
+        Panels between which a menu chooses; empty without a menu.
+    colour_label : str
+        Title of the colours of a map.
+    """
+
+    title: str
+    style: str
+    x: Axis
+    y: Axis
+    curves: list[Curve]
+    caption: str = ""
+    y2: Axis | None = None
+    marks: list[float] = field(default_factory=list)
+    choices: list["Panel"] = field(default_factory=list)
+    colour_label: str = ""
+
+    @property
+    def description(self) -> str:
+        """Text alternative of the chart: its axes, and the range of each curve."""
+        ranges = []
+        for curve in self.curves[:4]:
+            finite = np.asarray(curve.y, float)[np.isfinite(np.asarray(curve.y, float))]
+            if finite.size:
+                low, high = (
+                    format_number(float(value), 4) for value in (finite.min(), finite.max())
+                )
+                ranges.append(f"{curve.name or self.y.label} from {low} to {high}")
+        return f"{self.title}: {self.y.label} against {self.x.label}; {'; '.join(ranges)}."
+
+
+def make_axis(name: str, unit: str, values: np.ndarray, is_log: bool = False) -> Axis:
+    """Return the axis for values [SI]; a name such as `contact_fraction` is displayed in percent."""
+    label = name.replace("_", " ")
+    size = np.abs(values[np.isfinite(values)]).max(initial=0.0)
+    unit, scale = choose_scale(name, unit or "1", size)
+    return Axis(f"{label} [{unit}]" if unit else label, scale, is_log)
+
+
+def thin(values: np.ndarray, count: int = MAX_CURVE_POINTS) -> np.ndarray:
+    """Return the indices that a curve needs: the smallest and the largest value of each of many intervals."""
+    if values.ndim > 1 or values.size <= 2 * count:
+        return np.arange(len(values))
+    edges = np.linspace(0, values.size, count + 1).astype(int)
+    picks = ((np.argmin, np.inf), (np.argmax, -np.inf))  # an unknown value is no extreme
+    extremes = [
+        start + pick(np.where(np.isnan(values[start:end]), unknown, values[start:end]))
+        for start, end in pairwise(edges)
+        for pick, unknown in picks
+    ]
+    return np.unique([0, *extremes, values.size - 1])
+
+
+def join_names(*names: str) -> str:
+    """Return the parts of an entry of the legend that are not empty."""
+    return ", ".join(name for name in names if name)

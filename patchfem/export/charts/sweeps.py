@@ -1,0 +1,238 @@
+"""Charts of a sweep: panels of the styles `relative`, `menu`, `maps` and `shares`.
+
+They take answers of kind "sweep", from memory or from their folders.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ...campaigns.sweeps.changes import MAIN_MEASURES
+from ...campaigns.sweeps.limits import NEGLIGIBLE_CHANGE
+from ...campaigns.sweeps.sweep_table import FINAL_OUTCOMES, MeasureColumn
+from ..answer import Answer, Variable
+from ..quantities import format_value
+from .panel import Axis, Curve, Panel, join_names, make_axis, thin
+from .table import Chart
+
+MAX_DRAWN_CASES = 1000  # cases of a measure, so that a page stays below 1.5 MB
+MAX_LINES = 8  # lines of a chart, one for each combination of the other keys
+MAX_MAP_VALUES = 40  # values of each key in a map
+# Ratio of the largest to the smallest value of a key and of a measure at which an axis is logarithmic.
+MIN_KEY_RATIO = 10.0
+MIN_MEASURE_RATIO = 100.0
+SYMBOLS = np.array(["circle", "circle-open", "x"])  # settled, over the tolerance, not settled
+
+
+class SweepView(NamedTuple):
+    """Sweep along one of its keys.
+
+    Attributes
+    ----------
+    data : dict of str to Variable
+    details : dict
+    axis : str
+        Variable of the key on the axis.
+    others : list of str
+        Variables of the other keys of a grid; [] if the cases are rows.
+    """
+
+    data: dict[str, Variable]
+    details: dict
+    axis: str
+    others: list[str]
+
+    @property
+    def is_grid(self) -> bool:
+        """Whether the cases are all combinations of the values of the keys."""
+        return self.data[self.axis].dims == (self.axis,)
+
+    def split(self, name: str, default: float | str = np.nan) -> np.ndarray:
+        """Return a variable as (lines, values of the key on the axis), or the default if it is missing."""
+        if name not in self.data:
+            return np.array(default)
+        variable = self.data[name]
+        place = variable.dims.index(self.axis) if self.others else 0
+        moved = np.moveaxis(variable.values, place, -1)
+        return moved.reshape(-1, moved.shape[-1])
+
+    def find_symbols(self, name: str) -> np.ndarray:
+        """Return the symbol of each case (lines, values): settled, over the tolerance or not settled."""
+        parts = (self.split(name), self.split(f"{name}_error"), self.split(f"{name}_floor", 0.0))
+        tolerance = self.details.get("tolerance") or np.nan
+        is_over = MeasureColumn("", *parts).misses(tolerance)
+        has_settled = np.isin(self.split("outcome", FINAL_OUTCOMES[0]), FINAL_OUTCOMES)
+        return SYMBOLS[np.where(has_settled, is_over.astype(int), 2)]
+
+    def name_lines(self) -> list[str]:
+        """Return the values of the other keys of each line as text; [""] for a single line."""
+        lines = [""]
+        for name in self.others:
+            variable = self.data[name]
+            label = name.replace("_", " ")
+            values = [format_value(value, variable.unit) for value in variable.values.tolist()]
+            lines = [join_names(line, f"{label} {value}") for line in lines for value in values]
+        return lines
+
+    def scale(self, name: str, min_ratio: float = MIN_KEY_RATIO) -> tuple[Axis, np.ndarray]:
+        """Return the axis of a variable and its values in the unit of the axis; words stay words.
+
+        `min_ratio` is the ratio of its values at which the axis is logarithmic.
+        """
+        values = self.data[name].values
+        if values.dtype.kind != "f":
+            return Axis(name.replace("_", " ")), values.astype(str)
+        finite = values[np.isfinite(values)]
+        is_log = finite.min(initial=np.inf) > 0 and finite.max() >= min_ratio * finite.min()
+        axis = make_axis(name, self.data[name].unit, values, bool(is_log))
+        return axis, values * axis.scale
+
+
+def view_sweep(answer: Answer, axis: str = "") -> SweepView:
+    """Return the view of a sweep along a key; by default the numerical key with the most values."""
+    keys = list_keys(answer)
+    columns = {key: answer.data[key].values for key in keys}
+    counts = {key: (one.dtype.kind == "f", np.unique(one).size) for key, one in columns.items()}
+    view = SweepView(answer.data, answer.details, axis or max(keys, key=counts.__getitem__), [])
+    return view._replace(others=[key for key in keys if view.is_grid and key != view.axis])
+
+
+def list_keys(answer: Answer) -> list[str]:
+    """Return the names of the variables of the swept keys."""
+    return [re.sub(r"\W", "_", key) for key in answer.details["of"]["keys"]]
+
+
+def list_measures(answers: dict[str, Answer]) -> list[str]:
+    """Return the measures that have a value in at least one case, the main ones first."""
+    names = {
+        name: None
+        for answer in answers.values()
+        for name in answer.data
+        if f"{name}_error" in answer.data and np.isfinite(answer.data[name].values).any()
+    }
+    return sorted(names, key=lambda name: name not in MAIN_MEASURES)
+
+
+def spread_indices(size: int, count: int) -> np.ndarray:
+    """Return at most `count` evenly spaced indices of `size` elements, both ends included."""
+    return np.unique(np.linspace(0, size - 1, min(size, count)).astype(int))
+
+
+def make_relative(answers: dict[str, Answer], chart: Chart) -> Panel | None:
+    """Return the main measures relative to their first case along the only key, with the band of 5 %."""
+    curves = []
+    for title, answer in answers.items():
+        view = view_sweep(answer)
+        if view.others or not view.is_grid:
+            continue
+        x_axis, x = view.scale(view.axis)
+        for name in chart.y:
+            values = view.split(name).ravel()
+            if values.size > 1 and abs(values[0]) > 0:  # False for NaN
+                keep = thin(values, MAX_DRAWN_CASES // 2)
+                label = join_names(title, name.replace("_", " "))
+                curves.append(Curve(label, x[keep], values[keep] / values[0]))
+    if not curves:
+        return None
+
+    ratios = np.concatenate([curve.y[np.isfinite(curve.y)] for curve in curves])
+    # A logarithmic axis leaves out 0.
+    is_log = bool(ratios.min() >= 0 and ratios.max() >= MIN_KEY_RATIO * ratios[ratios > 0].min())
+    band = [np.full(2, 1 + change) for change in (0, -NEGLIGIBLE_CHANGE, NEGLIGIBLE_CHANGE)]
+    curves.insert(0, Curve("± 5 %", curves[0].x[[0, -1]], *band))
+    axis = Axis("value / value of the first case", is_log=is_log)
+    return Panel(chart.title, chart.style, x_axis, axis, curves, chart.caption)
+
+
+def make_menu(answers: dict[str, Answer], chart: Chart) -> Panel | None:
+    """Return a panel for each measure against a key, between which a menu chooses."""
+    names = list_measures(answers)
+    return _add_choices(chart, [make_measure_panel(answers, name) for name in names])
+
+
+def _add_choices(chart: Chart, panels: list[Panel]) -> Panel | None:
+    """Return a panel with a menu of panels, or the only panel; None without panels."""
+    if not panels:
+        return None
+    panel = replace(panels[0], title=chart.title, caption=chart.caption)
+    return replace(panel, style=chart.style, choices=panels) if len(panels) > 1 else panel
+
+
+def make_measure_panel(answers: dict[str, Answer], name: str) -> Panel:
+    """Return a measure against a swept key, a line for each combination of the other keys.
+
+    Random cases are points against the key with the largest share of the variance of the measure.
+    All sweeps have the units of the first one.
+    """
+    curves = []
+    axes = None
+    for title, answer in answers.items():
+        if name not in answer.data:
+            continue
+        view = view_sweep(answer)
+        shares = answer.details.get("ranking", {}).get(name)
+        if shares and not view.others:
+            view = view_sweep(answer, re.sub(r"\W", "_", shares[0]["key"]))
+        x_axis, x = view.scale(view.axis)
+        axes = axes or (x_axis, view.scale(name, MIN_MEASURE_RATIO)[0])
+        values = view.split(name) * axes[1].scale
+        errors = np.broadcast_to(view.split(f"{name}_error") * axes[1].scale, values.shape)
+        symbols = np.broadcast_to(view.find_symbols(name), values.shape)
+        texts = view.name_lines()
+        lines = spread_indices(len(values), MAX_LINES)
+        for line in lines:
+            keep = thin(values[line], MAX_DRAWN_CASES // (2 * len(lines)))
+            y, error, marks = (array[line][keep] for array in (values, errors, symbols))
+            band = (None, None) if np.isnan(error).all() else (y - error, y + error)
+            is_plain = (marks == SYMBOLS[0]).all()
+            label = join_names(title, texts[line])
+            curves.append(Curve(label, x[keep], y, *band, symbols=None if is_plain else marks))
+    return Panel(name.replace("_", " "), "dots" if view.is_grid else "points", *axes, curves)
+
+
+def make_map_menu(answers: dict[str, Answer], chart: Chart) -> Panel | None:
+    """Return a map of each measure over two keys, between which a menu chooses."""
+    view = view_sweep(next(iter(answers.values())))
+    if len(answers) > 1 or len(view.others) != 1:
+        return None
+    x_axis, x = view.scale(view.axis)
+    y_axis, y = view.scale(view.others[0])
+    columns = spread_indices(x.size, MAX_MAP_VALUES)
+    rows = spread_indices(y.size, MAX_MAP_VALUES)
+    panels = []
+    for name in list_measures(answers):
+        axis, _ = view.scale(name)
+        values = view.split(name)[np.ix_(rows, columns)] * axis.scale
+        if np.isfinite(values).any():
+            curve = Curve("", x[columns], values, rows=y[rows])
+            title = name.replace("_", " ")
+            panels.append(Panel(title, "map", x_axis, y_axis, [curve], colour_label=axis.label))
+    return _add_choices(chart, panels)
+
+
+def make_shares(answers: dict[str, Answer], chart: Chart) -> Panel | None:
+    """Return bars of the shares of the variance with their intervals, with a menu of the measures."""
+    panels = []
+    ranking = next(iter(answers.values())).details.get("ranking", {})
+    for name, indices in ranking.items() if len(answers) == 1 else ():
+        # The first bar is at the bottom.
+        columns = {part: np.array([index[part] for index in indices[::-1]]) for part in indices[0]}
+        keys = columns.pop("key")
+        first, total, low, high = (100 * column for column in columns.values())
+        ends = (None, None) if (low == high).all() else (low, high)
+        curves = [Curve("with interactions", keys, total, *ends), Curve("alone", keys, first)]
+        axes = (Axis("share of the variance [%]"), Axis(""))
+        panels.append(Panel(name.replace("_", " "), "bars", *axes, curves))
+    return _add_choices(chart, panels)
+
+
+STYLES = {
+    "relative": make_relative,
+    "menu": make_menu,
+    "maps": make_map_menu,
+    "shares": make_shares,
+}

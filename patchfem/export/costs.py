@@ -1,0 +1,208 @@
+"""The answer of `cost`: numerical error against CPU time, for several tolerances or values of a setting."""
+
+from dataclasses import asdict
+from typing import NamedTuple
+
+from ..campaigns.cost import (
+    TOLERANCE,
+    Cost,
+    WorstError,
+    describe_fastest_setting,
+    find_fastest_run,
+    find_fastest_settings,
+    find_measures_with_error,
+    find_worst_error,
+    find_worst_run_error,
+)
+from ..formatting import format_number
+from ..model.model import Model
+from . import quantities
+from .answer import Answer, Quantity, Remarks, Variable, encode, make_columns
+from .runs import make_origin
+
+# columns of cost.csv that every run has: attribute -> heading and unit
+RUN_COLUMNS = {
+    "label": ("setting", ""),
+    "seconds": ("seconds", "s"),
+    "wall_seconds": ("wall_seconds", "s"),
+    "timings": ("timings", ""),
+}
+
+
+class Row(NamedTuple):
+    """A run of a curve, and its least accurate measure.
+
+    knob: TOLERANCE, or the setting that varies; worst: of the measures that are compared along the curve.
+    """
+
+    knob: str
+    run: Cost
+    worst: WorstError
+
+
+def make_answer(curves: dict[str, list[Cost]], model: Model) -> Answer:
+    """Return the answer of `cost`.
+
+    Parameters
+    ----------
+    curves : dict
+        TOLERANCE or numerical setting -> its runs from coarse to fine.
+    model : Model
+    """
+    tolerance = model.accuracy.tolerance
+    knob, runs = next(iter(curves.items()))
+    rows = []
+    for one, curve in curves.items():
+        shared = None if one == TOLERANCE else find_measures_with_error(curve)
+        rows += [
+            Row(one, run, find_worst_error(run, shared or list(run.values), run.tolerance))
+            for run in curve
+        ]
+    main = _find_main_measure(runs)
+
+    # the scene as it is, or the fastest run that meets its tolerance
+    if knob == TOLERANCE:
+        chosen = next((run for run in runs if run.tolerance == tolerance), runs[-1])
+    else:
+        chosen = find_fastest_run(runs, tolerance) or runs[-1]
+    row = next(row for row in rows if row.run is chosen)
+    sentences = _describe_scene(row, runs) if knob == TOLERANCE else []
+    details = {one: describe_runs(one, curve, tolerance) for one, curve in curves.items()}
+    texts = [part["sentence"] for part in details.values() if part["sentence"]]
+    sentences += [f"{text[0].upper()}{text[1:]}." for text in texts]
+    return Answer(
+        kind="cost",
+        title=model.source.title,
+        verdict=tuple(sentences[:4]),
+        quantities=_make_quantities(row, main, tolerance),
+        data=_make_data(rows, main, tolerance),
+        remarks=Remarks(notes=tuple(dict.fromkeys(text for run in runs for text in run.remedies))),
+        details=details,
+        origin=make_origin(model.source, "cost"),
+    )
+
+
+def describe_runs(knob: str, runs: list[Cost], tolerance: float) -> dict:
+    """Return the runs of a curve as an entry of cost.json, in SI units.
+
+    `runs`: the attributes of each `Cost`, with `worst` {`measure`, `error`} and `meets_tolerance`. `cheapest`: by measure
+    the label of the fastest run within the tolerance. `sentence`: the cost of all measures. The last two are None for
+    TOLERANCE, because its runs have different tolerances.
+
+    Parameters
+    ----------
+    knob : str
+        TOLERANCE or a numerical setting.
+    runs : list of Cost
+    tolerance : float
+        That of the scene.
+    """
+    entries = []
+    for run in runs:
+        worst = find_worst_run_error(run)
+        entry = {
+            "worst": {"measure": worst.name, "error": worst.fraction},
+            "meets_tolerance": run.meets_tolerance(),
+            "remedies": list(run.remedies),
+        }
+        entries.append(asdict(run) | entry)
+    is_setting = knob != TOLERANCE
+    return {
+        "runs": entries,
+        "cheapest": find_fastest_settings(runs, tolerance) if is_setting else None,
+        "sentence": describe_fastest_setting(runs, tolerance) if is_setting else None,
+    }
+
+
+def _describe_scene(row: Row, runs: list[Cost]) -> list[str]:
+    """Return sentences on the scene as it is, the smallest tolerance that is met, and the advice of a run that misses."""
+    run = row.run
+    error = ""
+    if row.worst.name:
+        name = row.worst.name.replace("_", " ")
+        error = f", with a largest error of {format_number(row.worst.fraction, 2)} in {name}"
+    sentences = [
+        f"At its tolerance {run.tolerance:g} the scene takes {format_number(run.seconds, 2)} CPU s and "
+        f"{'meets' if run.meets_tolerance() else 'misses'} the tolerance{error}."
+    ]
+    met = [one for one in runs if one.meets_tolerance()]
+    if met:
+        best = min(met, key=lambda one: one.tolerance)
+        seconds = format_number(best.seconds, 2)
+        sentences.append(f"The smallest tolerance that is met is {best.label}, in {seconds} CPU s.")
+    else:
+        sentences.append("No run meets its tolerance.")
+    advice = [
+        f"For the tolerance {one.tolerance:g}: {text}."
+        for one in runs
+        if one not in met
+        for text in one.remedies
+    ]
+    return sentences + advice[-1:]
+
+
+def _find_main_measure(runs: list[Cost]) -> str:
+    """Return the least accurate of the key quantities in the first and coarsest run, else of all measures."""
+    names = find_measures_with_error(runs)
+    names = [name for name in quantities.KEY if name in names] or names
+    return find_worst_error(runs[0], names, runs[0].tolerance).name or names[0]
+
+
+def _find_unit(name: str) -> str:
+    """Return the unit of a measure."""
+    definition = quantities.find_definition(name)
+    return definition.unit if definition else "1"
+
+
+def _make_quantities(row: Row, main: str, tolerance: float) -> dict[str, Quantity]:
+    """Return CPU time and error of a run, the tolerance of the scene, and the main measure."""
+    run = row.run
+    out = {
+        "cpu_time": Quantity(run.seconds, "s"),
+        "elapsed_time": Quantity(run.wall_seconds, "s"),
+        "largest_error": Quantity(row.worst.fraction),
+        "tolerance": Quantity(tolerance),
+    }
+    if main in run.values:
+        error = run.errors.get(main)
+        out[main] = Quantity(run.values[main], _find_unit(main), error, floor=run.floors[main])
+    return out
+
+
+def _make_data(rows: list[Row], main: str, tolerance: float) -> dict[str, Variable]:
+    """Return a row for each run: the columns of cost.csv, which the charts and the table of the page show too."""
+    runs = [row.run for row in rows]
+    columns = {"knob": ([row.knob for row in rows], "")}
+    for attribute, (name, unit) in RUN_COLUMNS.items():
+        columns[name] = ([getattr(run, attribute) for run in runs], unit)
+    for name in dict.fromkeys(name for run in runs for name in run.values):
+        for prefix, part in (("", "values"), ("error_", "errors"), ("distance_", "distances")):
+            values = [getattr(run, part).get(name) for run in runs]
+            columns[prefix + name] = (values, _find_unit(name))
+
+    # an exact run has no place on a logarithmic axis
+    columns["largest_error"] = ([row.worst.fraction or None for row in rows], "1")
+    columns["worst_measure"] = ([row.worst.name.replace("_", " ") for row in rows], "")
+    for name in ("nodes", "steps"):
+        counts = [getattr(run, name) for run in runs]
+        if any(counts):
+            columns[name] = (counts, "1")
+    data = make_columns("run", columns)
+    data |= {"main_measure": data[main], "main_measure_error": data[f"error_{main}"]}
+
+    # a colour for each varied setting and for runs that miss the tolerance
+    has_several = rows[0].knob != rows[-1].knob
+    data["result"] = encode(
+        "run",
+        [
+            f"{row.knob.replace('_', ' ')}: " * has_several
+            + f"{'meets' if row.worst.fraction <= row.run.tolerance else 'misses'} its tolerance"
+            for row in rows
+        ],
+    )
+    seconds = data["seconds"].values
+    ends = {
+        "allowed_seconds": ([seconds.min(), seconds.max()], "s"),
+        "allowed_error": ([tolerance, tolerance], "1"),
+    }
+    return data | make_columns("end", ends)

@@ -1,0 +1,93 @@
+"""Stress around the contact on a regular grid, frame by frame, for the film of a page."""
+
+from pathlib import Path
+
+import numpy as np
+
+from .vtkhdf import Frames, read_frames
+
+GRID_POINTS = (61, 60)  # columns and rows of the grid
+MAX_FRAMES = 30
+WINDOW_HEIGHT = 0.6  # height of the window around the contact over its width
+# Largest contact, over the length of the pieces, that the window shows as a whole.
+MAX_CONTACT_FRACTION = 0.25
+# Ratio to the median interval between frames above which an interval separates the pressed state
+# from the last cycle.
+MIN_BREAK_RATIO = 3.0
+
+
+def last_frames(times) -> np.ndarray:
+    """Return the numbers of the last frames whose times (f,) [s] follow each other closely.
+
+    For a rig they are the frames of its last cycle, without the pressed state long before it; for a
+    bench all frames of its slide.
+    """
+    steps = np.diff(times)
+    if not steps.size:
+        return np.arange(len(times))
+    breaks = np.flatnonzero(steps > MIN_BREAK_RATIO * np.median(steps))
+    return np.arange(breaks[-1] + 1 if breaks.size else 0, len(times))
+
+
+def contact_window(frames: Frames) -> tuple[float, float, float, float]:
+    """Return left, right, bottom and top [m] of a window around the contact in all frames.
+
+    It is twice as wide as the contact; around the largest pressure of a long contact it is a
+    quarter of the length of the pieces.
+    """
+    line = frames.blocks["interface"]
+    x = line.points[:, 0]
+    pressure = line.point_data["normal_stress"].max(axis=0)
+    length = np.ptp(x)
+    touching = x[pressure > 0] if pressure.any() else x[[0, -1]]
+    width = np.ptp(touching)
+    is_long = width > MAX_CONTACT_FRACTION * length
+    centre = x[np.argmax(pressure)] if is_long else (touching[0] + touching[-1]) / 2
+    half = length / 8 if is_long else max(width, 4 * np.diff(x).max())
+    left = max(x[0], min(centre - half, x[-1] - 2 * half))
+    right = min(x[-1], left + 2 * half)
+    reach = WINDOW_HEIGHT / 2 * (right - left)
+    return float(left), float(right), float(-reach), float(reach)
+
+
+def stress_frames(path: Path) -> dict[str, np.ndarray]:
+    """Return the von Mises stress around the contact in the last cycle, on a regular grid.
+
+    Parameters
+    ----------
+    path : Path
+        A file of fields. A static patch has one frame.
+
+    Returns
+    -------
+    dict
+        `x` (61,) and `y` (60,) [m], y > 0 in the upper piece; `times` (f,) [s] of at most 30 frames;
+        `values` (f, 60, 61) [Pa] of the cell at each point, NaN outside the pieces.
+
+    Raises
+    ------
+    PatchfemError
+        If the file is damaged.
+    """
+    frames = read_frames(path)
+    cycle = last_frames(frames.times)
+    numbers = cycle[np.linspace(0, cycle.size - 1, min(MAX_FRAMES, cycle.size)).round().astype(int)]
+    left, right, bottom, top = contact_window(frames)
+    columns, rows = GRID_POINTS
+    x = np.linspace(left, right, columns)
+    y = bottom + (top - bottom) * (np.arange(rows) + 0.5) / rows  # no row is on the interface
+
+    values = np.full((numbers.size, rows, columns), np.nan)
+    for side in ("lower", "upper"):
+        block = frames.blocks[side]
+        stress = block.cell_data["von_mises"][numbers]
+        corners = block.points[block.cells, :2]
+        # A cell gives its stress to the points of the grid in the rectangle around it.
+        first, last = (
+            np.stack([np.searchsorted(x, ends[:, 0], how), np.searchsorted(y, ends[:, 1], how)], 1)
+            for ends, how in ((corners.min(axis=1), "left"), (corners.max(axis=1), "right"))
+        )
+        for cell in np.flatnonzero((last > first).all(axis=1)):
+            across, down = map(slice, first[cell], last[cell])
+            values[:, down, across] = stress[:, cell, None, None]
+    return {"x": x, "y": y, "times": frames.times[numbers], "values": values}

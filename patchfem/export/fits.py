@@ -1,0 +1,486 @@
+"""The answer of `fit`: fitted values of a scene with their intervals, measured and fitted data.
+
+A fit to a loop, to frequency and damping against amplitude, to rows of a rig or to a worn depth differs in its `Parts`.
+"""
+
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from .. import __version__
+from ..campaigns.fits.curve import EXTENT, FittedCurve
+from ..campaigns.fits.loop import FittedLoop
+from ..campaigns.fits.request import FitOptions, Listener, fit_measurement
+from ..campaigns.fits.wear import COEFFICIENT_KEY, FittedCoefficient
+from ..campaigns.rows.fit import SAME_SCORE, FittedRows
+from ..disk.atomic_write import write_text
+from ..formatting import format_number
+from ..identify.least_squares import Fit
+from ..model.model import build, write_resolved
+from ..scene.ranges import Range
+from ..scene.scene import Scene, add_sets, move_scene
+from . import page, store
+from .answer import Answer, Quantity, Remarks, Variable, encode, make_columns
+from .folder import STARTS, Folder
+from .quantities import format_quantity
+from .runs import make_origin
+
+FITTED_SCENE = "scene.fitted.toml"
+MAX_NAMED_VALUES = 2  # largest number of fitted values in the headline
+MIN_NAMED_CORRELATION = 0.95  # smallest correlation of two values that the verdict states
+LOOP_UNITS = {"force": "N", "friction_ratio": "1"}
+KINDS = {"acceleration": "m s-2", "displacement": "m"}  # readings of a row, and their units
+# settings and gains of the sensors of a rig that a scene may leave out
+INSTRUMENT = {
+    "reading": "peak",
+    "reading_cutoff": None,
+    "acceleration_gain": 1.0,
+    "displacement_gain": 1.0,
+}
+WEAR_UNIT = "m2 N-1"
+AnyFit = FittedLoop | FittedCurve | FittedRows | FittedCoefficient
+
+
+def fit_into(
+    scene: Scene,
+    to: str,
+    free: Sequence[str],
+    options: FitOptions,
+    target: Path,
+    listener: Listener,
+    with_page: bool = True,
+    command: str = "",
+) -> Answer:
+    """Fit keys of a scene to a measurement, and write the results folder.
+
+    Parameters
+    ----------
+    scene, to, free, options, listener
+        As for `campaigns.fits.request.fit_measurement`.
+    target : Path
+        Results folder, which is claimed before the work.
+    with_page : bool
+    command : str
+        Command that repeats the fit; "" in Python.
+
+    Returns
+    -------
+    Answer
+
+    Raises
+    ------
+    SceneError, PatchfemError
+        For input that cannot be used, before anything is computed.
+    """
+    with Folder(target, options.resume) as folder:
+        if folder.dropped and listener.say is not None:
+            listener.say(folder.dropped)
+        fit = fit_measurement(scene, to, free, options, listener, folder.path / STARTS)
+        answer = make_answer(fit, scene)
+        if command:
+            answer = replace(answer, origin=answer.origin | {"command": command})
+        store.write(answer, folder.path)
+        text = format_fitted_scene(fit, scene, answer.verdict, folder.target)
+        write_text(folder.path / FITTED_SCENE, text)
+        if with_page:
+            page.write_page(folder.path)
+    return answer
+
+
+class Parts(NamedTuple):
+    """What differs between the kinds of fits.
+
+    residual: sentence on the distance of fit and measurement; details: further keys of fit.json, among them `measured` (name
+    of the file) and `quantity` (what was measured); scores: quantities of the residual; data.
+    """
+
+    residual: str
+    details: dict
+    scores: dict[str, Quantity]
+    data: dict[str, Variable]
+
+
+def make_answer(fit: AnyFit, scene: Scene) -> Answer:
+    """Return the answer of a fit.
+
+    Parameters
+    ----------
+    fit : FittedLoop, FittedCurve, FittedRows or FittedCoefficient
+    scene : Scene
+        Scene before the fit.
+    """
+    parts = _DESCRIBE[type(fit)](fit)
+    search = {} if isinstance(fit, FittedCoefficient) else _describe_search(fit)
+    details = {
+        "patchfem": __version__,
+        "title": scene.title,
+        "outcome": "done",
+        "values": _describe_values(fit),
+    }
+    details |= search | parts.details
+
+    fitted = dict(details["values"])
+    fitted |= {f"offset_{name}": entry for name, entry in details.get("offsets", {}).items()}
+    measures = {}
+    for name, entry in fitted.items():
+        reason = "" if entry["interval"] else "the measurement does not determine an interval"
+        ends = {"low": entry["low"], "high": entry["high"]}
+        measures[name] = Quantity(entry["value"], entry["unit"], **ends, reason=reason)
+    pairs = _collect_pairs(details.get("correlation", []), list(fitted))
+    verdict = (_make_headline(details, measures), parts.residual)
+    if pairs and abs(pairs["correlation"].values[0]) >= MIN_NAMED_CORRELATION:
+        names = pairs["pair"].values[0].replace(", ", " and ")
+        verdict += (
+            f"{names} are correlated by {pairs['correlation'].values[0]:.2f}: the measurement determines a combination of "
+            "them better than each one.",
+        )
+    return Answer(
+        kind="fit",
+        title=scene.title,
+        verdict=verdict,
+        quantities=measures | parts.scores,
+        data=parts.data | pairs,
+        remarks=Remarks(tuple(details["warnings"]), tuple(details.get("notes", ()))),
+        details=details,
+        origin=make_origin(build(scene).source, "fit"),
+    )
+
+
+def _make_headline(details: dict, measures: dict[str, Quantity]) -> str:
+    """Return a sentence with the first fitted values and their intervals."""
+    keys = list(details["values"])
+    named = keys[:MAX_NAMED_VALUES]
+    text = ", ".join(f"{key} = {format_quantity(key, measures[key])}" for key in named)
+    if len(keys) > len(named):
+        text += f" and {len(keys) - len(named)} more"
+    source = details["measured"]
+    if source == "--to":  # a depth given with the command
+        source = details["quantity"]
+    if details["outcome"] != "done":
+        return f"The fit to {source} did not converge; best values so far: {text}."
+    return f"Fitted to {source}: {text}."
+
+
+def _collect_pairs(correlation: list[list[float | None]], names: list[str]) -> dict[str, Variable]:
+    """Return the correlation of each pair of fitted values, the strongest first; {} for a single value."""
+    if len(names) < 2:
+        return {}
+    first, second = np.triu_indices(len(names), 1)
+    values = np.array(correlation, float)[first, second]
+    order = np.argsort(-np.abs(np.nan_to_num(values)), kind="stable")
+    texts = [f"{names[first[k]]}, {names[second[k]]}" for k in order]
+    columns = {
+        "pair": (texts, ""),
+        "correlation": (values[order], "1"),
+    }
+    return make_columns("pair", columns)
+
+
+def _known(values) -> list:
+    """Return numbers as nested lists, or a single number, with None for those that are not finite."""
+    return np.where(np.isfinite(values), values, None).tolist()
+
+
+def _describe_values(fit: AnyFit) -> dict[str, dict]:
+    """Return all fitted values by scene key, as written in fit.json."""
+    if isinstance(fit, FittedCoefficient):
+        ends = {"low": fit.low, "high": fit.high, "interval": [fit.low, fit.high]}
+        bounds = [fit.bounds.low, fit.bounds.high]
+        return {COEFFICIENT_KEY: {"value": fit.value, "unit": WEAR_UNIT, **ends, "bounds": bounds}}
+    keys = fit.keys
+    return {bound.key: _describe_value(bound, keys.fit, k) for k, bound in enumerate(keys.ranges)}
+
+
+def _describe_value(bound: Range, fit: Fit, k: int) -> dict:
+    """Return fitted value k with its confidence interval and range, as written in fit.json."""
+    ends = fit.intervals.ends[k].tolist()
+    interval = ends if np.isfinite(ends).all() else None
+    low, high = interval or (None, None)
+    return {
+        "value": float(fit.values[k]),
+        "unit": bound.unit,
+        "low": low,
+        "high": high,
+        "interval": interval,
+        "method": fit.intervals.methods[k],
+        "bounds": [bound.low, bound.high],
+        "at_bound": fit.at_bound[k] or None,
+        "sensitivity": float(fit.intervals.sensitivity[k]),
+    }
+
+
+def _describe_search(fit: FittedLoop | FittedCurve | FittedRows) -> dict:
+    """Return outcome, warnings and counts of a search, and what the data do not determine, as written in fit.json."""
+    keys = fit.keys
+    intervals = keys.fit.intervals
+    names = [bound.key for bound in keys.ranges]
+    names += [offset.range.key for offset in getattr(fit, "offsets", ())]
+    return {
+        "outcome": str(keys.outcome),
+        "unknown": [
+            {name: part for name, part in zip(names, row, strict=True) if part}
+            for row in intervals.unknown.tolist()
+        ],
+        "correlation": _known(intervals.correlation),
+        "evaluations": keys.fit.counts.evaluations,
+        "failures": keys.fit.counts.failures,
+        "descents_agreed": keys.fit.agreed,
+        "warnings": keys.warnings,
+        "seconds": round(keys.seconds, 6),
+    }
+
+
+def describe_loop_fit(fit: FittedLoop) -> Parts:
+    """Return the parts of a fit to a friction loop."""
+    loop = fit.loop
+    fitted = fit.keys.fit
+    unit = LOOP_UNITS[loop.quantity]
+    peak = float(np.abs(loop.reading).max())
+    n_rows = int((~fit.held_out).sum())
+    scores = {
+        "residual_rms": Quantity(fit.rms, unit),
+        "residual_fraction": Quantity(fit.rms / peak),
+    }
+    text = format_quantity("residual_rms", scores["residual_rms"])
+    residual = (
+        f"The residual of {n_rows} rows is {text} rms, {100 * fit.rms / peak:.2g} % of the peak."
+    )
+    if loop.quantity == "force":
+        works = np.trapezoid([loop.reading, fit.model], loop.displacement)
+        scores["work_measured"], scores["work_fitted"] = (Quantity(work, "J") for work in works)
+        share = format_number(100 * works[1] / works[0], 4)
+        residual += f" The fitted loop dissipates {share} % of the measured work."
+
+    # rows that are held out are drawn and scored apart
+    columns = {
+        "slide": (loop.displacement, "m"),
+        loop.quantity: (loop.reading, unit),
+        "fitted": (fit.model, unit),
+        "residual": (fit.model - loop.reading, unit),
+        "row": (np.arange(loop.reading.size), "1"),
+        "held": (fit.held_out.astype(np.int8), ""),
+    }
+    if loop.time is not None:
+        columns["time"] = (loop.time, "s")
+    held = None
+    if fit.held_out_rms is not None:
+        held = {"rows": int(fit.held_out.sum()), "rms": fit.held_out_rms}
+        scores["held_out_rms"] = Quantity(fit.held_out_rms, unit)
+        shown = np.where(fit.held_out, loop.reading, np.nan)
+        columns["held_out"] = (shown, unit)
+    return Parts(
+        residual=residual,
+        details={
+            "measured": loop.path.name,
+            "quantity": loop.quantity,
+            "offsets": {
+                offset.name: _describe_value(offset.range, fitted, k)
+                for k, offset in enumerate(fit.offsets, len(fit.keys.ranges))
+            },
+            "unit": unit,
+            "rows": n_rows,
+            "effective_rows": _known(fitted.intervals.rows),
+            "rms": fit.rms,
+            "held": held,
+            "peak": peak,
+            "step_error": fit.step_error,
+            "steps_between_rows": fit.steps_per_row,
+        },
+        scores=scores,
+        data=make_columns("row", columns),
+    )
+
+
+def describe_curve_fit(fit: FittedCurve) -> Parts:
+    """Return the parts of a fit to measured frequency and damping against amplitude."""
+    measured = fit.measured
+    n_rows = int(measured.amplitude.size)
+    errors = 2 * measured.error  # half the width of a 95 % interval
+    columns = {"amplitude": (measured.amplitude, "m")}
+    curve = {"curve_amplitude": (fit.beyond[0], "m")}
+    rms = {}
+    for k, (name, unit) in enumerate((("frequency", "Hz"), ("damping", "1"))):
+        value = measured.value[k]
+        distance = fit.model[k] - value
+        rms[name] = float(np.sqrt(np.mean((distance / value) ** 2)))
+        columns |= {
+            name: (value, unit),
+            f"{name}_error": (errors[k], unit),
+            f"{name}_fitted": (fit.model[k], unit),
+            f"{name}_residual": (distance / errors[k], "1"),
+        }
+        curve[f"curve_{name}"] = (fit.beyond[k + 1], unit)
+    assumed = " The errors of the measured values are assumed." if measured.assumed else ""
+    percent = {name: f"{100 * value:.2g} %" for name, value in rms.items()}
+    return Parts(
+        residual=f"At {n_rows} amplitudes the residual is {percent['frequency']} rms of the frequency and "
+        f"{percent['damping']} of the damping ratio, by method {fit.method}.{assumed}",
+        details={
+            "measured": fit.path.name,
+            "quantity": "decay",
+            "method": fit.method,
+            "rows": n_rows,
+            "rms": rms,
+            "notes": list(fit.notes),
+            "evaluations": fit.n_computed,
+        },
+        scores={f"{name}_residual_rms": Quantity(value) for name, value in rms.items()},
+        data=make_columns("row", columns) | make_columns("curve_amplitude", curve),
+    )
+
+
+def describe_rows_fit(fit: FittedRows) -> Parts:
+    """Return the parts of a fit to a table of measured responses.
+
+    Scores are root mean squares of ln(computed/measured).
+    """
+    search = fit.search
+    scores = fit.compute_scores()
+    totals = {name: score["all"] for name, score in scores.items() if score is not None}
+    texts = [f"{name.replace('_', ' ')} {value:.3f}" for name, value in totals.items() if value]
+    n_best = int((search.rms <= np.nanmin(search.rms) * SAME_SCORE).sum())
+    names = [bound.key for bound in fit.keys.ranges]
+    starts = []
+    for first, last, rms in zip(search.starts, search.ends, _known(search.rms), strict=True):
+        begin, end = (dict(zip(names, values.tolist(), strict=True)) for values in (first, last))
+        starts.append({"from": begin, "to": None if rms is None else end, "training": rms})
+    instrument = {
+        name: getattr(fit.models.instrument, name, default) for name, default in INSTRUMENT.items()
+    }
+    for name, value in zip(names, fit.keys.fit.values.tolist(), strict=True):
+        table, _, key = name.partition(".")
+        if table == "measured":
+            instrument[key] = value
+    rows, data = _collect_rows(fit)
+    return Parts(
+        residual=f"The rms of ln(computed/measured) is {', '.join(texts)}; {n_best} of {search.rms.size} starts led to "
+        "within 1 % of the best.",
+        details={
+            "measured": fit.cells.path.name,
+            "quantity": "rows",
+            "scores": scores,
+            "scores_stable": fit.compute_scores(only_stable=True),
+            "unstable": fit.settings.unstable,
+            "reading": instrument,
+            "readings": int((~fit.held_out).sum()),
+            "held": int(fit.held_out.sum()),
+            "rms": fit.keys.fit.rms,
+            "seed": fit.settings.seed,
+            "starts": starts,
+            "rows": rows,
+            "motions": fit.n_motions,
+        },
+        scores={f"score_{name}": Quantity(value) for name, value in totals.items()},
+        data=data,
+    )
+
+
+def _collect_rows(fit: FittedRows) -> tuple[list[dict], dict[str, Variable]]:
+    """Return measured and computed readings of each row: as written in fit.json, and as arrays with their ratios."""
+    cells = fit.cells
+    count = len(cells.rows)
+    is_held = np.zeros(count, bool)
+    is_held[cells.row[fit.held_out]] = True
+    entries = [asdict(row) for row in cells.rows]
+    uses = [
+        ("held out" if held else "fitted") + ", unstable in the test" * ("U" in row["flag"])
+        for held, row in zip(is_held, entries, strict=True)
+    ]
+    data = {
+        "use": encode("row", uses),
+        "drive": encode("row", [f"{row['frequency']:.6g} Hz" for row in entries]),
+    }
+    columns = {
+        name: ([row[name] for row in entries], unit)
+        for name, unit in (("frequency", "Hz"), ("input", "m s-2"), ("flag", ""))
+    }
+    columns["held"] = (is_held.astype(np.int8), "")
+    for part, (name, unit) in enumerate(KINDS.items()):
+        # a row without a reading has no computed one
+        is_kind = cells.is_acceleration == (name == "acceleration")
+        places = cells.row[is_kind]
+        computed = np.full(count, np.nan)
+        computed[places] = fit.computed[part, cells.condition[is_kind]]
+        held = np.full(count, None)
+        held[places] = fit.held_out[is_kind]
+        measured = np.array([row[name] for row in entries], float)
+        for k, number in enumerate(_known(computed)):
+            reading = entries[k][name]
+            entries[k][name] = {"measured": reading, "computed": number, "held": held[k]}
+        ratio = computed / np.where(measured > 0, measured, np.nan)
+        columns |= {
+            name: (measured, unit),
+            f"computed_{name}": (computed, unit),
+            f"{name}_ratio": (ratio, "1"),
+        }
+        # ends of the line on which both are equal
+        known = np.concatenate([measured[measured > 0], computed[computed > 0]])
+        ends = [known.min(), known.max()] if known.size else []
+        data |= make_columns(f"equal_{name}", {f"equal_{name}": (ends, unit)})
+    return entries, data | make_columns("row", columns)
+
+
+def describe_wear_fit(fit: FittedCoefficient) -> Parts:
+    """Return the parts of a fitted wear coefficient."""
+    measured = fit.measured
+    ends = {"value": measured.value, "low": measured.low, "high": measured.high}
+    name = measured.name.replace("_", " ")
+    text = format_quantity(measured.name, Quantity(unit="m", **ends))
+    points = {
+        "coefficient": ([fit.value], WEAR_UNIT),
+        "depth": ([measured.value], "m"),
+        "depth_low": ([measured.low], "m"),
+        "depth_high": ([measured.high], "m"),
+    }
+    coefficients, depths = fit.curve[:, fit.curve[0] <= EXTENT * fit.high]
+    curve = {
+        "curve_coefficient": (coefficients, WEAR_UNIT),
+        "curve_depth": (depths, "m"),
+    }
+    return Parts(
+        residual=f"The interval is that of the measured {name}, {text}.",
+        details={
+            "measured": Path(measured.source).name,
+            "quantity": measured.name,
+            "runs": fit.runs,
+            "model": fit.model,
+            "data": ends,
+            "warnings": [],
+        },
+        scores={"fitted_depth": Quantity(fit.model, "m")},
+        data=make_columns("point", points) | make_columns("curve_coefficient", curve),
+    )
+
+
+_DESCRIBE = {
+    FittedLoop: describe_loop_fit,
+    FittedCurve: describe_curve_fit,
+    FittedRows: describe_rows_fit,
+    FittedCoefficient: describe_wear_fit,
+}
+
+
+def format_fitted_scene(fit: AnyFit, scene: Scene, verdict: Sequence[str], folder: Path) -> str:
+    """Return the text of the fitted scene, in SI units with all defaults, below comments that say what was fitted.
+
+    Parameters
+    ----------
+    fit : FittedLoop, FittedCurve, FittedRows or FittedCoefficient
+    scene : Scene
+        Scene before the fit.
+    verdict : sequence of str
+        Sentences of the answer.
+    folder : Path
+        Folder to which the paths of the fitted scene are relative.
+    """
+    if isinstance(fit, FittedCoefficient):
+        fitted = add_sets(scene, [fit.bounds.format_assignment(fit.value)])
+    else:
+        fitted = fit.keys.fitted_scene()
+    # the model is built before the scene moves, because its file names are relative to its folder
+    model = build(fitted)
+    text = write_resolved(move_scene(fitted, folder / FITTED_SCENE), model)
+    return "\n".join([*(f"# {sentence}" for sentence in verdict), "", text])

@@ -1,0 +1,394 @@
+"""report.html: a self-contained page, made from the files of one or several answers alone.
+
+Every page has the same template: verdict, tiles with the key numbers, charts, tables, all measures, notes and origin.
+"""
+
+import base64
+import gzip
+import json
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+
+from ..core import PatchfemError
+from ..disk.atomic_write import explain_write_error, write_text
+from ..formatting import format_number
+from . import quantities, several, store
+from .answer import Answer, Quantity
+from .charts import panels, plotly
+from .charts.table import CHARTS, TABLES, Column
+
+FILE_TEXTS = {
+    "fields.vtkhdf": "fields of both pieces and their interface, frame by frame (ParaView 5.13 or newer)",
+    "interfaces": "fields of every interface that has a patch of its own, in the same format",
+    "result.nc": "histories, curves and fields along the interface (xarray, MATLAB, ncdump)",
+    "backbone.nc": "curves (xarray, MATLAB, ncdump)",
+    "sweep.nc": "all cases (xarray, MATLAB, ncdump)",
+    "summary.json": "verdict, measures with their errors, warnings and notes, in SI units",
+    "scene.resolved.toml": "the scene in SI units, with all default values",
+    "scene.fitted.toml": "the scene with the fitted values, ready to run",
+}
+WIDE_STYLES = ("relative", "menu", "maps", "film")  # styles of charts that take the whole width
+TALL_STYLES = ("relative", "menu", "maps", "shares", "film", "bars")
+COMPRESSION = 6  # of the figures in a page
+MAX_LISTED_CASES = 25  # largest number of cases of a sweep that the page lists
+
+
+def write_page(folder: Path) -> Path:
+    """Write report.html into a folder from the other files of the folder, and return its path.
+
+    Raises
+    ------
+    PatchfemError
+        If the folder has no complete result.
+    """
+    path = Path(folder) / store.PAGE
+    write_text(path, make_page([Path(folder)]))
+    return path
+
+
+def write_report(folders: list[Path], out: Path | None = None) -> Path:
+    """Write the page of one folder again, or of several folders side by side, and return its path.
+
+    Parameters
+    ----------
+    folders : list of Path
+    out : Path, optional
+        The page; by default report.html in a single folder, else in the current folder.
+
+    Raises
+    ------
+    PatchfemError
+        If a folder has no complete result, or if the results are of different kinds.
+    Missing
+        If the page cannot be written.
+    """
+    text = make_page([Path(folder) for folder in folders])
+    path = Path(out or (Path(folders[0]) / store.PAGE if len(folders) == 1 else store.PAGE))
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise explain_write_error(error, path, path) from None
+    write_text(path, text)
+    return path
+
+
+def make_page(folders: list[Path]) -> str:
+    """Return the page of an answer, or of several answers of the same kind side by side.
+
+    Parameters
+    ----------
+    folders : list of Path
+
+    Raises
+    ------
+    PatchfemError
+        If a folder has no complete result, or if the answers are of different kinds.
+    """
+    answers = _read_all(folders)
+    first = next(iter(answers.values()))
+    figures = [
+        plotly.draw(panel)
+        | {"wide": panel.style in WIDE_STYLES, "tall": panel.style in TALL_STYLES}
+        for panel in panels.make_panels(answers, CHARTS[first.kind])
+    ]
+    if len(folders) == 1:
+        figures += _draw_films(folders[0])
+    captions = first.details.get("captions", {}) if len(folders) == 1 else {}
+    for number, figure in enumerate(figures):
+        figure["anchor"] = f"chart{number}"
+        figure["caption"] += f" {captions[figure['title']]}" if figure["title"] in captions else ""
+    content = _describe(answers)
+    content |= {
+        "tables": make_tables(first)
+        if len(answers) == 1
+        else several.list_scene_differences(answers),
+        "files": _list_files(folders[0]) if len(folders) == 1 else [],
+        "figures": figures,
+        "data": _pack([_strip(figure) for figure in figures]),
+        "library": _library() if figures else "",
+    }
+    return _template().render(content)
+
+
+def _read_all(folders: list[Path]) -> dict[str, Answer]:
+    """Return the answers in folders by their names in legends; "" for a single answer."""
+    if not folders:
+        raise PatchfemError("report: at least one results folder is needed")
+    if len(folders) == 1:
+        return {"": store.read(folders[0])}
+    answers = {}
+    for folder in folders:
+        name = folder.resolve().name
+        answers[f"{name} ({len(answers) + 1})" if name in answers else name] = store.read(folder)
+    if len({"run" if answer.is_run else answer.kind for answer in answers.values()}) > 1:
+        kinds = ", ".join(f"{name}: {answer.kind}" for name, answer in answers.items())
+        raise PatchfemError(f"report: the folders have results of different kinds ({kinds})")
+    return answers
+
+
+def _describe(answers: dict[str, Answer]) -> dict:
+    """Return the parts of a page that are text: title, verdict, tiles, measures, notes and origin."""
+    is_single = len(answers) == 1
+    first = next(iter(answers.values()))
+    names = dict.fromkeys(name for answer in answers.values() for name in answer.quantities)
+    zeros = [
+        name
+        for name in names
+        if all(
+            name in answer.quantities and quantities.is_zero(name, answer.quantities[name])
+            for answer in answers.values()
+        )
+    ]
+    measures = [
+        {
+            "name": f"measure-{name}",
+            "label": name.replace("_", " "),
+            "texts": [_format_entry(name, answer, first) for answer in answers.values()],
+            "meaning": _explain(name, answers),
+        }
+        for name in names
+        if name not in zeros
+    ]
+    verdict = list(first.verdict)
+    if not is_single:
+        headlines = _label_all(answers, lambda answer: answer.verdict[:1])
+        verdict = headlines + several.compare_measures(answers)
+    content = {
+        "title": first.title or f"patchfem {first.kind}" if is_single else ", ".join(answers),
+        "subtitle": _subtitle(first) if is_single else f"{first.kind} · {len(answers)} results",
+        "verdict": verdict,
+        "warnings": _label_all(answers, lambda answer: answer.remarks.warnings),
+        "measures": measures,
+        "has_errors": any("±" in text for row in measures for text in row["texts"]),
+        "zeros": [name.replace("_", " ") for name in zeros],
+    }
+    if not is_single:
+        return content | {"heading": list(answers)}
+
+    origin = first.origin
+    versions = ", ".join(f"{name} {text}" for name, text in origin.get("versions", {}).items())
+    texts = [
+        ("Scene", origin.get("scene", "")),
+        ("Scene in SI with all defaults", origin.get("resolved", "")),
+        ("Versions", versions),
+    ]
+    return content | {
+        "notes": first.remarks.notes,
+        "tiles": make_tiles(first),
+        "command": origin.get("command", ""),
+        "effects": first.details.get("effects", []),
+        "texts": [part for part in texts if part[1]],
+    }
+
+
+def _label_all(answers: dict[str, Answer], get_sentences) -> list[str]:
+    """Return the sentences of all answers, each with the name of its answer if there are several."""
+    return [
+        f"{name}: {sentence}" if name else sentence
+        for name, answer in answers.items()
+        for sentence in get_sentences(answer)
+    ]
+
+
+def _subtitle(answer: Answer) -> str:
+    """Return the line below the title: version, kind, drive, engine and time."""
+    details = answer.details
+    engine = (details.get("numerics") or {}).get("engine", "") if answer.is_run else ""
+    seconds = (details.get("seconds") or {}).get("total") if answer.is_run else None
+    parts = (
+        f"patchfem {answer.origin.get('patchfem', '')}".strip(),
+        answer.kind,
+        answer.origin.get("driven", ""),
+        answer.details.get("outcome", "") if answer.is_run else "",
+        f"engine {engine}" if engine else "",
+        f"computed in {seconds:.2f} s" if seconds is not None else "",
+    )
+    return " · ".join(part for part in parts if part)
+
+
+def make_tiles(answer: Answer) -> list[dict[str, str]]:
+    """Return the tiles of the key quantities: `label`, `text` and `meaning` of each."""
+    return [
+        {
+            "label": name.replace("_", " "),
+            "text": quantities.format_quantity(name, quantity),
+            "meaning": quantities.describe(name, answer.kind),
+        }
+        for name, quantity in quantities.choose_key(answer.quantities).items()
+    ]
+
+
+def _format_entry(name: str, answer: Answer, first: Answer) -> str:
+    """Return a measure as text with its change from the first answer; "" if it is absent."""
+    return several.format_entry(name, answer.quantities.get(name), first.quantities.get(name))
+
+
+def _explain(name: str, answers: dict[str, Answer]) -> str:
+    """Return the definition of a measure, and why it has no value in an answer."""
+    found = [answer.quantities[name] for answer in answers.values() if name in answer.quantities]
+    kind = next(iter(answers.values())).kind
+    reasons = dict.fromkeys(one.reason for one in found if one.value is None and one.reason)
+    return " ".join(
+        [quantities.describe(name, kind), *(f"No value: {reason}." for reason in reasons)]
+    )
+
+
+def make_tables(answer: Answer) -> list[dict]:
+    """Return the tables of an answer that have rows: `title`, `headings` and `rows` of strings."""
+    tables = _make_case_table(answer) if answer.kind == "sweep" else []
+    for table in TABLES.get(answer.kind, ()):
+        rows = _find_rows(answer, table.source)
+        if not rows:
+            continue
+        columns = [column for column in table.columns if any(column.key in row for row in rows)]
+        tables.append(
+            {
+                "title": table.title,
+                "headings": [column.title for column in columns],
+                "rows": [[_format_cell(row, column) for column in columns] for row in rows],
+            }
+        )
+    return tables
+
+
+def _make_case_table(answer: Answer) -> list[dict]:
+    """Return a table of the main measures of each case, for a sweep of few cases over one key; else no table."""
+    dims = {variable.dims for variable in answer.data.values() if variable.dims}
+    key = next(iter(dims))[0] if len(dims) == 1 else ""
+    rows = _find_rows(answer, key) if key in answer.data else []
+    if not 0 < len(rows) <= MAX_LISTED_CASES:
+        return []
+    known = [
+        name
+        for name in quantities.KEY
+        if any(row.get(name, {}).get("value") is not None for row in rows)
+    ]
+    names = [key, *known][: quantities.MAX_TILES]
+    columns = [Column(name, name.replace("_", " ")) for name in names]
+    cells = [[_format_cell(row, column) for column in columns] for row in rows]
+    return [{"title": "Cases", "headings": [column.title for column in columns], "rows": cells}]
+
+
+def _find_rows(answer: Answer, source: str) -> list[dict]:
+    """Return the rows of a table: a list or objects by name in the details, or the variables of a dimension."""
+    content = answer.details
+    for key in source.split("/"):
+        content = content.get(key) if isinstance(content, dict) else None
+    if isinstance(content, list):
+        # the quantities of an object may be in an object of their own
+        return [row | row.get("measures", {}) for row in content]
+    if isinstance(content, dict):
+        return [{"name": name.replace("_", " "), **row} for name, row in content.items()]
+    variables = {name: one for name, one in answer.data.items() if one.dims == (source,)}
+    size = len(next(iter(variables.values())).values) if variables else 0
+    return [{name: _make_cell(variables, name, k) for name in variables} for k in range(size)]
+
+
+def _make_cell(variables: dict, name: str, index: int) -> str | dict:
+    """Return one value of a variable: a string, or a quantity as an object with its error."""
+    variable = variables[name]
+    value = variable.values[index]
+    if variable.meanings:
+        return variable.meanings[int(value)]
+    if isinstance(value, str):
+        return value
+    numbers = {"value": float(value)}
+    for end in ("error", "low", "high"):
+        if f"{name}_{end}" in variables:
+            numbers[end] = float(variables[f"{name}_{end}"].values[index])
+    finite = {key: number if np.isfinite(number) else None for key, number in numbers.items()}
+    return finite | {"unit": variable.unit}
+
+
+def _format_cell(row: dict, column: Column) -> str:
+    """Return a cell of a table as text; a missing value is a dash."""
+    value = row.get(column.key)
+    if value is None:
+        return "-"
+    if column.style == "rounded":
+        number = value["value"] if isinstance(value, dict) else value
+        return "-" if number is None else format_number(number, 3)
+    if isinstance(value, dict):
+        known = {key: value.get(key) for key in ("value", "error", "low", "high")}
+        return quantities.format_quantity(
+            column.key, Quantity(unit=value.get("unit", "1"), **known)
+        )
+    if isinstance(value, float):
+        if column.style == "quantity":
+            ends = (row.get(key) for key in ("error", "low", "high"))
+            return quantities.format_quantity(
+                column.key, Quantity(value, row.get("unit", "1"), *ends)
+            )
+        if column.style == "percent":
+            return f"{100 * value:+.3g} %"
+        return format_number(value, 6)
+    return str(value).replace("_", " ") if column.style == "name" else str(value)
+
+
+def _draw_films(folder: Path) -> list[dict]:
+    """Return the figure of the stress in both pieces with a slider over the frames, if the folder has the fields."""
+    path = folder / store.FIELDS
+    if not path.is_file():
+        return []
+    panel = make_stress_panel(path)
+    return [] if panel is None else [plotly.draw(panel) | {"wide": True, "tall": True}]
+
+
+def make_stress_panel(path: Path) -> panels.Panel | None:
+    """Return the panel of the stress in both pieces from a file of fields; None if the pieces do not touch."""
+    from .fields.film import stress_frames
+
+    frames = stress_frames(path)
+    if not np.nanmax(frames["values"], initial=0.0) > 0:
+        return None
+    return panels.make_film(frames, "von Mises stress in both pieces", "Pa")
+
+
+def _list_files(folder: Path) -> list[tuple[str, str]]:
+    """Return name and description of the files beside the page."""
+    names = sorted(path.name for path in folder.iterdir() if not path.name.startswith("."))
+    csv_text = "columns of this curve (spreadsheet)"
+    known = [
+        (name, FILE_TEXTS.get(name, csv_text))
+        for name in names
+        if name in FILE_TEXTS or name.endswith(".csv")
+    ]
+    details = [
+        (name, "all numbers of this answer, in SI units")
+        for name in names
+        if name in store.DETAIL_FILES.values()
+    ]
+    return known + details
+
+
+def _strip(figure: dict) -> dict:
+    """Return the entries of a figure that the script of the page reads."""
+    return {key: figure[key] for key in ("anchor", "data", "layout", "frames") if key in figure}
+
+
+def _pack(content: list) -> str:
+    """Return an object as compressed JSON in base64; equal objects give equal strings."""
+    text = json.dumps(content, separators=(",", ":"), allow_nan=False)
+    return base64.b64encode(gzip.compress(text.encode(), COMPRESSION, mtime=0)).decode()
+
+
+@cache
+def _library() -> str:
+    """Return the compressed bundle of plotly.js in base64."""
+    path = files(__package__) / "plotly" / "plotly-cartesian.min.js.gz"
+    return base64.b64encode(path.read_bytes()).decode()
+
+
+@cache
+def _template():
+    """Return the template of all pages."""
+    from jinja2 import Environment
+
+    text = (files(__package__) / "page.html").read_text("utf-8")
+    environment = Environment(autoescape=True, trim_blocks=True)
+    # sentences mark keys and measures by backquotes, which a page does not show
+    environment.filters["plain"] = lambda sentence: sentence.replace("`", "")
+    return environment.from_string(text)

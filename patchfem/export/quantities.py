@@ -1,0 +1,298 @@
+"""Definitions of all quantities, and how their numbers are displayed.
+
+The measures of runs are defined in `response.rows` and `runs.results.patch_rows`; QUANTITIES defines those of the other
+verbs. KEY lists the quantities that come first: in the tiles of a page, on the screen and in the first columns of a table.
+"""
+
+from ..formatting import (
+    UNIT_LADDERS,
+    choose_unit,
+    format_number,
+    format_with_error,
+    round_to_error,
+)
+from ..response import rows
+from ..runs.results import patch_rows
+from . import surface_definitions
+from .answer import Definition, Quantity
+
+MAX_TILES = 10  # largest number of key quantities on a page and on the screen
+# words at the end of a name that mark a fraction (in percent) or a phase (in degrees)
+PERCENT_WORDS = ("fraction", "share")
+# display units of areas of sections and of wear coefficients
+LADDERS = UNIT_LADDERS | {"m2": (("um^2", 1e12),), "m2 N-1": (("m^2/N", 1.0),)}
+DEGREES = ("deg", 57.29577951308232)
+
+KEY = (
+    "frequency_at_smallest_amplitude",
+    "frequency_at_largest_amplitude",
+    "damping_at_smallest_amplitude",
+    "damping_at_largest_amplitude",
+    "largest_damping",
+    "amplitude_of_largest_damping",
+    "free_frequency",
+    "stuck_frequency",
+    "cpu_time",
+    "largest_error",
+    "worn_depth_mean",
+    "worn_depth_max",
+    "worn_area",
+    "worn_volume",
+    "track_width",
+    "track_depth",
+    "wear_coefficient",
+    "amplitude_ratio",
+    "slope_ratio",
+    "Ra",
+    "Rq",
+    "Rz",
+    "RSm",
+    "Rsk",
+    "Rk",
+    "Pa",
+    "Pq",
+    "Pt",
+    "Sa",
+    "Sq",
+    "Sz",
+    "Ssk",
+    "Sdr",
+    "Sal",
+    "relative_displacement_amplitude",
+    "relative_displacement_rms",
+    "absolute_acceleration_peak",
+    "absolute_acceleration_rms",
+    "response_frequency",
+    "response_damping",
+    "slip_amplitude",
+    "equivalent_stiffness",
+    "equivalent_damping",
+    "loop_area",
+    "friction_power",
+    "friction_force_peak",
+    "friction_ratio_peak",
+    "flutter_amplitude",
+    "onset_level",
+    "jump_level",
+    "contact_fraction",
+    "pressure_peak",
+    "contact_half_width",
+    "normal_load",
+    "approach",
+    "normal_stiffness",
+    "tangential_stiffness",
+)
+
+
+# kinds of answers whose quantities are defined in `surfaces.definitions`
+SURFACE_KINDS = ("compare", "pairs", "profile")
+QUANTITIES: dict[str, Definition] = {
+    # sweep
+    "peak_height": Definition("1", "largest response over the swept frequency"),
+    "half_power_width": Definition(
+        "Hz", "width of the peak between the frequencies at which it falls to 1/sqrt(2)"
+    ),
+    "limit": Definition(
+        "1",
+        "value of the swept key at which a measure has changed by 5 % (the peak pressure: by 100 %) from the first case, "
+        "with the cases between which it lies",
+    ),
+    # backbone
+    "frequency_at_smallest_amplitude": Definition(
+        "Hz", "frequency of the mode at the smallest amplitude of the recommended curve"
+    ),
+    "frequency_at_largest_amplitude": Definition(
+        "Hz", "frequency of the mode at the largest amplitude of the recommended curve"
+    ),
+    "damping_at_smallest_amplitude": Definition(
+        "1", "damping ratio of structure and friction at the smallest amplitude"
+    ),
+    "damping_at_largest_amplitude": Definition(
+        "1", "damping ratio of structure and friction at the largest amplitude"
+    ),
+    "largest_damping": Definition(
+        "1", "largest damping ratio among the amplitudes of the recommended curve"
+    ),
+    "amplitude_of_largest_damping": Definition(
+        "m", "amplitude at the output with the largest damping ratio"
+    ),
+    "free_frequency": Definition(
+        "Hz", "frequency of the mode without its contact; a bonded spring is included"
+    ),
+    "stuck_frequency": Definition(
+        "Hz", "frequency of the mode while the contact sticks with its own stiffness"
+    ),
+    "exponent_micro": Definition(
+        "1", "exponent of the energy loss per cycle over the amplitude in micro-slip"
+    ),
+    "exponent_gross": Definition(
+        "1", "exponent of the energy loss per cycle over the amplitude in gross slip; 1 in theory"
+    ),
+    # fit; of keys of a scene, see FITTED_KEY
+    "offset_force": Definition("N", "constant force that is fitted to the whole record"),
+    "offset_displacement": Definition(
+        "m", "fitted distance of the first row from the position without stress"
+    ),
+    "residual_rms": Definition("1", "root mean square of fitted minus measured values", 3),
+    "residual_fraction": Definition(
+        "1", "root mean square of fitted minus measured values, over the largest measured value"
+    ),
+    "held_out_rms": Definition(
+        "1", "root mean square of predicted minus measured values of the rows that are held out"
+    ),
+    "work_measured": Definition("J", "work of the measured force over the record"),
+    "work_fitted": Definition("J", "work of the fitted force over the record"),
+    "frequency_residual_rms": Definition(
+        "1", "root mean square of the relative deviation of the fitted frequency"
+    ),
+    "damping_residual_rms": Definition(
+        "1", "root mean square of the relative deviation of the fitted damping ratio"
+    ),
+    "score_fitted": Definition(
+        "1", "root mean square of ln(computed/measured) of the readings that were fitted"
+    ),
+    "score_held_out": Definition(
+        "1", "root mean square of ln(computed/measured) of the readings that were held out"
+    ),
+    "score_left_out": Definition(
+        "1", "root mean square of ln(computed/measured) of each reading in the fit without it"
+    ),
+    "fitted_depth": Definition("m", "worn depth computed with the fitted coefficient"),
+    # cost
+    "cpu_time": Definition("s", "CPU time of the scene as it is, with its error estimates"),
+    "elapsed_time": Definition("s", "elapsed time of the same run"),
+    "largest_error": Definition(
+        "1", "largest numerical error of a measure in this run, relative to its value and floor"
+    ),
+    "tolerance": Definition("1", "tolerance of the scene, its key accuracy.tolerance"),
+}
+FITTED_KEY = "value of this key of the scene that fits the measurement best, with its 95 % interval"
+
+
+def find_definition(name: str, kind: str = "") -> Definition | None:
+    """Return the definition of a quantity, whose name may end in the number of an interface; None if there is none.
+
+    kind: of the answer; a comparison of surfaces has names of runs with a meaning of their own.
+    """
+    if "." in name:
+        return Definition("1", FITTED_KEY)
+    if kind in SURFACE_KINDS:
+        return surface_definitions.find(name) or surface_definitions.find(
+            rows.remove_interface_number(name)
+        )
+    if name in QUANTITIES:
+        return QUANTITIES[name]
+    # quantities of a sweep: limits of its key, and extremes of measures
+    name = name.removeprefix("largest_").removeprefix("smallest_")
+    base_name = "limit" if name.startswith("limit_") else rows.remove_interface_number(name)
+    for table in (QUANTITIES, patch_rows.TABLE, rows.TABLE):
+        for candidate in (name, base_name):
+            if candidate in table:
+                return Definition(table[candidate].unit, table[candidate].text)
+    return None
+
+
+def describe(name: str, kind: str = "") -> str:
+    """Return what a quantity of a kind of answer is in one sentence, or "" if no table defines it."""
+    definition = find_definition(name, kind)
+    if definition is None:
+        return ""
+    base_name = rows.remove_interface_number(name)
+    number = name.removeprefix(base_name).removeprefix("_")
+    part = "group" if kind in SURFACE_KINDS else "interface"
+    text = f"{definition.text}; of {part} {number}" if number else definition.text
+    return f"{text[0].upper()}{text[1:].rstrip('.')}."
+
+
+def choose_scale(name: str, unit: str, size: float) -> tuple[str, float]:
+    """Return the display unit of a quantity and the number of it in one SI unit.
+
+    Parameters
+    ----------
+    name : str
+        A name that ends in `fraction` or `share` is displayed in percent, one that ends in `phase` in degrees.
+    unit : str
+        SI unit.
+    size : float
+        Magnitude of the number [SI].
+    """
+    last_word = rows.remove_interface_number(name).rpartition("_")[2]
+    if unit == "1" and last_word in PERCENT_WORDS:
+        return "%", 100.0
+    if unit == "rad" and last_word == "phase":
+        return DEGREES
+    if unit not in LADDERS:
+        return ("" if unit == "1" else unit.replace(" s-1", "/s")), 1.0
+    return choose_unit(LADDERS[unit], size)
+
+
+def format_quantity(name: str, quantity: Quantity) -> str:
+    """Return a quantity as text, such as "14.808 ± 0.041 um" or "2.1 um (1.8 to 2.6)".
+
+    An interval that is not centred on the value stands in brackets. A missing value is a dash.
+    """
+    value = quantity.value
+    if value is None:
+        return "-"
+    error = quantity.error
+    ends = [abs(end) for end in (quantity.low, quantity.high) if end is not None]
+    unit, scale = choose_scale(name, quantity.unit, max([abs(value), *ends]))
+    if error is None and not ends and name in QUANTITIES:
+        return f"{format_number(value * scale, QUANTITIES[name].digits)} {unit}".strip()
+    if error is not None or not ends:
+        texts = round_to_error(
+            value * scale,
+            None if error is None else error * scale,
+            _zero_limit(name, quantity) * scale,
+        )
+        return format_with_error(*texts, unit)
+    return _format_interval(value * scale, quantity, unit, scale)
+
+
+def format_value(value: float | str, unit: str, digits: int = 4) -> str:
+    """Return a number [SI] without an error in a readable unit; a word is unchanged."""
+    if isinstance(value, str):
+        return value
+    label, scale = choose_scale("", unit or "1", abs(value))
+    return f"{format_number(float(value) * scale, digits)} {label}".strip()
+
+
+def _format_interval(value: float, quantity: Quantity, unit: str, scale: float) -> str:
+    """Return a value, in its display unit, with the ends of its interval in brackets."""
+    ends = [None if end is None else end * scale for end in (quantity.low, quantity.high)]
+    if None in ends:
+        limit = f"at least {ends[0]:.3g}" if ends[1] is None else f"at most {ends[1]:.3g}"
+        return f"{format_number(value, 3)} {unit} ({limit})".replace("  ", " ")
+
+    # both ends and the value have two digits of the width of the interval
+    half_width = (ends[1] - ends[0]) / 2
+    texts = [round_to_error(number, half_width)[0] for number in (value, *ends)]
+    return f"{texts[0]} {unit} ({texts[1]} to {texts[2]})".replace("  ", " ")
+
+
+def _zero_limit(name: str, quantity: Quantity) -> float:
+    """Return the magnitude [SI] below which a quantity is displayed as 0.
+
+    It is the floor of its definition where that is smaller than the floor of the run, which a run raises to its tolerance.
+    """
+    table = patch_rows.TABLE if name in patch_rows.TABLE else rows.TABLE
+    row = table.get(rows.remove_interface_number(name))
+    return quantity.floor if row is None else min(row.floor, quantity.floor)
+
+
+def is_zero(name: str, quantity: Quantity) -> bool:
+    """Return whether a quantity is displayed as 0."""
+    return format_quantity(name, quantity).partition(" ")[0] == "0"
+
+
+def choose_key(quantities: dict[str, Quantity]) -> dict[str, Quantity]:
+    """Return the quantities for the tiles: those of KEY that are present, at most MAX_TILES; none that is missing or 0."""
+    names = [name for name in KEY if name in quantities]
+    # the quantities of a verb without key names are shown in their own order
+    names = names or list(quantities)
+    shown = {
+        name: quantities[name]
+        for name in names
+        if quantities[name].value is not None and not is_zero(name, quantities[name])
+    }
+    return dict(list(shown.items())[:MAX_TILES])

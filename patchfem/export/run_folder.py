@@ -1,0 +1,152 @@
+"""A run that writes its results folder: the run, its answer and its fields first, then its page."""
+
+from dataclasses import replace
+from pathlib import Path
+from time import perf_counter
+from typing import NamedTuple
+
+from .. import __version__
+from ..core import Missing, NotConverged, PatchfemError
+from ..runs.results.result import Result, shorten_file_names
+from ..runs.run import StateFile, is_march, run
+from . import page, store
+from .answer import Answer
+from .fields import vtkhdf
+from .folder import STATE, Folder, identify_folder, is_state
+from .runs import make_answer
+
+MAX_INTERFACES = 6  # largest number of interfaces whose fields are written
+INTERFACES_FOLDER = "interfaces"
+
+
+class WrittenRun(NamedTuple):
+    """Finished run whose results are on disk.
+
+    answer, result: of the run; folder_id: device and inode of the folder, which identify it after it has been renamed.
+    """
+
+    answer: Answer
+    result: Result
+    folder_id: tuple[int, int]
+
+
+def run_into(
+    run_plan, target: Path, report=None, progress=None, *, fresh: bool = False, resume: bool = False
+) -> WrittenRun:
+    """Run a plan and write its results into a folder, without the page.
+
+    The folder is locked first. An older results folder is replaced only when the new one is complete, and a folder with
+    other files is refused before anything runs. If the motion does not converge, the patch that was pressed before is
+    written, with the outcome not_converged.
+
+    Parameters
+    ----------
+    run_plan : Plan
+    target : Path
+        Results folder.
+    report, progress : callable, optional
+        Functions that take a line of text and the completed fraction.
+    fresh : bool
+        Whether the pieces are condensed again instead of being read from the cache.
+    resume : bool
+        Whether to continue from the saved state.
+
+    Raises
+    ------
+    PatchfemError
+        If there is no state to continue from, or if the folder has other files.
+    NotConverged
+        If the motion does not converge and there is no pressed patch.
+    """
+    with Folder(target, resume) as folder:
+        if folder.dropped and report is not None:
+            report(folder.dropped)
+        state_file = None
+        if saves_state(run_plan):
+            state_file = StateFile(folder.path / STATE, __version__, resume)
+        try:
+            result = run(run_plan, report, progress, fresh=fresh, state_file=state_file)
+        except NotConverged as error:
+            result = _partial_result(error)
+        return write_results(result, folder.path)
+
+
+def _partial_result(error: NotConverged) -> Result:
+    """Return the partial result of a run that did not converge, with the reason as a warning."""
+    result = error.partial_result
+    if result is None:
+        raise NotConverged(
+            f"{error}; the run stopped before any result, so there is no results folder"
+        ) from None
+    reason = shorten_file_names([str(error)], result.plan.model.source.path)
+    return replace(result, warnings=[*reason, *result.warnings])
+
+
+def saves_state(run_plan) -> bool:
+    """Return whether the run of a plan saves its state for a later resume."""
+    wears = run_plan.model.wear is not None and run_plan.model.patch is not None
+    return wears or is_march(run_plan)
+
+
+def is_complete(run_plan, target: Path) -> bool:
+    """Return whether a folder contains the complete run of a plan.
+
+    It is False for a folder with the state of an interrupted run. PatchfemError if the folder contains the complete run of
+    another scene or of another version.
+    """
+    state = target.parent / f"{target.name}.partial"
+    if state.is_dir() and any(is_state(path.name) for path in state.iterdir()):
+        return False
+    try:
+        version = store.read_summary(target)["patchfem"]
+        text = (target / store.SCENE).read_text("utf-8")
+    except (OSError, PatchfemError):
+        return False
+    if (version, text) == (__version__, run_plan.model.source.resolved):
+        return True
+    raise PatchfemError(
+        f"{target}: this folder has no interrupted run but the complete run of another scene or version; name another "
+        "folder with -o, or run without --resume to replace that run"
+    )
+
+
+def write_results(result: Result, folder: Path) -> WrittenRun:
+    """Write all files of a run, except its page, into an existing folder."""
+    start_time = perf_counter()
+    notes = result.extra.setdefault("notes", [])
+    if result.patch is not None:
+        vtkhdf.write_fields(result, folder / store.FIELDS)
+    for face in result.extra.get("faces", ())[:MAX_INTERFACES]:
+        face_folder = folder / INTERFACES_FOLDER / face.folder
+        face_folder.mkdir(parents=True, exist_ok=True)
+        face_result = replace(
+            result,
+            plan=replace(result.plan, model=face.model),
+            patch=face.patch,
+            fields=face.fields,
+            extra={"notes": []},
+        )
+        vtkhdf.write_fields(face_result, face_folder / store.FIELDS)
+        notes += [f"interface {face.name}: {note}" for note in face_result.extra["notes"]]
+    result.seconds["files"] = perf_counter() - start_time
+    answer = make_answer(result)
+    store.write(answer, folder)
+    return WrittenRun(answer, result, identify_folder(folder))
+
+
+def write_run_page(written: WrittenRun, folder: Path) -> Path:
+    """Write the page of a run into its complete results folder, and return the path of the page.
+
+    Missing if another run has replaced the folder in the meantime.
+    """
+    if not Path(folder).is_dir() or identify_folder(folder) != written.folder_id:
+        raise Missing(f"{folder}: replaced by another run while the page was drawn")
+    return page.write_page(folder)
+
+
+def save_run(result: Result, folder: Path) -> Answer:
+    """Write the results folder of a finished run with its page; an older results folder is replaced."""
+    with Folder(folder) as claimed:
+        written = write_results(result, claimed.path)
+    write_run_page(written, claimed.target)
+    return written.answer

@@ -1,0 +1,466 @@
+"""The verdict of a run in at most four sentences: headline with the key numbers, outcome, place of contact, accuracy.
+
+In: a `Result` and its quantities. Out: sentences. Every number in them is a quantity with its error.
+"""
+
+import numpy as np
+
+from ..core import Outcome
+from ..formatting import (
+    UNIT_LADDERS,
+    choose_unit,
+    format_length,
+    format_number,
+    format_quantity,
+    format_value,
+)
+from ..response.outcome import NOT_SETTLED_WARNING, OPEN_LOOP
+from ..response.rows import remove_interface_number
+from ..runs.results.patch_rows import find_unknown_measures
+from ..runs.results.result import Result
+from . import quantities
+from .answer import Quantity
+from .run_data import find_readings
+
+MAX_LISTED = 3  # largest number of interfaces or contact regions that are listed one by one
+# largest slip [m] and largest work relative to force times motion that are attributed to round-off
+SLIP_ROUND_OFF = 1e-15
+WORK_ROUND_OFF = 1e-12
+# deviation from the final position, relative to this position, at which a released output is at rest
+REST_FRACTION = 5e-3
+ZERO_FRACTION = 1e-9  # final position, relative to the largest motion, that counts as 0
+MIN_DECAY_AMPLITUDES = (
+    5  # smallest number of amplitudes of a decay for which its damping is printed
+)
+SCATTER = "_scatter"  # end of the name of a measure that states the scatter between random records
+CYCLE_ROUND_OFF = 1e-6  # a run with this much less than one cycle still covers the cycle
+
+# parts of a headline: (measure, text); a run shows the first MAX_PARTS that it has
+HEADLINES = {
+    "wear": (
+        ("worn_depth_max", "{} worn off at the deepest place"),
+        ("worn_volume", "{} worn off"),
+        ("contact_fraction", "{} of the length in contact"),
+    ),
+    "random": (
+        ("relative_displacement_rms", "the output moves {} rms"),
+        ("response_frequency", "H1 peaks at {}"),
+        ("response_damping", "its damping ratio is {}"),
+        ("friction_power", "friction dissipates {}"),
+    ),
+    "rig": (
+        ("relative_displacement_amplitude", "displacement amplitude at the output {}"),
+        ("absolute_acceleration_peak", "peak acceleration {}"),
+        ("loop_area", "{} dissipated per cycle"),
+    ),
+    "bench": (
+        ("friction_ratio_peak", "friction ratio peaks at {}"),
+        ("equivalent_stiffness", "equivalent stiffness {}"),
+        ("loop_area", "{} dissipated per cycle"),
+        ("slip_amplitude", "slip amplitude {}"),
+    ),
+    "patch": (
+        ("contact_fraction", "{} of the length in contact"),
+        ("pressure_peak", "peak pressure {}"),
+        ("approach", "approach {}"),
+    ),
+}
+MAX_PARTS = 3
+
+
+def make_verdict(result: Result, measures: dict[str, Quantity], details: dict) -> tuple[str, ...]:
+    """Return the sentences about a run, the headline first.
+
+    Parameters
+    ----------
+    result : Result
+    measures : dict of str to Quantity
+    details : dict
+        Further keys of summary.json: `cycles`, `contact`, `loop` and `run_away`, as far as they exist.
+    """
+    release, decay = describe_release(result)
+    outcome = describe_outcome(result, measures, details)
+    headline = release or _headline(result, measures, details)
+    if result.outcome in (Outcome.NO_CONTACT, Outcome.NOT_CONVERGED) or not headline:
+        return (outcome,)
+    sentences = [headline, decay, outcome, _compare_with_readings(result)]
+    if result.plan.kind != "patch":
+        sentences.append(_describe_place(details.get("contact")))
+    sentences.append(describe_accuracy(result, measures))
+    return tuple([sentence for sentence in sentences if sentence][:4])
+
+
+def _headline(result: Result, measures: dict[str, Quantity], details: dict) -> str:
+    """Return the sentence with the key numbers of a run; "" if it has none."""
+    kind = _choose_headline(result, measures)
+    parts = []
+    for name, text in HEADLINES[kind]:
+        if name == "loop_area":
+            parts += _interface_parts(result, measures, text)
+        elif _is_known(measures, name) and not quantities.is_zero(name, measures[name]):
+            part = text.format(_format(name, measures))
+            if (kind, name) == ("patch", "contact_fraction"):
+                part += _describe_place(details.get("contact"), " ({})")
+            parts.append(part)
+    if not parts:
+        return ""
+    text = ", ".join(parts[:MAX_PARTS])
+    cycles = details.get("cycles")
+    if cycles is not None and cycles < 1 - CYCLE_ROUND_OFF:
+        text = f"in {cycles:.2g} of a cycle: {text}"
+    return f"{text[0].upper()}{text[1:]}."
+
+
+def _choose_headline(result: Result, measures: dict[str, Quantity]) -> str:
+    """Return the key of HEADLINES for a run."""
+    if "worn_volume" in measures or "worn_depth_max" in measures:
+        return "wear"
+    if "relative_displacement_rms" in measures:
+        return "random"
+    return {"patch": "patch", "bench": "bench"}.get(result.plan.kind, "rig")
+
+
+def _is_known(measures: dict[str, Quantity], name: str) -> bool:
+    """Return whether a measure has a value."""
+    return name in measures and measures[name].value is not None
+
+
+def _interface_parts(result: Result, measures: dict[str, Quantity], text: str) -> list[str]:
+    """Return the dissipated energy of the interface, or of each of a few interfaces."""
+    names = [name for name in measures if remove_interface_number(name) == "loop_area"]
+    names = [
+        name
+        for name in names
+        if _is_known(measures, name) and not quantities.is_zero(name, measures[name])
+    ]
+    if not names:
+        return []
+    if result.outcome in (Outcome.TRANSIENT, Outcome.GROWS):
+        text += " (mean of the last cycles)"
+    if any(warning.startswith(OPEN_LOOP) for warning in result.warnings):
+        text = "friction work of the last cycle {}"
+    has_strips = any(name == "contact.strips" for name in result.plan.effects)
+    if len(names) == 1 or has_strips or len(names) > MAX_LISTED:
+        where = "" if len(names) == 1 or has_strips else f" at interface 1 of {len(names)}"
+        return [text.format(quantities.format_quantity(names[0], measures[names[0]])) + where]
+    values = [_format(name, measures) for name in names]
+    return [text.format(f"{', '.join(values[:-1])} and {values[-1]}") + " at the interfaces"]
+
+
+def describe_outcome(result: Result, measures: dict[str, Quantity], details: dict) -> str:
+    """Return the sentence on how a run ended.
+
+    `stuck` refers to the interface as a whole: if its last cycles dissipate or slip more than their error, a part slips.
+    """
+    outcome = result.outcome
+    if outcome is Outcome.NOT_CONVERGED and (unknown := find_unknown_measures(result.measures)):
+        names = " and of ".join(unknown)
+        return f"The error of {names} is as large as the value; use the other measures with their errors."
+    if result.plan.kind == "bench" and outcome is Outcome.DONE:
+        return _bench_outcome(measures, details)
+    if run_away := details.get("run_away"):
+        drive, knee = (format_quantity(run_away[name], "m s-2", 4) for name in ("drive", "knee"))
+        return f"{outcome.sentence} Above {knee} friction alone does not limit it; the drive is {drive}."
+    if outcome is Outcome.TRANSIENT and _is_release(result):
+        return "The run ended before the motion came to rest; raise drive.cycles to see more of it."
+    if outcome is Outcome.STUCK and {"loop_area", "slip_amplitude"} & measures.keys():
+        return _stuck_outcome(result, measures)
+    regime = result.extra.get("regime")
+    if regime is None:
+        return outcome.sentence
+    multiplier = float(np.abs(np.asarray(result.extra["multipliers"])).max(initial=0.0))
+    stability = "decays" if multiplier < 1 else "grows or persists"
+    if regime in ("stuck", "unbounded") or multiplier == 0:
+        return f"{outcome.sentence[:-1]} (regime: {regime})."
+    return (
+        f"{outcome.sentence[:-1]} (regime: {regime}); a disturbance {stability} "
+        f"(largest Floquet multiplier {multiplier:.4g})."
+    )
+
+
+def _bench_outcome(measures: dict[str, Quantity], details: dict) -> str:
+    """Return the sentence on slip and loss factor of a bench."""
+    slip = measures.get("slip_amplitude")
+    if (
+        slip is not None
+        and slip.value is not None
+        and slip.value <= max(_error_of(slip), SLIP_ROUND_OFF)
+    ):
+        return _no_slip("contact_fraction" in measures, "cycle")
+    loop = details.get("loop")
+    if loop is None:
+        return Outcome.DONE.sentence
+    amplitude = format_quantity(loop["slide_amplitude"], "m", 4)
+    factor = format_value(loop["loss_factor"], loop["error"], 1e-9)
+    return f"At a slide amplitude of {amplitude} the loss factor is {factor}."
+
+
+def _error_of(quantity: Quantity) -> float:
+    """Return the error of a quantity, or its floor if the error is unknown."""
+    return quantity.floor if quantity.error is None else quantity.error
+
+
+def _no_slip(has_patch: bool, cycles: str) -> str:
+    """Return the sentence for an interface without slip.
+
+    At an edge where the pressure of a patch ends, any force causes slip; a mesh may not show it.
+    """
+    limit = " beyond the error of this mesh; a slip zone smaller than an element cannot be detected"
+    return f"The interface sticks: no slip in the last {cycles}{limit * has_patch}."
+
+
+def _stuck_outcome(result: Result, measures: dict[str, Quantity]) -> str:
+    """Return the sentence for an interface that sticks as a whole."""
+    rings = ""
+    if any(warning.startswith(NOT_SETTLED_WARNING) for warning in result.warnings):
+        rings = " The amplitude has not settled: it is that of a transient."
+    has_patch = "contact_fraction" in measures
+    part = "part of the patch slips" if has_patch else "part of it slips"
+    force, motion = (
+        measures[name].value or 0.0 if name in measures else 0.0
+        for name in ("friction_force_peak", "relative_displacement_amplitude")
+    )
+    limits = {"loop_area": WORK_ROUND_OFF * abs(force * motion), "slip_amplitude": 0.0}
+    texts = {"loop_area": "{} per cycle", "slip_amplitude": "by {}"}
+    for kind, limit in limits.items():
+        slipping = {
+            name: quantity
+            for name, quantity in measures.items()
+            if remove_interface_number(name) == kind and quantity.value
+        }
+        name = max(slipping, key=lambda one: slipping[one].value, default="")
+        if name and slipping[name].value > max(_error_of(slipping[name]), limit):
+            size = texts[kind].format(quantities.format_quantity(name, slipping[name]))
+            return f"The interface as a whole sticks, but {part} ({size}).{rings}"
+    return _no_slip(has_patch, "cycles") + rings
+
+
+def _describe_place(contact: dict | None, form: str = "In contact: {}.") -> str:
+    """Return where the contact is along x, such as "x = -6.35 to -3.56 mm"; "" if all of the length is in contact."""
+    if not contact or not contact["stretches"]:
+        return ""
+    first, last, stretches = contact["from"], contact["to"], contact["stretches"]
+    if len(stretches) == 1 and stretches[0][0] <= first and stretches[0][1] >= last:
+        return ""
+    unit, scale = choose_unit(UNIT_LADDERS["m"], max(abs(first), abs(last)))
+    texts = [
+        f"{format_number(start * scale, 4)} to {format_number(end * scale, 4)}"
+        for start, end in stretches[:MAX_LISTED]
+    ]
+    if len(stretches) > MAX_LISTED:
+        whole = f"{format_number(stretches[0][0] * scale, 4)} to {format_number(stretches[-1][1] * scale, 4)}"
+        return form.format(f"{len(stretches)} regions from x = {whole} {unit}")
+    return form.format(f"x = {' and '.join(texts)} {unit}")
+
+
+def _compare_with_readings(result: Result) -> str:
+    """Return a sentence on the ratio of computed and measured readings at the drive of the run; "" without a measurement."""
+    parts = []
+    for reading in list_readings(result):
+        if "repeat" not in reading["reading"]:
+            ratio = format_number(reading["ratio"], 3)
+            parts.append(f"the {reading['reading']} is {ratio} times the measured one")
+    if not parts:
+        return ""
+    text = " and ".join(parts)
+    return f"{text[0].upper()}{text[1:]}."
+
+
+def list_readings(result: Result) -> list[dict]:
+    """Return the measured readings at the drive of the run beside the computed ones.
+
+    Returns
+    -------
+    list of dict
+        Keys `reading` (what, with "repeat run" where it is one), `measured` and `computed` (objects with value, unit and
+        error, in SI) and `ratio`.
+    """
+    from ..structure import drive_sizes
+
+    readings = find_readings(result)
+    if readings is None:
+        return []
+    rows, computed = readings
+    level = drive_sizes.find_max_acceleration(result.plan.model.rig.drive.signal)
+    listed = []
+    for row in rows:
+        if abs(row.input - level) > 0.01 * row.input:
+            continue
+        for name, unit in (("acceleration", "m s-2"), ("displacement", "m")):
+            value = getattr(row, name)
+            if not value or name not in computed:
+                continue
+            reading, error = computed[name]
+            listed.append(
+                {
+                    "reading": f"{name} (repeat run)" if "R" in row.flag else name,
+                    "measured": {"value": value, "unit": unit},
+                    "computed": {"value": reading, "unit": unit, "error": error},
+                    "ratio": reading / value,
+                }
+            )
+    return listed
+
+
+def make_captions(result: Result) -> dict[str, str]:
+    """Return sentences that are added to the captions of charts: {title of the chart: sentence}."""
+    captions = {
+        "Pressure on the interface": _explain_drawn_peak(result),
+        "Pressure while it wears": _describe_edge_peaks(result),
+        "Frequency response H1": _describe_gain_peak(result),
+    }
+    return {title: sentence for title, sentence in captions.items() if sentence}
+
+
+def _explain_drawn_peak(result: Result) -> str:
+    """Return why the largest pressure drawn for a static patch is not `pressure_peak`; "" if both are equal."""
+    peak = result.measures.get("pressure_peak")
+    if result.plan.kind != "patch" or peak is None or peak.value is None:
+        return ""
+    largest = format_quantity(float(np.max(result.fields["normal_stress"])), "Pa", 4)
+    estimate = format_quantity(peak.value, "Pa", 4)
+    if largest == estimate:
+        return ""
+    strips = " and over the strips" if result.patch.strips is not None else ""
+    return (
+        f"The drawn pressures are means over the elements beside a node{strips}, at most {largest}; the measure "
+        f"pressure_peak, {estimate}, is the estimated maximum of the continuous pressure."
+    )
+
+
+def _describe_edge_peaks(result: Result) -> str:
+    """Return after which cycles of wear the peak pressure lies at the edge of the contact."""
+    history = result.extra.get("wear", {})
+    above = np.asarray(history.get("pressure_peak_at_edge", ()))
+    if not (above > 0).any():
+        return ""
+    cycles = np.asarray(history["cycle"])[above > 0]
+    listed = ", ".join(format_number(float(cycle), 4) for cycle in cycles)
+    largest = format_quantity(float(above.max()), "Pa", 2)
+    return (
+        f"After {listed} cycles the peak pressure is that of a node at the edge of the contact, up to {largest} above "
+        "all pressures farther inside; it has an error of this size."
+    )
+
+
+def _describe_gain_peak(result: Result) -> str:
+    """Return the 95 % intervals of frequency and damping at the peak of H1 under a random drive."""
+    parts = []
+    for name, text in (
+        ("response_frequency", "the peak is at {}"),
+        ("response_damping", "its damping ratio is {}"),
+    ):
+        value = result.measures.get(name)
+        scatter = result.measures.get(name + SCATTER)
+        if value is None or scatter is None or None in (value.value, scatter.value):
+            return ""
+        low, high = max(value.value - scatter.value, 0.0), value.value + scatter.value
+        interval = Quantity(value.value, value.unit, None, low, high)
+        parts.append(text.format(quantities.format_quantity(name, interval)))
+    sentence = "; ".join(parts)
+    return f"{sentence[0].upper()}{sentence[1:]} (95 % interval over records of the random drive)."
+
+
+def describe_accuracy(result: Result, measures: dict[str, Quantity]) -> str:
+    """Return a sentence that all errors are within the tolerance, with the largest; "" if a warning says more."""
+    tolerance = result.plan.model.accuracy.tolerance
+    if result.outcome is Outcome.GROWS and result.response is not None:
+        end = format_quantity(float(result.response.time[-1]), "s", 3)
+        return f"The motion still grows after {end}: the measures are those of the last cycles, without errors."
+    ratios = {
+        name: measure.error_ratio(tolerance)
+        for name, measure in result.measures.items()
+        if measure.value is not None and measure.error is not None and not name.endswith(SCATTER)
+    }
+    if not ratios or max(ratios.values()) > 1:
+        return ""
+    # errors that are too small to be displayed say nothing
+    visible = {name: ratio for name, ratio in ratios.items() if "±" in _format(name, measures)}
+    if not visible:
+        return f"All errors are within the tolerance {tolerance:g}."
+    name = max(visible, key=lambda one: (visible[one], one))
+    largest = format_number(100 * visible[name], 2)
+    return (
+        f"All errors are within the tolerance {tolerance:g}; the largest is {largest} % of what it allows "
+        f"({name}: {_format(name, measures)})."
+    )
+
+
+def _format(name: str, measures: dict[str, Quantity]) -> str:
+    """Return a measure as text with its error."""
+    return quantities.format_quantity(name, measures[name])
+
+
+def _is_release(result: Result) -> bool:
+    """Return whether a run is a free motion after a release."""
+    rig = result.plan.model.rig
+    return rig is not None and rig.drive.kind == "free"
+
+
+def describe_release(result: Result) -> tuple[str, str]:
+    """Return two sentences on a released output: first swing and rest, and its decay; "" for what does not exist."""
+    response = result.response
+    if not _is_release(result) or response is None or response.time.size < 2:
+        return "", ""
+    amplitude = result.measures.get("relative_displacement_amplitude")
+    error = getattr(amplitude, "error", None) or 0.0
+    last = getattr(amplitude, "value", None)
+    motion = describe_swing(response.time, response.output, error, last)
+    return f"{motion[0].upper()}{motion[1:]}.", _describe_decay(result.extra.get("decay"))
+
+
+def _describe_decay(decay) -> str:
+    """Return a sentence on frequency and damping ratio at the start and at the end of a decay; "" without them."""
+    if decay is None:
+        return ""
+    known = np.flatnonzero(np.isfinite(decay.damping_error + decay.frequency_error))
+    if known.size < MIN_DECAY_AMPLITUDES:
+        return ""
+    parts = [
+        f"{format_value(decay.frequency[k], decay.frequency_error[k], unit='Hz')} and damping ratio "
+        f"{format_value(decay.damping[k], decay.damping_error[k])} at {format_quantity(float(decay.amplitude[k]), 'm', 3)}"
+        for k in (known[1], known[-1])
+    ]
+    return f"It decays with {', with '.join(parts)}."
+
+
+def describe_swing(time, output, error: float = 0.0, amplitude: float | None = None) -> str:
+    """Describe a released motion: start, first swing, number of reversals, and where and when it comes to rest.
+
+    Parameters
+    ----------
+    time, output : (k,) ndarray
+        Stored samples with all reversals [s], [m].
+    error : float
+        Error of the amplitude [m]; an output that moves by no more is at rest.
+    amplitude : float, optional
+        Amplitude of the last whole cycle [m]; by default that of the last tenth of the samples.
+    """
+    largest = np.abs(output).max()
+    end = 0.0 if abs(output[-1]) < ZERO_FRACTION * largest else float(output[-1])
+    distance = np.abs(output - end)
+    start_text = f"released at {format_length(float(output[0]), 3)}, the output"
+    if not np.isfinite(distance).all() or not distance.max() > 0:
+        return f"{start_text} does not move"
+
+    rest_limit = max(error, REST_FRACTION * abs(end), ZERO_FRACTION * largest)
+    steps = np.diff(output)
+    moving = np.flatnonzero(np.abs(steps) > 1e-13 * largest)
+    reversals = 1 + moving[:-1][np.diff(np.sign(steps[moving])) != 0]
+    reversals = reversals[distance[reversals] > rest_limit]
+    goal = f"goes to {format_length(end, 3)}"
+    if reversals.size:
+        goal = f"first swings to {format_length(float(output[reversals[0]]), 3)}"
+
+    last_tenth = time >= time[-1] - 0.1 * (time[-1] - time[0])
+    last = np.ptp(output[last_tenth]) / 2
+    last = last if amplitude is None else min(last, amplitude)
+    if last > rest_limit:
+        end_time = format_quantity(float(time[-1]), "s", 3)
+        size = format_length(float(last), 3)
+        return f"{start_text} {goal} and after {end_time} still moves with an amplitude of {size}"
+    far = np.flatnonzero(distance > rest_limit)
+    rest = min(int(far[-1]) if far.size else 0, time.size - 2)
+    rest_time = format_quantity(float(time[rest + 1]), "s", 3)
+    count = f", reverses {reversals.size} times" if reversals.size else ""
+    return f"{start_text} {goal}{count} and rests at {format_length(end, 3)} after {rest_time}"

@@ -1,0 +1,199 @@
+"""The answer of a run: measures, verdict, arrays and the keys of summary.json."""
+
+import math
+import shlex
+import sys
+import tomllib
+from pathlib import Path
+
+from .. import __version__
+from ..core import Measure, Outcome
+from ..disk.installed import list_installed_versions
+from ..effects import EFFECTS
+from ..runs.patch import values
+from ..runs.results.result import Result, collect_used_settings, engine_by_measure
+from ..runs.rig import plan as rig_plan
+from .answer import Answer, Quantity, Remarks
+from .driven import describe_drive, list_changed_keys
+from .run_data import collect_data
+from .run_words import list_readings, make_captions, make_verdict
+
+# ratio of a stiffness to its error above which the loss factor is computed
+MIN_STIFFNESS_ERRORS = 10.0
+PACKAGES = ("numpy", "scipy", "scikit-fem", "numba", "xarray", "h5netcdf", "matplotlib")
+
+
+def make_answer(result: Result) -> Answer:
+    """Return the answer of a run."""
+    run_plan = result.plan
+    source = run_plan.model.source
+    measures = make_quantities(result.measures)
+    details = make_details(result)
+    changed = list_changed_keys(source.sets)
+    title = f"{source.title}; changed: {changed}" if source.title and changed else source.title
+    return Answer(
+        kind=run_plan.kind,
+        title=title,
+        verdict=make_verdict(result, measures, details),
+        quantities=measures,
+        data=collect_data(result),
+        remarks=Remarks(tuple(result.warnings), tuple(result.extra.get("notes", ()))),
+        details=details,
+        origin=make_origin(source, "run"),
+    )
+
+
+def make_quantities(measures: dict[str, Measure]) -> dict[str, Quantity]:
+    """Return the measures of a run as quantities."""
+    quantities = {}
+    for name, one in measures.items():
+        is_unknown = one.value is not None and one.error is None
+        reason = "error unknown" if is_unknown else one.reason
+        quantities[name] = Quantity(
+            one.value, one.unit, one.error, floor=float(one.floor), reason=reason
+        )
+    return quantities
+
+
+def make_origin(source, verb: str) -> dict:
+    """Return where an answer comes from.
+
+    Parameters
+    ----------
+    source : model.Source
+        Scene as text, as written and with all defaults.
+    verb : str
+        Verb that repeats it on the scene.
+
+    Returns
+    -------
+    dict
+        Keys `patchfem`, `scene`, `resolved`, `command`, `driven` and `versions`, all without the folder of the scene.
+    """
+    return {
+        "patchfem": __version__,
+        "scene": source.text,
+        "resolved": source.resolved,
+        "command": make_command(verb, source.path, source.sets),
+        # other verbs ignore or vary the drive of the scene
+        "driven": describe_drive(tomllib.loads(source.resolved)) if verb == "run" else "",
+        "versions": list_versions(),
+    }
+
+
+def make_command(verb: str, path: Path, sets: tuple[str, ...]) -> str:
+    """Return the command line that repeats a verb; files are named without their folder."""
+    words = ["patchfem", verb, Path(path).name]
+    for assignment in sets:
+        key, _, value = assignment.partition("=")
+        words += ["--set", f"{key}={Path(value).name if value.startswith('/') else value}"]
+    return shlex.join(words)
+
+
+def list_versions() -> dict[str, str]:
+    """Return the versions of Python and of the packages that compute."""
+    installed = list_installed_versions()
+    python = ".".join(map(str, sys.version_info[:3]))
+    return {"python": python} | {name: installed[name] for name in PACKAGES if name in installed}
+
+
+def make_details(result: Result) -> dict:
+    """Return the further keys of summary.json for a run."""
+    details = {
+        "outcome": str(result.outcome),
+        "effects": _list_effects(result),
+        "not_in_scene": list(result.plan.not_in_scene),
+        "seconds": {name: round(float(value), 6) for name, value in result.seconds.items()},
+        "numerics": collect_used_settings(result) | {"measures": engine_by_measure(result)},
+    }
+    cycles = count_cycles(result)
+    optional = {
+        "cycles": None if cycles is None else float(cycles),
+        "contact": _find_contact(result),
+        "run_away": _find_run_away(result),
+        "loop": _find_loss_factor(result),
+        "measured": list_readings(result),
+        "captions": make_captions(result),
+    }
+    return details | {name: value for name, value in optional.items() if value}
+
+
+def count_cycles(result: Result) -> float | None:
+    """Return the number of cycles of the drive or of the slide in a run, or None if it has none."""
+    response = result.response
+    period = result.extra.get("period")
+    if response is not None and period and result.plan.kind != "bench":
+        return float(response.time[-1] - response.time[0]) / period
+    return tomllib.loads(result.plan.model.source.resolved).get("slide", {}).get("cycles")
+
+
+def _list_effects(result: Result) -> list[dict]:
+    """Return `effect`, `equations` and `seconds` of each computed effect.
+
+    Law and modes share one loop, whose time is that of the law.
+    """
+    patch_seconds = {} if result.patch is None else result.patch.seconds
+    loop_seconds = result.seconds.get("march", result.seconds.get("bench", 0.0))
+    entries = []
+    for name in result.plan.effects:
+        seconds = patch_seconds.get(name.removeprefix("contact."), 0.0)
+        if name == "contact":
+            seconds = patch_seconds.get("condense", 0.0) + patch_seconds.get("press", 0.0)
+        elif name == "contact.shear":
+            seconds = result.seconds.get("reduce", 0.0)
+        elif name.startswith("friction.law=") or (name, result.plan.kind) == (
+            "structure",
+            "linear",
+        ):
+            seconds = loop_seconds
+        equations = EFFECTS[name].equations
+        entries.append(
+            {"effect": name, "equations": equations, "seconds": round(float(seconds), 6)}
+        )
+    return entries
+
+
+def _find_contact(result: Result) -> dict:
+    """Return the ends of the interface and of each part in contact [m], for a solved patch without strips."""
+    patch = result.patch
+    if patch is None or patch.strips is not None or not patch.active.any():
+        return {}
+    if patch.points is not None:
+        intervals = patch.points.intervals
+    else:
+        intervals = values.contact_intervals(patch, values.contact_ends(patch))
+    ends = {"from": float(patch.x[0]), "to": float(patch.x[-1])}
+    return ends | {"stretches": intervals.tolist()}
+
+
+def _find_run_away(result: Result) -> dict:
+    """Return the drive of an unsettled motion and the largest one that friction can limit [m s-2], if it is larger."""
+    if result.outcome not in (Outcome.TRANSIENT, Outcome.GROWS):
+        return {}
+    found = rig_plan.find_drive_and_knee(result.plan.model)
+    return found if found and found["drive"] > found["knee"] else {}
+
+
+def _find_loss_factor(result: Result) -> dict:
+    """Return slide amplitude [m] and loss factor of a bench in periodic motion.
+
+    The loss factor is the work of a cycle over 2 pi times the largest elastic energy, W/(pi k A^2) with the equivalent
+    stiffness k. {} if this stiffness is not positive beyond its error.
+    """
+    stiffness = result.measures.get("equivalent_stiffness")
+    work = result.measures.get("loop_area")
+    if result.plan.kind != "bench" or stiffness is None or work is None:
+        return {}
+    if None in (stiffness.value, work.value) or work.value < 0:
+        return {}
+    stiffness_error = stiffness.error or stiffness.floor
+    if stiffness.value <= MIN_STIFFNESS_ERRORS * stiffness_error:
+        return {}
+
+    amplitude = result.plan.model.slide.amplitude
+    elastic = math.pi * stiffness.value * amplitude**2
+    factor = work.value / elastic
+    error = None
+    if None not in (stiffness.error, work.error):
+        error = work.error / elastic + factor * stiffness.error / stiffness.value
+    return {"slide_amplitude": amplitude, "loss_factor": factor, "error": error}

@@ -1,0 +1,99 @@
+"""Comparison of several answers of the same kind: what differs in their scenes and in their measures."""
+
+import tomllib
+from textwrap import shorten
+from typing import Any
+
+from ..formatting import format_number
+from .answer import Answer, Quantity
+from .quantities import KEY, format_quantity
+
+MAX_SENTENCES = 5  # largest number of measures that are compared in words
+MIN_FACTOR = 10.0  # smallest ratio to the first value that is written as a factor
+MAX_CELL_LENGTH = 80  # largest number of characters of a value of a scene
+
+
+def differs(quantity: Quantity | None, first: Quantity | None) -> bool:
+    """Return whether a quantity differs from that of the first answer by more than both errors."""
+    if quantity is None or first is None or None in (quantity.value, first.value):
+        return False
+    limit = _find_uncertainty(quantity) + _find_uncertainty(first)
+    return quantity.unit == first.unit and abs(quantity.value - first.value) > limit
+
+
+def _find_uncertainty(quantity: Quantity) -> float:
+    """Return the half-width of the interval of a quantity, but at least its floor."""
+    if None in (quantity.low, quantity.high):
+        return quantity.floor
+    return max((quantity.high - quantity.low) / 2, quantity.floor)
+
+
+def format_entry(name: str, quantity: Quantity | None, first: Quantity | None) -> str:
+    """Return a quantity as text, with its change from the first answer if it differs by more than both errors.
+
+    The change is in percent, or a factor if it is large; there is none from a value that may be 0.
+    """
+    if quantity is None:
+        return ""
+    text = format_quantity(name, quantity)
+    if not differs(quantity, first) or abs(first.value) <= _find_uncertainty(first):
+        return text
+    factor = quantity.value / first.value
+    if abs(factor) >= MIN_FACTOR:
+        return f"{text} (x {format_number(factor, 2)})"
+    change = (quantity.value - first.value) / abs(first.value)
+    return f"{text} ({100 * change:+.{1 if abs(change) > 0.01 else 2}f} %)"
+
+
+def compare_measures(answers: dict[str, Answer]) -> list[str]:
+    """Return a sentence for each of at most five measures that differ by more than their errors, key measures first."""
+    first_name, *others = answers
+    first = answers[first_name].quantities
+    changed = [
+        name
+        for name in dict.fromkeys([*KEY, *first])
+        if any(differs(answers[other].quantities.get(name), first.get(name)) for other in others)
+    ]
+    if not changed:
+        return ["No measure differs by more than its error."]
+    sentences = []
+    for name in changed[:MAX_SENTENCES]:
+        parts = []
+        for label, answer in answers.items():
+            text = format_entry(name, answer.quantities.get(name), first[name])
+            if text:
+                parts.append(f"{text} in {label}")
+        sentences.append(f"{name[0].upper()}{name[1:].replace('_', ' ')}: {', '.join(parts)}.")
+    if len(changed) > MAX_SENTENCES:
+        sentences.append(f"{len(changed) - MAX_SENTENCES} more measures differ; see the table.")
+    return sentences
+
+
+def list_scene_differences(answers: dict[str, Answer]) -> list[dict]:
+    """Return a table of the keys in which the resolved scenes differ, as `page.make_tables` does; [] without any."""
+    scenes = {
+        name: _flatten(tomllib.loads(answer.origin.get("resolved", "")))
+        for name, answer in answers.items()
+    }
+    rows = []
+    for key in dict.fromkeys(key for scene in scenes.values() for key in scene):
+        texts = [str(scene.get(key, "-")) for scene in scenes.values()]
+        if len(set(texts)) > 1:
+            rows.append([key, *(shorten(text, MAX_CELL_LENGTH) for text in texts)])
+    if not rows:
+        return []
+    return [{"title": "Where the scenes differ", "headings": ["key", *answers], "rows": rows}]
+
+
+def _flatten(table: Any, prefix: str = "") -> dict[str, Any]:
+    """Return nested tables of a scene as dotted keys; tables of a list are named by their name or number."""
+    if isinstance(table, dict):
+        pairs = table.items()
+    elif isinstance(table, list) and table and isinstance(table[0], dict):
+        pairs = [(entry.get("name", number), entry) for number, entry in enumerate(table, 1)]
+    else:
+        return {prefix: table}
+    flat = {}
+    for name, entry in pairs:
+        flat |= _flatten(entry, f"{prefix}.{name}" if prefix else str(name))
+    return flat

@@ -1,0 +1,56 @@
+"""The answer of a verb as lines on the screen: verdict, key numbers, and one line for each file."""
+
+import shlex
+from pathlib import Path
+
+from . import quantities, store
+from .answer import Answer, Quantity
+
+
+def make_lines(answer: Answer, is_verbose: bool = False) -> list[str]:
+    """Return the lines of an answer for the standard output, without warnings and notes.
+
+    Parameters
+    ----------
+    answer : Answer
+    is_verbose : bool
+        Whether all quantities are shown instead of the key quantities.
+    """
+    lines = [answer.title] if answer.title else []
+    lines += answer.verdict
+    shown = answer.quantities if is_verbose else quantities.choose_key(answer.quantities)
+    return lines + format_quantities(shown)
+
+
+def list_quantities(shown: dict[str, Quantity]) -> list[tuple[str, str]]:
+    """Return name and text of each quantity, with the reason for a missing value or error."""
+    return [
+        (
+            name,
+            quantities.format_quantity(name, quantity)
+            + (f" ({quantity.reason})" if quantity.reason else ""),
+        )
+        for name, quantity in shown.items()
+    ]
+
+
+def format_quantities(shown: dict[str, Quantity]) -> list[str]:
+    """Return an aligned line for each quantity."""
+    rows = list_quantities(shown)
+    width = max((len(name) for name, _ in rows), default=0)
+    return [f"  {name:<{width}}  {text}" for name, text in rows]
+
+
+def list_files(folder: Path, has_page: bool = True) -> list[str]:
+    """Return a line for the results folder, and for its page, its fields and its main table if it has them."""
+    lines = [f"results: {folder}{'' if has_page else ' (without report.html: --no-page)'}"]
+    for label, name in (("page", store.PAGE), ("fields", store.FIELDS), ("table", "sweep.csv")):
+        if (folder / name).is_file():
+            lines.append(f"{label}: {folder / name}")
+    inside = sorted(folder.glob("interfaces/*"))
+    if inside:
+        first = shlex.quote(str(inside[0]))
+        lines.append(
+            f"fields of each interface: {folder / 'interfaces'}; view: patchfem view {first}"
+        )
+    return lines

@@ -1,0 +1,74 @@
+"""Definitions of the quantities of compare, profile and wear between two runs, by name."""
+
+from ..surface.compare.records import DEFINITIONS
+from ..surface.roughness.areal import AREAL
+from ..surface.roughness.parameters import PROFILE
+from .answer import Definition
+
+# names in a track -> names in compare.json and in the answer
+TRACK_NAMES = {"depth_mean": "track_depth"}
+
+# quantities that have the same meaning between two scans, two traces and two runs
+_OWN = {
+    "worn_volume": ("m3", "volume lost in the common part of two scans, or on the patch of a run"),
+    "worn_depth_mean": (
+        "m",
+        "mean depth of the lost material: lost area divided by the common length, or lost volume divided by the common area "
+        "or by the area of the patch",
+    ),
+    "worn_depth_max": ("m", "largest depth of the lost material"),
+    "worn_area": ("m2", "lost area of the section, which is the lost volume per width"),
+    "worn_share": ("1", "fraction of the common area, or of the area of the patch, that is worn"),
+    "hidden_wear": (
+        "m",
+        "largest mean of an even or wedge-shaped wear, which measured surfaces show as a shift of the datum",
+    ),
+    "track_hidden_wear": (
+        "m",
+        "mean of the even or wedge-shaped wear of the worn part, which a trace of this part alone cannot show",
+    ),
+    "wear_coefficient": (
+        "m2 N-1",
+        "coefficient of Archard's law with which the computed depth of a run fits the measured depth",
+    ),
+    "patch_centre": ("m", "middle of the patch, in x of the second trace"),
+    "dominant_wavelength": (
+        "m",
+        "wavelength of the octave with the largest mean square height, of the levelled trace",
+    ),
+    "band_amplitude": (
+        "m",
+        "amplitude of a sine with the mean square of the waves from 60 to 110 um, of the levelled trace",
+    ),
+    "difference_rms": (
+        "m",
+        "root mean square of measured less computed depth over the patch, with the fitted coefficient",
+    ),
+}
+
+
+def name_in_track(name: str) -> str:
+    """Return the name in an answer of a quantity of a track."""
+    return TRACK_NAMES.get(name, f"track_{name}")
+
+
+def list_names() -> list[str]:
+    """Return the names of all definitions; the parts of a track without the prefix track_."""
+    heights = [f"P{name}" for name in PROFILE if name != "z"]
+    roughness = [name if name.startswith("Mr") else f"R{name}" for name in PROFILE]
+    return list(dict.fromkeys([*_OWN, *DEFINITIONS, *heights, *roughness, *AREAL]))
+
+
+def find(name: str) -> Definition | None:
+    """Return the definition of a quantity of compare, pairs or profile; None if there is none."""
+    for table in (_OWN, DEFINITIONS, AREAL):
+        if name in table:
+            return Definition(*table[name])
+    for letter, profile in (("P", "levelled trace"), ("R", "roughness profile"), ("", "profile")):
+        if name.startswith(letter) and name.removeprefix(letter) in PROFILE:
+            unit, text = PROFILE[name.removeprefix(letter)]
+            return Definition(unit, f"{text}, of the {profile}")
+    for part, (unit, text) in DEFINITIONS.items():
+        if name == name_in_track(part):
+            return Definition(unit, f"{text}; of the longest track")
+    return None

@@ -1,0 +1,220 @@
+"""Sentences of a comparison: one table of codes each for verdicts, findings and reasons.
+
+A sentence is a template whose fields are the numbers of the record as text; no sentence is read back.
+"""
+
+from collections import defaultdict
+from typing import NamedTuple
+
+from ...formatting import format_number
+from ...surface.compare.records import Comparison, Track
+from ...surface.quantity import Quantity
+from .. import answer, quantities
+
+ROUNDING = 1e-6  # largest difference of a ratio from 1 that is round-off
+MAX_SENTENCES = 4  # of a verdict
+INTERVALS = "Numbers in brackets are 95 % intervals, which hold for the place that was measured."
+
+# Headline for each code of the verdict. {mean}: worn depth with its interval; {region}: what it is the mean of.
+VERDICTS = {
+    "worn": "Worn depth {mean}, the mean over {region}.",
+    "no_wear": "No wear is shown: the mean worn depth over {region} is at most {at_most}.",
+    "grown": "Material grew: {grown} stand above the first surface, {lost} are lost; deposits, or files in the wrong order.",
+    "worn_and_grown": "Worn depth {mean}, the mean over {region}, and material grew: {lost} lost, {grown} grown.",
+    "growth_at_ends": "Either a scar of {scar_depth} over nearly all of the surface, or {growth_height} of material that "
+    "grew at the ends: both are possible.",
+    "elsewhere": "Not comparable: the two surfaces have no part in common, and no unworn flanks of a track show a depth.",
+    "no_datum": "No worn depth: the place is the same, but too few heights agree ({unworn} of all) to measure depths from.",
+    "mirror_finish": "Not comparable: the surface (rms height {rq}) is no rougher than the noise ({noise}).",
+    "identical": "No wear: both files hold the same heights; was the same file given twice?",
+}
+
+# Second sentence where there is no worn depth: what would be seen, or what to do.
+ADVICE = {
+    "no_wear": "A track over the middle third with unworn flanks is found from a mean depth of {detection_limit} on.",
+    "elsewhere": "Measure the same place again, or across the whole track with unworn surface on both sides.",
+    "no_datum": "Measure a longer part, so that more of the unworn surface is on both traces.",
+    "mirror_finish": "Mark the start of the traces on the part, and give the known shift of the second one.",
+    "growth_at_ends": "Traces that end on unworn surface on both sides would decide.",
+}
+
+# Sentences on findings: further sentences of the verdict, warnings, and notes.
+IN_VERDICT = {
+    "no_old_surface_left": "From {from} to {to} nothing of the first surface is left; the depth is measured below "
+    "the unworn flanks.",
+    "hidden_even_wear": "Even or wedge-shaped wear of both surfaces{limit} looks like a shift of the datum and is not in "
+    "these depths.",
+    "worn_tops": "Only the tops are lost; the valleys between them are those of the first surface.",
+}
+WARNINGS = {
+    "identical_files": "Both files hold the same heights; was the same file given twice?",
+    "other_gain": "All heights after wear are {gain} times those before, as another gain of the instrument would make "
+    "them, and wear does not; calibrate z of both measurements.",
+    "exchanged": "Material stands above the first surface: maybe the files are in the wrong order.",
+    "other_step": "The traces have different steps, {before} before and {after} after; slopes and the largest depth depend "
+    "on them.",
+    "drift": "The datum drifts by {height}, more than the noise; the intervals contain this error.",
+    "either_plane": "Another plane fits the unworn heights as well, and would give other depths.",
+}
+NOTES = {
+    "other_tracks": "{count} more tracks were found; compare.json lists them.",
+    "track_cut": "The track leaves the common part, so that it may be wider than stated.",
+    "deposits": "{amount} of material lie above the first surface: deposits or pile-up.",
+    "bow_subtracted": "A bow of {height} over the common length was subtracted, because a bent datum and wear of this shape "
+    "look alike; it would be a worn area of {area}.",
+    "mirrored": "The second surface was measured in the opposite direction; it was mirrored, so that its x counts from "
+    "the other end.",
+    "turned": "The second scan is a replica: its heights were turned upside down.",
+    "other_length": "Lengths in the second trace are {scale} ({low} to {high}) times those in the first.",
+}
+NO_LIMIT = "any amount"  # stands for a missing number
+
+# Why a quantity has no value.
+REASONS = {
+    "elsewhere": "the two surfaces have no part in common",
+    "no_wear": "no wear is shown",
+    "no_track": "no track is shown",
+    "cut_off": "the track leaves the part that both surfaces show",
+    "no_flanks": "the flanks of the track are not known",
+    "noise": "the noise is as large as the roughness",
+    "too_short": "the surface is too short",
+    "not_hidden": "unworn parts show where the datum is, so that no wear can hide",
+    "identical": "both files hold the same heights",
+    "no_datum": "too few heights agree to measure depths from",
+    "growth_at_ends": "a scar and growth at the ends are both possible",
+    "flat": "the surface is flat",
+    "undetermined": "the heights do not determine it",
+    "holes": "missing heights prevent it",
+    "band": "the surface is too short, or its step too long, for the waves of the band",
+    "strips": "the patch is in strips",
+}
+
+# SI units of the numbers of findings other than lengths; of areas between traces, and of volumes between scans
+UNITS = {"unworn": "1", "scale": "1", "low": "1", "high": "1", "gain": "1", "volume": "m3"}
+AMOUNTS = ("grown", "lost", "area")
+
+
+class Words(NamedTuple):
+    """Sentences of a comparison: verdict (at most four), warnings and notes."""
+
+    verdict: tuple[str, ...]
+    warnings: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def to_answer(quantity: Quantity) -> answer.Quantity:
+    """Return a measured quantity as that of an answer, with its reason in words."""
+    reason = REASONS.get(quantity.reason, quantity.reason)
+    value, low, high, unit = quantity[:4]
+    return answer.Quantity(value, unit, low=low, high=high, reason=reason)
+
+
+def to_json(values: dict[str, Quantity]) -> dict[str, dict]:
+    """Return measured quantities by name as objects of a JSON file."""
+    return {name: to_answer(quantity).as_json() for name, quantity in values.items()}
+
+
+def format_value(name: str, quantity: Quantity) -> str:
+    """Return a measured quantity as text with its interval, as on a page."""
+    return quantities.format_quantity(name, to_answer(quantity))
+
+
+def format_rounded(number: float, unit: str, digits: int = 4) -> str:
+    """Return a number [SI] in its display unit."""
+    name, scale = quantities.choose_scale("", unit, abs(number))
+    return f"{format_number(number * scale, digits)} {name}".strip()
+
+
+def is_known(quantity: Quantity | answer.Quantity | None) -> bool:
+    """Return whether a quantity exists and has a value."""
+    return quantity is not None and quantity.value is not None
+
+
+def describe_region(comparison: Comparison) -> str:
+    """Return what the mean worn depth is the mean of."""
+    return "the common area" if comparison.is_areal else "the common length"
+
+
+def describe(comparison: Comparison) -> Words:
+    """Return the sentences of a comparison."""
+    values = comparison.values
+    code, numbers = comparison.verdict
+    fields = _format_numbers(numbers, comparison.is_areal)
+    fields["region"] = describe_region(comparison)
+    if is_known(values.get("worn_depth_mean")):
+        fields["mean"] = format_value("worn_depth_mean", values["worn_depth_mean"])
+    verdict = [VERDICTS[code].format_map(fields)]
+    if code in ADVICE:
+        # the limit of a track that would be found may be unknown
+        if code != "no_wear" or numbers.get("detection_limit") is not None:
+            verdict.append(ADVICE[code].format_map(fields))
+    elif is_known(values.get("worn_depth_max")):
+        verdict.append(_describe_loss(comparison))
+    verdict += describe_waves(values.get("amplitude_ratio"))
+
+    warnings, notes = [], []
+    for code, numbers in comparison.findings:
+        fields = _format_numbers(numbers, comparison.is_areal)
+        if code in WARNINGS:
+            warnings.append(WARNINGS[code].format_map(fields))
+        elif code in NOTES:
+            notes.append(NOTES[code].format_map(fields))
+        else:
+            verdict.append(IN_VERDICT[code].format_map(fields))
+    notes = [*verdict[MAX_SENTENCES:], *notes, INTERVALS]
+    return Words(tuple(verdict[:MAX_SENTENCES]), tuple(warnings), tuple(notes))
+
+
+def _describe_loss(comparison: Comparison) -> str:
+    """Return the sentence on the lost volume, the track and the deepest place."""
+    values = comparison.values
+    parts = [f"{format_value('worn_depth_max', values['worn_depth_max'])} at the deepest place"]
+    if comparison.track is not None:
+        parts.insert(0, _describe_track(comparison.track))
+    if is_known(values.get("worn_volume")):
+        parts.insert(0, f"{format_value('worn_volume', values['worn_volume'])} are lost")
+    text = "; ".join(parts)
+    return f"{text[0].upper()}{text[1:]}."
+
+
+def _describe_track(track: Track) -> str:
+    """Return the clause on place, width and mean depth of a track."""
+    places = ["the beginning of the common part", "the end of the common part"]
+    for side, name in enumerate(("from", "to")):
+        end = track.values[name]
+        if is_known(end) and not track.cut[side]:
+            places[side] = format_rounded(end.value, "m", digits=5)
+    where = "of the second trace" if track.section is None else "across it"
+    width, depth = (format_value(name, track.values[name]) for name in ("width", "depth_mean"))
+    return f"a track from {places[0]} to {places[1]} {where} is {width} wide and {depth} deep on average"
+
+
+def describe_waves(ratio: Quantity | None) -> list[str]:
+    """Return the sentence on the amplitude of the waves of the band; [] if it is unknown."""
+    if ratio is None or None in ratio[:3]:
+        return []
+    change = "no change is shown"
+    if ratio.high < 1 - ROUNDING:
+        change = "they are reduced"
+    elif ratio.low > 1 + ROUNDING:
+        change = "they are increased"
+    text = format_value("amplitude_ratio", ratio)
+    return [f"The waves from 60 to 110 um have {text} times their amplitude before wear: {change}."]
+
+
+def _format_numbers(numbers: dict, is_areal: bool) -> dict[str, str]:
+    """Return the numbers of a finding as text by name."""
+    fields = defaultdict(lambda: NO_LIMIT)
+    for name, number in numbers.items():
+        unit = UNITS.get(name, "m")
+        if name in AMOUNTS:
+            unit = "m3" if is_areal else "m2"
+        if isinstance(number, float):
+            # a ratio of lengths differs from 1 in its last digits
+            fields[name] = format_rounded(number, unit, digits=6 if unit == "1" else 4)
+        elif number is not None:
+            fields[name] = str(number)
+    fields["amount"] = fields.get("volume", fields["area"])
+    # without a limit there is nothing to state
+    fields["limit"] = f", by up to {fields['limit']} on average," if "limit" in fields else ""
+    return fields

@@ -1,0 +1,59 @@
+"""Variables of the answers on surfaces: names, descriptions, and how arrays become variables."""
+
+import numpy as np
+
+from ..answer import Variable
+
+MAX_MAP_POINTS = 400  # largest number of rows and of columns of a stored map
+TEXTS = {
+    "x": "position along the surface; in the second trace of a comparison",
+    "y": "position across; middle of a strip",
+    "before": "height before wear",
+    "after": "height after wear, aligned",
+    "depth": "worn depth: before less after",
+    "state": "state of each height",
+    "track_end": "ends of the tracks",
+    "before_map": "height before wear, or gap of the unloaded surfaces",
+    "after_map": "height after wear, or gap of the unloaded surfaces",
+    "depth_map": "worn depth: before less after",
+    "section_depth": "mean worn depth across the track",
+    "material_ratio": "material ratio",
+    "gap_before": "gap of the unloaded surfaces before wear",
+    "gap_after": "gap of the unloaded surfaces, wear included",
+    "hidden_depth": "even and wedge-shaped part of the wear, which a trace cannot show",
+    "x_patch": "position along the patch",
+    "measured_depth": "measured worn depth",
+    "computed_depth": "worn depth of the run with the fitted coefficient",
+    "depth_difference": "measured less computed depth",
+    "file": "measured surface",
+    "line": "line of the table of pairs",
+    "primary": "height of the primary profile",
+    "waviness": "height of the waviness profile",
+    "roughness": "height of the roughness profile",
+    "height_map": "height",
+    "density": "power spectral density of the primary profile",
+}
+
+
+def along(dimension: str, unit: str = "m", **arrays: np.ndarray) -> dict[str, Variable]:
+    """Return arrays (n,) along one dimension as variables by name; missing numbers are NaN."""
+    return {
+        name: Variable((dimension,), values, unit, TEXTS.get(name, name.replace("_", " ")))
+        for name, values in arrays.items()
+    }
+
+
+def band(dimension: str, name: str, values: np.ndarray, half: np.ndarray) -> dict[str, Variable]:
+    """Return lengths (n,) [m] with the ends of their band as the variables NAME, NAME_low and NAME_high."""
+    ends = {f"{name}_low": values - half, f"{name}_high": values + half}
+    return along(dimension, **{name: values}, **ends)
+
+
+def maps(x: np.ndarray, y: np.ndarray, **heights: np.ndarray) -> dict[str, Variable]:
+    """Return maps (m, n) [m] at x (n,), y (m,) [m] as variables, with every k-th row and column if they are large."""
+    rows, columns = (slice(None, None, -(-axis.size // MAX_MAP_POINTS)) for axis in (y, x))
+    data = along("x", x=x[columns]) | along("y", y=y[rows])
+    for name, values in heights.items():
+        shown = values[rows, columns].astype(np.float32)
+        data[name] = Variable(("y", "x"), shown, "m", TEXTS[name])
+    return data

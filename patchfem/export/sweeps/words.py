@@ -1,0 +1,176 @@
+"""The sentences of a sweep: largest change, limit or peak, ranking, and what limits the trust."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...campaigns.sweeps.changes import MAIN_MEASURES, SweepAnalysis
+from ...campaigns.sweeps.limits import DOUBLING, KeyLimit
+from ...campaigns.sweeps.peaks import FREQUENCY_KEY, PeakOnLine
+from ...campaigns.sweeps.ranking import SobolIndex
+from ...campaigns.sweeps.sweep_table import SweepTable
+from ...core import Outcome
+from ...formatting import format_number
+from ...response import rows
+from ..answer import Quantity
+from ..quantities import choose_scale, format_quantity, format_value
+
+SMALLEST_SHARE = 0.01  # fraction of the variance below which a key is not named
+MAX_NAMED_KEYS = 3  # keys with their shares in a sentence
+
+
+def make_verdict(table: SweepTable, analysis: SweepAnalysis) -> tuple[str, ...]:
+    """Return two to four sentences, of which the first one is the headline."""
+    sentences = [_describe_change(table, analysis)]
+    if table.is_random:
+        for name, indices in list(analysis.ranking.items())[:1]:
+            sentences.append(_describe_ranking(name, indices))
+        for name, (low, _, high) in list(analysis.quantiles.items())[:1]:
+            ends = (_format_measure(name, table.measures[name].unit, end) for end in (low, high))
+            sentences.append(f"90 % of the cases have a {_label(name)} of {' to '.join(ends)}.")
+    elif analysis.peaks:
+        sentences.append(_describe_peaks(table, analysis.peaks))
+    elif analysis.limits:
+        sentences.append(_describe_limit(analysis.limits))
+    return (*(sentence for sentence in sentences if sentence), _describe_cases(table, analysis))
+
+
+def _describe_change(table: SweepTable, analysis: SweepAnalysis) -> str:
+    """Return the headline: the measure that changes most, by how much, and with which key."""
+    counts = analysis.cases
+    n_known = counts["count"] - counts["unfinished"] - counts["failed"]
+    if n_known < 2:
+        one = "Only one case has a result, so that no change is known."
+        return one if n_known else "No case has a result."
+    if not analysis.ranges:
+        return f"No main measure of {n_known} cases changes by more than its error."
+
+    name, *cases, relative = analysis.ranges[0]
+    # a requested measure comes first even if others change more
+    is_most = relative == max(entry.relative for entry in analysis.ranges)
+    changes = "changes most:" if is_most else "changes"
+    column = table.measures[name]
+    low, high = (_format_measure(name, column.unit, column.values[case]) for case in cases)
+    varied = [key for key in table.keys if key.count > 1]
+    if len(varied) == 1:
+        places = [format_value(varied[0].values[case], varied[0].unit) for case in cases]
+        return (
+            f"With {varied[0].key}, {_label(name)} {changes} from {low} at {places[0]} "
+            f"to {high} at {places[1]}."
+        )
+    share = ""
+    for index in analysis.ranking.get(name, ())[:1]:
+        share = f", mainly with {index.key} ({100 * index.total:.0f} % of its variance)"
+    return f"{_label(name).capitalize()} {changes} from {low} to {high}{share}."
+
+
+def _label(name: str) -> str:
+    """Return the name of a measure as words."""
+    return name.replace("_", " ")
+
+
+def _format_measure(name: str, unit: str, value: float) -> str:
+    """Return a value of a measure with its unit."""
+    label, scale = choose_scale(name, unit, value)
+    return f"{format_number(value * scale, 4)} {label}".strip() if value else "0"
+
+
+def _describe_limit(limits: list[KeyLimit]) -> str:
+    """Return how far the key may go before a measure changes by 5 %; "" if no such limit exists."""
+    small = [limit for limit in limits if abs(limit.change) < DOUBLING]
+    open_ended = [limit for limit in small if not limit.is_never_reached]
+    if not open_ended:
+        names = " and ".join(_label(limit.measure) for limit in small)
+        return f"{names.capitalize()} changes by less than 5 % over all cases." if names else ""
+    # limits of a motion come before those of its patch, which change before the motion does
+    moving = [limit for limit in open_ended if limit.measure in rows.TABLE]
+    first = min(moving or open_ended, key=lambda limit: np.nan_to_num(limit.value, nan=limit.low))
+    ends = [format_value(end, first.unit, 3) for end in (first.low, first.high, first.value)]
+    if not np.isfinite(first.value):
+        return (
+            f"{first.key} may reach at least {ends[0]} before {_label(first.measure)} changes by 5 %; "
+            "more cases are needed to find this limit."
+        )
+    return (
+        f"{first.key} may reach {ends[2]} before {_label(first.measure)} changes by 5 % "
+        f"(between the cases at {ends[0]} and {ends[1]})."
+    )
+
+
+def describe_place(table: SweepTable, entry: PeakOnLine) -> str:
+    """Return the values of the keys besides the frequency at which a peak was found."""
+    others = [key for key in table.keys if key.key != FREQUENCY_KEY]
+    return ", ".join(
+        f"{key.key} {format_value(key.values[entry.case], key.unit)}" for key in others
+    )
+
+
+def make_peak_quantities(entry: PeakOnLine, unit: str) -> dict[str, Quantity]:
+    """Return frequency, height and width of a peak, whose height has this unit."""
+    peak = entry.peak
+    reason = "" if np.isfinite(peak.width) else "the cases do not show it"
+    return {
+        "peak_frequency": Quantity(peak.frequency, "Hz", peak.frequency_error),
+        "peak_height": Quantity(peak.height, unit, peak.height_error),
+        "half_power_width": Quantity(peak.width, "Hz", peak.width_error, reason=reason),
+    }
+
+
+def _describe_peaks(table: SweepTable, peaks: list[PeakOnLine]) -> str:
+    """Return where the first and the last of the peaks over frequency lie."""
+    name = peaks[0].measure
+    clauses = []
+    for entry in peaks if len(peaks) < 3 else (peaks[0], peaks[-1]):
+        quantities = make_peak_quantities(entry, table.measures[name].unit)
+        frequency, height, width = (format_quantity("", one) for one in quantities.values())
+        place = describe_place(table, entry)
+        text = f"{frequency}{' with ' * bool(place)}{place} ({height}"
+        if np.isfinite(entry.peak.width):
+            text += f", half-power width {width}"
+        clauses.append(f"{text})")
+    return f"{_label(name).capitalize()} peaks at {' and at '.join(clauses)}."
+
+
+def _describe_ranking(name: str, indices: list[SobolIndex]) -> str:
+    """Return the shares of the keys in the variance of a measure, with their intervals."""
+    parts = [
+        f"{index.key} {100 * index.total:.0f} % ({100 * index.low:.0f} to {100 * index.high:.0f} %)"
+        for index in indices[:MAX_NAMED_KEYS]
+        if index.total >= SMALLEST_SHARE
+    ]
+    return f"Shares of the variance of {_label(name)}: {', '.join(parts)}."
+
+
+def _describe_cases(table: SweepTable, analysis: SweepAnalysis) -> str:
+    """Return how many cases there are, and how many are missing, failed, unsettled or over the tolerance."""
+    cases = analysis.cases
+    counts = {
+        "unfinished": cases["unfinished"],
+        "failed": cases["failed"],
+        "not converged": cases["outcomes"].get(Outcome.NOT_CONVERGED, 0),
+    }
+    n_unsettled = cases["count"] - int(table.settled.sum()) - sum(counts.values())
+    counts[f"unsettled{_describe_unsettled(table)}"] = n_unsettled
+    missed = cases["over_tolerance"]
+    main = [name for name in MAIN_MEASURES if name in missed] or list(missed)
+    if main:
+        name = max(main, key=lambda name: missed[name]["count"])
+        others = f" and {len(missed) - 1} more" if len(missed) > 1 else ""
+        counts[f"over the tolerance in {_label(name)}{others}"] = missed[name]["count"]
+    clauses = [f"{count} {text}" for text, count in counts.items() if count]
+    if not clauses:
+        return f"All {len(table)} cases settled and meet the tolerance."
+    return f"{len(table)} cases: {', '.join(clauses)}."
+
+
+def _describe_unsettled(table: SweepTable) -> str:
+    """Return the largest amplitude of unsettled cases in brackets if it is above that of all others."""
+    name = MAIN_MEASURES[0]
+    if name not in table.measures:
+        return ""
+    values = table.measures[name].values
+    unsettled = values[~table.settled & np.isfinite(values)]
+    if not unsettled.size or unsettled.max() <= np.nanmax(values[table.settled], initial=0.0):
+        return ""
+    text = format_value(float(unsettled.max()), table.measures[name].unit)
+    return f" (their {_label(name)} is up to {text} at the end)"

@@ -1,0 +1,261 @@
+"""Displacement and stress inside both pieces in all frames of a run, and where a material yields.
+
+In: a `Result` with a solved patch. Out: `Pieces`, plain arrays on the meshes of both pieces and on
+their interface.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..elasticity import coating_traction, recovery
+from ..elasticity.elasticity import compute_displacement, von_mises
+from ..formatting import format_length
+from .patch.strength import YIELDING_NEGLECTED, min_von_mises_ratio, yield_strength
+from .results.result import patch_surface
+
+# Height over that of the piece of the region at the held far face in which no yielding is looked
+# for: the stress in its corners is unbounded under a rigid holder.
+HELD_REGION_FRACTION = 0.2
+
+
+class PieceFields(NamedTuple):
+    """Mesh of one piece, and its fields in f frames.
+
+    The interface is at y = 0; the lower piece has y < 0, the upper one y > 0.
+
+    - points (n, 2): x and y of the nodes [m].
+    - blocks: node numbers (c, 3) or (c, 4) of the cells, numbered block after block.
+    - is_coating (t,): whether a cell belongs to the coating.
+    - displacement (f, n, 2): [m].
+    - stress (f, t, 4): xx, yy, zz, xy at the centre of each cell [Pa], positive in tension.
+    - von_mises (f, t): [Pa].
+    - stress_error (f, t): error of the stress in each cell over the energy norm of both pieces [1],
+      estimated by the method of Zienkiewicz and Zhu.
+    """
+
+    points: np.ndarray
+    blocks: tuple[np.ndarray, ...]
+    is_coating: np.ndarray
+    displacement: np.ndarray
+    stress: np.ndarray
+    von_mises: np.ndarray
+    stress_error: np.ndarray
+
+
+class Pieces(NamedTuple):
+    """Both pieces and their interface in f frames.
+
+    - time (f,): [s].
+    - lower, upper: fields of the pieces.
+    - x (k,): positions along the interface [m].
+    - weight (k,): areas [m2]; weight times normal stress adds up to the load.
+    - interface: fields by name, (f, k), (f, k, 2) or for strips (f, s, k).
+    - width: width of the pieces [m].
+    """
+
+    time: np.ndarray
+    lower: PieceFields
+    upper: PieceFields
+    x: np.ndarray
+    weight: np.ndarray
+    interface: dict[str, np.ndarray]
+    width: float
+
+
+class _LoadedPiece(NamedTuple):
+    """A piece with the displacement and stress that its loads cause, with y towards its inside.
+
+    - sign: -1 for the lower piece, whose y is then reversed, and 1 for the upper piece.
+    - cells: its cells.
+    - interface: node numbers of its face in order of x.
+    - u (1 + f, n, 2): displacement [m] in the pressed state, and what each frame adds to it.
+    - stress (f, t, 4): stress at the centres of the cells in each frame [Pa].
+    - error: estimated error of this stress.
+    """
+
+    sign: float
+    cells: recovery.Cells
+    interface: np.ndarray
+    u: np.ndarray
+    stress: np.ndarray
+    error: recovery.StressError
+
+
+def compute_pieces(result) -> Pieces:
+    """Compute displacement and stress of both pieces in the frames of a run.
+
+    Parameters
+    ----------
+    result : Result
+        A run with a solved patch.
+
+    Returns
+    -------
+    Pieces
+    """
+    patch = result.patch
+    fields = result.fields
+    pair = patch.pair
+    low_forces, high_forces = _nodal_forces(patch, fields)
+    low = _load_piece(-1.0, pair.piece, *low_forces)
+    high = _load_piece(1.0, pair.upper, *high_forces)
+    held = _holder_motion(patch, fields, high.cells.points)
+    lower = _make_piece(low, high.error, 0.0)
+    upper = _make_piece(high, low.error, held)
+
+    # The fields of the interface are those of the run, its motion is that of the lower piece, and
+    # below a coating act other stresses than on its face.
+    surface = patch_surface(patch, fields)
+    names = [name for name in fields if name != "time" and not name.startswith("holder_")]
+    interface = {name: fields[name] for name in names}
+    interface |= _bond_stress(low, "lower", surface.x) | _bond_stress(high, "upper", surface.x)
+    interface["displacement"] = _interpolate_displacement(lower, low.interface, surface.x)
+    slide = _holder_field(fields, "slide", 0.0)
+    interface["holder_slide"] = np.repeat(slide, surface.x.size, axis=1)
+    width = result.plan.model.patch.pieces.width
+    return Pieces(fields["time"], lower, upper, surface.x, surface.weight, interface, width)
+
+
+def _nodal_forces(patch, fields: dict) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return shear and normal forces (1 + f, n) [N/m] on the nodes of the lower and upper piece.
+
+    The first row is the pressed state, the others add to it in each frame. A frame of a worn patch
+    has its own pressure.
+    """
+    length = patch.pieces.interface.weight / patch.pieces.interface.width
+    pressed = patch.pressure.sigma_n
+    none = np.zeros((len(fields["time"]), length.size))
+    shear = np.concatenate([none[:1], fields.get("shear_stress", none)])
+    change = fields["normal_stress"] - pressed if "holder_closing" in fields else none
+    normal = np.concatenate([pressed[None], change])
+    low_shear, high_shear = patch.pair.forces(shear * length)
+    low_normal, high_normal = patch.pair.forces(normal * length)
+    return [(low_shear, low_normal), (-high_shear, high_normal)]
+
+
+def _load_piece(sign: float, piece, shear, normal) -> _LoadedPiece:
+    """Return a condensed piece with its displacement and stress under nodal forces [N/m]."""
+    cells = recovery.get_cells(piece)
+    u = compute_displacement(piece, shear, normal)
+    motion = u[:1] + u[1:]
+    stress = recovery.centre_stress(cells, motion)
+    gauss_points = recovery.make_points(cells, "gauss")
+    fit = recovery.fit_recovery(cells)
+    error = recovery.estimate_error(fit, motion, stress, gauss_points)
+    return _LoadedPiece(sign, cells, piece.mesh.pressure_nodes, u, stress, error)
+
+
+def _make_piece(piece: _LoadedPiece, other_error, held) -> PieceFields:
+    """Return the fields of a piece whose holder moves by `held` (f, n, 2) [m]."""
+    flip = np.array([1.0, piece.sign])
+    return PieceFields(
+        points=piece.cells.points * flip,
+        blocks=tuple(block[:, :: int(piece.sign)] for block in piece.cells.blocks),
+        is_coating=piece.cells.is_coating,
+        displacement=(piece.u[:1] + piece.u[1:]) * flip + held,
+        stress=piece.stress * [1.0, 1.0, 1.0, piece.sign],
+        von_mises=von_mises(piece.stress),
+        stress_error=piece.error.relative_error(other_error)[0],
+    )
+
+
+def _bond_stress(piece: _LoadedPiece, side: str, x) -> dict[str, np.ndarray]:
+    """Return the stresses (f, k) [Pa] between coating and substrate at x (k,) [m], none without a coating.
+
+    Compression is positive; the shear stress is that on the lower one of both along +x.
+    """
+    traction = coating_traction.compute_coating_traction(piece.cells, piece.u)
+    bonds = coating_traction.interpolate_coating_traction(piece.cells, traction, x)
+    signs = {"normal_bond": 1.0, "shear_bond": -piece.sign}
+    return {f"{name}_{side}": signs[name] * (u[:1] + u[1:]) for name, u in bonds.items()}
+
+
+def _holder_motion(patch, fields: dict, points) -> np.ndarray:
+    """Return the motion (f, n, 2) [m] of points (n, 2) [m] that move with the upper holder."""
+    rotation = _holder_field(fields, "rotation", patch.pressure.rotation)
+    closing = _holder_field(fields, "closing", patch.pressure.approach)
+    slide = _holder_field(fields, "slide", 0.0)
+    x, y = points.T
+    return np.stack([slide - rotation * y, rotation * x - closing], axis=2)
+
+
+def _holder_field(fields: dict, name: str, constant: float) -> np.ndarray:
+    """Return a motion of the upper holder (f, 1), or the constant that it has in all frames."""
+    return fields.get(f"holder_{name}", np.full(len(fields["time"]), constant))[:, None]
+
+
+def _interpolate_displacement(piece: PieceFields, interface, x) -> np.ndarray:
+    """Return the displacement (f, k, 2) [m] of the face of a piece at positions x (k,) [m]."""
+    node_x = piece.points[interface, 0]
+    face = piece.displacement[:, interface]
+    by_axis = [[np.interp(x, node_x, row) for row in face[..., axis]] for axis in (0, 1)]
+    return np.stack(by_axis, axis=2)
+
+
+def add_yielding_notes(result, pieces: Pieces) -> None:
+    """Add notes on materials that yield inside the pieces to the notes of a result.
+
+    They replace notes on the same material at its face, which know only the pressure.
+    """
+    peak = result.measures.get("pressure_peak")
+    has_peak = peak is not None and peak.value is not None
+    min_peak = peak.value - (peak.error or 0.0) if has_peak else 0.0
+    faces = result.extra.get("yielding_faces", {})
+    yielding = faces | find_yielding(result.plan.model.patch, pieces, min_peak)
+    notes = result.extra.setdefault("notes", [])
+    notes[:] = [text for text in notes if text not in faces.values()]
+    notes += [text for text in yielding.values() if text not in notes]
+
+
+def find_yielding(patch_model, pieces: Pieces, min_peak: float = 0.0) -> dict:
+    """Find the materials whose von Mises stress exceeds their yield strength in any frame.
+
+    Parameters
+    ----------
+    patch_model : PatchModel
+    pieces : Pieces
+    min_peak : float
+        Lower limit of the peak pressure [Pa]. A material of a face is left out if this pressure
+        causes a larger stress there than the mesh shows.
+
+    Returns
+    -------
+    dict
+        Note by Strength.
+    """
+    highest = {}  # (stress [Pa], side, position [m]) by Strength and side
+    for side in ("lower", "upper"):
+        piece = getattr(pieces, side)
+        model = getattr(patch_model.pieces, side)
+        centres = np.concatenate([piece.points[block].mean(axis=1) for block in piece.blocks])
+        free_height = (1 - HELD_REGION_FRACTION) * np.abs(piece.points[:, 1]).max()
+        is_free = np.abs(centres[:, 1]) < free_height
+        coating = model.coating.material if model.coating else None
+
+        for is_coating, material in ((False, model.substrate), (True, coating)):
+            strength = yield_strength(material)
+            cells = np.flatnonzero((piece.is_coating == is_coating) & is_free)
+            if strength is None or not cells.size:
+                continue
+            stress = piece.von_mises[:, cells].max(axis=0)
+            limit = strength.pressure
+            if is_coating or coating is None:  # the material is that of the face
+                ratio = min_von_mises_ratio(material.poisson, patch_model.pieces.plane)
+                limit = max(limit, ratio * min_peak)
+            if stress.max() > limit:
+                place = centres[cells[np.argmax(stress)]]
+                highest.setdefault(strength, {})[side] = (float(stress.max()), side, place)
+    places = {strength: list(sides.values()) for strength, sides in highest.items()}
+    return {strength: _describe_yielding(strength, places[strength]) for strength in places}
+
+
+def _describe_yielding(strength, places: list) -> str:
+    """Return the note on a material that yields, with its largest stress and the position."""
+    stress, side, (x, y) = max(places, key=lambda place: place[0])
+    both = "; the other piece exceeds its yield strength too" * (len(places) > 1)
+    return (
+        f"the von Mises stress reaches {stress / 1e6:.4g} MPa in the {strength.material} of the "
+        f"{side} piece, at x = {format_length(x)} and {format_length(abs(y))} from the interface; "
+        f"{strength.words}{both}; {YIELDING_NEGLECTED}"
+    )

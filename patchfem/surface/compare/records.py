@@ -1,0 +1,218 @@
+"""Records of a comparison of two surfaces before and after wear: what it found, and the evidence.
+
+Depth is the height before minus the height after, so that lost material has a positive depth. Codes
+and numbers stand here; sentences are made where results are shown.
+"""
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from ..areal import Areal
+from ..profile import Profile
+from ..quantity import Quantity
+
+# Unit and definition of each quantity of a comparison.
+DEFINITIONS = {
+    "shift": ("m", "x of a feature in the second trace minus its x in the first"),
+    "tilt": ("rad", "slope of the second trace relative to the first"),
+    "scale": ("1", "length of the second trace divided by that of the first"),
+    "worn_depth_mean": ("m", "lost area or volume divided by the size of the common part"),
+    "worn_depth_max": ("m", "largest depth"),
+    "worn_area": ("m2", "area lost in the common part, per unit of width"),
+    "grown_area": ("m2", "area above the first trace in the common part"),
+    "worn_depth_within": ("m", "mean depth of the longest track: lost area divided by its width"),
+    "worn_from_before": ("m", "x in the first trace at which the longest track begins"),
+    "worn_to_before": ("m", "x in the first trace at which the longest track ends"),
+    "worn_from_after": ("m", "x in the second trace at which the longest track begins"),
+    "worn_to_after": ("m", "x in the second trace at which the longest track ends"),
+    "amplitude_ratio": ("1", "rms of the waves from 60 to 110 um after wear divided by before"),
+    "slope_ratio": ("1", "rms slope after wear divided by before, at the same step"),
+    "hidden_wear": ("m", "largest mean wear that an even or wedge-shaped loss may hide"),
+    "worn_volume": ("m3", "volume lost in the common part"),
+    "grown_volume": ("m3", "volume above the first scan in the common part"),
+    "worn_share": ("1", "worn area divided by the area of the common part"),
+    "shift_x": ("m", "x of a feature in the second scan minus its x in the first"),
+    "shift_y": ("m", "y of a feature in the second scan minus its y in the first"),
+    "rotation": ("rad", "rotation of the second scan about the middle of the first, anticlockwise"),
+    "from": ("m", "x in the second trace at which the track begins"),
+    "to": ("m", "x in the second trace at which the track ends"),
+    "width": ("m", "width of the track"),
+    "depth_mean": ("m", "lost area divided by width"),
+    "depth_floor": ("m", "mean depth of the deepest fifth of the width"),
+    "step": ("m", "mean depth over the middle third of the width (ISO 5436-1, type A1)"),
+    "area_gross": ("m2", "area lost in the track"),
+    "pile_up": ("m2", "area above the first trace within one width of the track on both sides"),
+    "pile_up_left": ("m2", "area above the first trace within one width before the track"),
+    "pile_up_right": ("m2", "area above the first trace within one width behind the track"),
+    "area_net": ("m2", "lost area less pile-up"),
+    "length": ("m", "length of the track in the common part of the scans"),
+    "volume": ("m3", "area lost in the mean section times the length of the track"),
+    "direction": ("rad", "direction of the track from the x axis, anticlockwise"),
+    "Ra": ("m", "mean of the absolute heights of the roughness profile"),
+    "Rq": ("m", "root mean square of the heights of the roughness profile"),
+    "slope": ("1", "root mean square slope of the roughness profile"),
+}
+
+
+class Finding(NamedTuple):
+    """Code of something that was found, and the numbers (SI) that a sentence about it needs."""
+
+    code: str
+    numbers: dict[str, float | int | str | None]
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """Place of the second surface on the first.
+
+    - values: shift, tilt, scale of a trace; shift_x, shift_y, rotation of a scan.
+    - mirrored: whether the second surface was mirrored, along "x" (traces) or "x", "y" (scans); "".
+    - turned: whether the heights of a scan were inverted (a replica).
+    - basis: "place" if heights are compared at the same place, "flanks" if the depth is measured
+      below the unworn flanks of the second trace alone, "" if there is no reference.
+    """
+
+    values: dict[str, Quantity]
+    mirrored: str = ""
+    turned: bool = False
+    basis: str = "place"
+
+
+@dataclass(frozen=True, eq=False)
+class Datum:
+    """Unworn heights from which the depth is measured.
+
+    - unworn: fraction of the heights on which the fit rests.
+    - noise: median standard deviation of the depth of an unworn height [m].
+    - bend: height of the parabola that was subtracted, over the common length [m].
+    - correlation: number of neighbouring samples that share an error.
+    - detection_limit: mean depth [m] from which on a track over the middle third is found; None if
+      unknown.
+    """
+
+    unworn: float
+    noise: float
+    bend: float
+    correlation: float
+    detection_limit: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """Single worn track.
+
+    - values: from, to, width, depth_mean, depth_floor, step, area_gross, area_net, pile_up,
+      pile_up_left, pile_up_right; of a scan direction, length and volume too.
+    - cut: whether the track leaves the common part at its beginning, and at its end.
+    - section: places (k,), mean depth (k,) and scatter (k,) of the sections of a scan [m].
+    """
+
+    values: dict[str, Quantity]
+    cut: tuple[bool, bool] = (False, False)
+    section: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
+    n_sections: int = 1
+
+
+@dataclass(frozen=True, eq=False)
+class TraceCurves:
+    """Curves of two aligned traces at x (n,) [m] of the second one.
+
+    - before, after: heights (n,) [m] about the least-squares line of the first trace.
+    - depth, noise: worn depth and the standard deviation of an unworn one, (n,) [m].
+    - unworn, worn, grown: masks (n,).
+    """
+
+    x: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+    depth: np.ndarray
+    noise: np.ndarray
+    unworn: np.ndarray
+    worn: np.ndarray
+    grown: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class ScanMaps:
+    """Maps (m, n) of two aligned scans at x (n,), y (m,) [m] of the first one; NaN where unknown.
+
+    - before, after: heights [m] about the least-squares plane of the first scan.
+    - depth: worn depth [m], missing heights filled from their neighbours.
+    - noise: standard deviation of an unworn depth [m].
+    - unworn, worn, grown: masks.
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+    depth: np.ndarray
+    noise: np.ndarray
+    unworn: np.ndarray
+    worn: np.ndarray
+    grown: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """What the numbers of a comparison rest on; None where there is no common place.
+
+    - placement, datum: how the second surface was laid on the first.
+    - curves: of traces, or maps of scans.
+    - roughness: {"inside", "outside": {"before", "after": {"Ra", "Rq", "slope": Quantity}}} of the
+      track; {} without a track. `cutoff` [m] is that of these values.
+    - removed: heights left out before and after as spikes, dropouts or dust.
+    """
+
+    placement: Placement | None = None
+    datum: Datum | None = None
+    curves: TraceCurves | ScanMaps | None = None
+    roughness: dict[str, dict[str, dict[str, Quantity]]] = field(default_factory=dict)
+    cutoff: float | None = None
+    removed: tuple[int, int] = (0, 0)
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Comparison of two surfaces.
+
+    - before, after: the surfaces as read.
+    - verdict: `Finding` with one of the codes of `compare`.
+    - values: quantities by name, a missing value with the code of its reason.
+    - tracks: worn tracks, the longest one first.
+    - findings: what else a reader must know.
+    - evidence: placement, datum, curves and roughness.
+    - direction: "x", "y" or "".
+    """
+
+    before: Profile | Areal
+    after: Profile | Areal
+    verdict: Finding
+    values: dict[str, Quantity]
+    tracks: tuple[Track, ...] = ()
+    findings: tuple[Finding, ...] = ()
+    evidence: Evidence = Evidence()
+    direction: str = ""
+
+    @property
+    def track(self) -> Track | None:
+        """The longest track, or None."""
+        return self.tracks[0] if self.tracks else None
+
+    @property
+    def is_areal(self) -> bool:
+        """Whether scans are compared, not traces."""
+        return isinstance(self.before, Areal)
+
+
+def name_quantity(name: str, value: float, low: float | None, high: float | None) -> Quantity:
+    """Return the quantity of this name with its interval."""
+    bounds = [None if number is None else float(number) for number in (value, low, high)]
+    return Quantity(*bounds, *DEFINITIONS[name], name=name)
+
+
+def name_unknown(name: str, reason: str) -> Quantity:
+    """Return the quantity of this name without a value; reason: its code."""
+    return Quantity(None, None, None, *DEFINITIONS[name], reason, name)

@@ -1,0 +1,284 @@
+"""Two areal scans of the same region: the place of the second one on the first, and the depth between.
+
+A point p of the first scan is at c + R(rotation) (p - c) + shift on the second one, with the middle c
+of the first. The depth there is z1 + plane - z2.
+"""
+
+from functools import cached_property
+from itertools import combinations, pairwise
+from typing import NamedTuple
+
+import numpy as np
+from scipy import ndimage
+
+from ..areal import Areal, fill_nearest
+from ..profile import robust_deviation
+from .statistics import (
+    TINY,
+    compute_threshold,
+    estimate_one_sided_scale,
+    find_mode,
+    solve_biweight_step,
+)
+
+SEARCH_PIXELS = 96  # points along the longer side of the images that are correlated
+ANGLES = np.radians(
+    np.arange(-6, 6.1, 0.5)
+)  # rotations that the search tries, and the same turned by 180 degrees
+WAVES_PER_SIDE = (
+    20  # side of a scan relative to the deviation of the Gaussian that removes long waves
+)
+MIN_OVERLAP = 0.3  # smallest common region relative to the smaller scan
+N_TILES = 8  # number of tiles along each side, whose modes span the planes
+MAX_PLANES = 3000  # number of planes through three tiles that are compared
+MIN_TILE_POINTS = 20  # smallest number of known heights in a tile
+SQUARES = (1, 3, 9, 25)  # sides of the squares whose mean depth is tested
+MAX_PULL = 8.0  # standard deviations to which a single depth counts in a mean
+REFINE_WIDTHS = (
+    4,
+    3,
+    2,
+    1,
+    0,
+    0,
+    0,
+    0,
+)  # deviations of the Gaussians that smooth both scans in turn
+
+
+class ScanPlace(NamedTuple):
+    """Shift along x and y [m], rotation [rad], and the significance of the correlation there."""
+
+    shift_x: float
+    shift_y: float
+    rotation: float
+    significance: float
+
+
+def remove_long_waves(z, part: float = WAVES_PER_SIDE) -> np.ndarray:
+    """Subtract the Gaussian mean surface from heights (m, n) without gaps."""
+    return z - ndimage.gaussian_filter(z, np.array(z.shape) / part)
+
+
+def find_scan_place(before: Areal, after: Areal) -> ScanPlace:
+    """Find the place of the second scan by the whitened correlation of the valleys of small images."""
+    pixel = (
+        max(np.ptp(before.x), np.ptp(before.y), np.ptp(after.x), np.ptp(after.y)) / SEARCH_PIXELS
+    )
+    first, second = (_make_image(scan, pixel) for scan in (before, after))
+    size = [a + b for a, b in zip(first.shape, second.shape)]
+    transform = np.fft.rfft2(first, size)
+    ones = [np.fft.rfft2(np.ones(image.shape), size) for image in (first, second)]
+    count = np.fft.irfft2(ones[0] * ones[1].conj(), size)
+    usable = count > MIN_OVERLAP * min(first.size, second.size)
+    power = np.fft.irfft2(np.fft.rfft2(first**2, size) * ones[1].conj(), size)
+    best = ScanPlace(0.0, 0.0, 0.0, -np.inf)
+    for angle in np.concatenate((ANGLES, ANGLES + np.pi)):
+        # Turning the image of the second scan back by its rotation; row numbers increase with y.
+        turned = ndimage.rotate(second, np.degrees(angle), reshape=False, order=1)
+        product = np.fft.irfft2(transform * np.fft.rfft2(turned, size).conj(), size)
+        norm = np.fft.irfft2(ones[0] * np.fft.rfft2(turned**2, size).conj(), size)
+        norm = np.sqrt(np.maximum(power * norm, 1e-12 * power.max() ** 2))
+        score = np.where(usable, product / (norm + TINY), 0.0) * np.sqrt(np.maximum(count, 0.0))
+        scatter = max(robust_deviation(score[usable]), 1e-12)
+        at = np.unravel_index(np.argmax(score), size)
+        significance = float(score[at] / scatter)
+        if significance > best.significance:
+            lag = [k if k < n / 2 else k - n for k, n in zip(at, size)]
+            best = _locate(
+                before, after, pixel, (first.shape, second.shape), lag, float(angle), significance
+            )
+    return best
+
+
+def _make_image(scan: Areal, pixel: float) -> np.ndarray:
+    """Return the whitened valleys of a scan on square pixels [m]."""
+    steps = np.array([np.diff(scan.y).mean(), np.diff(scan.x).mean()])
+    z = ndimage.gaussian_filter(fill_nearest(scan.z), 0.4 * pixel / steps)
+    z = remove_long_waves(ndimage.zoom(z, np.minimum(steps / pixel, 1.0), order=1), 12)
+    z = np.clip(z, -3 * z.std(), np.median(z))
+    spectrum = np.fft.rfft2(z - z.mean())
+    # A periodic lay must not hide the valleys.
+    return np.fft.irfft2(
+        spectrum / (np.abs(spectrum) + np.median(np.abs(spectrum)) + 1e-300), z.shape
+    )
+
+
+def _locate(before, after, pixel, shapes, lag, angle: float, significance: float) -> ScanPlace:
+    """Return the place that belongs to a lag (rows, columns) of the turned second image."""
+    middles = [np.array([scan.y.mean(), scan.x.mean()]) for scan in (before, after)]
+    centers = [(np.array(shape) - 1) / 2 for shape in shapes]
+    # The middle of the second image lies at this place of the first scan.
+    place = middles[0] + (centers[1] + lag - centers[0]) * pixel
+    cos = np.cos(angle)
+    sin = np.sin(angle)
+    dy, dx = place - middles[0]
+    shift_x = middles[1][1] - middles[0][1] - (cos * dx - sin * dy)
+    shift_y = middles[1][0] - middles[0][0] - (sin * dx + cos * dy)
+    return ScanPlace(float(shift_x), float(shift_y), angle, significance)
+
+
+class ScanModel:
+    """Depth of the second scan below the first as a function of [shift x, y, rotation, plane (3)].
+
+    It holds each `stride`-th point of the first scan. Depths are flat arrays (n,) of the points in
+    `known`, which both scans show at the first state.
+    """
+
+    def __init__(self, before: Areal, after: Areal, state, stride: int = 1):
+        """Choose the common points at a state."""
+        self.x = before.x[::stride]
+        self.y = before.y[::stride]
+        self.z = before.z[::stride, ::stride]
+        self.shape = self.z.shape
+        self.steps = np.array([np.diff(after.y).mean(), np.diff(after.x).mean()])
+        self.start = np.array([after.y[0], after.x[0]])
+        filled = fill_nearest(after.z)
+        self.spline = ndimage.spline_filter(filled)
+        self.gradient = [g / step for g, step in zip(np.gradient(filled), self.steps)]
+        self.middle = np.array([before.y.mean(), before.x.mean()])
+        self.points = (
+            np.array(np.meshgrid(self.y, self.x, indexing="ij")) - self.middle[:, None, None]
+        )
+        half = np.array([np.ptp(before.y), np.ptp(before.x)]) / 2
+        v, u = self.points / half[:, None, None]
+        self.plane = np.array([np.ones(u.shape), u, v])
+        self.keep_common(state, np.isfinite(after.z))
+
+    def keep_common(self, state, is_measured) -> None:
+        """Keep the points that both scans show at a state."""
+        pixels = self._map_pixels(state)
+        weights = ndimage.map_coordinates(is_measured.astype(float), pixels, order=1, cval=0.0)
+        self.known = np.isfinite(self.z) & (weights > 0.99)
+
+    def _map_pixels(self, state) -> np.ndarray:
+        """Return the rows and columns (2, m, n) of the points in the second scan."""
+        cos = np.cos(state[2])
+        sin = np.sin(state[2])
+        dy, dx = self.points
+        turned = np.array([sin * dx + cos * dy + state[1], cos * dx - sin * dy + state[0]])
+        return (turned + (self.middle - self.start)[:, None, None]) / self.steps[:, None, None]
+
+    def compute_map(self, state) -> np.ndarray:
+        """Return the depth (m, n) [m]; NaN where it is unknown."""
+        depth = np.full(self.shape, np.nan)
+        depth[self.known] = self.compute_depth(state)
+        return depth
+
+    def compute_depth(self, state) -> np.ndarray:
+        """Return the depth (n,) [m] of the known points."""
+        pixels = self._map_pixels(state)[:, self.known]
+        second = ndimage.map_coordinates(self.spline, pixels, prefilter=False, mode="nearest")
+        return self.z[self.known] + state[3:] @ self.plane[:, self.known] - second
+
+    def compute_jacobian(self, state) -> np.ndarray:
+        """Return the derivative (n, 6) of the depth by the state."""
+        pixels = self._map_pixels(state)[:, self.known]
+        gy, gx = (
+            ndimage.map_coordinates(g, pixels, order=1, mode="nearest") for g in self.gradient
+        )
+        dy, dx = self.points[:, self.known]
+        cos = np.cos(state[2])
+        sin = np.sin(state[2])
+        turn = gx * (-sin * dx - cos * dy) + gy * (cos * dx - sin * dy)
+        return np.column_stack((-gx, -gy, -turn, *self.plane[:, self.known]))
+
+    def compute_noise_terms(self, jacobian) -> np.ndarray:
+        """Return terms (n, 2) of the variance: of the instrument, and of positions on slopes."""
+        return np.column_stack((np.ones(len(jacobian)), jacobian[:, 0] ** 2 + jacobian[:, 1] ** 2))
+
+    def find_changed(self, depth, noise) -> np.ndarray:
+        """Return the points (n,) bool whose mean depth over a square noise does not explain."""
+        relative = np.full(self.shape, np.nan)
+        relative[self.known] = depth / noise
+        return find_changed_points(relative, self.known)[self.known]
+
+    def refine_place(self, state) -> np.ndarray:
+        """Improve shift and rotation by biweight steps on the short waves, smoothed less and less."""
+        state = np.array(state, float)
+        for width in REFINE_WIDTHS:
+            depth = self._remove_waves(self.compute_depth(state), width)
+            jacobian = np.column_stack(
+                [
+                    self._remove_waves(column, width)
+                    for column in self.compute_jacobian(state)[:, :3].T
+                ]
+            )
+            sigma = max(robust_deviation(depth), 1e-15)
+            state[:3] += solve_biweight_step(depth, jacobian, sigma)
+        return state
+
+    def _remove_waves(self, values, width: float) -> np.ndarray:
+        image = np.full(self.shape, np.nan)
+        image[self.known] = values
+        return remove_long_waves(ndimage.gaussian_filter(fill_nearest(image), width))[self.known]
+
+    @cached_property
+    def tiles(self) -> list[tuple[slice, slice]]:
+        """Tiles of the map, row by row."""
+        rows, columns = (np.linspace(0, n, N_TILES + 1).astype(int) for n in self.shape)
+        tiles = []
+        for top, bottom in pairwise(rows):
+            tiles += [(slice(top, bottom), slice(*ends)) for ends in pairwise(columns)]
+        return tiles
+
+    def find_plane(self, state) -> np.ndarray:
+        """Return the state with the plane through three tile modes that has much on it and little above."""
+        depth = self.compute_map(state)
+        random = np.random.default_rng(0)
+        modes = []
+        centers = []
+        for tile in self.tiles:
+            values = depth[tile][self.known[tile]]
+            if values.size > MIN_TILE_POINTS:
+                modes.append(find_mode(values))
+                centers.append([part[tile][self.known[tile]].mean() for part in self.plane])
+        if len(modes) < 3:
+            return state
+        subsets = np.array(list(combinations(range(len(modes)), 3)))
+        subsets = subsets[random.permutation(len(subsets))[:MAX_PLANES]]
+        matrices = np.array(centers)[subsets]
+        good = np.abs(np.linalg.det(matrices)) > 0.05
+        right = -np.array(modes)[subsets[good]][..., None]
+        planes = np.linalg.solve(matrices[good], right)[..., 0]
+
+        values = depth[self.known]
+        sample = random.permutation(values.size)[:2000]
+        residual = values[sample] + planes @ self.plane[:, self.known][:, sample]
+        scale = np.quantile(np.abs(residual), 0.2, axis=1)
+        near = np.flatnonzero(scale <= 3 * scale.min())
+        residual = residual[near] / max(scale.min(), 1e-15)
+        gain = (np.abs(residual) < 5).mean(axis=1) - 0.5 * (residual < -10).mean(axis=1)
+        state = state.copy()
+        state[3:] += planes[near[np.argmax(gain)]]
+        return state
+
+
+def find_changed_points(relative, known) -> np.ndarray:
+    """Return the points (m, n) bool whose mean relative depth over squares exceeds their scatter.
+
+    Parameters
+    ----------
+    relative : (m, n) array
+        Depth in standard deviations.
+    known : (m, n) bool array
+        Points whose depth is known.
+    """
+    limit = compute_threshold(len(SQUARES) * relative.size)
+    remainder = np.where(known, np.clip(relative, -MAX_PULL, MAX_PULL), 0.0)
+    changed = np.zeros(relative.shape, bool)
+    for side in SQUARES:
+        if side > min(relative.shape) / 4:
+            break
+        use = known & ~changed
+        weight = ndimage.uniform_filter(use.astype(float), side)
+        mean = ndimage.uniform_filter(np.where(use, remainder, 0.0), side) / np.maximum(
+            weight, 0.25
+        )
+        scatter = max(estimate_one_sided_scale(mean[use & (weight > 0.5)]), 1 / side)
+        high = (mean > limit * scatter) & (weight > 0.25)
+        if side == 1:
+            changed |= ndimage.binary_opening(high, np.ones((3, 3)))
+        else:
+            changed |= ndimage.binary_dilation(high, np.ones((side, side)))
+    return ndimage.binary_opening(changed, np.ones((4, 4))) & known

@@ -1,0 +1,290 @@
+"""Tracks of a section: where they begin and end, their depths, and the material beside them.
+
+An end is a change point from the unworn surface to a flank, by profile likelihood.
+"""
+
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from ..profile import find_runs
+from ..quantity import SIDE, Quantity
+from .records import Track, name_quantity, name_unknown
+from .section import Section
+from .statistics import UNWORN_LIMIT
+
+MAX_GAP_FRACTION = 0.05  # largest unworn gap in a track relative to its width
+MIN_FRAGMENTS = (
+    5  # number of worn parts from which on they may be tops of one track between valleys
+)
+MAX_TOP_FRACTION = 0.25  # largest gap between such tops relative to the width of those on one side
+MAX_GAP_RATIO = 4.0  # largest gap between such tops relative to the median gap
+MIN_CUT_SAMPLES = 4  # smallest number of samples of a top that was cut off
+MAX_CUT_SCATTER = 0.7  # scatter of its heights after wear relative to that before
+MIN_FAR_DEPTH = (
+    4.0  # standard deviations of a single height outside of a track that may belong to it
+)
+FLANK_FRACTION = 0.1  # length of the flanks beyond the known ends of a track, relative to its width
+MIN_CHANGED_FRACTION = 0.85  # fraction of changed heights in a wider gap that belongs to the track
+MAX_CUT_SAMPLES = 5  # number of samples between a track and the end of the section that cuts it off
+# Powers of the distance from the end in the forms of a flank: cliff, cliff with a slope, wedge, round.
+FLANKS = ((0,), (0, 1), (1,), (2,), (1, 2), (2, 3))
+CLEAR_DEVIANCE = 12.0  # lead of a form of flank that excludes another one
+FLANK_HEIGHT = 25.0  # depth, in standard deviations, to which a flank is fitted
+MIN_FLANK_SAMPLES = 12  # smallest number of samples of a flank, and of the surface beside it
+MAX_FLANK_SAMPLES = 400  # largest number of samples in which a flank reaches FLANK_HEIGHT
+SHALLOW_SAMPLES = 60  # number of samples of a flank that stays below FLANK_HEIGHT
+MAX_CANDIDATES = 80  # number of places that are tried as an end
+MAX_SQUARE = 16.0  # squared residual of a single depth beyond which it counts no more
+N_FIFTHS = 5  # number of parts of a track, of which the deepest is the floor
+
+
+class End(NamedTuple):
+    """Place [m] where a track begins or ends, with its interval."""
+
+    value: float
+    low: float
+    high: float
+
+
+def find_spans(section: Section) -> list[tuple[int, int]]:
+    """Return the first and last worn sample of each track, the widest one first.
+
+    Gaps of a twentieth of the width are bridged, and wider ones in which most heights changed: new
+    roughness in a track may stand above the first surface.
+    """
+    changed = np.abs(section.depth) > UNWORN_LIMIT * section.noise
+    changed |= section.worn
+    spans = find_runs(section.worn)
+    gaps = [later[0] - earlier[1] for earlier, later in pairwise(spans)]
+    max_gap = MAX_CUT_SAMPLES
+    gap_fraction = MAX_GAP_FRACTION
+    if len(spans) >= MIN_FRAGMENTS:
+        max_gap = max(max_gap, MAX_GAP_RATIO * float(np.median(gaps)))
+        gap_fraction = MAX_TOP_FRACTION
+    is_joined = True
+    while is_joined:
+        is_joined = False
+        for k in range(len(spans) - 1):
+            (first, stop), (start, last) = spans[k : k + 2]
+            gap = start - stop
+            width = max(stop - first, last - start)
+            is_capped = _is_below_cut(section, spans[k], spans[k + 1])
+            is_changed = gap <= width and changed[stop : start + 1].mean() > MIN_CHANGED_FRACTION
+            if gap <= max(gap_fraction * width, max_gap) or is_changed or is_capped:
+                spans[k : k + 2] = [(first, last)]
+                is_joined = True
+                break
+    return sorted(spans, key=lambda span: section.x[span[0]] - section.x[span[1]])
+
+
+def _is_below_cut(section: Section, first: tuple[int, int], second: tuple[int, int]) -> bool:
+    """Return whether all heights between two worn parts lie below them: valleys under tops cut off."""
+    near = slice(first[0], second[1] + 1)
+    after = section.after[near]
+    after = after - np.polyval(np.polyfit(section.x[near], after, 1), section.x[near])
+    start = first[0]
+    cuts = [float(np.quantile(after[a - start : b + 1 - start], 0.9)) for a, b in (first, second)]
+    between = after[first[1] + 1 - start : second[0] - start]
+    margin = UNWORN_LIMIT * float(np.median(section.noise))
+    return bool(between.size and np.quantile(between, 0.98) <= max(cuts) + margin)
+
+
+def cover_spans(section: Section, spans: list[tuple[int, int]]) -> np.ndarray:
+    """Return the samples (n,) bool of all tracks with their flanks."""
+    covered = np.zeros(section.x.size, bool)
+    for first, last in spans:
+        margin = max(int(FLANK_FRACTION * (last - first)), MIN_FLANK_SAMPLES)
+        covered[max(first - margin, 0) : last + margin + 1] = True
+    return covered
+
+
+def find_ends(section: Section, span: tuple[int, int]) -> tuple[End, End]:
+    """Find where a track begins and ends."""
+    # Pile-up beside a track is no flank.
+    relative = np.where(section.grown, 0.0, section.depth / section.noise)
+    first, last = span
+    middle = (first + last) // 2 + 1
+    start = _find_change_point(section.x[:middle], relative[:middle], first, section)
+    back = slice(None, max(middle - 1, 0) - section.x.size - 1, -1)
+    stop = _find_change_point(-section.x[back], relative[back], section.x.size - 1 - last, section)
+
+    # Tops that were cut off do not show where, up to the next top, the track ends.
+    runs = find_runs(section.worn[first : last + 1])
+    left = _find_next_top(section, first + runs[0][0], first + runs[0][1], -1)
+    right = _find_next_top(section, first + runs[-1][0], first + runs[-1][1], 1)
+    start = start._replace(low=min(start.low, float(section.x[left])))
+    stop = stop._replace(low=min(stop.low, -float(section.x[right])))
+    reach = max(int(FLANK_FRACTION * (last - first)), MIN_FLANK_SAMPLES)
+    far = np.flatnonzero(relative > MIN_FAR_DEPTH)
+    left = far[(far >= first - reach) & (far < first)]
+    right = far[(far <= last + reach) & (far > last)]
+    if left.size:
+        start = start._replace(low=min(start.low, float(section.x[left[0]])))
+    if right.size:
+        stop = stop._replace(low=min(stop.low, -float(section.x[right[-1]])))
+    return start, End(-stop.value, -stop.high, -stop.low)
+
+
+def _find_next_top(section: Section, first: int, last: int, way: int) -> int:
+    """Return the far side of the next top beyond a worn part whose tops were cut off, else its end.
+
+    The heights of a part that was cut scatter less after wear than before; those of a part that was
+    lowered evenly do not.
+    """
+    end = first if way < 0 else last
+    after = section.after[first : last + 1]
+    before = after + section.depth[first : last + 1]
+    if after.size < MIN_CUT_SAMPLES or np.std(np.diff(after, 2)) + after.std() > (
+        MAX_CUT_SCATTER * (np.std(np.diff(before, 2)) + before.std())
+    ):
+        return end
+    level = np.quantile(after, 0.9) + UNWORN_LIMIT * float(np.median(section.noise))
+    outside = section.after[:first][::-1] if way < 0 else section.after[last + 1 :]
+    above = find_runs(outside > level)
+    distance = above[0][1] + 1 if above else outside.size
+    return end + way * distance
+
+
+def _find_change_point(x, relative, worn: int, section: Section) -> End:
+    """Find the place before the sample `worn` at which the depth leaves zero.
+
+    Parameters
+    ----------
+    x, relative : (n,) array
+        Place [m] and depth in standard deviations, from outside to the middle of the track.
+    worn : int
+        First worn sample.
+    section : Section
+        For the correlation of the errors, and the error of the level.
+    """
+    step = float(np.median(np.diff(x)))
+    if worn < 3:
+        return End(float(x[worn]), float(x[0] - step), float(x[worn]))
+    # Above half of its depth, the floor of a shallow track begins.
+    inner = relative[worn : worn + MAX_FLANK_SAMPLES]
+    height = min(FLANK_HEIGHT, np.quantile(inner, 0.9) / 2)
+    deep = np.flatnonzero(inner > max(height, MIN_FAR_DEPTH))
+    length = int(deep[0]) + 3 if deep.size else SHALLOW_SAMPLES
+    stop = min(worn + length, x.size)
+    low = max(worn - max(length, MIN_FLANK_SAMPLES), 0)
+    part = x[low:stop]
+    depths = relative[low:stop]
+    if part.size < 8:
+        return End(float(x[worn]), float(x[max(worn - 3, 0)] - step), float(part[-1] + step))
+
+    # The level of the unworn heights is uncertain, so the change point is sought for three levels.
+    level = SIDE * float(section.draws.mean(axis=1).std() / np.median(section.noise))
+    stride = max(part.size // MAX_CANDIDATES, 1)
+    places = part[2:-1:stride]
+    levels = np.array([depths, depths + level, depths - level])
+    deviance = _fit_flanks(part, levels, places - step / 2, section.correlation)
+    lowest = deviance.min(axis=2, keepdims=True)
+    is_likely = deviance < lowest + SIDE**2
+    is_likely &= lowest < lowest.min(axis=1, keepdims=True) + CLEAR_DEVIANCE
+    ends = np.flatnonzero(is_likely.any(axis=(0, 1)))
+    best = int(np.argmin(deviance[0].min(axis=0)))
+    margin = stride * step
+    return End(
+        float(places[best]), float(places[ends[0]] - margin), float(places[ends[-1]] + margin)
+    )
+
+
+def _fit_flanks(x, depths, places, correlation: float) -> np.ndarray:
+    """Fit flanks that begin at each place (m,) to depths (levels, n); return deviances (levels, forms, m)."""
+    distance = np.clip(x - places[:, None], 0.0, None) / np.ptp(x)
+    is_inside = distance > 0
+    deviance = np.empty((len(depths), len(FLANKS), places.size))
+    for form, powers in enumerate(FLANKS):
+        base = is_inside[..., None] * distance[..., None] ** np.array(powers)
+        normal = np.einsum("mni,mnj->mij", base, base)
+        normal += 1e-12 * np.eye(len(powers)) * np.trace(normal, axis1=1, axis2=2)[:, None, None]
+        right = np.einsum("mni,ln->mil", base, depths)
+        fitted = base @ np.linalg.solve(normal, right)
+        residual = depths.T - fitted
+        deviance[:, form] = np.minimum(residual**2, MAX_SQUARE).sum(axis=1).T
+    # Depths whose scatter exceeds the noise carry less information.
+    return deviance / max(correlation, float(deviance[0].min()) / x.size)
+
+
+def measure_track(section: Section, span: tuple[int, int]) -> Track:
+    """Measure a track: its ends, width, depths, areas and the material beside it."""
+    start, end = find_ends(section, span)
+    x = section.x
+    width = max(end.value - start.value, float(np.median(section.widths)))
+    shorter = np.hypot(start.high - start.value, end.value - end.low)
+    longer = np.hypot(start.value - start.low, end.high - end.value)
+    widths = name_quantity("width", width, max(width - shorter, 0.0), width + longer)
+
+    # The ends are uncertain by the area between the bounds of their intervals.
+    area, error = section.integrate((x >= start.value) & (x <= end.value) & ~section.grown)
+    for place in (start, end):
+        near = section.integrate((x >= place.low) & (x <= place.high))[0]
+        error = float(np.hypot(error, near / (2 * SIDE)))
+    mean = area / width
+    mean_error = float(np.hypot(error / width, mean * max(shorter, longer) / SIDE / width))
+    values = {
+        "from": name_quantity("from", *start),
+        "to": name_quantity("to", *end),
+        "width": widths,
+        "depth_mean": _bound("depth_mean", mean, mean_error),
+        "depth_floor": _measure_floor(section, start.value, width),
+        "step": _average(section, "step", start.value + width / 3, end.value - width / 3),
+        "area_gross": _bound("area_gross", area, error),
+    }
+    left = _measure_pile_up(section, "pile_up_left", start.value - width, start.value)
+    right = _measure_pile_up(section, "pile_up_right", end.value, end.value + width)
+    piled = left.value + right.value
+    piled_error = float(np.hypot(left.high - left.value, right.high - right.value)) / SIDE
+    values |= {
+        "pile_up": _bound("pile_up", piled, piled_error),
+        "pile_up_left": left,
+        "pile_up_right": right,
+        "area_net": name_quantity(
+            "area_net",
+            area - piled,
+            area - piled - SIDE * np.hypot(error, piled_error),
+            area - piled + SIDE * np.hypot(error, piled_error),
+        ),
+    }
+
+    # Where the section cuts the track off, its end and what lies beyond are unknown.
+    cut = (span[0] < MAX_CUT_SAMPLES, span[1] >= x.size - MAX_CUT_SAMPLES)
+    unknown = {"from": cut[0], "to": cut[1], "pile_up_left": cut[0], "pile_up_right": cut[1]}
+    unknown |= dict.fromkeys(("step", "pile_up", "area_net"), any(cut))
+    for name, is_unknown in unknown.items():
+        if is_unknown:
+            values[name] = name_unknown(name, "cut_off")
+    if any(cut):
+        values["width"] = values["width"]._replace(high=None)
+    return Track(values, cut)
+
+
+def _bound(name: str, value: float, error: float) -> Quantity:
+    """Return a quantity that cannot be negative with the interval of a standard deviation."""
+    return name_quantity(name, value, max(value - SIDE * error, 0.0), value + SIDE * error)
+
+
+def _average(section: Section, name: str, first: float, last: float) -> Quantity:
+    """Return the mean depth between two places."""
+    inside = (section.x >= first) & (section.x <= last)
+    if not inside.any():
+        inside[int(np.argmin(np.abs(section.x - (first + last) / 2)))] = True
+    area, error = section.integrate(inside)
+    length = float(section.widths[inside].sum())
+    return _bound(name, area / length, error / length)
+
+
+def _measure_floor(section: Section, start: float, width: float) -> Quantity:
+    """Return the mean depth of the deepest fifth of the width."""
+    edges = start + width * np.arange(N_FIFTHS + 1) / N_FIFTHS
+    parts = [_average(section, "depth_floor", *ends) for ends in pairwise(edges)]
+    return max(parts, key=lambda part: part.value)
+
+
+def _measure_pile_up(section: Section, name: str, first: float, last: float) -> Quantity:
+    """Return the area above the first surface between two places."""
+    inside = (section.x >= first) & (section.x <= last) & section.grown
+    area, error = section.integrate(inside, -1.0) if inside.any() else (0.0, 0.0)
+    return _bound(name, area, error)

@@ -1,0 +1,148 @@
+"""Waves and roughness before and after wear: ratios of amplitude and slope, and sizes in a track."""
+
+from itertools import pairwise
+
+import numpy as np
+from scipy import ndimage, special
+
+from ...core import PatchfemError
+from ..profile import Profile
+from ..quantity import SIDE, Quantity
+from ..roughness.filter import filter_trace
+from ..roughness.report import fitting_cutoff
+from ..roughness.spectrum import BAND
+from .records import TraceCurves, name_quantity, name_unknown
+
+MAX_BLOCKS = 12  # largest number of blocks whose ratios show the scatter of a ratio
+MIN_BLOCKS = 4  # smallest number of blocks
+BLOCK_WAVES = 2.0  # smallest length of a block in the longest wave; shorter blocks are correlated
+CUTOFF_TO_DEVIATION = (
+    0.187  # deviation of the Gaussian filter of ISO 16610-21 relative to its cut-off
+)
+RATIO_ERROR = 0.004  # standard deviation of a ratio due to tip, interpolation and datum
+MAX_NOISE_FRACTION = 0.5  # noise relative to the size of the surface above which a ratio is unknown
+MIN_CUTOFFS = 2.0  # smallest length of a piece in cut-offs, half of one is trimmed at each end
+MIN_WAVES = 3.0  # smallest length of a trace relative to the longest wave of the band
+MIN_STEPS = 4.0  # smallest length of the shortest wave of the band in steps
+
+
+def compare_waves(lines: list[np.ndarray], step: float, noise: float) -> dict[str, Quantity]:
+    """Compute the ratios of amplitude and slope, after divided by before, with their intervals.
+
+    The band is cut out by two Gaussian filters. The interval of the logarithm follows from the scatter of
+    the ratios of blocks, which aligned surfaces share.
+
+    Parameters
+    ----------
+    lines : list of (k, n) array [m]
+        Levelled lines before and after wear, at one step.
+    step : float
+        Step [m].
+    noise : float
+        Standard deviation of the depth [m], of both surfaces together.
+    """
+    length = min(line.shape[1] for line in lines) * step
+    if length < MIN_WAVES * BAND[1] or step > BAND[0] / MIN_STEPS:
+        return {name: name_unknown(name, "band") for name in ("amplitude_ratio", "slope_ratio")}
+    passed = [_pass_band(z, step) for z in lines]
+    slopes = [np.diff(z, axis=1) / step for z in lines]
+    # White noise has the slope noise sqrt(2)/step, and the fraction of its band in the amplitude.
+    band_noise = noise / np.sqrt(2) * np.sqrt(2 * step * (1 / BAND[0] - 1 / BAND[1]))
+    count = int(np.clip(length / (BLOCK_WAVES * BAND[1]), MIN_BLOCKS, MAX_BLOCKS))
+    if min(len(line) for line in lines) >= MAX_BLOCKS:
+        count = MAX_BLOCKS  # groups of lines
+    student = float(special.stdtrit(count - 1, 0.975))
+    values = {}
+    for name, sizes, error in (
+        ("amplitude_ratio", passed, band_noise),
+        ("slope_ratio", slopes, noise / step),
+    ):
+        blocks = np.array([_mean_squares(size, count) for size in sizes])
+        totals = blocks.mean(axis=1)
+        if not totals.min() > 0 or error**2 > MAX_NOISE_FRACTION * totals.min():
+            values[name] = name_unknown(name, "noise")
+            continue
+        ratio = float(np.sqrt(totals[1] / totals[0]))
+        # Linearised ratio of two means: the scatter of its numerator and denominator together.
+        influence = blocks[1] / totals[1] - blocks[0] / totals[0]
+        scatter = influence.std(ddof=1) / np.sqrt(count) / 2
+        width = student * float(np.hypot(scatter, RATIO_ERROR))
+        values[name] = name_quantity(name, ratio, ratio * np.exp(-width), ratio * np.exp(width))
+    return values
+
+
+def _pass_band(z, step: float) -> np.ndarray:
+    """Return the waves (k, n) [m] of the band."""
+    short, long = (CUTOFF_TO_DEVIATION * wave / step for wave in BAND)
+    return ndimage.gaussian_filter1d(z, short) - ndimage.gaussian_filter1d(z, long)
+
+
+def _mean_squares(values, count: int) -> np.ndarray:
+    """Return the mean squares of blocks: along a single line, or of groups of lines."""
+    parts = np.array_split(values, count, axis=0 if len(values) >= MAX_BLOCKS else 1)
+    return np.array([np.mean(part**2) for part in parts])
+
+
+def measure_roughness(curves: TraceCurves, spans) -> tuple[dict, float | None]:
+    """Measure Ra, Rq and slope inside and outside of the tracks, before and after wear.
+
+    Returns
+    -------
+    regions : dict
+        {"inside", "outside": {"before", "after": {name: Quantity}}}; {} if a region is too short.
+    cutoff : float or None
+        Cut-off [m] that fits both regions.
+    """
+    edges = [
+        0,
+        *(index for first, last in sorted(spans) for index in (first, last)),
+        curves.x.size - 1,
+    ]
+    pieces = list(pairwise(edges))
+    groups = {"outside": pieces[::2], "inside": pieces[1::2]}
+    step = float(np.median(np.diff(curves.x)))
+    lengths = [max((last - first for first, last in group), default=0) for group in groups.values()]
+    cutoff = fitting_cutoff(min(lengths) * step, step)
+    if cutoff is None:
+        return {}, None
+    regions = {}
+    for region, group in groups.items():
+        sides = {
+            side: _pool(curves.x, z, group, cutoff)
+            for side, z in (("before", curves.before), ("after", curves.after))
+        }
+        if not all(sides.values()):
+            return {}, None
+        regions[region] = sides
+    return regions, cutoff
+
+
+def _pool(x, z, pieces, cutoff: float) -> dict[str, Quantity]:
+    """Pool the sizes of pieces of a trace; their scatter over sections of one cut-off gives the interval."""
+    step = float(np.median(np.diff(x)))
+    sections = []
+    for first, last in pieces:
+        if x[last] - x[first] < MIN_CUTOFFS * cutoff:
+            continue
+        places = np.arange(x[first], x[last], step)
+        piece = Profile(places, np.interp(places, x, z), "piece")
+        try:
+            rough = filter_trace(piece, cutoff)[1].z
+        except PatchfemError:
+            continue
+        count = max(int(rough.size * step / cutoff), 1)
+        for part in np.array_split(rough, count):
+            slope = np.mean(np.diff(part) ** 2) / step**2
+            sections.append((np.abs(part).mean(), np.mean(part**2), slope))
+    if not sections:
+        return {}
+    table = np.array(sections)
+    means = table.mean(axis=0)
+    errors = SIDE * table.std(axis=0, ddof=1) / np.sqrt(len(table)) if len(table) > 1 else means
+    out = {}
+    for k, name in enumerate(("Ra", "Rq", "slope")):
+        bounds = np.array([means[k], max(means[k] - errors[k], 0.0), means[k] + errors[k]])
+        if name != "Ra":
+            bounds = np.sqrt(bounds)
+        out[name] = name_quantity(name, *bounds)
+    return out

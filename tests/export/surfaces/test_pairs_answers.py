@@ -1,0 +1,70 @@
+"""Answer of a table of pairs: groups, means against Student's t, files, and pairs that fail."""
+
+import csv
+
+import numpy as np
+import pytest
+from comparisons import compare_traces
+from scipy.stats import t
+
+from patchfem.campaigns.surface_pairs import read_pairs
+from patchfem.export import page, quantities, store
+from patchfem.export.surfaces import compare, pairs
+
+DEPTHS = (0.5e-6, 0.7e-6, 0.75e-6)
+
+
+def make_rows() -> list[dict]:
+    """Return three pairs of one group, one of another group and one that failed."""
+    rows = []
+    for line, depth in enumerate((*DEPTHS, 2e-6), 2):
+        details = compare.make_answer(compare_traces()).details
+        details["worn_depth_mean"] |= {"value": depth, "low": 0.99 * depth, "high": 1.01 * depth}
+        labels = {"group": "b" if line == 5 else "a", "part": f"no. {line}"}
+        rows.append(details | {"line": line, "labels": labels, "outcome": "done", "message": ""})
+        rows[-1] |= {"before": f"{line}.csv"}
+    failed = {"line": 6, "before": "x.csv", "after": "y.csv", "direction": None, "labels": {}}
+    return [*rows, failed | {"outcome": "failed", "message": "x.csv: there is no such file"}]
+
+
+def test_exact_means_of_groups(tmp_path):
+    """The mean of a group has the interval of Student's t; a single pair has none; the sentence states its number."""
+    answer = pairs.make_answer(make_rows(), "pairs.csv")
+    first, second = answer.details["means"]
+    mean = first["worn_depth_mean"]
+    half = t.ppf(0.975, 2) * np.std(DEPTHS, ddof=1) / np.sqrt(3)
+    assert mean["value"] == pytest.approx(np.mean(DEPTHS), rel=1e-12)
+    assert mean["high"] - mean["value"] == pytest.approx(half, rel=1e-9)
+    assert (first["pairs"], mean["pairs"], first["kind"], first["group"]) == (3, 3, "place", "a")
+    assert second["pairs"] == 1 and "worn_depth_mean" not in second
+    assert answer.verdict[0] == "5 pairs: 4 worn, 0 not, 1 failed."
+    text = quantities.format_quantity("worn_depth_mean", answer.quantities["worn_depth_mean_1"])
+    assert answer.verdict[1].startswith(
+        f"A, registered traces, along x: worn depth mean {text}, the mean of 3"
+    )
+
+    store.write(answer, tmp_path)
+    page.write_page(tmp_path)
+    rows = list(csv.DictReader((tmp_path / "pairs.csv").read_text("utf-8").splitlines()))
+    assert [float(row["worn_depth_mean [m]"] or 0) for row in rows] == [*DEPTHS, 2e-6, 0]
+    assert rows[4]["message"] == "x.csv: there is no such file" and rows[0]["part"] == "no. 2"
+    html = (tmp_path / "report.html").read_text("utf-8")
+    assert "Worn depth of the pairs" in html and "x.csv: there is no such file" in html
+    page.write_page(tmp_path)
+    assert html == (tmp_path / "report.html").read_text("utf-8")
+
+
+def test_always_pairs_with_one_first_surface_are_noted():
+    """Pairs that share the surface before wear get a note, others do not."""
+    rows = make_rows()
+    assert pairs.SHARED_NOTE not in pairs.make_answer(rows, "p").remarks.notes
+    rows[1]["before"] = rows[0]["before"]
+    assert pairs.SHARED_NOTE in pairs.make_answer(rows, "p").remarks.notes
+
+
+def test_exact_table_keeps_labels_and_folder(tmp_path):
+    """Names are relative to the table, a direction belongs to its line, and other columns are labels."""
+    (tmp_path / "pairs.csv").write_text("before,after,direction,group\na.csv,b.csv,y,steel\n")
+    (line,) = read_pairs(tmp_path / "pairs.csv")
+    assert line.paths == (tmp_path / "a.csv", tmp_path / "b.csv")
+    assert (line.line, line.direction, dict(line.labels)) == (2, "y", {"group": "steel"})

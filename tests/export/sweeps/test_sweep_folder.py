@@ -1,0 +1,246 @@
+"""The folder of a sweep: it survives kills and damaged files, and computes only what is missing."""
+
+import csv
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+
+import h5netcdf
+import numpy as np
+import pytest
+import xarray as xr
+from command_line import run_cli
+from computed_cases import ComputedCases
+from limits import limit_file_size
+from scene_texts import COULOMB, POINT, SHORT
+
+from patchfem.campaigns.sweeps import sweep
+from patchfem.export import store
+from patchfem.export.sweeps import store as chunks
+
+RIG = POINT + COULOMB + SHORT
+OVER = ("--over", "drive.acceleration=1 g..5 g:10", "--over", "normal.load=10 N..200 N:10,-1 N")
+TABLES = ("sweep.csv", "sweep.nc", "sweep.json", "summary.json", "report.html")
+MAX_BYTES_PER_CASE = 600  # of the chunks
+MAX_MEMORY_PER_CASE = 1000  # bytes; measured 800 from 2 000 to 20 000 cases
+
+
+@pytest.fixture(scope="module")
+def scene_file(tmp_path_factory):
+    """Return the file of a rig under a base acceleration."""
+    path = tmp_path_factory.mktemp("scene") / "rig.toml"
+    path.write_text(RIG, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def swept(scene_file):
+    """Return the folder of a sweep of 110 cases, ten of which are refused, without files of its cases."""
+    folder = scene_file.parent / "swept"
+    assert run_cli("sweep", scene_file, *OVER, "-o", folder, "--keep", "none").code == 3
+    return folder
+
+
+def assert_same_tables(folder, other) -> None:
+    """Assert that the files of two sweeps are identical byte for byte."""
+    for name in TABLES:
+        assert (folder / name).read_bytes() == (other / name).read_bytes(), name
+
+
+def read_rows(folder) -> list[dict]:
+    """Return the rows of sweep.csv."""
+    with open(folder / "sweep.csv", encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_exact_chunks_are_small_netcdf_files(swept):
+    """The chunks take less than 600 bytes per case, and xarray reads the numbers of sweep.csv from them."""
+    files = list((swept / "chunks").iterdir())
+    assert sum(path.stat().st_size for path in files) < MAX_BYTES_PER_CASE * 110
+    values = []
+    for path in files:
+        with xr.open_dataset(path, engine="h5netcdf") as chunk:
+            names = list(json.loads(chunk.attrs["measures"]))
+            values += chunk["values"].values[names.index("loop_area")].tolist()
+    cells = [float(row["loop_area"] or "nan") for row in read_rows(swept)]
+    np.testing.assert_array_equal(np.sort(values), np.sort(cells))
+
+
+@pytest.mark.parametrize("damage", ["empty", "half", "one byte", "other content"])
+def test_always_cases_of_damaged_chunk_run_again(swept, scene_file, tmp_path, monkeypatch, damage):
+    """The cases of damaged chunks run again, and all files are the same as before."""
+    folder = shutil.copytree(swept, tmp_path / "out")
+    for path in (folder / "chunks").iterdir():
+        data = bytearray(path.read_bytes())
+        data[len(data) // 2] ^= 255
+        changed = {"empty": b"", "half": bytes(data[: len(data) // 2]), "one byte": bytes(data)}
+        path.write_bytes(changed.get(damage, b"a text"))
+    computed = ComputedCases(monkeypatch)
+    words = ("sweep", scene_file, *OVER, "-o", folder, "--keep", "none", "--resume")
+    assert run_cli(*words).code == 3
+    assert len(computed) == 110
+    assert_same_tables(folder, swept)
+
+
+def test_exact_resumed_sweep_computes_what_is_missing(scene_file, tmp_path, monkeypatch):
+    """A resumed sweep computes the values that are new and the cases without their files only."""
+    computed = ComputedCases(monkeypatch)
+    folder = tmp_path / "out"
+
+    def run_sweep(values: str, *words) -> int:
+        """Run a sweep over the friction coefficient, and return the number of computed cases."""
+        before = len(computed)
+        over = ("--over", f"friction.static={values}")
+        assert run_cli("sweep", scene_file, *over, "-o", folder, *words).code == 0
+        return len(computed) - before
+
+    assert run_sweep("0.2,0.3,0.4") == 3
+    assert run_sweep("0.2,0.3,0.4", "--resume") == 0
+    assert run_sweep("0.3,0.5", "--resume") == 1  # a value with another position is not new
+    case = next(row["case"] for row in read_rows(folder) if row["friction.static"] == "0.3")
+    (folder / "cases" / case / "summary.json").unlink()
+    assert run_sweep("0.2,0.3,0.4,0.5", "--resume") == 1
+    assert [row["friction.static"] for row in read_rows(folder)] == ["0.2", "0.3", "0.4", "0.5"]
+    assert run_sweep("0.2,0.3") == 2
+    assert len(list((folder / "cases").iterdir())) == 2
+
+
+@pytest.mark.parametrize("n_chunks", [1, 3])
+def test_exact_interrupted_sweep_has_all_files(swept, scene_file, tmp_path, monkeypatch, n_chunks):
+    """A sweep that is interrupted after one or more chunks of one case has all files, and resumes to the same ones."""
+    folder = tmp_path / "out"
+    words = ("sweep", scene_file, *OVER, "-o", folder, "--keep", "none")
+    with monkeypatch.context() as patch:
+        patch.setattr(sweep, "MAX_CASES_PER_CHUNK", 1)
+        ComputedCases(patch).chunks_before_interrupt = n_chunks
+        assert run_cli(*words).code == 130
+    cases = json.loads((folder / "sweep.json").read_text("utf-8"))["cases"]
+    assert (cases["count"], cases["unfinished"]) == (110, 110 - n_chunks)
+    assert sum(bool(row["outcome"]) for row in read_rows(folder)) == n_chunks
+    assert f"{110 - n_chunks} unfinished" in (folder / "report.html").read_text("utf-8")
+    assert run_cli(*words, "--resume").code == 3
+    assert_same_tables(folder, swept)
+    assert len(list((folder / "chunks").iterdir())) <= 2
+
+
+@pytest.mark.parametrize(
+    "executor", [("-j", "2"), pytest.param(("--executor", "dask"), marks=pytest.mark.slow)]
+)
+def test_exact_killed_sweep_resumes_to_same_bytes(scene_file, tmp_path, executor):
+    """A sweep that is killed four times resumes to the bytes of an undisturbed one; no chunk is ever incomplete."""
+    # all cases slip, so that they are computed together whatever their chunk is
+    over = ("--over", "friction.static=0.02..0.1:6000")
+    words = [sys.executable, "-m", "patchfem", "sweep", str(scene_file), *over, "--keep", "none"]
+    whole = tmp_path / "whole"
+    subprocess.run([*words, "-q", "-o", whole], check=True)
+    folder = tmp_path / "killed"
+    words += ["-q", "-o", folder, "--resume", *executor]
+    for _ in range(4):
+        n_before = len(list(folder.glob("chunks/*.nc")))
+        process = subprocess.Popen(words, stdout=subprocess.DEVNULL, start_new_session=True)
+        while process.poll() is None and len(list(folder.glob("chunks/*.nc"))) <= n_before:
+            time.sleep(0.02)
+        assert process.poll() is None
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+        for path in folder.glob("chunks/[0-9a-f]*.nc"):
+            with h5netcdf.File(path, "r") as file:
+                assert file["name"].shape[0] > 0
+    subprocess.run(words, check=True, stdout=subprocess.DEVNULL)
+    assert (folder / "sweep.csv").read_bytes() == (whole / "sweep.csv").read_bytes()
+
+
+def test_exact_shards_and_returned_results_give_same_files(
+    swept, scene_file, tmp_path, monkeypatch
+):
+    """Shards with --collect, and workers that cannot write to the folder, give the files of a single sweep."""
+    words = ("sweep", scene_file, *OVER, "--keep", "none")
+    for shard in ("2/3", "1/3"):
+        assert run_cli(*words, "-o", tmp_path / "shards", "--shard", shard).code == 0
+    early = run_cli(*words, "-o", tmp_path / "shards", "--collect")
+    assert early.code == 4 and "37 of 110 cases have no answer" in early.err
+    assert run_cli(*words, "-o", tmp_path / "shards", "--shard", "3/3").code == 0
+    assert run_cli(*words, "-o", tmp_path / "shards", "--collect").code == 3
+    assert_same_tables(tmp_path / "shards", swept)
+    monkeypatch.setattr("patchfem.export.sweeps.folder.Writer.__call__", lambda *given: False)
+    assert run_cli(*words, "-o", tmp_path / "returned").code == 3
+    assert_same_tables(tmp_path / "returned", swept)
+
+
+def test_exact_files_of_cases_follow_keep(scene_file, tmp_path):
+    """`--keep` stores nothing, a summary or a results folder of each case, and a failed case has a summary."""
+    over = ("--over", "friction.static=-1,0.1")
+    results = {"summary.json", "scene.resolved.toml", "result.nc"}
+    names = {
+        "none": set(),
+        "summaries": {"summary.json"},
+        "results": results,
+        "pages": results | {"report.html"},
+    }
+    for keep, expected in names.items():
+        folder = tmp_path / keep
+        assert run_cli("sweep", scene_file, *over, "-o", folder, "--keep", keep).code == 3
+        failed, done = read_rows(folder)
+        if keep == "none":
+            assert "case" not in done and not (folder / "cases").exists()
+            continue
+        assert {path.name for path in (folder / "cases" / done["case"]).iterdir()} == expected
+        summary = store.read_summary(folder / "cases" / done["case"])
+        assert float(done["loop_area"]) == summary["measures"]["loop_area"]["value"]
+        message = store.read_summary(folder / "cases" / failed["case"])["message"]
+        assert message == failed["message"] and "friction.static" in message
+
+
+@pytest.mark.parametrize("has_older_file", [False, True])
+def test_refuses_sweep_without_disk_space(scene_file, tmp_path, has_older_file):
+    """A sweep without disk space for its first case ends with code 4 and leaves the folder as it was."""
+    folder = tmp_path / "out"
+    if has_older_file:
+        folder.mkdir()
+        (folder / "sweep.csv").write_text("older", encoding="utf-8")
+    with limit_file_size(200):  # the summary of a case needs a few kB
+        answer = run_cli("sweep", scene_file, "--over", "drive.acceleration=1 g,2 g", "-o", folder)
+    assert answer.code == 4 and "a case cannot be written" in answer.err
+    texts = [path.read_text() for path in tmp_path.rglob("*") if path.is_file()]
+    assert texts == ["older"] * has_older_file
+
+
+def test_exact_small_chunks_are_merged(tmp_path, monkeypatch):
+    """Thirty files of one case are merged into two with the same results, those of other cases too."""
+    results = chunks.CaseResults.blank(30)
+    results.outcome[:] = "steady"
+    results.add_measure("loop_area", "J")
+    results.values["loop_area"][:] = np.arange(30.0)
+    names = np.arange(1, 31, dtype=np.uint64) ** 5
+    for case in range(30):
+        chunks.write_chunk(tmp_path, names[[case]], results.select(np.array([case])))
+    monkeypatch.setattr(chunks, "MAX_CASES_PER_FILE", 20)
+    stored = chunks.Chunks(tmp_path, names[:25])
+    stored.merge_files(removes_others=False)
+    assert len(stored.list_files()) == 2
+    total = chunks.CaseResults.blank(25)
+    for numbers, part in stored.iterate_results():
+        total.insert(numbers, part)
+    assert total.values["loop_area"].tolist() == list(range(25))
+
+
+@pytest.mark.slow
+def test_always_memory_per_case_is_small(scene_file, tmp_path):
+    """From 2 000 to 20 000 cases the memory grows by less than 1 kB for each case."""
+    command = (
+        "import resource, sys; from patchfem.__main__ import run_command; run_command(sys.argv[1:]); "
+        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)"
+    )
+    sizes = []
+    for count in (2000, 20_000):
+        over = f"drive.acceleration=1 g..5 g:{count}"
+        words = ("sweep", scene_file, "--over", over, "-o", tmp_path / str(count), "-q")
+        done = subprocess.run(
+            [sys.executable, "-c", command, *words], capture_output=True, text=True, check=True
+        )
+        sizes.append(1024 * int(done.stdout.split()[-1]))
+    assert (sizes[1] - sizes[0]) / 18_000 < MAX_MEMORY_PER_CASE

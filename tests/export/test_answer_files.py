@@ -1,0 +1,170 @@
+"""Files of an answer: they are read back unchanged, other programs read them, and damaged ones are refused by name."""
+
+import json
+import shutil
+
+import h5py
+import numpy as np
+import pytest
+import xarray as xr
+from command_line import run_cli
+from limits import limit_file_size
+from scene_texts import BENCH
+
+from patchfem import PatchfemError
+from patchfem.core import Missing
+from patchfem.export import netcdf, store
+from patchfem.export.answer import Answer, Quantity, Remarks, Variable
+
+
+def make_answer() -> Answer:
+    """Return an answer with floats, integers, codes, texts, two dimensions, a scalar and an empty array."""
+    generator = np.random.default_rng(5)
+    data = {
+        "time": Variable(("time",), np.linspace(0, 1, 300), "s", "time"),
+        "force": Variable(("time",), generator.normal(size=300), "N", "force"),
+        "mode": Variable(("mode",), np.array(["axial", "größer"]), "", "mode"),
+        "modal": Variable(("time", "mode"), generator.normal(size=(300, 2)), "m"),
+        "status": Variable(
+            ("frame", "x"),
+            generator.integers(0, 3, (3, 40)).astype(np.int8),
+            "",
+            "status",
+            ("open", "stick", "slip"),
+        ),
+        "interface": Variable(("event",), np.arange(5, dtype=np.int32), "1"),
+        "gone": Variable(("event",), np.array([1.0, np.nan, np.inf, -0.0, 5e-324]), "1"),
+        "nothing": Variable(("none",), np.zeros(0), "m"),
+        "mean": Variable((), np.array(0.1), "m"),
+    }
+    quantities = {
+        "loop_area": Quantity(1.25e-3, "J", 1e-6, floor=1e-12),
+        "worn_depth_mean": Quantity(2e-6, "m", None, 1.5e-6, 3e-6),
+        "slip_amplitude": Quantity(None, "m", reason="it has no meaning here"),
+    }
+    details = {"outcome": "steady", "seconds": {"total": 1.0}}
+    origin = {
+        "patchfem": "9",
+        "scene": "a = 1",
+        "resolved": "a = 1.0\n",
+        "versions": {"numpy": "2"},
+    }
+    remarks = Remarks(("a warning",), ("a note",))
+    return Answer(
+        "rig", "größer", ("First.", "Second."), quantities, data, remarks, details, origin
+    )
+
+
+def test_exact_answer_is_read_back(tmp_path):
+    """An answer that is read from its folder has the same sentences, quantities, arrays, details and origin."""
+    answer = make_answer()
+    store.write(answer, tmp_path)
+    read = store.read(tmp_path)
+    for name in ("kind", "title", "verdict", "quantities", "remarks", "details", "origin"):
+        assert getattr(read, name) == getattr(answer, name), name
+    assert list(read.data) == list(answer.data)
+    for name, variable in answer.data.items():
+        other = read.data[name]
+        assert (other.dims, other.unit, other.text, other.meanings) == (
+            variable.dims,
+            variable.unit,
+            variable.text,
+            variable.meanings,
+        )
+        np.testing.assert_array_equal(other.values, variable.values)
+        assert other.values.dtype.kind == variable.values.dtype.kind
+
+
+def test_exact_netcdf_equals_that_of_xarray(tmp_path):
+    """xarray reads the same values, types and attributes as from a file that it has written itself; h5py reads them too."""
+    answer = make_answer()
+    netcdf.write_netcdf(answer, tmp_path / "ours.nc")
+    netcdf.to_dataset(answer).to_netcdf(tmp_path / "theirs.nc", engine="h5netcdf")
+    with (
+        xr.open_dataset(tmp_path / "ours.nc", engine="h5netcdf") as ours,
+        xr.open_dataset(tmp_path / "theirs.nc", engine="h5netcdf") as theirs,
+    ):
+        xr.testing.assert_identical(ours, theirs)
+        assert {name: ours[name].dtype for name in ours.variables} == {
+            name: theirs[name].dtype for name in theirs.variables
+        }
+    with h5py.File(tmp_path / "ours.nc") as file:
+        assert file["force"].attrs["units"] == "N"
+        np.testing.assert_array_equal(file["force"][:], answer.data["force"].values)
+
+
+def test_refuses_full_disk(tmp_path):
+    """Without disk space a file is refused as missing resource, and no part of it remains."""
+    with limit_file_size(5000), pytest.raises(Missing):
+        netcdf.write_netcdf(make_answer(), tmp_path / "none.nc")
+    assert not list(tmp_path.iterdir())
+
+
+def cut_summary(folder) -> None:
+    """Cut summary.json in the middle."""
+    text = (folder / "summary.json").read_text("utf-8")
+    (folder / "summary.json").write_text(text[: len(text) // 2], "utf-8")
+
+
+def change_summary(**entries):
+    """Return a function that changes entries of summary.json."""
+
+    def change(folder) -> None:
+        """Change the entries in a folder."""
+        content = json.loads((folder / "summary.json").read_text("utf-8"))
+        (folder / "summary.json").write_text(json.dumps(content | entries), "utf-8")
+
+    return change
+
+
+def cut_netcdf(folder) -> None:
+    """Cut result.nc in the middle."""
+    content = (folder / "result.nc").read_bytes()
+    (folder / "result.nc").write_bytes(content[: len(content) // 2])
+
+
+def remove_dataset(folder) -> None:
+    """Remove the times from result.nc, and put a link to itself in their place."""
+    with h5py.File(folder / "result.nc", "r+") as file:
+        del file["time"]
+        file["time"] = h5py.SoftLink("/time")
+
+
+DAMAGES = {
+    "cut summary": cut_summary,
+    "wrong measure": change_summary(measures={"loop_area": {"value": "a"}}),
+    "huge number": change_summary(measures={"loop_area": {"value": [], "unit": "J"}}),
+    "unknown kind": change_summary(kind="b"),
+    "no verdict": change_summary(verdict=None),
+    "cut netCDF": cut_netcdf,
+    "text as netCDF": lambda folder: (folder / "result.nc").write_text("a", "utf-8"),
+    "ring in netCDF": remove_dataset,
+    "no summary": lambda folder: (folder / "summary.json").unlink(),
+    "summary of 1.1": lambda folder: (folder / "summary.json").write_text(
+        '{"kind": "rig"}', "utf-8"
+    ),
+}
+
+
+@pytest.fixture(scope="module")
+def bench_results(tmp_path_factory):
+    """Return the results folder of a bench."""
+    base = tmp_path_factory.mktemp("files")
+    (base / "bench.toml").write_text(BENCH, "utf-8")
+    assert run_cli("run", base / "bench.toml", "-o", base / "out", "-q").code == 0
+    return base / "out"
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_refuses_damaged_folder(bench_results, tmp_path, damage):
+    """A damaged folder is refused by every verb that reads it, with code 2 and one sentence that names the folder."""
+    folder = tmp_path / "out"
+    shutil.copytree(bench_results, folder)
+    DAMAGES[damage](folder)
+    with pytest.raises(PatchfemError):
+        store.read(folder)
+    for command in (("report", folder), ("export", folder, "-o", tmp_path / "h.csv")):
+        answer = run_cli(*command)
+        assert answer.code == 2, (command, answer)
+        assert "out" in answer.err and "internal fault" not in answer.err
+        assert len(answer.err.strip().splitlines()) == 1

@@ -1,0 +1,339 @@
+"""fields.vtkhdf and its exports agree with the run when VTK, PyVista, meshio and h5py read them."""
+
+import csv
+import re
+import tomllib
+
+import h5py
+import meshio
+import numpy as np
+import pytest
+import pyvista
+from command_line import run_cli
+from exported import CROWNED, frame_values, write_small_series
+from vtkmodules.vtkCommonCore import vtkDataArray
+from vtkmodules.vtkIOHDF import vtkHDFReader
+
+import patchfem as pf
+from patchfem.export.fields.blocks import FIELDS
+from patchfem.export.fields.film import stress_frames
+from patchfem.export.fields.vtkhdf import NAME, read_frames
+
+PARTS = ["lower", "upper", "interface"]
+MAX_ROUNDING = 1e-6  # relative error of a number in the file
+MAX_ESTIMATE_ROUNDING = 1e-2  # that of stress_error, which is an estimate itself
+
+
+def read_with_vtk(path) -> list:
+    """Return the frames of a file as VTK reads them."""
+    reader = vtkHDFReader()
+    reader.SetFileName(str(path))
+    reader.UpdateInformation()
+    frames = []
+    for number in range(reader.GetNumberOfSteps()):
+        reader.SetStep(number)
+        reader.Update()
+        frames.append((reader.GetTimeValue(), pyvista.wrap(reader.GetOutputDataObject(0)).copy()))
+    return frames
+
+
+def assert_block_equal(grid, block, number: int) -> None:
+    """Assert that a grid has the mesh and the fields of a block, and no other fields."""
+    sizes = np.diff(grid.cell_offsets)
+    assert np.array_equal(grid.points, block.points)
+    assert np.array_equal(
+        grid.cell_connectivity, np.concatenate([c[:n] for c, n in zip(block.cells, sizes)])
+    )
+    for data, written in ((grid.point_data, block.point_data), (grid.cell_data, block.cell_data)):
+        assert set(data.keys()) - {"part"} == written.keys()
+        for name, values in written.items():
+            tolerance = MAX_ESTIMATE_ROUNDING if name == "stress_error" else MAX_ROUNDING
+            np.testing.assert_allclose(
+                data[name], frame_values(values, number), tolerance, 0, err_msg=name
+            )
+
+
+def test_exact_vtk_reads_pieces(tmp_path, capfd):
+    """VTK reads named blocks with the meshes, times and numbers of the pieces, and prints no error."""
+    small = write_small_series(tmp_path / "out", 4)
+    frames = read_with_vtk(tmp_path / "out" / NAME)
+    assert [time for time, _ in frames] == list(small.times) and not capfd.readouterr().err
+    for number, (_, grids) in enumerate(frames):
+        assert grids.keys() == PARTS
+        for part in PARTS:
+            assert_block_equal(grids[part], small.blocks[part], number)
+        for side, piece in (("lower", small.pieces.lower), ("upper", small.pieces.upper)):
+            # triangles come first, which shows that the cells have their own values
+            assert list(grids[side].celltypes) == [5, 5, 9, 9, 9, 9, 9]
+            stress = grids[side].cell_data["stress"]
+            np.testing.assert_allclose(stress[:, :4], piece.stress[number], 2 * MAX_ROUNDING)
+            assert not stress[:, 4:].any()
+            assert np.array_equal(grids[side].cell_data["material"], piece.is_coating)
+        worn = small.pieces.interface["worn_depth"][number]
+        np.testing.assert_allclose(
+            grids["interface"]["worn_depth"], worn.mean(axis=0), 2 * MAX_ROUNDING
+        )
+
+
+def test_exact_load_of_file_is_load_of_run(bench_folder):
+    """In every frame areas times pressure of the file add up to the load within 1e-10."""
+    line = read_frames(bench_folder / NAME).blocks["interface"]
+    scene = tomllib.loads((bench_folder / "scene.resolved.toml").read_text("utf-8"))
+    load = float(scene["contact"]["load"].removesuffix(" N"))
+    for pressure in line.point_data["normal_stress"]:
+        assert line.point_data["weight"][0] @ pressure == pytest.approx(load, rel=1e-10)
+
+
+def test_exact_coating_carries_load_and_friction(bench_folder):
+    """In every frame the stress below each coating carries the load and the friction force within 2e-6 of the load."""
+    line = read_frames(bench_folder / NAME).blocks["interface"]
+    weight = line.point_data["weight"][0]
+    load = weight @ line.point_data["normal_stress"].T
+    for side in ("lower", "upper"):
+        for name in ("normal", "shear"):
+            carried = line.point_data[f"{name}_bond_{side}"].astype(float) @ weight
+            acting = line.point_data[f"{name}_stress"].astype(float) @ weight
+            assert np.abs(carried - acting).max() < 2e-6 * load.max()
+    assert np.abs(line.point_data["shear_stress"]).max() > 0
+
+
+def test_exact_file_states_units_and_codes(tmp_path):
+    """Every array of the file has its unit, and those with codes the meanings of the codes."""
+    write_small_series(tmp_path / "out")
+    units = {"normal_stress": "Pa", "gap": "m", "stress_error": "1", "weight": "m2", "stress": "Pa"}
+    with h5py.File(tmp_path / "out" / NAME) as file:
+        for part in PARTS:
+            group = file["VTKHDF"][part]
+            arrays = {**group["PointData"], **group["CellData"]}
+            for name, array in arrays.items():
+                assert array.attrs["units"] == units.get(name, array.attrs["units"]) != ""
+        assert file["VTKHDF/lower/CellData/material"].attrs["flag_meanings"] == "substrate coating"
+        status = file["VTKHDF/interface/PointData/status"].attrs
+        assert status["flag_meanings"] == "open stick slip" and list(status["flag_values"]) == [
+            0,
+            1,
+            2,
+        ]
+
+
+def test_exact_vtu_agrees_in_meshio(tmp_path):
+    """A .vtu has the fields of all parts of one frame, NaN where a part has none, with units and time."""
+    small = write_small_series(tmp_path / "out")
+    out = tmp_path / "new" / "a.vtu"
+    assert run_cli("export", tmp_path / "out", "-o", out, "--frame", 1).out.startswith(
+        f"{out}: frame 1 of 0 to 2"
+    )
+    mesh = meshio.read(out)
+    part = np.concatenate(mesh.cell_data["part"])
+    stress = np.concatenate(mesh.cell_data["von_mises"])
+    for code, name in enumerate(PARTS):
+        cells = stress[part == code]
+        if name in ("lower", "upper"):
+            np.testing.assert_allclose(
+                np.sort(cells), np.sort(small.blocks[name].cell_data["von_mises"][1]), MAX_ROUNDING
+            )
+        else:
+            assert np.isnan(cells).all()
+    n_pieces = 2 * len(small.pieces.lower.points)
+    gap = mesh.point_data["gap"]
+    assert np.isnan(gap[:n_pieces]).all()
+    np.testing.assert_allclose(
+        gap[n_pieces:][:4], small.pieces.interface["gap"][1], 2 * MAX_ROUNDING
+    )
+    grid = pyvista.read(out)
+    assert grid.field_data["TimeValue"][0] == small.times[1]
+    assert read_unit(grid, "gap") == "m"
+
+
+def read_unit(grid, name: str) -> str:
+    """Return the unit of a point array as VTK reads it."""
+    information = grid.point_data.VTKObject.GetAbstractArray(name).GetInformation()
+    return information.Get(vtkDataArray.UNITS_LABEL())
+
+
+def test_exact_pvd_agrees_in_pyvista(tmp_path):
+    """A .pvd has the times, blocks and numbers of the series."""
+    small = write_small_series(tmp_path / "out", 12)
+    assert run_cli("export", tmp_path / "out", "-o", tmp_path / "a.pvd").code == 0
+    reader = pyvista.PVDReader(str(tmp_path / "a.pvd"))
+    assert reader.time_values == list(small.times)
+    for number in (0, 7, 11):
+        reader.set_active_time_point(number)
+        grids = reader.read()[0]
+        assert grids.keys() == PARTS
+        for part in PARTS:
+            assert_block_equal(grids[part], small.blocks[part], number)
+        assert read_unit(grids["interface"], "normal_stress") == "Pa"
+
+
+def test_exact_csv_has_interface_values(tmp_path):
+    """A .csv has the points of the interface and their fields in SI, as they are in the file."""
+    write_small_series(tmp_path / "out")
+    assert run_cli("export", tmp_path / "out", "-o", tmp_path / "a.csv", "--frame", 1).code == 0
+    with open(tmp_path / "a.csv", newline="", encoding="utf-8") as file:
+        header, *rows = csv.reader(file)
+    columns = dict(zip(header, np.array(rows, float).T))
+    line = read_frames(tmp_path / "out" / NAME).blocks["interface"]
+    assert np.array_equal(columns.pop("x [m]"), line.points[:, 0])
+    for k, axis in enumerate("xy"):
+        moved = columns.pop(f"displacement_{axis} [m]").astype(np.float32)
+        assert np.array_equal(moved, line.point_data["displacement"][1, :, k])
+    for label, values in columns.items():
+        name, unit = label.rstrip("]").split(" [")
+        written = frame_values(line.point_data[name], 1)
+        assert np.array_equal(values.astype(written.dtype), written) and FIELDS[name].unit == unit
+
+
+def test_exact_vtkhdf_export_equals_file(tmp_path):
+    """A .vtkhdf has the same numbers as the file of the run."""
+    write_small_series(tmp_path / "out")
+    assert run_cli("export", tmp_path / "out", "-o", tmp_path / "a.vtkhdf").code == 0
+    original, copy = (
+        read_frames(path).blocks for path in (tmp_path / "out" / NAME, tmp_path / "a.vtkhdf")
+    )
+    for part in PARTS:
+        for data, copied in zip(original[part][2:], copy[part][2:]):
+            assert all(np.array_equal(values, copied[name]) for name, values in data.items())
+
+
+@pytest.mark.parametrize(
+    "arguments, code, message",
+    [
+        (["-o", "a.mat"], 2, "it has no summary.json"),
+        (["-o", "a.xlsx"], 2, ".pvd, .vtkhdf, .vtu, .csv"),
+        (
+            ["-o", "a.py"],
+            2,
+            "the script for ParaView was removed in patchfem 2.0; open fields.vtkhdf",
+        ),
+        (["-o", "a.vtu", "--frame", "-4"], 2, "frames 0 to 2"),
+        (["-o", "a.pvd", "--frame", "1"], 2, "contains all frames"),
+        ([], 2, "-o"),
+        (["-o", f"out/{NAME}/x/a.vtu"], 4, f"{NAME} is a file"),
+    ],
+)
+def test_refuses_unsupported_field_export(tmp_path, monkeypatch, arguments, code, message):
+    """An unsupported file, a frame that does not exist or a place that is no folder is refused; no file is written."""
+    write_small_series(tmp_path / "out")
+    monkeypatch.chdir(tmp_path)
+    answer = run_cli("export", "out", *arguments)
+    assert answer.code == code and message in answer.err and "internal fault" not in answer.err
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+def test_refuses_missing_or_damaged_fields(tmp_path):
+    """A missing folder, a run without fields, a damaged file and one of an older version are refused."""
+    for folder, code, message in (
+        ("nowhere", 4, "no such results folder"),
+        (".", 4, "only a run with [contact]"),
+    ):
+        answer = run_cli("export", tmp_path / folder, "-o", tmp_path / "a.vtu")
+        assert answer.code == code and message in answer.err
+    (tmp_path / NAME).write_bytes(b"\x89HDF\r\n\x1a\n spoilt")
+    assert "not the fields of a run" in run_cli("view", tmp_path, "-o", tmp_path / "a.png").err
+    write_small_series(tmp_path)
+    with h5py.File(tmp_path / NAME, "r+") as file:
+        del file["VTKHDF/interface/PointData/holder_slide"]
+    answer = run_cli("view", tmp_path, "-o", tmp_path / "a.png")
+    assert (
+        answer.code == 2
+        and "interface has no holder_slide" in answer.err
+        and "run the scene again" in answer.err
+    )
+
+
+@pytest.fixture(scope="module")
+def crowned_run():
+    """Return the result of a crowned pair."""
+    return pf.run(CROWNED)
+
+
+def test_exact_grids_of_result_agree_with_patch_and_file(crowned_run, tmp_path):
+    """Result.to_pyvista has the numbers of result.patch and of the file, with stresses in MPa, units and time."""
+    all_frames = crowned_run.to_pyvista(frame=None)
+    crowned_run.save(tmp_path / "run")
+    for number, (time, written) in enumerate(read_with_vtk(tmp_path / "run" / NAME)):
+        grids = all_frames[number]
+        assert grids.keys() == written.keys() == PARTS
+        assert grids["upper"].field_data["TimeValue"][0] == time
+        for part in grids.keys():
+            units = dict(text.rstrip("]").split(" [") for text in grids[part].field_data["units"])
+            for data, expected in (
+                (grids[part].point_data, written[part].point_data),
+                (grids[part].cell_data, written[part].cell_data),
+            ):
+                for name in expected.keys():
+                    factor = 1e6 if units[name] == "MPa" else 1.0
+                    tolerance = (
+                        MAX_ESTIMATE_ROUNDING if name == "stress_error" else 2 * MAX_ROUNDING
+                    )
+                    np.testing.assert_allclose(data[name] * factor, expected[name], tolerance, 0)
+    assert number == len(all_frames) - 1
+
+    line = crowned_run.to_pyvista()["interface"]
+    patch = crowned_run.patch
+    for name, unit in (("normal_stress", 1e6), ("shear_stress", 1e6), ("slip", 1.0), ("gap", 1.0)):
+        values = getattr(patch, name)
+        np.testing.assert_allclose(line[name] * unit, values, 1e-6, 1e-6 * np.abs(values).max())
+    assert np.array_equal(line.points[:, 0], patch.x)
+
+
+def test_always_frame_is_selected_by_number(crowned_run):
+    """A frame is selected by its number, also counted from the end; other numbers are refused."""
+    all_frames = crowned_run.to_pyvista(frame=None)
+    count = len(all_frames)
+    for number in (2, -count, np.int64(count - 1)):
+        moved = crowned_run.to_pyvista(frame=number)["upper"]["displacement"]
+        assert np.array_equal(moved, all_frames[number]["upper"]["displacement"])
+    for number in (count, -count - 1, 0.5, "last"):
+        with pytest.raises(pf.PatchfemError, match=rf"no frame {number}; .* 0 to {count - 1}"):
+            crowned_run.to_pyvista(frame=number)
+
+
+def test_refuses_grids_of_run_without_contact():
+    """A run without [contact] has no grids and is refused."""
+    with pytest.raises(pf.PatchfemError, match=re.escape("no [contact]")):
+        pf.run(pf.new("bench")).to_pyvista()
+
+
+def test_exact_film_has_stress_of_cells(tmp_path):
+    """On the grid of the film each point has the stress of its cell, here linear in x and depth; outside it is NaN."""
+    frames = read_frames(write_linear_stress(tmp_path))
+    film = stress_frames(tmp_path / NAME)
+    assert film["values"].shape == (2, film["y"].size, film["x"].size)
+    assert np.array_equal(film["times"], frames.times)
+    x, y = np.meshgrid(film["x"], film["y"])
+    # centres of the cells of 50 um in which the points are
+    cell_x = (np.floor(x / 5e-5) + 0.5) * 5e-5
+    cell_depth = (np.floor(np.abs(y) / 5e-5) + 0.5) * 5e-5
+    expected = np.where(y < 0, 5e6, 9e6) + 2e9 * cell_x + 3e9 * cell_depth
+    assert (np.isfinite(film["values"][0]) == (np.abs(y) <= 1e-3)).all()
+    # points on the line between two cells may have the stress of either
+    is_inner = (np.abs(x / 5e-5 - np.round(x / 5e-5)) > 1e-6) & (np.abs(y) < 1e-3)
+    is_inner &= np.abs(y / 5e-5 - np.round(y / 5e-5)) > 1e-6
+    assert is_inner.sum() > 500
+    for number, values in enumerate(film["values"]):
+        np.testing.assert_allclose(values[is_inner], (1 + number) * expected[is_inner], 2e-6)
+
+
+def write_linear_stress(folder):
+    """Write the fields of two pieces of 40 x 20 cells whose stress is linear in x and depth."""
+    from patchfem.export.fields.vtkhdf import write_blocks
+
+    blocks = dict(write_small_series(folder, 2, times=[0.0, 1.0]).blocks)
+    for side, sign, offset in (("lower", -1, 5e6), ("upper", 1, 9e6)):
+        mesh = pyvista.ImageData(
+            dimensions=(41, 21, 1), spacing=(5e-5, 5e-5, 0), origin=(-1e-3, 0, 0)
+        )
+        grid = mesh.cast_to_unstructured_grid()
+        cells = grid.cell_connectivity.reshape(-1, 4)[:, [0, 1, 3, 2]]
+        centres = grid.points[cells].mean(axis=1)
+        stress = offset + 2e9 * centres[:, 0] + 3e9 * centres[:, 1]
+        blocks[side] = blocks[side]._replace(
+            points=grid.points * [1, sign, 0],
+            cells=cells,
+            point_data={"displacement": np.zeros((1, len(grid.points), 3), np.float32)},
+            cell_data={"von_mises": np.stack([stress, 2 * stress]).astype(np.float32)},
+        )
+    write_blocks(folder / NAME, blocks, [0.0, 1.0])
+    return folder / NAME

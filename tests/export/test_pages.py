@@ -1,0 +1,245 @@
+"""Pages of all kinds of runs: self-contained, accessible, equal to their files, and made again from the files alone."""
+
+import json
+import os
+import re
+import shutil
+
+import numpy as np
+import pytest
+import xarray as xr
+from command_line import run_cli
+from page_data import (
+    find_accessibility_errors,
+    find_wrong_numbers,
+    parse_page,
+    read_charts,
+    read_measures,
+    read_tiles,
+    strip_scripts,
+)
+from scene_texts import (
+    BENCH,
+    COATED,
+    COULOMB,
+    DRIVE,
+    FORCED,
+    LINEAR,
+    MODE,
+    PAIR,
+    PLASTIC,
+    POINT,
+    RIG,
+    SMALL_PATCH,
+    SWEEP,
+)
+
+from patchfem.export import quantities
+
+LEVELS = DRIVE.replace(
+    'acceleration = "5 g"', 'waveform = "levels"\nlevels = ["3 g", "5 g", "6 g"]'
+)
+RELEASE = '[drive]\nkind = "free"\ndisplacement = "0.1 mm"\ncycles = 60\n'
+RANDOM = (
+    '[drive]\nkind = "base"\nwaveform = "random"\nspectrum = "1e-2 g^2/Hz"\nfrom = "20 Hz"\nto = "300 Hz"\n'
+    'duration = "2 s"\n'
+)
+WEAR = '[slide]\nkind = "sine"\namplitude = "15 um"\nfrequency = "143 Hz"\ncycles = 2\n[wear]\n'
+WEAR += 'coefficient = "1e-15 1/Pa"\ncycles = 1e5\n'
+CURVE = SWEEP + '[accuracy]\nmethod = "harmonic"\ntolerance = 1e-2\n'
+SMALL_LOAD = '[normal]\nload = "2 N"\n'
+SCENES = {
+    "patch": SMALL_PATCH,
+    "no contact": COATED.replace('load = "26 lbf"\n', "")
+    + '[contact.approach]\ndistance = "0 um"\n',
+    "bench": BENCH,
+    "rig": RIG,
+    "linear": LINEAR,
+    "masses": PAIR + FORCED,
+    "levels": POINT + PLASTIC + MODE + LEVELS,
+    "release": SMALL_LOAD + COULOMB + MODE + RELEASE,
+    "random": POINT + PLASTIC + MODE + RANDOM,
+    "curve": SMALL_LOAD + COULOMB + MODE + CURVE,
+    "wear": SMALL_PATCH + COULOMB + WEAR,
+}
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory):
+    """Return a function that runs a scene of SCENES once and returns its results folder."""
+    base = tmp_path_factory.mktemp("pages")
+
+    def find_folder(name: str):
+        """Return the results folder of a scene."""
+        folder = base / name.replace(" ", "_")
+        if not folder.exists():
+            scene = base / f"{folder.name}.toml"
+            scene.write_text(SCENES[name], "utf-8")
+            answer = run_cli("run", scene, "-o", folder, "-q")
+            assert answer.code == 0, answer.err
+        return folder
+
+    return find_folder
+
+
+def read_page(folder) -> str:
+    """Return the page of a folder."""
+    return (folder / "report.html").read_text("utf-8")
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_exact_numbers_of_page_equal_files(folders, name):
+    """Tiles and measures of the page equal summary.json, and the charts contain the arrays of result.nc."""
+    folder = folders(name)
+    page = read_page(folder)
+    summary = json.loads((folder / "summary.json").read_text("utf-8"))
+    measures = summary["measures"]
+    texts = read_measures(page)
+    assert find_wrong_numbers(texts, measures) == []
+    zeros = (
+        {one.replace(" ", "_") for one in re.findall(r"Zero: (.*?)\.</p>", page)[0].split(", ")}
+        if "Zero: " in page
+        else set()
+    )
+    assert texts.keys() | zeros == measures.keys()
+    tiles = {label.replace(" ", "_"): text for label, text in read_tiles(page).items()}
+    assert len(tiles) <= quantities.MAX_TILES and find_wrong_numbers(tiles, measures) == []
+
+    if not (folder / "result.nc").is_file():
+        return
+    with xr.open_dataset(folder / "result.nc") as data:
+        arrays = {
+            name: np.abs(np.asarray(data[name].values, float))
+            for name in data.variables
+            if data[name].dtype.kind in "fi"
+        }
+    for title, figure in read_charts(page).items():
+        if "von Mises" in title:
+            continue  # from fields.vtkhdf
+        for trace in figure["data"]:
+            values = np.asarray(trace.get("z", trace["y"]), float)
+            if not np.isfinite(values).any() or trace.get("hoverinfo") == "skip":
+                continue
+            # the largest value belongs to one of the arrays, times a power of ten or 1/g
+            largest = np.nanmax(np.abs(values))
+            scales = [10.0**k for k in range(-12, 13, 3)] + [1 / 9.80665]
+            candidates = np.concatenate([one[np.isfinite(one)].ravel() for one in arrays.values()])
+            ratios = [np.abs(candidates * scale - largest).min() for scale in scales]
+            assert min(ratios) <= 1e-6 * largest, (title, trace.get("name"))
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_always_page_is_self_contained_and_accessible(folders, name):
+    """A page is one file below 2.5 MB; its links lead to files beside it, its ids are unique, its charts have a text."""
+    folder = folders(name)
+    page = read_page(folder)
+    parsed = parse_page(page)
+    assert find_accessibility_errors(page) == []
+    assert len(parsed.ids) == len(set(parsed.ids))
+    assert all((folder / link).exists() for link in parsed.links)
+    content = strip_scripts(page)
+    assert "http" not in content and "url(" not in content and "@import" not in content
+    assert not re.search(r"<script[^>]* src", page) and len(page.encode()) < 2.5e6
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_exact_headline_is_short_and_stands_first(folders, name):
+    """The headline has at most 30 words, the verdict at most four sentences, and both stand before charts and tables."""
+    page = read_page(folders(name))
+    box = re.search(r'<div class="box">(.*?)</div>', page)[1]
+    sentences = re.findall(r"<p>(.*?)</p>", box)
+    assert 1 <= len(sentences) <= 4 and len(sentences[0].split()) <= 30
+    start = page.index('<div class="box">')
+    assert not any(tag in page[:start] for tag in ("<figure", "<table", "<h2"))
+
+
+def test_exact_page_is_made_again_from_its_files(folders, tmp_path, monkeypatch):
+    """The page made by `report` from a moved folder equals the first one byte by byte, without scene and caches."""
+    for name in ("rig", "wear", "random"):
+        folder = tmp_path / name
+        shutil.copytree(folders(name), folder)
+        first = (folder / "report.html").read_bytes()
+        os.remove(folder / "report.html")
+        monkeypatch.setenv("PATCHFEM_CACHE", str(tmp_path / "empty"))
+        answer = run_cli("report", folder)
+        assert answer.code == 0, answer.err
+        assert (folder / "report.html").read_bytes() == first
+
+
+EXPECTED_CHARTS = {
+    "patch": {"Pressure on the interface", "Gap", "von Mises stress in both pieces"},
+    "bench": {"Friction loop", "Displacement", "Friction force", "Energy"},
+    "rig": {
+        "Friction loop",
+        "Displacement",
+        "Acceleration",
+        "Whole run",
+        "Pressure on the interface",
+        "Shear stress on the interface",
+        "Where it sticks and slips",
+        "Energy",
+        "von Mises stress in both pieces",
+    },
+    "levels": {"Levels of the drive"},
+    "release": {"Frequency of the decay", "Damping of the decay", "Whole run"},
+    "random": {"Frequency response H1", "Spectral density", "Coherence"},
+    "curve": {"Steady motions"},
+    "wear": {"Wear over the cycles", "Pressure while it wears", "Worn depth"},
+    "no contact": set(),
+}
+
+
+@pytest.mark.parametrize("name", EXPECTED_CHARTS)
+def test_exact_page_has_charts_of_its_kind(folders, name):
+    """The page of each kind of run has the charts of its kind, with labels and units on both axes."""
+    charts = read_charts(read_page(folders(name)))
+    assert charts.keys() >= EXPECTED_CHARTS[name]
+    if name == "no contact":
+        assert (
+            "von Mises stress in both pieces" not in charts
+            and "Pressure on the interface" not in charts
+        )
+    for title, figure in charts.items():
+        for axis in ("xaxis", "yaxis"):
+            assert figure["layout"][axis]["title"]["text"], title
+
+
+def test_exact_loop_of_chart_encloses_measured_work(folders):
+    """The area of the drawn friction loop of a bench is the measure loop_area."""
+    folder = folders("bench")
+    trace = read_charts(read_page(folder))["Friction loop"]["data"][0]
+    slide = np.asarray(trace["x"], float) * 1e-6
+    force = np.asarray(trace["y"], float)
+    measures = json.loads((folder / "summary.json").read_text("utf-8"))["measures"]
+    work = np.sum(np.diff(slide) * (force[1:] + force[:-1]) / 2)
+    assert work == pytest.approx(measures["loop_area"]["value"], rel=2e-2)
+
+
+def test_exact_levels_are_listed_with_their_errors(folders):
+    """The table of levels has drive, amplitude with error and state of each level, as in result.nc."""
+    folder = folders("levels")
+    page = read_page(folder)
+    table = page[page.index("<h2>Levels of the drive</h2>") :]
+    rows = re.findall(r"<tr>(<td>.*?</td>)</tr>", table[: table.index("</table>")])
+    with xr.open_dataset(folder / "result.nc") as data:
+        assert len(rows) == data.sizes["level"] == 3
+        for row, drive in zip(rows, data.level_drive.values / 9.80665, strict=True):
+            assert f"<td>{drive:g} g</td>" in row and ("slips" in row or "sticks" in row)
+
+
+def test_always_page_works_in_browser(folders, chromium):
+    """The charts are drawn without an error on the console, in the light and on a narrow screen without broken words."""
+    for name in ("rig", "wear", "curve"):
+        page = chromium.visit(folders(name) / "report.html", 390)
+        page.wait_for_charts()
+        assert page.faults == [] and page.broken_words() == []
+        assert page.evaluate("document.documentElement.scrollWidth") <= 390
+        count = page.evaluate("document.querySelectorAll('.chart .main-svg').length")
+        assert count >= len(read_charts(read_page(folders(name))))
+
+
+@pytest.mark.parametrize("name", ["rig", "wear", "random"])
+def test_always_page_shows_no_backquotes(folders, name):
+    """Sentences, captions and definitions show no backquotes; scenes and commands are shown as written."""
+    page = re.sub(r"(?s)<(script|style|pre)\b.*?</\1>", "", read_page(folders(name)))
+    assert "`" not in page

@@ -1,0 +1,297 @@
+"""Pages and files of backbones, fits, costs and several results: equal to their files, short, and made again from them."""
+
+import csv
+import json
+import re
+import shutil
+
+import numpy as np
+import pytest
+import xarray as xr
+from command_line import run_cli
+from page_data import (
+    find_accessibility_errors,
+    parse_page,
+    parse_quantity,
+    read_charts,
+    strip_scripts,
+)
+from scene_texts import DRIVE, MODE, PLASTIC, POINT
+
+from patchfem.export import quantities
+
+BENCH = (
+    POINT
+    + PLASTIC
+    + '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "20 Hz"\ncycles = 2\n'
+)
+BLOCK = POINT + PLASTIC + MODE + DRIVE
+STATIC = "friction.static=0.1..0.7"
+G_N = 9.80665
+MIL = 25.4e-6
+
+
+def write_loop(path, noise: float) -> None:
+    """Write the loop of an elastic-plastic contact (30 N, 2 um) under a sine with noise [N], in two labelled cycles."""
+    time = np.linspace(0.0, 0.1, 121)
+    slide = 10e-6 * np.sin(2 * np.pi * 20 * time)
+    force = [0.0]
+    for step in np.diff(slide):
+        force.append(float(np.clip(force[-1] + 30.0 / 2e-6 * step, -30.0, 30.0)))
+    force += noise * np.random.default_rng(1).normal(size=time.size)
+    rows = zip(time, slide, force, 1 + (time > 0.05), strict=True)
+    lines = [f"{t!r},{x!r},{f!r},{c}" for t, x, f, c in (map(float, row) for row in rows)]
+    path.write_text("\n".join(["time [s],displacement [m],force [N],cycle", *lines]), "utf-8")
+
+
+def write_rows(path) -> None:
+    """Write the response of an oscillator (141 Hz, damping 3 %) to a base of 2 g, in closed form, at five frequencies."""
+    lines = ["frequency [Hz],input [g],acceleration [g],displacement [mil],flag"]
+    for frequency in (120.0, 135.0, 143.0, 150.0, 160.0):
+        omega, natural = 2 * np.pi * frequency, 2 * np.pi * 141.0
+        motion = -2 * G_N / (natural**2 - omega**2 + 2j * 0.03 * natural * omega)
+        felt = abs(2 * G_N - omega**2 * motion) / G_N
+        lines.append(f"{frequency},2,{felt!r},{abs(motion) / MIL!r},{'U' * (frequency == 143)}")
+    path.write_text("\n".join(lines), "utf-8")
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory):
+    """Results folders of a backbone, of fits to a loop, to a curve and to rows, and of a cost, by name."""
+    base = tmp_path_factory.mktemp("studies")
+    (base / "bench.toml").write_text(BENCH, "utf-8")
+    (base / "block.toml").write_text(BLOCK, "utf-8")
+    (base / "linear.toml").write_text(MODE + DRIVE, "utf-8")
+    write_loop(base / "loop.csv", 0.3)
+    write_rows(base / "rows.csv")
+    free_mode = (
+        "structure.mode.axial.frequency=120 Hz..160 Hz,structure.mode.axial.damping=0.005..0.2"
+    )
+    amplitudes = ("--amplitudes", "0.1 um..200 um:9")
+    commands = {
+        "backbone": ("backbone", "block.toml", *amplitudes),
+        "loop": (
+            *("fit", "bench.toml", "--to", "loop.csv", "--hold", "cycle=2"),
+            *("--free", f"{STATIC},friction.bond_length=0.3 um..20 um"),
+        ),
+        "curve": ("fit", "block.toml", "--to", "backbone/backbone.csv", "--free", STATIC),
+        "rows": (
+            *("fit", "linear.toml", "--to", "rows.csv", "--free", free_mode),
+            *("--hold", "frequency=160 Hz", "--starts", "2"),
+        ),
+        "cost": ("cost", "bench.toml", "--verbose"),
+        "stronger": ("backbone", "block.toml", *amplitudes, "--set", "friction.static=0.4"),
+    }
+    for name, (verb, scene, *options) in commands.items():
+        paths = [base / word if word.endswith(".csv") else word for word in options]
+        if name == "curve":  # the table of a single method
+            rows = (base / "backbone/backbone.csv").read_text("utf-8").splitlines()
+            kept = [row for row in rows if not row.startswith("quasi-static")]
+            (base / "balance.csv").write_text("\n".join(kept), "utf-8")
+            paths[1] = base / "balance.csv"
+        answer = run_cli(verb, base / scene, *paths, "-o", base / name, "-q")
+        assert answer.code == 0, (name, answer.err)
+    return base
+
+
+NAMES = ("backbone", "loop", "curve", "rows", "cost")
+
+
+def read_page(folder) -> str:
+    """Return the page of a results folder."""
+    return (folder / "report.html").read_text("utf-8")
+
+
+def read_json(path) -> dict:
+    """Return the content of a JSON file."""
+    return json.loads(path.read_text("utf-8"))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_exact_displayed_numbers_equal_the_files(folders, name):
+    """Each measure of a page is that of summary.json, and each point of a chart a number of the netCDF file."""
+    page = read_page(folders / name)
+    measures = read_json(folders / name / "summary.json")["measures"]
+    shown = dict(re.findall(r'<tr id="measure-([^"]+)"><td>.*?</td><td class="v">(.*?)</td>', page))
+    assert shown and set(shown) <= set(measures)
+    for key, text in shown.items():
+        entry = measures[key]
+        value, _ = parse_quantity(text)
+        width = (entry["high"] - entry["low"]) / 2 if entry["low"] is not None else 0.0
+        assert value == pytest.approx(
+            entry["value"], rel=1e-2 if not width else 1e-5, abs=0.06 * width
+        ), key
+
+    stored = folders / name / ("backbone.nc" if name == "backbone" else "result.nc")
+    with xr.open_dataset(stored) as data:
+        numbers = [
+            data[one].values.ravel() for one in data.variables if data[one].dtype.kind in "fi"
+        ]
+    numbers = np.concatenate(numbers).astype(float)
+    charts = read_charts(page)
+    assert charts
+    for title, chart in charts.items():
+        for trace in chart["data"]:
+            values = np.asarray(trace["y"], float)
+            values = values[np.isfinite(values)]
+            if trace.get("hoverinfo") == "skip" or not values.size:
+                continue
+            largest = values[np.argmax(np.abs(values))]
+            scales = [*10.0 ** np.arange(-12, 13, 3), 1 / G_N]
+            assert min(
+                np.nanmin(np.abs(numbers * scale - largest)) for scale in scales
+            ) <= 1e-6 * abs(largest), (title, trace.get("name"))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_always_page_is_short_accessible_and_self_contained(folders, name):
+    """The headline has at most 30 words, the verdict at most four sentences, and nothing is loaded from elsewhere."""
+    page = read_page(folders / name)
+    verdict = read_json(folders / name / "summary.json")["verdict"]
+    assert 1 <= len(verdict) <= 4 and len(verdict[0].split()) <= 30
+    assert page.count("<b>") <= quantities.MAX_TILES
+    parsed = parse_page(page)
+    assert find_accessibility_errors(page) == [] and len(parsed.ids) == len(set(parsed.ids))
+    assert all((folders / name / link).exists() for link in parsed.links)
+    assert "http" not in strip_scripts(page)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_exact_page_is_made_again_from_its_files(folders, name, tmp_path):
+    """`report` makes the same bytes from a copy of the folder without its page."""
+    shutil.copytree(folders / name, tmp_path / name)
+    (tmp_path / name / "report.html").unlink()
+    assert run_cli("report", tmp_path / name).code == 0
+    assert read_page(tmp_path / name) == read_page(folders / name)
+
+
+def test_exact_backbone_files_agree(folders):
+    """backbone.csv, backbone.nc and backbone.json hold the same curves, and the band contains the recommended one."""
+    folder = folders / "backbone"
+    curves = read_json(folder / "backbone.json")["curves"]
+    with open(folder / "backbone.csv", newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    heads = [
+        "method",
+        "amplitude [m]",
+        "frequency [Hz]",
+        "frequency_error [Hz]",
+        "damping",
+        "damping_error",
+    ]
+    assert list(rows[0]) == heads
+    with xr.open_dataset(folder / "backbone.nc") as data:
+        for method, curve in curves.items():
+            mine = [row for row in rows if row["method"] == method]
+            for head in heads[1:]:
+                name = head.partition(" ")[0]
+                stored = data[f"{method.replace('-', '_')}_{name}"].values
+                assert [float(row[head]) for row in mine] == curve[name] == stored.tolist()
+        for name in ("frequency", "damping"):
+            value = data[f"balance_{name}"]
+            assert (data[f"balance_{name}_low"] <= value).all()
+            assert (data[f"balance_{name}_high"] >= value).all()
+
+
+def test_exact_headline_of_backbone_is_that_of_closed_form(folders):
+    """In stick the frequency is sqrt(k/m + omega^2)/2 pi and the loss that of the structure, both in the measures."""
+    measures = read_json(folders / "backbone" / "summary.json")["measures"]
+    details = read_json(folders / "backbone" / "backbone.json")
+    free = details["free_frequency"]
+    stuck = measures["stuck_frequency"]["value"]
+    assert measures["frequency_at_smallest_amplitude"]["value"] == pytest.approx(stuck, rel=1e-6)
+    # the structure's constant c = 2 zeta omega_free m gives the ratio zeta omega_free/omega
+    damping = measures["damping_at_smallest_amplitude"]["value"]
+    assert damping * stuck / free == pytest.approx(0.003, rel=1e-3)
+    verdict = read_json(folders / "backbone" / "summary.json")["verdict"][0]
+    assert "Frequency falls from" in verdict and "damping ratio rises from" in verdict
+
+
+def test_exact_fits_recover_known_parameters(folders):
+    """The intervals of the fits contain the parameters from which the data were made; the fitted curve goes beyond them."""
+    loop = read_json(folders / "loop" / "fit.json")["values"]
+    for key, truth in (("friction.static", 0.3 * 100 / 115.65), ("friction.bond_length", 2e-6)):
+        assert loop[key]["low"] < loop[key]["high"]
+        if key == "friction.bond_length":
+            assert loop[key]["low"] <= truth <= loop[key]["high"]
+    force = loop["friction.static"]["value"] * 26 * 4.4482216152605
+    assert force == pytest.approx(30.0, rel=5e-3)
+    rows = read_json(folders / "rows" / "fit.json")
+    assert rows["values"]["structure.mode.axial.frequency"]["value"] == pytest.approx(
+        141.0, rel=1e-4
+    )
+    assert rows["values"]["structure.mode.axial.damping"]["value"] == pytest.approx(0.03, rel=1e-3)
+    assert rows["scores"]["held_out"]["all"] < 1e-3
+    with xr.open_dataset(folders / "curve" / "result.nc") as data:
+        assert data["curve_amplitude"].max() > 2.9 * data["amplitude"].max()
+        assert data["curve_amplitude"].min() < data["amplitude"].min() / 2.9
+        np.testing.assert_allclose(data["frequency_fitted"], data["frequency"], rtol=1e-5)
+
+
+def test_exact_cost_table_agrees_with_json(folders):
+    """cost.csv has the columns of the contract, with the numbers of cost.json; the page lists each run."""
+    details = read_json(folders / "cost" / "cost.json")
+    with open(folders / "cost" / "cost.csv", newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert list(rows[0])[:5] == ["knob", "setting", "seconds", "wall_seconds", "timings"]
+    runs = [(knob, run) for knob, part in details.items() for run in part["runs"]]
+    for row, (knob, run) in zip(rows, runs, strict=True):
+        assert (row["knob"], row["setting"]) == (knob, run["label"])
+        assert float(row["seconds"]) == run["seconds"]
+        errors = {
+            name[6:]: float(cell)
+            for name, cell in row.items()
+            if name.startswith("error_") and cell
+        }
+        assert errors == run["errors"]
+    page = read_page(folders / "cost")
+    table = re.search(r"<h2>Runs</h2>.*?</table>", page, re.S)[0]
+    assert table.count("<tr>") == len(runs) + 1
+
+
+def test_exact_report_compares_results_of_one_kind(folders, tmp_path):
+    """The page of two backbones names the measures that differ by more than their errors, and the keys that differ."""
+    out = tmp_path / "both.html"
+    assert run_cli("report", folders / "backbone", folders / "stronger", "-o", out).code == 0
+    page = out.read_text("utf-8")
+    first, second = (
+        read_json(folders / name / "summary.json")["measures"] for name in ("backbone", "stronger")
+    )
+    ratio = second["stuck_frequency"]["value"] / first["stuck_frequency"]["value"]
+    assert f"({100 * (ratio - 1):+.1f} %)" in page
+    scenes = re.search(r"<h2>Where the scenes differ</h2>.*?</table>", page, re.S)[0]
+    assert re.findall(r"<td>(.*?)</td>", scenes) == ["friction.static", "0.3", "0.4"]
+    # free frequencies are equal, so they are not a difference
+    free = re.search(r'<tr id="measure-free_frequency">.*?</tr>', page)[0]
+    assert "%" not in re.sub(r'<td class="soft">.*', "", free)
+    traces = read_charts(page)["Frequency"]["data"]
+    colours = {
+        trace["name"].partition(",")[0]: trace["line"]["color"]
+        for trace in traces
+        if "name" in trace
+    }
+    assert len(set(colours.values())) == 2
+
+
+def test_refuses_results_of_different_kinds(folders, tmp_path):
+    """Results of different kinds, and folders without results, are refused in one sentence with exit code 2."""
+    answer = run_cli("report", folders / "backbone", folders / "loop", "-o", tmp_path / "x.html")
+    assert answer.code == 2 and "different kinds (backbone: backbone, loop: fit)" in answer.err
+    answer = run_cli("report", folders / "backbone", tmp_path, "-o", tmp_path / "x.html")
+    assert answer.code == 2 and "summary.json" in answer.err and len(answer.err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("ending", ["png", "svg", "pdf"])
+def test_exact_plot_is_a_picture(folders, tmp_path, ending):
+    """`write_plot` writes the first chart of an answer in the format of the ending, and refuses another ending."""
+    from patchfem.core import PatchfemError
+    from patchfem.export import store
+    from patchfem.export.charts import axes
+
+    starts = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
+    for name in NAMES:
+        path = tmp_path / f"{name}.{ending}"
+        axes.write_plot(store.read(folders / name), path)
+        assert path.read_bytes().startswith(starts[ending])
+    with pytest.raises(PatchfemError, match=r"\.png, \.svg, \.pdf"):
+        axes.write_plot(store.read(folders / "cost"), tmp_path / "a.jpg")

@@ -1,0 +1,134 @@
+"""Comparison of two areal scans: volumes of constructed craters and tracks, placement, and refusals."""
+
+import numpy as np
+import pytest
+import scan_pairs
+from scipy.ndimage import gaussian_filter
+
+from patchfem.core import PatchfemError
+from patchfem.surface import Options, Profile, compare_surfaces
+from patchfem.surface.areal import Areal
+
+UM = 1e-6
+STEP = 2 * UM
+
+
+def make_pair(worn, seed=0, noise=10e-9) -> tuple[Areal, Areal]:
+    """Return scans (m, n) before and after a loss (m, n) [m]; the second one starts 5 columns and 3 rows later."""
+    random = np.random.default_rng(seed)
+    rows, columns = worn.shape
+    z = gaussian_filter(random.normal(size=(rows + 20, columns + 20)), 2.0)
+    z *= 0.5 * UM / z.std()
+    before = z[:rows, :columns]
+    after = z[3 : 3 + rows, 5 : 5 + columns] - np.roll(worn, (-3, -5), (0, 1))
+    axes = (STEP * np.arange(columns), STEP * np.arange(rows))
+    scans = []
+    for name, heights in (("before", before), ("after", after)):
+        tilt = 1e-3 * axes[0] if name == "after" else 0.0
+        heights = heights + noise * random.normal(size=heights.shape) + tilt
+        scans.append(Areal(*axes, heights, name))
+    return tuple(scans)
+
+
+def make_crater(depth: float, radius: float, shape=(120, 140)) -> np.ndarray:
+    """Return the depths of a paraboloid in the middle of a scan."""
+    y, x = np.indices(shape)
+    r = np.hypot(y - shape[0] / 2, x - shape[1] / 2) * STEP
+    return depth * np.clip(1 - (r / radius) ** 2, 0, None)
+
+
+def test_exact_volume_and_place_of_crater():
+    """The volume pi/2 depth radius^2 of a paraboloid, its depth and the shift lie in narrow intervals."""
+    found = compare_surfaces(*make_pair(make_crater(3 * UM, 60 * UM)))
+    assert found.verdict.code == "worn" and found.is_areal
+    volume = found.values["worn_volume"]
+    true = np.pi / 2 * 3 * UM * (60 * UM) ** 2
+    assert volume.low <= true <= volume.high and volume.value == pytest.approx(true, rel=0.02)
+    largest = found.values["worn_depth_max"]
+    assert largest.low <= 3 * UM <= largest.high
+    placed = found.evidence.placement.values
+    assert placed["shift_x"].value == pytest.approx(-5 * STEP, abs=0.1 * STEP)
+    assert placed["shift_y"].value == pytest.approx(-3 * STEP, abs=0.1 * STEP)
+    assert placed["rotation"].value == pytest.approx(0.0, abs=1e-3)
+    assert found.track is None
+
+
+def test_exact_section_of_straight_track():
+    """A straight track along y has a mean section with the area 2/3 depth x width."""
+    x = (np.arange(140) - 70) * STEP
+    worn = np.tile(2 * UM * np.clip(1 - (x / (50 * UM)) ** 2, 0, None), (120, 1))
+    found = compare_surfaces(*make_pair(worn, 1))
+    track = found.track.values
+    area = 2 / 3 * 2 * UM * 100 * UM
+    assert track["area_gross"].value == pytest.approx(area, rel=0.03)
+    assert track["width"].low <= 100 * UM <= track["width"].high
+    assert abs(np.sin(track["direction"].value)) == pytest.approx(1.0, abs=1e-3)
+    assert found.track.n_sections > 90
+
+
+def test_always_unworn_identical_and_other_scans():
+    """Unworn scans show no wear, the same heights are named, and another place has no depth."""
+    before, after = make_pair(np.zeros((100, 100)), 2)
+    assert compare_surfaces(before, after).verdict.code == "no_wear"
+    assert compare_surfaces(before, before).verdict.code == "identical"
+    _, other = make_pair(np.zeros((100, 100)), 33)
+    assert compare_surfaces(before, other).verdict.code == "elsewhere"
+
+
+def test_always_mirrored_and_inverted_scans_are_found():
+    """A mirrored scan and a replica are turned back."""
+    before, after = make_pair(make_crater(2 * UM, 50 * UM), 3)
+    mirrored = Areal(after.x, after.y, after.z[:, ::-1].copy(), "after")
+    found = compare_surfaces(before, mirrored)
+    assert found.verdict.code == "worn" and found.evidence.placement.mirrored == "x"
+    replica = compare_surfaces(before, Areal(after.x, after.y, -after.z, "after"))
+    assert replica.verdict.code == "worn" and replica.evidence.placement.turned
+
+
+def test_exact_missing_heights_and_spikes_do_not_count():
+    """Missing heights and single spikes change the volume by less than its interval."""
+    before, after = make_pair(make_crater(3 * UM, 60 * UM), 4)
+    z = after.z.copy()
+    random = np.random.default_rng(0)
+    z[random.random(z.shape) < 0.05] = np.nan
+    z[20, 30] = 50 * UM
+    found = compare_surfaces(before, Areal(after.x, after.y, z, "after"))
+    true = np.pi / 2 * 3 * UM * (60 * UM) ** 2
+    assert found.values["worn_volume"].low <= true <= found.values["worn_volume"].high
+    assert found.evidence.removed[1] >= 1
+
+
+@pytest.mark.parametrize("kind", ["smooth track", "crater", "deposits", "remounted", "exchanged"])
+def test_always_kinds_of_change_have_right_verdict(kind):
+    """Rotated and shifted scans of five kinds of change have no false verdict, and the volume lies in its interval."""
+    pair = scan_pairs.draw_pair(4321, kind)
+    scans = []
+    for name, z in (("before", pair.before), ("after", pair.after)):
+        axes = (pair.spacing * np.arange(z.shape[1]), pair.spacing * np.arange(z.shape[0]))
+        scans.append(Areal(*axes, z, name))
+    found = compare_surfaces(*scans)
+    allowed = {
+        "deposits": ("grown",),
+        "remounted": ("no_wear",),
+        "exchanged": ("grown", "elsewhere"),
+    }
+    assert found.verdict.code in allowed.get(kind, ("worn",))
+    if found.verdict.code == "worn":
+        volume = found.values["worn_volume"]
+        assert volume.low <= pair.truth.volumes.worn <= volume.high
+
+
+def test_refuses_mixed_and_small_surfaces():
+    """A trace beside a scan, a shift of scans and scans of few rows are refused."""
+    before, after = make_pair(np.zeros((40, 40)), 5)
+    trace = Profile(before.x, before.z[0], "trace")
+    for arguments, message in (
+        ((before, trace), "two traces are needed, or two areal scans"),
+        ((before, after, Options(shift=0.0)), "areal scans are registered automatically"),
+        ((before, after, Options(datum="straight")), "the plane of areal scans is fitted"),
+    ):
+        with pytest.raises(PatchfemError, match=message):
+            compare_surfaces(*arguments)
+    small = [Areal(scan.x, scan.y[:9], scan.z[:9], scan.source) for scan in (before, after)]
+    with pytest.raises(PatchfemError, match="at least 16 along each side"):
+        compare_surfaces(*small)

@@ -1,0 +1,293 @@
+"""Comparison of two traces: worn areas and ends of constructed tracks, and what is said in rare cases."""
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter1d
+
+from patchfem.core import PatchfemError
+from patchfem.surface import Options, Profile, compare_files, compare_surfaces
+
+UM = 1e-6
+NM = 1e-9
+SHIFT = 40 * UM
+
+
+def draw_surface(seed: int, count: int = 4400, rms: float = 0.4 * UM) -> np.ndarray:
+    """Return rough heights [m] at steps of 1 um."""
+    z = gaussian_filter1d(np.random.default_rng(seed).normal(size=count), 8.0)
+    return rms * z / z.std()
+
+
+def make_pair(worn, seed=0, noise=5 * NM, tilt=2e-4, surface=None) -> tuple[Profile, Profile]:
+    """Return traces of a surface before and after the loss `worn` (n,) [m]; x of the second one starts 40 um later."""
+    random = np.random.default_rng([seed, 1])
+    count = len(worn)
+    surface = draw_surface(seed, count + 400) if surface is None else surface
+    x = UM * np.arange(count)
+    before = surface[:count] + noise * random.normal(size=count)
+    start = round(SHIFT / UM)
+    after = surface[start : start + count] - worn + tilt * x + noise * random.normal(size=count)
+    return Profile(x, before, "before"), Profile(x, after, "after")
+
+
+def make_parabola(depth: float, first: int, last: int, count: int = 4000) -> np.ndarray:
+    """Return the depths (count,) of a parabolic track between two samples."""
+    u = (np.arange(count) - (first + last) / 2) / ((last - first) / 2)
+    return depth * np.clip(1 - u**2, 0, None)
+
+
+def has_finding(comparison, code: str) -> bool:
+    """Return whether a comparison has a finding of this code."""
+    return any(finding.code == code for finding in comparison.findings)
+
+
+@pytest.mark.parametrize("depth", [0.1 * UM, 2 * UM, 20 * UM])
+def test_exact_area_and_ends_of_parabola(depth):
+    """Area 2/3 depth x width, its mean over the common length, largest depth, ends and shift lie in narrow intervals."""
+    worn = make_parabola(depth, 1500, 2500)
+    found = compare_surfaces(*make_pair(worn))
+    assert found.verdict.code == "worn" and found.evidence.placement.basis == "place"
+    values = found.values
+    area = worn.sum() * UM
+    length = np.ptp(found.evidence.curves.x)
+    truths = {
+        "worn_area": area,
+        "worn_depth_mean": area / length,
+        "worn_depth_max": depth,
+        "worn_from_after": 1500 * UM,
+        "worn_to_after": 2500 * UM,
+        "worn_from_before": 1540 * UM,
+    }
+    for name, true in truths.items():
+        assert (
+            values[name].low - UM * name.startswith("worn_f") <= true <= values[name].high + UM
+        ), name
+    assert values["worn_area"].value == pytest.approx(area, rel=0.03)
+    assert values["shift"].value == pytest.approx(-SHIFT, abs=0.1 * UM)
+    assert values["tilt"].value == pytest.approx(2e-4, rel=0.01)
+    track = found.track.values
+    assert track["depth_mean"].value == pytest.approx(2 / 3 * depth, rel=0.05)
+    assert track["width"].low <= 1000 * UM <= track["width"].high
+    assert track["step"].value == pytest.approx(depth * (1 - 1 / 27), rel=0.03)
+
+
+def test_always_mean_is_over_common_length_and_track_mean_over_track():
+    """`worn_depth_mean` is the area over the common length, `track.depth_mean` over the width of the track."""
+    found = compare_surfaces(*make_pair(make_parabola(UM, 1000, 1500)))
+    mean = found.values["worn_depth_mean"].value
+    length = found.values["worn_area"].value / mean
+    assert length == pytest.approx(np.ptp(found.evidence.curves.x), rel=0.01)
+    assert found.track.values["depth_mean"].value == pytest.approx(2 / 3 * UM, rel=0.03)
+    assert found.values["worn_depth_within"].value == found.track.values["depth_mean"].value
+
+
+def test_always_unworn_pairs_show_no_wear():
+    """Of 12 unworn pairs with tilt and bow none is called worn or grown; the detection limit is stated."""
+    for seed in range(12):
+        before, after = make_pair(np.zeros(3000), seed)
+        bow = 0.1 * UM * np.linspace(-1, 1, 3000) ** 2
+        found = compare_surfaces(before, Profile(after.x, after.z + bow * (seed % 2), "after"))
+        assert found.verdict.code == "no_wear", seed
+        assert 0 < found.verdict.numbers["detection_limit"] < 20 * NM
+        assert has_finding(found, "hidden_even_wear")
+        assert found.values["hidden_wear"].high is None
+
+
+def test_exact_shallow_track_is_found_above_limit():
+    """Tracks of twice the detection limit over the middle third are found, with a mean in the interval."""
+    for seed in range(4):
+        limit = compare_surfaces(*make_pair(np.zeros(3000), seed)).verdict.numbers[
+            "detection_limit"
+        ]
+        worn = np.zeros(3000)
+        worn[1000:2000] = 2 * limit
+        found = compare_surfaces(*make_pair(worn, seed))
+        assert found.verdict.code == "worn", seed
+        area = found.values["worn_area"]
+        assert area.low <= 2 * limit * 1000 * UM <= area.high
+
+
+def test_always_identical_files_are_named():
+    """Identical heights are no comparison."""
+    before, _ = make_pair(np.zeros(2000))
+    found = compare_surfaces(before, before)
+    assert found.verdict.code == "identical" and has_finding(found, "identical_files")
+    assert found.values["worn_depth_mean"].reason == "identical"
+
+
+def test_always_mirrored_trace_is_found():
+    """A trace measured in the other direction is mirrored back."""
+    before, after = make_pair(make_parabola(UM, 1500, 2500))
+    found = compare_surfaces(before, Profile(after.x, after.z[::-1].copy(), "after"))
+    assert found.verdict.code == "worn" and has_finding(found, "mirrored")
+    assert found.evidence.placement.mirrored == "x"
+
+
+def test_always_exchanged_files_show_growth():
+    """In the wrong order, wear is growth."""
+    before, after = make_pair(make_parabola(UM, 1500, 2500))
+    found = compare_surfaces(after, before)
+    assert found.verdict.code == "grown" and has_finding(found, "exchanged")
+    assert found.values["worn_depth_mean"].value is None
+
+
+def test_always_other_place_has_no_depth():
+    """Traces of two surfaces with the same statistics have no common place."""
+    for seed in range(6):
+        before, _ = make_pair(np.zeros(3000), seed)
+        _, after = make_pair(np.zeros(3000), seed + 100)
+        found = compare_surfaces(before, after)
+        assert found.verdict.code == "elsewhere", seed
+        assert found.values["worn_depth_mean"].reason == "elsewhere"
+
+
+def test_exact_deep_track_at_another_place_is_measured_below_its_flanks():
+    """A track of 20 um in a trace without any old surface is measured below the line through its flanks."""
+    worn = make_parabola(20 * UM, 1200, 2800)
+    before, _ = make_pair(np.zeros(4000), 3)
+    _, after = make_pair(worn, 77)
+    found = compare_surfaces(before, after)
+    assert found.verdict.code == "worn" and found.evidence.placement.basis == "flanks"
+    assert has_finding(found, "no_old_surface_left")
+    area = found.values["worn_area"]
+    assert area.low <= worn.sum() * UM <= area.high
+    assert found.values["shift"].value is None
+
+
+def test_always_scar_over_ninety_percent_may_be_growth_at_ends():
+    """A scar over 90 % of the trace and growth at both ends look alike; both numbers are stated."""
+    worn = np.zeros(4000)
+    worn[200:3800] = UM
+    found = compare_surfaces(*make_pair(worn))
+    assert found.verdict.code == "growth_at_ends"
+    assert found.verdict.numbers["growth_height"] == pytest.approx(UM, rel=0.1)
+
+
+def test_always_transfer_of_equal_area_is_worn_and_grown():
+    """Material lost at one place and built up at another one is stated as both."""
+    change = make_parabola(UM, 600, 1400) - make_parabola(UM, 2400, 3200)
+    found = compare_surfaces(*make_pair(change))
+    assert found.verdict.code == "worn_and_grown" and has_finding(found, "deposits")
+    assert found.values["worn_area"].value == pytest.approx(2 / 3 * UM * 800 * UM, rel=0.05)
+    assert found.values["grown_area"].value == pytest.approx(2 / 3 * UM * 800 * UM, rel=0.05)
+
+
+def test_always_other_gain_is_named():
+    """Heights that differ by 3 % everywhere are an error of the instrument, not wear."""
+    before, after = make_pair(np.zeros(4000), noise=2 * NM)
+    found = compare_surfaces(before, Profile(after.x, 1.03 * after.z, "after"))
+    assert found.verdict.code == "no_wear"
+    gains = [finding.numbers["gain"] for finding in found.findings if finding.code == "other_gain"]
+    assert gains == [pytest.approx(1.03, abs=0.002)]
+
+
+def test_always_mirror_finish_is_named():
+    """A surface that is smoother than the noise has no place that could be found."""
+    surface = draw_surface(5, rms=0.2 * NM)
+    found = compare_surfaces(*make_pair(np.zeros(4000), 5, noise=4 * NM, surface=surface))
+    assert found.verdict.code == "mirror_finish"
+
+
+def test_exact_pile_up_is_measured_beside_the_track():
+    """Ridges on both sides are pile-up, and the net area is the lost area less the pile-up."""
+    worn = make_parabola(2 * UM, 1600, 2400)
+    ridges = make_parabola(0.5 * UM, 1400, 1600) + make_parabola(0.5 * UM, 2400, 2600)
+    track = compare_surfaces(*make_pair(worn - ridges)).track.values
+    assert track["pile_up"].value == pytest.approx(ridges.sum() * UM, rel=0.15)
+    net = track["area_gross"].value - track["pile_up"].value
+    assert track["area_net"].value == pytest.approx(net, rel=1e-9)
+
+
+def test_exact_cut_track_has_no_end_beyond_the_trace():
+    """A track that leaves the common part has one end, and a width without upper limit."""
+    worn = np.zeros(4000)
+    worn[2500:] = UM
+    found = compare_surfaces(*make_pair(worn))
+    assert found.verdict.code == "worn" and has_finding(found, "track_cut")
+    assert found.track.cut == (False, True)
+    assert found.track.values["to"].reason == "cut_off" and found.track.values["width"].high is None
+    assert found.track.values["from"].value == pytest.approx(2500 * UM, abs=6 * UM)
+
+
+def test_exact_worn_tops_reduce_ratio_of_slopes():
+    """Tops cut off at half a deviation leave valleys; their mean depth and the flatter slope are found."""
+    surface = draw_surface(8)
+    cut = np.maximum(surface - 0.2 * UM, 0.0)
+    start = round(SHIFT / UM)
+    worn = cut[start : start + 4000]
+    found = compare_surfaces(*make_pair(worn, 8, surface=surface))
+    assert found.verdict.code == "worn"
+    assert (
+        found.values["worn_depth_mean"].low <= worn.mean() <= found.values["worn_depth_mean"].high
+    )
+    assert found.values["slope_ratio"].high < 1.0
+
+
+def test_exact_spikes_and_dropouts_are_left_out():
+    """Spikes, saturated dropouts and missing heights do not count, and the removed heights are counted."""
+    before, after = make_pair(make_parabola(UM, 1500, 2500))
+    z = after.z.copy()
+    z[[300, 2900, 2901]] += 8 * UM
+    z[3300:3306] = -40 * UM
+    z[800:830] = np.nan
+    found = compare_surfaces(before, Profile(after.x, z, "after"))
+    assert found.verdict.code == "worn"
+    assert found.evidence.removed[1] >= 9
+    assert found.values["worn_area"].value == pytest.approx(2 / 3 * UM * 1000 * UM, rel=0.02)
+
+
+def test_exact_known_shift_is_used():
+    """A known shift places traces that no search could place."""
+    surface = draw_surface(5, rms=0.2 * NM)
+    worn = make_parabola(0.2 * UM, 1500, 2500)
+    pair = make_pair(worn, 5, noise=4 * NM, surface=surface)
+    found = compare_surfaces(*pair, Options(shift=-SHIFT))
+    assert found.verdict.code == "worn"
+    assert found.values["worn_area"].value == pytest.approx(worn.sum() * UM, rel=0.03)
+
+
+def test_exact_roughness_inside_and_outside_of_a_polished_track():
+    """Ra inside of a track whose floor is smooth falls, and that outside stays."""
+    surface = draw_surface(9)
+    start = round(SHIFT / UM)
+    worn = np.zeros(4000)
+    inside = slice(1000, 3000)
+    worn[inside] = surface[start : start + 4000][inside] + 3 * UM
+    found = compare_surfaces(*make_pair(worn, 9, surface=surface))
+    regions = found.evidence.roughness
+    assert regions["inside"]["after"]["Ra"].value < 0.2 * regions["inside"]["before"]["Ra"].value
+    ratio = regions["outside"]["after"]["Ra"].value / regions["outside"]["before"]["Ra"].value
+    assert ratio == pytest.approx(1.0, abs=0.05)
+
+
+def test_exact_files_give_same_numbers(tmp_path):
+    """Files with a header give the same comparison as the traces."""
+    pair = make_pair(make_parabola(UM, 1500, 2500))
+    paths = []
+    for trace in pair:
+        path = tmp_path / f"{trace.source}.csv"
+        rows = "".join(f"{x:.9g},{z:.9g}\n" for x, z in zip(trace.x / UM, trace.z / UM))
+        path.write_text(f"x [um],z [um]\n{rows}")
+        paths.append(path)
+    found = compare_files(*paths)
+    expected = compare_surfaces(*pair)
+    assert found.values["worn_area"].value == pytest.approx(
+        expected.values["worn_area"].value, rel=1e-4
+    )
+
+
+@pytest.mark.parametrize(
+    "options, message",
+    [
+        (Options(datum="bent"), "datum 'bent': straight is needed"),
+        (Options(direction="z"), "direction 'z': x or y is needed"),
+    ],
+)
+def test_refuses_unknown_options(options, message):
+    """Unknown options and traces of too few heights are refused."""
+    pair = make_pair(np.zeros(2000))
+    with pytest.raises(PatchfemError, match=message):
+        compare_surfaces(*pair, options)
+    short = [Profile(trace.x[:20], trace.z[:20], trace.source) for trace in pair]
+    with pytest.raises(PatchfemError, match="20 heights; a comparison needs at least 40"):
+        compare_surfaces(*short)
