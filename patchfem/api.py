@@ -1503,10 +1503,11 @@ class Result(run_result.Result):
     def _repr_html_(self) -> str:
         """Return the HTML representation for notebooks: outcome, headline, measures and warnings."""
         answer = runs.make_answer(self)
-        rows = "".join(
-            f"<tr><td>{escape(name)}</td><td style='text-align:right'>{escape(text)}</td></tr>"
-            for name, text in show.list_quantities(answer.quantities)
-        )
+        rows = ""
+        for name, text in show.list_quantities(answer.quantities):
+            rows += (
+                f"<tr><td>{escape(name)}</td><td style='text-align:right'>{escape(text)}</td></tr>"
+            )
         sentences = escape(" ".join(answer.verdict))
         warnings = "".join(f"<p>&#9888; {escape(text)}</p>" for text in self.warnings)
         title = f"<b>{escape(answer.title)}</b><br>" if answer.title else ""

@@ -14,7 +14,7 @@ from ..surface.quantity import Mean, Quantity, average_quantities
 COLUMNS = ("before", "after")  # columns that every table has
 DIRECTIONS = ("", "x", "y")
 # Quantities that are averaged; positions are not, because they depend on where a trace begins.
-AVERAGED = (
+AVERAGED_QUANTITIES = (
     "worn_depth_mean",
     "worn_volume",
     "grown_volume",
@@ -130,7 +130,7 @@ def average_pairs(rows: list[dict]) -> dict[Group, GroupMeans]:
     groups = {}
     for group, parts in members.items():
         means = {}
-        for name in AVERAGED:
+        for name in AVERAGED_QUANTITIES:
             known = [part[name] for part in parts if part.get(name, {}).get("high") is not None]
             values = [Quantity(q["value"], q["low"], q["high"], q["unit"], "") for q in known]
             if len(values) > 1:

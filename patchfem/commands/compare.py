@@ -143,13 +143,10 @@ def _compare_in_scene(before: Path, after: Path, options, base: tuple, output: O
 
     def run_surfaces(*paths: Path):
         """Run the scene with each trace."""
-        profile = "contact.profile"
-        models = [
-            load_model(
-                scene, (*sets, f"{profile}.file={path.resolve()}", f"{profile}.heights=surface")
-            )
-            for path in paths
-        ]
+        models = []
+        for path in paths:
+            profile = (f"contact.profile.file={path.resolve()}", "contact.profile.heights=surface")
+            models.append(load_model(scene, (*sets, *profile)))
         return pressing.run_both_surfaces(*models, scene.name, output.report)
 
     save(

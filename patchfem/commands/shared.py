@@ -129,7 +129,13 @@ def describe_command() -> str:
 def present(answer, output: Output, draw_page: Callable[[], None] = lambda: None) -> None:
     """Print an answer, draw its page and its picture, and print the names of its files.
 
-    draw_page: function that is called after the numbers are printed, because they do not need the page.
+    Parameters
+    ----------
+    answer : Answer
+    output : Output
+        Where and how the answer is printed.
+    draw_page : callable
+        Function that is called after the numbers are printed, because they do not need the page.
     """
     if output.as_json:
         content = store.make_summary(answer) if answer.is_run else answer.details
@@ -154,7 +160,9 @@ def present(answer, output: Output, draw_page: Callable[[], None] = lambda: None
 def print_remarks(answer) -> None:
     """Print the warnings and notes of an answer on stderr."""
     for text in answer.remarks.warnings:
-        print_message(make_printable(f"warning: {text}"))
+        # some remarks are followed by tables for the scene file
+        for line in f"warning: {text}".split("\n"):
+            print_message(make_printable(line))
     for text in answer.remarks.notes:
         note(text)
 
@@ -220,7 +228,8 @@ def print_message(text: str) -> None:
 
 def note(text: str) -> None:
     """Print a note on stderr, without control characters that could move the cursor."""
-    print_message(make_printable(f"note: {text}"))
+    for line in f"note: {text}".split("\n"):
+        print_message(make_printable(line))
 
 
 def load_scene(path: Path, sets, faults=None, prepare=None):

@@ -133,9 +133,7 @@ def backbone(
 
     def compute_curves(_):
         """Compute the curves of all methods."""
-        report = None
-        if output.report is not None:
-            report = lambda name: print_message(f"{name} ...")  # noqa: E731
+        report = output.report and (lambda name: print_message(f"{name} ..."))
         curves = backbone_curves.compute_backbone(free_model, mode, lengths, methods, report)
         return backbones.make_answer(curves.add_notes(notes), free_model.source)
 

@@ -179,7 +179,7 @@ def _collect_pairs(correlation: list[list[float | None]], names: list[str]) -> d
     return make_columns("pair", columns)
 
 
-def _known(values) -> list:
+def _replace_unknown(values) -> list:
     """Return numbers as nested lists, or a single number, with None for those that are not finite."""
     return np.where(np.isfinite(values), values, None).tolist()
 
@@ -224,7 +224,7 @@ def _describe_search(fit: FittedLoop | FittedCurve | FittedRows) -> dict:
             {name: part for name, part in zip(names, row, strict=True) if part}
             for row in intervals.unknown.tolist()
         ],
-        "correlation": _known(intervals.correlation),
+        "correlation": _replace_unknown(intervals.correlation),
         "evaluations": keys.fit.counts.evaluations,
         "failures": keys.fit.counts.failures,
         "descents_agreed": keys.fit.agreed,
@@ -282,7 +282,7 @@ def describe_loop_fit(fit: FittedLoop) -> Parts:
             },
             "unit": unit,
             "rows": n_rows,
-            "effective_rows": _known(fitted.intervals.rows),
+            "effective_rows": _replace_unknown(fitted.intervals.rows),
             "rms": fit.rms,
             "held": held,
             "peak": peak,
@@ -344,7 +344,9 @@ def describe_rows_fit(fit: FittedRows) -> Parts:
     n_best = int((search.rms <= np.nanmin(search.rms) * SAME_SCORE).sum())
     names = [bound.key for bound in fit.keys.ranges]
     starts = []
-    for first, last, rms in zip(search.starts, search.ends, _known(search.rms), strict=True):
+    for first, last, rms in zip(
+        search.starts, search.ends, _replace_unknown(search.rms), strict=True
+    ):
         begin, end = (dict(zip(names, values.tolist(), strict=True)) for values in (first, last))
         starts.append({"from": begin, "to": None if rms is None else end, "training": rms})
     instrument = {
@@ -407,7 +409,7 @@ def _collect_rows(fit: FittedRows) -> tuple[list[dict], dict[str, Variable]]:
         held = np.full(count, None)
         held[places] = fit.held_out[is_kind]
         measured = np.array([row[name] for row in entries], float)
-        for k, number in enumerate(_known(computed)):
+        for k, number in enumerate(_replace_unknown(computed)):
             reading = entries[k][name]
             entries[k][name] = {"measured": reading, "computed": number, "held": held[k]}
         ratio = computed / np.where(measured > 0, measured, np.nan)

@@ -32,7 +32,7 @@ FILE_TEXTS = {
 }
 WIDE_STYLES = ("relative", "menu", "maps", "film")  # styles of charts that take the whole width
 TALL_STYLES = ("relative", "menu", "maps", "shares", "film", "bars")
-COMPRESSION = 6  # of the figures in a page
+COMPRESSION = 6  # level of the compression of the figures in a page
 MAX_LISTED_CASES = 25  # largest number of cases of a sweep that the page lists
 
 
@@ -107,8 +107,8 @@ def make_page(folders: list[Path]) -> str:
         else several.list_scene_differences(answers),
         "files": _list_files(folders[0]) if len(folders) == 1 else [],
         "figures": figures,
-        "data": _pack([_strip(figure) for figure in figures]),
-        "library": _library() if figures else "",
+        "data": pack_figures([_strip(figure) for figure in figures]),
+        "library": read_library() if figures else "",
     }
     return _template().render(content)
 
@@ -369,14 +369,14 @@ def _strip(figure: dict) -> dict:
     return {key: figure[key] for key in ("anchor", "data", "layout", "frames") if key in figure}
 
 
-def _pack(content: list) -> str:
+def pack_figures(content: list) -> str:
     """Return an object as compressed JSON in base64; equal objects give equal strings."""
     text = json.dumps(content, separators=(",", ":"), allow_nan=False)
     return base64.b64encode(gzip.compress(text.encode(), COMPRESSION, mtime=0)).decode()
 
 
 @cache
-def _library() -> str:
+def read_library() -> str:
     """Return the compressed bundle of plotly.js in base64."""
     path = files(__package__) / "plotly" / "plotly-cartesian.min.js.gz"
     return base64.b64encode(path.read_bytes()).decode()

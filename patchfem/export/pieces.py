@@ -208,7 +208,23 @@ def draw_result(result, onto=None):
 
 
 def write_picture(frames: Frames, number: int, title: str, magnify: float | None, out: Path) -> str:
-    """Write a picture of one frame; return a line on it."""
+    """Write a picture of one frame.
+
+    Parameters
+    ----------
+    frames : Frames
+    number : int
+        Number of the frame.
+    title : str
+    magnify : float or None
+        Magnification of the displacements; None for one that shows them.
+    out : Path
+
+    Returns
+    -------
+    str
+        Line on the picture.
+    """
     with write_atomically(out) as partial:
         draw_pieces(frames, np.array([number]), title, magnify)[0].savefig(partial, dpi=1.5 * DPI)
     last = len(frames.times) - 1
@@ -224,7 +240,20 @@ def _make_page(player: str, title: str) -> str:
 
 
 def write_film(frames: Frames, title: str, magnify: float | None, out: Path) -> str:
-    """Write the last cycle as .gif or .mp4, or as a page with a slider; return a line on it.
+    """Write the last cycle as .gif or .mp4, or as a page with a slider.
+
+    Parameters
+    ----------
+    frames : Frames
+    title : str
+    magnify : float or None
+        Magnification of the displacements; None for one that shows them.
+    out : Path
+
+    Returns
+    -------
+    str
+        Line on the film.
 
     Raises
     ------

@@ -250,7 +250,17 @@ def format_quantity(name: str, quantity: Quantity) -> str:
 
 
 def format_value(value: float | str, unit: str, digits: int = 4) -> str:
-    """Return a number [SI] without an error in a readable unit; a word is unchanged."""
+    """Return a number without an error in a readable unit.
+
+    Parameters
+    ----------
+    value : float or str
+        Number [SI], or a word, which is returned.
+    unit : str
+        SI unit; "" for a number.
+    digits : int, optional
+        Number of significant digits.
+    """
     if isinstance(value, str):
         return value
     label, scale = choose_scale("", unit or "1", abs(value))

@@ -33,7 +33,7 @@ MIN_DECAY_AMPLITUDES = (
     5  # smallest number of amplitudes of a decay for which its damping is printed
 )
 SCATTER = "_scatter"  # end of the name of a measure that states the scatter between random records
-CYCLE_ROUND_OFF = 1e-6  # a run with this much less than one cycle still covers the cycle
+CYCLE_ROUND_OFF = 1e-6  # largest part of a cycle that is missing through round-off
 
 # parts of a headline: (measure, text); a run shows the first MAX_PARTS that it has
 HEADLINES = {
@@ -154,8 +154,14 @@ def describe_outcome(result: Result, measures: dict[str, Quantity], details: dic
     """
     outcome = result.outcome
     if outcome is Outcome.NOT_CONVERGED and (unknown := find_unknown_measures(result.measures)):
-        names = " and of ".join(unknown)
-        return f"The error of {names} is as large as the value; use the other measures with their errors."
+        *first, last = unknown
+        names = f"{', '.join(first)} and {last}" if first else last
+        error = (
+            "errors of {} are as large as the values"
+            if first
+            else "error of {} is as large as the value"
+        )
+        return f"The {error.format(names)}; use the other measures with their errors."
     if result.plan.kind == "bench" and outcome is Outcome.DONE:
         return _bench_outcome(measures, details)
     if run_away := details.get("run_away"):
@@ -184,7 +190,7 @@ def _bench_outcome(measures: dict[str, Quantity], details: dict) -> str:
     if (
         slip is not None
         and slip.value is not None
-        and slip.value <= max(_error_of(slip), SLIP_ROUND_OFF)
+        and slip.value <= max(_find_error(slip), SLIP_ROUND_OFF)
     ):
         return _no_slip("contact_fraction" in measures, "cycle")
     loop = details.get("loop")
@@ -195,7 +201,7 @@ def _bench_outcome(measures: dict[str, Quantity], details: dict) -> str:
     return f"At a slide amplitude of {amplitude} the loss factor is {factor}."
 
 
-def _error_of(quantity: Quantity) -> float:
+def _find_error(quantity: Quantity) -> float:
     """Return the error of a quantity, or its floor if the error is unknown."""
     return quantity.floor if quantity.error is None else quantity.error
 
@@ -229,7 +235,7 @@ def _stuck_outcome(result: Result, measures: dict[str, Quantity]) -> str:
             if remove_interface_number(name) == kind and quantity.value
         }
         name = max(slipping, key=lambda one: slipping[one].value, default="")
-        if name and slipping[name].value > max(_error_of(slipping[name]), limit):
+        if name and slipping[name].value > max(_find_error(slipping[name]), limit):
             size = texts[kind].format(quantities.format_quantity(name, slipping[name]))
             return f"The interface as a whole sticks, but {part} ({size}).{rings}"
     return _no_slip(has_patch, "cycles") + rings

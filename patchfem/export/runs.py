@@ -82,7 +82,16 @@ def make_origin(source, verb: str) -> dict:
 
 
 def make_command(verb: str, path: Path, sets: tuple[str, ...]) -> str:
-    """Return the command line that repeats a verb; files are named without their folder."""
+    """Return the command line that repeats a verb.
+
+    Parameters
+    ----------
+    verb : str
+    path : Path
+        Scene file; it is named without its folder.
+    sets : tuple of str
+        ``table.key=value`` strings.
+    """
     words = ["patchfem", verb, Path(path).name]
     for assignment in sets:
         key, _, value = assignment.partition("=")

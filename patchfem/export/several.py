@@ -32,6 +32,13 @@ def format_entry(name: str, quantity: Quantity | None, first: Quantity | None) -
     """Return a quantity as text, with its change from the first answer if it differs by more than both errors.
 
     The change is in percent, or a factor if it is large; there is none from a value that may be 0.
+
+    Parameters
+    ----------
+    name : str
+        Name of the quantity.
+    quantity, first : Quantity or None
+        The quantity of an answer and that of the first answer.
     """
     if quantity is None:
         return ""

@@ -176,7 +176,7 @@ def _summary_model() -> type:
     class Number(BaseModel):
         """Entry of a measure."""
 
-        model_config = ConfigDict(extra="forbid", strict=True)
+        model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
         value: float | None
         unit: str
         error: float | None

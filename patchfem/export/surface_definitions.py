@@ -9,7 +9,7 @@ from .answer import Definition
 TRACK_NAMES = {"depth_mean": "track_depth"}
 
 # quantities that have the same meaning between two scans, two traces and two runs
-_OWN = {
+_MEANINGS = {
     "worn_volume": ("m3", "volume lost in the common part of two scans, or on the patch of a run"),
     "worn_depth_mean": (
         "m",
@@ -56,12 +56,12 @@ def list_names() -> list[str]:
     """Return the names of all definitions; the parts of a track without the prefix track_."""
     heights = [f"P{name}" for name in PROFILE if name != "z"]
     roughness = [name if name.startswith("Mr") else f"R{name}" for name in PROFILE]
-    return list(dict.fromkeys([*_OWN, *DEFINITIONS, *heights, *roughness, *AREAL]))
+    return list(dict.fromkeys([*_MEANINGS, *DEFINITIONS, *heights, *roughness, *AREAL]))
 
 
 def find(name: str) -> Definition | None:
     """Return the definition of a quantity of compare, pairs or profile; None if there is none."""
-    for table in (_OWN, DEFINITIONS, AREAL):
+    for table in (_MEANINGS, DEFINITIONS, AREAL):
         if name in table:
             return Definition(*table[name])
     for letter, profile in (("P", "levelled trace"), ("R", "roughness profile"), ("", "profile")):

@@ -7,8 +7,7 @@ interface nodes (`nodes`), roughness (`roughness`), and what changed between two
 
 # Names that other folders use, by module.
 PUBLIC = {
-    "areal": ("level_plane"),
-    "compare.compare": ("Options", "compare_files", "compare_surfaces"),
+    "compare.compare": ("Options", "compare_files"),
     "compare.records": (
         "Comparison",
         "Finding",

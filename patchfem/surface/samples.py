@@ -103,8 +103,8 @@ def require_finite(path, columns: tuple, names: tuple, lines, factors: tuple) ->
             )
 
 
-def _sample_place(path, lines, k: int) -> str:
-    return f"{path}: sample {k + 1}" if lines is None else f"{path}:{lines[k]}"
+def _sample_place(path, lines, number: int) -> str:
+    return f"{path}: sample {number + 1}" if lines is None else f"{path}:{lines[number]}"
 
 
 def undo_rounding(path, x, factor: float, name: str = "x") -> Places:

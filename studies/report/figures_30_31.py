@@ -62,7 +62,9 @@ SETS = 20  # number of sets of four traces
 LINES_BETWEEN = 160  # number of lines between the traces before and after
 UM = 1e-6  # [m] one micrometre
 BITE = 0.03e-6  # [m] depth worn off in one pass
-BLUE, ORANGE, GREY = "#1f5f99", "#c8551b", "#8a8a8a"
+BLUE = "#1f5f99"
+ORANGE = "#c8551b"
+GREY = "#8a8a8a"
 
 
 class Set(NamedTuple):

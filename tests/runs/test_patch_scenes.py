@@ -377,11 +377,11 @@ def test_always_scene_outside_model_gives_warning(tables, keys, message):
 @pytest.mark.parametrize(
     "shape, ends, pattern",
     [
-        (TILT.format(-1e-4), (False, True), r", from x = 4.47 to 6.35 mm \(right end\); peak"),
+        (TILT.format(-1e-4), (False, True), r"length in contact \(x = 4.4\d+ to 6.35 mm\), peak"),
         (
             '[contact.profile]\nfile = "hollow.csv"\n',
             (True, True),
-            r", from x = -6.35 to -(\S+) mm \(left end\) and from \1 to 6.35 mm \(right end\); peak",
+            r"length in contact \(x = -6.35 to -(\S+) and \1 to 6.35 mm\), peak",
         ),
     ],
     ids=["right", "both"],

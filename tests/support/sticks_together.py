@@ -247,9 +247,7 @@ def compare_rig(seed: int, folder: Path | None = None, earlier: dict | None = No
     except pf.PatchfemError as error:
         return line | {"rows": [], "refused": str(error)}
     data = result.to_xarray()
-    time, slide, speed = (
-        data[name].values for name in ("time", "relative_displacement", "relative_velocity")
-    )
+    time, slide, speed = (data[name].values for name in ("time", "slide", "slide_velocity"))
     is_last = np.append(np.diff(time) > 0, True)
     curve = CubicHermiteSpline(time[is_last], slide[:, is_last], speed[:, is_last], axis=1)
     gaps = {}

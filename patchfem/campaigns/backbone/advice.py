@@ -118,7 +118,7 @@ def _describe_agreement(band: Band, curves: dict) -> list:
     return [f"Up to {edge} the computed methods and the predicted ring-down agree {within}."]
 
 
-def _describe_ring_down(joint: JointMode, band: Band, curves: dict, has_failed: bool) -> list:
+def _describe_ring_down(joint: JointMode, band: Band, curves: dict, *, has_failed: bool) -> list:
     """Describe how the damping of a ring-down differs from that of the curve, and why.
 
     has_failed: whether method decay was tried and has no curve.

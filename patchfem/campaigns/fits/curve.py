@@ -354,11 +354,11 @@ def fit_curve(
             *widened.notes,
         ),
         n_computed=curves.n_computed,
-        beyond=_compute_beyond(curves, fit.values),
+        beyond=_extrapolate_curve(curves, fit.values),
     )
 
 
-def _compute_beyond(curves: CurveModel, values) -> np.ndarray:
+def _extrapolate_curve(curves: CurveModel, values) -> np.ndarray:
     """Compute amplitude, frequency and damping (3, j) of the fitted model beyond the measured amplitudes.
 
     Amplitudes at which the mode does not oscillate are left out.
@@ -487,10 +487,8 @@ def _find_nearest_amplitudes(amplitudes, targets) -> np.ndarray:
 
 def _format_amplitudes(amplitudes) -> str:
     """Format the first amplitudes as a list with units."""
-    listed = ", ".join(
-        format_length(amplitude, 3) for amplitude in amplitudes[:MAX_LISTED_AMPLITUDES]
-    )
-    return listed + (", ..." if len(amplitudes) > MAX_LISTED_AMPLITUDES else "")
+    listed = [format_length(amplitude, 3) for amplitude in amplitudes[:MAX_LISTED_AMPLITUDES]]
+    return ", ".join(listed) + (", ..." if len(amplitudes) > MAX_LISTED_AMPLITUDES else "")
 
 
 def _compute_backbone_curve(model, amplitudes, method: str) -> np.ndarray:

@@ -186,12 +186,27 @@ def choose_kind(scene: Scene, to: str) -> str:
 
 
 def check_options(kind: str, options: FitOptions, format_option: Callable) -> None:
-    """Raise PatchfemError for fit options that are invalid or belong to another kind of fit."""
+    """Check the options of a fit.
+
+    Parameters
+    ----------
+    kind : str
+        Kind of the fit.
+    options : FitOptions
+    format_option : callable
+        Turns the name of an option into the words of a message.
+
+    Raises
+    ------
+    PatchfemError
+        If an option is invalid or belongs to another kind of fit.
+    """
     others = [name for name in options.names_given() if name not in OPTIONS_BY_KIND[kind]]
     if others:
-        belong = "; ".join(
+        reasons = [
             f"{format_option(name)} applies only to {FITS_BY_OPTION[name]}" for name in others
-        )
+        ]
+        belong = "; ".join(reasons)
         these = "this option" if len(others) == 1 else "these options"
         raise PatchfemError(f"{belong}; this scene is {KINDS[kind]}; leave {these} out")
     starts = options.starts

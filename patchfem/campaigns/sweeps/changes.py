@@ -81,7 +81,7 @@ def analyse(table: SweepTable, requested: str = "") -> SweepAnalysis:
 
 def find_range(table: SweepTable, name: str) -> list[MeasureRange]:
     """Return the range of a measure; [] if it does not vary by more than its errors and floors."""
-    values = table.trusted(name)
+    values = table.select_trusted(name)
     if not np.isfinite(values).any():
         return []
     column = table.measures[name]

@@ -89,7 +89,7 @@ def find_limits(table: SweepTable) -> list[KeyLimit]:
         column = table.measures.get(name)
         if column is None or not np.any(np.abs(column.values) > column.floors):
             continue
-        values = table.trusted(name)
+        values = table.select_trusted(name)
         errors = np.nan_to_num(column.errors)
         on_lines = [
             _find_limit_on_line(name, key, along[order], values[line], errors[line], largest)

@@ -18,7 +18,7 @@ FREQUENCY_KEY = "drive.frequency"
 HEIGHT_MEASURES = ("relative_displacement_amplitude", "absolute_acceleration_peak")
 MIN_FREQUENCIES = 5  # smallest number of frequencies in which a peak is sought
 DIFFERENCE_FACTOR = 3.0  # safety factor of the differences between interpolating polynomials
-N_NEWTON_STEPS = 3  # from a root that eigenvalues give to round-off
+N_NEWTON_STEPS = 3  # number of steps from a root that eigenvalues give to round-off
 MAX_STEADY_ERROR = 0.01  # largest relative error of a steady estimate that counts as a height
 
 
@@ -80,7 +80,7 @@ def _find_heights(table: SweepTable, name: str) -> tuple[np.ndarray, np.ndarray]
 
     For a case that did not settle it is the steady estimate if that is exact enough.
     """
-    heights = table.trusted(name)
+    heights = table.select_trusted(name)
     errors = np.nan_to_num(table.measures[name].errors)
     steady = table.measures.get(f"{name}_steady")
     if steady is None:

@@ -38,7 +38,9 @@ N_HALVES = 6  # surfaces that are fitted to random halves of the cases
 SMOOTHING_PARAMETERS = (1e-8, 1e-4, 1e-2, 1.0)
 MIN_CASES_PER_KEY = 16  # with fewer, half of the cases do not show the error of an index
 MIN_EXPLAINED = 0.5  # fraction of the variance of the other half that a usable surface explains
-MIN_KNOWN_FRACTION = 0.9  # of the cases; the others may be no random sample
+MIN_KNOWN_FRACTION = (
+    0.9  # smallest fraction of cases with a value; the others may be no random sample
+)
 QUANTILE_LEVELS = (0.05, 0.5, 0.95)
 MIN_RANDOM_CASES = 20  # smallest number of cases for a statement about 90 % of them
 ROUND_OFF = 1e-9  # relative spread of values that differ by round-off only
@@ -74,12 +76,11 @@ def rank_keys(table: SweepTable, requested: str = "") -> dict[str, list[SobolInd
         return {}
     names = [name for name in dict.fromkeys((requested, *RANKED_MEASURES)) if _varies(table, name)]
     columns = {name: table.measures[name].values for name in names}
+    arrays = {}
     if table.is_grid:
-        complete = [name for name in names if np.isfinite(columns[name]).all()]
-        arrays = {
-            name: compute_grid_indices(columns[name].reshape(table.shape))[:, varied]
-            for name in complete
-        }
+        for name in [name for name in names if np.isfinite(columns[name]).all()]:
+            indices = compute_grid_indices(columns[name].reshape(table.shape))
+            arrays[name] = indices[:, varied]
     else:
         known = np.isfinite(list(columns.values())).all(axis=0) if columns else np.zeros(1, bool)
         if known.sum() < MIN_CASES_PER_KEY * len(varied):
@@ -203,7 +204,7 @@ def compute_quantiles(table: SweepTable, requested: str = "") -> dict[str, np.nd
     settled value have none, because the others may be the extreme ones.
     """
     quantiles = {}
-    settled = table.settled
+    settled = table.has_settled
     if not table.is_random or len(table) < MIN_RANDOM_CASES:
         return {}
     for name in dict.fromkeys((requested, *RANKED_MEASURES)):

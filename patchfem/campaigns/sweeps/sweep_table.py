@@ -122,10 +122,8 @@ class SweepTable:
 
         tolerance: that of all cases, unless it is swept.
         """
-        keys = [
-            SweptKey(axis.key, convert_unit(axis.unit), values)
-            for axis, values in zip(cases.axes, cases.make_columns(range(len(cases))))
-        ]
+        columns = zip(cases.axes, cases.make_columns(range(len(cases))))
+        keys = [SweptKey(axis.key, convert_unit(axis.unit), values) for axis, values in columns]
         swept = [key.values for key in keys if key.key == "accuracy.tolerance"]
         tolerance = swept[0] if swept else tolerance
         outcome = np.full(len(cases), "", object)
@@ -142,7 +140,7 @@ class SweepTable:
         return numbers.reshape(-1, self.shape[axis])
 
     @property
-    def settled(self) -> np.ndarray:
+    def has_settled(self) -> np.ndarray:
         """Whether each case (n,) has a final outcome."""
         return np.isin(self.outcome.astype(str), FINAL_OUTCOMES)
 
@@ -159,14 +157,14 @@ class SweepTable:
             column.floors[numbers] = np.nan_to_num(part.floors[name])
         self.messages.update({int(numbers[k]): text for k, text in part.messages.items()})
 
-    def trusted(self, name: str) -> np.ndarray:
+    def select_trusted(self, name: str) -> np.ndarray:
         """Return the values (n,) of a measure that count for statements on it; NaN for others.
 
         A value counts if it meets the tolerance and its case has settled. The case need not have
         settled if no settled case has a value, or if the measure is a steady estimate.
         """
         column = self.measures[name]
-        settled = self.settled
+        settled = self.has_settled
         needs_settling = not name.endswith("_steady") and np.isfinite(column.values[settled]).any()
         counts = settled if needs_settling else np.ones(len(self), bool)
         return np.where(counts & ~column.misses(self.tolerance), column.values, np.nan)

@@ -35,7 +35,7 @@ STYLE = {
     "lines.linewidth": 1.4,
 }
 # metadata that leave out the date
-UNDATED = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
+NO_DATE = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
 PANEL_SIZE = (6.4, 4.2)  # width and height of a panel [inch]
 
 
@@ -161,7 +161,7 @@ def _save(figure, target, ending: str) -> None:
     from matplotlib import rc_context
 
     with rc_context(STYLE):
-        figure.savefig(target, dpi=150, format=ending, metadata=UNDATED.get(ending))
+        figure.savefig(target, dpi=150, format=ending, metadata=NO_DATE.get(ending))
 
 
 def _to_svg(figure) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 from ...formatting import format_number
 from ..quantities import choose_scale
 
-MAX_CURVE_POINTS = 3000  # a longer curve keeps the extremes of as many intervals
+MAX_CURVE_POINTS = 3000  # largest number of intervals of which a curve keeps the extremes
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +104,18 @@ class Panel:
 
 
 def make_axis(name: str, unit: str, values: np.ndarray, is_log: bool = False) -> Axis:
-    """Return the axis for values [SI]; a name such as `contact_fraction` is displayed in percent."""
+    """Return the axis for values.
+
+    Parameters
+    ----------
+    name : str
+        Name of the quantity; one such as `contact_fraction` is displayed in percent.
+    unit : str
+        SI unit; "" for a number.
+    values : array
+        [SI]
+    is_log : bool, optional
+    """
     label = name.replace("_", " ")
     size = np.abs(values[np.isfinite(values)]).max(initial=0.0)
     unit, scale = choose_scale(name, unit or "1", size)

@@ -9,7 +9,7 @@ from ..answer import Answer, Variable
 from .panel import Axis, Curve, Panel, join_names, make_axis, thin
 from .table import Chart
 
-MAX_MAP_COLUMNS = 400  # a finer map keeps every n-th column
+MAX_MAP_COLUMNS = 400  # largest number of columns; a finer map keeps every n-th one
 N_SHOWN_CYCLES = 3  # number of cycles of the span "cycles"
 SWEEP_STYLES = ("relative", "menu", "maps", "shares")
 MARGIN_NODES = 3  # unloaded nodes beside the contact that the span "contact" shows
@@ -40,7 +40,7 @@ def _group_by_units(answers: dict[str, Answer], chart: Chart) -> list[dict[str, 
     groups = {}
     for name, answer in answers.items():
         data = answer.data
-        y_units = {data[part].unit for part in (_split(y)[0] for y in chart.y) if part in data}
+        y_units = {data[part].unit for part in (_split_name(y)[0] for y in chart.y) if part in data}
         x_name = _find_x(data, chart)
         x_unit = data[x_name].unit if x_name else ""
         groups.setdefault((x_unit, frozenset(y_units)), {})[name] = answer
@@ -50,12 +50,13 @@ def _group_by_units(answers: dict[str, Answer], chart: Chart) -> list[dict[str, 
 def _repeat_for_interfaces(chart: Chart, data: dict[str, Variable]) -> list[Chart]:
     """Return a chart over x for each interface that has a patch of its own, with the variables x_1, x_2, ..."""
     numbers = [number for number in range(1, MAX_INTERFACES + 1) if f"x_{number}" in data]
+    names = data["interface"].values if "interface" in data else ()
     if chart.x != "x" or "x" in data or not numbers:
         return [chart]
     return [
         replace(
             chart,
-            title=f"{chart.title} {number}" if len(numbers) > 1 else chart.title,
+            title=f"{chart.title} ({names[number - 1]})" if len(numbers) > 1 else chart.title,
             x=f"x_{number}",
             y=tuple(f"{name}_{number}" for name in chart.y),
         )
@@ -88,7 +89,7 @@ def make_panel(answers: dict[str, Answer], chart: Chart) -> Panel | None:
         chart.log,
         "x",
     )
-    main = [_split(name)[0] for name in chart.y if _split(name)[0] in first_data]
+    main = [_split_name(name)[0] for name in chart.y if _split_name(name)[0] in first_data]
     y_values = [data[name].values for data in selections.values() for name in main if name in data]
     y_label = chart.labels[1] or main[0]
     if y_label == "*":
@@ -157,7 +158,7 @@ def _find_map_rows(
     return Axis("frame"), np.arange(len(variable.values))
 
 
-def _split(name: str) -> tuple[str, str]:
+def _split_name(name: str) -> tuple[str, str]:
     """Return the variable and its own horizontal variable of "NAME@X"; "" for none."""
     variable, _, x_name = name.partition("@")
     return variable, x_name
@@ -171,7 +172,7 @@ def _find_x(data: dict[str, Variable], chart: Chart) -> str:
 def _select(data: dict[str, Variable], chart: Chart) -> dict[str, Variable]:
     """Return the variables restricted to the span of a chart; {} if the chart has nothing to show."""
     x_name = _find_x(data, chart)
-    names = [_split(name)[0] for name in chart.y]
+    names = [_split_name(name)[0] for name in chart.y]
     shown = [name for name in names if name in data and np.any(data[name].values)]
     if not x_name or not shown:
         return {}
@@ -229,7 +230,7 @@ def _make_axis(name: str, unit: str, arrays: list, log: str, letter: str) -> Axi
 def _make_curves(data: dict[str, Variable], chart: Chart, name: str, axes: tuple) -> list[Curve]:
     """Return the curves of one variable: one for each interface, code, or element of the first dimension."""
     is_line = name in chart.lines
-    name, own_x = _split(name)
+    name, own_x = _split_name(name)
     if (
         name not in data
         or (own_x and own_x not in data)

@@ -51,7 +51,7 @@ class SweepView(NamedTuple):
         """Whether the cases are all combinations of the values of the keys."""
         return self.data[self.axis].dims == (self.axis,)
 
-    def split(self, name: str, default: float | str = np.nan) -> np.ndarray:
+    def split_lines(self, name: str, default: float | str = np.nan) -> np.ndarray:
         """Return a variable as (lines, values of the key on the axis), or the default if it is missing."""
         if name not in self.data:
             return np.array(default)
@@ -62,10 +62,14 @@ class SweepView(NamedTuple):
 
     def find_symbols(self, name: str) -> np.ndarray:
         """Return the symbol of each case (lines, values): settled, over the tolerance or not settled."""
-        parts = (self.split(name), self.split(f"{name}_error"), self.split(f"{name}_floor", 0.0))
+        parts = (
+            self.split_lines(name),
+            self.split_lines(f"{name}_error"),
+            self.split_lines(f"{name}_floor", 0.0),
+        )
         tolerance = self.details.get("tolerance") or np.nan
         is_over = MeasureColumn("", *parts).misses(tolerance)
-        has_settled = np.isin(self.split("outcome", FINAL_OUTCOMES[0]), FINAL_OUTCOMES)
+        has_settled = np.isin(self.split_lines("outcome", FINAL_OUTCOMES[0]), FINAL_OUTCOMES)
         return SYMBOLS[np.where(has_settled, is_over.astype(int), 2)]
 
     def name_lines(self) -> list[str]:
@@ -131,7 +135,7 @@ def make_relative(answers: dict[str, Answer], chart: Chart) -> Panel | None:
             continue
         x_axis, x = view.scale(view.axis)
         for name in chart.y:
-            values = view.split(name).ravel()
+            values = view.split_lines(name).ravel()
             if values.size > 1 and abs(values[0]) > 0:  # False for NaN
                 keep = thin(values, MAX_DRAWN_CASES // 2)
                 label = join_names(title, name.replace("_", " "))
@@ -179,15 +183,18 @@ def make_measure_panel(answers: dict[str, Answer], name: str) -> Panel:
             view = view_sweep(answer, re.sub(r"\W", "_", shares[0]["key"]))
         x_axis, x = view.scale(view.axis)
         axes = axes or (x_axis, view.scale(name, MIN_MEASURE_RATIO)[0])
-        values = view.split(name) * axes[1].scale
-        errors = np.broadcast_to(view.split(f"{name}_error") * axes[1].scale, values.shape)
+        values = view.split_lines(name) * axes[1].scale
+        errors = np.broadcast_to(view.split_lines(f"{name}_error") * axes[1].scale, values.shape)
         symbols = np.broadcast_to(view.find_symbols(name), values.shape)
         texts = view.name_lines()
         lines = spread_indices(len(values), MAX_LINES)
         for line in lines:
             keep = thin(values[line], MAX_DRAWN_CASES // (2 * len(lines)))
             y, error, marks = (array[line][keep] for array in (values, errors, symbols))
-            band = (None, None) if np.isnan(error).all() else (y - error, y + error)
+            # the interval of a quantity without negative values does not reach below zero
+            least = 0.0 if np.nanmin(values, initial=0.0) >= 0 else -np.inf
+            has_band = not np.isnan(error).all()
+            band = (np.maximum(y - error, least), y + error) if has_band else (None, None)
             is_plain = (marks == SYMBOLS[0]).all()
             label = join_names(title, texts[line])
             curves.append(Curve(label, x[keep], y, *band, symbols=None if is_plain else marks))
@@ -206,7 +213,7 @@ def make_map_menu(answers: dict[str, Answer], chart: Chart) -> Panel | None:
     panels = []
     for name in list_measures(answers):
         axis, _ = view.scale(name)
-        values = view.split(name)[np.ix_(rows, columns)] * axis.scale
+        values = view.split_lines(name)[np.ix_(rows, columns)] * axis.scale
         if np.isfinite(values).any():
             curve = Curve("", x[columns], values, rows=y[rows])
             title = name.replace("_", " ")

@@ -166,6 +166,13 @@ RUN = (
         caption="Last cycles: resultant of the frictional shear stress.",
     ),
     Chart(
+        "Friction force across the sliding direction",
+        "time",
+        ("lateral_force",),
+        span="cycles",
+        caption="Last cycles: second component of the friction force of an interface in a plane.",
+    ),
+    Chart(
         "Steady motions",
         "curve_frequency",
         ("curve_amplitude",),
@@ -329,11 +336,12 @@ SWEEP = (
         "its interactions (total index), with the interval of the latter.",
     ),
 )
+# Methods of a backbone; the first one with a curve is recommended.
 BACKBONE_METHODS = (
     "balance",
     "quasi-static",
     "decay",
-)  # of a backbone; the first one with a curve is recommended
+)
 _METHOD_CURVES = {
     name: tuple(
         f"{method}_{name}@{method}_amplitude".replace("-", "_") for method in BACKBONE_METHODS
@@ -554,7 +562,7 @@ COMPARE = (
         caption="Gap between the pieces without load, wear included.",
     ),
     Chart(
-        "Pressure",
+        "Pressure on the interface",
         "x_pressed_before x_pressed_after",
         ("pressure_before@x_pressed_before", "pressure_after@x_pressed_after"),
         labels=("x of the patch", "normal stress"),

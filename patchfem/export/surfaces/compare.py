@@ -21,7 +21,7 @@ from ..surface_definitions import name_in_track
 from . import predicted as predicted_wear
 from . import sentences
 from .sentences import to_json
-from .variables import along, band, maps
+from .variables import band, make_variables, maps
 
 SIDES = ("before", "after")
 STATES = ("not used", "unworn", "worn", "grown")  # meanings of the codes of the variable `state`
@@ -212,7 +212,7 @@ def _make_data(comparison: Comparison) -> dict[str, Variable]:
             curves.x, curves.y, before_map=heights[0], after_map=heights[1], depth_map=curves.depth
         )
     else:
-        data = along("x", x=curves.x, before=heights[0], after=heights[1])
+        data = make_variables("x", x=curves.x, before=heights[0], after=heights[1])
         data |= band("x", "depth", curves.depth, SIDE * curves.noise)
         state = np.select((curves.unworn, curves.worn, curves.grown), (1, 2, 3)).astype(np.int8)
         data["state"] = Variable(("x",), state, "", "state of each height", STATES)
@@ -224,10 +224,10 @@ def _make_tracks(tracks: tuple[Track, ...]) -> dict[str, Variable]:
     if not tracks:
         return {}
     ends = [track.values[name].value for track in tracks for name in ("from", "to")]
-    data = along("track_end", track_end=np.array(ends, float))
+    data = make_variables("track_end", track_end=np.array(ends, float))
     if tracks[0].section is not None:
         places, depth, scatter = tracks[0].section
-        data |= along("section_place", section_place=places)
+        data |= make_variables("section_place", section_place=places)
         data |= band("section_place", "section_depth", depth, scatter)
     return data
 
@@ -239,7 +239,7 @@ def _make_separate(comparison: Comparison) -> dict[str, Variable]:
     data = {}
     traces = [level(resample_evenly(each)) for each in (comparison.before, comparison.after)]
     for side, trace in zip(SIDES, traces, strict=True):
-        data |= along(f"x_{side}", **{f"x_{side}": trace.x, f"trace_{side}": trace.z})
+        data |= make_variables(f"x_{side}", **{f"x_{side}": trace.x, f"trace_{side}": trace.z})
     return data | _make_abbott([trace.z for trace in traces])
 
 
@@ -249,8 +249,8 @@ def _make_abbott(heights) -> dict[str, Variable]:
     if not all(values.size for values in known):
         return {}
     curves = [np.quantile(values, 1 - MATERIAL_RATIOS) for values in known]
-    data = along("material_ratio", "1", material_ratio=MATERIAL_RATIOS)
-    return data | along("material_ratio", abbott_before=curves[0], abbott_after=curves[1])
+    data = make_variables("material_ratio", "1", material_ratio=MATERIAL_RATIOS)
+    return data | make_variables("material_ratio", abbott_before=curves[0], abbott_after=curves[1])
 
 
 def _add_pressed(answer: Answer, runs: SurfaceRuns) -> Answer:
@@ -261,7 +261,9 @@ def _add_pressed(answer: Answer, runs: SurfaceRuns) -> Answer:
         run = getattr(runs, side)
         if run is not None:
             x = f"x_pressed_{side}"
-            data |= along(x, **{x: run.x}) | along(x, "Pa", **{f"pressure_{side}": run.stress})
+            data |= make_variables(x, **{x: run.x}) | make_variables(
+                x, "Pa", **{f"pressure_{side}": run.stress}
+            )
     warnings = (*answer.remarks.warnings, *runs.failed, *pressed["warnings"])
     return replace(
         answer,

@@ -12,7 +12,7 @@ from ...core import PatchfemError
 from ...surface.compare.compare import DEFAULTS, Options
 from ..answer import Answer, Remarks, Variable
 from . import compare, sentences, worn
-from .variables import along
+from .variables import make_variables
 
 # Basis of the answer for a pair, in words; means are taken only over pairs with the same basis.
 KINDS = {
@@ -22,7 +22,7 @@ KINDS = {
     "flanks": "traces compared by the unworn flanks of a track",
     "nothing": "traces that cannot be registered to each other",
 }
-CHARTED = {
+CHARTED_QUANTITIES = {
     "worn_depth_mean": "m",
     "amplitude_ratio": "1",
 }  # quantities of the charts and their units
@@ -156,10 +156,10 @@ def _collect_means(groups: dict[Group, GroupMeans]) -> dict:
 
 def _make_data(rows: list[dict]) -> dict[str, Variable]:
     """Return the quantities of the charts with their intervals over the line of each pair."""
-    data = along("pair", "1", line=np.array([float(row["line"]) for row in rows]))
-    for name, unit in CHARTED.items():
+    data = make_variables("pair", "1", line=np.array([float(row["line"]) for row in rows]))
+    for name, unit in CHARTED_QUANTITIES.items():
         cells = [row.get(name, {}) for row in rows]
         for key, suffix in (("value", ""), ("low", "_low"), ("high", "_high")):
             values = np.array([cell.get(key) for cell in cells], float)
-            data |= along("pair", unit, **{name + suffix: values})
+            data |= make_variables("pair", unit, **{name + suffix: values})
     return data

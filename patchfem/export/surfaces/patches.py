@@ -11,7 +11,7 @@ from ...wear.between_runs import PatchState
 from .. import store
 from ..answer import Answer
 
-REQUIRED = ("x", "weight", "unloaded_gap", "normal_stress")
+REQUIRED_VARIABLES = ("x", "weight", "unloaded_gap", "normal_stress")
 
 
 class PatchRun(NamedTuple):
@@ -45,7 +45,7 @@ def read_patch(folder: Path) -> PatchRun:
     scene = tomllib.loads(answer.origin.get("resolved", ""))
     if "contact" not in scene:
         raise PatchfemError(f"{folder}: a run without [contact] has no surfaces to compare")
-    missing = [name for name in REQUIRED if name not in data]
+    missing = [name for name in REQUIRED_VARIABLES if name not in data]
     if missing:
         raise PatchfemError(
             f"{folder}: result.nc contains no {' and no '.join(missing)}; run the scene again"

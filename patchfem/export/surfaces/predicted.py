@@ -15,12 +15,12 @@ from ...wear.predicted import MeasuredDepth, PredictedWear, WearHistory
 from ..answer import Answer, Quantity, Remarks
 from . import sentences
 from .patches import read_patch, worn_depths
-from .variables import along, band
+from .variables import band, make_variables
 
 MIN_DEPARTURE = (
     0.01  # smallest relative difference of the proportional coefficient that is reported
 )
-COEFFICIENT_MARGIN = 1.2  # of the coefficient that a note proposes, above the fitted one
+COEFFICIENT_MARGIN = 1.2  # ratio of the coefficient that a note proposes to the fitted one
 
 
 def add_predicted(answer: Answer, comparison: Comparison, folder: Path, piece: str) -> Answer:
@@ -68,7 +68,7 @@ def add_predicted(answer: Answer, comparison: Comparison, folder: Path, piece: s
     kept = sentences.MAX_SENTENCES - 1
     notes = (*answer.remarks.notes, *answer.verdict[kept:], *notes)
     depths = fitted.depths
-    data = along(
+    data = make_variables(
         "x_patch",
         x_patch=depths.x,
         computed_depth=depths.computed,

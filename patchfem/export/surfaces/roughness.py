@@ -15,10 +15,10 @@ from ...surface.roughness.report import RoughnessReport
 from ...surface.roughness.spectrum import BAND
 from ..answer import Answer, Remarks, Variable
 from . import sentences
-from .variables import along, maps
+from .variables import make_variables, maps
 
 KINDS = {"profile": "traces", "areal": "scans"}
-CONFIDENCE = 0.9  # of the interval of a parameter of a single trace, from 5 to 95 %
+CONFIDENCE = 0.9  # probability of the interval of a parameter of a single trace, from 5 to 95 %
 MAX_SIZE_RATIO = (
     1.001  # of lengths or steps of several files, above which their means mix quantities
 )
@@ -193,9 +193,9 @@ def _find_moments(each: RoughnessReport) -> dict | None:
 
 def _make_data(reports: list[RoughnessReport]) -> dict[str, Variable]:
     """Return the Abbott curves of all files, and the profiles, map and spectrum of a single file."""
-    data = along("file", "", file=np.array([each.source for each in reports]))
+    data = make_variables("file", "", file=np.array([each.source for each in reports]))
     curves = [abbott_curve(each.heights) for each in reports]
-    data |= along("material_ratio", "1", material_ratio=curves[0][0])
+    data |= make_variables("material_ratio", "1", material_ratio=curves[0][0])
     heights = np.array([height for _, height in curves])
     data["abbott"] = Variable(("file", "material_ratio"), heights, "m", "height")
     if len(reports) > 1:
@@ -204,10 +204,12 @@ def _make_data(reports: list[RoughnessReport]) -> dict[str, Variable]:
     surface = reports[0].surface
     if reports[0].kind == "areal":
         return data | maps(surface.x, surface.y, height_map=surface.z)
-    data |= along("x", x=surface.primary.x, primary=surface.primary.z)
+    data |= make_variables("x", x=surface.primary.x, primary=surface.primary.z)
     if surface.roughness is not None:
         rough = surface.roughness
-        data |= along("x_rough", x_rough=rough.x, roughness=rough.z, waviness=surface.waviness.z)
+        data |= make_variables(
+            "x_rough", x_rough=rough.x, roughness=rough.z, waviness=surface.waviness.z
+        )
     is_wave = surface.spectrum.frequency > 0
-    data |= along("wavelength", wavelength=1 / surface.spectrum.frequency[is_wave])
-    return data | along("wavelength", "m3", density=surface.spectrum.density[is_wave])
+    data |= make_variables("wavelength", wavelength=1 / surface.spectrum.frequency[is_wave])
+    return data | make_variables("wavelength", "m3", density=surface.spectrum.density[is_wave])

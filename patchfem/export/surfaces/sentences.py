@@ -12,7 +12,7 @@ from ...surface.quantity import Quantity
 from .. import answer, quantities
 
 ROUNDING = 1e-6  # largest difference of a ratio from 1 that is round-off
-MAX_SENTENCES = 4  # of a verdict
+MAX_SENTENCES = 4  # largest number of sentences of a verdict
 INTERVALS = "Numbers in brackets are 95 % intervals, which hold for the place that was measured."
 
 # Headline for each code of the verdict. {mean}: worn depth with its interval; {region}: what it is the mean of.
@@ -120,7 +120,17 @@ def format_value(name: str, quantity: Quantity) -> str:
 
 
 def format_rounded(number: float, unit: str, digits: int = 4) -> str:
-    """Return a number [SI] in its display unit."""
+    """Return a number in its display unit.
+
+    Parameters
+    ----------
+    number : float
+        [SI]
+    unit : str
+        SI unit.
+    digits : int, optional
+        Number of significant digits.
+    """
     name, scale = quantities.choose_scale("", unit, abs(number))
     return f"{format_number(number * scale, digits)} {name}".strip()
 

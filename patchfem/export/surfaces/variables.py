@@ -35,7 +35,7 @@ TEXTS = {
 }
 
 
-def along(dimension: str, unit: str = "m", **arrays: np.ndarray) -> dict[str, Variable]:
+def make_variables(dimension: str, unit: str = "m", **arrays: np.ndarray) -> dict[str, Variable]:
     """Return arrays (n,) along one dimension as variables by name; missing numbers are NaN."""
     return {
         name: Variable((dimension,), values, unit, TEXTS.get(name, name.replace("_", " ")))
@@ -46,13 +46,13 @@ def along(dimension: str, unit: str = "m", **arrays: np.ndarray) -> dict[str, Va
 def band(dimension: str, name: str, values: np.ndarray, half: np.ndarray) -> dict[str, Variable]:
     """Return lengths (n,) [m] with the ends of their band as the variables NAME, NAME_low and NAME_high."""
     ends = {f"{name}_low": values - half, f"{name}_high": values + half}
-    return along(dimension, **{name: values}, **ends)
+    return make_variables(dimension, **{name: values}, **ends)
 
 
 def maps(x: np.ndarray, y: np.ndarray, **heights: np.ndarray) -> dict[str, Variable]:
     """Return maps (m, n) [m] at x (n,), y (m,) [m] as variables, with every k-th row and column if they are large."""
     rows, columns = (slice(None, None, -(-axis.size // MAX_MAP_POINTS)) for axis in (y, x))
-    data = along("x", x=x[columns]) | along("y", y=y[rows])
+    data = make_variables("x", x=x[columns]) | make_variables("y", y=y[rows])
     for name, values in heights.items():
         shown = values[rows, columns].astype(np.float32)
         data[name] = Variable(("y", "x"), shown, "m", TEXTS[name])

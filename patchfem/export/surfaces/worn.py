@@ -15,7 +15,7 @@ from . import sentences
 from .compare import SIDES, build
 from .patches import PatchRun, read_patch
 from .sentences import format_value, to_json
-from .variables import along, maps
+from .variables import make_variables, maps
 
 # measures of both runs that stand beside each other; the first three are in the verdict
 MEASURES = (
@@ -169,17 +169,21 @@ def _make_data(runs: tuple[PatchRun, PatchRun], wear: Wear) -> dict[str, Variabl
         data = maps(state.x, state.y, before_map=before, after_map=after, depth_map=wear.depth)
     else:
         line = np.interp(state.x, state.x[[0, -1]], wear.hidden)
-        data = along("x", x=state.x, gap_before=before, gap_after=after)
-        data |= along("x", depth=wear.depth, hidden_depth=line)
+        data = make_variables("x", x=state.x, gap_before=before, gap_after=after)
+        data |= make_variables("x", depth=wear.depth, hidden_depth=line)
     if wear.track:
         ends = np.array([wear.track[name].value for name in ("from", "to")])
-        data |= along("track_end", track_end=ends)
+        data |= make_variables("track_end", track_end=ends)
     for side, run in zip(SIDES, runs, strict=True):
         own, x = run.answer.data, f"x_pressed_{side}"
         pressure = own["normal_stress"].values[-1]
-        data |= along(x, **{x: run.state.x}) | along(x, "Pa", **{f"pressure_{side}": pressure})
+        data |= make_variables(x, **{x: run.state.x}) | make_variables(
+            x, "Pa", **{f"pressure_{side}": pressure}
+        )
         if "loop_slide" in own and own["loop_slide"].values.ndim == 1:
             loop = f"sample_{side}"
-            data |= along(loop, **{f"slide_{side}": own["loop_slide"].values})
-            data |= along(loop, "N", **{f"force_{side}": own["loop_friction_force"].values})
+            data |= make_variables(loop, **{f"slide_{side}": own["loop_slide"].values})
+            data |= make_variables(
+                loop, "N", **{f"force_{side}": own["loop_friction_force"].values}
+            )
     return data

@@ -27,7 +27,14 @@ TABLE_TYPES = {"values": np.float64, "errors": np.float32, "floors": np.float32}
 
 
 def write_chunk(folder: Path, names: np.ndarray, results: CaseResults) -> Path:
-    """Write the results of cases with these names (n,) into a folder, and return the file.
+    """Write the results of cases into a file of a folder, and return the file.
+
+    Parameters
+    ----------
+    folder : Path
+    names : (n,) array of int
+        Names of the cases.
+    results : CaseResults
 
     Raises
     ------

@@ -149,7 +149,7 @@ def _describe_cases(table: SweepTable, analysis: SweepAnalysis) -> str:
         "failed": cases["failed"],
         "not converged": cases["outcomes"].get(Outcome.NOT_CONVERGED, 0),
     }
-    n_unsettled = cases["count"] - int(table.settled.sum()) - sum(counts.values())
+    n_unsettled = cases["count"] - int(table.has_settled.sum()) - sum(counts.values())
     counts[f"unsettled{_describe_unsettled(table)}"] = n_unsettled
     missed = cases["over_tolerance"]
     main = [name for name in MAIN_MEASURES if name in missed] or list(missed)
@@ -160,7 +160,7 @@ def _describe_cases(table: SweepTable, analysis: SweepAnalysis) -> str:
     clauses = [f"{count} {text}" for text, count in counts.items() if count]
     if not clauses:
         return f"All {len(table)} cases settled and meet the tolerance."
-    return f"{len(table)} cases: {', '.join(clauses)}."
+    return f"{len(table)} case{'s' * (len(table) > 1)}: {', '.join(clauses)}."
 
 
 def _describe_unsettled(table: SweepTable) -> str:
@@ -169,8 +169,8 @@ def _describe_unsettled(table: SweepTable) -> str:
     if name not in table.measures:
         return ""
     values = table.measures[name].values
-    unsettled = values[~table.settled & np.isfinite(values)]
-    if not unsettled.size or unsettled.max() <= np.nanmax(values[table.settled], initial=0.0):
+    unsettled = values[~table.has_settled & np.isfinite(values)]
+    if not unsettled.size or unsettled.max() <= np.nanmax(values[table.has_settled], initial=0.0):
         return ""
     text = format_value(float(unsettled.max()), table.measures[name].unit)
     return f" (their {_label(name)} is up to {text} at the end)"

@@ -95,9 +95,9 @@ def _average_parts(z, edges) -> np.ndarray:
     return np.add.reduceat(z, edges[:-1], axis=1) / np.diff(edges)
 
 
-def _fit_line(u, z, beside) -> np.ndarray:
+def _fit_line(place, z, beside) -> np.ndarray:
     """Return the line (n,) through the flanks; biweight steps give pile-up beside the track no weight."""
-    base = np.column_stack((np.ones(u.size), u))
+    base = np.column_stack((np.ones(place.size), place))
     line = np.zeros(2)
     sigma = np.inf
     for _ in range(10):

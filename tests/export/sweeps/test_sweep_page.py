@@ -212,8 +212,8 @@ def test_exact_large_sweeps_are_thinned(shape):
         if line is not None:
             assert (curve.y.min(), curve.y.max()) == (line.min(), line.max())
     figures = [plotly.draw(panel) for panel in panels.make_panels({"": answer}, CHARTS["sweep"])]
-    library = len(page._library())
-    assert library + len(page._pack(figures)) < MAX_PAGE_BYTES
+    library = len(page.read_library())
+    assert library + len(page.pack_figures(figures)) < MAX_PAGE_BYTES
 
 
 def test_exact_sweeps_beside_each_other(folders, tmp_path):
