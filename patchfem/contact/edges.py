@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..elasticity.lapack import cho_factor, cho_solve
+from .strip_compliance import StripCompliance
 
 # Smallest pressure, relative to the largest, at which a node with a smooth asperity law counts as
 # in contact
@@ -99,12 +99,12 @@ class SetFactor:
     def __init__(self, compliance, active):
         self.compliance = compliance
         self.index = np.flatnonzero(active)
-        self.factor = cho_factor(compliance[np.ix_(self.index, self.index)])
+        self.solve_on_set = StripCompliance(compliance).solver(active)
 
     def solve(self, motions) -> np.ndarray:
         """Return the forces (m, r) [N] of the nodes in contact under given displacements (m, r) [m] of them."""
         out = np.zeros(motions.shape)
-        out[self.index] = cho_solve(self.factor, motions[self.index])
+        out[self.index] = self.solve_on_set(motions[self.index])
         return out
 
 
@@ -252,8 +252,9 @@ def set_stiffness(contact: SetFactor, motions, edges: list) -> np.ndarray:
     outside = [edge.node + edge.side for edge in edges]
     nodes = [edge.node for edge in edges]
     n_motions = motions.shape[1]
-    units = np.eye(len(compliance))[:, nodes]
-    solved = contact.solve(np.concatenate([motions, compliance[:, outside], units], axis=1))
+    units = np.zeros((len(compliance), len(edges)))
+    units[nodes, np.arange(len(edges))] = 1.0
+    solved = contact.solve(np.concatenate([motions, compliance[outside].T, units], axis=1))
     force, outer, inner = np.split(solved, [n_motions, n_motions + len(edges)], axis=1)
     stiffness = (force * motions).sum(axis=0)
     if contact.index.size < 3:

@@ -161,7 +161,7 @@ class Piece:
         """
         if "factor" not in self.computed:
             mesh = self.mesh
-            is_fixed = np.zeros((len(mesh.points), 2), bool)
+            is_fixed = np.zeros((mesh.n_nodes, 2), bool)
             is_fixed[mesh.far] = True
             if self.guided is not None:
                 x = mesh.points[:, 0]
@@ -196,7 +196,7 @@ class Piece:
     def solve(self, load) -> np.ndarray:
         """Return displacements (frames, N, 2) [m] under interface loads (m, 2, frames) [N/m]."""
         mesh = self.mesh
-        full_load = np.zeros((len(mesh.points), *load.shape[1:]))
+        full_load = np.zeros((mesh.n_nodes, *load.shape[1:]))
         full_load[mesh.interface] = np.einsum("ij,i...->j...", spread_matrix(mesh), load)
         u = self.factor.solve(full_load)
         if self.round_off_error:

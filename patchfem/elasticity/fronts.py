@@ -14,7 +14,7 @@ import numpy as np
 from ..core import NotConverged
 from .lapack import cho_inverse, dgemm, dpotrf, dtrsm, use_one_blas_thread
 
-MAX_LEAF_CELLS = 64  # largest number of cells in a part that is not halved further
+MAX_LEAF_CELLS = 100  # largest number of cells in a part that is not halved further
 # Smallest pivot, relative to the diagonal entry before its front is eliminated, for which round-off is not examined;
 # pivots lose digits where a long thin part bends
 MIN_SAFE_PIVOT = 1e-6
@@ -280,32 +280,32 @@ def _number_unknowns(nodes) -> np.ndarray:
 
 def _eliminate(own, ring, terms, place) -> tuple[Front, _Stiffness]:
     """Add up the stiffnesses of a part and eliminate its own nodes: K_oo = L L^T, S = K_rr - W^T W with W = L^-1 K_or."""
-    n_ring = 2 * ring.size
-    remaining = np.zeros((n_ring + 2, n_ring + 2))
-    own_own = np.zeros((2 * own.size, 2 * own.size))
-    own_ring = np.zeros((2 * own.size, n_ring))
-    ring_ring = np.zeros((n_ring, n_ring))
+    sums = None
     for nodes, matrix in terms:
-        # Nodes that the term does not contain take the zeros in its last rows and columns.
+        # Nodes that the term does not contain take the zeros in its last rows and columns, as does the node that is
+        # added to the ring for the zeros of the result.
         place[own] = place[ring] = nodes.size
         place[nodes] = np.arange(nodes.size)
         of_own = _number_unknowns(place[own])
-        of_ring = _number_unknowns(place[ring])
+        of_ring = _number_unknowns(np.append(place[ring], nodes.size))
         rows = matrix.take(of_own, 0)
-        own_own += rows.take(of_own, 1)
-        own_ring += rows.take(of_ring, 1)
-        ring_ring += matrix.take(of_ring, 0).take(of_ring, 1)
+        term = (
+            rows.take(of_own, 1),
+            rows.take(of_ring, 1),
+            matrix.take(of_ring, 0).take(of_ring, 1),
+        )
+        sums = term if sums is None else tuple(map(np.add, sums, term, sums))
+    own_own, own_ring, remaining = sums
     factor = own_own
     smallest_pivot = 1.0
     if own.size:
         factor, smallest_pivot = _factorise(own_own)
         # The arrays are passed transposed, because LAPACK stores columns.
         coupling = own_ring.T
-        if n_ring:
-            dtrsm(1.0, factor, coupling, side=1, lower=1, trans_a=1, overwrite_b=1)
-            dgemm(-1.0, coupling, coupling, beta=1.0, c=ring_ring.T, trans_b=1, overwrite_c=1)
-    remaining[:n_ring, :n_ring] = ring_ring
-    return Front(own, ring, factor, own_ring, smallest_pivot), _Stiffness(ring, remaining)
+        dtrsm(1.0, factor, coupling, side=1, lower=1, trans_a=1, overwrite_b=1)
+        dgemm(-1.0, coupling, coupling, beta=1.0, c=remaining.T, trans_b=1, overwrite_c=1)
+    front = Front(own, ring, factor, own_ring[:, : 2 * ring.size], smallest_pivot)
+    return front, _Stiffness(ring, remaining)
 
 
 def _factorise(matrix) -> tuple[np.ndarray, float]:

@@ -92,6 +92,11 @@ class TensorGrid:
         return self.columns.size, self.depth.size
 
     @property
+    def n_nodes(self) -> int:
+        """Number of nodes, known without the arrays of a grid that may be too large for the memory."""
+        return self.columns.size * self.depth.size
+
+    @property
     def interface(self) -> np.ndarray:
         """Nodes (m,) of the interface by increasing x."""
         return (np.arange(self.x.size) + self.outer.size - 1) * self.depth.size

@@ -62,6 +62,11 @@ class PieceMesh:
         return self.interface[:: 1 + self.is_quadratic]
 
     @property
+    def n_nodes(self) -> int:
+        """Number of nodes."""
+        return len(self.points)
+
+    @property
     def x(self) -> np.ndarray:
         """Coordinates of the pressure nodes (m,) [m], in ascending order."""
         return self.points[self.pressure_nodes, 0]

@@ -426,5 +426,5 @@ def predict_condensing_seconds(bodies) -> float:
     bodies : iterable of TensorGrid, PieceMesh or None
     """
     return sum(
-        SECONDS_PER_NODE * len(body.points) ** NODE_EXPONENT for body in bodies if body is not None
+        SECONDS_PER_NODE * body.n_nodes**NODE_EXPONENT for body in bodies if body is not None
     )

@@ -59,7 +59,7 @@ def predict_grid_sizes(patch_model, tolerance: float) -> GridSizes:
     bodies = [body for body in levels[0] if body is not None]
     return GridSizes(
         bodies[0].x.size,
-        sum(len(body.points) for body in bodies),
+        sum(body.n_nodes for body in bodies),
         len(levels),
         sum(map(predict_condensing_seconds, levels)),
     )

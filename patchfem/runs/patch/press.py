@@ -281,11 +281,10 @@ def make_patch(
     """
     slip_compliance = contact.pieces.tangential
     if not patch_model.interface.has_shear:
-        slip_compliance = frozen_array(slip_compliance - pair.compliance.tangential)
+        slip_compliance = slip_compliance - pair.compliance.tangential
     if patch_model.loading.tangential_stiffness:
-        slip_compliance = frozen_array(
-            slip_compliance + 1 / patch_model.loading.tangential_stiffness
-        )
+        slip_compliance = slip_compliance + 1 / patch_model.loading.tangential_stiffness
+    slip_compliance.setflags(write=False)
     x = contact.pieces.interface.x
     averaging = patch_model.gap.averaging_length(x, contact.pressure.sigma_n > 0)
     return Patch(

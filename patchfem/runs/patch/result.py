@@ -266,8 +266,11 @@ def notes_on_neglected_effects(model, patch, coarse) -> list:
             "the largest slide"
         )
     if coarse[0] is not None and patch.pressure.outcome is not Outcome.NO_CONTACT:
-        # An unstructured mesh has no coarser one: its second mesh is finer than its first.
-        other = patch if coarse[-1] is None else coarse[0]
+        # An unstructured mesh has no coarser one: its second mesh is finer than its first. The change by
+        # the plane state is the same on all meshes that resolve the contact, as an automatic one does.
+        other = patch
+        if coarse[-1] is not None:
+            other = coarse[-1] if patch_model.mesh.is_automatic else coarse[0]
         out += store.get_or_compute_in_sweep(
             patch_model,
             ("plane band", other),

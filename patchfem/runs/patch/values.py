@@ -4,6 +4,8 @@ In: a `Patch`. Out: values by name, such as peak pressure, contact length and st
 peak pressure at rounded ends that the mesh does not resolve.
 """
 
+from weakref import WeakKeyDictionary
+
 import numpy as np
 
 from ...closed_forms import contact
@@ -20,6 +22,9 @@ from .press import Patch
 MAX_CURVATURE_RATIO = 2.0
 # Smallest number of contact cells on a rounded end at which its pressure peak is resolved.
 MIN_ROUNDING_CELLS = 4
+
+# Values of the patches in use: refinement, error estimates and notes need the same ones
+_VALUES_BY_PATCH: WeakKeyDictionary = WeakKeyDictionary()
 
 
 def estimate_peak_pressure(x, sigma, node_fraction=None) -> float:
@@ -133,6 +138,13 @@ def compute_static_values(patch: Patch) -> dict:
     If a node lies at the edge of a step, the values are the weighted mean of the two solutions with
     this node on either side of the step. `patch_rows` defines the measures.
     """
+    if patch not in _VALUES_BY_PATCH:
+        _VALUES_BY_PATCH[patch] = _compute_static_values(patch)
+    return _VALUES_BY_PATCH[patch].copy()
+
+
+def _compute_static_values(patch: Patch) -> dict:
+    """Return the values of all static measures of a solved patch by name, in SI units."""
     if patch.step_variants:
         parts = [(weight, compute_static_values(part)) for weight, part in patch.step_variants]
         names = parts[0][1]
