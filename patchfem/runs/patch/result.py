@@ -266,11 +266,12 @@ def notes_on_neglected_effects(model, patch, coarse) -> list:
             "the largest slide"
         )
     if coarse[0] is not None and patch.pressure.outcome is not Outcome.NO_CONTACT:
-        # An unstructured mesh has no coarser one: its second mesh is finer than its first. The change by
-        # the plane state is the same on all meshes that resolve the contact, as an automatic one does.
+        # An unstructured mesh has no coarser one: its second mesh is finer than its first. Even the
+        # coarsest mesh of a static patch has 20 cells along the contact, which is enough for the change.
         other = patch
         if coarse[-1] is not None:
-            other = coarse[-1] if patch_model.mesh.is_automatic else coarse[0]
+            mesh = patch_model.mesh
+            other = coarse[-1] if mesh.is_automatic and mesh.is_static else coarse[0]
         out += store.get_or_compute_in_sweep(
             patch_model,
             ("plane band", other),
