@@ -43,7 +43,7 @@ def write_advice(joint: JointMode, band: Band | None, curves: dict, missing: dic
         *_describe_slip(joint, curve),
         _describe_band_width(band, curve),
         *_describe_agreement(band, curves),
-        *_describe_ring_down(joint, band, curves, "decay" in missing),
+        *_describe_ring_down(joint, band, curves, has_failed="decay" in missing),
         *_describe_static_curve(band, curves),
         *_describe_coupling(joint, band, curve),
     ]
