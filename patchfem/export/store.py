@@ -7,6 +7,7 @@ read, the arrays as netCDF, a CSV file for each curve, and report.html, which is
 import csv
 import io
 import json
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -23,6 +24,8 @@ SUMMARY = "summary.json"
 SCENE = "scene.resolved.toml"
 PAGE = "report.html"
 FIELDS = "fields.vtkhdf"
+# variable of CPU times; it is in summary.json, so that equal runs write equal netCDF files
+CPU_TIMES = "accuracy_seconds"
 # netCDF file of each kind of answer; result.nc for all others
 DATA_FILES = {"sweep": "sweep.nc", "backbone": "backbone.nc"}
 # JSON file with the `details` of each kind of answer; those of a run are in summary.json
@@ -53,7 +56,8 @@ def write(answer: Answer, folder: Path) -> None:
     if answer.origin.get("resolved"):
         write_text(folder / SCENE, answer.origin["resolved"])
     if answer.data:
-        write_netcdf(answer, folder / data_file(answer.kind))
+        data = {name: variable for name, variable in answer.data.items() if name != CPU_TIMES}
+        write_netcdf(replace(answer, data=data), folder / data_file(answer.kind))
     for name, text in format_curves(answer).items():
         write_text(folder / name, text)
     if not answer.is_run:
@@ -75,6 +79,8 @@ def make_summary(answer: Answer) -> dict:
         "title": answer.title,
         "kind": answer.kind,
     }
+    if CPU_TIMES in answer.data:
+        details[CPU_TIMES] = answer.data[CPU_TIMES].values.tolist()
     if "outcome" in details:
         summary["outcome"] = details.pop("outcome")
     summary |= {
@@ -117,6 +123,9 @@ def read(folder: Path) -> Answer:
             origin = origin | {"resolved": (folder / SCENE).read_text("utf-8")}
         path = folder / data_file(kind)
         data = read_netcdf(path) if path.is_file() else {}
+        if CPU_TIMES in details:
+            times = np.array(details[CPU_TIMES], float)
+            data[CPU_TIMES] = Variable(("accuracy_run",), times, "s", "CPU time of the motion")
     except (OSError, ValueError, KeyError, TypeError, RuntimeError) as error:
         raise PatchfemError(f"{folder}: a file of this folder is damaged: {error}") from None
     return Answer(

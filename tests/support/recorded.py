@@ -267,10 +267,10 @@ def clean(results: dict, folder: Path) -> dict:
 def hide_times(line: str) -> str:
     """Return a line with # in place of numbers that depend on the speed of the machine.
 
-    The seconds of an effect stand alone in a line of a page, with three decimals. Other numbers that do so are hidden
+    Seconds stand alone in a line of a page, with three decimals. Other numbers that do so are hidden
     too; they are compared in the files of the results.
     """
-    if "CPU" in line or "Wall-clock" in line or re.fullmatch(r"\d+\.\d{3}", line):
+    if "CPU" in line or "Wall-clock" in line or re.fullmatch(r"\d+\.\d{3}( s)?", line):
         return NUMBER.sub("#", line)
     # The first evenly spaced row depends on the round-off of the times.
     line = re.sub(r"before [\d.]+ ms the rows", "before # ms the rows", line)

@@ -6,8 +6,9 @@ import scan_pairs
 from scipy.ndimage import gaussian_filter
 
 from patchfem.core import PatchfemError
-from patchfem.surface import Options, Profile, compare_surfaces
+from patchfem.surface import Options, Profile
 from patchfem.surface.areal import Areal
+from patchfem.surface.compare.compare import compare_surfaces
 
 UM = 1e-6
 STEP = 2 * UM

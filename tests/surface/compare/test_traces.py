@@ -5,7 +5,8 @@ import pytest
 from scipy.ndimage import gaussian_filter1d
 
 from patchfem.core import PatchfemError
-from patchfem.surface import Options, Profile, compare_files, compare_surfaces
+from patchfem.surface import Options, Profile, compare_files
+from patchfem.surface.compare.compare import compare_surfaces
 
 UM = 1e-6
 NM = 1e-9
