@@ -60,6 +60,11 @@ class CondensedPair:
         return float(self.grid.first_row_height + self.upper_grid.first_row_height) / 2
 
     @property
+    def is_quadratic(self) -> bool:
+        """Whether a piece has elements of second order, whose interface has nodes between the pressure nodes."""
+        return any(mesh.interface.size > mesh.x.size for mesh in (self.grid, self.upper_grid))
+
+    @property
     def round_off_error(self) -> float:
         """Relative round-off error of the compliance; 0 if it is negligible."""
         return max(self.piece.round_off_error, self.upper.round_off_error)

@@ -155,7 +155,9 @@ def _edge_values_between_nodes(patch, weight) -> EdgeValues:
         if not force.any():
             continue
         pressed = edges.SetFactor(normal, force > 0)
-        ends = edges.find_edges(pressed, x, force, gap, softness, patch.pair.row)
+        ends = edges.find_edges(
+            pressed, x, force, gap, softness, patch.pair.row, patch.pair.is_quadratic
+        )
         intervals = edges.contact_intervals(x, force, ends)
         length += np.diff(intervals).sum()
         first = min(first, intervals[0, 0])

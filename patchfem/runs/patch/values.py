@@ -215,7 +215,9 @@ def contact_ends(patch: Patch, pressed: edges.SetFactor | None = None) -> list:
         softness = None if normal is bare else np.diag(normal) - np.diag(bare)
         force = patch.pressure.sigma_n * patch.pieces.interface.weight
         pressed = pressed or edges.SetFactor(normal, patch.active)
-        ends = edges.find_edges(pressed, x, force, patch.gap, softness, patch.pair.row)
+        ends = edges.find_edges(
+            pressed, x, force, patch.gap, softness, patch.pair.row, patch.pair.is_quadratic
+        )
     jumps = patch.model.gap.jumps
     return edges.snap_to_steps(ends, x, patch.unloaded_gap, jumps) if jumps else ends
 
