@@ -39,7 +39,7 @@ class ContactEdge(NamedTuple):
 
 
 def edge_offset(
-    inner, outer, fraction, row_height: float | None = None, is_quadratic: bool = False
+    inner, outer, fraction, row_height: float | None = None, *, is_quadratic: bool = False
 ):
     """Return the inward offset [m] of an edge from the position that follows from its cell fraction.
 
@@ -124,6 +124,7 @@ def find_edges(
     gap,
     softness=None,
     row_height: float | None = None,
+    *,
     is_quadratic: bool = False,
 ) -> list:
     """Find the edges of a contact set.
@@ -160,7 +161,9 @@ def find_edges(
         gap_rate = 1 - compliance[outside] @ force_rate
         fraction = compute_edge_fraction(force[node], force_rate[node], gap[outside], gap_rate)
         cell = abs(x[outside] - x[node])
-        offset = edge_offset(abs(x[node] - x[inside]), cell, fraction, row_height, is_quadratic)
+        offset = edge_offset(
+            abs(x[node] - x[inside]), cell, fraction, row_height, is_quadratic=is_quadratic
+        )
         if softness is not None:
             offset *= 1 - softness[node] / compliance[node, node]
         position = x[node] + fraction * (x[outside] - x[node]) - side * offset

@@ -39,8 +39,6 @@ MAX_UNRESOLVED_NODES = 3  # Largest number of nodes of a contact that counts as 
 ROUND_OFF_FRACTION = 5e-12  # Relative round-off error of the solved contact equations.
 MIN_ERROR = 1e-9  # Smallest relative error that is reported; no application needs a smaller one.
 MIN_EDGE_OFFSET = 0.012  # Smallest position error of a contact edge, in cell lengths.
-# The same error on a mesh file, whose first row has no single height.
-MIN_FILE_EDGE_OFFSET = 0.1
 # Ratio of the remaining increase of a corner pressure to its change by the last refinement.
 CORNER_RISE_FACTOR = 4.0
 # Fraction of the corner pressure of a coating that cells longer than the coating thickness miss.
@@ -508,7 +506,8 @@ def _contact_edge_position_error(pair, cell):
     A soft coating thinner than the cells acts as a Winkler foundation, whose contact ends where the
     nodal pressure vanishes. cell: longest cell in which the contact ends [m].
     """
-    out = MIN_EDGE_OFFSET if isinstance(pair.grid, TensorGrid) else MIN_FILE_EDGE_OFFSET
+    # The first row of a mesh file has no single height, on which the offset of an edge depends.
+    out = MIN_EDGE_OFFSET if isinstance(pair.grid, TensorGrid) else 0.1
     for grid, piece in ((pair.grid, pair.piece), (pair.upper_grid, pair.upper)):
         if grid.coating_thickness > 0:
             ratio = piece.layers.coating[0] / piece.layers.substrate[0]

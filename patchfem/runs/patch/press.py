@@ -368,8 +368,7 @@ def solve_contact(
 
     The conditions are pressure >= 0, gap >= 0 and pressure times gap = 0 at every node. They are solved
     by an active set (`contact.unilateral`). A patch in strips and one with a nonlinear asperity layer
-    have solvers of their own; a prescribed approach of pieces that rotate is found by a search over the
-    load.
+    have solvers of their own.
 
     Parameters
     ----------
@@ -378,8 +377,12 @@ def solve_contact(
         Compliance of the pieces without asperity layer.
     gap : (m,) or (s, m)
         Unloaded gap [m].
-    added, warm_start
-        See `StripCompliance`; for strips only.
+    added : (s, m) ndarray, optional
+        What each strip adds to the diagonal of its compliance [m/N].
+    warm_start : WarmStart, optional
+        Results of the previous solution of the strips.
+    start : (m,) ndarray of bool, optional
+        Contact set of a similar patch without strips, from which the search starts.
 
     Returns
     -------

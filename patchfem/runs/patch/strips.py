@@ -156,7 +156,7 @@ def _edge_values_between_nodes(patch, weight) -> EdgeValues:
             continue
         pressed = edges.SetFactor(normal, force > 0)
         ends = edges.find_edges(
-            pressed, x, force, gap, softness, patch.pair.row, patch.pair.is_quadratic
+            pressed, x, force, gap, softness, patch.pair.row, is_quadratic=patch.pair.is_quadratic
         )
         intervals = edges.contact_intervals(x, force, ends)
         length += np.diff(intervals).sum()

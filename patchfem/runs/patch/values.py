@@ -216,7 +216,13 @@ def contact_ends(patch: Patch, pressed: edges.SetFactor | None = None) -> list:
         force = patch.pressure.sigma_n * patch.pieces.interface.weight
         pressed = pressed or edges.SetFactor(normal, patch.active)
         ends = edges.find_edges(
-            pressed, x, force, patch.gap, softness, patch.pair.row, patch.pair.is_quadratic
+            pressed,
+            x,
+            force,
+            patch.gap,
+            softness,
+            patch.pair.row,
+            is_quadratic=patch.pair.is_quadratic,
         )
     jumps = patch.model.gap.jumps
     return edges.snap_to_steps(ends, x, patch.unloaded_gap, jumps) if jumps else ends
