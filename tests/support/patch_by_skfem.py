@@ -25,8 +25,9 @@ from skfem import Basis, BilinearForm, ElementQuad2, ElementVector, MeshQuad
 from skfem.helpers import ddot, eye, sym_grad, trace
 
 FAMILIES = ("plain", "step", "overhang", "linear layer", "smooth trace")
-# Shortest columns at the contact edges over the length of the contact, and growth of the columns, of both levels
-LEVELS = ((1 / 30, 1.2), (1 / 120, 0.9))
+# Shortest columns at the contact edges over the length of the contact, growth of the columns, and smallest number of
+# columns in half the interface, of both levels
+LEVELS = ((1 / 30, 1.2, 12), (1 / 120, 0.9, 24))
 
 
 @BilinearForm
@@ -144,7 +145,7 @@ def solve_program(C, gap, rigid, target, spring):
     return f * target[0], q * scale, f > w
 
 
-def solve_level(contact: dict, trace_points, finest: float, growth: float) -> dict:
+def solve_level(contact: dict, trace_points, finest: float, growth: float, n_columns: int) -> dict:
     """Return the measures of a scene on columns that are bisected to the given shortest ones."""
     get = {key: read_number(contact[key]) for key in ("length", "width", "height", "load")}
     plane = contact.get("plane", "strain")
@@ -177,7 +178,7 @@ def solve_level(contact: dict, trace_points, finest: float, growth: float) -> di
         thin = min((p["thickness"] for p in pieces if p["thickness"]), default=half)
         corner = size if singular or step else min(half / 40, thin / 6, width / 30)
         sizes = np.array([corner] * len(marks) + [size] * len(edges))
-        largest = half / 12 if trace_points is None else half / 80
+        largest = half / n_columns if trace_points is None else half / 80
         x = bisect(-half, half, near, sizes, growth, largest)
         h = np.diff(x)
         weight = (np.append(h, 0) + np.append(0, h)) / 2
