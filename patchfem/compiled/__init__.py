@@ -57,7 +57,6 @@ PACKAGE_FOLDER = Path(__file__).parents[1]  # folder of the package
 # Modules of tuples that kernels take and of row numbers; they belong to the hash because the
 # machine code depends on the order of the fields and on the numbers.
 TUPLE_MODULES = (
-    "contact/batch/arrays.py",
     "contact/set_arrays.py",
     "dynamics/grooves/arrays.py",
     "dynamics/interfaces/arrays.py",
