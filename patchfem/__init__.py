@@ -20,16 +20,18 @@ Read the package in this order. A module imports only from its own entry of the 
 16. `friction`     friction laws and the sum over bonds along the path
 17. `slip`         partial slip of the pieces: elements, shear modes, tangents
 18. `structure`    modes and drive of the rig
-19. `dynamics`     engines: event-driven solution, time stepping, harmonic balance
-20. `model`        model of a scene: pieces, gap, law, slide, modes, drive, numerics
-21. `response`     measures of a run: outcome, events, levels and free vibration
-22. `wear`         wear depth over many cycles
-23. `runs`         patch, bench and rig: static contact, friction and dynamics combined
-24. `identify`     parameters from measurements, with confidence intervals
-25. `campaigns`    studies with many runs: fits, error against cost, sweeps
-26. `export`       summary, netCDF, VTK, report
-27. `api`          Python interface: load, build, plan and run
-28. `commands`     verbs of the command line
+19. `hybrid`       motion from event to event by steps of order 8
+20. `points`       steps of order 2: many contact points, and sweeps over many cases
+21. `dynamics`     engines: event-driven solution, time stepping, harmonic balance
+22. `model`        model of a scene: pieces, gap, law, slide, modes, drive, numerics
+23. `response`     measures of a run: outcome, events, levels and free vibration
+24. `wear`         wear depth over many cycles
+25. `runs`         patch, bench and rig: static contact, friction and dynamics combined
+26. `identify`     parameters from measurements, with confidence intervals
+27. `campaigns`    studies with many runs: fits, error against cost, sweeps
+28. `export`       summary, netCDF, VTK, report
+29. `api`          Python interface: load, build, plan and run
+30. `commands`     verbs of the command line
 
 From Python: `import patchfem as pf`, then `pf.run("scene.toml")`. All imports are lazy: a module
 that is imported as a whole, as in `from .contact import unilateral`, is loaded on first use (`lazy_imports`).

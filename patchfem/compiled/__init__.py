@@ -67,6 +67,9 @@ TUPLE_MODULES = (
     "dynamics/smooth/arrays.py",
     "dynamics/events/modal_system.py",
     "dynamics/events/elements.py",
+    "hybrid/records.py",
+    "points/case_rows.py",
+    "points/march_rows.py",
 )
 # State of the environment variable that makes numba run all kernels as Python.
 IS_JIT_DISABLED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
@@ -103,6 +106,7 @@ def hash_sources():
     for source in (
         *(PACKAGE_FOLDER / "compiled" / name for name in ("jit.py", "pass_by_reference.py")),
         *sorted(PACKAGE_FOLDER.rglob("*kernels.py")),
+        *sorted((PACKAGE_FOLDER / "hybrid" / "laws").glob("*.py")),
         *(PACKAGE_FOLDER / name for name in TUPLE_MODULES),
     ):
         digest.update(

@@ -20,7 +20,7 @@ Bonds whose path or damage exceeds a cut-off are left out. The compiled sum alon
 """
 
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, lru_cache
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -33,6 +33,8 @@ from .recursion import BondState, length_and_direction, move_bonds, press_bonds,
 from .strips import PathState, Strip, Strips, strip_weights, surviving_density
 
 N_POINTS = 5  # number of Gauss points in a panel of a step
+N_SHORT_POINTS = 2  # the same in a step of at most SHORT_STEP bond lengths, exact to 1e-6
+SHORT_STEP = 0.25
 # Ends of the panels of a step in bond lengths; the force changes most in the first bond length
 PANEL_ENDS = (0, 1, 2, 4, 8, 16, 32)
 # Smallest number of strips, in addition to half of all strips, that the cut-off removes at once;
@@ -145,6 +147,10 @@ class Quadrature:
         """
         dq = np.atleast_1d(np.asarray(dq, float))
         after = self.advance(state, dq, s0, s1, dt)
+        # Bonds that were lost have no pressure any more, so that all of a point act, or none.
+        after = replace(
+            after, pressure=_active_pressure(after), first_active=0 * after.first_active
+        )
         stored = self.stored_energy(state)
         energy_gain = self.stored_energy(after) - stored
         if not dq.any():
@@ -197,7 +203,7 @@ class Quadrature:
             damage = self._damaging_part(state, dq, middle).length / middle
             elastic = 1 - damage * middle / path
             panel_ends = np.unique(np.append(np.minimum(PANEL_ENDS, damage), damage))
-        points, weights = _gauss_points()
+        points, weights = _gauss_points(N_SHORT_POINTS if damage <= SHORT_STEP else N_POINTS)
         mean = np.zeros((len(dq), len(s0)))
         dissipated = np.zeros(len(s0))
         for low, high in pairwise(panel_ends):
@@ -385,7 +391,7 @@ class Quadrature:
 
     def _sums(self, state: Strips) -> np.ndarray:
         """Return traction / mu_s [Pa] and stored energy / mu_s [J/m2] as an array (d + 1, m)."""
-        return _sum_strips(state, self.weights(state))
+        return _sum_law(state, self.law)
 
     def traction(self, state: Strips) -> np.ndarray:
         """Return the traction [Pa], positive against slip: (m,) on a line, (2, m) in a plane."""
@@ -396,22 +402,29 @@ class Quadrature:
         return self.law.static * self._sums(state)[-1]
 
 
+@lru_cache(4)
+def _sum_law(state: Strips, law: Bonds) -> np.ndarray:
+    """Return the sums of a state, which traction, energy and the next step need again."""
+    return _sum_strips(state, strip_weights(state, law))
+
+
 @cache
-def _gauss_points() -> tuple:
+def _gauss_points(count: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the Gauss points of a panel in (-1, 1), and their weights."""
-    return np.polynomial.legendre.leggauss(N_POINTS)
+    return np.polynomial.legendre.leggauss(count)
 
 
 def _active_pressure(state: Strips) -> np.ndarray:
     """Return the pressure (k, m) [Pa] at which bonds formed, or 0 for bonds that no longer act."""
-    if not state.first_active.any():
-        return state.pressure
     return state.pressure * (np.arange(len(state.pressure))[:, None] >= state.first_active)
 
 
 def _sum_strips(state: Strips, weights) -> np.ndarray:
     """Sum products of weights (k, c) and pressures over the strips of bonds that still act, (c, m)."""
-    return weights.T @ _active_pressure(state)
+    count = len(state.pressure)
+    if ((state.first_active > 0) & (state.first_active < count)).any():
+        return weights.T @ _active_pressure(state)
+    return (weights.T @ state.pressure) * (state.first_active < count)
 
 
 def _drop_single_axis(vectors):
