@@ -169,7 +169,7 @@ def _suggest_name(
     }
     if is_table:
         return suggestions.suggest_table(model, written_table, key)
-    return suggestions.suggest_key(model, table_key, written_table, key, is_set=is_set)
+    return suggestions.suggest_key(model, written_table, key, is_set=is_set)
 
 
 def _list_tables_with_key(model: type[Table], key: str) -> list[str]:

@@ -167,9 +167,15 @@ def make_value(rng: random.Random, model: Any, key: str, pool: dict[str, list]) 
     choices += pool.get(f"{model.__name__}.{key}", [])[:6]
     kind = find_quantity_kind(model, name)
     if tuple in map(get_origin, types) and kind:
-        choices += [[EXAMPLE_QUANTITIES[kind]] * 2, [f"0 {EXAMPLE_QUANTITIES[kind].partition(' ')[2]}"] * 3]
+        choices += [
+            [EXAMPLE_QUANTITIES[kind]] * 2,
+            [f"0 {EXAMPLE_QUANTITIES[kind].partition(' ')[2]}"] * 3,
+        ]
     elif kind:
-        choices += [EXAMPLE_QUANTITIES[kind], re.sub("[0-9.e-]+", "1e-3", EXAMPLE_QUANTITIES[kind], count=1)]
+        choices += [
+            EXAMPLE_QUANTITIES[kind],
+            re.sub("[0-9.e-]+", "1e-3", EXAMPLE_QUANTITIES[kind], count=1),
+        ]
     elif find_inner_table(model, name) is not None:
         inner = find_inner_table(model, name)
         table = {
@@ -217,10 +223,16 @@ def change_scene(rng: random.Random, scene: dict, pool: dict[str, list]) -> None
         ]
         if selectors:
             m, t, key = rng.choice(selectors)
-            names = LAWS if key == "law" and "static" in t else WAVEFORMS if key == "waveform" else ()
-            t[key] = rng.choice(list(names) or list(list_allowed_values(m, attributes_by_key(m)[key])))
+            names = (
+                LAWS if key == "law" and "static" in t else WAVEFORMS if key == "waveform" else ()
+            )
+            t[key] = rng.choice(
+                list(names) or list(list_allowed_values(m, attributes_by_key(m)[key]))
+            )
     elif way == "table":
-        key = rng.choice([k for k, n in attributes_by_key(Tables).items() if find_inner_table(Tables, n)])
+        key = rng.choice(
+            [k for k, n in attributes_by_key(Tables).items() if find_inner_table(Tables, n)]
+        )
         scene[key] = make_value(rng, Tables, key, pool)
     elif keys:
         key = rng.choice(list(keys))
@@ -230,7 +242,9 @@ def change_scene(rng: random.Random, scene: dict, pool: dict[str, list]) -> None
 def format_value(value: Any) -> str:
     """Format a plain value as TOML, with tables inline."""
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{json.dumps(k)} = {format_value(v)}" for k, v in value.items()) + "}"
+        return (
+            "{" + ", ".join(f"{json.dumps(k)} = {format_value(v)}" for k, v in value.items()) + "}"
+        )
     if isinstance(value, list):
         return "[" + ", ".join(map(format_value, value)) + "]"
     return json.dumps(value).replace("NaN", "nan") if not isinstance(value, float) else repr(value)
@@ -286,17 +300,23 @@ def compare(before: list[dict], after: list[dict]) -> None:
     counts = {"refused": 0, "places": 0, "sentences": 0, "remarks": 0, "read": 0}
     sentences: dict[tuple, int] = {}
     for number, (old, new) in enumerate(zip(before, after, strict=True)):
+        old.pop("text", None)
         counts["refused"] += "mistakes" in old
         if ("mistakes" in old) != ("mistakes" in new):
             print(number, "REFUSED" if "mistakes" in new else "ACCEPTED", old, new)
         elif "mistakes" in old:
-            places = sorted(map(find_place, old["mistakes"])), sorted(map(find_place, new["mistakes"]))
+            places = (
+                sorted(map(find_place, old["mistakes"])),
+                sorted(map(find_place, new["mistakes"])),
+            )
             if places[0] != places[1]:
                 counts["places"] += 1
                 print(number, "PLACES", old["mistakes"], new["mistakes"])
             for one in set(old["mistakes"]) ^ set(new["mistakes"]):
                 words = re.sub(r"scene.toml:?\d*: ", "", one)
-                sentences[words, one in new["mistakes"]] = sentences.get((words, one in new["mistakes"]), 0) + 1
+                sentences[words, one in new["mistakes"]] = (
+                    sentences.get((words, one in new["mistakes"]), 0) + 1
+                )
             counts["sentences"] += old["mistakes"] != new["mistakes"]
         else:
             if old["remarks"] != new["remarks"]:

@@ -65,16 +65,6 @@ class StructureFacts(TableFacts):
         return [key for key in DESCRIPTION_KEYS if self.has(key)]
 
     @property
-    def second_description(self) -> str:
-        """Second of the DESCRIPTION_KEYS that the scene sets, or "" if it sets at most one."""
-        return self.descriptions[1] if len(self.descriptions) > 1 else ""
-
-    @property
-    def joined_descriptions(self) -> str:
-        """Ways in which the structure is described, joined as text."""
-        return " and ".join(self.descriptions)
-
-    @property
     def description(self) -> str:
         """Description of the structure if there is exactly one, or "" otherwise."""
         return self.descriptions[0] if len(self.descriptions) == 1 else ""
@@ -133,16 +123,6 @@ class StructureFacts(TableFacts):
 
 
 DESCRIPTION_RULES = (
-    MistakeRule(
-        lambda s: s.second_description,
-        "structure.{second_description}",
-        "{joined_descriptions} exclude each other: keep one description of the rig",
-    ),
-    MissingKeyRule(
-        lambda s: not s.descriptions,
-        "structure.mode",
-        "at least one [[structure.mode]] is needed; a mass on a spring is a mode with the frequency sqrt(k/m)/(2 pi)",
-    ),
     MissingKeyRule(
         lambda s: not s.has("moving_mass") and s.descriptions in ([], ["mode"]),
         "structure.moving_mass",
@@ -163,16 +143,6 @@ DESCRIPTION_RULES = (
             f"structure.{key} needs this key",
         )
         for key in ("spring", "damper")
-    ),
-    MissingKeyRule(
-        lambda s: s.has("output_mass") and not s.has_any("masses", "reduced"),
-        "structure.masses",
-        "structure.output_mass needs this key",
-    ),
-    MissingKeyRule(
-        lambda s: s.has("interface") and not s.has_any("masses", "file", "reduced"),
-        "structure.masses",
-        "structure.interface needs this key, or structure.file or [structure.reduced]",
     ),
     *(
         MistakeRule(
@@ -568,11 +538,6 @@ def find_file_extension(name: str) -> str:
 def _check_start(draft: SceneDraft) -> None:
     """Report missing initial values, and lists without one value for each mode or mass."""
     structure = draft.tables.structure
-    if not draft.has("structure.start.displacement") and not draft.has("structure.start.velocity"):
-        draft.add_missing(
-            "structure.start.displacement",
-            "or structure.start.velocity, one value per mode or mass",
-        )
     count = CoordinateNumbers.from_structure(structure).number or len(structure.mode or ())
     noun = "mode" if count == 1 else "modes"
     if structure.reduced is not None:

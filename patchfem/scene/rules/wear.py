@@ -6,7 +6,6 @@ from math import pi
 from ...effects import Waveform, find_waveform, law_has_trait, law_takes_key, name_laws_with_key
 from .grooves import find_groove_key, find_groove_table
 from .rule_table import (
-    MissingKeyRule,
     MistakeRule,
     RemarkRule,
     TableFacts,
@@ -168,11 +167,6 @@ FRICTION_RULES = (
         lambda w: w.depths and not _increases_from_zero(w.depths),
         "wear.friction.depth",
         'depths that rise from 0 are needed, such as ["0 um", "1 um", "5 um"]',
-    ),
-    MissingKeyRule(
-        lambda w: not w.has_any(*(f"friction.{key}" for key in FACTOR_KEYS)),
-        "wear.friction.coefficient_factor",
-        "the table needs a factor: coefficient_factor, bond_length_factor or both",
     ),
 )
 LAW_RULES = (
