@@ -15,8 +15,7 @@ How to add a key
        spacing: key(quantity("length", gt=0) | None, "distance between two bolts; default: one bolt") = None
 
    If the help text or the `required` text of another key lists the kinds or waveforms with which a key is used, extend
-   these texts by hand. A new kind of quantity needs its units in `UNIT_FACTORS` and an example in
-   `EXAMPLE_QUANTITIES` of `quantities`.
+   these texts by hand. A new kind of quantity needs its units and an example in units.toml.
 2. If the value of the key must agree with another key, add a row to the rules of its table in `scene.rules`; the rules
    of [normal], [slide] and [measured] stand in `rules.check`, those of the other tables in the module of their name. The
    condition reads the values of the table in SI and the sentence names them in braces::
