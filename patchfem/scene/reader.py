@@ -46,7 +46,7 @@ def read_tables(draft: SceneDraft) -> None:
 def _read_table(draft: SceneDraft, model: type[Table], raw: dict[str, Any], table_key: str) -> Any:
     """Read one table of a scene, and report missing or wrong values."""
     if id(raw) in draft.read_before:
-        return draft.read_before[id(raw)][1]
+        return draft.read_before[id(raw)]
     names = attributes_by_key(model)
     values = {}
     for key, value in raw.items():
@@ -65,9 +65,7 @@ def _read_table(draft: SceneDraft, model: type[Table], raw: dict[str, Any], tabl
         if key not in raw:
             draft.add_missing(f"{table_key}.{key}", "")
     unknown = {names[key]: None for key in (*raw, *list_required_keys(model)) if key in names}
-    table = build_table(model, unknown | valid)
-    draft.read_now[id(raw)] = raw, table
-    return table
+    return build_table(model, unknown | valid)
 
 
 def _read_inner(draft: SceneDraft, definition: KeyDefinition, value: Any, path: str) -> Any:
