@@ -7,7 +7,7 @@ from importlib.util import find_spec
 import pytest
 import surfaces
 from command_line import run_cli
-from scene_texts import COATED, COULOMB, DRIVE, KEYS, MODE, NONLOCAL, POINT, TRIANGLE
+from scene_texts import COATED, COULOMB, DRIVE, MODE, NONLOCAL, POINT, TRIANGLE
 
 import patchfem as pf
 from patchfem.mesh import read_pieces
@@ -89,21 +89,6 @@ TRIED = {  # removed feature -> (function that uses it, replacement that the mes
     "quadrature exponential": (
         partial(load, BONDS, {"accuracy.quadrature": "exponential"}),
         "use 'merged'",
-    ),
-    "harmonics over grooves": (
-        partial(load, GROOVED, {"accuracy.method": "harmonic", "accuracy.harmonics": 15}),
-        "leave `harmonics` out",
-    ),
-    **{
-        f"law {law} over grooves": (
-            partial(load, GROOVED + KEYS[law], {"friction.law": law}),
-            "use law 'coulomb'",
-        )
-        for law in removed.LAWS_REMOVED_OVER_GROOVES
-    },
-    "oscillating load over grooves": (
-        partial(load, GROOVED, {"normal.amplitude": "10 N", "normal.frequency": "20 Hz"}),
-        "leave one of the two out",
     ),
     "profile --level": (
         partial(run_failing_command, ("profile", "a.csv", "--level=1 um")),

@@ -73,7 +73,7 @@ PUBLIC = {
         "has_effect",
         "list_fixed_settings",
     ),
-    "rules.limits": ("find_lateral_slide_obstacle",),
+    "rules.support": ("find_lateral_slide_obstacle",),
     "rules.methods": (
         "ENGINE_SUPPORT",
         "EngineSupport",

@@ -122,7 +122,7 @@ MISSING = [
     (RIG, r"^static.*\n", "[friction]", "friction.static", "missing; a plain number is needed"),
     (RIG, r"^bond_length.*\n", "[friction]", "friction.bond_length", "law 'nonlocal' needs this key"),
     (RIG, r"^slide = 0.1\n", "[[structure.mode]]", "structure.mode.second.slide", "missing; a plain number"),
-    (RIG, r"^cycles.*\n", "[drive]", "drive.cycles", "missing; a plain number is needed; waveform 'sine' needs this key or duration"),
+    (RIG, r"^cycles.*\n", "[drive]", "drive.cycles", "waveform 'sine' needs this key or duration"),
     (LINEAR, r"^\[\[(.|\n)*(?=\[drive)", "[structure]", "structure.mode", "this key or masses or file or reduced is needed"),
     (BENCH, r"^kind.*\n", "[slide]", "slide.kind", "missing; one of constant, sine, triangle, dwell, file"),
     (BENCH, r"^amplitude.*\n", "[slide]", "slide.amplitude", "kind 'triangle' needs this key"),

@@ -58,6 +58,7 @@ SELECTORS = (
             ),
         },
     ),
+    Selector(tables.Interface, "", {"": ("load|contact", "")}),
     Selector(
         tables.Friction,
         "law",

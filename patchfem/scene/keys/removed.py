@@ -5,7 +5,6 @@ REMOVED_METHODS = {  # removed values of accuracy.method
     name: f"'{name}' was removed in {REMOVING_VERSION}; use 'march' (studies/integrators compares the methods)"
     for name in ("duhamel", "newmark", "euler")
 }
-LAWS_REMOVED_OVER_GROOVES = ("iwan", "bouc-wen", "lugre")
 # Removed values of accuracy.quadrature.
 REMOVED_QUADRATURES = {
     "exponential": f"'exponential' was removed in {REMOVING_VERSION}; use 'merged'"
