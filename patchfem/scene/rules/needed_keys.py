@@ -22,11 +22,13 @@ def check_needed_keys(draft: SceneDraft) -> None:
         choices = find_choices(table)
         for need, is_required, reason in choices.needs:
             used = [bundle for bundle in need.bundles if bundle[0] not in choices.unused]
-            _check_need(draft, table_key, need._replace(bundles=used), is_required, reason)
+            _check_need(
+                draft, table_key, need._replace(bundles=used), reason, is_required=is_required
+            )
         for model, needed_by_key in NEEDS.items():
             for key, words in needed_by_key.items() if isinstance(table, model) else ():
                 for need in parse_needs(words) if key in written else ():
-                    _check_need(draft, table_key, need, True, key)
+                    _check_need(draft, table_key, need, key, is_required=True)
         for key, reason in choices.unused.items():
             path = f"{table_key}.{key}"
             if key in written and key in REFUSED_KEYS:
@@ -37,7 +39,7 @@ def check_needed_keys(draft: SceneDraft) -> None:
 
 
 def _check_need(
-    draft: SceneDraft, table_key: str, need: Need, is_required: bool, reason: str
+    draft: SceneDraft, table_key: str, need: Need, reason: str, *, is_required: bool
 ) -> None:
     """Report keys of which none is given, or too many."""
 
@@ -55,7 +57,9 @@ def _check_need(
     elif need.bundles and is_required:
         first, *others = used[:1] or need.bundles
         keys = " or ".join(("this key", *map(", ".join, others)))
-        sentence = f"{reason} needs {keys}" if reason else f"{keys} is needed" if others else ""
+        sentence = f"{keys} is needed" if others else ""
+        if reason:
+            sentence = f"{reason} needs {keys}"
         for key in first:
             if not is_written(key):
                 hint = HINTS.get(key, "")

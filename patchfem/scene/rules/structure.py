@@ -6,7 +6,6 @@ from functools import cached_property
 from math import pi, sqrt
 from typing import Any, NamedTuple
 
-from ...effects import describe_unsupported, find_waveform
 from ..keys.removed import REMOVED_NASTRAN
 from ..keys.tables import Tables
 from ..keys.types import advise_on_name
@@ -17,11 +16,7 @@ ARRAY_EXTENSIONS = (".npz", ".mat")
 UNIVERSAL_EXTENSIONS = (".uff", ".unv")
 # File extensions of matrices from finite-element programs, for [structure.reduced].
 NASTRAN_EXTENSIONS = (".op4", ".pch", ".bdf", ".dat")  # files that are no longer read
-MATRIX_EXTENSIONS = (
-    ".mtx",
-    ".mat",
-    ".npz",
-)
+MATRIX_EXTENSIONS = (".mtx", ".mat", ".npz")
 # Largest plausible damping ratio, at which a free oscillation decays to a few per cent within one
 # cycle; a larger value probably has a wrong unit, because 1 % is 0.01.
 MAX_USUAL_DAMPING = 0.5
@@ -115,12 +110,6 @@ class StructureFacts(TableFacts):
         """Whether the scene has a joint."""
         return bool(self.scene.friction or self.interface)
 
-    @property
-    def has_changing_load(self) -> bool:
-        """Whether the normal load of the joint changes."""
-        has_motion = any(mode.normal or mode.pitch for mode in self.mode)
-        return bool(self.scene.normal.amplitude) or has_motion
-
 
 DESCRIPTION_RULES = (
     MissingKeyRule(
@@ -208,36 +197,6 @@ STUCK_RULES = (
         "structure.measured",
         "'stuck' subtracts the stiffness of the joint from the modes, but this scene has no joint; add [friction] and "
         "its load, or leave `measured` out",
-    ),
-    *(
-        MistakeRule(
-            lambda s, is_there=is_there: s.is_stuck and is_there(s),
-            "structure.measured",
-            f"'stuck' cannot be used with {description}, because only modes can be measured with the joint; leave "
-            "`measured` out",
-        )
-        for description, is_there in (
-            ("structure.masses", lambda s: s.has_masses),
-            ("structure.reduced", lambda s: s.reduced),
-        )
-    ),
-    *(
-        MistakeRule(
-            lambda s, is_there=is_there: s.is_stuck and is_there(s),
-            "structure.measured",
-            f"'stuck' cannot be used with {cause}, because the joint then has no single stiffness to subtract from the "
-            "modes; give the modes without the joint",
-        )
-        for cause, is_there in (
-            ("a spring of structure.bonded.wavelength", lambda s: s.bonded.wavelength),
-            ("grooves", lambda s: (s.scene.contact or s.scene.normal).grooves),
-            ("a normal load that changes", lambda s: s.has_changing_load),
-            ("strips that yaw", lambda s: any(mode.yaw for mode in s.mode)),
-            (
-                "[structure.interface.contact]",
-                lambda s: any(face.contact for face in s.interface),
-            ),
-        )
     ),
 )
 REDUCED_RULES = (
@@ -331,7 +290,6 @@ def _check_modes(draft: SceneDraft) -> None:
                 f"structure.mode.{index}.damping",
                 f"= {mode.damping:g} is a damping ratio: 1 means critical damping, and 1 % is written 0.01",
             )
-    _check_instruments(draft, modes)
     _check_base(draft, modes)
 
 
@@ -396,38 +354,13 @@ def describe_default_outputs(tables: Tables) -> list[str]:
     return sentences
 
 
-def _check_instruments(draft: SceneDraft, modes: tuple) -> None:
-    """Report sensors whose motion differs from that of the output, if any key refers to the output."""
-    written = []
-    for index, mode in enumerate(modes):
+def find_instrument_key(draft: SceneDraft) -> str:
+    """Return the key of the first sensor whose motion differs from that of the output, or "" if there is none."""
+    for index, mode in enumerate(draft.values.structure.mode):
         output = default_output(index) if mode.table.output is None else mode.output
         for key in ("accelerometer", "gauge"):
             if getattr(mode.table, key) is not None and mode[key] != output:
-                written.append(f"structure.mode.{index}.{key}")
-    beside = _find_output_dependent_key(draft)
-    if written and beside:
-        draft.add_mistake(
-            written[0],
-            describe_unsupported(
-                f"with {beside}", "give `accelerometer` and `gauge` the value of `output`"
-            ),
-        )
-
-
-def _find_output_dependent_key(draft: SceneDraft) -> str:
-    """Return the key whose effect depends on the motion of the output, or "" if there is none."""
-    for key in ("structure.travel", "structure.stiffening"):
-        if draft.has(key):
-            return key
-    drive = draft.tables.drive
-    if drive is None:
-        return ""
-    if drive.kind == "free":
-        return "drive.kind = 'free'"
-    waveform = find_waveform(drive)
-    is_marched = draft.values.accuracy.method != "harmonic"
-    if is_marched and (waveform.is_swept or waveform.has_levels):
-        return f"drive.waveform = '{drive.waveform}'"
+                return f"structure.mode.{index}.{key}"
     return ""
 
 
@@ -476,14 +409,6 @@ def _check_lateral(draft: SceneDraft, key: str, interface: Any) -> None:
             f"{noun} {shared[0]} is already in `between`; the second direction needs coordinates of its own, which "
             "must move at right angles to the coordinates of `between`",
         )
-    if draft.has("structure.file"):
-        instead = "use structure.masses or [structure.reduced], or leave this key out"
-        draft.add_mistake(key, describe_unsupported("with structure.file", instead))
-    if draft.has("structure.bonded"):
-        instead = "either"
-        if draft.has("structure.masses"):
-            instead = "write a [[structure.spring]] between the same places"
-        draft.add_mistake(key, describe_unsupported("with [structure.bonded]", instead))
 
 
 def _check_mass_number(draft: SceneDraft, key: str, number: int | None) -> None:

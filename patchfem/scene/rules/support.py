@@ -33,8 +33,10 @@ from .methods import (
 )
 from .rule_table import MistakeRule, TableFacts, apply_rules
 from .scene_draft import SceneDraft
+from .structure import find_instrument_key
 from .view import wrap_value
 
+SCENE_FEATURES = ("wear", "stuck", "instruments")  # features that do not depend on a joint
 SINGLE_SUMS = "use 'auto', 'direct' or 'truncated'"
 SUMS = ("direct", "truncated", "merged")  # methods of accuracy.quadrature that sum single bonds
 
@@ -70,6 +72,7 @@ class Joint(TableFacts):
         self.load_change_description = describe_load_change(self.load_change)
         self.grooves = find_climbed_grooves(draft.tables)
         self.yaw = find_yaw_key(draft.tables)
+        self.instrument_key = find_instrument_key(draft)
         self.wave = find_waveform(draft.tables.drive)
 
     def has_trait(self, trait: str) -> bool:
@@ -178,6 +181,18 @@ FEATURES = {
     "harmonics": Feature(lambda j: j.scene.accuracy.harmonics, "accuracy.harmonics"),
     "wear": Feature(lambda j: j.scene.wear and not j.is_interface, "wear"),
     "worn start": Feature(lambda j: j.scene.wear.start, "wear.start"),
+    "stuck": Feature(
+        lambda j: j.scene.structure.measured == "stuck" and not j.is_interface,
+        "structure.measured",
+        "'stuck'",
+    ),
+    "instruments": Feature(lambda j: not j.is_interface and j.instrument_key, "{instrument_key}"),
+    "travel": Feature(lambda j: j.scene.structure.travel, "structure.travel"),
+    "levels or sweep": Feature(
+        lambda j: j.scene.accuracy.method != "harmonic" and (j.wave.is_swept or j.wave.has_levels),
+        "drive.waveform",
+        "drive.waveform = '{scene.drive.waveform}'",
+    ),
     # the load
     "oscillating load": Feature(lambda j: j.scene.normal.amplitude, "normal.amplitude"),
     "moving load": Feature(lambda j: j.load_change[:9] == "structure", "{load_change}"),
@@ -264,6 +279,14 @@ FEATURES = {
     "interlock": Feature(
         lambda j: j.scene.structure.bonded.wavelength, "structure.bonded.wavelength"
     ),
+    "masses": Feature(lambda j: j.scene.structure.masses, "structure.masses"),
+    "reduced": Feature(lambda j: j.scene.structure.reduced, "[structure.reduced]"),
+    "file": Feature(lambda j: j.scene.structure.file, "structure.file"),
+    "bonded": Feature(lambda j: j.scene.structure.bonded, "[structure.bonded]"),
+    "patches": Feature(
+        lambda j: any(face.contact for face in j.scene.structure.interface),
+        "[structure.interface.contact]",
+    ),
     "interfaces": Feature(
         lambda j: j.scene.structure.interface, "structure.interface", "[[structure.interface]]"
     ),
@@ -277,9 +300,16 @@ FEATURES = {
         lambda j: j.is_interface and j.contact, "{patch_key}", "[structure.interface.contact]"
     ),
     "approach": Feature(lambda j: j.contact.approach, "{patch_key}.approach"),
-    "own grooves": Feature(lambda j: j.contact.grooves, "{patch_key}.grooves"),
+    "own grooves": Feature(
+        lambda j: j.contact.grooves or j.scene.normal.grooves, "{patch_key}.grooves"
+    ),
     "plane slide": Feature(lambda j: j.is_interface and j.lateral, "{table_key}.lateral"),
 }
+AT_OUTPUT = "give `accelerometer` and `gauge` the value of `output`"
+ONLY_MODES = "only modes can be measured with the joint: leave `measured` out"
+WITHOUT_JOINT = (
+    "the joint has no single stiffness to subtract from the modes: give the modes without the joint"
+)
 STEADY = "wear is computed from the last cycle of a steady motion: use"
 # Features that no run supports together, and what to do instead: a key of `effects.REMEDIES`, or the advice itself. A
 # mistake is reported at the key of the first feature.
@@ -351,6 +381,20 @@ SUPPORT = (
     ("wear, rig, release", f"{STEADY} kind 'base' or 'force'"),
     ("wear, rig, transient", f"{STEADY} waveform 'sine'"),
     ("wear, rig, harmonic", "use 'auto', 'exact' or 'march'"),
+    ("stuck, masses", ONLY_MODES),
+    ("stuck, reduced", ONLY_MODES),
+    ("stuck, interlock", WITHOUT_JOINT),
+    ("stuck, own grooves", WITHOUT_JOINT),
+    ("stuck, oscillating load", WITHOUT_JOINT),
+    ("stuck, moving load", WITHOUT_JOINT),
+    ("stuck, yaw", WITHOUT_JOINT),
+    ("stuck, patches", WITHOUT_JOINT),
+    ("instruments, travel", AT_OUTPUT),
+    ("instruments, stiffening", AT_OUTPUT),
+    ("instruments, release", AT_OUTPUT),
+    ("instruments, levels or sweep", AT_OUTPUT),
+    ("plane slide, file", "use structure.masses or [structure.reduced], or leave this key out"),
+    ("plane slide, bonded", "either"),
     ("wear, averaged", "leave out [wear] or use law 'coulomb'"),
 )
 # Features that a slide in two directions on a bench does not support, with what to do instead.
@@ -408,7 +452,9 @@ def check_combinations(draft: SceneDraft, kind: str) -> None:
         for names, instead in SUPPORT:
             first, *others = names.split(", ")
             key = FEATURES[first].key
-            if not there.issuperset((first, *others)) or not (joint.is_read or first == "wear"):
+            if not there.issuperset((first, *others)) or not (
+                joint.is_read or first in SCENE_FEATURES
+            ):
                 continue
             if key not in reported:
                 beside = " and ".join(filter(None, map(_name_feature, others)))
