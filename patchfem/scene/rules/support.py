@@ -300,8 +300,9 @@ FEATURES = {
         lambda j: j.is_interface and j.contact, "{patch_key}", "[structure.interface.contact]"
     ),
     "approach": Feature(lambda j: j.contact.approach, "{patch_key}.approach"),
-    "own grooves": Feature(
-        lambda j: j.contact.grooves or j.scene.normal.grooves, "{patch_key}.grooves"
+    "own grooves": Feature(lambda j: j.contact.grooves, "{patch_key}.grooves"),
+    "grooved faces": Feature(
+        lambda j: j.contact.grooves or j.scene.normal.grooves, "contact.grooves", "grooves"
     ),
     "plane slide": Feature(lambda j: j.is_interface and j.lateral, "{table_key}.lateral"),
 }
@@ -384,7 +385,7 @@ SUPPORT = (
     ("stuck, masses", ONLY_MODES),
     ("stuck, reduced", ONLY_MODES),
     ("stuck, interlock", WITHOUT_JOINT),
-    ("stuck, own grooves", WITHOUT_JOINT),
+    ("stuck, grooved faces", WITHOUT_JOINT),
     ("stuck, oscillating load", WITHOUT_JOINT),
     ("stuck, moving load", WITHOUT_JOINT),
     ("stuck, yaw", WITHOUT_JOINT),
