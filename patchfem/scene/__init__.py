@@ -47,7 +47,7 @@ PUBLIC = {
         "UNIT_FACTORS",
         "parse_quantity",
     ),
-    "keys.removed": ("describe_removed_option",),
+    "keys.removed": ("describe_removed",),
     "keys.tables": (
         "Drive",
         "Friction",

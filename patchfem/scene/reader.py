@@ -9,7 +9,6 @@ from typing import Any
 from pydantic import ValidationError
 
 from . import suggestions
-from .keys import removed
 from .keys.lookup import (
     LIMITS_BY_ERROR_TYPE,
     KeyDefinition,
@@ -18,6 +17,7 @@ from .keys.lookup import (
     format_for_message,
     is_table_or_value,
 )
+from .keys.removed import describe_removed
 from .keys.tables import Tables
 from .keys.types import (
     Table,
@@ -124,8 +124,8 @@ def _report_unknown(
     path = f"{table_key}.{key}" if table_key else key
     # The number of an item, as in structure.mode.0, is no part of the name of its keys.
     name = ".".join(piece for piece in path.split(".") if not piece.isdecimal())
-    if name in removed.REMOVED_KEYS:
-        draft.add_mistake(path, removed.REMOVED_KEYS[name])
+    if removed := describe_removed(name):
+        draft.add_mistake(path, removed)
         return
     is_table = _is_table(raw[key])
     known = list(attributes_by_key(model))

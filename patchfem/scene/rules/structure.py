@@ -6,7 +6,7 @@ from functools import cached_property
 from math import pi, sqrt
 from typing import Any, NamedTuple
 
-from ..keys.removed import REMOVED_NASTRAN
+from ..keys.removed import describe_removed
 from ..keys.tables import Tables
 from ..keys.types import advise_on_name
 from .rule_table import MissingKeyRule, MistakeRule, RemarkRule, TableFacts, apply_rules
@@ -449,7 +449,8 @@ def _check_matrix_files(draft: SceneDraft) -> None:
             extension = find_file_extension(file)
             advice = advise_on_name(extension, MATRIX_EXTENSIONS)
             if extension in NASTRAN_EXTENSIONS:
-                advice = f"{REMOVED_NASTRAN}; {advice}"
+                removed = describe_removed("files of Nastran", "reading files of Nastran")
+                advice = f"{removed}; {advice}"
             draft.add_mistake(
                 f"structure.reduced.{key}", f"the name ends in '{extension}'; {advice}"
             )
