@@ -3,7 +3,7 @@
 _OTHER_METHOD = "use 'march' (studies/integrators compares the methods)"
 _WITHOUT_KEY = "use method 'march' without it"
 # Version that removed a key, a value (key=value), files or an option of a verb, and what to use instead.
-REMOVED = {
+REMOVED_NAMES = {
     "accuracy.method=duhamel": ("1.0", _OTHER_METHOD),
     "accuracy.method=newmark": ("1.0", _OTHER_METHOD),
     "accuracy.method=euler": ("1.0", _OTHER_METHOD),
@@ -57,11 +57,11 @@ def describe_removed(name: str, shown: str = "this key") -> str:
     Parameters
     ----------
     name : str
-        Key of REMOVED, such as "accuracy.method=euler" or "profile --tip".
+        Key of REMOVED_NAMES, such as "accuracy.method=euler" or "profile --tip".
     shown : str
         What the sentence calls it, such as "profile --tip" or, in Python, "profile: tip".
     """
-    if name not in REMOVED:
+    if name not in REMOVED_NAMES:
         return ""
-    version, instead = REMOVED[name]
+    version, instead = REMOVED_NAMES[name]
     return f"{shown} was removed in patchfem {version}; {instead}"

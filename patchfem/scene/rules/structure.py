@@ -177,15 +177,13 @@ FILE_RULES = (
         "a universal file has nodes, not masses; use slide_at with [friction]",
     ),
 )
-BONDED_RULES = (
+JOINT_RULES = (
     MistakeRule(
         lambda s: s.bonded and s.has_masses and s.n_interfaces != 1,
         "structure.bonded",
         "applies only to a single contact, but there are {n_interfaces} interfaces; instead write a "
         "[[structure.spring]] between the masses of the interface",
     ),
-)
-STUCK_RULES = (
     MistakeRule(
         lambda s: s.measured_joint and not s.is_stuck,
         "structure.measured_joint",
@@ -239,8 +237,7 @@ def check_structure(draft: SceneDraft) -> None:
         _check_matrix_files(draft)
         _check_mass_pair(draft, "structure.reduced.slide", structure.reduced.slide)
         apply_rules(draft, REDUCED_RULES, facts)
-    apply_rules(draft, BONDED_RULES, facts)
-    apply_rules(draft, STUCK_RULES, facts)
+    apply_rules(draft, JOINT_RULES, facts)
     if structure.start is not None:
         _check_start(draft)
 

@@ -311,7 +311,7 @@ ONLY_MODES = "only modes can be measured with the joint: leave `measured` out"
 WITHOUT_JOINT = (
     "the joint has no single stiffness to subtract from the modes: give the modes without the joint"
 )
-STEADY = "wear is computed from the last cycle of a steady motion: use"
+STEADY_ADVICE = "wear is computed from the last cycle of a steady motion: use"
 # Features that no run supports together, and what to do instead: a key of `effects.REMEDIES`, or the advice itself. A
 # mistake is reported at the key of the first feature.
 SUPPORT = (
@@ -379,8 +379,8 @@ SUPPORT = (
         "leave out [wear] or describe a single interface by [friction] and [normal]",
     ),
     ("wear, moving load", "leave out [wear] or this key"),
-    ("wear, rig, release", f"{STEADY} kind 'base' or 'force'"),
-    ("wear, rig, transient", f"{STEADY} waveform 'sine'"),
+    ("wear, rig, release", f"{STEADY_ADVICE} kind 'base' or 'force'"),
+    ("wear, rig, transient", f"{STEADY_ADVICE} waveform 'sine'"),
     ("wear, rig, harmonic", "use 'auto', 'exact' or 'march'"),
     ("stuck, masses", ONLY_MODES),
     ("stuck, reduced", ONLY_MODES),
