@@ -155,7 +155,7 @@ def _reject_removed_options(function: Callable) -> Callable:
         """Call the function, unless a keyword is a removed option."""
         verb = function.__name__
         for name in keywords:
-            if sentence := removed.describe_removed_option(verb, f"--{name}", f"{verb}: {name}"):
+            if sentence := removed.describe_removed(f"{verb} --{name}", f"{verb}: {name}"):
                 raise PatchfemError(sentence)
         return function(*args, **keywords)
 

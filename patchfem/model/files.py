@@ -13,7 +13,7 @@ from ..exceptions import PatchfemError
 from ..inputs import measured
 from ..mesh import files
 from ..scene.files import file_exists, list_named_files
-from ..scene.rules import limits
+from ..scene.rules import support
 from . import (
     drive,
     earlier_wear,
@@ -140,7 +140,7 @@ def _check_profile(path: Path, tables, *, is_valid: bool) -> tuple:
 def _check_slide(path: Path, tables, *, is_valid: bool) -> None:
     """Check that the friction law and the contact can follow a path, including lateral motion."""
     has_lateral = len(slide.read_path_file(path)) == 3
-    if is_valid and has_lateral and (reason := limits.find_lateral_slide_obstacle(tables)):
+    if is_valid and has_lateral and (reason := support.find_lateral_slide_obstacle(tables)):
         raise PatchfemError(reason)
 
 

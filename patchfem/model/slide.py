@@ -10,7 +10,7 @@ import numpy as np
 from ..core import Missing, PatchfemError
 from ..inputs import slides
 from ..scene.keys.quantities import UNIT_FACTORS
-from ..scene.rules.limits import find_lateral_slide_obstacle
+from ..scene.rules.support import find_lateral_slide_obstacle
 from .file_cache import cache_by_file
 
 # Smallest number of steps per straight leg; the coarsest run of the

@@ -39,7 +39,6 @@ SIZES = {  # Constant -> description of the quantity that it bounds.
     "inputs.cells.MAX_BYTES": "bytes of a text file with a table",
     "inputs.records.MAX_BYTES": "bytes of a laboratory file",
     "inputs.matlab.MAX_BYTES": "bytes of a .mat file",
-    "inputs.matlab5.MAX_NUMBERS": "number of elements of one variable in a .mat file",
     "mesh.files.MAX_FILE_BYTES": "bytes of a mesh file",
     "surface.files.content.MAX_BYTES": "bytes of the file of a scan, also after decompression",
     "surface.files.table.MAX_LENGTH": "length of a trace [m]",
