@@ -14,8 +14,6 @@ interface under a constant load. Optional features are:
 - `pieces`: the event-driven engine with several elements that stick or slip;
 - `harmonic`: harmonic balance;
 - `grooves`: grooves whose flanks the surfaces climb;
-- `plane`: an interface of a rig that slides in two directions;
-- `two-directions`: a bench that slides in two directions.
 
 Traits of laws:
 
@@ -218,7 +216,7 @@ EFFECTS = {
         "laws.elastic_plastic",
         "F' = k v, |F| <= mu N (3.12, corrected for reversals), k = stiffness or mu N/bond_length",
         ("bond_length|stiffness", ""),
-        "shear joints varying-load harmonic pieces grooves plane",
+        "shear joints varying-load harmonic pieces grooves",
         "timeless",
     ),
     "friction.law=nonlocal": _make_law(
@@ -229,7 +227,7 @@ EFFECTS = {
             "kinetic reading order rest_growth slip_growth rest_speed "
             "initial_bonds breakaway spread temperature",
         ),
-        "shear joints varying-load harmonic two-directions grooves",
+        "shear joints varying-load harmonic grooves",
         "bonds",
     ),
     "friction.law=convolution": _make_law(

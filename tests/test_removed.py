@@ -10,6 +10,7 @@ from command_line import run_cli
 from scene_texts import COATED, COULOMB, DRIVE, MODE, NONLOCAL, POINT, TRIANGLE
 
 import patchfem as pf
+from patchfem.inputs import read_slide
 from patchfem.mesh import read_pieces
 from patchfem.scene.keys import removed
 from patchfem.surface import read_surface
@@ -20,6 +21,18 @@ GROOVED = (
 )
 WORN = COATED + COULOMB + TRIANGLE + '[wear]\ncoefficient = "1e-15 1/Pa"\ncycles = 100\n'
 BONDS = POINT + NONLOCAL + MODE + DRIVE
+FILES = 'stiffness = "{0}"\nmass = "m.mtx"\nboundary = [1]\nmodes = 1\n'
+MASSES = """[structure]
+masses = ["1 kg", "1 kg"]
+[[structure.spring]]
+between = [1, 0]
+stiffness = "1 kN/m"
+[[structure.interface]]
+between = [1, 2]
+law = "coulomb"
+static = 0.3
+load = "10 N"
+"""
 
 
 def load(text: str, keys: dict, folder) -> None:
@@ -55,6 +68,13 @@ def export_script(folder) -> None:
     """Export the results of a patch as a script for ParaView."""
     results = pf.run(COATED, **{"accuracy.tolerance": 0.05}).save(folder / "out")
     pf.export(results, folder / "play.py")
+
+
+def read_two_directions(folder) -> None:
+    """Read a prescribed slide with a column of a second direction."""
+    path = folder / "path.csv"
+    path.write_text("time [s],displacement [m],lateral [m]\n0,0,0\n1,1,1\n", "utf-8")
+    read_slide(path)
 
 
 def write_rig(folder):
@@ -134,6 +154,19 @@ TRIED = {  # removed feature -> (function that uses it, replacement that the mes
     "export of a script for ParaView": (export_script, "write .pvd for older versions"),
     "profile(tip=)": (partial(call, pf.profile, "tip"), "compare the tip radius with"),
     "report(measured=)": (partial(call, pf.report, "measured"), "`patchfem import FILE"),
+    "backbone by decay": (
+        lambda folder: pf.backbone(write_rig(folder), method="decay"),
+        'drive.kind = "free"',
+    ),
+    "matrix of Nastran": (
+        lambda folder: pf.load(f"[structure.reduced]\n{FILES.format('k.op4')}{DRIVE}"),
+        "use one of .mtx, .mat, .npz",
+    ),
+    "structure.interface.lateral": (
+        lambda folder: pf.load(f"{MASSES}lateral = [2, 1]\n{DRIVE}"),
+        "an interface slides along x alone",
+    ),
+    "slide in two directions": (read_two_directions, "leave out the column"),
     ".unv mesh": (partial(read_file, read_pieces, "pair.unv"), "use .med or .msh"),
 }
 

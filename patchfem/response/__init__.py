@@ -130,7 +130,6 @@ PUBLIC = {
         "error_floor",
         "find_definition",
         "larger_term",
-        "lateral_work",
         "remove_interface_number",
         "set_final_floors",
         "stick_fraction",

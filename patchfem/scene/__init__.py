@@ -73,7 +73,6 @@ PUBLIC = {
         "has_effect",
         "list_fixed_settings",
     ),
-    "rules.support": ("find_lateral_slide_obstacle",),
     "rules.methods": (
         "ENGINE_SUPPORT",
         "EngineSupport",

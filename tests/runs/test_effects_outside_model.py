@@ -3,7 +3,7 @@ off the piece."""
 
 import numpy as np
 import pytest
-from scene_texts import COATED, COULOMB, MODE, NONLOCAL, PIECE
+from scene_texts import COATED, COULOMB, MODE, PIECE
 
 from patchfem import plan
 from patchfem.runs.run import run
@@ -77,18 +77,6 @@ def test_exact_warning_states_contact_length_of_tilted_patch():
     length = float(warning.partition("contact length ")[2].split(" mm")[0])
     fraction = result.measures["contact_fraction"].value
     assert 0.2 < fraction < 0.9 and length == pytest.approx(12.7 * fraction, abs=0.5)
-
-
-def test_exact_lateral_slide_beyond_width_leaves_contact(tmp_path):
-    """A lateral slide beyond the width has the outcome leaves_contact."""
-    for across, outcome in ((12.6, "done"), (12.8, "leaves_contact")):
-        path = tmp_path / "path.csv"
-        path.write_text(f"time [s],displacement [um],lateral [mm]\n0,0,0\n1,5,{across}\n", "utf-8")
-        law = NONLOCAL.replace("1 um", "1 mm")
-        assert (
-            run_text(COATED + law + f'[slide]\nkind = "file"\nfile = "{path}"\n', False).outcome
-            == outcome
-        )
 
 
 @pytest.mark.share(1, 2)

@@ -166,13 +166,6 @@ RUN = (
         caption="Last cycles: resultant of the frictional shear stress.",
     ),
     Chart(
-        "Friction force across the sliding direction",
-        "time",
-        ("lateral_force",),
-        span="cycles",
-        caption="Last cycles: second component of the friction force of an interface in a plane.",
-    ),
-    Chart(
         "Steady motions",
         "curve_frequency",
         ("curve_amplitude",),

@@ -135,7 +135,6 @@ def collect_motion_features(model: Model, *, steady: bool = False) -> methods.Mo
         rig.friction.strips_slide_apart,
         spring,
         waveform,
-        is_plane=rig.modes.lateral_faces is not None,
     )
 
 

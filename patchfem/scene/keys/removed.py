@@ -15,6 +15,10 @@ REMOVED_NAMES = {
         "1.0",
         "leave it out: contact and wear are always solved together in each jump",
     ),
+    "structure.interface.lateral": (
+        "2.0",
+        "leave it out: an interface slides along x alone",
+    ),
     "structure.mode.lateral": (
         "1.1",
         "no run could use it; leave it out: the patch slides along x alone",

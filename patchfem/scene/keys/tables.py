@@ -207,8 +207,7 @@ class Slide(Table):
     )
     file: key(
         Text | None,
-        "table with the columns time and displacement; a third column, lateral, makes the slide "
-        "two-dimensional",
+        "table with the columns time and displacement",
     ) = None
 
 
@@ -309,13 +308,6 @@ class Interface(Friction):
         "numbers of the two masses that rub, counted from 1; 0 is the base; the slide is the motion "
         "of the first mass minus the motion of the second",
     )
-    lateral: key(
-        MassPair | None,
-        "for an interface that slides in a plane: numbers of a second pair of masses or "
-        "boundary coordinates; the motion of the first minus the motion of the second is the slide "
-        "perpendicular to the slide of the pair `between`; the friction force, which is the resultant of both "
-        "directions, is at most `static` times `load`",
-    ) = None
     load: key(
         Force | None,
         "normal force on the interface; a patch, [structure.interface.contact], may be given in "

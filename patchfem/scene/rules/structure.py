@@ -372,8 +372,6 @@ def _check_masses(draft: SceneDraft) -> None:
     for name in ("spring", "damper", "interface"):
         for index, item in enumerate(getattr(structure, name) or ()):
             _check_mass_pair(draft, f"structure.{name}.{index}.between", item.between)
-    for index, interface in enumerate(structure.interface or ()):
-        _check_lateral(draft, f"structure.interface.{index}.lateral", interface)
     _check_mass_number(draft, "structure.output_mass", structure.output_mass)
 
 
@@ -392,29 +390,13 @@ def _check_mass_pair(draft: SceneDraft, key: str, pair: tuple | None) -> None:
         _check_mass_number(draft, key, number)
 
 
-def _check_lateral(draft: SceneDraft, key: str, interface: Any) -> None:
-    """Report a second direction that has a coordinate in common with the first or cannot be used."""
-    pair = interface.lateral
-    _check_mass_pair(draft, key, pair)
-    if pair is None:
-        return
-    shared = sorted({*pair} & {*(interface.between or ())} - {0})
-    if shared:
-        noun = CoordinateNumbers.from_structure(draft.tables.structure).noun
-        draft.add_mistake(
-            key,
-            f"{noun} {shared[0]} is already in `between`; the second direction needs coordinates of its own, which "
-            "must move at right angles to the coordinates of `between`",
-        )
-
-
 def _check_mass_number(draft: SceneDraft, key: str, number: int | None) -> None:
     """Report the number of a mass that does not exist."""
     coordinates = CoordinateNumbers.from_structure(draft.tables.structure)
     if coordinates.number is None or number is None or number <= coordinates.number:
         return
     base = ""
-    if key.endswith(("between", "lateral", "slide")):
+    if key.endswith(("between", "slide")):
         base = "; 0 stands for the base"
     draft.add_mistake(
         key,

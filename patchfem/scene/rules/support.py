@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 
 from ...effects import (
     LAWS,
-    REMEDIES,
     describe_law,
     describe_unsupported,
     find_waveform,
@@ -23,7 +22,7 @@ from ...effects import (
     suggest_laws,
 )
 from ..keys.contact import Contact
-from ..keys.tables import Friction, Tables
+from ..keys.tables import Friction
 from .methods import (
     check_method,
     describe_load_change,
@@ -101,13 +100,6 @@ class Joint(TableFacts):
     def grooves_advice(self) -> str:
         """Advice on a friction law that does not support grooves."""
         return suggest_laws("grooves", friction=self.table)
-
-    @property
-    def plane_advice(self) -> str:
-        """Advice on a friction law that does not support motion in two directions."""
-        if self.has_trait("set-valued"):
-            return REMEDIES["stiff"]
-        return f"{suggest_laws('plane')}, or leave lateral out"
 
     @property
     def needs_list(self) -> bool:
@@ -223,10 +215,6 @@ FEATURES = {
         "{law_description}",
     ),
     "one interface": Feature(lambda j: j.lacks("joints"), "{table_key}.law", "{law_description}"),
-    "one direction": Feature(lambda j: j.lacks("plane"), "{table_key}.law", "{law_description}"),
-    "straight slide": Feature(
-        lambda j: j.lacks("two-directions"), "{table_key}.law", "law '{law}'"
-    ),
     "flat faces": Feature(
         lambda j: not j.needs_list and j.lacks("grooves"), "{table_key}.law", "law '{law}'"
     ),
@@ -304,7 +292,6 @@ FEATURES = {
     "grooved faces": Feature(
         lambda j: j.contact.grooves or j.scene.normal.grooves, "contact.grooves", "grooves"
     ),
-    "plane slide": Feature(lambda j: j.is_interface and j.lateral, "{table_key}.lateral"),
 }
 AT_OUTPUT = "give `accelerometer` and `gauge` the value of `output`"
 ONLY_MODES = "only modes can be measured with the joint: leave `measured` out"
@@ -362,8 +349,6 @@ SUPPORT = (
     ("one interface, others", "{joints_advice}"),
     ("one interface, patch", "{joints_advice}"),
     ("no elements, compliance", f"leave out {{compliance}}, or {suggest_laws('pieces', 'shear')}"),
-    ("plane slide, one direction", "{plane_advice}"),
-    ("plane slide, patch", "give the interface a load, or leave lateral out"),
     ("approach, interface", "give contact.load instead"),
     ("own grooves, interface", "out"),
     (
@@ -394,19 +379,8 @@ SUPPORT = (
     ("instruments, stiffening", AT_OUTPUT),
     ("instruments, release", AT_OUTPUT),
     ("instruments, levels or sweep", AT_OUTPUT),
-    ("plane slide, file", "use structure.masses or [structure.reduced], or leave this key out"),
-    ("plane slide, bonded", "either"),
     ("wear, averaged", "leave out [wear] or use law 'coulomb'"),
 )
-# Features that a slide in two directions on a bench does not support, with what to do instead.
-LATERAL_SUPPORT = {
-    "straight slide": suggest_laws("two-directions"),
-    "spread": REMEDIES["either"],
-    "breakaway": REMEDIES["either"],
-    "compliance": REMEDIES["either"],
-    "lower shape": REMEDIES["shapes"],
-    "oscillating load": REMEDIES["either"],
-}
 JOINT_RULES = (
     MistakeRule(
         lambda j: j.kind == "rig" and j.yaw and not j.contact.strips,
@@ -481,18 +455,3 @@ def _check_shape_sides(joint: Joint) -> None:
             f"{names} on different pieces", "put all shapes on one piece"
         )
         joint.draft.add_mistake(key, message)
-
-
-def find_lateral_slide_obstacle(tables: Tables) -> str:
-    """Return why a bench cannot follow a path file with lateral motion, or "" if it can."""
-    draft = SceneDraft("", {}, {})
-    draft.tables = tables
-    joint = Joint(draft, "friction", tables.friction, tables.contact, "bench")
-    for name, instead in LATERAL_SUPPORT.items():
-        feature = FEATURES[name]
-        if feature.is_there(joint):
-            words = _name_feature(name).format_map(joint)
-            return describe_unsupported(
-                f"a lateral column with {words}", f"{instead}, or leave the lateral column out"
-            )
-    return ""
