@@ -15,8 +15,6 @@ A law is a number in `return_maps_kernels.Law` with a branch in each of five fun
 # Names that other folders use, by module.
 PUBLIC = {
     "case_rows": ("Cases", "Number"),
-    "cases": ("CaseMarch", "list_parameters", "march_cases"),
     "contacts": ("Contact",),
-    "laws": ("make_point_law",),
     "march": ("Motion",),
 }

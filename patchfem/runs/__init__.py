@@ -90,15 +90,12 @@ PUBLIC = {
         "tabulate_static_motions",
         "make_laws_on_mesh",
         "estimate_mesh_error",
-        "estimate_decay_mesh_errors",
-        "describe_unknown_mesh_errors",
         "compute_static_curve",
         "with_automatic_method",
     ),
     "rig.engines": (
         "ENGINES",
         "PIECES",
-        "SMOOTH",
         "collect_motion_features",
     ),
     "rig.numerics": ("choose_numerics",),
@@ -107,7 +104,6 @@ PUBLIC = {
         "find_drive_and_knee",
         "stuck_stiffnesses",
     ),
-    "rig.solve": ("solve_rig",),
     "run": (
         "StateFile",
         "is_march",

@@ -12,7 +12,7 @@ from patchfem.response import (
     locate_reversals,
     make_half_cycles,
 )
-from patchfem.runs import estimate_decay_mesh_errors
+from patchfem.runs.rig.decays import estimate_decay_mesh_errors
 
 RELEASED = DRIVE[: DRIVE.index("kind")] + 'kind = "free"\ndisplacement = "2 mm"\ncycles = 30\n'
 
