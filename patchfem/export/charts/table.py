@@ -491,8 +491,7 @@ COMPARE = (
         ("depth", "hidden_depth"),
         marks=("track_end",),
         labels=("", "worn depth"),
-        caption="Depth of the surface after wear below the one before. Band: 95 % noise of a single depth. Vertical "
-        "lines: ends of the worn parts.",
+        caption="Depth of the surface after wear below the one before. Vertical lines: ends of the worn parts.",
     ),
     Chart(
         "Both traces, each about its own line",

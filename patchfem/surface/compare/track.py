@@ -237,8 +237,8 @@ def measure_track(section: Section, span: tuple[int, int]) -> Track:
         "step": _average(section, "step", start.value + width / 3, end.value - width / 3),
         "area_gross": _bound("area_gross", area, error),
     }
-    left = _measure_pile_up(section, "pile_up_left", start.value - width, start.value)
-    right = _measure_pile_up(section, "pile_up_right", end.value, end.value + width)
+    left = _measure_pile_up(section, "pile_up_left", start.value, -width)
+    right = _measure_pile_up(section, "pile_up_right", end.value, width)
     piled = left.value + right.value
     piled_error = float(np.hypot(left.high - left.value, right.high - right.value)) / SIDE
     values |= {
@@ -287,8 +287,27 @@ def _measure_floor(section: Section, start: float, width: float) -> Quantity:
     return max(parts, key=lambda part: part.value)
 
 
-def _measure_pile_up(section: Section, name: str, first: float, last: float) -> Quantity:
-    """Return the area above the first surface between two places."""
-    inside = (section.x >= first) & (section.x <= last) & section.grown
-    area, error = section.integrate(inside, -1.0) if inside.any() else (0.0, 0.0)
+def _measure_pile_up(section: Section, name: str, end: float, width: float) -> Quantity:
+    """Return the area above the first surface beside a track.
+
+    The flanks of the ridge, which are too low to be found as grown, count as well: the one towards the track, and one of
+    the same length behind the ridge.
+
+    Parameters
+    ----------
+    section : Section
+    name : str
+    end : float
+        End of the track [m].
+    width : float
+        Length [m] beside the track that is searched, negative before the track.
+    """
+    low, high = sorted((end, end + width))
+    side = (section.x >= low) & (section.x <= high)
+    grown = section.x[side & section.grown]
+    if not grown.size:
+        return _bound(name, 0.0, 0.0)
+    flank = float(np.abs(grown - end).min())
+    inside = side & (section.x >= grown.min() - flank) & (section.x <= grown.max() + flank)
+    area, error = section.integrate(inside, -1.0)
     return _bound(name, area, error)
