@@ -79,21 +79,14 @@ def test_exact_run_loads_folders_of_its_scene(write_scene, tmp_path, kind):
     assert {name for name in PHYSICS if has_code_of(modules, name)} == set(folders.split())
 
 
-@pytest.fixture(scope="module", autouse=True)
-def reference_cell_cache():
-    """Store the matrices of the reference cells on disk, as the first run with scikit-fem does."""
-    code = "from patchfem.elasticity.tensor_stiffness import tensor_stencil as f; f([0, 1], [0, 1], [1], [1])"
-    subprocess.run([sys.executable, "-c", code], check=True)
-
-
 PATCH_KEYS = "elasticity.mortar surface"
 RIG_KEYS = {"structure.bonded", "hybrid.periodic"}
 MODULES_OF_SCENES = {  # run from Python -> text of the scene, modules that are loaded, modules that are not
     "patch": (
         PATCH,
-        "contact.unilateral mesh.tensor",
+        "contact.unilateral mesh.grid",
         "compiled contact.asperity_laws contact.strips contact.conjugate_gradients elasticity.mortar "
-        "elasticity.substructure elasticity.fronts elasticity.recovery export mesh.anymesh response scipy skfem",
+        "elasticity.recovery export mesh.pieces mesh.checks response scipy skfem",
     ),
     "skin": (
         PATCH + '[contact.asperities]\nlaw = "exponential"\ndecay_length = "1 um"\n',

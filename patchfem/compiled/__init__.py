@@ -57,7 +57,6 @@ PACKAGE_FOLDER = Path(__file__).parents[1]  # folder of the package
 # Modules of tuples that kernels take and of row numbers; they belong to the hash because the
 # machine code depends on the order of the fields and on the numbers.
 TUPLE_MODULES = (
-    "contact/batch/arrays.py",
     "contact/set_arrays.py",
     "dynamics/grooves/arrays.py",
     "dynamics/interfaces/arrays.py",
@@ -68,6 +67,8 @@ TUPLE_MODULES = (
     "dynamics/events/modal_system.py",
     "dynamics/events/elements.py",
     "hybrid/records.py",
+    "points/case_rows.py",
+    "points/march_rows.py",
 )
 # State of the environment variable that makes numba run all kernels as Python.
 IS_JIT_DISABLED = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")

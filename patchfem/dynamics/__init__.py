@@ -142,7 +142,6 @@ PUBLIC = {
         "JointsModel",
         "make_cubic_spring",
         "make_interlocking_spring",
-        "pair_plane_joints",
     ),
     "march.lane_rows": (
         "LANES",

@@ -82,11 +82,6 @@ PUBLIC = {
     ),
     "laws.iwan": ("max_yield_displacement",),
     "laws.lugre": ("LuGre",),
-    "laws.plane_kernels": (
-        "advance_straight",
-        "solve_plane_step",
-        "update_plane_memory",
-    ),
     "laws.stretch": (
         "growth_numbers",
         "points_element",

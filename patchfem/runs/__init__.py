@@ -90,8 +90,6 @@ PUBLIC = {
         "tabulate_static_motions",
         "make_laws_on_mesh",
         "estimate_mesh_error",
-        "estimate_decay_mesh_errors",
-        "describe_unknown_mesh_errors",
         "compute_static_curve",
         "with_automatic_method",
     ),
@@ -106,7 +104,6 @@ PUBLIC = {
         "find_drive_and_knee",
         "stuck_stiffnesses",
     ),
-    "rig.solve": ("solve_rig",),
     "run": (
         "StateFile",
         "is_march",

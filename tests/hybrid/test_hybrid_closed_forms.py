@@ -45,7 +45,7 @@ def test_free_block_stops_after_six_half_cycles():
         np.pi * np.arange(1, 7), abs=1e-10
     )
     assert motion.final.y[0, 0] == pytest.approx(-0.5, abs=1e-10)
-    assert abs(motion.final.y[0, 1]) < 1e-20
+    assert abs(motion.final.y[0, 1]) < 1e-16  # round-off of the projection on the constraint
 
 
 def test_rest_under_static_above_kinetic_friction_is_exact():

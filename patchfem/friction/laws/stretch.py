@@ -10,23 +10,16 @@ CONSTANT_LENGTH_FLAG = -1.0  # value in place of a_s that marks a constant bond 
 
 
 def growth_numbers(law: Bonds) -> np.ndarray:
-    """Return the parameters (6,) of bond growth and breakaway as an array for compiled code.
+    """Return the parameters (6,) or (6, c) of bond growth and breakaway as an array for compiled code.
 
     They are a_s [m s-2], or -1 for a constant bond length, l_k [m], v_h [m/s], eps_0 [m], eps_k [m] and the fraction of
     the bond length that stretches without damage.
     """
-    if not law.has_growth:
-        return np.array([CONSTANT_LENGTH_FLAG, 1.0, 1.0, law.length, law.length, law.breakaway])
-    return np.array(
-        [
-            law.rest_growth,
-            law.slip_growth,
-            law.rest_speed,
-            law.length,
-            law.ratio * law.length,
-            law.breakaway,
-        ]
-    )
+    growth = (CONSTANT_LENGTH_FLAG, 1.0, 1.0, law.length, law.length, law.breakaway)
+    if law.has_growth:
+        rates = law.rest_growth, law.slip_growth, law.rest_speed
+        growth = (*rates, law.length, law.ratio * law.length, law.breakaway)
+    return np.array(np.broadcast_arrays(*growth))
 
 
 def points_element(law: Bonds, area, sigma, pattern=None) -> Element:

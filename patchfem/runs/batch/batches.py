@@ -97,8 +97,6 @@ BATCH_FAILURE_NOTE = (
 )
 # Batches in order of preference: the first one that supports a model computes it.
 BATCHES: tuple[Batch, ...] = (
-    Batch("patches", "patch", compile_seconds=6.0, takes_columns=True, min_chunk_cases=2048),
-    Batch("benches", "bench", cost_fraction=0.4, min_chunk_cases=64),
     Batch(
         "lumped.lanes",
         "rig",

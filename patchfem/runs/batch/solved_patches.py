@@ -1,9 +1,7 @@
 """Batches in two stages: the static contact problems of the patches, then the motions.
 
 In: models of a group, and the functions of a batch that build the contact models and compute the
-motions. Out: `CaseResults`. Patches with equal pieces are solved together
-(`runs.patch.static_batch`), others as in single runs. A case that the batch cannot complete is
-computed by a single run.
+motions. Out: `CaseResults`. A case that the batch cannot complete is computed by a single run.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -24,7 +22,7 @@ from ..results.travel import check_pieces_overlap, warn_of_large_slide
 from ..rig.engines import describe_unused_settings
 from ..rig.motion_warnings import warn_of_law
 from ..rig.numerics import choose_numerics
-from . import one_by_one, patches
+from . import one_by_one
 from .case_results import CaseResults
 
 NONE: Mapping = MappingProxyType({})  # no settings or error sources to report
@@ -77,13 +75,15 @@ def solve(
     report : callable, optional
         Callback for progress messages.
     """
-    return patches.solve_patches_then_motions(
-        models, batch.cases_per_call, lambda part: _solve_cases(part, batch, report)
-    )
+    results = CaseResults.blank(len(models))
+    for first in range(0, len(models), batch.cases_per_call):
+        part = list(models[first : first + batch.cases_per_call])
+        results.insert(range(first, first + len(part)), _solve_cases(part, batch, report))
+    return results
 
 
 def _solve_cases(models: list, batch: PatchBatch, report: Callable | None) -> CaseResults:
-    """Compute the motions of models whose patches are already solved."""
+    """Solve the patches of models, then compute their motions."""
     begin = perf_counter()
     results = CaseResults.blank(len(models))
     solved_cases = {}

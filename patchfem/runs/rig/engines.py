@@ -120,7 +120,6 @@ def collect_motion_features(model: Model, *, steady: bool = False) -> methods.Mo
         spring,
         waveform,
         lower_shape=model.side if model.side == "lower" else "",
-        is_plane=rig.modes.lateral_faces is not None,
     )
 
 

@@ -49,8 +49,7 @@ def make_contact(model: Model, numerics: Numerics, patch):
         If the law cannot be combined with other joints.
     """
     rig = model.rig
-    lateral_rows = model.rig.modes.lateral_faces
-    has_joints = len(rig.modes.interfaces) > 1 or lateral_rows is not None
+    has_joints = len(rig.modes.interfaces) > 1
     if model.grooves is not None:
         load = patch.pressure.load if patch is not None else model.point.load
         return rigid.make_climbing_model(model, load, patch, numerics.shear_modes)
@@ -63,10 +62,6 @@ def make_contact(model: Model, numerics: Numerics, patch):
     if has_joints:
         elements = _make_independent_elements(model, numerics, patch)
         all_joints = [joints.Joint(k, element) for k, element in enumerate(elements)]
-    if lateral_rows is not None:
-        is_lateral = [bool(interface.lateral) for interface in rig.friction.interfaces]
-        all_joints = joints.pair_plane_joints(all_joints, is_lateral)
-        rows += [row for row, lateral in zip(lateral_rows, is_lateral) if lateral]
     if rig.springs.interlock is not None:
         all_joints.append(joints.make_interlocking_spring(0, *rig.springs.interlock))
     if rig.springs.cubic is not None:

@@ -124,9 +124,6 @@ def mode_frequencies(rig, chain: dict) -> list:
     modes = rig.modes
     rows = rig.modes.interfaces
     stiffness = stuck_stiffnesses(rig, chain)
-    if modes.lateral_faces is not None:
-        rows = np.concatenate([rows, modes.lateral_faces])
-        stiffness = np.tile(stiffness, 2)
     has_names = rig.structure.lists_modes and modes.shapes is None
     frequencies = []
     for k, omega in enumerate(modes.omega):

@@ -42,7 +42,6 @@ class MotionFeatures(NamedTuple):
     - waveform: NO_WAVEFORM of a release and of the sine of a response curve.
     - drive: the table [drive].
     - lower_shape: shape that moves the pressure with the lower piece, such as "contact.crown.on = 'lower'".
-    - is_plane: whether an interface slides in two directions.
     """
 
     joints: list[Joint]
@@ -52,7 +51,6 @@ class MotionFeatures(NamedTuple):
     waveform: Waveform
     drive: Any = None
     lower_shape: str = ""
-    is_plane: bool = False
 
     @property
     def compliance(self) -> str:
@@ -92,7 +90,6 @@ FEATURE_FINDERS = {
     "spring": lambda motion: (
         f"with {motion.spring}" if motion.spring and not motion.has_grooves else ""
     ),
-    "plane": lambda motion: "with structure.interface.lateral" if motion.is_plane else "",
     "faces": lambda motion: "with several interfaces" if len(motion.joints) > 1 else "",
     "levels": lambda motion: "with waveform 'levels'" if motion.waveform.has_levels else "",
     "pressed": lambda motion: motion.load_change if _is_pressed_by_motion(motion) else "",
@@ -221,7 +218,6 @@ def find_motion_features(tables: Tables, kind: str) -> MotionFeatures:
         waveform=find_waveform(tables.drive),
         drive=tables.drive,
         lower_shape=f"{lower[0]} = 'lower'" if lower else "",
-        is_plane=any(getattr(law, "lateral", None) is not None for law in laws),
     )
 
 

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 from lane_cases import PATCH, draw_patches, draw_points
-from scene_texts import SMALL_PATCH
 
 import patchfem as pf
 from patchfem.runs import with_shared_meshes
@@ -38,8 +37,6 @@ def build_variants(text: str, key: str, values) -> list:
 
 
 MODELS = {  # Name of the batch: function that builds its models.
-    "patches": lambda: build_variants(SMALL_PATCH, "contact.load", (50.0, 60.0, 70.0)),
-    "benches": lambda: build_variants(SHEARED_BENCH, "slide.amplitude", (2e-6, 3e-6)),
     "lumped.lanes": lambda: draw_points("coulomb", 7, 64),
     "lumped.lumped": lambda: draw_points("coulomb", 7, 4),
     # The pressure is the same in all cases, so one patch is solved for all.
@@ -86,17 +83,13 @@ def test_exact_every_batch_has_models():
 
 @pytest.mark.parametrize("name", MODELS)
 def test_always_batch_solves_its_cases_together(name, single_runs):
-    """At most a quarter of the cases, which stick or vibrate freely, run one by one; all patches of
-    benches are pressed together."""
+    """At most a quarter of the cases, which stick or vibrate freely, run one by one."""
     models = MODELS[name]()
     assert batches.choose_batch(models[0], len(models)).name == name
     messages = []
     results = batches.solve_models(models, report=messages.append)
     assert not [line for line in messages if "one by one" in line]
-    if name == "benches":
-        assert all(plan.model.patch.solved is not None for plan in single_runs)
-    else:
-        assert len(single_runs) <= 0.25 * len(models)
+    assert len(single_runs) <= 0.25 * len(models)
     if name in LANE_BATCHES:
         engines = [numerics["engine"] for numerics in results.numerics.values()]
         assert engines.count("lanes") > 0.7 * len(models)

@@ -1,0 +1,581 @@
+"""Many cases of one mode and one contact point in a compiled loop.
+
+A step moves the mode exactly under a parabola of the drive and a friction force that is constant or linear
+in time, with the mean of the law (`return_maps_kernels`); errors are of order 2 to 3. A step in which the velocity
+changes its sign, or a rigid point is released, is halved up to LEVELS times, because a law takes the net increment as
+its path; events of a rigid point are then located by linear interpolation. A motion that repeats is not computed again.
+"""
+
+from math import cos, inf, nan, sin
+
+import numpy as np
+
+from ..compiled.jit import njit
+from ..friction.flags_kernels import NJIT_KERNEL
+from .case_rows import Now, Number, Seen
+from .return_maps_kernels import Law, MeanForce, Step, advance, mean_force, prepare, read
+
+LEVELS = 5  # halvings of a step that contains an event
+TICKS = 1 << LEVELS  # shortest steps in a step
+TAYLOR_TERMS = 12  # of the exponential of a shortest step, whose product with any rate is below 0.1
+MAX_ITERATIONS = 60  # Newton steps and bisections for the increment of a step
+RESIDUAL = 1e-10  # residual of a step relative to its increments
+SAME_CYCLE = (
+    1e-8  # change between two cycles relative to the range of the motion, below which it repeats
+)
+GAUSS_POINT = (
+    0.7745966692414834  # sqrt(3/5), distance of the outer points of Gauss's rule from the middle
+)
+# Distance of the mean force from the mean of the forces at both ends of a step, relative to the force of the drive and to
+# the squared phase of a whole step, above which the step is halved
+MAX_FORCE_BEND = 0.3
+FULL_STICK = 1e-9  # fraction of the slide below which its irreversible or elastic part is round-off
+N_READ = 2  # measured cycles of a motion that repeats
+
+
+@njit(**NJIT_KERNEL)
+def write_responses(damping, stiffness, step, table):
+    """Write the responses (LEVELS + 1, 2, 5) of slide and velocity in a step and its halves.
+
+    The columns belong to slide and velocity at the start, and to accelerations 1, t and t^2/2. The exponential of the
+    shortest step is a Taylor series; that of a step of twice the length is its square.
+    """
+    shortest = step / TICKS
+    for column in range(5):
+        # Derivatives of the motion that starts with a unit of this column.
+        term = 1.0 if column == 0 else 0.0
+        rate = 1.0 if column == 1 else 0.0
+        table[LEVELS, 0, column] = term
+        table[LEVELS, 1, column] = rate
+        factor = 1.0
+        for k in range(1, TAYLOR_TERMS):
+            force = 1.0 if column == k + 1 else 0.0
+            term, rate = rate, force - damping * rate - stiffness * term
+            factor *= shortest / k
+            table[LEVELS, 0, column] += factor * term
+            table[LEVELS, 1, column] += factor * rate
+    for level in range(LEVELS, 0, -1):
+        h = step / (1 << level)
+        half = table[level]
+        for row in range(2):
+            for column in range(5):
+                total = half[row, 0] * half[0, column] + half[row, 1] * half[1, column]
+                if column > 1:
+                    # Polynomials of the second half are shifted by h.
+                    total += half[row, column]
+                    if column > 2:
+                        total += h * half[row, column - 1]
+                    if column == 4:
+                        total += 0.5 * h * h * half[row, 2]
+                table[level - 1, row, column] = total
+
+
+@njit(**NJIT_KERNEL)
+def solve_step(free, response, h, case, now, numbers, memory, j):
+    """Solve dq = free - response of F for the slide of a step by Newton's method in a bracket.
+
+    Over the step F(t) is linear with the time mean F_m and the change D from its value at the start. As the slide is
+    nearly the parabola through its ends with the velocities v0 and v1, F_m is the path mean plus K h (v0 - v1)/12 with
+    the secant K = D/dq of the elastic force; so steps without a kink of the law are of order 4.
+
+    Returns
+    -------
+    (float, float, float, float)
+        Increment [m], velocity at the end [m/s], path-mean force [N], and its distance from the mean of the forces at both
+        ends [N].
+    """
+    mobility = case[Number.MOBILITY]
+    beta = response[0, 2] * mobility
+    gamma = response[1, 2] * mobility
+    tilt = (response[0, 3] / h - 0.5 * response[0, 2]) * mobility
+    velocity_tilt = (response[1, 3] / h - 0.5 * response[1, 2]) * mobility
+    load = case[Number.LOAD]
+    start = now[Now.VELOCITY]
+    follows_path = numbers[0, j] != Law.TANH
+    # The mean force is extrapolated from that of the last step and the force at its end.
+    force = 2 * now[Now.FORCE] - now[Now.MEAN]
+    dq = free[0] - beta * force
+    end = free[1] - gamma * force
+    low = -inf
+    high = inf
+    change = 0.0
+    mean = MeanForce(0.0, 0.0, 0.0, 0.0, 0.0)
+    for _ in range(MAX_ITERATIONS):
+        mean = mean_force(numbers, memory, j, load, Step(dq, h, start, end, gamma))
+        force = mean.force
+        time_mean = force
+        change = mean.end - now[Now.FORCE]
+        elastic = mean.bend if numbers[0, j] == Law.LUGRE else change
+        if follows_path and dq != 0 and start != end:
+            bend = h / 12 * (start - end)
+            if start * end < 0:
+                # The part of the path that is not retraced, as the secant loses its meaning at a reversal.
+                bend *= abs((start + end) / (start - end))
+            time_mean += elastic / dq * bend
+        residual = dq - free[0] + beta * time_mean + tilt * change
+        if abs(residual) <= RESIDUAL * (abs(free[0]) + abs(dq)):
+            break
+        if residual > 0:
+            high = dq
+        else:
+            low = dq
+        # The force at the end changes twice as much as the mean, the time mean two thirds as much if it follows the path.
+        slope = mean.by_increment + gamma / beta * mean.by_velocity
+        weight = beta * (2 / 3 if time_mean != force else 1.0)
+        slope = 1 + slope * (weight + (2 * tilt if mean.by_increment != 0 else 0.0))
+        dq -= residual / slope if slope > 0 else residual
+        if not low < dq < high:
+            dq = 0.5 * (low + high) if high - low < inf else free[0] - beta * force
+        # Velocity and displacement at the end differ from the free ones by the same mean force.
+        end = free[1] - gamma / beta * (free[0] - dq - tilt * change) - velocity_tilt * change
+    bend = mean.bend if not follows_path else force - now[Now.FORCE] - 0.5 * change
+    return dq, end, force, bend
+
+
+@njit(**NJIT_KERNEL)
+def end_at_event(q, v, h, hold, case, now, numbers, memory, j):
+    """Resolve the event of a Coulomb point inside a shortest step, with slide q and velocity v at its end.
+
+    `hold` is the force that would keep the point at rest at the end of the step.
+    """
+    mobility = case[Number.MOBILITY]
+    load = case[Number.LOAD]
+    direction = memory[0, j]
+    slip_force = numbers[2, j] * load
+    rest_force = numbers[1, j] * load
+    if direction == 0:
+        # Release: the force falls to that of slip at a fraction of the step.
+        first = abs(now[Now.FORCE])
+        fraction = (rest_force - first) / (abs(hold) - first) if abs(hold) > first else 1.0
+        fraction = min(max(fraction, 0.0), 1.0)
+        now[Now.EVENT] = fraction
+        rest = (1 - fraction) * h
+        memory[0, j] = 1.0 if hold > 0 else -1.0
+        now[Now.VELOCITY] = mobility * (hold - memory[0, j] * slip_force) * rest
+        now[Now.SLIDE] += 0.5 * now[Now.VELOCITY] * rest
+        return
+    fraction = now[Now.VELOCITY] / (now[Now.VELOCITY] - v)
+    now[Now.EVENT] = fraction
+    rest = (1 - fraction) * h
+    if abs(hold) <= rest_force:
+        memory[0, j] = 0.0
+        now[Now.SLIDE] += 0.5 * now[Now.VELOCITY] * fraction * h
+        now[Now.VELOCITY] = 0.0
+        return
+    # Reversal: for the rest of the step the force has the other sign.
+    memory[0, j] = -direction
+    change = 2 * mobility * direction * slip_force * rest
+    now[Now.SLIDE] = q + 0.5 * change * rest
+    now[Now.VELOCITY] = v + change
+
+
+@njit(**NJIT_KERNEL)
+def try_step(waves, h, response, is_shortest, max_bend, case, now, numbers, memory, j):
+    """Advance a case by a step, or return False if the step contains an event and can be halved.
+
+    `waves` are the sines of the drive at the start, in the middle and at the end; `max_bend` [N] is the largest difference
+    of the mean force from the mean of the forces at both ends, above which the law has a corner in the step.
+    """
+    now[Now.EVENT] = -1.0
+    drive = case[Number.DRIVE]
+    q = now[Now.SLIDE]
+    v = now[Now.VELOCITY]
+    slope = drive * (4 * waves[1] - 3 * waves[0] - waves[2]) / h
+    curvature = drive * 4 * (waves[0] - 2 * waves[1] + waves[2]) / (h * h)
+    constant = drive * waves[0]
+    row = response[0]
+    free = row[0] * q + row[1] * v + row[2] * constant + row[3] * slope + row[4] * curvature - q
+    row = response[1]
+    free_velocity = (
+        row[0] * q + row[1] * v + row[2] * constant + row[3] * slope + row[4] * curvature
+    )
+    is_rigid = numbers[0, j] == Law.COULOMB
+    mobility = case[Number.MOBILITY]
+    load = case[Number.LOAD]
+
+    if is_rigid:
+        direction = memory[0, j]
+        force = direction * numbers[2, j] * load
+        if direction == 0:
+            hold = (drive * waves[2] - case[Number.STIFFNESS] * q) / mobility
+            if abs(hold) > numbers[1, j] * load:
+                if is_shortest:
+                    end_at_event(q, v, h, hold, case, now, numbers, memory, j)
+                return is_shortest
+            now[Now.MEAN] = 0.5 * (now[Now.FORCE] + hold)
+            return True
+        dq = free - response[0, 2] * mobility * force
+        end = free_velocity - response[1, 2] * mobility * force
+    else:
+        prepare(numbers, memory, j, Step(0.0, h, v, v, 0.0))
+        dq, end, force, bend = solve_step(
+            (free, free_velocity), response, h, case, now, numbers, memory, j
+        )
+        # A law takes the net increment of a reversal inside the step as its path.
+        turns = v * end < 0 and numbers[0, j] != Law.TANH
+        if (turns or abs(bend) > max_bend) and not is_shortest:
+            return False
+    if is_rigid and memory[0, j] * end < 0:
+        if is_shortest:
+            hold = (drive * waves[2] - case[Number.STIFFNESS] * (q + dq)) / mobility
+            now[Now.MEAN] = force
+            end_at_event(q + dq, end, h, hold, case, now, numbers, memory, j)
+        return is_shortest
+    first = 0.0
+    if v * end < 0 and numbers[0, j] != Law.TANH:
+        # The extreme lies where a linear velocity is 0.
+        fraction = v / (v - end)
+        now[Now.EVENT] = fraction
+        first = 0.5 * v * fraction * h
+        advance(numbers, memory, j, load, Step(first, fraction * h, v, 0.0, 0.0))
+        h -= fraction * h
+        v = 0.0
+    advance(numbers, memory, j, load, Step(dq - first, h, v, end, response[1, 2] * mobility))
+    now[Now.SLIDE] = q + dq
+    now[Now.VELOCITY] = end
+    now[Now.MEAN] = force
+    return True
+
+
+@njit(**NJIT_KERNEL)
+def find_force(wave, case, now, numbers, memory, j):
+    """Write the friction force and the irreversible slide at the end of a step."""
+    state = read(numbers, memory, j, case[Number.LOAD])
+    now[Now.FORCE] = state.force
+    now[Now.SLIP] = now[Now.SLIDE] - state.stretch
+    if numbers[0, j] == Law.COULOMB and memory[0, j] == 0:
+        hold = case[Number.DRIVE] * wave - case[Number.STIFFNESS] * now[Now.SLIDE]
+        now[Now.FORCE] = hold / case[Number.MOBILITY]
+
+
+@njit(**NJIT_KERNEL)
+def add_energies(waves, h, case, start, now):
+    """Add the energies per mass of a step; integrals of the velocity by Simpson's rule."""
+    middle = 1.5 * (now[Now.SLIDE] - start[0]) / h - 0.25 * (start[1] + now[Now.VELOCITY])
+    end = now[Now.VELOCITY]
+    power = case[Number.DRIVE] * h / 6
+    work = power * (waves[0] * start[1] + 4 * waves[1] * middle + waves[2] * end)
+    now[Now.WORK_IN] += work
+    now[Now.POWER] += abs(work)
+    squares = start[1] * start[1] + 4 * middle * middle + end * end
+    now[Now.VISCOUS] += case[Number.DAMPING] * h / 6 * squares
+    now[Now.FRICTION] += case[Number.MOBILITY] * now[Now.MEAN] * (now[Now.SLIDE] - start[0])
+    energy = 0.5 * (end * end + case[Number.STIFFNESS] * now[Now.SLIDE] * now[Now.SLIDE])
+    now[Now.STORED] = max(now[Now.STORED], energy)
+
+
+@njit(**NJIT_KERNEL)
+def observe_extremes(h, law, start, now, seen, observes):
+    """Update the extremes of the slide in the cycle, and the friction forces there."""
+    q = now[Now.SLIDE]
+    force = now[Now.FORCE]
+    if start[1] * now[Now.VELOCITY] < 0 or (start[1] != 0 and now[Now.VELOCITY] == 0):
+        # The velocity is linear near a reversal.
+        fraction = start[1] / (start[1] - now[Now.VELOCITY])
+        q = start[0] + 0.5 * start[1] * fraction * h
+        force = start[2] + fraction * (now[Now.FORCE] - start[2])
+        if law == Law.TANH:
+            force = 0.0
+        elif now[Now.FORCE] * start[2] < 0:
+            force = 0.5 * (start[2] + now[Now.FORCE])
+        elif now[Now.VELOCITY] == 0:
+            force = nan  # rigid friction at rest takes many values
+    if q > now[Now.MAX]:
+        now[Now.MAX] = q
+        if observes:
+            seen[Seen.FORCE_AT_MAX] = force
+    if q < now[Now.MIN]:
+        now[Now.MIN] = q
+        if observes:
+            seen[Seen.FORCE_AT_MIN] = force
+
+
+@njit(**NJIT_KERNEL)
+def find_acceleration(sine, q, v, force, case):
+    """Return the absolute acceleration at the output."""
+    a = case[Number.DRIVE] * sine - case[Number.DAMPING] * v - case[Number.STIFFNESS] * q
+    return case[Number.OUTPUT] * (a - case[Number.MOBILITY] * force) + case[Number.BASE] * sine
+
+
+@njit(**NJIT_KERNEL)
+def observe_acceleration(waves, h, case, start, now, seen):
+    """Update the largest acceleration: that of a parabola through both ends and the middle, or beside an event."""
+    q = now[Now.SLIDE]
+    v = now[Now.VELOCITY]
+    last = find_acceleration(waves[2], q, v, now[Now.FORCE], case)
+    peak = abs(last)
+    if now[Now.EVENT] >= 0:
+        sine = waves[0] + now[Now.EVENT] * (waves[2] - waves[0])
+        before = find_acceleration(sine, q, 0.0, start[2], case)
+        after = find_acceleration(sine, q, 0.0, now[Now.FORCE], case)
+        peak = max(peak, abs(before), abs(after))
+    else:
+        first = find_acceleration(waves[0], start[0], start[1], start[2], case)
+        q_middle = 0.5 * (start[0] + q) + h / 8 * (start[1] - v)
+        v_middle = 1.5 * (q - start[0]) / h - 0.25 * (start[1] + v)
+        # The force in the middle has the mean of the step by Simpson's rule.
+        force = 1.5 * now[Now.MEAN] - 0.25 * (start[2] + now[Now.FORCE])
+        middle = find_acceleration(waves[1], q_middle, v_middle, force, case)
+        bend = first - 2 * middle + last
+        tilt = last - first
+        peak = max(peak, abs(first))
+        if abs(tilt) < 2 * abs(bend):
+            peak = max(peak, abs(middle - tilt * tilt / (8 * bend)))
+    seen[Seen.MAX_ACCELERATION] = max(seen[Seen.MAX_ACCELERATION], peak)
+
+
+@njit(**NJIT_KERNEL)
+def observe_harmonics(time, h, omega, start, now, seen):
+    """Add the integrals of the slide, a cubic in the step, by Gauss's rule with three points."""
+    q = now[Now.SLIDE]
+    v = now[Now.VELOCITY]
+    for k in range(3):
+        s = 0.5 + 0.5 * GAUSS_POINT * (k - 1)
+        weight = h * (4 / 9 if k == 1 else 5 / 18)
+        rest = 1 - s
+        value = start[0] + s * s * (3 - 2 * s) * (q - start[0])
+        value = weight * (value + h * s * rest * (rest * start[1] - s * v))
+        c = cos(omega * (time + s * h))
+        w = sin(omega * (time + s * h))
+        seen[Seen.COS_1] += value * c
+        seen[Seen.SIN_1] += value * w
+        seen[Seen.COS_3] += value * c * (4 * c * c - 3)
+        seen[Seen.SIN_3] += value * w * (3 - 4 * w * w)
+        seen[Seen.LAST_MEAN] += value
+    seen[Seen.SPAN] += h
+
+
+@njit(**NJIT_KERNEL)
+def observe_stick(time, h, omega, is_rigid, start, now, seen):
+    """Add the time of stick, in which less than half of the slide is irreversible.
+
+    The irreversible fraction is interpolated between the middles of steps.
+    """
+    dq = now[Now.SLIDE] - start[0]
+    event = now[Now.EVENT]
+    path = abs(dq)
+    excess = -0.5
+    if event >= 0 and is_rigid:
+        # The point stops, is released or turns.
+        moves_first = event if start[1] != 0 else 0.0
+        moves_last = 1 - event if now[Now.VELOCITY] != 0 else 0.0
+        excess += moves_first + moves_last
+    elif path > 0:
+        if event >= 0:
+            first = 0.5 * start[1] * event * h
+            path = abs(first) + abs(dq - first)
+        excess += abs(now[Now.SLIP] - start[3]) / path
+    centre = time + 0.5 * h
+    elapsed = centre - seen[Seen.MIDDLE]
+    last = seen[Seen.EXCESS]
+    if seen[Seen.SPAN] == h:
+        last = excess
+    sticking = 0.0
+    if last < 0 and excess < 0:
+        sticking = elapsed
+    elif last < 0 or excess < 0:
+        # The law changes at once if it sticks or slips completely in one of both steps, else gradually.
+        before = elapsed - 0.5 * h
+        part = last / (last - excess)
+        crossing = 2 * part * before if part < 0.5 else before + (part - 0.5) * h
+        if 0.5 - abs(last) < FULL_STICK:
+            crossing = before + (0.5 - abs(excess)) * h
+        elif 0.5 - abs(excess) < FULL_STICK:
+            crossing = 2 * before * abs(last)
+        sticking = crossing if last < 0 else elapsed - crossing
+        if last < 0:
+            angle = 2 * omega * (seen[Seen.MIDDLE] + crossing)
+            seen[Seen.STARTS] += 1
+            seen[Seen.START_COS] += cos(angle)
+            seen[Seen.START_SIN] += sin(angle)
+    seen[Seen.STUCK] += sticking
+    seen[Seen.STICK] = sticking + (seen[Seen.STICK] if last < 0 else 0.0)
+    seen[Seen.LONGEST_STICK] = max(seen[Seen.LONGEST_STICK], seen[Seen.STICK])
+    seen[Seen.MIDDLE] = centre
+    seen[Seen.EXCESS] = excess
+
+
+@njit(**NJIT_KERNEL)
+def observe_forces(start, now, seen):
+    """Add the extremes of force and slip, and the friction work."""
+    dq = now[Now.SLIDE] - start[0]
+    seen[Seen.MAX_FORCE] = max(seen[Seen.MAX_FORCE], abs(now[Now.FORCE]))
+    seen[Seen.MIN_SLIP] = min(seen[Seen.MIN_SLIP], now[Now.SLIP])
+    seen[Seen.MAX_SLIP] = max(seen[Seen.MAX_SLIP], now[Now.SLIP])
+    seen[Seen.WORK] += now[Now.MEAN] * dq
+    seen[Seen.SAMPLED] += 0.5 * (start[2] + now[Now.FORCE]) * dq
+    seen[Seen.PASSED] += abs(now[Now.MEAN] * dq)
+
+
+@njit(**NJIT_KERNEL)
+def start_window(now, seen):
+    """Start the observation of the last cycles."""
+    seen[:] = 0.0
+    seen[Seen.MIN_SLIP] = seen[Seen.MAX_SLIP] = now[Now.SLIP]
+    seen[Seen.START_SLIDE] = now[Now.SLIDE]
+    seen[Seen.START_VELOCITY] = now[Now.VELOCITY]
+
+
+@njit(**NJIT_KERNEL)
+def end_cycle(now, seen, history):
+    """Record extremes and phasor of a cycle, and those that belong to the window."""
+    history[0] = now[Now.MIN]
+    history[1] = now[Now.MAX]
+    history[2] = now[Now.COS]
+    history[3] = now[Now.SIN]
+    change = now[Now.MAX] - now[Now.MIN]
+    seen[Seen.RANGE] += change
+    secant = (seen[Seen.FORCE_AT_MAX] - seen[Seen.FORCE_AT_MIN]) / change
+    if change > 0 and secant == secant:
+        seen[Seen.SECANT] += secant
+        seen[Seen.N_SECANTS] += 1
+    if seen[Seen.N_CYCLES] == 0:
+        seen[Seen.FIRST_MEAN] = seen[Seen.LAST_MEAN]
+    seen[Seen.N_CYCLES] += 1
+
+
+@njit(**NJIT_KERNEL)
+def repeats(omega, now):
+    """Return whether a motion is that of the cycle before, whose end is then replaced."""
+    size = SAME_CYCLE * (now[Now.MAX] - now[Now.MIN])
+    force = SAME_CYCLE * abs(now[Now.MEAN])
+    is_same = (
+        abs(now[Now.SLIDE] - now[Now.LAST_SLIDE]) <= size
+        and abs(now[Now.VELOCITY] - now[Now.LAST_VELOCITY]) <= omega * size
+        and abs(now[Now.FORCE] - now[Now.LAST_FORCE]) <= force
+    )
+    now[Now.LAST_SLIDE] = now[Now.SLIDE]
+    now[Now.LAST_VELOCITY] = now[Now.VELOCITY]
+    now[Now.LAST_FORCE] = now[Now.FORCE]
+    return is_same
+
+
+@njit(**NJIT_KERNEL)
+def rotate(waves, k, part):
+    """Return the sine of the sum of two tabulated angles."""
+    return waves[0, k] * waves[1, part] + waves[1, k] * waves[0, part]
+
+
+@njit(**NJIT_KERNEL)
+def rotate_cosine(waves, k, part):
+    """Return the cosine of the sum of two tabulated angles."""
+    return waves[1, k] * waves[1, part] - waves[0, k] * waves[0, part]
+
+
+@njit(**NJIT_KERNEL)
+def march_cycle(steps, table, waves, observes, case, now, numbers, memory, j, seen):
+    """March a case over a cycle; `waves` are those of `march_cases`."""
+    omega = case[Number.OMEGA]
+    step = 2 * np.pi / omega / steps
+    max_bend = (
+        MAX_FORCE_BEND * (omega * step) ** 2 * abs(case[Number.DRIVE]) / case[Number.MOBILITY]
+    )
+    level = 0
+    tick = 0
+    start = (0.0, 0.0, 0.0, 0.0)
+    now[Now.MIN] = now[Now.MAX] = now[Now.SLIDE]
+    now[Now.COS] = now[Now.SIN] = 0.0
+    while tick < steps * TICKS:
+        size = TICKS >> level
+        h = step / (1 << level)
+        time = tick * (step / TICKS)
+        if level == 0:
+            k = 2 * (tick // TICKS)
+            drive = waves[0, k], waves[0, k + 1], waves[0, k + 2]
+            cosines = waves[1, k], waves[1, k + 2]
+        else:
+            # Rotation from the last whole step; the half steps of a step in TICKS parts are the last columns.
+            k = 2 * (tick // TICKS)
+            first = 2 * steps + 1 + 2 * (tick % TICKS)
+            drive = (
+                rotate(waves, k, first),
+                rotate(waves, k, first + size),
+                rotate(waves, k, first + 2 * size),
+            )
+            cosines = rotate_cosine(waves, k, first), rotate_cosine(waves, k, first + 2 * size)
+        start = now[Now.SLIDE], now[Now.VELOCITY], now[Now.FORCE], now[Now.SLIP]
+        if not try_step(
+            drive, h, table[level], level == LEVELS, max_bend, case, now, numbers, memory, j
+        ):
+            level += 1
+            continue
+
+        find_force(drive[2], case, now, numbers, memory, j)
+        add_energies(drive, h, case, start, now)
+        now[Now.COS] += 0.5 * h * (start[0] * cosines[0] + now[Now.SLIDE] * cosines[1])
+        now[Now.SIN] += 0.5 * h * (start[0] * drive[0] + now[Now.SLIDE] * drive[2])
+        observe_extremes(h, numbers[0, j], start, now, seen, observes)
+        if observes:
+            observe_forces(start, now, seen)
+            observe_acceleration(drive, h, case, start, now, seen)
+            observe_harmonics(time, h, omega, start, now, seen)
+            observe_stick(time, h, omega, numbers[0, j] == Law.COULOMB, start, now, seen)
+        tick += size
+        if level > 0 and tick % (2 * size) == 0:
+            level -= 1
+
+
+@njit(cache=True, **NJIT_KERNEL)
+def march_cases(steps, waves, parameters, numbers, memory, nows, seens, histories, table):
+    """March cases over their cycles.
+
+    Parameters
+    ----------
+    steps : int
+        Steps per cycle.
+    waves : (2, 2 steps + 2 TICKS + 2) array
+        Sines and cosines of the drive at half steps of a cycle, and at half of the shortest steps of a step.
+    parameters, numbers, memory
+        See `case_rows.Cases`; the memory is changed.
+    nows : (c, 19), seens : (c, 30), histories : (c, n, 4) array
+        State, observations, and extremes and phasor of every cycle; output.
+    table : (LEVELS + 1, 2, 5) array
+        Workspace.
+    """
+    for j in range(parameters.shape[0]):
+        case = parameters[j]
+        now = nows[j]
+        seen = seens[j]
+        omega = case[Number.OMEGA]
+        n_cycles = int(case[Number.CYCLES])
+        first = n_cycles - int(case[Number.WINDOW])
+        write_responses(
+            case[Number.DAMPING], case[Number.STIFFNESS], 2 * np.pi / omega / steps, table
+        )
+        now[Now.SLIDE] = case[Number.SLIDE]
+        now[Now.VELOCITY] = case[Number.VELOCITY]
+        if numbers[0, j] == Law.COULOMB and now[Now.VELOCITY] != 0:
+            memory[0, j] = 1.0 if now[Now.VELOCITY] > 0 else -1.0
+        find_force(0.0, case, now, numbers, memory, j)
+        now[Now.STORED] = 0.5 * (
+            now[Now.VELOCITY] ** 2 + case[Number.STIFFNESS] * now[Now.SLIDE] ** 2
+        )
+        cycle = 0
+        while cycle < n_cycles:
+            observes = cycle >= first
+            if cycle == first:
+                start_window(now, seen)
+            sums = now[Now.WORK_IN], now[Now.POWER], now[Now.VISCOUS], now[Now.FRICTION]
+            if observes:
+                seen[Seen.LAST_MEAN] = 0.0
+                seen[Seen.MIDDLE] -= 2 * np.pi / omega if seen[Seen.N_CYCLES] > 0 else 0.0
+            march_cycle(steps, table, waves, observes, case, now, numbers, memory, j, seen)
+            end_cycle(now, seen, histories[j, cycle])
+            is_same = repeats(omega, now)
+            cycle += 1
+            if is_same and not observes and cycle < n_cycles - N_READ:
+                # The cycles up to the last ones are repetitions of this one.
+                n_skipped = n_cycles - N_READ - cycle
+                for k in range(cycle, cycle + n_skipped):
+                    for column in range(4):
+                        histories[j, k, column] = histories[j, cycle - 1, column]
+                now[Now.WORK_IN] += n_skipped * (now[Now.WORK_IN] - sums[0])
+                now[Now.POWER] += n_skipped * (now[Now.POWER] - sums[1])
+                now[Now.VISCOUS] += n_skipped * (now[Now.VISCOUS] - sums[2])
+                now[Now.FRICTION] += n_skipped * (now[Now.FRICTION] - sums[3])
+                cycle += n_skipped
+                first = cycle
+        now[Now.ELASTIC] = read(numbers, memory, j, case[Number.LOAD]).energy
+        if seen[Seen.EXCESS] < 0:
+            # The second half of the last step
+            seen[Seen.STUCK] += 2 * np.pi / omega - seen[Seen.MIDDLE]

@@ -1,0 +1,203 @@
+"""Motion of many cases of one mode and one contact point, and their measures."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .. import compiled
+from ..core import ModalBasis, SineDrive
+from .case_kernels import LEVELS, TICKS
+from .case_rows import Cases, Now, Number, Seen
+
+FULL_STICK = 1e-12  # fraction of the time below which slip is round-off
+MIN_ALIGNMENT = 0.95  # resultant of the phases of slip starts below which they have no common phase
+MIN_ACCELERATION = 1e-9  # first harmonic [m s-2] below which it has no distortion
+MIN_SLIDE_RANGE = 1e-15  # range of the slide [m] below which the contact is at rest
+
+
+class CaseMarch(NamedTuple):
+    """Results of c cases.
+
+    - values: measures (c,) by name; NaN where a case does not have the measure
+    - extremes (c, n, 2), phasors (c, n): of the output in every cycle [m]
+    - repeats (c,): whether the motion has become periodic
+    - longest_stick (c,): duration of the longest stick in the measured cycles [s]
+    """
+
+    values: dict[str, np.ndarray]
+    extremes: np.ndarray
+    phasors: np.ndarray
+    repeats: np.ndarray
+    longest_stick: np.ndarray
+
+
+def list_parameters(
+    modes: ModalBasis, drive: SineDrive, load, cycles: int, window: int, start=None
+) -> tuple:
+    """Return the columns of `Cases.parameters`, in the order of `Number`.
+
+    Parameters
+    ----------
+    modes : ModalBasis
+        Of one mode that moves the contact; its numbers may be arrays (c,).
+    drive : SineDrive
+    load : float or (c,)
+        Normal load [N].
+    cycles, window : int
+        Number of cycles, and of the last of them that are measured.
+    start : core.InitialState, optional
+    """
+    slide, output = modes.slide[0], modes.output[0]
+    return (
+        modes.damping_matrix[0, 0],
+        modes.omega[0] ** 2,
+        -slide * modes.base[0] * drive.acceleration,
+        slide**2 / modes.mass,
+        drive.omega,
+        load,
+        output / slide,
+        drive.acceleration * drive.moving,
+        slide * (start.z[0] if start is not None else 0.0),
+        slide * (start.v[0] if start is not None else 0.0),
+        cycles,
+        window,
+    )
+
+
+def march_cases(cases: Cases, steps: int) -> CaseMarch:
+    """Run cases with a number of steps per cycle, and compute their measures.
+
+    Parameters
+    ----------
+    cases : Cases
+        With the same number of cycles.
+    steps : int
+        Whole steps per cycle; steps with an event are halved.
+    """
+    n = len(cases.parameters)
+    columns = cases.parameters.T
+    phase = (
+        np.pi / steps * np.concatenate([np.arange(2 * steps + 1), np.arange(2 * TICKS + 1) / TICKS])
+    )
+    now = np.zeros((n, len(Now)))
+    seen = np.zeros((n, len(Seen)))
+    history = np.zeros((n, int(columns[Number.CYCLES].max(initial=0)), 4))
+    compiled.load("points.case_kernels").march_cases(
+        steps, np.array([np.sin(phase), np.cos(phase)]), cases.parameters, cases.numbers,
+        cases.memory.copy(), now, seen, history, np.zeros((LEVELS + 1, 2, 5)),
+    )  # fmt: skip
+
+    output = columns[Number.OUTPUT][:, None]
+    phasors = (history[..., 2] - 1j * history[..., 3]) * columns[Number.OMEGA][:, None] / np.pi
+    with np.errstate(all="ignore"):
+        return CaseMarch(
+            compute_measures(cases, now, seen, history),
+            np.sort(history[..., :2] * output[..., None], axis=-1),
+            phasors * output,
+            seen[:, Seen.N_CYCLES] < columns[Number.WINDOW],
+            seen[:, Seen.LONGEST_STICK],
+        )
+
+
+def compute_measures(cases: Cases, now, seen, history) -> dict:
+    """Return the measures (c,) of a sweep row by name.
+
+    Parameters
+    ----------
+    cases : Cases
+    now : (c, 19), seen : (c, 30), history : (c, n, 4) array
+        State at the end and observations, see `case_rows`.
+    """
+    columns = cases.parameters.T
+    omega, ratio = columns[Number.OMEGA], columns[Number.OUTPUT]
+    mass = 1 / columns[Number.MOBILITY]
+    count = seen[:, Seen.N_CYCLES]
+    span = seen[:, Seen.SPAN]
+    window = int(columns[Number.WINDOW].max(initial=1))
+    low = history[:, -window:, 0].min(axis=1)
+    high = history[:, -window:, 1].max(axis=1)
+    work = seen[:, Seen.WORK]
+    stuck = seen[:, Seen.STUCK] / span
+    energies = _compute_energies(cases, now, mass)
+    values = {
+        "relative_displacement_amplitude": (high - low) / 2 * np.abs(ratio),
+        "absolute_acceleration_peak": seen[:, Seen.MAX_ACCELERATION],
+        "friction_force_peak": seen[:, Seen.MAX_FORCE],
+        "slip_amplitude": (seen[:, Seen.MAX_SLIP] - seen[:, Seen.MIN_SLIP]) / 2,
+        "stick_fraction": np.where(stuck > 1 - FULL_STICK, 1.0, stuck),
+        "slip_start_phase": _mean_phase(seen),
+        "normal_load": columns[Number.LOAD],
+        "loop_area": work / count,
+        "drift_per_cycle": (seen[:, Seen.LAST_MEAN] - seen[:, Seen.FIRST_MEAN])
+        * omega / (2 * np.pi) / np.maximum(count - 1, 1),
+        "work_check": np.abs(seen[:, Seen.SAMPLED] - work)
+        / (seen[:, Seen.PASSED] + mass * (now[:, Now.POWER] + now[:, Now.STORED])),
+    }  # fmt: skip
+    return values | energies | _compute_harmonics(cases, now, seen, values["loop_area"], high - low)
+
+
+def _compute_energies(cases: Cases, now, mass) -> dict:
+    """Return the energies [J] of the whole run and the relative error of their balance."""
+    columns = cases.parameters.T
+    stored = 0.5 * (now[:, Now.VELOCITY] ** 2 + columns[Number.STIFFNESS] * now[:, Now.SLIDE] ** 2)
+    first = 0.5 * (
+        columns[Number.VELOCITY] ** 2 + columns[Number.STIFFNESS] * columns[Number.SLIDE] ** 2
+    )
+    gap = now[:, Now.WORK_IN] + first - stored - now[:, Now.VISCOUS] - now[:, Now.FRICTION]
+    size = now[:, Now.POWER] + now[:, Now.STORED]
+    work = mass * now[:, Now.FRICTION]
+    return {
+        "energy_balance": np.divide(np.abs(gap), size, out=np.zeros_like(gap), where=size > 0),
+        "friction_work": work,
+        "energy_dissipated": work - now[:, Now.ELASTIC],
+        "energy_created": np.zeros_like(work),
+    }
+
+
+def _mean_phase(seen) -> np.ndarray:
+    """Return the mean phase (c,) [rad], modulo pi, at which slip starts; NaN without a common phase."""
+    count = seen[:, Seen.STARTS]
+    cosine, sine = seen[:, Seen.START_COS], seen[:, Seen.START_SIN]
+    is_common = (count > 0) & (np.hypot(cosine, sine) >= MIN_ALIGNMENT * count)
+    return np.where(is_common, np.arctan2(sine, cosine) / 2 % np.pi, np.nan)
+
+
+def _compute_harmonics(cases: Cases, now, seen, area, slide_range) -> dict:
+    """Return the measures that follow from harmonics; integrals by parts give those of velocity and acceleration."""
+    columns = cases.parameters.T
+    omega, span = columns[Number.OMEGA], seen[:, Seen.SPAN]
+    drive = 0.5 * span
+    q_jump = now[:, Now.SLIDE] - seen[:, Seen.START_SLIDE]
+    v_jump = now[:, Now.VELOCITY] - seen[:, Seen.START_VELOCITY]
+
+    def derivatives(order, cosine, sine):
+        """Return integrals of slide, velocity and acceleration times exp(-i order omega t)."""
+        slide = seen[:, cosine] - 1j * seen[:, sine]
+        velocity = q_jump + 1j * order * omega * slide
+        return slide, velocity, v_jump + 1j * order * omega * velocity
+
+    slide, velocity, first = derivatives(1, Seen.COS_1, Seen.SIN_1)
+    third = derivatives(3, Seen.COS_3, Seen.SIN_3)[2]
+    force = -1j * drive * columns[Number.DRIVE] - first
+    force = force - columns[Number.DAMPING] * velocity - columns[Number.STIFFNESS] * slide
+    force = force / columns[Number.MOBILITY]
+    ratio = columns[Number.OUTPUT]
+    fundamental = np.abs(ratio * first - 1j * drive * columns[Number.BASE]) * 2 / span
+    count = np.maximum(seen[:, Seen.N_CYCLES], 1)
+    half_range = seen[:, Seen.RANGE] / count / 2
+    n_secants = seen[:, Seen.N_SECANTS]
+    moves = slide_range > MIN_SLIDE_RANGE
+    damping = area / (2 * np.pi * cases.reference * half_range**2)
+    is_known = moves & (cases.reference > 0)
+    return {
+        "absolute_acceleration_fundamental": fundamental,
+        "acceleration_distortion": np.where(
+            fundamental > MIN_ACCELERATION, np.abs(ratio * third) * 2 / span / fundamental, np.nan
+        ),
+        "harmonic_force_ratio": np.abs(force / slide),
+        "equivalent_stiffness": np.where(moves, (force / slide).real, np.nan),
+        "equivalent_damping": np.where(is_known, damping, np.nan),
+        "secant_stiffness": np.where(
+            moves & (n_secants > 0), seen[:, Seen.SECANT] / n_secants, np.nan
+        ),
+    }

@@ -1,0 +1,113 @@
+"""Numbers and first memory of the laws of contact points, from keys of a scene or from parameters."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..friction.bonds.parameters import Bonds
+from ..friction.laws.iwan import max_yield_displacement
+from ..friction.laws.stretch import growth_numbers
+from .return_maps_kernels import Law, Masing
+
+N_NUMBERS = 10  # rows of numbers of a point
+N_MEMORY = 6  # rows of memory of a point, without a stack of reversals
+REVERSALS = 48  # reversals that parallel sliders remember
+MIN_LOAD = 1e-12  # load [N] in place of no load, to which a stiffness refers
+
+
+class PointLaw(NamedTuple):
+    """Law of a contact point, or of c points with numbers that differ.
+
+    - numbers (10,) or (10, c), memory (m,) or (m, c): see `return_maps_kernels`
+    - load: normal load [N] per which the numbers are, a float or (c,)
+    """
+
+    numbers: np.ndarray
+    memory: np.ndarray
+    load: float | np.ndarray
+
+
+def _pack(law: Law, numbers, memory=(), load=1.0, n_memory: int = N_MEMORY) -> PointLaw:
+    """Return a PointLaw from the first rows of numbers and memory; floats or (c,)."""
+    shape = np.broadcast_shapes(np.shape(load), *map(np.shape, (*numbers, *memory)))
+    rows = np.zeros((N_NUMBERS, *shape))
+    state = np.zeros((n_memory, *shape))
+    for row, number in enumerate((law, *numbers)):
+        rows[row] = number
+    for row, number in enumerate(memory):
+        state[row] = number
+    return PointLaw(rows, state, load)
+
+
+def make_jenkins(static: float, length: float, load: float = 1.0) -> PointLaw:
+    """Return an elastic-plastic point (eq. 3.12) of friction coefficient `static` and length [m]."""
+    return _pack(Law.JENKINS, (static, length), (0.0, load), load)
+
+
+def make_coulomb(static: float, kinetic: float, load: float = 1.0) -> PointLaw:
+    """Return a rigid point with static and kinetic friction."""
+    return _pack(Law.COULOMB, (static, kinetic), load=load)
+
+
+def make_tanh(static: float, speed: float, load: float = 1.0) -> PointLaw:
+    """Return the regularised law static load tanh(v/speed) of eq. 2.4."""
+    return _pack(Law.TANH, (static, speed), load=load)
+
+
+def make_bonds(bonds: Bonds, load: float = 1.0) -> PointLaw:
+    """Return a point with bonds of order 1 and reading = "stretch"."""
+    numbers = (bonds.static, bonds.length, *growth_numbers(bonds), bonds.initial)
+    return _pack(Law.BONDS, numbers, (bonds.length, bonds.initial * load), load)
+
+
+def make_cubic(stiffness: float) -> PointLaw:
+    """Return a spring of force stiffness q^3."""
+    return _pack(Law.CUBIC, (stiffness,))
+
+
+def make_interlocking(stiffness: float, wavelength: float) -> PointLaw:
+    """Return a spring whose force is sinusoidal, of stiffness [N/m] at rest."""
+    return _pack(Law.INTERLOCK, (stiffness, wavelength))
+
+
+def make_point_law(friction, load, bonds: Bonds | None = None) -> PointLaw:
+    """Return the law that the keys of a table [friction] define, under a load [N].
+
+    Parameters
+    ----------
+    friction : table
+        Keys in SI units; floats, or arrays (c,) of the values of c points.
+    load : float or (c,)
+        Normal load [N].
+    bonds : Bonds, optional
+        Bonds of the law "nonlocal" with their rest speed; without them the bonds have the keys `static` and
+        `bond_length` alone.
+    """
+    name = friction.law
+    load = np.maximum(load, MIN_LOAD)
+    limit = friction.static * load
+    kinetic = getattr(friction, "kinetic", None)
+    kinetic = friction.static if kinetic is None else kinetic
+    if name == "coulomb":
+        return make_coulomb(friction.static, kinetic, load)
+    if name == "tanh":
+        return make_tanh(friction.static, friction.reference_speed, load)
+    if name == "elastic-plastic":
+        has_length = friction.bond_length is not None
+        length = friction.bond_length if has_length else limit / friction.stiffness
+        return make_jenkins(friction.static, length, load)
+    if name == "nonlocal":
+        return make_bonds(bonds or Bonds(friction.static, friction.bond_length), load)
+    if name == "iwan":
+        chi, beta = friction.chi, friction.beta
+        length = max_yield_displacement(limit, friction.stiffness, chi, beta)
+        memory = (*(0.0,) * Masing.VIRGIN, 1.0)
+        size = Masing.STACK + 2 * REVERSALS
+        return _pack(Law.MASING, (limit, length, chi + 1, beta), memory, load, size)
+    if name == "bouc-wen":
+        length = limit / friction.stiffness
+        numbers = (friction.static, length, friction.exponent, friction.shape)
+        return _pack(Law.BOUC_WEN, numbers, load=load)
+    per_load = (friction.stiffness / load, kinetic, friction.static, friction.stribeck_speed)
+    damping = (friction.micro_damping / load, friction.viscous / load)
+    return _pack(Law.LUGRE, (*per_load, *damping), load=load)

@@ -1,0 +1,584 @@
+"""Return maps of the friction laws: path-mean force, its tangent and the state after a step of slide (compiled).
+
+Over a step a point slides by dq. Its law is replaced by the mean of the force along the straight path dq, so that
+mean force times dq is exactly the work of the law (a discrete gradient). Laws of the velocity use the mean of the
+forces at both ends, weighted so that a stiff law is damped (exponential fitting). A law is a branch of five functions:
+
+- `mean_force`: path-mean force and its derivatives by the increment and by the velocity at the end
+- `advance`: memory after the step
+- `read`: force, stored energy and elastic stretch of a state
+- `press`: memory after a change of the load at rest
+- `prepare`: memory for the middle of a step, from the velocity at its start
+
+Columns of `numbers` and `memory` belong to points; their rows depend on the law:
+
+============= ==================================================== =================================================
+law           numbers from row 1 on, per unit of load              memory
+============= ==================================================== =================================================
+COULOMB       mu_s, mu_k                                           direction of slip, 0 during stick
+TANH          mu, v_0 [m/s]                                        force
+JENKINS       mu, length [m]                                       force/mu, springs (load at which they yield)
+MASING        F_S, phi_max [m], chi + 1, beta                      see `Masing`
+BOUC_WEN      mu, length [m], exponent n, shape s                  z
+LUGRE         stiffness, kinetic, static, v_s, sigma_1, sigma_2    stretch [m], force
+BONDS         mu, eps_0 [m], growth (6) (eq. 2.10), m_0            eps, m, z, s2, eps in the middle of the step
+CUBIC         k_3 [N/m3]                                           slide [m]
+INTERLOCK     k [N/m], wavelength [m]                              slide [m]
+============= ==================================================== =================================================
+"""
+
+from enum import IntEnum
+from math import exp, inf, log1p, sin, sqrt, tanh
+from typing import NamedTuple
+
+from ..compiled.jit import njit
+from ..friction.bonds.point_kernels import (
+    MAX_SHORT_PATH,
+    bond_mean,
+    bond_step,
+    grow,
+    press_point,
+    shape_functions,
+    short_bond_mean,
+    short_bond_step,
+)
+from ..friction.flags_kernels import NJIT_KERNEL
+
+SMALL_RATE = 1e-4  # rate times step below which series replace exponentials
+LIMIT_FRACTION = 1e-9  # smallest Stribeck limit relative to the static one, because z divides by it
+PIECE = (
+    0.25  # longest piece of a path in relaxation lengths that the Bouc-Wen law integrates at once
+)
+NEARLY_SATURATED = (
+    1e-3  # distance of z from 1 below which any exponent of the Bouc-Wen law has a closed form
+)
+SATURATED = 1e-14  # distance of |z| from 1 that is round-off
+DIFFERENCE = 1e-6  # relative increment of the numerical tangent of the LuGre law
+
+
+class Law(IntEnum):
+    """Number of a friction law or spring in row 0 of `numbers`."""
+
+    COULOMB = 0
+    TANH = 1
+    JENKINS = 2
+    MASING = 3
+    BOUC_WEN = 4
+    LUGRE = 5
+    BONDS = 6
+    CUBIC = 7
+    INTERLOCK = 8
+
+
+class Masing(IntEnum):
+    """Rows of the memory of parallel sliders, which follow Masing's rules.
+
+    Displacement [m], force [N], direction, number of reversals on the stack, 1 until the sliders have slipped as a
+    whole and -1 then, stored energy [J], mean stretch [m], then displacement and force of each reversal.
+    """
+
+    SLIDE = 0
+    FORCE = 1
+    DIRECTION = 2
+    COUNT = 3
+    VIRGIN = 4
+    ENERGY = 5
+    STRETCH = 6
+    STACK = 7
+
+
+class Step(NamedTuple):
+    """Increment [m] and duration [s], velocities at both ends [m/s], and velocity per force [m/(s N)]."""
+
+    increment: float
+    duration: float
+    start_velocity: float
+    end_velocity: float
+    mobility: float
+
+
+class MeanForce(NamedTuple):
+    """Path-mean force [N], its derivatives by increment [N/m] and end velocity [N s/m], and the force at the end [N].
+
+    For a step that is long for the law "tanh" the force at the end is that at the start, as if it did not change. `bend`
+    [N] is the mean force less the mean of the forces at both ends, for the law "tanh", and the change of the elastic
+    force, for the LuGre law.
+    """
+
+    force: float
+    by_increment: float
+    by_velocity: float
+    end: float
+    bend: float
+
+
+class PointState(NamedTuple):
+    """Friction force [N], stored energy [J] and elastic stretch [m] of a point."""
+
+    force: float
+    energy: float
+    stretch: float
+
+
+class Relaxed(NamedTuple):
+    """Value after a path, and its mean over the path."""
+
+    end: float
+    mean: float
+
+
+@njit(**NJIT_KERNEL)
+def mean_force(numbers, memory, j, load, step):
+    """Return the `MeanForce` of point j under a load over a `Step`; a COULOMB point has to slip."""
+    law = numbers[0, j]
+    dq = step.increment
+    if law == Law.JENKINS:
+        moved = _stretch(memory[0, j], memory[1, j] / numbers[2, j] * dq, load)
+        slope = 0.5 * memory[1, j] / numbers[2, j] * moved.end * moved.end
+        return _end_path(numbers[1, j] * moved.mean, numbers[1, j] * slope, dq)
+    if law == Law.BONDS:
+        mean, slope = bond_mean(memory[1, j], memory[2, j], dq, load, memory[4, j])
+        stiffness = numbers[1, j] / numbers[2, j]
+        return _end_path(stiffness * mean, stiffness * slope, dq)
+    if law == Law.COULOMB:
+        force = memory[0, j] * numbers[2, j] * load
+        return MeanForce(force, 0.0, 0.0, force, 0.0)
+    if law == Law.TANH:
+        return _mean_tanh(numbers[1, j] * load, numbers[2, j], step)
+    if law == Law.LUGRE:
+        relaxed = _mean_lugre(numbers, memory[0, j], j, load, step)
+        force = relaxed.mean
+        last = _lugre_force(numbers, j, load, relaxed.end, step.end_velocity)
+        # A change of the increment changes the velocity at the end by about twice the mean velocity.
+        change = DIFFERENCE * (abs(dq) + numbers[3, j] / numbers[1, j])
+        velocity = step.end_velocity + 2 * change / step.duration
+        other = Step(dq + change, step.duration, step.start_velocity, velocity, step.mobility)
+        slope = (_mean_lugre(numbers, memory[0, j], j, load, other).mean - force) / change
+        elastic = load * numbers[1, j] * (relaxed.end - memory[0, j])
+        return MeanForce(force, slope, 0.0, last, elastic)
+    if law == Law.CUBIC or law == Law.INTERLOCK:
+        force, slope = _mean_spring(numbers, memory[0, j], j, dq)
+        return _end_path(force, slope, dq)
+
+    # Rate-independent laws: d(mean)/d(dq) = (force at the end - mean)/dq.
+    if law == Law.MASING:
+        path = _walk(numbers, memory, j, dq, False)
+        start = memory[Masing.FORCE, j]
+        stiffness = numbers[1, j] / numbers[2, j]
+    else:
+        path = _walk_bouc_wen(numbers, memory[0, j], j, load, dq)
+        start = numbers[1, j] * load * memory[0, j]
+        stiffness = numbers[1, j] * load / numbers[2, j]
+    if abs(dq) < 1e-9 * numbers[2, j]:
+        return _end_path(start + 0.5 * (path.end - start), 0.5 * stiffness, dq)
+    return MeanForce(path.mean, (path.end - path.mean) / dq, 0.0, path.end, 0.0)
+
+
+@njit(**NJIT_KERNEL)
+def _end_path(force, slope, dq):
+    """Return the `MeanForce` of a law of the path alone, as d(mean dq)/d(dq) is the force at the end."""
+    return MeanForce(force, slope, 0.0, force + slope * dq, 0.0)
+
+
+@njit(**NJIT_KERNEL)
+def _stretch(start, move, limit):
+    """Stretch a spring by an increment; it slips at +-limit.
+
+    Returns a `Relaxed` with the elastic fraction of the increment in place of the end.
+    """
+    free = start + move
+    end = min(max(free, -limit), limit)
+    if abs(move) < 1e-290:
+        return Relaxed(1.0, start)
+    elastic = 1 - (free - end) / move
+    return Relaxed(elastic, elastic * (start + end) * 0.5 + (1 - elastic) * end)
+
+
+@njit(**NJIT_KERNEL)
+def _mean_tanh(limit, speed, step):
+    """Return the mean of f(v) = limit tanh(v/speed) over a step.
+
+    Simpson's rule has the velocity in the middle from the cubic through both ends. A step that is long for the law,
+    x = mobility df/dv > 1, takes the forces at its ends with the weight theta = 1/(1 - exp(-x)) - 1/x of the second
+    one, which is exact for a linear law and damps a stiff one.
+    """
+    first = tanh(step.start_velocity / speed)
+    last = tanh(step.end_velocity / speed)
+    stiffness = limit / speed
+    slope = stiffness * (1 - last * last)
+    change = step.end_velocity - step.start_velocity
+    trapezoid = 0.5 * limit * (first + last)
+    secant = slope
+    if abs(change) > 1e-9 * speed:
+        secant = limit * (last - first) / change
+    x = step.mobility * secant
+    if x < 1:
+        velocity = 1.5 * step.increment / step.duration
+        middle = tanh((velocity - 0.25 * (step.start_velocity + step.end_velocity)) / speed)
+        middle_slope = stiffness * (1 - middle * middle)
+        force = limit * (first + 4 * middle + last) / 6
+        return MeanForce(
+            force,
+            middle_slope / step.duration,
+            (slope - middle_slope) / 6,
+            limit * last,
+            force - trapezoid,
+        )
+    decay = exp(-x)
+    theta = 1 / (1 - decay) - 1 / x
+    tangent = theta * slope
+    if abs(change) > 1e-9 * speed:
+        by_x = 1 / (x * x) - decay / ((1 - decay) * (1 - decay))
+        tangent += limit * (last - first) * by_x * step.mobility * (slope - secant) / change
+    force = limit * (first + theta * (last - first))
+    return MeanForce(force, 0.0, tangent, limit * first, force - trapezoid)
+
+
+@njit(**NJIT_KERNEL)
+def _mean_lugre(numbers, stretch, j, load, step):
+    """Return the stretch after a step, and the mean force of the LuGre law.
+
+    The stretch z relaxes to the steady one, z_s = g(v)/k in the direction of slip, over a path x = integral of
+    |v|/|z_s|. With x by Simpson's rule and z_s linear in the path between both ends the law is solved exactly, so that
+    a stiff law ends in its steady state.
+    """
+    dq = step.increment
+    duration = step.duration
+    direction = 1.0 if dq > 0 else -1.0
+    first = step.start_velocity
+    last = step.end_velocity
+    middle = 1.5 * dq / duration - 0.25 * (first + last)
+    begin = _stribeck_limit(numbers, j, first) / numbers[1, j]
+    centre = _stribeck_limit(numbers, j, middle) / numbers[1, j]
+    end = _stribeck_limit(numbers, j, last) / numbers[1, j]
+    path = duration / 6 * (abs(first) / begin + 4 * abs(middle) / centre + abs(last) / end)
+    shapes = shape_functions(path)
+    start = direction * begin
+    change = direction * (end - begin)
+    z = start + (stretch - start) * shapes.decay + change * (1 - shapes.f1)
+    mean = start + (stretch - start) * shapes.f1 + change * (0.5 - shapes.f2)
+    damping = numbers[5, j] * (z - stretch) / duration + numbers[6, j] * dq / duration
+    return Relaxed(z, load * (numbers[1, j] * mean + damping))
+
+
+@njit(**NJIT_KERNEL)
+def _lugre_force(numbers, j, load, stretch, velocity):
+    """Return the force of the LuGre law at a stretch and a velocity."""
+    limit = _stribeck_limit(numbers, j, velocity)
+    rate = velocity - abs(velocity) * stretch * numbers[1, j] / limit
+    return load * (numbers[1, j] * stretch + numbers[5, j] * rate + numbers[6, j] * velocity)
+
+
+@njit(**NJIT_KERNEL)
+def _stribeck_limit(numbers, j, velocity):
+    """Return the steady force of the LuGre law per load at a velocity."""
+    ratio = velocity / numbers[4, j]
+    rise = (numbers[3, j] - numbers[2, j]) * exp(-min(ratio * ratio, 700.0))
+    return max(numbers[2, j] + rise, LIMIT_FRACTION * numbers[3, j])
+
+
+@njit(**NJIT_KERNEL)
+def _mean_spring(numbers, slide, j, dq):
+    """Return the mean force over dq and its slope of a cubic or interlocking spring."""
+    end = slide + dq
+    if numbers[0, j] == Law.CUBIC:
+        k = 0.25 * numbers[1, j]
+        force = k * (slide + end) * (slide * slide + end * end)
+        return force, k * (slide * slide + 2 * slide * end + 3 * end * end)
+    turn = 6.283185307179586 / numbers[2, j]
+    half = 0.5 * turn * dq
+    ratio = sin(half) / half if abs(half) > SMALL_RATE else 1 - half * half / 6
+    force = numbers[1, j] / turn * sin(turn * slide + half) * ratio
+    if abs(half) < SMALL_RATE:
+        return force, 0.5 * numbers[1, j]
+    return force, (numbers[1, j] / turn * sin(turn * end) - force) / dq
+
+
+@njit(**NJIT_KERNEL)
+def _walk_bouc_wen(numbers, z, j, load, dq):
+    """Return force and path-mean force of the Bouc-Wen law, whose z is advanced by Runge-Kutta steps.
+
+    With y = z sgn(dq) and the path x in lengths, dy/dx = 1 - y^n for y > 0 and 1 - (1 - 2 s)|y|^n below.
+    """
+    direction = 1.0 if dq > 0 else -1.0
+    power = numbers[3, j]
+    unloading = 1 - 2 * numbers[4, j]
+    left = abs(dq) / numbers[2, j]
+    whole = left
+    longest = PIECE / max(1.0, power)
+    nearly = 1.0 if power == 1.0 or power == 2.0 else NEARLY_SATURATED
+    y = direction * z
+    area = 0.0
+    while left > 0:
+        if 1 - y <= nearly:
+            rest = _saturate(1 - y, power, left)
+            area += left - left * rest.mean
+            y = 1 - rest.end
+            break
+        # A piece ends where loading begins, at y = 0.
+        piece = min(left, longest)
+        if y < 0:
+            piece = min(piece, max(-y, 1e-12))
+        first = _bouc_wen_rate(y, power, unloading)
+        second = _bouc_wen_rate(y + 0.5 * piece * first, power, unloading)
+        third = _bouc_wen_rate(y + 0.5 * piece * second, power, unloading)
+        fourth = _bouc_wen_rate(y + piece * third, power, unloading)
+        area += piece * (y + piece * (first + second + third) / 6)
+        y += piece * (first + 2 * second + 2 * third + fourth) / 6
+        left -= piece
+    limit = direction * numbers[1, j] * load
+    return Relaxed(limit * y, limit * area / whole if whole > 0 else limit * y)
+
+
+@njit(**NJIT_KERNEL)
+def _saturate(distance, power, path):
+    """Return the distance e of z from 1 after a path in lengths, and its mean over the path.
+
+    To order e^3, de/dx = -n e + n (n - 1) e^2/2, which is Bernoulli's equation; it is exact for n = 1 and 2.
+    """
+    bend = 0.5 * (power - 1)
+    if distance < SATURATED:
+        return Relaxed(0.0, 0.0)
+    decay = exp(-power * path)
+    end = distance * decay / (1 - bend * distance * (1 - decay))
+    # The integral is ln((1 - bend e_end)/(1 - bend e))/(n bend).
+    fall = (distance - end) / (1 - bend * distance)
+    x = bend * fall
+    ratio = log1p(x) / x if x > SMALL_RATE else 1 - 0.5 * x
+    return Relaxed(end, fall / power * ratio / path)
+
+
+@njit(**NJIT_KERNEL)
+def _bouc_wen_rate(y, power, unloading):
+    """Return dy/dx of the Bouc-Wen law."""
+    size = y * y if power == 2.0 else abs(y) ** power
+    return 1 - size if y > 0 else 1 - unloading * size
+
+
+@njit(**NJIT_KERNEL)
+def _first_loading(numbers, j, x):
+    """Return the force of first loading and its integral, of Segalman's sliders (2005, eq. 22)."""
+    phi = numbers[2, j]
+    beta = numbers[4, j]
+    order = numbers[3, j]
+    ratio = min(x / phi, 1.0)
+    scale = numbers[1, j] / (beta + order / (order + 1))
+    power = ratio
+    if 0 < ratio < 1 and order != 1.0:
+        power = sqrt(ratio) if order == 0.5 else ratio**order
+    force = scale * ratio * (beta + 1 - power / (order + 1))
+    area = scale * phi * ratio * ratio * (0.5 * (beta + 1) - power / ((order + 1) * (order + 2)))
+    return Relaxed(force, area + numbers[1, j] * max(x - phi, 0.0))
+
+
+@njit(**NJIT_KERNEL)
+def _walk(numbers, memory, j, dq, commits):
+    """Return force and mean force of parallel sliders over dq by Masing's and Madelung's rules.
+
+    A branch from a reversal (q_r, F_r) is F = F_r + 2 d B(d (q - q_r)/2) with the force B of first loading. It ends
+    where it meets the start of the branch before. Entries of the stack from COUNT on may be overwritten.
+    """
+    direction = 1.0 if dq > 0 else -1.0
+    q = memory[Masing.SLIDE, j]
+    force = memory[Masing.FORCE, j]
+    n = int(memory[Masing.COUNT, j])
+    virgin = memory[Masing.VIRGIN, j]
+    if direction * memory[Masing.DIRECTION, j] < 0:
+        if n == 0 and virgin > 0:
+            # The curve of first loading is met again at -q.
+            memory[Masing.STACK, j] = -q
+            memory[Masing.STACK + 1, j] = -force
+            n = 1
+        memory[Masing.STACK + 2 * n, j] = q
+        memory[Masing.STACK + 2 * n + 1, j] = force
+        n += 1
+
+    left = abs(dq)
+    area = 0.0
+    loss = 0.0
+    is_slipping = False
+    while True:
+        if n == 0 and virgin < 0:
+            is_slipping = True
+            force = direction * numbers[1, j]
+            area += direction * force * left
+            loss += direction * force * left
+            q += direction * left
+            break
+        half = 0.5 if n > 0 else 1.0
+        top = Masing.STACK + 2 * n - 2
+        start = memory[top, j] if n > 0 else 0.0
+        start_force = memory[top + 1, j] if n > 0 else 0.0
+        x = half * direction * (q - start)
+        piece = left
+        if n > 1:
+            piece = min(left, max(direction * (memory[top - 2, j] - q), 0.0))
+        before = _first_loading(numbers, j, x)
+        after = _first_loading(numbers, j, x + half * piece)
+        force = start_force + direction / half * after.end
+        area += direction * start_force * piece + (after.mean - before.mean) / (half * half)
+
+        # The sliders that slip carry B - x B'; the integral of x B' is x B less that of B.
+        slipped = 2 * (after.mean - before.mean) - (x + half * piece) * after.end + x * before.end
+        loss += slipped / half
+        is_slipping = x + half * piece >= numbers[2, j]
+        q += direction * piece
+        left -= piece
+        if left <= 0:
+            break
+        n -= 2
+        if virgin > 0 and n == 1:
+            n = 0
+    if commits:
+        if is_slipping:
+            n = 0
+            virgin = -1.0
+        if Masing.STACK + 2 * n + 4 > memory.shape[0]:
+            # The stack is full: the oldest inner loop is given up.
+            for k in range(Masing.STACK + 2, Masing.STACK + 2 * n - 4):
+                memory[k, j] = memory[k + 4, j]
+            n -= 2
+        memory[Masing.SLIDE, j] = q
+        memory[Masing.FORCE, j] = force
+        memory[Masing.DIRECTION, j] = direction
+        memory[Masing.COUNT, j] = n
+        memory[Masing.VIRGIN, j] = virgin
+        memory[Masing.ENERGY, j] += area - loss
+        memory[Masing.STRETCH, j] += dq - direction * loss / numbers[1, j]
+    return Relaxed(force, direction * area / abs(dq) if dq != 0 else force)
+
+
+@njit(**NJIT_KERNEL)
+def prepare(numbers, memory, j, step):
+    """Set the bond length in the middle of a step from the velocity at its start (Strang splitting)."""
+    if numbers[0, j] == Law.BONDS:
+        memory[4, j] = memory[0, j]
+        if numbers[3, j] < 0:
+            return
+        half = 0.5 * step.duration
+        v = step.start_velocity
+        memory[4, j] = grow(memory[0, j], v, v, abs(v) * half, half, numbers[3:9, j])[0]
+
+
+@njit(**NJIT_KERNEL)
+def advance(numbers, memory, j, load, step):
+    """Advance the memory of point j under a load over a `Step`."""
+    law = numbers[0, j]
+    dq = step.increment
+    if law == Law.JENKINS:
+        start = memory[0, j]
+        springs = memory[1, j]
+        move = springs / numbers[2, j] * dq
+        memory[0, j] = min(max(start + move, -load), load)
+        if springs > load and move != 0:
+            # Springs beyond those of the load break as the point slips.
+            slipped = 1 - (memory[0, j] - start) / move
+            memory[1, j] = load + (springs - load) * exp(-slipped * abs(dq) / numbers[2, j])
+    elif law == Law.BONDS:
+        bonds = bond_step(memory[1, j], memory[2, j], memory[3, j], dq, load, memory[4, j])
+        memory[1, j] = bonds.m
+        memory[2, j] = bonds.z
+        memory[3, j] = bonds.s2
+        if numbers[3, j] >= 0:
+            v0 = step.start_velocity
+            v1 = step.end_velocity
+            memory[0, j] = grow(memory[0, j], v0, v1, abs(dq), step.duration, numbers[3:9, j])[0]
+    elif law == Law.TANH:
+        memory[0, j] = numbers[1, j] * load * tanh(step.end_velocity / numbers[2, j])
+    elif law == Law.LUGRE:
+        memory[0, j] = _mean_lugre(numbers, memory[0, j], j, load, step).end
+        memory[1, j] = _lugre_force(numbers, j, load, memory[0, j], step.end_velocity)
+    elif law == Law.MASING:
+        _walk(numbers, memory, j, dq, True)
+    elif law == Law.BOUC_WEN:
+        memory[0, j] = _walk_bouc_wen(numbers, memory[0, j], j, 1.0, dq).end / numbers[1, j]
+    elif law != Law.COULOMB:
+        memory[0, j] += dq
+
+
+@njit(**NJIT_KERNEL)
+def read(numbers, memory, j, load):
+    """Return the `PointState` of point j under a load; a COULOMB point has the force of its slip."""
+    law = numbers[0, j]
+    mu = numbers[1, j]
+    state = memory[0, j]
+    if law == Law.JENKINS:
+        if memory[1, j] <= 0:
+            return PointState(0.0, 0.0, 0.0)
+        stretch = numbers[2, j] * state / memory[1, j]
+        return PointState(mu * state, 0.5 * mu * state * stretch, stretch)
+    if law == Law.BONDS:
+        m = memory[1, j]
+        stretch = memory[2, j] / m if m > 0 else 0.0
+        stiffness = mu / numbers[2, j]
+        return PointState(stiffness * memory[2, j], 0.5 * stiffness * memory[3, j], stretch)
+    if law == Law.COULOMB:
+        return PointState(state * numbers[2, j] * load, 0.0, 0.0)
+    if law == Law.TANH:
+        return PointState(state, 0.0, 0.0)
+    if law == Law.MASING:
+        return PointState(
+            memory[Masing.FORCE, j], memory[Masing.ENERGY, j], memory[Masing.STRETCH, j]
+        )
+    if law == Law.BOUC_WEN:
+        stretch = numbers[2, j] * state
+        return PointState(mu * load * state, 0.5 * mu * load * state * stretch, stretch)
+    if law == Law.LUGRE:
+        return PointState(memory[1, j], 0.5 * mu * load * state * state, state)
+    if law == Law.CUBIC:
+        return PointState(mu * state**3, 0.25 * mu * state**4, 0.0)
+    turn = 6.283185307179586 / numbers[2, j]
+    sine = sin(0.5 * turn * state)
+    return PointState(mu / turn * sin(turn * state), 2 * mu * sine * sine / (turn * turn), 0.0)
+
+
+@njit(**NJIT_KERNEL)
+def press(numbers, memory, j, before, after):
+    """Change the load of point j at rest: elastic forces are cut at the new limit, new bonds form."""
+    law = numbers[0, j]
+    if before == after:
+        return
+    if law == Law.JENKINS:
+        memory[0, j] = min(max(memory[0, j], -after), after)
+        memory[1, j] = max(memory[1, j], after) if after > 0 else 0.0
+    elif law == Law.BONDS:
+        bonds = memory[1, j], memory[2, j], memory[3, j]
+        memory[1, j], memory[2, j], memory[3, j] = press_point(
+            bonds, before, after, numbers[9, j], numbers[2, j]
+        )
+    elif law == Law.TANH:
+        memory[0, j] *= after / before if before > 0 else 0.0
+
+
+@njit(**NJIT_KERNEL)
+def write_bond_means(numbers, memory, loads, slides, forces, slopes):
+    """Write mean forces (m,) and slopes of points with bonds, in a loop that vectorises; return False for long slides."""
+    for j in range(slides.size):
+        if abs(slides[j]) > MAX_SHORT_PATH * memory[4, j]:
+            return False
+    for j in range(slides.size):
+        mean, slope = short_bond_mean(memory[1, j], memory[2, j], slides[j], loads[j], memory[4, j])
+        stiffness = numbers[1, j] / numbers[2, j]
+        forces[j] = stiffness * mean
+        slopes[j] = stiffness * slope
+    return True
+
+
+@njit(**NJIT_KERNEL)
+def advance_bonds(memory, loads, slides):
+    """Advance points with bonds of constant length after short slides (m,)."""
+    for j in range(slides.size):
+        bonds = short_bond_step(
+            memory[1, j], memory[2, j], memory[3, j], slides[j], loads[j], memory[4, j]
+        )
+        memory[1, j] = bonds.m
+        memory[2, j] = bonds.z
+        memory[3, j] = bonds.s2
+
+
+@njit(**NJIT_KERNEL)
+def find_rest_limit(numbers, memory, j, load):
+    """Return the largest force at which a COULOMB point that sticks stays at rest; inf for other laws."""
+    if numbers[0, j] != Law.COULOMB or memory[0, j] != 0:
+        return inf
+    return numbers[1, j] * load

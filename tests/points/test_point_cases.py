@@ -1,0 +1,92 @@
+"""Sweeps over cases of one mode and one point against exact motions and against the march of many points."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from patchfem.core import ModalBasis, SineDrive
+from patchfem.points import cases, laws, march
+from patchfem.points.case_rows import Cases
+from patchfem.points.contacts import Contact, PointSet
+
+OMEGA = 2 * np.pi * 143.0
+LIMIT = 40.0  # friction limit [N] of 1 kg
+DRIVE = SineDrive(LIMIT / 0.8, OMEGA)
+MODES = ModalBasis(
+    ("a",), np.array([OMEGA]), np.array([0.003]), np.ones(1), np.ones(1), np.ones(1), 1.0
+)
+# Amplitude of the steady stick-slip motion at resonance, zeta = 0.003 and D = 0.8, by marching to 40 digits
+EXACT_AMPLITUDE = 0.28704671337871602595
+EXACT_STICK = 0.2127  # fraction of the time
+
+
+def make(law, accelerations=(DRIVE.acceleration,), ratio=1.0, cycles=200):
+    """Return a batch of cases with accelerations (c,) [m s-2] at a ratio of the resonance."""
+    count = len(accelerations)
+    drive = SineDrive(np.array(accelerations), ratio * OMEGA)
+    rows = cases.list_parameters(MODES, drive, law.load, cycles, min(10, cycles // 10))
+    return Cases(
+        np.ascontiguousarray(np.column_stack(np.broadcast_arrays(*rows))),
+        np.repeat(law.numbers[:, None], count, axis=1),
+        np.repeat(law.memory[:, None], count, axis=1),
+        np.full(count, OMEGA**2),
+    )
+
+
+def test_coulomb_block_at_resonance():
+    """Amplitude, stick fraction and energies of the two-stop motion with 64 steps per cycle."""
+    law = laws.make_coulomb(1.0, 1.0, LIMIT)
+    values = cases.march_cases(make(law), 64).values
+    amplitude = values["relative_displacement_amplitude"][0] * OMEGA**2 / DRIVE.acceleration
+    assert amplitude == pytest.approx(EXACT_AMPLITUDE, rel=3e-5)
+    assert values["stick_fraction"][0] == pytest.approx(EXACT_STICK, abs=2e-3)
+    assert values["energy_balance"][0] <= 1e-6
+    assert values["loop_area"][0] == pytest.approx(
+        4 * LIMIT * values["slip_amplitude"][0], rel=1e-4
+    )
+
+
+def test_exact_stick_under_static_friction():
+    """Below static friction a block at rest does not move at all."""
+    values = cases.march_cases(make(laws.make_coulomb(1.3, 1.0, LIMIT)), 32).values
+    assert values["relative_displacement_amplitude"][0] == 0
+    assert values["stick_fraction"][0] == 1
+
+
+def make_laws() -> dict:
+    """Return one law of each kind with a limit of LIMIT."""
+    keys = {
+        "static": 0.5, "kinetic": 0.4, "bond_length": None, "stiffness": 2e7, "exponent": 1.5, "shape": 0.6, "chi": -0.3,
+        "beta": 0.5, "stribeck_speed": 0.01, "micro_damping": 200.0, "viscous": 1.0, "reference_speed": 2e-3,
+    }  # fmt: skip
+    names = ("elastic-plastic", "iwan", "bouc-wen", "lugre", "tanh")
+    return {
+        name: laws.make_point_law(SimpleNamespace(law=name, **keys), 2 * LIMIT) for name in names
+    }
+
+
+@pytest.mark.parametrize("name", make_laws())
+def test_always_steps_converge(name):
+    """Amplitude and loop area of 20 drives approach those of 2048 steps per cycle."""
+    batch = make(make_laws()[name], LIMIT * np.linspace(0.9, 3.0, 20), 0.9, 60)
+    truth, rough, fine = [cases.march_cases(batch, steps).values for steps in (2048, 32, 128)]
+    for measure in ("relative_displacement_amplitude", "loop_area"):
+        size = np.abs(truth[measure])
+        assert np.median(np.abs(rough[measure] - truth[measure]) / size) <= 5e-3
+        assert np.median(np.abs(fine[measure] - truth[measure]) / size) <= 1e-3
+
+
+def test_cases_agree_with_the_march_of_points():
+    """The march of many points has the same amplitude and friction work per cycle, by another step."""
+    law = make_laws()["elastic-plastic"]
+    contact = Contact([PointSet([law], np.ones(1))])
+    motion = march.march(MODES, DRIVE, contact, 60, 800)
+    values = cases.march_cases(make(law, cycles=60), 512).values
+    low, high = motion.extremes[-1]
+    # Both are the last of 60 cycles; the window of the cases has six.
+    window = motion.extremes[-6:]
+    amplitude = (window[:, 1].max() - window[:, 0].min()) / 2
+    assert high > low
+    assert values["relative_displacement_amplitude"][0] == pytest.approx(amplitude, rel=3e-4)
+    assert values["friction_work"][0] == pytest.approx(motion.ledger["booked"], rel=3e-4)

@@ -1,0 +1,112 @@
+"""March of many contact points: closed forms, order, and scenes of today's march measure by measure."""
+
+import numpy as np
+import pytest
+from scene_texts import RIG
+
+import patchfem as pf
+from patchfem.core import InitialState, ModalBasis, SineDrive
+from patchfem.points import laws
+from patchfem.points.contacts import Contact, PointSet
+from patchfem.points.march import march
+
+from .today import marched_by_points
+
+OMEGA = 2 * np.pi * 143.0
+LIMIT = 40.0
+DRIVE = SineDrive(LIMIT / 0.8, OMEGA)
+EXACT_AMPLITUDE = 0.28704671337871602595  # see test_cases
+
+
+def make_modes(zeta=0.003) -> ModalBasis:
+    """Return one mode of 1 kg."""
+    one = np.ones(1)
+    return ModalBasis(("a",), np.array([OMEGA]), np.array([zeta]), one, one, one, 1.0)
+
+
+def run(law, steps, drive=DRIVE, cycles=60, **options):
+    """Return the motion of a block on one point."""
+    return march(
+        make_modes(), drive, Contact([PointSet([law], np.ones(1))]), cycles, steps, **options
+    )
+
+
+def amplitude(motion) -> float:
+    """Return the amplitude of the last cycle in static displacements of the drive."""
+    low, high = motion.extremes[-1]
+    return (high - low) / 2 * OMEGA**2 / DRIVE.acceleration
+
+
+def test_coulomb_block_at_resonance():
+    """The amplitude of the two-stop motion, and its energy balance."""
+    motion = run(laws.make_coulomb(1.0, 1.0, LIMIT), 200)
+    assert amplitude(motion) == pytest.approx(EXACT_AMPLITUDE, rel=1e-6)
+    ledger = motion.ledger
+    gap = ledger["work_in"] - ledger["viscous"] - ledger["booked"] - ledger["stored"]
+    assert abs(gap) <= 1e-6 * ledger["power"]
+
+
+def test_exact_release_of_a_coulomb_block():
+    """A block released at 11.5 F/k rests at -0.5 F/k after six half-cycles (decay of eq. 3.11)."""
+    unit = LIMIT / OMEGA**2
+    start = InitialState(np.array([11.5 * unit]), np.zeros(1))
+    still = SineDrive(0.0, OMEGA)
+    contact = Contact([PointSet([laws.make_coulomb(1.0, 1.0, LIMIT)], np.ones(1))])
+    motion = march(make_modes(0.0), still, contact, 5, 400, start=start)
+    assert motion.window.slide[-1] / unit == pytest.approx(-0.5, abs=1e-4)
+    assert np.ptp(motion.window.slide[-400:]) == 0
+
+
+def test_exact_stick_under_static_friction():
+    """Below static friction a block at rest does not move at all."""
+    motion = run(laws.make_coulomb(1.3, 1.0, LIMIT), 100, cycles=20)
+    assert not motion.extremes.any()
+
+
+def test_order_two():
+    """The error of the amplitude of an elastic-plastic block falls by about four for half of the step."""
+    law = laws.make_jenkins(1.0, 1e-5, LIMIT)
+    values = [amplitude(run(law, steps)) for steps in (100, 200, 400, 1600)]
+    errors = np.abs(np.array(values[:3]) - values[3])
+    assert errors[1] <= errors[0] / 2.5 and errors[2] <= errors[1] / 2.5
+
+
+def test_exact_parallel_points_are_one_point():
+    """Ten equal points that share the load move as one."""
+    one = run(laws.make_jenkins(1.0, 1e-5, LIMIT), 100, cycles=20)
+    points = [laws.make_jenkins(1.0, 1e-5, LIMIT / 10)] * 10
+    ten = march(make_modes(), DRIVE, Contact([PointSet(points, np.ones(1))]), 20, 100)
+    assert ten.window.slide == pytest.approx(one.window.slide, rel=1e-9, abs=1e-15)
+
+
+MOVING = RIG.replace("slide = 0.8", 'slide = 0.8\nnormal = 0.02\npitch = "5 rad/m"').replace(
+    "slide = 0.1", 'slide = 0.1\nnormal = 0.3\npitch = "40 rad/m"'
+)
+MEASURES = (
+    "relative_displacement_amplitude",
+    "absolute_acceleration_peak",
+    "slip_amplitude",
+    "stick_fraction",
+    "friction_force_peak",
+    "loop_area",
+)
+
+
+@pytest.mark.parametrize("law", ["nonlocal", "elastic-plastic"])
+def test_scene_with_pitch_heave_and_shear_as_today(law, tmp_path):
+    """All measures of a patch whose pressure changes with the motion agree with today's march within both errors."""
+    path = tmp_path / "scene.toml"
+    path.write_text(MOVING.replace("cycles = 200", "cycles = 6"))
+    sets = {
+        "contact.element_size": "400 um",
+        "accuracy.steps_per_cycle": "200",
+        "contact.shear": {},
+        "friction.law": law,
+    }
+    today = pf.run(path, **sets)
+    with marched_by_points() as counts:
+        points = pf.run(path, **sets)
+    assert len(counts) > 1
+    for name in MEASURES:
+        first, second = today.measures[name], points.measures[name]
+        assert abs(first.value - second.value) <= first.error + second.error, name
