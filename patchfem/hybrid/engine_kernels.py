@@ -194,7 +194,7 @@ def advance(rig, state, record, t_end, cycle):
     first_seen = MIN_SEEN * rig.settings[Setting.PERIOD]
     if cycle > 0:
         first_seen += record.cycles[cycle - 1, Cycle.END]
-    # On a bench no state but the friction work may depend on the path.
+    # The step error of a bench includes its integrals: besides the friction work no state may depend on the path.
     n_checked = find_integrals(rig, state.y)
     if rig.settings[Setting.IS_BENCH] > 0:
         n_checked += N_FACE_INTEGRALS * rig.faces.shape[0]

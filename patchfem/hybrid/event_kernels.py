@@ -26,7 +26,7 @@ class StepEvent(NamedTuple):
 
 N_CHECKS = 3  # points of a step at which margins are evaluated, besides its start
 N_MARGINS = 4
-LATEST = 4  # row of `State.margins` of the last evaluation
+LAST_MARGINS = 4  # row of `State.margins` of the last evaluation
 MARGIN_TOL = 1e-11  # margins are relative; above minus this they count as positive
 MAX_PIVOTS = 100
 MAX_OVERLOAD = 1e-9  # relative excess over the static friction that is attributed to round-off
@@ -121,8 +121,8 @@ def find_margin(rig, state, x, i, k):
     k : int
         Number of the margin (`records.Margin`).
     """
-    write_margins_inside(rig, state, x, LATEST)
-    return state.margins[LATEST, i, k]
+    write_margins_inside(rig, state, x, LAST_MARGINS)
+    return state.margins[LAST_MARGINS, i, k]
 
 
 @njit(**NJIT_KERNEL)
@@ -293,7 +293,7 @@ def hold_or_release(rig, state):
     """
     for _ in range(MAX_PIVOTS):
         update_grip(rig, state)
-        write_margins(rig, state, state.clock[Clock.TIME], state.y, state.margins[LATEST])
+        write_margins(rig, state, state.clock[Clock.TIME], state.y, state.margins[LAST_MARGINS])
         i = find_violation(rig, state)
         if i < 0:
             break
@@ -302,7 +302,7 @@ def hold_or_release(rig, state):
             memory[Memory.DIRECTION] = 1.0 if memory[Memory.FORCE] > 0 else -1.0
         else:
             memory[Memory.DIRECTION] = 0.0
-    copy_margins(state, LATEST)
+    copy_margins(state, LAST_MARGINS)
 
 
 @njit(**NJIT_KERNEL)
@@ -314,7 +314,7 @@ def find_violation(rig, state):
         if not rig.faces[i, Face.RIGID] or memory[Memory.CONTACT] < 0:
             continue
         if rests(memory):
-            if state.margins[LATEST, i, Margin.MOTION] < -MAX_OVERLOAD:
+            if state.margins[LAST_MARGINS, i, Margin.MOTION] < -MAX_OVERLOAD:
                 return i
         elif rig.settings[Setting.IS_BENCH] == 0:
             row = rig.rows[0, i]

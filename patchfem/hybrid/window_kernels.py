@@ -35,7 +35,7 @@ from .step_kernels import POINT, RATES, read_curve
 N_NODES = 5
 NODES = np.array([0.0, 0.5 - np.sqrt(21) / 14, 0.5, 0.5 + np.sqrt(21) / 14, 1.0])
 WEIGHTS = np.array([9.0, 49.0, 64.0, 49.0, 9.0]) / 180
-LATEST = 5  # row of `State.probes` of the last evaluation
+LAST_PROBES = 5  # row of `State.probes` of the last evaluation
 N_PARABOLAS = 6  # steps of the search for an extreme
 NEAR_EXTREME = 0.2  # extremes of a step that are further from those of the window are not located
 SAME_SLIDE_TOL = 1e-12  # relative difference of slides before and after an event
@@ -98,8 +98,8 @@ def find_probe(rig, state, x, column):
     y = state.rows[POINT]
     read_curve(state, x, y)
     t = state.clock[Clock.TIME] + x * state.clock[Clock.LENGTH]
-    write_probes(rig, state, t, y, state.probes[LATEST])
-    return state.probes[LATEST, column]
+    write_probes(rig, state, t, y, state.probes[LAST_PROBES])
+    return state.probes[LAST_PROBES, column]
 
 
 @njit(**NJIT_KERNEL)
@@ -263,7 +263,7 @@ def observe_window(rig, state, record, cycle, fraction):
     for node in range(N_NODES):
         find_probe(rig, state, fraction * NODES[node], 0)
         for k in range(state.probes.shape[1]):
-            state.probes[node, k] = state.probes[LATEST, k]
+            state.probes[node, k] = state.probes[LAST_PROBES, k]
 
     raise_both(rig, state, fraction, Probe.GAUGE, whole, Whole.MIN)
     raise_both(rig, state, fraction, Probe.ACCELERATION, whole, Whole.MIN_ACCELERATION)
@@ -357,7 +357,7 @@ def observe_reversal(rig, state, fraction, cycle, sign, column):
         cycle[column + 1] = 0.5 * (cycle[column + 1] + state.probes[0, force])
     elif value != known:
         cycle[column] = value
-        cycle[column + 1] = state.probes[LATEST, force]
+        cycle[column + 1] = state.probes[LAST_PROBES, force]
 
 
 @njit(**NJIT_KERNEL)
