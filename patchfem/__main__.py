@@ -168,11 +168,11 @@ def _describe_unexpected_arguments(verb: str, unused: list) -> str:
 
 def _describe_removed_option(arguments: list) -> str:
     """Return advice for the first removed option among the arguments; "" if there is none."""
-    from .scene.keys.removed import describe_removed_option
+    from .scene.keys.removed import describe_removed
 
     for argument in arguments[1:]:
         option = argument.partition("=")[0]
-        sentence = describe_removed_option(arguments[0], option, f"{arguments[0]} {option}")
+        sentence = describe_removed(f"{arguments[0]} {option}", f"{arguments[0]} {option}")
         if argument.startswith("--") and sentence:
             return sentence
     return ""

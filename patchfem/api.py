@@ -155,7 +155,7 @@ def _reject_removed_options(function: Callable) -> Callable:
         """Call the function, unless a keyword is a removed option."""
         verb = function.__name__
         for name in keywords:
-            if sentence := removed.describe_removed_option(verb, f"--{name}", f"{verb}: {name}"):
+            if sentence := removed.describe_removed(f"{verb} --{name}", f"{verb}: {name}"):
                 raise PatchfemError(sentence)
         return function(*args, **keywords)
 
@@ -492,7 +492,8 @@ def backbone(
 ) -> Dataset:
     """Compute frequency and damping ratio of a mode as functions of its amplitude at the output.
 
-    Every value has a numerical error estimate. The recommended curve has a band of values to expect in tests.
+    Every value has a numerical error estimate. The band of the recommended curve is its error and the difference of the
+    methods.
 
     Parameters
     ----------
@@ -504,7 +505,7 @@ def backbone(
         One or more amplitudes [m], or a string such as "1 um..1 mm:25". Default: a range around the amplitude at which
         the contact slips.
     method : str
-        "balance", "decay", "quasi-static" or "all". Default: "balance" and "quasi-static".
+        "balance" or "quasi-static". Default: both.
     modes : str or list, optional
         Modes that replace those of the scene, such as "120 Hz:0.01, 170 Hz:0.02" (frequency with the bolted joint,
         damping ratio, and optionally the participation `slide`), or a list of tuples such as ("120 Hz", 0.01).

@@ -192,8 +192,6 @@ class ModalBasis:
     - shapes (p, n): shapes of the coordinates at the modes or masses in `names`; None for the identity.
     - gauge (n,): participation of the point whose displacement is measured; None if it is the same point as `output`,
       whose acceleration is measured.
-    - lateral_faces (i, n): participation of the second direction of every interface, 0 for an interface without one;
-      None if no interface has a second direction.
     """
 
     names: tuple
@@ -210,7 +208,6 @@ class ModalBasis:
     yaw: np.ndarray | None = None
     shapes: np.ndarray | None = None
     gauge: np.ndarray | None = None
-    lateral_faces: np.ndarray | None = None
 
     @property
     def interfaces(self) -> np.ndarray:

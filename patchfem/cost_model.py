@@ -4,7 +4,7 @@ Plans contain these times, and runs that would take too long are rejected.
 
 All constants were measured on a reference machine with simple scenes and compiled code; `measure_machine_time_ratio`
 compares another machine with it. The numbers of steps, pieces and nodes are counted in `runs.rig.costs`,
-`runs.rig.bond_lists`, `runs.bench.engine`, `friction.bonds.engines`, `runs.patch.plan` and `elasticity.grid_fronts`.
+`runs.rig.bond_lists`, `runs.bench.engine`, `friction.bonds.engines` and `runs.patch.plan`.
 """
 
 from time import process_time
@@ -48,9 +48,9 @@ BOND_NODE_SECONDS = 6e-8
 # additional CPU time [s] per time step and node of elements in partial slip
 SLIP_NODE_SECONDS = 3e-9
 
-# CPU time [s] per run of the high-order integrator, in addition to its time steps
-SMOOTH_RUN_SECONDS = 0.02
-SMOOTH_STEP_SECONDS = 2e-6  # CPU time [s] per time step of the high-order integrator
+HYBRID_STEP_SECONDS = 4e-6  # CPU time [s] per step from event to event
+HYBRID_MODES_SECONDS = 4e-8  # additional CPU time [s] per such step and pair of modes
+HYBRID_INTERFACES_SECONDS = 1e-6  # additional CPU time [s] per such step and pair of interfaces
 KEPT_SAMPLE_SECONDS = 8e-6  # CPU time [s] per stored sample of the last cycles of time stepping
 # CPU time [s] per stored sample of the last cycles of the event-driven solution
 KEPT_EVENT_SAMPLE_SECONDS = 2.5e-6
@@ -71,14 +71,6 @@ BALANCE_UNKNOWN_SECONDS = 8e-10  # CPU time [s] per cubed number of unknowns of 
 # CPU times [s] of the Floquet multipliers of a smooth law, per cubed number of state variables: for a law that depends
 # only on the speed, and for a law with an evolving state
 MULTIPLIER_SECONDS = (2.5e-6, 4e-6)
-
-# Static condensation of the pieces to their interface. The constants were fitted to 15 grids of 21 x 20 to 301 x 201
-# nodes, whose times were 0.85 to 1.07 of the prediction.
-CONDENSE_CALL_SECONDS = 1.4e-3  # CPU time [s] per condensation
-CONDENSE_SHAPE_SECONDS = 9.8e-5  # CPU time [s] per stack of equal frontal matrices
-CONDENSE_FRONT_SECONDS = 4.5e-6  # CPU time [s] per frontal matrix
-CONDENSE_ENTRY_SECONDS = 1.38e-8  # CPU time [s] per entry of the triangular factors
-CONDENSE_OPERATION_SECONDS = 1.22e-11  # CPU time [s] per floating-point operation of a condensation
 
 # Lists of bonds, which are evaluated in one or more passes per time step.
 # CPU time [s] per strip and pass, by the form of the list (`friction.bonds.list_forms_kernels`)
@@ -103,7 +95,6 @@ PATCH_SECONDS = 0.15
 FIELDS_SECONDS = 0.1  # CPU time [s] per patch for its stress fields
 # time of all condensations of a patch over the predicted time of one condensation
 CONDENSING_FACTOR = 3.0
-OUTLINE_CONDENSING_FACTOR = 2.2  # CONDENSING_FACTOR for pieces with cells beyond the interface
 # Contact on points of a profile, on levels of more and more points. The number of iterations grows with the root of the
 # number of points; 12 traces took 0.25 to 2.6 of the predicted time, and one that did not converge 4.6.
 POINT_ENDS_SECONDS = 0.2  # CPU time [s] for the free ends of the pieces

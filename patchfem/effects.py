@@ -10,12 +10,10 @@ interface under a constant load. Optional features are:
 - `shear`: elastic pieces ([contact.shear]);
 - `joints`: several interfaces, stiffening springs and strips that yaw;
 - `varying-load`: a normal load that changes with the motion;
-- `exact`: the event-driven engine with the whole interface as one element;
-- `pieces`: the event-driven engine with several elements that stick or slip;
+- `exact`: steady motions of the whole interface as one rigid element;
+- `pieces`: elements that stick or slip, for patches that slip part by part;
 - `harmonic`: harmonic balance;
 - `grooves`: grooves whose flanks the surfaces climb;
-- `plane`: an interface of a rig that slides in two directions;
-- `two-directions`: a bench that slides in two directions.
 
 Traits of laws:
 
@@ -34,6 +32,7 @@ A gap shape has a table in `scene.keys.contact` and a function in `contact.gaps`
 `DRIVE_BUILDERS` of its module; the class `Waveform` describes its traits.
 """
 
+import re
 from importlib import import_module
 from typing import NamedTuple
 
@@ -83,7 +82,7 @@ class Waveform(NamedTuple):
 
     def accepts_key(self, key: str) -> bool:
         """Return whether the waveform accepts a key of the table [drive]."""
-        return key in " ".join(self.keys).split()
+        return key in re.findall(r"\w+", " ".join(self.keys))
 
     def _has_trait(self, trait: str) -> bool:
         """Return whether the waveform has a trait."""
@@ -125,11 +124,6 @@ class Waveform(NamedTuple):
         return self._has_trait("base-only")
 
     @property
-    def needs_duration(self) -> bool:
-        """Whether the scene must set the duration by `drive.cycles` or `drive.duration`."""
-        return self._has_trait("endless")
-
-    @property
     def has_steady_motion(self) -> bool:
         """Whether harmonic balance can compute the steady-state motion, or a curve of such motions."""
         return self.is_sine or self.has_levels or self.is_swept
@@ -141,7 +135,7 @@ GROOVE_EQUATION = (
     "F = V (t + phi)/(1 - phi t), V = N + m (t q'' + t' q'^2), t = A k sin(k q - phase)"
 )
 # keys of the table [drive] for the amplitude of a drive
-_DRIVE_SIZE_KEYS = "acceleration displacement force"
+_DRIVE_SIZE_KEYS = "acceleration|displacement force"
 
 
 def _make_law(module: str, equations: str, keys: tuple, supports: str, traits: str = "") -> Effect:
@@ -158,8 +152,11 @@ def _make_waveform(
 ) -> Effect:
     """Return the effect of a waveform, which also accepts the keys `cycles` and `duration`."""
     required, optional = keys
-    all_keys = (required, f"{optional} cycles duration".strip())
-    return Effect(module, equations, all_keys, traits=traits, phrase=phrase)
+    if "endless" in traits:
+        required = f"{required} cycles|duration".strip()
+    else:
+        optional = f"{optional} cycles|duration".strip()
+    return Effect(module, equations, (required, optional), traits=traits, phrase=phrase)
 
 
 EFFECTS = {
@@ -219,7 +216,7 @@ EFFECTS = {
         "laws.elastic_plastic",
         "F' = k v, |F| <= mu N (3.12, corrected for reversals), k = stiffness or mu N/bond_length",
         ("bond_length|stiffness", ""),
-        "shear joints varying-load harmonic pieces grooves plane",
+        "shear joints varying-load harmonic pieces grooves",
         "timeless",
     ),
     "friction.law=nonlocal": _make_law(
@@ -230,7 +227,7 @@ EFFECTS = {
             "kinetic reading order rest_growth slip_growth rest_speed "
             "initial_bonds breakaway spread temperature",
         ),
-        "shear joints varying-load harmonic two-directions grooves",
+        "shear joints varying-load harmonic grooves",
         "bonds",
     ),
     "friction.law=convolution": _make_law(
@@ -298,20 +295,20 @@ EFFECTS = {
     "drive.kind=free": Effect("patchfem.dynamics.propagator", "z(0), z'(0) given, G = 0"),
     "drive.waveform=sine": _make_waveform(
         "a(t) = a sin(2 pi f t)",
-        ("frequency", _DRIVE_SIZE_KEYS),
+        (f"frequency {_DRIVE_SIZE_KEYS}", ""),
         "sine endless",
         "{what} of {level} at {frequency}{place}",
         "patchfem.structure.drive_sizes",
     ),
     "drive.waveform=step": _make_waveform(
         "a(t) = a; or the base is displaced by X at t = 0: z(0) = -base X",
-        ("", _DRIVE_SIZE_KEYS),
+        (_DRIVE_SIZE_KEYS, ""),
         "step endless",
         "a step of {level} in {what}{place}",
     ),
     "drive.waveform=sweep": _make_waveform(
         "a(t) = a sin(2 pi int f dt), f' or f'/f constant",
-        ("from to", f"rate log_rate {_DRIVE_SIZE_KEYS}"),
+        (f"from to rate|log_rate {_DRIVE_SIZE_KEYS}", ""),
         "swept",
         "{what} of {level} swept from {from} to {to}{place}",
     ),
@@ -337,14 +334,15 @@ EFFECTS = {
     "drive.waveform=random": _make_waveform(
         "a(t) = sum_k A_k cos 2 pi f_k t + B_k sin 2 pi f_k t, A_k, B_k normal of variance "
         "G(f_k)/T",
-        ("", "spectrum file from to seed"),
+        ("spectrum|file", "from to seed"),
         "random base-only endless",
         "random {what} {density}, record {seed}",
         "patchfem.structure.noise",
     ),
     "structure.stiffening": Effect("patchfem.dynamics.march.joints", "F = k_3 x^3 at the output"),
     "accuracy.method=exact": Effect(
-        "patchfem.dynamics.events.histories", "closed form or series between events"
+        "patchfem.hybrid.runs",
+        "Runge-Kutta steps of order 8 that end where a law changes its regime, with a step error of 1e-12",
     ),
     "accuracy.method=march": Effect(
         "patchfem.dynamics.march.loop_kernels",

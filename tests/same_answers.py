@@ -112,12 +112,6 @@ def write_input_files(folder: Path) -> None:
     tables = {
         "gap.csv": ("x [mm],z [um]", 14 * t - 7, 0.4 * np.cos(9 * t) + 0.1 * t),
         "path.csv": ("time [ms],displacement [um]", 40 * t, 6 * np.sin(11 * t)),
-        "plane.csv": (
-            "time [ms],displacement [um],lateral [um]",
-            40 * t,
-            6 * np.sin(11 * t),
-            3 * t * (1 - t),
-        ),
         "shake.csv": ("time [ms],acceleration [g]", 80 * t, 6 * np.sin(60 * t) * np.exp(-t)),
     }
     for name, (head, *columns) in tables.items():

@@ -22,40 +22,12 @@ from command_line import (
 )
 from scene_texts import BENCH, COATED, COULOMB, PLASTIC, POINT, SHEAR, STRUCTURE, TRIANGLE
 
-import patchfem as pf
 from patchfem.export.runs import PACKAGES, list_versions
 
 RIG = Path(__file__).parents[1] / "studies" / "rig" / "rig.toml"
 PATCH = COATED + '[contact.tilt]\nangle = "0.1 mrad"\n'
 COULOMB_RIG = POINT + COULOMB + STRUCTURE
 PLASTIC_RIG = POINT + PLASTIC + STRUCTURE
-RINGING = """
-[normal]
-load = "109.3 N"
-[friction]
-law = "elastic-plastic"
-static = 0.755
-bond_length = "0.97 um"
-[structure]
-moving_mass = "0.214 kg"
-[[structure.mode]]
-name = "first"
-frequency = "136.3 Hz"
-damping = 0.003
-slide = 1.0
-base = 0.8
-[[structure.mode]]
-name = "second"
-frequency = "334.5 Hz"
-damping = 0.05
-slide = 0.3
-base = 0.1
-[drive]
-kind = "base"
-acceleration = "3.655 m/s^2"
-frequency = "123.9 Hz"
-cycles = 12
-"""
 
 
 @pytest.fixture
@@ -72,7 +44,7 @@ def write_scene(tmp_path):
 
 
 PHYSICS = set(
-    "closed_forms contact dynamics elasticity friction identify inputs mesh response slip structure surface wear "
+    "closed_forms contact dynamics elasticity friction hybrid identify inputs mesh response slip structure surface wear "
     "runs.bench runs.batch runs.patch runs.rig runs.wear".split()
 )
 PIECES = "contact elasticity mesh runs.patch "  # folders needed to solve a static patch
@@ -107,21 +79,14 @@ def test_exact_run_loads_folders_of_its_scene(write_scene, tmp_path, kind):
     assert {name for name in PHYSICS if has_code_of(modules, name)} == set(folders.split())
 
 
-@pytest.fixture(scope="module", autouse=True)
-def reference_cell_cache():
-    """Store the matrices of the reference cells on disk, as the first run with scikit-fem does."""
-    code = "from patchfem.elasticity.tensor_stiffness import tensor_stencil as f; f([0, 1], [0, 1], [1], [1])"
-    subprocess.run([sys.executable, "-c", code], check=True)
-
-
 PATCH_KEYS = "elasticity.mortar surface"
-RIG_KEYS = {"dynamics.march.joints", "structure.bonded", "dynamics.events.stick_steady"}
+RIG_KEYS = {"structure.bonded", "hybrid.periodic"}
 MODULES_OF_SCENES = {  # run from Python -> text of the scene, modules that are loaded, modules that are not
     "patch": (
         PATCH,
-        "contact.unilateral mesh.tensor",
+        "contact.unilateral mesh.grid",
         "compiled contact.asperity_laws contact.strips contact.conjugate_gradients elasticity.mortar "
-        "elasticity.substructure elasticity.fronts elasticity.recovery export mesh.anymesh response scipy skfem",
+        "elasticity.recovery export mesh.pieces mesh.checks response scipy skfem",
     ),
     "skin": (
         PATCH + '[contact.asperities]\nlaw = "exponential"\ndecay_length = "1 um"\n',
@@ -131,7 +96,7 @@ MODULES_OF_SCENES = {  # run from Python -> text of the scene, modules that are 
     "strips": (PATCH + "[contact.strips]\ncount = 2\n", "contact.strips", PATCH_KEYS),
     "point on a rig": (
         COULOMB_RIG,
-        "dynamics.events.histories structure.modes",
+        "hybrid.runs structure.modes",
         "structure.matrices structure.masses structure.arrays structure.universal structure.modal_fit structure.drives "
         "dynamics.harmonic.harmonic dynamics.harmonic.continuation dynamics.harmonic.balance dynamics.propagator "
         "dynamics.march runs.rig.steady " + " ".join(RIG_KEYS),
@@ -139,13 +104,8 @@ MODULES_OF_SCENES = {  # run from Python -> text of the scene, modules that are 
     **{
         name: (COULOMB_RIG + lines, module, " ".join(RIG_KEYS - {module}))
         for name, lines, module in (
-            (
-                "stiffening",
-                '[structure.stiffening]\ncubic = "1e12 N/m^3"\n',
-                "dynamics.march.joints",
-            ),
             ("bonded spring", '[structure.bonded]\nstiffness = "1e6 N/m"\n', "structure.bonded"),
-            ("harmonic", '[accuracy]\nmethod = "harmonic"\n', "dynamics.events.stick_steady"),
+            ("harmonic", '[accuracy]\nmethod = "harmonic"\n', "hybrid.periodic"),
         )
     },
     "bench": (BENCH, "runs.bench.bench", "campaigns export.sweeps scene.axes runs.batch"),
@@ -242,27 +202,6 @@ def test_exact_few_modules_load_before_signal_handling():
     run = subprocess.run(words, capture_output=True, text=True, check=True)
     roots = {one.partition(".")[0] for one in run.stdout.split()}
     assert roots <= {"patchfem", "importlib", "types", "warnings"}
-
-
-@pytest.mark.share(3)
-@pytest.mark.parametrize(
-    "text",
-    [STRUCTURE, COULOMB_RIG, PLASTIC_RIG, RINGING],
-    ids=["linear", "coulomb", "plastic", "ringing"],
-)
-def test_exact_short_history_needs_no_compiler(write_scene, tmp_path, monkeypatch, text):
-    """With an empty cache, a short time history imports neither numba nor llvmlite and writes no compiled code."""
-    monkeypatch.delenv(
-        "PATCHFEM_CACHE", raising=False
-    )  # this variable has priority over XDG_CACHE_HOME
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    modules = modules_after(FROM_PYTHON, write_scene(text))
-    assert_not_loaded(
-        modules, "compiled.jit", "compiled.cache_files", "dynamics.events.march_kernels"
-    )
-    assert "llvmlite" not in modules
-    assert not [*tmp_path.rglob("*.code"), *tmp_path.rglob("*.nbi")]
-    assert text != RINGING or pf.run(text).measures["ring_frequency"].value
 
 
 def cpu_seconds(pairs: int, *commands) -> list:

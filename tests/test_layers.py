@@ -45,8 +45,8 @@ OUTSIDE = {
     "meshio": ("mesh.files", "export.*"),
 }
 # folders of the physics in their reading order
-PHYSICS = ["core", "mesh", "surface", "elasticity", "contact", "slip", "dynamics", "runs"]
-ORDERED = ("dynamics", "runs", "export")  # folders with a reading order of their own
+PHYSICS = ["core", "mesh", "surface", "elasticity", "contact", "slip", "hybrid", "dynamics", "runs"]
+ORDERED = ("dynamics", "hybrid", "runs", "export")  # folders with a reading order of their own
 FUNCTION_LINES = 120  # the longest functions are commands with one line per option
 # syntax nodes that can name an object
 KNOWING = (ast.Name, ast.Attribute, ast.alias, ast.ClassDef, ast.arg, ast.AnnAssign, *FUNCTIONS)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..core import PatchfemError
-from ..inputs.cells import TableFormat, parse_header, read_text, split_cells
+from ..inputs.cells import TableFormat, parse_header, read_lines, split_cells
 from ..surface.quantity import Mean, Quantity, average_quantities
 
 COLUMNS = ("before", "after")  # columns that every table has
@@ -85,7 +85,7 @@ def read_pairs(table: Path) -> list[TableLine]:
         If it is no such table, with file and line.
     """
     path = Path(table)
-    header, *rows = read_text(path, "the table").split("\n")
+    header, *rows = read_lines(path, "the table")
     form = TableFormat({}, COLUMNS, ",".join(COLUMNS), "the table", has_label_units=True)
     columns, _ = parse_header(path, header, form)
     lines: dict[tuple, TableLine] = {}

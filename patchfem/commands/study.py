@@ -95,13 +95,9 @@ def backbone(
         'amplitudes (half peak-to-peak at the output), such as "1 um..1 mm:25"; default: around '
         "the onset of slip"
     ) = "",
-    method: Annotated[
-        Literal["balance", "decay", "quasi-static", "all"] | None,
-        Parameter(
-            help="method that computes the motion, such as balance; all also runs the free decay, which "
-            "takes longest; default: balance, with quasi-static beside it"
-        ),
-    ] = None,
+    method: text_option(
+        "method that computes the motion, such as balance; possible values: balance, quasi-static; default: both"
+    ) = "",
     modes: text_option(
         'frequency, damping ratio and optionally slide of modes that replace those of the scene, such as "120 Hz:0.01, '
         '170 Hz:0.02"; the frequencies are those of the bolted joint'

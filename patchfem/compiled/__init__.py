@@ -57,16 +57,15 @@ PACKAGE_FOLDER = Path(__file__).parents[1]  # folder of the package
 # Modules of tuples that kernels take and of row numbers; they belong to the hash because the
 # machine code depends on the order of the fields and on the numbers.
 TUPLE_MODULES = (
-    "contact/batch/arrays.py",
     "contact/set_arrays.py",
     "dynamics/grooves/arrays.py",
     "dynamics/interfaces/arrays.py",
     "dynamics/ledger.py",
     "dynamics/march/element_arrays.py",
     "dynamics/march/cycle_sum_arrays.py",
-    "dynamics/smooth/arrays.py",
     "dynamics/events/modal_system.py",
     "dynamics/events/elements.py",
+    "hybrid/records.py",
     "points/case_rows.py",
     "points/march_rows.py",
 )
@@ -105,6 +104,7 @@ def hash_sources():
     for source in (
         *(PACKAGE_FOLDER / "compiled" / name for name in ("jit.py", "pass_by_reference.py")),
         *sorted(PACKAGE_FOLDER.rglob("*kernels.py")),
+        *sorted((PACKAGE_FOLDER / "hybrid" / "laws").glob("*.py")),
         *(PACKAGE_FOLDER / name for name in TUPLE_MODULES),
     ):
         digest.update(

@@ -11,7 +11,7 @@ bare or with asperities (`asperity_laws`, `asperity_layer`). `edges` and `stiffn
 set. Read `gaps`, `unilateral` and `active_set` first.
 
 `contact_sets` and the kernels solve again and again while the holder moves (`press_kernels`, `polygon_kernels`,
-`press_path_kernels`), `batch` solves many cases at once, and `half_space` serves rows of thousands of points.
+`press_path_kernels`), and `half_space` serves rows of thousands of points.
 """
 
 # Names that other folders use, by module
@@ -22,10 +22,6 @@ PUBLIC = {
         "HertzAsperities",
         "LinearAsperities",
         "SmoothAsperities",
-    ),
-    "batch.intervals": (
-        "ContactBatch",
-        "Intervals",
     ),
     "conjugate_gradients": ("solve_by_gradients",),
     "contact_sets": ("ContactSets",),

@@ -6,8 +6,7 @@ With the pressure law P of this layer, the nodal areas A and the notation of `ac
 
 Newton's method solves for the separations s and the motion q together, in the symmetric form I + D^1/2 C D^1/2 with
 D = -A P'. A node that gains force moves along log P, one that loses force along s, and a node of negligible force may
-rise to 1 % of the mean pressure at once: each step uses the side of the tangent that cannot overshoot. Where Newton's
-method fails, the convex dual function of q alone is minimised, with every strip solved under its own approach.
+rise to 1 % of the mean pressure at once: each step uses the side of the tangent that cannot overshoot.
 """
 
 from typing import NamedTuple
@@ -21,10 +20,12 @@ from .asperity_laws import SmoothAsperities
 from .strip_compliance import StripCompliance
 from .unilateral import solve
 
-# Largest number of Newton steps; if they do not suffice, the dual function is minimized
+# Largest number of Newton steps; thin layers on rough gaps need up to 40
 MAX_NEWTON_STEPS = 60
-# Largest number of descent steps, and of trial points along each direction of descent
-MAX_DUAL_STEPS = 60
+DIVERGED_MESSAGE = (
+    "contact.asperities: the iteration of the rough layer did not converge; raise the decay length or the height "
+    'deviation, or set law = "linear"'
+)
 # Largest logarithm of a pressure [Pa] at which the asperity layer counts as untouched
 MIN_LOG_PRESSURE = -300.0
 # Largest logarithm of a force [N] for which products with the exponential function do not overflow
@@ -223,10 +224,7 @@ def _solve_strip(problem: AsperityProblem) -> AsperitySolution:
         return AsperitySolution(np.zeros(gap.size), gap, no_motion, 0)
     solution = _solve_newton(problem, separation, no_motion)
     if solution is None:
-        raise NotConverged(
-            "contact.asperities: the iteration of the rough layer did not converge; raise the decay "
-            'length or the height deviation, or set law = "linear"'
-        )
+        raise NotConverged(DIVERGED_MESSAGE)
     return solution
 
 
@@ -268,83 +266,6 @@ def solve_at_motion(problem: AsperityProblem, motion: np.ndarray) -> AsperitySol
     )
 
 
-def _try_approach(problem: AsperityProblem, motion: np.ndarray) -> AsperitySolution | None:
-    """Solve the strips under a motion, or return None if the pressure is too large to compute."""
-    try:
-        return solve_at_motion(problem, motion)
-    except PatchfemError:
-        return None
-
-
-def _minimise_dual(problem: AsperityProblem, approach: float, length: float) -> AsperitySolution:
-    """Minimise the convex dual function of the motion, from an approach [m].
-
-    The gradient of the dual function is the imbalance of load and moments. length [m]: decay length of the pressure
-    law, which scales the regularisation.
-    """
-    contact = problem.contact
-    motion = np.zeros(contact.target.size)
-    motion[0] = approach
-    damping = np.diag(contact.springs) + 1e-9 * contact.target[0] / length * np.eye(motion.size)
-    solution = _try_approach(problem, motion)
-    if solution is None:
-        no_force = np.zeros(contact.gap.size)
-        return AsperitySolution(no_force, problem.separation(no_force, motion), motion, 0)
-    n_iterations = solution.n_iterations
-    min_imbalance = np.inf
-    for _ in range(MAX_DUAL_STEPS):
-        imbalance = problem.imbalance(solution.force, solution.motion)
-        if np.abs(imbalance).max() <= NEWTON_TOL * contact.target[0]:
-            break
-        min_imbalance = min(min_imbalance, np.abs(imbalance).max())
-        slope = (
-            problem.area * problem.asperities.stiffness(solution.separation) * (solution.force > 0)
-        )
-        _, tangent = solve_tangent(problem.compliance, contact.motions, slope, slope)
-        direction = np.linalg.solve(tangent + damping, imbalance)
-        best, n_more = _search_dual(problem, solution, direction, min_imbalance)
-        n_iterations += n_more
-        if best is None:
-            break
-        solution = best
-    return solution._replace(n_iterations=n_iterations)
-
-
-def _search_dual(
-    problem: AsperityProblem, start: AsperitySolution, direction, min_imbalance
-) -> tuple:
-    """Search for the best solution along one direction of the holder motion by bisection.
-
-    Returns the solution and the number of iterations.
-
-    min_imbalance: smallest imbalance so far; a trial that halves it is taken at once.
-    """
-    first_slope = problem.imbalance(start.force, start.motion) @ direction
-    lower = 0.0
-    upper = np.inf
-    length = 1.0
-    best = None
-    n_iterations = 0
-    for _ in range(MAX_DUAL_STEPS):
-        trial = _try_approach(problem, start.motion + length * direction)
-        slope = -np.inf
-        is_halved = False
-        if trial is not None:
-            n_iterations += trial.n_iterations
-            imbalance = problem.imbalance(trial.force, trial.motion)
-            slope = imbalance @ direction
-            is_halved = np.abs(imbalance).max() <= 0.5 * min_imbalance
-        if slope >= 0 or is_halved:
-            best = trial
-            lower = length
-            if is_halved or slope <= 0.5 * first_slope:
-                break
-        else:
-            upper = length
-        length = 2 * lower if upper == np.inf else (lower + upper) / 2
-    return best, n_iterations
-
-
 def _linearised_start(problem: AsperityProblem) -> tuple:
     """Return initial separations and motion from a law that is linearized at the mean pressure."""
     contact = problem.contact
@@ -379,21 +300,13 @@ def solve_asperity_layer(problem: AsperityProblem) -> AsperitySolution:
     Returns
     -------
     AsperitySolution
-        The best solution that was reached; the caller checks the residuals.
 
     Raises
     ------
-    PatchfemError, NotConverged
-        As in `solve_at_motion`.
+    NotConverged
+        If Newton's method fails.
     """
     solution = _solve_newton(problem, *_linearised_start(problem))
-    if solution is not None:
-        return solution
-    mean_separation = problem.asperities.separation(np.array([problem.mean_pressure]))
-    decay_length = 1 / problem.asperities.log_pressure(mean_separation)[1][0]
-    approach = problem.contact.gap.min() - mean_separation[0]
-    dual = _minimise_dual(problem, approach, decay_length)
-    refined = _solve_newton(problem, dual.separation, dual.motion)
-    if refined is None:
-        return dual
-    return refined._replace(n_iterations=dual.n_iterations + refined.n_iterations)
+    if solution is None:
+        raise NotConverged(DIVERGED_MESSAGE)
+    return solution

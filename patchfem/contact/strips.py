@@ -23,6 +23,7 @@ from .asperity_laws import ExponentialAsperities, LinearAsperities, SmoothAsperi
 from .asperity_layer import (
     MIN_LOG_PRESSURE,
     AsperityProblem,
+    AsperitySolution,
     solve_asperity_layer,
     solve_at_motion,
     solve_tangent,
@@ -31,6 +32,8 @@ from .strip_compliance import StripCompliance
 from .unilateral import (
     INDEFINITE_MESSAGE,
     ContactSolution,
+    compute_balances,
+    compute_residuals,
     explain_singular_set,
     refuse_residuals,
     refuse_tipping,
@@ -222,61 +225,40 @@ def split_into_strips(pieces: Compliance, count: int) -> StripProperties:
     )
 
 
-def compute_strip_residuals(
-    strips: StripModel, gap, force, position: HolderPosition, loads: HolderLoads
-) -> MappingProxyType:
-    """Compute the relative residuals of the contact conditions for pressed strips.
+def compute_law_residuals(
+    asperities: SmoothAsperities, area, problem: ContactProblem, solution: AsperitySolution
+) -> dict:
+    """Compute the relative residuals of the contact conditions for strips with a smooth asperity layer.
 
-    The mismatch of the law is relative to the largest force and to what the law gains over the depth of the gap (1e-5
-    of it for a smooth law); pressures that count as none are left out.
+    The mismatch of the law is relative to the largest force and to 1e-5 of what the law gains over the depth of the gap;
+    pressures that count as none are left out.
 
     Parameters
     ----------
-    strips : StripModel
-    gap, force : (s, m) ndarray
-        Gap [m] before loading, with the rotation about x, and forces [N].
-    position : HolderPosition
-        Approach and rotation about y beyond that in the gap.
-    loads : HolderLoads
+    asperities : SmoothAsperities
+    area : (n,) ndarray
+        Nodal areas [m2].
+    problem : ContactProblem
+    solution : AsperitySolution
+        Its separations are those of the geometry.
 
     Returns
     -------
-    mapping
-        tension; penetration and complementarity of bare strips, law of an asperity layer, each of the worst strip;
-        force_balance, moment_balance and roll_balance where load or moment are given.
+    dict of float
+        tension, law, and the balances of `unilateral.compute_balances`.
     """
-    compliance, (x, weight, offsets), asperities = strips
-    theta = position.theta
-    displacement = compliance.product(force.ravel()).reshape(force.shape)
-    opening = gap + theta * x - position.delta + displacement
-    depth = np.ptp(gap, axis=1) + np.abs(displacement).max() + abs(theta) * np.ptp(x)
-    depth += MIN_TOTAL_FORCE
+    force = solution.force
+    opening = solution.separation
+    depth = np.ptp(problem.gap) + np.abs(opening - problem.gap).max() + MIN_TOTAL_FORCE
     largest = max(force.max(), np.exp(MIN_LOG_PRESSURE))
-    total = max(force.sum(), MIN_TOTAL_FORCE)
-    residuals = {"tension": max(0.0, -force.min()) / largest}
-    if asperities is None:
-        residuals["penetration"] = np.max(np.maximum(0.0, -opening.min(axis=1)) / depth)
-        residuals["complementarity"] = np.max(np.abs(force * opening).sum(axis=1) / (total * depth))
-    else:
-        if isinstance(asperities, LinearAsperities):
-            rate = np.full(gap.shape, asperities.k)
-        else:
-            rate = 1e-5 * asperities.stiffness(opening)
-        gain = depth * (weight * rate).max(axis=1)
-        mismatch = np.abs(force - weight * asperities.pressure(opening))
-        mismatch -= weight * np.exp(MIN_LOG_PRESSURE)
-        residuals["law"] = np.max(np.maximum(0.0, mismatch.max(axis=1)) / (largest + gain))
-    load = loads.load
-    if load is not None:
-        residuals["force_balance"] = abs(force.sum() - load) / load
-    if loads.moment is not None:
-        spring_moment = loads.spring * theta
-        moment_error = abs((force @ x).sum() - loads.moment - spring_moment)
-        residuals["moment_balance"] = moment_error / (load * np.ptp(x) + abs(spring_moment))
-    if loads.roll_moment is not None:
-        moment_error = abs(force.sum(axis=1) @ offsets - loads.roll_moment)
-        residuals["roll_balance"] = moment_error / (load * np.ptp(offsets))
-    return MappingProxyType({key: float(value) for key, value in residuals.items()})
+    mismatch = np.abs(force - area * asperities.pressure(opening))
+    mismatch -= area * np.exp(MIN_LOG_PRESSURE)
+    gain = 1e-5 * depth * (area * asperities.stiffness(opening)).max()
+    return {
+        "tension": float(max(0.0, -force.min()) / largest),
+        "law": float(max(0.0, mismatch.max()) / (largest + gain)),
+        **compute_balances(problem, solution),
+    }
 
 
 def press_strips(
@@ -328,38 +310,37 @@ def press_strips(
     if isinstance(asperities, ExponentialAsperities) and asperities.reference is None:
         mean_pressure = loads.load / (strips.layout.weight.sum() * offsets.size)
         strips = strips._replace(asperities=replace(asperities, reference=mean_pressure))
-    problem = _holder_problem(strips.layout, gap, loads)
+    compliance, layout, asperities = strips
+    is_smooth = isinstance(asperities, SmoothAsperities)
+    if asperities is not None and not is_smooth:
+        compliance = compliance.add_to_diagonal(1 / (asperities.k * layout.weight))
+        compliance = replace(compliance, warm_start=strips.compliance.warm_start)
+    problem = _holder_problem(layout, gap - (approach or 0.0), loads)
     with use_one_blas_thread():
-        if isinstance(asperities, SmoothAsperities):
-            solution = _press_with_asperities(strips, problem, approach)
+        if is_smooth:
+            area = np.tile(layout.weight, offsets.size)
+            solution = _press_with_asperities(asperities, compliance, area, problem)
         else:
-            solution = _press_bare(strips, problem, approach)
+            solution = _press_bare(compliance, problem)
+    opening = problem.gap - problem.motions @ solution.motion + compliance.product(solution.force)
+    if is_smooth:
+        geometric = solution._replace(separation=opening)
+        residuals = compute_law_residuals(asperities, area, problem, geometric)
+        opening = solution.separation
+    else:
+        residuals = compute_residuals(compliance, problem, solution)
     force = solution.force.reshape(gap.shape)
-    change = _holder_position(solution.motion, loads)
-    gap = gap + change.roll * offsets[:, None]
-    residuals = compute_strip_residuals(strips, gap, force, change, loads)
     # A single strip may be in contact at one node; `unilateral.solve` then chooses the rotation.
-    if not isinstance(asperities, SmoothAsperities) and offsets.size > 1:
+    if not is_smooth and offsets.size > 1:
         _refuse_loose_holder(force, loads)
     _refuse_strip_residuals(asperities, residuals)
-    opening = _strip_opening(strips, gap, solution, change)
-    position = HolderPosition(change.delta, rotation + change.theta, roll + change.roll)
+    opening = opening.reshape(gap.shape)
+    if not is_smooth:
+        compressed = 0.0 if asperities is None else -force / (asperities.k * layout.weight)
+        opening = np.where(force > 0, compressed, np.maximum(opening, 0.0))
+    position = _holder_position(solution.motion, loads, approach)
+    position = HolderPosition(position.delta, rotation + position.theta, roll + position.roll)
     return _make_state(strips, force, opening, position, solution.n_iterations, residuals)
-
-
-def _strip_opening(strips: StripModel, gap, solution, position: HolderPosition) -> np.ndarray:
-    """Return the gap (s, m) [m] under load; with asperities, the gap between the mean planes.
-
-    gap: (s, m) [m] before loading, with the rotation about x; position: that beyond the gap.
-    """
-    compliance, layout, asperities = strips
-    if isinstance(asperities, SmoothAsperities):
-        return solution.separation.reshape(gap.shape)
-    force = solution.force.reshape(gap.shape)
-    displacement = compliance.product(solution.force).reshape(gap.shape)
-    opening = np.maximum(gap + position.theta * layout.x - position.delta + displacement, 0.0)
-    compressed = 0.0 if asperities is None else -force / (asperities.k * layout.weight)
-    return np.where(force > 0, compressed, opening)
 
 
 def _holder_problem(layout: StripLayout, gap, loads: HolderLoads) -> ContactProblem:
@@ -379,27 +360,20 @@ def _holder_problem(layout: StripLayout, gap, loads: HolderLoads) -> ContactProb
     )
 
 
-def _holder_position(motion, loads: HolderLoads) -> HolderPosition:
+def _holder_position(motion, loads: HolderLoads, approach: float | None) -> HolderPosition:
     """Convert the approach and the released rotations (r,) to the position of the holder."""
     theta = -float(motion[1]) if loads.moment is not None else 0.0
     roll = -float(motion[-1]) if loads.roll_moment is not None else 0.0
-    return HolderPosition(float(motion[0]), theta, roll)
+    return HolderPosition(float(motion[0] if approach is None else approach), theta, roll)
 
 
-def _press_bare(strips: StripModel, problem: ContactProblem, approach) -> ContactSolution:
-    """Solve strips that have no asperity layer, or a linear one."""
-    compliance, layout, asperities = strips
+def _press_bare(compliance: StripCompliance, problem: ContactProblem) -> ContactSolution:
+    """Solve strips that have no asperity layer, or a linear one that the compliance contains."""
+    if not problem.target.size:
+        if problem.gap.min() < 0:
+            return solve(compliance, problem)
+        return ContactSolution(np.zeros(problem.gap.size), np.zeros(0), 0.0, 0)
     warm_start = compliance.warm_start
-    if asperities is not None:
-        compliance = compliance.add_to_diagonal(1 / (asperities.k * layout.weight))
-        compliance = replace(compliance, warm_start=warm_start)
-    if approach is not None:
-        gap = problem.gap - approach
-        if gap.min() < 0:
-            solution = solve(compliance, problem._replace(gap=gap))
-        else:
-            solution = ContactSolution(np.zeros(gap.size), np.zeros(0), 0.0, 0)
-        return solution._replace(motion=np.array([approach]))
     touch_approach = problem.gap.min()
     start = None
     if warm_start is not None and warm_start.contact_set is not None:
@@ -410,8 +384,8 @@ def _press_bare(strips: StripModel, problem: ContactProblem, approach) -> Contac
         message = explain_singular_set(compliance.common, problem)
         # The column of the roll is the last one, and it is the only one that is constant along a
         # strip.
-        rolls = np.ptp(problem.motions[: layout.x.size, -1]) == 0 and problem.target.size > 1
-        if rolls and message != INDEFINITE_MESSAGE:
+        rolls = np.ptp(problem.motions[: len(compliance.common), -1]) == 0
+        if rolls and problem.target.size > 1 and message != INDEFINITE_MESSAGE:
             message = LOOSE_ROLL_MESSAGE
         raise NotConverged(message) from None
     if warm_start is not None:
@@ -420,28 +394,25 @@ def _press_bare(strips: StripModel, problem: ContactProblem, approach) -> Contac
     return solution
 
 
-def _press_with_asperities(strips: StripModel, problem: ContactProblem, approach):
+def _press_with_asperities(
+    asperities: SmoothAsperities, compliance: StripCompliance, area, problem: ContactProblem
+) -> AsperitySolution:
     """Solve strips with an asperity layer of a smooth pressure law.
 
     Each motion is scaled: the largest closing of a node per unit of motion becomes 1, and load and moments become
     comparable.
     """
-    compliance, layout, asperities = strips
+    if not problem.target.size:
+        layer = AsperityProblem(asperities, compliance, area, problem)
+        return solve_at_motion(layer, np.zeros(0))
     scale = 1 / np.abs(problem.motions).max(axis=0)
     scaled = problem._replace(
         motions=problem.motions * scale,
         target=problem.target * scale,
         springs=problem.springs * scale**2,
     )
-    area = np.tile(layout.weight, layout.offsets.size)
-    if approach is None:
-        solution = solve_asperity_layer(AsperityProblem(asperities, compliance, area, scaled))
-        return solution._replace(motion=solution.motion * scale)
-    moved_problem = scaled._replace(gap=problem.gap - approach)
-    solution = solve_at_motion(
-        AsperityProblem(asperities, compliance, area, moved_problem), np.zeros(0)
-    )
-    return solution._replace(motion=np.array([approach]))
+    solution = solve_asperity_layer(AsperityProblem(asperities, compliance, area, scaled))
+    return solution._replace(motion=solution.motion * scale)
 
 
 def _refuse_controls(strips: StripModel, gap, loads: HolderLoads, approach) -> None:

@@ -9,6 +9,7 @@ cycles, conjugate gradients and the primal active-set method follow. `compute_re
 shares no intermediate result with the solver.
 """
 
+from dataclasses import replace
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -144,7 +145,7 @@ def solve(
 
     The forces are those of a strictly convex quadratic program, so that neither the set from which the search starts
     nor the method that finds them changes them. The residuals of every pressed patch are computed anew
-    (`compute_residuals`, `strips.compute_strip_residuals`).
+    (`compute_residuals`).
 
     Parameters
     ----------
@@ -218,7 +219,9 @@ def solve_forces(c, x, gap, target, start=None, spring: float = 0.0) -> PlainSol
     return PlainSolution(solution.force, solution.motion, solution.n_iterations)
 
 
-def compute_residuals(c, x, problem: ContactProblem, solution: ContactSolution) -> MappingProxyType:
+def compute_residuals(
+    compliance: StripCompliance, problem: ContactProblem, solution: ContactSolution
+) -> dict:
     """Compute the relative residuals of the contact conditions for a solution.
 
     An opening is relative to the sum of the magnitudes of its terms at the same node, so a spike of the gap elsewhere
@@ -226,40 +229,60 @@ def compute_residuals(c, x, problem: ContactProblem, solution: ContactSolution) 
 
     Parameters
     ----------
-    c : (m, m) ndarray
-        Compliance [m/N].
-    x : (m,) ndarray
-        Positions [m].
+    compliance : StripCompliance
     problem : ContactProblem
     solution : ContactSolution
 
     Returns
     -------
-    mapping
-        force_balance, moment_balance (if the rotation is free), penetration, tension, complementarity.
+    dict of float
+        penetration, tension, complementarity, and the balances of `compute_balances`.
     """
-    gap = problem.gap
     force = solution.force
-    delta = solution.closing
-    theta = solution.theta
-    load = float(problem.target[0]) if problem.target.size else float(force.sum())
-    opening = gap + theta * x - delta + c @ force
-    loaded_nodes = np.flatnonzero(force)
-    span = slice(loaded_nodes[0], loaded_nodes[-1] + 1)
-    scale = np.abs(gap) + np.abs(theta * x) + abs(delta) + np.abs(c[:, span]) @ np.abs(force[span])
+    magnitudes = replace(compliance, common=np.abs(compliance.common))
+    opening = problem.gap - problem.motions @ solution.motion + compliance.product(force)
+    scale = np.abs(problem.gap) + np.abs(problem.motions) @ np.abs(solution.motion)
+    scale += magnitudes.product(np.abs(force))
     relative_opening = opening / np.where(scale > 0, scale, 1.0)
+    load = max(force.sum(), MIN_LOAD)
     residuals = {
-        "force_balance": abs(force.sum() - load) / load,
         "penetration": max(0.0, -relative_opening.min()),
         "tension": max(0.0, -force.min()) / load,
         "complementarity": np.abs(force * relative_opening).sum() / load,
     }
-    if problem.target.size > 1:
-        spring_moment = problem.springs[1] * theta
-        residuals["moment_balance"] = abs(force @ x - problem.target[1] - spring_moment) / (
-            load * np.ptp(x) + abs(spring_moment)
-        )
-    return MappingProxyType({key: float(value) for key, value in residuals.items()})
+    return {key: float(value) for key, value in residuals.items()} | compute_balances(
+        problem, solution
+    )
+
+
+def compute_balances(problem: ContactProblem, solution) -> dict:
+    """Compute the relative residuals of the balance of load and moments.
+
+    A moment is relative to the load times the length over which its axis varies, plus the moment of the spring.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+    solution : ContactSolution or AsperitySolution
+
+    Returns
+    -------
+    dict of float
+        force_balance, moment_balance of a rotation about y and roll_balance of a roll, as far as they are free.
+    """
+    out = {}
+    for k, (target, spring) in enumerate(zip(problem.target, problem.springs)):
+        arm = problem.motions[:, k]
+        spring_moment = spring * solution.motion[k]
+        error = abs(target - arm @ solution.force - spring_moment)
+        if k == 0:
+            out["force_balance"] = float(error / target)
+            continue
+        # The arm of a roll is the same at neighbouring nodes of a strip.
+        name = "moment_balance" if arm[0] != arm[1] else "roll_balance"
+        scale = problem.target[0] * np.ptp(arm) + abs(spring_moment)
+        out[name] = float(error / scale)
+    return out
 
 
 def refuse_unsolvable(x, gap, load: float, moment: float | None, spring: float) -> None:
@@ -435,12 +458,13 @@ def _solve_and_check(
     """
     x = pieces.interface.x
     weight = pieces.interface.weight
+    compliance = StripCompliance(pieces.normal)
     with use_one_blas_thread():
         try:
-            solution = solve(StripCompliance(pieces.normal), problem, start)
+            solution = solve(compliance, problem, start)
         except np.linalg.LinAlgError:
             raise NotConverged(explain_singular_set(pieces.normal, problem)) from None
-        residuals = compute_residuals(pieces.normal, x, problem, solution)
+        residuals = compute_residuals(compliance, problem, solution)
         refuse_residuals(residuals, RESIDUAL_TOL)
         force = solution.force
         opening = problem.gap + solution.theta * x - solution.closing + pieces.normal @ force
@@ -453,7 +477,7 @@ def _solve_and_check(
         float(force @ x),
         Outcome.DONE,
         solution.n_iterations,
-        residuals,
+        MappingProxyType(residuals),
     )
 
 

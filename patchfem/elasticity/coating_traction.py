@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..mesh.grading import LENGTH_TOL
+from ..mesh.pieces import find_edges
 from .elasticity import hooke
 from .recovery import Cells, make_points
 
@@ -43,24 +44,35 @@ def compute_coating_traction(cells: Cells, u) -> CoatingTraction | None:
     CoatingTraction or None
         None without a coating.
     """
-    edges = _find_bonded_edges(cells)
-    if not len(edges):
+    # A bonded edge is shared by a coating cell, which it surrounds counterclockwise, and a substrate cell.
+    edges = find_edges(cells.groups, len(cells.points))
+    is_coating = cells.is_coating[edges.owner]
+    n_coating = np.bincount(edges.twin, is_coating)[edges.twin]
+    is_bonded = is_coating & (n_coating == 1) & ~edges.is_border
+    if not is_bonded.any():
         return None
-    nodes = np.unique(edges)
-    nodes = nodes[np.lexsort((cells.points[nodes, 1], cells.points[nodes, 0]))]
-    position = np.empty(len(cells.points), np.int64)
-    position[nodes] = np.arange(nodes.size)
-    along_x, inward = (cells.points[edges[:, 1]] - cells.points[edges[:, 0]]).T
+    ends = edges.ends[is_bonded]
+    middles = edges.middles[is_bonded]
+    edge_nodes = ends
+    fractions = np.array([1 / 2, 1 / 2])
+    if (middles >= 0).all():
+        edge_nodes = np.column_stack([ends, middles])
+        fractions = np.array([1 / 6, 1 / 6, 2 / 3])
+
     # Each normal points into the substrate and has the length of its edge.
+    along_x, inward = (cells.points[ends[:, 1]] - cells.points[ends[:, 0]]).T
     edge_normals = np.stack([inward, -along_x], axis=1)
-    edge_lengths = np.hypot(*edge_normals.T)
-    across = np.zeros((nodes.size, 2))
-    length = np.zeros(nodes.size)
-    for ends in position[edges].T:
-        np.add.at(across, ends, edge_normals)
-        np.add.at(length, ends, edge_lengths / 2)
-    across /= np.hypot(*across.T)[:, None]
+    across = np.zeros(cells.points.shape)
+    length = np.zeros(len(cells.points))
+    for nodes, fraction in zip(edge_nodes.T, fractions):
+        np.add.at(across, nodes, edge_normals)
+        np.add.at(length, nodes, fraction * np.hypot(*edge_normals.T))
+    nodes = np.unique(edge_nodes)
+    nodes = nodes[np.lexsort((cells.points[nodes, 1], cells.points[nodes, 0]))]
+    length = length[nodes]
+    across = across[nodes] / np.hypot(*across[nodes].T)[:, None]
     along = across[:, ::-1] * [1.0, -1.0]
+
     coating = _select_coating(cells, nodes)
     gauss_points = make_points(coating, "gauss")
     force = np.stack([-_nodal_forces(coating, gauss_points, motion)[nodes] for motion in u])
@@ -69,54 +81,28 @@ def compute_coating_traction(cells: Cells, u) -> CoatingTraction | None:
     return CoatingTraction(nodes, length, force, shear, normal)
 
 
-def _find_bonded_edges(cells: Cells) -> np.ndarray:
-    """Return the edges (e, 2) that are shared by a coating cell and a substrate cell."""
-    edges = np.concatenate(
-        [
-            np.stack([block, np.roll(block, -1, axis=1)], axis=2).reshape(-1, 2)
-            for block in cells.blocks
-        ]
-    )
-    is_coating = cells.is_coating[cells.cell_of_corner()]
-    in_coating = np.zeros(len(cells.points), bool)
-    in_coating[edges[is_coating]] = True
-    in_substrate = np.zeros(len(cells.points), bool)
-    in_substrate[edges[~is_coating]] = True
-    may_be_shared = (in_coating & in_substrate)[edges].all(axis=1)
-    edges = edges[may_be_shared]
-    is_coating = is_coating[may_be_shared]
-    key = edges.min(axis=1) * len(cells.points) + edges.max(axis=1)
-    return edges[is_coating & np.isin(key, key[~is_coating])]
-
-
 def _select_coating(cells: Cells, nodes) -> Cells:
-    """Return the coating cells that touch given nodes.
-
-    No other cell exerts a force of the coating on these nodes.
-    """
-    is_touched = np.zeros(len(cells.points), bool)
-    is_touched[nodes] = True
-    blocks = []
-    first = 0
-    for block in cells.blocks:
-        is_coating = cells.is_coating[first : first + len(block)]
-        first += len(block)
-        blocks.append(block[is_coating & is_touched[block].any(axis=1)])
-    is_coating = np.ones(sum(map(len, blocks)), bool)
-    return Cells(cells.points, tuple(blocks), is_coating, cells.layers)
+    """Return the coating cells that touch given nodes; no other cell exerts a force of the coating on them."""
+    groups = {}
+    n_cells = 0
+    for kind, group in cells.groups.items():
+        is_coating = cells.is_coating[n_cells : n_cells + len(group)]
+        n_cells += len(group)
+        groups[kind] = group[is_coating & np.isin(group, nodes).any(axis=1)]
+    return Cells(cells.points, groups, np.ones(sum(map(len, groups.values())), bool), cells.layers)
 
 
 def _nodal_forces(coating: Cells, gauss_points: list, u) -> np.ndarray:
     """Return the nodal forces (N, 2) [N/m] in equilibrium with the stress of coating cells."""
-    out = np.zeros((len(coating.points), 2))
-    for points in gauss_points:
-        is_coating = np.ones(points.weight.shape[1], bool)
-        xx, yy, _, xy = np.moveaxis(hooke(points.strain(u), is_coating, coating.layers), -1, 0)
-        tensor = np.array([[xx, xy], [xy, yy]]) * points.weight
-        # The second axis of the stress tensor is along the local coordinates.
-        local = np.einsum("ijgc,jkgc->gkic", tensor, points.inverse_jacobian)
-        force = np.tensordot(points.element.gradient, local, axes=([0, 1], [0, 1]))
-        np.add.at(out, points.corners, force.swapaxes(1, 2))
+    out = np.zeros(coating.points.shape)
+    for nodes, points in zip(coating.groups.values(), gauss_points):
+        strain = points.strain(u[nodes])
+        xx, yy, _, xy = np.moveaxis(
+            hooke(strain, np.ones(strain.shape[1:], bool), coating.layers), -1, 0
+        )
+        tensor = np.stack([np.stack([xx, xy], -1), np.stack([xy, yy], -1)], -2)
+        forces = (points.weights[..., None, None] * tensor @ points.gradients).sum(axis=1)
+        np.add.at(out, nodes, forces.swapaxes(1, 2))
     return out
 
 

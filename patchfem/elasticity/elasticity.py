@@ -1,8 +1,7 @@
-"""Plane elasticity of one piece on a tensor grid of bilinear quadrilaterals.
+"""Plane elasticity of one piece on any mesh of triangles and quadrilaterals.
 
 The unknowns of a node are its displacements along x and into the piece, so both pieces of a pair
-obey the same equations. The functions of compliance and displacement also serve a piece on an
-unstructured mesh (`substructure`).
+obey the same equations.
 """
 
 from dataclasses import dataclass, field
@@ -12,17 +11,15 @@ import numpy as np
 
 from ..core import NotConverged, frozen_array
 from ..formatting import format_length
-from ..mesh.tensor import TensorGrid
-from .condense import CondensedGrid, condense
-from .lapack import use_one_blas_thread
-from .tensor_stiffness import tensor_stencil
+from ..mesh.elements import ELEMENTS, Element
+from .fronts import CellBlock, Fronts, condense
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Layers:
     """Elastic constants of the substrate and the coating of a piece.
 
-    - ``coating``, ``substrate``: Young's modulus [Pa] and Poisson ratio of each material
+    - ``coating``, ``substrate``: Young's modulus [Pa] and Poisson's ratio
     - ``plane``: "strain" or "stress"
     """
 
@@ -39,15 +36,13 @@ class Layers:
 def lame(young: float, poisson: float, plane: str) -> tuple[float, float]:
     """Return the Lame constants lambda and mu of a plane problem.
 
-    In plane stress lambda is E nu / (1 - nu^2), with which the equations of plane stress have the
-    form of those of plane strain.
+    Those of plane stress give the stresses in the plane from the strains in the plane.
 
     Parameters
     ----------
     young : float
         Young's modulus [Pa].
     poisson : float
-        Poisson ratio [1].
     plane : {"strain", "stress"}
 
     Returns
@@ -60,111 +55,212 @@ def lame(young: float, poisson: float, plane: str) -> tuple[float, float]:
     return young * poisson / ((1 + poisson) * (1 - 2 * poisson)), mu
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Piece:
-    """Piece on a tensor grid of bilinear quadrilaterals, whose far face is fixed.
+class CellPoints(NamedTuple):
+    """Points in cells of one element, with g points in each of t cells of k nodes.
 
-    The stiffness is assembled and factorised on first use: a piece whose compliance is in the disk
-    cache is often never assembled.
-
-    - ``grid``: columns and rows of nodes
-    - ``layers``: the materials
-    - ``computed``: cached results by name: factor
+    - ``values``: (g, k) shape functions
+    - ``gradients``: (t, g, 2, k) derivatives of the shape functions along x and inward [1/m]
+    - ``weights``: (t, g) areas [m2]
     """
 
-    grid: TensorGrid
+    values: np.ndarray
+    gradients: np.ndarray
+    weights: np.ndarray
+
+    def strain(self, u) -> np.ndarray:
+        """Return the plane strains exx, eyy, exy (3, t, g) [1] of displacements u (t, k, 2) [m] at the nodes."""
+        slopes = self.gradients @ u[:, None]
+        return np.stack(
+            [slopes[..., 0, 0], slopes[..., 1, 1], (slopes[..., 0, 1] + slopes[..., 1, 0]) / 2]
+        )
+
+
+def evaluate_cells(points, cells, element: Element, local_points, weights) -> CellPoints:
+    """Evaluate the shape functions at the same local points of all cells.
+
+    Parameters
+    ----------
+    points : (N, 2) ndarray
+        Nodes [m].
+    cells : (t, k) ndarray of int
+    element : Element
+    local_points : (g, 2) ndarray
+    weights : (g,) ndarray
+        Of the integration in local coordinates.
+
+    Returns
+    -------
+    CellPoints
+    """
+    values, local_gradients = element.evaluate(local_points)
+    jacobian = local_gradients @ points[cells][:, None]
+    (a, b), (c, d) = np.moveaxis(jacobian, (-2, -1), (0, 1))
+    determinant = a * d - b * c
+    inverse = np.stack([np.stack([d, -b], -1), np.stack([-c, a], -1)], -2)
+    gradients = (inverse / determinant[..., None, None]) @ local_gradients
+    return CellPoints(values, gradients, determinant * weights)
+
+
+def compute_stiffness(points, cells, element: Element, lam, mu) -> np.ndarray:
+    """Integrate the stiffness of cells, sigma(u) : eps(v) with sigma = lam tr(eps) I + 2 mu eps.
+
+    Parameters
+    ----------
+    points : (N, 2) ndarray
+        Nodes [m].
+    cells : (t, k) ndarray of int
+    element : Element
+    lam, mu : (t,) ndarray
+        Lame constants [Pa].
+
+    Returns
+    -------
+    (t, 2 k, 2 k) ndarray [N/m per m]
+        Unknowns node by node along x and inward.
+    """
+    _, gradients, weights = evaluate_cells(points, cells, element, element.gauss, element.weights)
+    along, inward = np.moveaxis(gradients, 2, 0)
+    weighted_along = along * weights[..., None]
+    weighted_inward = inward * weights[..., None]
+    xx = weighted_along.swapaxes(1, 2) @ along
+    yy = weighted_inward.swapaxes(1, 2) @ inward
+    xy = weighted_along.swapaxes(1, 2) @ inward
+    lam = lam[:, None, None]
+    mu = mu[:, None, None]
+    n_cells, k = cells.shape
+    out = np.empty((n_cells, k, 2, k, 2))
+    out[:, :, 0, :, 0] = (lam + 2 * mu) * xx + mu * yy
+    out[:, :, 1, :, 1] = (lam + 2 * mu) * yy + mu * xx
+    out[:, :, 0, :, 1] = lam * xy + mu * xy.swapaxes(1, 2)
+    out[:, :, 1, :, 0] = out[:, :, 0, :, 1].swapaxes(1, 2)
+    return out.reshape(n_cells, 2 * k, 2 * k)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Piece:
+    """Piece whose far face is fixed, and whose stiffness is factorised on demand.
+
+    - ``mesh``: TensorGrid or PieceMesh
+    - ``layers``: materials
+    - ``guided``: displacement that is also fixed at both ends of a rectangle (0 along x, 1 inward), or None
+    """
+
+    mesh: object
     layers: Layers
+    guided: int | None = None
     computed: dict = field(default_factory=dict)
 
     @property
-    def stencil(self) -> np.ndarray:
-        """Stiffness per unit width (nx, ny - 1, 3, 3, 2, 2) [N/m per m] (`tensor_stiffness`)."""
-        lam, mu = self.layers.lame(self.grid.is_coating_cell()[0])
-        return tensor_stencil(self.grid.x, self.grid.depth, lam, mu)
+    def factor(self) -> Fronts:
+        """Factors of the stiffness after condensation to the interface.
+
+        Raises
+        ------
+        NotConverged
+            If the stiffness is singular to working precision; the message says what to change.
+        """
+        if "factor" not in self.computed:
+            mesh = self.mesh
+            is_fixed = np.zeros((mesh.n_nodes, 2), bool)
+            is_fixed[mesh.far] = True
+            if self.guided is not None:
+                x = mesh.points[:, 0]
+                is_fixed[(x == x.min()) | (x == x.max()), self.guided] = True
+            try:
+                factor = condense(
+                    self._stiffness_blocks(), mesh.cell_positions, mesh.interface, is_fixed
+                )
+                self.computed["round_off_error"] = factor.estimate_round_off()
+            except NotConverged as error:
+                raise NotConverged(f"{error}; {self._describe_remedy()}") from None
+            self.computed["factor"] = factor
+        return self.computed["factor"]
 
     @property
     def round_off_error(self) -> float:
         """Relative round-off error of the compliance [1], which is 0 before the piece is factorised."""
-        return self.computed["factor"].round_off_error if "factor" in self.computed else 0.0
+        return self.computed.get("round_off_error", 0.0)
 
-    @property
-    def factor(self) -> CondensedGrid:
-        """Stiffness of the piece after condensation to its interface.
-
-        NotConverged, with a remedy, if the stiffness cannot be factorised.
-        """
-        if "factor" not in self.computed:
-            x = self.grid.x
-            is_mirrored = np.abs(x + x[::-1]).max() <= 1e-13 * self.grid.length
-            try:
-                self.computed["factor"] = condense(self.stencil, bool(is_mirrored))
-            except NotConverged as error:
-                min_length = min(np.diff(x).min(), np.diff(self.grid.depth).min())
-                size = (self.grid.length, self.grid.height)
-                remedy = describe_remedy(
-                    self.layers, min_length, size, has_coating=self.grid.coating_rows > 0
-                )
-                raise NotConverged(f"{error}; {remedy}") from None
-        return self.computed["factor"]
+    def _stiffness_blocks(self) -> list[CellBlock]:
+        """Return the stiffnesses of the cells."""
+        out = []
+        constants = self.layers.lame(self.mesh.is_coating)
+        n_cells = 0
+        for kind, cells in self.mesh.blocks.items():
+            lam, mu = constants[:, n_cells : n_cells + len(cells)]
+            n_cells += len(cells)
+            matrices = compute_stiffness(self.mesh.points, cells, ELEMENTS[kind], lam, mu)
+            out.append(CellBlock(cells, matrices))
+        return out
 
     def solve(self, load) -> np.ndarray:
-        """Return displacements (frames, nx * ny, 2) [m] under loads (nx, 2, frames) [N/m]."""
-        nx, _, frames = load.shape
-        out = np.zeros((frames, nx, self.grid.depth.size, 2))
-        out[:, :, :-1] = np.moveaxis(self.factor.displacement(load), 3, 0)
-        return out.reshape(frames, -1, 2)
+        """Return displacements (frames, N, 2) [m] under interface loads (m, 2, frames) [N/m]."""
+        mesh = self.mesh
+        full_load = np.zeros((mesh.n_nodes, *load.shape[1:]))
+        full_load[mesh.interface] = np.einsum("ij,i...->j...", spread_matrix(mesh), load)
+        u = self.factor.solve(full_load)
+        if self.round_off_error:
+            u += self.factor.solve(full_load - self.factor.compute_forces(u))
+        return np.moveaxis(u, 2, 0)
+
+    def _describe_remedy(self) -> str:
+        """Return a sentence that says what to change if the stiffness is singular."""
+        mesh = self.mesh
+        layers = self.layers
+        ratio = layers.coating[0] / layers.substrate[0]
+        if mesh.coating_thickness and not 1e-3 < ratio < 1e3:
+            return (
+                f"the Young's moduli of coating and substrate differ by a factor of {max(ratio, 1 / ratio):.2g}: bring "
+                "the moduli closer together, make the coating thicker, or leave the coating out"
+            )
+        shortest = min(mesh.tributary_lengths().min(), mesh.first_row_height)
+        return (
+            f"the shortest cell is {format_length(shortest, 3)} in a piece of "
+            f"{format_length(mesh.length, 3)} x {format_length(mesh.height, 3)}: use longer "
+            "cells (contact.element_size, or the cells of contact.mesh)"
+        )
 
 
-def describe_remedy(layers: Layers, min_length: float, size, *, has_coating: bool) -> str:
-    """Return a sentence that says what to change if the stiffness of a piece is singular.
+def spread_matrix(mesh) -> np.ndarray:
+    """Return the matrix T that converts forces f at m pressure nodes into forces T^T f on the n interface nodes.
+
+    f_i is the pressure at a node times the tributary length of the node. On elements of first order T = 1. On elements
+    of second order T_ij = int psi_i N_j / tributary length with the shape functions N and the dual functions psi of the
+    hat functions between corners (`mortar`), for which T = 1 on elements of first order, too. A pressure for each node,
+    or one that is linear between corners, would ripple beside free ends.
 
     Parameters
     ----------
-    layers : Layers
-    min_length : float
-        Length of the shortest side of a cell [m].
-    size : (2,) sequence
-        Length and height of the piece [m].
-    has_coating : bool
-        Whether the piece has cells of a coating.
+    mesh : TensorGrid or PieceMesh
 
     Returns
     -------
-    str
+    (m, n) ndarray [1]
     """
-    ratio = layers.coating[0] / layers.substrate[0]
-    if has_coating and not 1e-3 < ratio < 1e3:
-        return (
-            f"the Young's moduli of coating and substrate differ by a factor of {max(ratio, 1 / ratio):.2g}: bring "
-            "the moduli closer together, make the coating thicker, or leave the coating out"
-        )
-    return (
-        f"the shortest cell is {format_length(min_length, 3)} in a piece of "
-        f"{format_length(size[0], 3)} x {format_length(size[1], 3)}: use longer "
-        "cells (contact.element_size, or the cells of contact.mesh)"
-    )
+    m = mesh.x.size
+    if mesh.interface.size == m:
+        return np.eye(m)
+    out = np.zeros((m, mesh.interface.size))
+    # int psi_i N_j over an edge of length 1 with its nodes at 0, 1/2 and 1
+    integrals = np.array([[1 / 3, 1 / 3, -1 / 6], [-1 / 6, 1 / 3, 1 / 3]])
+    for edge, length in enumerate(np.diff(mesh.x)):
+        out[edge : edge + 2, 2 * edge : 2 * edge + 3] += integrals * length
+    return out / mesh.tributary_lengths()[:, None]
 
 
-def compute_displacement(piece, shear: np.ndarray, normal: np.ndarray) -> np.ndarray:
+def compute_displacement(piece: Piece, shear: np.ndarray, normal: np.ndarray) -> np.ndarray:
     """Compute the displacements of a piece under forces on its interface.
 
-    The factors of the stiffness are computed once and reused.
-
     Parameters
     ----------
-    piece : Piece or substructure.Substructure
-    shear, normal : (frames, m) ndarray
-        Nodal forces per unit width [N/m] that act on the piece along +x and inward.
+    piece : Piece
+    shear, normal : (frames, m) or (m,) ndarray
+        Forces per unit width along x and inward [N/m].
 
     Returns
     -------
-    (frames, nodes, 2) ndarray [m]
+    (frames, N, 2) ndarray [m]
         Along x and inward.
-
-    Raises
-    ------
-    NotConverged
-        If the stiffness of the piece cannot be factorised.
     """
     load = np.stack([np.atleast_2d(shear).T, np.atleast_2d(normal).T], axis=1)
     return piece.solve(load.astype(float))
@@ -175,16 +271,15 @@ def hooke(strain, is_coating, layers: Layers) -> np.ndarray:
 
     Parameters
     ----------
-    strain : (3, ..., t) array_like
-        exx, eyy and exy [1], exy half the engineering shear strain.
-    is_coating : (t,) ndarray of bool
+    strain : (3, ...) array_like
+        exx, eyy, exy [1].
+    is_coating : (...) ndarray of bool
     layers : Layers
 
     Returns
     -------
-    (..., t, 4) ndarray
-        xx, yy, zz, xy [Pa], positive in tension. zz is nu (xx + yy) in plane strain and 0 in plane
-        stress.
+    (..., 4) ndarray [Pa]
+        Stresses xx, yy, zz, xy; zz = 0 in plane stress.
     """
     exx, eyy, exy = strain
     lam, mu = layers.lame(is_coating)
@@ -216,33 +311,13 @@ class InterfaceCompliance(NamedTuple):
     nt: np.ndarray
 
 
-def interface_compliance(piece) -> InterfaceCompliance:
-    """Compute the compliances of a piece at its interface, per unit width.
-
-    They are the inverse of the Schur complement of the stiffness at the nodes of the interface, with
-    bilinear quadrilaterals (and linear triangles), a fixed far face and free ends. The order in which
-    the inner nodes are eliminated does not enter. Every factorisation is checked with an irregular
-    load: `round_off_error` of the piece is the change of its solution by one step of iterative
-    refinement.
-
-    Parameters
-    ----------
-    piece : Piece or substructure.Substructure
-        It is factorised if it is not yet.
-
-    Returns
-    -------
-    InterfaceCompliance
-        Symmetric nn and tt, positive definite [m2/N].
-
-    Raises
-    ------
-    NotConverged
-        If the stiffness of the piece cannot be factorised.
-    """
-    with use_one_blas_thread():
-        both = piece.factor.compliance()
+def interface_compliance(piece: Piece) -> InterfaceCompliance:
+    """Compute the compliances of a piece at its interface, per unit width."""
+    both = piece.factor.compliance
     along = slice(0, None, 2)
     inward = slice(1, None, 2)
     blocks = (both[inward, inward], both[along, along], both[inward, along])
+    spread = spread_matrix(piece.mesh)
+    if spread.shape[0] < spread.shape[1]:
+        blocks = [spread @ block @ spread.T for block in blocks]
     return InterfaceCompliance(*(frozen_array(block) for block in blocks))

@@ -1,126 +1,193 @@
-"""Multifrontal Cholesky factors of a sparse stiffness, in dense fronts (Duff and Reid 1983).
+"""Static condensation of a plane mesh to its interface by multifrontal elimination.
 
-Each leaf or cut of a nested dissection has a front, a dense matrix of the unknowns of its nodes
-(the own unknowns of the front) and of all later unknowns that are coupled with them. Eliminating
-the own unknowns leaves an update, which is added to the front that owns the first later node. The
-last front is the interface. It receives all updates, so its matrix is the Schur complement S, and
-S^-1 is the compliance.
+The cells are halved again and again (nested dissection, George 1973). Each part has a front, the dense stiffness of its
+nodes. The nodes whose cells all lie in the part are eliminated; what remains is the stiffness of the nodes that the part
+shares with others, which is added to the front of the next larger part (Duff and Reid 1983). The last front is that of
+the interface, the Schur complement S = K_ss - K_si K_ii^-1 K_is, and S^-1 is the compliance.
 """
 
 from dataclasses import dataclass
-from itertools import pairwise, product
+from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import eigvalsh
-from scipy.linalg.blas import dsyrk, dtrsm
-from scipy.linalg.lapack import dpotrf, dtfsm, dtfttr, dtrttf
-from scipy.sparse import csc_matrix, csr_matrix, tril
 
 from ..core import NotConverged
-from .dissect import dissect_nodes, graph_coordinates
-from .lapack import cho_inverse
+from .lapack import cho_inverse, dgemm, dpotrf, dtrsm, use_one_blas_thread
 
-UNKNOWNS_PER_NODE = 2  # number of unknowns of a node, which are consecutive
-# Smallest number of nodes of an update that is added by runs of consecutive nodes; a smaller update
-# is added by one indexed assignment
-MIN_SLICED_NODES = 40
-# Mean length [nodes] of runs of consecutive node numbers from which an update is added run by run;
-# with shorter runs it is added column by column
-MIN_MEAN_RUN_LENGTH = 24
+MAX_LEAF_CELLS = 100  # largest number of cells in a part that is not halved further
+# Smallest pivot, relative to the diagonal entry before its front is eliminated, for which round-off is not examined;
+# pivots lose digits where a long thin part bends
+MIN_SAFE_PIVOT = 1e-6
+# Largest residual of a solution, relative to the largest load, that is not refined
+RESIDUAL_TOL = 1e-8
+# Largest relative change of the displacements by one step of refinement; factors with a larger
+# change are rejected
+MAX_REFINEMENT_CHANGE = 1e-2
+
+
+class CellBlock(NamedTuple):
+    """Cells of one element: node numbers (t, k), and stiffnesses (t, 2 k, 2 k) per unit width [N/m per m]."""
+
+    nodes: np.ndarray
+    matrices: np.ndarray
+
+
+class Front(NamedTuple):
+    """Eliminated nodes of one part.
+
+    - ``own``: (a,) eliminated nodes
+    - ``ring``: (b,) nodes that remain
+    - ``factor``: (2 a, 2 a) lower Cholesky factor L of the stiffness of the own nodes
+    - ``coupling``: (2 a, 2 b) L^-1 K_own,ring
+    - ``smallest_pivot``: smallest pivot relative to the diagonal entry before the elimination
+    """
+
+    own: np.ndarray
+    ring: np.ndarray
+    factor: np.ndarray
+    coupling: np.ndarray
+    smallest_pivot: float = 1.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Fronts:
-    """Cholesky factors of a matrix (n, n), stored in frontal matrices.
+    """Factors of the stiffness of a piece with n nodes, of which m lie on the interface.
 
-    - ``triangles``: triangle of L for the own unknowns of each front, in LAPACK's rectangular format
-    - ``lower_blocks``: (later, own) columns of L below each triangle
-    - ``first_unknowns``: (f + 1,) first own unknown of each front, and n
-    - ``later_unknowns``: later unknowns that are coupled with the own unknowns of each front
+    - ``blocks``: cells, in which fixed displacements are decoupled
+    - ``fronts``: fronts in the order of elimination
+    - ``interface``: (m,) nodes
+    - ``compliance``: (2 m, 2 m) displacements of the interface per unit force on it [m2/N], node by node along x and
+      inward
+    - ``n_nodes``: number of nodes
+    - ``smallest_pivot``: smallest pivot relative to the diagonal entry of its front
     """
 
-    triangles: list
-    lower_blocks: list
-    first_unknowns: np.ndarray
-    later_unknowns: list
-
-    @property
-    def n_entries(self) -> int:
-        """Number of stored floating-point numbers of 8 bytes."""
-        return sum(part.size for part in (*self.triangles, *self.lower_blocks))
-
-    def compliance(self) -> np.ndarray:
-        """Return the diagonal block (k, k) of the inverse that belongs to the last front."""
-        size = self.first_unknowns[-1] - self.first_unknowns[-2]
-        low, _ = dtfttr(size, self.triangles[-1], uplo="L")
-        return cho_inverse(low)
+    blocks: list
+    fronts: list
+    interface: np.ndarray
+    compliance: np.ndarray
+    n_nodes: int
+    smallest_pivot: float
 
     def solve(self, load) -> np.ndarray:
-        """Solve the equations for loads (n, r) by forward and back substitution."""
-        x = np.array(load, dtype=float, order="C")
-        starts = self.first_unknowns
-        fronts = list(
-            zip(self.triangles, self.lower_blocks, starts, starts[1:], self.later_unknowns)
-        )
-        for triangle, lower_block, start, stop, later in fronts:
-            x[start:stop] = dtfsm(1.0, triangle, x[start:stop], uplo="L")
-            x[later] -= lower_block @ x[start:stop]
-        for triangle, lower_block, start, stop, later in reversed(fronts):
-            right = x[start:stop] - lower_block.T @ x[later]
-            x[start:stop] = dtfsm(1.0, triangle, right, uplo="L", trans="T")
-        return x
+        """Return the displacements (n, 2, r) [m] under loads of the same shape [N/m]."""
+        u = np.array(load, float)
+        frames = u.shape[2]
+        with use_one_blas_thread():
+            for own, ring, factor, coupling, _ in self.fronts:
+                half_solved = dtrsm(1.0, factor, u[own].reshape(-1, frames), lower=1)
+                u[own] = half_solved.reshape(-1, 2, frames)
+                u[ring] -= (coupling.T @ half_solved).reshape(-1, 2, frames)
+            forces = u[self.interface].reshape(-1, frames)
+            u[self.interface] = (self.compliance @ forces).reshape(-1, 2, frames)
+            for own, ring, factor, coupling, _ in reversed(self.fronts):
+                right = u[own].reshape(-1, frames) - coupling @ u[ring].reshape(-1, frames)
+                u[own] = dtrsm(1.0, factor, right, lower=1, trans_a=1).reshape(-1, 2, frames)
+        return u
 
-
-class ZeroEnergyMotion(NotConverged):
-    """Exception for a stiffness matrix that has a rigid-body mode or another zero-energy mode."""
-
-
-class SparseFactor:
-    """Cholesky factors of a sparse matrix that does not come from a mesh.
-
-    The order of elimination follows from the graph of the matrix (`dissect.graph_coordinates`).
-    Unknowns with the same neighbours form one node of this graph. `min_pivot` and the
-    exceptions are those of `factorise`.
-    """
-
-    def __init__(self, matrix, min_pivot: float = 0.0):
-        pattern = csr_matrix(matrix != 0)
-        # Rows with the same pattern have the same sum of random numbers.
-        numbers = np.random.default_rng(0).integers(2**62, size=matrix.shape[0])
-        row_hash = pattern.astype(np.int64) @ numbers
-        _, first, node = np.unique(row_hash, return_index=True, return_inverse=True)
-        graph = pattern[first][:, first]
-        pairs = np.stack(tril(graph, -1).nonzero(), axis=1)
-        node_order, firsts = dissect_nodes(graph_coordinates(graph), pairs)
-        position = np.argsort(node_order)[node]
-        self.order = np.argsort(position, kind="stable")
-        first_unknowns = np.searchsorted(position[self.order], firsts)
-        matrix = csc_matrix(matrix[self.order][:, self.order])
-        self.fronts = factorise(matrix, first_unknowns, 1, min_pivot)
-
-    def solve(self, load) -> np.ndarray:
-        """Solve the equations for loads (n,) or (n, r)."""
-        load = np.asarray(load, float)
-        solution = self.fronts.solve(load[self.order].reshape(len(load), -1))
-        out = np.empty_like(load)
-        out[self.order] = solution.reshape(load.shape)
+    def compute_forces(self, u) -> np.ndarray:
+        """Return the nodal forces (n, 2, r) [N/m] that cause displacements of the same shape [m]."""
+        out = np.zeros_like(u)
+        for nodes, matrices in self.blocks:
+            local = u[nodes].reshape(len(nodes), -1, u.shape[2])
+            np.add.at(out, nodes, (matrices @ local).reshape(*nodes.shape, 2, -1))
         return out
 
+    def estimate_round_off(self) -> float:
+        """Estimate the relative round-off error of the compliance from one step of iterative refinement.
 
-def factorise(
-    matrix: csc_matrix, firsts, per_node: int = UNKNOWNS_PER_NODE, min_pivot: float = 0.0
-) -> Fronts:
-    """Factorise a symmetric positive definite matrix; its unknowns are eliminated in the given order.
+        The change by this step is the error of the compliance, too: a compliance refined in double
+        precision differs by as much and is no better.
+
+        Returns
+        -------
+        float
+            Largest change over the largest displacement; 0 if no pivot is small or the residual is at most
+            `RESIDUAL_TOL`.
+
+        Raises
+        ------
+        NotConverged
+            If the change is larger than `MAX_REFINEMENT_CHANGE`.
+        """
+        if self.smallest_pivot > MIN_SAFE_PIVOT:
+            return 0.0
+        load = np.zeros((self.n_nodes, 2, 1))
+        # The fractional parts of k^2 (sqrt(5) - 1)/2 are equidistributed (Weyl 1916).
+        number = np.arange(1, 2 * self.interface.size + 1).reshape(-1, 2, 1)
+        load[self.interface] = number**2 * ((np.sqrt(5) - 1) / 2) % 1 - 0.5
+        u = self.solve(load)
+        residual = load - self.compute_forces(u)
+        if np.abs(residual).max() <= RESIDUAL_TOL * np.abs(load).max():
+            return 0.0
+        change = float(np.abs(self.solve(residual)).max() / np.abs(u).max())
+        if not change <= MAX_REFINEMENT_CHANGE:
+            raise NotConverged(
+                f"the equations of the piece are solved only to a relative accuracy of {change:.1e}, but "
+                f"{MAX_REFINEMENT_CHANGE:.0e} is needed"
+            )
+        return change
+
+
+class _Part(NamedTuple):
+    """Part of a mesh that consists of the leaves from `begin` to `end`, and the numbers of its two halves."""
+
+    halves: tuple
+    begin: int
+    end: int
+
+
+class _Stiffness(NamedTuple):
+    """Stiffness (2 k + 2, 2 k + 2) of the nodes (k,) of a part; its last two rows and columns are zero."""
+
+    nodes: np.ndarray
+    matrix: np.ndarray
+
+
+def _dissect(positions) -> tuple[list[_Part], list[np.ndarray]]:
+    """Halve cells at positions (t, 2) across the longer side of each part.
+
+    Returns
+    -------
+    parts : list of _Part
+        Both halves of a part stand before it.
+    leaves : list of ndarray
+        Cells of each leaf.
+    """
+    parts = []
+    leaves = []
+
+    def divide(cells) -> int:
+        """Divide cells, and return the number of their part."""
+        begin = len(leaves)
+        halves = ()
+        if cells.size > MAX_LEAF_CELLS:
+            along = positions[cells]
+            along = along[:, np.argmax(np.ptp(along, axis=0))]
+            cut = np.partition(along, cells.size // 2)[cells.size // 2]
+            is_first = along < cut if (along < cut).any() else along <= cut
+            halves = (divide(cells[is_first]), divide(cells[~is_first]))
+        else:
+            leaves.append(cells)
+        parts.append(_Part(halves, begin, len(leaves)))
+        return len(parts) - 1
+
+    divide(np.arange(len(positions)))
+    return parts, leaves
+
+
+def condense(blocks: list[CellBlock], positions, interface, is_fixed) -> Fronts:
+    """Condense a mesh to its interface.
 
     Parameters
     ----------
-    matrix : (n, n) csc_matrix
-    firsts : (f + 1,) sequence of int
-        Front k owns the nodes firsts[k]:firsts[k + 1].
-    per_node : int
-        Unknowns of a node, which follow one another.
-    min_pivot : float
-        Every pivot must exceed this fraction of the diagonal entry of the matrix [1].
+    blocks : list of CellBlock
+    positions : (t, 2) ndarray
+        Positions of the cells, by which they are divided.
+    interface : (m,) ndarray of int
+        Nodes.
+    is_fixed : (n, 2) ndarray of bool
+        Fixed displacements; none of them belongs to the interface unless the compliance there is not used.
 
     Returns
     -------
@@ -128,120 +195,123 @@ def factorise(
 
     Raises
     ------
-    ZeroEnergyMotion
-        If a pivot is too small but no motion has negative energy.
     NotConverged
-        If the matrix is not positive definite.
+        If the stiffness is not positive definite.
     """
-    lower = tril(matrix, format="csc")
-    diagonal = matrix.diagonal()
-    later_nodes = _find_later_nodes(lower, firsts, per_node)
-    n_fronts = len(later_nodes)
-    front_of_node = np.repeat(np.arange(n_fronts), np.diff(firsts))
-    position = np.empty(firsts[-1], np.int64)  # position of a node within the present front
-    updates = [[] for _ in range(n_fronts)]
-    triangles = []
-    lower_blocks = []
-    for number, (start, stop) in enumerate(pairwise(firsts)):
-        later = later_nodes[number]
-        nodes = np.concatenate([np.arange(start, stop), later])
-        position[nodes] = np.arange(nodes.size)
-        own = per_node * (stop - start)
-        front = _make_front(lower, start, stop, per_node * nodes.size, position, per_node)
-        for rows, update in updates[number]:
-            _add_update(front, update, position[rows], per_node)
-        updates[number] = None  # the update is no longer needed and its memory is freed
-        triangle, fault = dpotrf(front[:own, :own], lower=1)
-        size = diagonal[per_node * start : per_node * stop]
-        if fault or (np.diag(triangle) ** 2 <= min_pivot * size).any():
-            raise _describe_fault(front[:own, :own], size, min_pivot)
-        lower_block = np.empty((0, own), order="F")
-        if later.size:
-            lower_block = dtrsm(1.0, triangle, front[own:, :own], side=1, lower=1, trans_a=1)
-            remainder = np.asfortranarray(front[own:, own:])
-            update = dsyrk(-1.0, lower_block, beta=1.0, c=remainder, lower=1, overwrite_c=1)
-            updates[front_of_node[later[0]]].append((later, update))
-        triangles.append(dtrttf(triangle, uplo="L")[0])
-        lower_blocks.append(lower_block)
-    later_unknowns = [_list_unknowns(nodes, per_node) for nodes in later_nodes]
-    return Fronts(triangles, lower_blocks, per_node * np.asarray(firsts), later_unknowns)
+    blocks = [_decouple_fixed(block, is_fixed) for block in blocks]
+    parts, leaves = _dissect(positions)
+    first, last = _find_leaves_of_nodes(blocks, leaves, len(is_fixed))
+    last[interface] = len(leaves)  # these nodes belong to no part
+    place = np.empty(len(is_fixed), np.int64)
+    stiffnesses = {}
+    fronts = []
+    with use_one_blas_thread():
+        for number, part in enumerate(parts):
+            if part.halves:
+                terms = [stiffnesses.pop(half) for half in part.halves]
+            else:
+                terms = [_assemble_leaf(blocks, leaves[part.begin], place)]
+            nodes = np.unique(np.concatenate([term.nodes for term in terms]))
+            is_own = (first[nodes] >= part.begin) & (last[nodes] < part.end)
+            own = nodes[is_own]
+            ring = nodes[~is_own]
+            front, stiffnesses[number] = _eliminate(own, ring, terms, place)
+            fronts.append(front)
+        nodes, schur = stiffnesses[len(parts) - 1]
+        place[nodes] = np.arange(nodes.size)
+        unknowns = _number_unknowns(place[interface])
+        factor, pivot = _factorise(schur.take(unknowns, 0).take(unknowns, 1))
+        compliance = cho_inverse(factor)
+    smallest_pivot = min([pivot, *(front.smallest_pivot for front in fronts)])
+    return Fronts(blocks, fronts, interface, compliance, len(is_fixed), smallest_pivot)
 
 
-def _describe_fault(block, diagonal, min_pivot: float) -> NotConverged:
-    """Return the exception for a frontal matrix that cannot be factorized.
-
-    block: (k, k), of which the lower half is read; diagonal: (k,) entries of the matrix there.
-    """
-    scale = np.sqrt(np.where(diagonal > 0, diagonal, 1.0))
-    if eigvalsh(block / np.outer(scale, scale))[0] > -min_pivot:
-        return ZeroEnergyMotion("the piece can move without any strain")
-    return NotConverged("the stiffness of the piece is not positive definite")
-
-
-def _add_update(front, update, nodes, per_node: int) -> None:
-    """Add the lower triangle of an update matrix to a frontal matrix.
-
-    nodes: ascending positions of its nodes in the front. A small update is added by one indexed
-    assignment, a large one in rectangles of successive nodes, or by columns if few nodes are
-    successive.
-    """
-    unknowns = _list_unknowns(nodes, per_node)
-    if nodes.size < MIN_SLICED_NODES:
-        # Both are stored by rows, so their transposes are added.
-        front.T[unknowns[:, None], unknowns] += update.T
-        return
-    cuts = np.flatnonzero(np.diff(nodes) > 1) + 1
-    if (cuts.size + 1) * MIN_MEAN_RUN_LENGTH > nodes.size:
-        for column, target in enumerate(unknowns):
-            front[unknowns[column:], target] += update[column:, column]
-        return
-    starts = per_node * np.append(0, cuts)
-    stops = per_node * np.append(cuts, nodes.size)
-    runs = [
-        (slice(start, stop), slice(unknowns[start], unknowns[start] + stop - start))
-        for start, stop in zip(starts, stops)
-    ]
-    for (columns, target_columns), (rows, target_rows) in product(runs, runs):
-        if rows.start >= columns.start:
-            front[target_rows, target_columns] += update[rows, columns]
+def _decouple_fixed(block: CellBlock, is_fixed) -> CellBlock:
+    """Return cells in which the fixed displacements are decoupled, with a stiffness of 1 on the diagonal."""
+    is_fixed = is_fixed[block.nodes].reshape(len(block.nodes), -1)
+    cells = np.flatnonzero(is_fixed.any(axis=1))
+    is_free = ~is_fixed[cells]
+    matrices = block.matrices.copy()
+    matrices[cells] *= is_free[:, :, None] & is_free[:, None]
+    cell, unknown = np.nonzero(is_fixed)
+    matrices[cell, unknown, unknown] = 1.0
+    return block._replace(matrices=matrices)
 
 
-def _list_unknowns(nodes, per_node: int) -> np.ndarray:
-    return (per_node * nodes[:, None] + np.arange(per_node)).ravel()
+def _find_leaves_of_nodes(blocks, leaves, n_nodes: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the first and the last leaf (n_nodes,) that contains a cell of each node."""
+    leaf = np.empty(sum(len(block.nodes) for block in blocks), np.int64)
+    for number, cells in enumerate(leaves):
+        leaf[cells] = number
+    first = np.full(n_nodes, len(leaves))
+    last = np.full(n_nodes, -1)
+    n_cells = 0
+    for nodes, _ in blocks:
+        of_cell = leaf[n_cells : n_cells + len(nodes), None]
+        n_cells += len(nodes)
+        np.minimum.at(first, nodes, of_cell)
+        np.maximum.at(last, nodes, of_cell)
+    return first, last
 
 
-def _find_later_nodes(lower: csc_matrix, firsts, per_node: int) -> list:
-    """Return the uneliminated nodes to which each front is coupled (symbolic factorization).
-
-    A later node may be coupled with a front only once earlier nodes are eliminated. Each list is in
-    ascending order.
-    """
-    n_fronts = len(firsts) - 1
-    front_of_node = np.repeat(np.arange(n_fronts), np.diff(firsts))
-    pointer = lower.indptr[::per_node]
-    rows = lower.indices // per_node
-    from_updates = [[] for _ in range(n_fronts)]
-    later_nodes = []
-    for number, (start, stop) in enumerate(pairwise(firsts)):
-        coupled = [rows[pointer[start] : pointer[stop]], *from_updates[number]]
-        nodes = np.unique(np.concatenate(coupled))
-        later = nodes[np.searchsorted(nodes, stop) :]
-        from_updates[number] = None  # the update is no longer needed and its memory is freed
-        if later.size:
-            from_updates[front_of_node[later[0]]].append(later)
-        later_nodes.append(later)
-    return later_nodes
+def _assemble_leaf(blocks, cells, place) -> _Stiffness:
+    """Assemble the stiffness of given cells; `place` is a workspace (n_nodes,)."""
+    selected = []
+    n_cells = 0
+    for nodes, matrices in blocks:
+        here = cells[(cells >= n_cells) & (cells < n_cells + len(nodes))] - n_cells
+        n_cells += len(nodes)
+        selected.append((nodes[here], matrices[here]))
+    nodes = np.unique(np.concatenate([cells.ravel() for cells, _ in selected]))
+    place[nodes] = np.arange(nodes.size)
+    size = 2 * nodes.size + 2
+    total = 0.0
+    for cell_nodes, matrices in selected:
+        unknowns = _number_unknowns(place[cell_nodes])
+        entries = unknowns[:, :, None] * size + unknowns[:, None]
+        total = total + np.bincount(entries.ravel(), matrices.ravel(), size**2)
+    return _Stiffness(nodes, total.reshape(size, size))
 
 
-def _make_front(
-    lower: csc_matrix, start: int, stop: int, size: int, position, per_node: int
-) -> np.ndarray:
-    """Assemble a frontal matrix from the matrix columns of the nodes that are eliminated in it."""
-    front = np.zeros((size, size), order="F")
-    pointer = lower.indptr[per_node * start : per_node * stop + 1]
-    entries = slice(pointer[0], pointer[-1])
-    nodes, components = np.divmod(lower.indices[entries], per_node)
-    rows = per_node * position[nodes] + components
-    columns = np.repeat(np.arange(pointer.size - 1), np.diff(pointer))
-    front[rows, columns] = lower.data[entries]
-    return front
+def _number_unknowns(nodes) -> np.ndarray:
+    """Return the numbers (..., 2 k) of the unknowns of nodes (..., k), node by node along x and inward."""
+    return (2 * nodes[..., None] + np.array([0, 1])).reshape(*nodes.shape[:-1], 2 * nodes.shape[-1])
+
+
+def _eliminate(own, ring, terms, place) -> tuple[Front, _Stiffness]:
+    """Add up the stiffnesses of a part and eliminate its own nodes: K_oo = L L^T, S = K_rr - W^T W with W = L^-1 K_or."""
+    sums = None
+    for nodes, matrix in terms:
+        # Nodes that the term does not contain take the zeros in its last rows and columns, as does the node that is
+        # added to the ring for the zeros of the result.
+        place[own] = place[ring] = nodes.size
+        place[nodes] = np.arange(nodes.size)
+        of_own = _number_unknowns(place[own])
+        of_ring = _number_unknowns(np.append(place[ring], nodes.size))
+        rows = matrix.take(of_own, 0)
+        term = (
+            rows.take(of_own, 1),
+            rows.take(of_ring, 1),
+            matrix.take(of_ring, 0).take(of_ring, 1),
+        )
+        sums = term if sums is None else tuple(map(np.add, sums, term, sums))
+    own_own, own_ring, remaining = sums
+    factor = own_own
+    smallest_pivot = 1.0
+    if own.size:
+        factor, smallest_pivot = _factorise(own_own)
+        # The arrays are passed transposed, because LAPACK stores columns.
+        coupling = own_ring.T
+        dtrsm(1.0, factor, coupling, side=1, lower=1, trans_a=1, overwrite_b=1)
+        dgemm(-1.0, coupling, coupling, beta=1.0, c=remaining.T, trans_b=1, overwrite_c=1)
+    front = Front(own, ring, factor, own_ring[:, : 2 * ring.size], smallest_pivot)
+    return front, _Stiffness(ring, remaining)
+
+
+def _factorise(matrix) -> tuple[np.ndarray, float]:
+    """Return the lower Cholesky factor of a symmetric matrix, which is overwritten, and its smallest relative pivot."""
+    diagonal = matrix.diagonal().copy()
+    factor, fault = dpotrf(matrix.T, lower=1, clean=0, overwrite_a=1)
+    if fault:
+        raise NotConverged("the stiffness of the piece is not positive definite")
+    return factor, float((factor.diagonal() ** 2 / diagonal).min())

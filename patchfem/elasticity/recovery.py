@@ -7,133 +7,69 @@ error (Zienkiewicz and Zhu 1987).
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from ..core import frozen_array
-from ..mesh.nodal_averages import Patches, collect_patches
-from .elasticity import Layers, Piece, hooke
-from .lapack import use_one_blas_thread
-from .reference_cells import ElementValues, element_values
+from ..mesh.elements import ELEMENTS
+from .elasticity import CellPoints, Layers, Piece, evaluate_cells, hooke
 
 # Smallest determinant of the correlations of (1, x, y) for which a patch determines a plane; a
 # patch with a smaller one is extended by the neighbouring cells
 MIN_PLANE_DETERMINANT = 0.1
+# Elements of first order by the number of their corners, by which recovered stresses are interpolated
+LINEAR_ELEMENTS = {3: ELEMENTS["triangle"], 4: ELEMENTS["quad"]}
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Cells:
-    """Cells of one piece, in blocks of the same element type.
+    """Cells of one piece.
 
-    - ``points``: (N, 2) x and depth [m] of the nodes
-    - ``blocks``: arrays (c, 3) or (c, 4) of node numbers; the cells are numbered block after block
-    - ``is_coating``: (t,) bool
-    - ``layers``: the materials
+    - ``points``: (N, 2) x and depth of the nodes [m]
+    - ``groups``: nodes (t, k) of the cells by the name of their element
+    - ``is_coating``: (t,) bool, in the order of the groups
+    - ``layers``: materials
     """
 
     points: np.ndarray
-    blocks: tuple
+    groups: dict
     is_coating: np.ndarray
     layers: Layers
+
+    @property
+    def blocks(self) -> tuple[np.ndarray, ...]:
+        """Corners (t, 3) or (t, 4) of the cells of each element."""
+        return tuple(nodes[:, : ELEMENTS[kind].n_corners] for kind, nodes in self.groups.items())
 
     def cell_of_corner(self) -> np.ndarray:
         """Return the cell number of every cell corner."""
         sizes = np.concatenate([np.full(len(block), block.shape[1]) for block in self.blocks])
         return np.repeat(np.arange(sizes.size), sizes)
 
-    def corners(self) -> np.ndarray:
-        """Return the node number of every cell corner."""
-        return np.concatenate([block.ravel() for block in self.blocks])
-
     def centres(self) -> np.ndarray:
         """Return the centres of the cells (t, 2) [m] as x and depth."""
         return np.concatenate([self.points[block].mean(axis=1) for block in self.blocks])
 
 
-def get_cells(piece) -> Cells:
-    """Return the cells of an elasticity.Piece or a substructure.Substructure."""
-    if isinstance(piece, Piece):
-        x = piece.grid.x
-        depth = piece.grid.depth
-        points = np.stack(np.broadcast_arrays(x[:, None], depth), axis=-1).reshape(-1, 2)
-        # A cell has the nodes (column, row), (column + 1, row), (column + 1, row + 1) and
-        # (column, row + 1); cells and nodes are numbered column by column.
-        first = (np.arange(x.size - 1)[:, None] * depth.size + np.arange(depth.size - 1)).ravel()
-        corners = np.stack([first, first + depth.size, first + depth.size + 1, first + 1], axis=1)
-        return Cells(points, (corners,), piece.grid.is_coating_cell().ravel(), piece.layers)
+def get_cells(piece: Piece) -> Cells:
+    """Return the cells of a piece."""
     mesh = piece.mesh
-    blocks = tuple(block for block in (mesh.triangles, mesh.quads) if len(block))
-    return Cells(mesh.points, blocks, mesh.is_coating, piece.layers)
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class CellPoints:
-    """Points in the cells of one block, with the values of the shape functions of scikit-fem.
-
-    - ``corners``: (n, c) nodes of the cells
-    - ``element``: values of the element at the points of its reference cell
-    - ``inverse_jacobian``: (2, 2, g, c) derivative of local coordinate j along axis i at [i, j]
-      [1/m]
-    - ``weight``: (g, c) weights for integrals over the cells [m2]
-    """
-
-    corners: np.ndarray
-    element: ElementValues
-    inverse_jacobian: np.ndarray
-    weight: np.ndarray
-
-    def strain(self, u) -> np.ndarray:
-        """Return the plane strains exx, eyy, exy (3, g, c) [1] of displacements u (N, 2) [m]."""
-        local_slopes = _local_slopes(self.element, self.corners, u)
-        slopes = np.einsum("glkc,ilgc->kigc", local_slopes, self.inverse_jacobian)
-        return np.stack([slopes[0, 0], slopes[1, 1], (slopes[0, 1] + slopes[1, 0]) / 2])
-
-    def interpolate(self, values) -> np.ndarray:
-        """Interpolate values (n, ..., c) at the corners; returns (g, ..., c) at the points."""
-        return _combine_corners(self.element.shape, values)
-
-
-def _local_slopes(element: ElementValues, corners, values) -> np.ndarray:
-    """Return the derivatives (g, 2, 2, c) of nodal values (N, 2) with respect to the local coordinates.
-
-    The second axis is the local coordinate, the third the component of the values.
-    """
-    by_component = np.ascontiguousarray(np.transpose(values))
-    corner_values = np.stack([by_component.take(nodes, axis=1) for nodes in corners])
-    return _combine_corners(element.gradient, corner_values)
-
-
-def _combine_corners(factors, values) -> np.ndarray:
-    """Return the products (..., c) of factors (..., n) with values (n, ..., c) at the corners."""
-    # Several BLAS threads only wait for each other in products with so few rows.
-    with use_one_blas_thread():
-        return np.tensordot(factors, values, axes=1)
+    return Cells(mesh.points, mesh.blocks, mesh.is_coating, piece.layers)
 
 
 def make_points(cells: Cells, kind: str) -> list[CellPoints]:
-    """Return the Gauss points or the centres of the cells of each block.
-
-    Parameters
-    ----------
-    cells : Cells
-    kind : {"gauss", "centre"}
-        Gauss points, with which the stiffness is integrated, or the centres.
-
-    Returns
-    -------
-    list of CellPoints
-    """
-    points = []
-    for block in cells.blocks:
-        corners = np.ascontiguousarray(block.T)
-        element = element_values(len(corners), kind)
-        jacobian = _local_slopes(element, corners, cells.points)
-        (x_by_first, y_by_first), (x_by_second, y_by_second) = np.moveaxis(jacobian, 0, 2)
-        determinant = x_by_first * y_by_second - y_by_first * x_by_second
-        adjugate = np.array([[y_by_second, -y_by_first], [-x_by_second, x_by_first]])
-        weight = element.weight[:, None] * determinant
-        points.append(CellPoints(corners, element, adjugate / determinant, weight))
-    return points
+    """Return the Gauss points ("gauss") or the centres ("centre") of the cells of each element."""
+    out = []
+    for name, nodes in cells.groups.items():
+        element = ELEMENTS[name]
+        local_points = element.gauss
+        weights = element.weights
+        if kind == "centre":
+            local_points = element.centre
+            weights = np.array([element.weights.sum()])
+        out.append(evaluate_cells(cells.points, nodes, element, local_points, weights))
+    return out
 
 
 def centre_stress(cells: Cells, u: np.ndarray) -> np.ndarray:
@@ -142,33 +78,68 @@ def centre_stress(cells: Cells, u: np.ndarray) -> np.ndarray:
     Parameters
     ----------
     cells : Cells
-    u : (frames, nodes, 2) ndarray
-        Displacements [m] along x and inward.
+    u : (frames, N, 2) ndarray
+        Displacements [m].
 
     Returns
     -------
-    (frames, t, 4) ndarray
-        xx, yy, zz, xy [Pa], positive in tension. y is the inward axis, so xy changes its sign for
-        a piece that is drawn at y < 0.
+    (frames, t, 4) ndarray [Pa]
+        Stresses xx, yy, zz, xy.
     """
     centres = make_points(cells, "centre")
     out = np.empty((len(u), cells.is_coating.size, 4))
     for frame, motion in zip(out, u):
-        strains = [points.strain(motion)[:, 0] for points in centres]
+        strains = [
+            points.strain(motion[nodes])[..., 0]
+            for points, nodes in zip(centres, cells.groups.values())
+        ]
         frame[:] = hooke(np.concatenate(strains, axis=1), cells.is_coating, cells.layers)
     return out
 
 
+class Patches(NamedTuple):
+    """Cells around each of s points, with their weights in the value at the point.
+
+    - ``point``: (e,) point of each entry, in ascending order
+    - ``cell``: (e,) cell of each entry
+    - ``weight``: (e,) weight of each entry
+    """
+
+    point: np.ndarray
+    cell: np.ndarray
+    weight: np.ndarray
+
+    def __matmul__(self, values) -> np.ndarray:
+        """Return the weighted sums (s, k) of values (t, k) at the cells."""
+        starts = np.flatnonzero(np.diff(self.point, prepend=-1))
+        return np.add.reduceat(self.weight[:, None] * values[self.cell], starts)
+
+    def list_cells(self, points) -> tuple[np.ndarray, np.ndarray]:
+        """Return the cells around given points (p,), and the position in `points` to which each belongs."""
+        counts = np.bincount(self.point)
+        starts = np.cumsum(counts) - counts
+        owner = np.repeat(np.arange(len(points)), counts[points])
+        first = np.repeat(
+            starts[points] - np.cumsum(counts[points]) + counts[points], counts[points]
+        )
+        return self.cell[np.arange(owner.size) + first], owner
+
+
+def collect_patches(point, cell) -> Patches:
+    """Group pairs of a point and a cell (e,) by point, each pair once."""
+    keys = np.unique(np.asarray(point, np.int64) << 32 | cell)
+    return Patches(keys >> 32, keys & 0xFFFFFFFF, np.ones(keys.size))
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class Recovery:
-    """Linear map of cell-centre stresses to nodes, separately for each material.
+    """Linear map of cell-centre stresses to the s recovery points: nodes, as seen from one material.
 
-    A node on the border of coating and substrate has two recovery points.
-
-    - ``cells``: the Cells
-    - ``node``, ``is_coating``: (s,) node number and material of each recovery point
-    - ``recovery_point``: recovery point of every corner, in the order of `Cells.corners`
-    - ``fit``: cells and weights of every recovery point; the weights add up to 1
+    - ``cells``: cells of the piece
+    - ``node``: (s,) node of each recovery point
+    - ``is_coating``: (s,) material of each recovery point
+    - ``recovery_point``: recovery point of each cell corner, in the order of `Cells.cell_of_corner`
+    - ``fit``: weights of the cells around each recovery point
     """
 
     cells: Cells
@@ -178,73 +149,79 @@ class Recovery:
     fit: Patches
 
     def __call__(self, values) -> np.ndarray:
-        """Map values (..., t, k) at cell centres to recovery points (..., s, k).
-
-        Linear fields are recovered exactly.
-        """
-        values = np.asarray(values)
-        by_cell = np.moveaxis(values, -2, 0)
-        out = self.fit @ by_cell.reshape(len(by_cell), -1)
-        return np.moveaxis(out.reshape(-1, *by_cell.shape[1:]), 0, -2)
+        """Map values (t, k) at cell centres to recovery points (s, k)."""
+        return self.fit @ values
 
 
 def fit_recovery(cells: Cells) -> Recovery:
     """Fit a plane to the cell-centre stresses around every node, separately for each material.
 
-    A patch that is too thin for a plane, as at edges and corners, takes in the cells around it. If
-    it stays thin, as in a coating of one row, the fit has no slope across it.
+    Where few cells of a material meet at a node, as in a coating of one row, their neighbours are
+    added.
+
+    Parameters
+    ----------
+    cells : Cells
+
+    Returns
+    -------
+    Recovery
     """
     cell_of_corner = cells.cell_of_corner()
-    key, recovery_point = np.unique(
-        2 * cells.corners() + cells.is_coating[cell_of_corner], return_inverse=True
-    )
+    corners = np.concatenate([block.ravel() for block in cells.blocks])
+    key = 2 * corners + cells.is_coating[cell_of_corner]
+    key, recovery_point = np.unique(key, return_inverse=True)
     node = key // 2
     patches = collect_patches(recovery_point, cell_of_corner)
     centres = cells.centres()
     fit, is_thin = _fit_planes(patches, cells.points[node], centres)
     if is_thin.any():
-        thin_points = np.flatnonzero(is_thin)
-        thin_patches = patches.select(thin_points)
-        # These are the points whose patches contain the cells of the thin patches.
-        neighbour_points = collect_patches(patches.cells, patches.point_of_entry).select(
-            thin_patches.cells
-        )
-        neighbour_patches = patches.select(neighbour_points.cells)
-        wide_patches = collect_patches(
-            thin_patches.point_of_entry[neighbour_points.point_of_entry][
-                neighbour_patches.point_of_entry
-            ],
-            neighbour_patches.cells,
-        )
-        wide_fit, _ = _fit_planes(wide_patches, cells.points[node[thin_points]], centres)
-        is_kept = ~is_thin[fit.point_of_entry]
-        fit = collect_patches(
-            np.concatenate([fit.point_of_entry[is_kept], thin_points[wide_fit.point_of_entry]]),
-            np.concatenate([fit.cells[is_kept], wide_fit.cells]),
-            np.concatenate([fit.weights[is_kept], wide_fit.weights]),
-        )
+        # The cells around all points of the cells in a thin patch
+        thin = np.flatnonzero(is_thin)
+        around, owner = patches.list_cells(thin)
+        points, number = collect_patches(patches.cell, patches.point).list_cells(around)
+        wide_cells, wide_number = patches.list_cells(points)
+        wide = collect_patches(owner[number[wide_number]], wide_cells)
+        wide_fit, _ = _fit_planes(wide, cells.points[node[thin]], centres)
+        is_kept = ~is_thin[fit.point]
+        parts = zip((part[is_kept] for part in fit), wide_fit._replace(point=thin[wide_fit.point]))
+        fit = Patches(*map(np.concatenate, parts))
+        order = np.argsort(fit.point, kind="stable")
+        fit = Patches(*(part[order] for part in fit))
     return Recovery(cells, node, key % 2 == 1, recovery_point, fit)
 
 
 def _fit_planes(patches: Patches, points, centres) -> tuple[Patches, np.ndarray]:
     """Fit a plane to the values at the cell centres around each node by least squares.
 
-    Returns the weights of the cells of each patch, and whether it is too thin for a plane.
+    Parameters
+    ----------
+    patches : Patches
+        Cells around each node.
+    points : (s, 2) ndarray
+        Nodes [m].
+    centres : (t, 2) ndarray [m]
 
-    points: (s, 2) [m] at which the planes are evaluated.
+    Returns
+    -------
+    fit : Patches
+        Weights of the cell values in the value of the plane at the node.
+    is_thin : (s,) ndarray of bool
+        Whether the cells of a node do not determine a plane well.
     """
-    starts = patches.starts[:-1]
-    counts = np.diff(patches.starts)
-    row = patches.point_of_entry
-    offset = centres[patches.cells] - points[row]
+    row = patches.point
+    starts = np.flatnonzero(np.diff(row, prepend=-1))
+    counts = np.bincount(row)
+    offset = centres[patches.cell] - points[row]
     size = np.maximum.reduceat(np.abs(offset), starts)
     offset /= np.where(size > 0, size, 1.0)[row]
+
     terms = np.column_stack([np.ones(row.size), offset])
     gram = np.add.reduceat(terms[:, :, None] * terms[:, None], starts)
     scale = np.sqrt(np.einsum("sii->si", gram))
     scale = np.where(scale > 0, scale, 1.0)
-    correlations = gram / (scale[:, :, None] * scale[:, None])
-    is_thin = np.linalg.det(correlations) < MIN_PLANE_DETERMINANT
+    is_thin = np.linalg.det(gram / (scale[:, :, None] * scale[:, None])) < MIN_PLANE_DETERMINANT
+
     mean = gram[:, 0, 1:] / counts[:, None]
     deviation = offset - mean[row]
     spread = np.add.reduceat(deviation[:, :, None] * deviation[:, None], starts)
@@ -252,15 +229,15 @@ def _fit_planes(patches: Patches, points, centres) -> tuple[Patches, np.ndarray]
     inverse = np.linalg.pinv(spread, rcond=1e-8, hermitian=True)
     slope = np.einsum("sij,sj->si", inverse, -mean)
     weights = 1 / counts[row] + np.einsum("ni,ni->n", deviation, slope[row])
-    return Patches(patches.starts, patches.cells, weights), is_thin
+    return patches._replace(weight=weights), is_thin
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class StressError:
     """Estimate of the error of the stress in the energy norm.
 
-    - ``error``: (frames, t) squared norm of the error of every cell [J/m]
-    - ``energy``: (frames,) squared norm of the computed stress, twice the stored energy [J/m]
+    - ``error``: (frames, t) squared errors of the cells [N]
+    - ``energy``: (frames,) squared norms of the stress of the piece [N]
     """
 
     error: np.ndarray
@@ -269,16 +246,10 @@ class StressError:
     def relative_error(self, *others: "StressError") -> tuple[np.ndarray, np.ndarray]:
         """Return the errors divided by the energy norm of the stress in all pieces.
 
-        Parameters
-        ----------
-        *others : StressError
-            Errors of the pieces that are pressed together with this piece.
-
         Returns
         -------
-        cells : (frames, t) ndarray [1]
-        total : (frames,) ndarray [1]
-            Its square is the sum of the squares of the cells.
+        by_cell : (frames, t) ndarray
+        in_piece : (frames,) ndarray
         """
         total = self.error.sum(axis=1)
         norm = np.zeros(total.size)
@@ -291,53 +262,50 @@ class StressError:
 def estimate_error(recovery: Recovery, u, stress, gauss_points: list) -> StressError:
     """Estimate the error of the stress by the method of Zienkiewicz and Zhu.
 
-    ||sigma* - sigma||^2 = integral of (sigma* - sigma) : C^-1 : (sigma* - sigma) per metre of
-    width. sigma* is the recovered stress, interpolated by the shape functions. The integrals are
-    sums over the Gauss points. The components (xx + yy) / (2 sqrt(lam + mu)),
-    (xx - yy) / (2 sqrt(mu)) and xy / sqrt(mu) of a stress have squares that add up to the
-    integrand.
-
     Parameters
     ----------
     recovery : Recovery
     u : (frames, N, 2) ndarray
         Displacements [m].
     stress : (frames, t, 4) ndarray
-        Stress at the cell centres [Pa] (`centre_stress`).
+        From `centre_stress` [Pa].
     gauss_points : list of CellPoints
 
     Returns
     -------
     StressError
     """
-    lam, mu = recovery.cells.layers.lame(recovery.cells.is_coating)
+    cells = recovery.cells
+    lam, mu = cells.layers.lame(cells.is_coating)
+    # The energy is (lam + mu) (exx + eyy)^2 + mu (exx - eyy)^2 + 4 mu exy^2, in components whose squares add up.
     bulk = np.sqrt(lam + mu)
     shear = np.sqrt(mu)
-    recover = recovery.fit.group_by_size()
     error = np.zeros((len(u), mu.size))
     energy = np.zeros(len(u))
     for frame, motion in enumerate(u):
         xx, yy, _, xy = stress[frame].T
-        recovered = recover(np.stack([(xx + yy) / (2 * bulk), (xx - yy) / (2 * shear), xy / shear]))
-        first_cell = 0
-        first_corner = 0
-        for points in gauss_points:
-            n_corners, n_cells = points.corners.shape
-            cells = slice(first_cell, first_cell + n_cells)
-            corners = slice(first_corner, first_corner + n_cells * n_corners)
-            nodes = recovery.recovery_point[corners].reshape(n_cells, n_corners).T
-            at_corners = np.stack([recovered.take(node, axis=1) for node in nodes])
-            at_points = points.interpolate(at_corners)
-            exx, eyy, exy = points.strain(motion)
-            components = (
-                bulk[cells] * (exx + eyy),
-                shear[cells] * (exx - eyy),
-                shear[cells] * (2 * exy),
+        at_centres = np.stack([(xx + yy) / (2 * bulk), (xx - yy) / (2 * shear), xy / shear], axis=1)
+        recovered = recovery(at_centres)[recovery.recovery_point]
+        first_cell = first_corner = 0
+        for (kind, nodes), points in zip(cells.groups.items(), gauss_points):
+            n_corners = ELEMENTS[kind].n_corners
+            part = slice(first_cell, first_cell + len(nodes))
+            at_corners = recovered[first_corner : first_corner + n_corners * len(nodes)]
+            first_cell = part.stop
+            first_corner = first_corner + len(at_corners)
+            shape = LINEAR_ELEMENTS[n_corners].evaluate(ELEMENTS[kind].gauss).values
+            at_points = shape @ at_corners.reshape(len(nodes), n_corners, 3)
+            exx, eyy, exy = points.strain(motion[nodes])
+            computed = np.stack(
+                [
+                    bulk[part, None] * (exx + eyy),
+                    shear[part, None] * (exx - eyy),
+                    shear[part, None] * 2 * exy,
+                ],
+                axis=-1,
             )
-            for k, component in enumerate(components):
-                energy[frame] += (points.weight * component**2).sum()
-                difference = at_points[:, k] - component
-                error[frame, cells] += np.einsum("gc,gc->c", points.weight, difference**2)
-            first_cell = cells.stop
-            first_corner = corners.stop
+            energy[frame] += (points.weights[..., None] * computed**2).sum()
+            error[frame, part] = (points.weights[..., None] * (at_points - computed) ** 2).sum(
+                axis=(1, 2)
+            )
     return StressError(frozen_array(error), frozen_array(energy))

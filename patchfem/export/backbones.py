@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from ..campaigns.backbone.band import PREFERRED_METHODS, Band
-from ..campaigns.backbone.records import Backbone, Curve
+from ..campaigns.backbone.band import Band
+from ..campaigns.backbone.records import METHODS, Backbone, Curve
 from ..core import PatchfemError
 from ..formatting import format_quantity
 from . import quantities
@@ -160,7 +160,7 @@ def _make_data(backbone: Backbone) -> dict[str, Variable]:
     """
     records = [
         (method.replace("-", "_"), backbone.curves[method], COLUMNS)
-        for method in PREFERRED_METHODS
+        for method in METHODS
         if method in backbone.curves
     ]
     band = backbone.answer.band

@@ -17,6 +17,7 @@ from . import surface_definitions
 from .answer import Definition, Quantity
 
 MAX_TILES = 10  # largest number of key quantities on a page and on the screen
+MEASURED_DIGITS = 4  # of quantities of measured surfaces without an error; traces have no more
 # words at the end of a name that mark a fraction (in percent) or a phase (in degrees)
 PERCENT_WORDS = ("fraction", "share")
 # display units of areas of sections and of wear coefficients
@@ -237,8 +238,9 @@ def format_quantity(name: str, quantity: Quantity) -> str:
     error = quantity.error
     ends = [abs(end) for end in (quantity.low, quantity.high) if end is not None]
     unit, scale = choose_scale(name, quantity.unit, max([abs(value), *ends]))
-    if error is None and not ends and name in QUANTITIES:
-        return f"{format_number(value * scale, QUANTITIES[name].digits)} {unit}".strip()
+    digits = None if error is not None or ends else _find_digits(name)
+    if digits is not None:
+        return f"{format_number(value * scale, digits)} {unit}".strip()
     if error is not None or not ends:
         texts = round_to_error(
             value * scale,
@@ -247,6 +249,16 @@ def format_quantity(name: str, quantity: Quantity) -> str:
         )
         return format_with_error(*texts, unit)
     return _format_interval(value * scale, quantity, unit, scale)
+
+
+def _find_digits(name: str) -> int | None:
+    """Return the number of digits of a quantity without an error; None for a measure of a run, which has all digits."""
+    if name in QUANTITIES:
+        return QUANTITIES[name].digits
+    base_name = rows.remove_interface_number(name)
+    if base_name in rows.TABLE or base_name in patch_rows.TABLE:
+        return None
+    return None if surface_definitions.find(name) is None else MEASURED_DIGITS
 
 
 def format_value(value: float | str, unit: str, digits: int = 4) -> str:

@@ -84,24 +84,6 @@ VARIABLES = {
         "resultant friction force, positive when it opposes positive slip",
         "response.extra.forces.T response.force",
     ),
-    "lateral_displacement": Row(
-        "interface time",
-        "m",
-        "slide of the interface across the sliding direction",
-        "response.lateral response.extra.lateral_slides.T",
-    ),
-    "lateral_velocity": Row(
-        "interface time",
-        "m s-1",
-        "velocity of the slide across the sliding direction",
-        "response.extra.lateral_slide_rates.T",
-    ),
-    "lateral_force": Row(
-        "interface time",
-        "N",
-        "friction force across the sliding direction",
-        "response.lateral_force response.extra.lateral_forces.T",
-    ),
     "yaw_moment": Row(
         "time",
         "N m",

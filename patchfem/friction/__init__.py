@@ -12,7 +12,6 @@ PUBLIC = {
         "RECURSION",
         "RequestedEngine",
         "choose_engine",
-        "unsupported_reason",
     ),
     "bonds.list_forms_kernels": (
         "FORM_MOMENTS",
@@ -83,22 +82,12 @@ PUBLIC = {
     ),
     "laws.iwan": ("max_yield_displacement",),
     "laws.lugre": ("LuGre",),
-    "laws.plane_kernels": (
-        "advance_straight",
-        "solve_plane_step",
-        "update_plane_memory",
-    ),
     "laws.stretch": (
         "growth_numbers",
         "points_element",
         "unpack_bonds",
     ),
-    "laws.stretch_kernels": (
-        "end_motion",
-        "relax_stretch",
-        "start_motion",
-        "state_rates",
-    ),
+    "laws.stretch_kernels": ("relax_stretch",),
     "laws.tanh": ("TanhLaw",),
     "path_work": ("sampled_work",),
     "protocol": (

@@ -8,7 +8,7 @@ ask for the columns of one purpose: `slides` (a prescribed slide), `signals` (a 
 `loops` (force against displacement) and `measured` (responses of a rig). `units` lists all units.
 Files of laboratories: `records` selects and converts channels that share one time, from any file that
 `laboratory` opens: tables, universal files (`universal`) or MATLAB files (`matlab`).
-Matrices of finite-element programs: `matrices`, with the formats of Nastran in `nastran`.
+Matrices of finite-element programs: `matrices`.
 Read `columns` first.
 """
 
@@ -18,7 +18,7 @@ PUBLIC = {
         "NUMBER_PATTERN",
         "TableFormat",
         "parse_header",
-        "read_text",
+        "read_lines",
         "split_cells",
     ),
     "columns": ("read_columns",),
@@ -27,7 +27,10 @@ PUBLIC = {
         "Loop",
         "read_loop",
     ),
-    "matlab": ("read_variables",),
+    "matlab": (
+        "read_real_arrays",
+        "read_variables",
+    ),
     "matrices": (
         "Matrix",
         "align_rows",

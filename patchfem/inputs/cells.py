@@ -5,9 +5,7 @@ Nothing here needs NumPy, because `patchfem check` reads tables of measured resp
 
 import csv
 import re
-from codecs import getincrementaldecoder
-from collections.abc import Iterator, Mapping
-from io import IncrementalNewlineDecoder
+from collections.abc import Mapping
 from math import isfinite
 from pathlib import Path
 from typing import NamedTuple
@@ -15,7 +13,6 @@ from typing import NamedTuple
 from ..exceptions import Missing, PatchfemError
 
 MAX_BYTES = 64 * 2**20  # largest size of a text file in bytes
-BLOCK_BYTES = 2**17  # number of bytes read at a time, so that a long file takes little memory
 MAX_VALUE = 1e50  # largest value in SI; the keys of a scene have the same limit
 NUMBER_PATTERN = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _HEADER_CELL_PATTERN = re.compile(r"\s*([A-Za-z_]\w*)\s*(?:\[\s*([^\[\]]*?)\s*\])?\s*")
@@ -39,25 +36,14 @@ class TableFormat(NamedTuple):
     has_label_units: bool = False
 
 
-def read_text(path: Path, contents: str) -> str:
-    """Read a text file with "\\n" at the end of each line; errors as in `read_line_blocks`."""
-    return "\n".join(line for lines in read_line_blocks(path, contents) for line in lines)
-
-
-def read_line_blocks(path: Path, contents: str, remedy: str = "") -> Iterator[list]:
-    """Yield the lines of a text file in blocks.
-
-    The last line is empty if the file ends with a line break.
+def read_lines(path: Path, contents: str, remedy: str = "") -> list[str]:
+    """Read the lines of a text file; the last one is empty if the file ends with a line break.
 
     Parameters
     ----------
     path : Path
     contents, remedy : str
         Words of the error messages, as in `TableFormat`.
-
-    Yields
-    ------
-    list of str
 
     Raises
     ------
@@ -66,26 +52,12 @@ def read_line_blocks(path: Path, contents: str, remedy: str = "") -> Iterator[li
     PatchfemError
         If the file cannot be read or is too large.
     """
-    decoder = IncrementalNewlineDecoder(getincrementaldecoder("utf-8-sig")(), translate=True)
-    line_parts = []
-    n_bytes = 0
     try:
-        with open(path, "rb") as file:
-            while data := file.read(BLOCK_BYTES):
-                n_bytes += len(data)
-                if n_bytes > MAX_BYTES:
-                    raise PatchfemError(
-                        f"{path}: more than {MAX_BYTES >> 20} MiB of text; leave out some rows of "
-                        f"{contents}"
-                    )
-                *lines, last = decoder.decode(data).split("\n")
-                if lines:
-                    lines[0] = "".join([*line_parts, lines[0]])
-                    yield lines
-                    line_parts = []
-                line_parts.append(last)
-        line_parts.append(decoder.decode(b"", final=True))
-        yield "".join(line_parts).split("\n")
+        if path.stat().st_size > MAX_BYTES:
+            raise PatchfemError(
+                f"{path}: more than {MAX_BYTES >> 20} MiB of text; leave out some rows of {contents}"
+            )
+        return path.read_text("utf-8-sig").split("\n")
     except FileNotFoundError:
         raise Missing(f"{path}: no such {contents.split()[-1]}{remedy}") from None
     except (OSError, UnicodeDecodeError, ValueError) as error:

@@ -1,7 +1,5 @@
 """Columns of numbers from a comma-separated table whose header states the units."""
 
-import re
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,11 +11,9 @@ from .cells import (
     TableFormat,
     parse_header,
     parse_number,
-    read_line_blocks,
+    read_lines,
     split_cells,
 )
-
-_NUMERIC_TEXT_PATTERN = re.compile(r"[0-9eE+.,\t -]*")
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -43,24 +39,18 @@ def read_columns(path, table: TableFormat) -> Columns:
         If the file is not such a table; the message names the line.
     """
     path = Path(path)
-    line_number = 2
-    blocks = _iterate_row_blocks(path, table)
-    names, factors = parse_header(path, next(blocks)[0], table)
-    numbers = [np.zeros((0, len(factors)))]
-    labels = []
-    for lines in blocks:
-        block = _read_plain_block(lines, names, factors)
-        if block is None:
-            block, texts = _read_block(path, line_number, lines, names, factors)
-            labels += texts
-        numbers.append(block)
-        line_number += len(lines)
-    values = np.concatenate(numbers)
-    if len(values) < 2:
+    header, *lines = read_lines(path, table.contents, table.remedy)
+    names, factors = parse_header(path, header, table)
+    while lines and not lines[-1].strip():
+        lines.pop()
+    if len(lines) < 2:
         raise PatchfemError(
-            f"{path}:{line_number - 1}: {table.contents} needs at least two rows below the header, "
-            f"not {len(values)}"
+            f"{path}:{len(lines) + 1}: {table.contents} needs at least two rows below the header, not {len(lines)}"
         )
+    values = _read_numbers(lines, list(factors.values())) if len(names) == len(factors) else None
+    labels = []
+    if values is None:
+        values, labels = _read_cells(path, lines, names, factors)
     label_names = [name for name in names if name not in factors]
     return Columns(
         {name: frozen_array(column) for name, column in zip(factors, values.T)},
@@ -69,46 +59,26 @@ def read_columns(path, table: TableFormat) -> Columns:
     )
 
 
-def _iterate_row_blocks(path: Path, table: TableFormat) -> Iterator[list]:
-    """Yield the header, then blocks of rows; blank lines at the end of the file are left out."""
-    blank = []
-    is_header = True
-    for lines in read_line_blocks(path, table.contents, table.remedy):
-        if is_header:
-            yield lines[:1]
-            lines = lines[1:]
-            is_header = False
-        n_filled = max((n for n, line in enumerate(lines, 1) if line.strip()), default=0)
-        if n_filled:
-            yield [*blank, *lines[:n_filled]]
-            blank = []
-        # A blank line before further rows is an error; the first of them is enough to report it.
-        blank = blank or lines[n_filled : n_filled + 1]
+def _read_numbers(lines: list[str], factors: list[float]) -> np.ndarray | None:
+    """Return rows that contain only numbers, in SI; None if a cell is not a number, or out of range.
 
-
-def _read_plain_block(lines: list, names: list, factors: dict) -> np.ndarray | None:
-    """Read rows that contain only numbers, in SI, or return None if `_read_block` has to read them.
-
-    This path takes 0.3 us per row and a tenth of the memory of the other one.
+    NumPy's reader takes a tenth of the time of `_read_cells`, but does not say which cell is wrong.
     """
-    text = ",".join(lines)
-    if len(names) > len(factors) or not _NUMERIC_TEXT_PATTERN.fullmatch(text):
-        return None
-    if any(line.count(",") != len(names) - 1 for line in lines):
-        return None
     try:
-        numbers = np.array(list(map(float, text.split(","))))
-    except ValueError:  # an empty cell, or a sign without a number
+        values = np.loadtxt(lines, delimiter=",", comments=None, ndmin=2)
+    except ValueError:
         return None
-    values = numbers.reshape(len(lines), -1) * list(factors.values())
-    return values if np.abs(values).max() <= MAX_VALUE else None
+    if values.shape != (len(lines), len(factors)):  # NumPy leaves out blank lines
+        return None
+    values = values * factors
+    return values if (np.abs(values) <= MAX_VALUE).all() else None
 
 
-def _read_block(path: Path, line_number: int, lines: list, names: list, factors: dict) -> tuple:
+def _read_cells(path: Path, lines: list[str], names: list[str], factors: dict) -> tuple:
     """Read rows cell by cell: numbers in SI (rows, columns), and strings of other columns."""
     numbers = []
     texts = []
-    for number, line in enumerate(lines, line_number):
+    for number, line in enumerate(lines, 2):
         cells = split_cells(path, number, line, names)
         location = f"{path}:{number}: "
         numbers.append(

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..core import PatchfemError
 from . import matlab, universal
-from .cells import NUMBER_PATTERN, read_text
+from .cells import NUMBER_PATTERN, read_lines
 from .loops import EXPORTED_NAMES, find_standard_name
 from .measured import UNIVERSAL_EXTENSIONS
 from .records import (
@@ -94,7 +94,9 @@ def _find_quantity(name: str, names: list, exported_names: Mapping) -> str:
 
 def _read_table(path: Path, exported_names: Mapping) -> list:
     """Read the numeric columns of a table as channels; columns that contain text are left out."""
-    header, *lines = read_text(path, "a measured table").rstrip("\n").split("\n")
+    header, *lines = read_lines(path, "a measured table")
+    while lines and not lines[-1]:
+        lines.pop()
     separator = max(",;\t", key=header.count)
     heads = [_HEADER_CELL_PATTERN.fullmatch(_strip_cell(cell)) for cell in header.split(separator)]
     names = [head[1] for head in heads]
@@ -150,8 +152,7 @@ def _read_matlab(path: Path, requests: list) -> Records:
     Only real arrays are read; nothing in the file is executed.
     """
     check_file(path, "save fewer variables or a part of the record")
-    variables = matlab.read_variables(path)
-    arrays = {name: array for name, array in variables.items() if array.kind == "number"}
+    arrays = matlab.read_real_arrays(path)
     described = [
         f"{name} {_format_shape(arrays[name])}" for name in list(arrays)[:MAX_LISTED_ARRAYS]
     ]
@@ -181,7 +182,7 @@ def _select_values(path, arrays: dict, request: RequestedChannel, contents: str)
             f"--map {request.quantity}={request.source}: a .mat file has no units; write the unit, such "
             f'as "{request.quantity}={request.source} [unit]"'
         )
-    values = arrays[name].values()
+    values = arrays[name]
     if match is None:
         if values.ndim != 2 or min(values.shape) != 1:
             raise PatchfemError(

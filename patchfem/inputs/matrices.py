@@ -2,7 +2,7 @@
 
 .mtx: Matrix Market, or the text that Abaqus writes for *MATRIX GENERATE (row, column, number, or node,
 direction, node, direction, number); .mat: MATLAB; .npz: arrays of NumPy, or one matrix of
-scipy.sparse.save_npz; .op4, .pch, .bdf, .dat: Nastran.
+scipy.sparse.save_npz.
 """
 
 import zipfile
@@ -14,7 +14,7 @@ import numpy as np
 from scipy import sparse
 
 from ..core import PatchfemError
-from . import matlab, nastran
+from . import matlab
 from .damage import refuse_damage
 
 # Names of each matrix in a file with several matrices.
@@ -25,6 +25,8 @@ MATRIX_NAMES = {
 }
 MAX_SKEW = 1e-8  # largest skew part |A - A^T| / |A| of a matrix that counts as symmetric
 SKEW_REFUSAL = "gyroscopic and follower terms are not supported"
+MAX_NUMBERS = 5 * 10**7  # largest number of values in a matrix
+MAX_ROWS = 2 * 10**6  # largest number of rows in a matrix
 MAX_LISTED_ARRAYS = 12  # largest number of arrays that an error message lists
 # Number of entries from which the rounding of a matrix is estimated.
 N_SAMPLED_NUMBERS = 500
@@ -141,7 +143,7 @@ def align_rows(*matrices: Matrix) -> list[Matrix]:
             "same way"
         )
     if with_places:
-        places, index = nastran.rank_dofs(np.vstack([matrix.places for matrix in matrices]))
+        places, index = _rank_dofs(np.vstack([matrix.places for matrix in matrices]))
         ends = np.cumsum([len(matrix.places) for matrix in matrices])
         parts = np.split(index, ends[:-1])
         return [
@@ -241,8 +243,8 @@ def _read_market(path: Path, matrix_name: str) -> Matrix:
         lines = (line for line in file if line.strip() and line[0] != "%")
         n_rows, n_columns, *count = map(int, next(lines, "").split())
         n_numbers = count[0] if count else n_rows * n_columns
-        max_numbers = min(nastran.MAX_NUMBERS, path.stat().st_size)
-        if max(n_rows, n_columns) > nastran.MAX_ROWS or n_numbers > max_numbers:
+        max_numbers = min(MAX_NUMBERS, path.stat().st_size)
+        if max(n_rows, n_columns) > MAX_ROWS or n_numbers > max_numbers:
             raise PatchfemError(
                 f"{path}: the header announces {n_numbers} numbers in {n_rows} x {n_columns}, more than "
                 "the file can hold"
@@ -266,7 +268,7 @@ def _read_market(path: Path, matrix_name: str) -> Matrix:
     if field == "complex":
         numbers = table[:, -2] + 1j * table[:, -1]
     values = sparse.coo_array((numbers, (rows, columns)), (n_rows, n_columns)).tocsr()
-    return Matrix(values if symmetry == "general" else nastran.complete_symmetric_matrix(values))
+    return Matrix(values if symmetry == "general" else _complete_symmetric_matrix(values))
 
 
 def _read_abaqus(path: Path) -> Matrix:
@@ -286,18 +288,32 @@ def _read_abaqus(path: Path) -> Matrix:
     labels = _to_integers(path, table[:, :-1])
     places = None
     if table.shape[1] == 5:
-        places, index = nastran.rank_dofs(labels.reshape(-1, 2))
+        places, index = _rank_dofs(labels.reshape(-1, 2))
         rows, columns = index.reshape(-1, 2).T
         n = len(places)
-    elif labels.min() < 1 or labels.max() > nastran.MAX_ROWS:
-        raise PatchfemError(f"{path}: rows and columns count from 1 to {nastran.MAX_ROWS} at most")
+    elif labels.min() < 1 or labels.max() > MAX_ROWS:
+        raise PatchfemError(f"{path}: rows and columns count from 1 to {MAX_ROWS} at most")
     else:
         rows, columns = labels.T - 1
         n = labels.max()
     values = sparse.coo_array((table[:, -1], (rows, columns)), (n, n)).tocsr()
     if (rows <= columns).all() or (rows >= columns).all():
-        values = nastran.complete_symmetric_matrix(values)
+        values = _complete_symmetric_matrix(values)
     return Matrix(values, places, has_size=False)
+
+
+def _complete_symmetric_matrix(triangle: sparse.csr_array) -> sparse.csr_array:
+    """Return the symmetric matrix of which one triangle is given."""
+    return (triangle + (triangle - sparse.diags_array(triangle.diagonal())).T).tocsr()
+
+
+def _rank_dofs(places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the sorted distinct degrees of freedom (n, 2), and the index (k,) of each row of `places` (k, 2) in them.
+
+    A degree of freedom is a row of node and direction.
+    """
+    degrees, index = np.unique(places, axis=0, return_inverse=True)
+    return degrees, index.ravel()
 
 
 def _to_integers(path, numbers: np.ndarray) -> np.ndarray:
@@ -309,10 +325,11 @@ def _to_integers(path, numbers: np.ndarray) -> np.ndarray:
 
 def _read_matlab(path: Path, matrix_name: str) -> Matrix:
     arrays = {
-        name: array for name, array in matlab.read_variables(path).items() if array.kind != "text"
+        name: array
+        for name, array in matlab.read_variables(path).items()
+        if array.dtype.kind in matlab.NUMBER_KINDS
     }
-    array = arrays[_find_matrix_name(path, arrays, matrix_name)]
-    return Matrix(sparse.csr_array(array.values() if array.sparse is None else array.sparse()))
+    return Matrix(sparse.csr_array(arrays[_find_matrix_name(path, arrays, matrix_name)]))
 
 
 def _read_numpy(path: Path, matrix_name: str) -> Matrix:
@@ -324,22 +341,5 @@ def _read_numpy(path: Path, matrix_name: str) -> Matrix:
         return Matrix(sparse.csr_array(file[_find_matrix_name(path, file.files, matrix_name)]))
 
 
-def _read_output4(path: Path, matrix_name: str) -> Matrix:
-    matrices = nastran.read_output4(path)
-    return Matrix(matrices[_find_matrix_name(path, matrices, matrix_name)].assemble())
-
-
-def _read_dmig(path: Path, matrix_name: str) -> Matrix:
-    matrices = nastran.read_dmig(path)
-    values, places = matrices[_find_matrix_name(path, matrices, matrix_name)].assemble()
-    return Matrix(values, places, has_size=False)
-
-
 # Reader of each file extension.
-READERS_BY_EXTENSION = {
-    ".mtx": _read_market,
-    ".mat": _read_matlab,
-    ".npz": _read_numpy,
-    ".op4": _read_output4,
-    **dict.fromkeys((".pch", ".bdf", ".dat"), _read_dmig),
-}
+READERS_BY_EXTENSION = {".mtx": _read_market, ".mat": _read_matlab, ".npz": _read_numpy}

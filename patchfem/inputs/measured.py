@@ -5,7 +5,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from ..exceptions import PatchfemError
-from .cells import TableFormat, parse_header, parse_number, read_text, split_cells
+from .cells import TableFormat, parse_header, parse_number, read_lines, split_cells
 
 COLUMN_UNITS = {
     "frequency": {"Hz": 1.0, "kHz": 1e3},
@@ -54,7 +54,7 @@ def read_table(path: Path) -> list[MeasuredRow]:
     ending = path.suffix.lower()
     if ending in (".mat", *UNIVERSAL_EXTENSIONS) and path.is_file():
         raise _make_record_error(path)
-    header, *lines = read_text(path, TABLE_FORMAT.contents).split("\n")
+    header, *lines = read_lines(path, TABLE_FORMAT.contents)
     columns = {cell.partition("[")[0].strip().lower() for cell in header.split(",")}
     if "time" in columns and "frequency" not in columns:
         raise _make_record_error(path)

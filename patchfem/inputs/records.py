@@ -254,7 +254,7 @@ def make_records(path, values: dict, notes: list, channel_list: str = "") -> Rec
 def shift_to_zero(values: dict) -> dict:
     """Subtract the first row from time and displacements, as a prescribed displacement requires."""
     return {
-        name: column - column[0] if name in ("time", "displacement", "lateral") else column
+        name: column - column[0] if name in ("time", "displacement") else column
         for name, column in values.items()
     }
 

@@ -1,4 +1,4 @@
-"""A prescribed displacement, along one or two directions, from a table over time.
+"""A prescribed displacement from a table over time.
 
 The slide is linear between the rows. Other columns are ignored.
 """
@@ -13,7 +13,7 @@ from .cells import TableFormat
 from .columns import read_columns
 from .units import RECORD_UNITS, SLIDE_UNITS
 
-COLUMN_NAMES = ("time", "displacement", "lateral")
+COLUMN_NAMES = ("time", "displacement")
 
 
 def read_slide(path, units: Mapping = SLIDE_UNITS) -> tuple:
@@ -30,7 +30,7 @@ def read_slide(path, units: Mapping = SLIDE_UNITS) -> tuple:
     Returns
     -------
     tuple of numpy.ndarray
-        Time (k,) [s], displacement (k,) [m] and, if the file has it, lateral displacement (k,) [m].
+        Time (k,) [s] and displacement (k,) [m].
 
     Raises
     ------
@@ -41,14 +41,18 @@ def read_slide(path, units: Mapping = SLIDE_UNITS) -> tuple:
     """
     path = Path(path)
     table = TableFormat(
-        {**RECORD_UNITS, **units},
+        {**RECORD_UNITS, **units, "lateral": units["displacement"]},
         ("time", "displacement"),
         "time [s],displacement [um]",
         "a path",
         "; slide.file is relative to the scene",
     )
-    values = read_columns(path, table).values
-    columns = {name: values[name] for name in COLUMN_NAMES if name in values}
+    columns = read_columns(path, table)
+    if "lateral" in columns.values:
+        raise PatchfemError(
+            f"{path}:1: a slide in two directions was removed in patchfem 2.0; leave out the column lateral"
+        )
+    columns = {name: columns.values[name] for name in COLUMN_NAMES}
     for name, column in columns.items():
         if column[0] != 0:
             raise PatchfemError(
@@ -56,11 +60,11 @@ def read_slide(path, units: Mapping = SLIDE_UNITS) -> tuple:
                 f"displacement 0; subtract the first {name} from the column, or use `patchfem "
                 "import --zero`"
             )
-    time, *displacements = columns.values()
+    time, displacement = columns.values()
     require_increasing_time(path, time)
-    if not np.any(displacements):
+    if not np.any(displacement):
         raise PatchfemError(f"{path}: displacement is 0 in every row, so nothing slides")
-    return tuple(columns.values())
+    return time, displacement
 
 
 def require_increasing_time(path, time: np.ndarray) -> None:

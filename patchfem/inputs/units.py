@@ -12,7 +12,7 @@ _TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
 _LENGTH_UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "in": 0.0254, "mil": 25.4e-6}
 _ACCELERATION_UNITS = {"m/s^2": 1.0, "g": 9.80665, "mm/s^2": 1e-3, "in/s^2": 0.0254}
 RATIO_UNITS = {"": 1.0, "1": 1.0, "%": 0.01}
-SLIDE_UNITS = {"time": _TIME_UNITS, "displacement": _LENGTH_UNITS, "lateral": _LENGTH_UNITS}
+SLIDE_UNITS = {"time": _TIME_UNITS, "displacement": _LENGTH_UNITS}
 FORCE_UNITS = {
     "force": {"N": 1.0, "kN": 1e3, "lbf": 4.4482216152605, "kgf": 9.80665},
     "friction_ratio": RATIO_UNITS,
@@ -20,7 +20,6 @@ FORCE_UNITS = {
 # Quantities that a record may contain besides time; a reader ignores those that it does not need.
 RECORD_UNITS = {
     "displacement": _LENGTH_UNITS,
-    "lateral": _LENGTH_UNITS,
     "velocity": {"m/s": 1.0, "mm/s": 1e-3, "um/s": 1e-6, "in/s": 0.0254},
     "acceleration": _ACCELERATION_UNITS,
     "base_acceleration": _ACCELERATION_UNITS,

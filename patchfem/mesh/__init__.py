@@ -1,29 +1,23 @@
-"""Meshes of the two pieces: tensor grids, pieces with shaped ends, and mesh files.
+"""Meshes of the two pieces: structured grids and mesh files.
 
-In: sizes and layers, or a file with tagged cells and edges. Out: a `TensorGrid`, `ShapedGrid` or
-`PieceMesh` for each piece, with its interface nodes, materials and fixed nodes. All three have `x`,
-`height`, `first_row_height`, `coating_thickness`, `tributary_lengths()`, `refine()` and `base_grid`.
+In: sizes and layers, or a file with tagged cells and edges. Out: a `TensorGrid` or `PieceMesh` for each piece, with its
+interface nodes, materials and fixed nodes. Both have the same attributes, so that all later steps treat them alike.
 
-- Read `tensor` first: a grid of columns and rows that grow with depth. `grading` divides a length
-  into cells of target lengths, which grow with the distance from bands of small cells.
-- `ends` and `shaped`: pieces that are longer than the interface, chamfered or rounded.
-- `files` reads and writes tagged meshes with meshio; `decks` reads .inp; `anymesh` checks them and
-  builds both pieces; `recognise` detects tensor grids; `pairs` joins two pieces into one mesh.
-- `nodal_averages` adds up values over the cells around a node.
+- Read `grid` first: a grid of columns, which go on beyond the interface, and of rows that grow with depth. `grading`
+  divides a length into cells of target lengths, which grow with the distance from bands of small cells; `ends` has the
+  chamfered and rounded ends.
+- `elements` has the shape functions of first and second order; `pieces` a mesh of any of these elements.
+- `files` reads and writes tagged meshes with meshio, `decks` reads .inp; `checks` builds both pieces and checks them.
 """
 
 # Names that other folders use, by module
 PUBLIC = {
-    "anymesh": (
-        "PieceMesh",
-        "cell_edges",
-    ),
+    "elements": ("ELEMENTS",),
     "ends": (
         "End",
         "SHARP_END",
     ),
     "files": (
-        "read_bodies",
         "read_pieces",
         "write_mesh",
     ),
@@ -34,19 +28,11 @@ PUBLIC = {
         "divide_into_rows",
         "tributary_lengths",
     ),
-    "nodal_averages": (
-        "Patches",
-        "collect_patches",
-    ),
-    "recognise": (
-        "find_holes",
-        "measure_clamped_length",
-    ),
-    "shaped": ("shaped_grid",),
-    "tensor": (
+    "grid": (
         "ROW_SLOPE",
         "TensorGrid",
         "graded_grid",
         "row_scale",
     ),
+    "pieces": ("PieceMesh",),
 }

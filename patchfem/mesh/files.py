@@ -5,9 +5,7 @@ upper_interface, lower_interface, upper_far, lower_far. The lower piece lies at 
 one at y >= 0, and each has interface nodes of its own.
 """
 
-import re
 from contextlib import redirect_stderr, redirect_stdout
-from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 from typing import NamedTuple
@@ -16,10 +14,10 @@ import numpy as np
 
 from ..core import PatchfemError
 from ..disk.atomic_write import write_atomically
-from .anymesh import PairMesh, TaggedMesh, build_pair
+from .checks import PairMesh, TaggedBlock, TaggedMesh, build_pair
 from .decks import read_deck
-from .pairs import join_meshes
-from .recognise import recognise_grids
+from .elements import ELEMENTS
+from .pieces import find_edges
 
 # Tag numbers of the cells of a pair
 CELL_TAGS = {"upper_substrate": 1, "upper_coating": 2, "lower_substrate": 3, "lower_coating": 4}
@@ -29,6 +27,7 @@ EDGE_TAGS = {"upper_interface": 11, "lower_interface": 12, "upper_far": 13, "low
 MAX_FILE_BYTES = 256 * 2**20
 # Smallest size [bytes] of an entry in these sections of a .msh file
 MIN_ENTRY_BYTES = {b"$Nodes": 6, b"$Elements": 4}
+LINES = ("line", "line3")  # names of lines in meshio
 
 
 def write_mesh(lower, path: Path, upper=None) -> None:
@@ -37,16 +36,16 @@ def write_mesh(lower, path: Path, upper=None) -> None:
     Parameters
     ----------
     lower, upper : TensorGrid or PieceMesh
-        Their coordinates are written in m; upper is None if it equals the lower piece.
+        The upper piece is like the lower one if left out.
     path : Path
-        Its suffix selects the format: .msh or .vtu.
+        A .msh file (format 2.2, physical names) or a .vtu file (cell array `tag`).
 
     Raises
     ------
     PatchfemError
-        If the suffix is neither .msh nor .vtu.
+        For another suffix.
     Missing
-        If the folder cannot be written.
+        If the file cannot be written.
     """
     import meshio
 
@@ -72,50 +71,57 @@ def write_mesh(lower, path: Path, upper=None) -> None:
         meshio.write(partial, mesh, **options)
 
 
-def read_bodies(path: Path, unit: float = 1.0) -> tuple:
-    """Read a tagged mesh of any format as two tensor grids if possible, otherwise as unstructured meshes.
-
-    Parameters
-    ----------
-    path : Path
-    unit : float
-        Length unit [m] of the coordinates in the file.
+def join_meshes(lower, upper) -> tuple[np.ndarray, list[TaggedBlock]]:
+    """Join the meshes of a pair, the lower piece at y <= 0 and first.
 
     Returns
     -------
-    lower, upper : TensorGrid, or PieceMesh
-        Both are grids if `recognise_grids` finds both pieces to be tensor grids; upper is then None
-        if it equals the lower grid.
-
-    Raises
-    ------
-    PatchfemError
-        As `read_pieces`.
+    points : (N, 2) ndarray [m]
+    blocks : list of TaggedBlock
+        Cells by element, then the edges of the interfaces and of the far faces.
     """
-    pair = read_pieces(path, unit)
-    return recognise_grids(pair) or (pair.lower, pair.upper)
+    points = []
+    cells = {}
+    lines = []
+    n_points = 0
+    for side, sign, body in (("lower", -1.0, lower), ("upper", 1.0, upper)):
+        n_cells = 0
+        for kind, nodes in body.blocks.items():
+            is_coating = body.is_coating[n_cells : n_cells + len(nodes)]
+            n_cells += len(nodes)
+            names = np.where(is_coating, f"{side}_coating", f"{side}_substrate")
+            cells.setdefault(kind, []).append((nodes + n_points, names))
+        edges = find_edges(body.blocks, len(body.points))
+        for tag, tagged in (("interface", body.interface), ("far", body.far)):
+            is_tagged = edges.is_border & np.isin(edges.ends, tagged).all(axis=1)
+            nodes = edges.ends[is_tagged] + n_points
+            if (edges.middles >= 0).any():
+                nodes = np.column_stack([nodes, edges.middles[is_tagged] + n_points])
+            lines.append((nodes, np.full(len(nodes), f"{side}_{tag}")))
+        points.append(body.points * [1.0, sign])
+        n_points += len(body.points)
+    cells[LINES[lines[0][0].shape[1] - 2]] = lines
+    blocks = [TaggedBlock(kind, *map(np.concatenate, zip(*parts))) for kind, parts in cells.items()]
+    return np.concatenate(points), blocks
 
 
 def read_pieces(path: Path, unit: float = 1.0) -> PairMesh:
-    """Read both pieces of a tagged mesh of triangles and quads: .msh, .vtu, .inp or .med.
-
-    The interfaces need the same ends; their nodes between may differ (`PairMesh.has_matching_nodes`).
+    """Read both pieces of a tagged mesh of triangles and quadrilaterals: .msh, .vtu, .inp or .med.
 
     Parameters
     ----------
     path : Path
     unit : float
-        Length unit [m] of the coordinates in the file.
+        Length unit of the coordinates [m].
 
     Returns
     -------
     PairMesh
-        Its coordinates are in m.
 
     Raises
     ------
     PatchfemError
-        If the file cannot be read, or as `anymesh.build_pair`.
+        If the file cannot be read, or for the reasons of `checks.build_pair`.
     """
     path = Path(path)
     if not path.is_file():
@@ -129,9 +135,9 @@ def read_pieces(path: Path, unit: float = 1.0) -> PairMesh:
             mesh = read_deck(path.read_text("utf-8", "replace"))
         except PatchfemError as error:
             raise PatchfemError(f"{path}: {error}") from None
-        except (ValueError, IndexError, StopIteration, OverflowError) as error:
+        except (ValueError, LookupError, OverflowError) as error:
             fault = f"{type(error).__name__}: {error}"
-            raise PatchfemError(f"{path}: not a readable {path.suffix} file ({fault})") from None
+            raise PatchfemError(f"{path}: not a readable .inp file ({fault})") from None
     elif path.suffix in (".msh", ".vtu", ".med"):
         mesh = _convert_mesh(path, _read_with_meshio(path))
     elif path.suffix == ".unv":
@@ -140,15 +146,15 @@ def read_pieces(path: Path, unit: float = 1.0) -> PairMesh:
         )
     else:
         raise PatchfemError(f"{path}: a mesh can be read only from .msh, .vtu, .inp or .med")
-    return build_pair(replace(mesh, points=unit * mesh.points), path)
+    return build_pair(mesh._replace(points=unit * mesh.points), path)
 
 
 class _Tags(NamedTuple):
     """Tags in a meshio mesh.
 
-    - ``names``: name by (1 for lines or 2 for cells, code)
-    - ``codes``: an array for each block of cells, or None
-    - ``tag_help``: how files of this format contain tags, for messages
+    - ``names``: name by (dimension, code)
+    - ``codes``: code of every cell by block of cells, None without tags
+    - ``tag_help``: how files of this format contain tags
     """
 
     names: dict
@@ -168,7 +174,9 @@ def _read_tags(path: Path, mesh) -> _Tags:
     if path.suffix == ".med":
         names = {}
         for family, groups in mesh.cell_tags.items():
-            names[1, family] = names[2, family] = _select_group(groups)
+            words = [name.strip().lower() for name in groups]
+            known = [name for name in words if name in CELL_TAGS | EDGE_TAGS]
+            names[1, family] = names[2, family] = (known or words)[0]
         tag_help = "names of groups of faces and of edges"
         return _Tags(names, mesh.cell_data.get("cell_tags"), tag_help)
     names = {(2, code): name for name, code in CELL_TAGS.items()}
@@ -179,43 +187,33 @@ def _read_tags(path: Path, mesh) -> _Tags:
 
 
 def _convert_mesh(path: Path, mesh) -> TaggedMesh:
-    """Convert a meshio mesh: group triangles, quads and edge nodes by their tags."""
+    """Convert a meshio mesh: name its cells, and collect the nodes of its lines by their tags."""
     tags = _read_tags(path, mesh)
-    cells = {"triangle": [np.empty((0, 3), np.int64)], "quad": [np.empty((0, 4), np.int64)]}
-    labels = {"triangle": [np.empty(0, "U1")], "quad": []}
+    blocks = []
     nodes = {}
     for block, codes in zip(mesh.cells, tags.codes or [None] * len(mesh.cells)):
         if block.type == "vertex":
             continue
-        if block.type != "line" and block.type not in cells:
+        if block.type not in LINES and block.type not in ELEMENTS:
             raise PatchfemError(
-                f"{path}: {block.type} cells; only linear triangles, quads and lines can be used"
+                f"{path}: {block.type} cells; only plane triangles, quadrilaterals and lines can be used"
             )
-        dimension = 1 if block.type == "line" else 2
+        dimension = 1 if block.type in LINES else 2
         codes = np.zeros(len(block.data), int) if codes is None else np.ravel(codes)
-        for code in np.unique(codes).tolist():
-            tagged_cells = block.data[codes == code]
-            name = tags.names.get((dimension, int(code)), f"tag {int(code)}" if code else "")
-            if block.type == "line":
-                known_nodes = nodes.get(name, np.empty(0, np.int64))
-                nodes[name] = np.append(known_nodes, np.ravel(tagged_cells))
-            else:
-                cells[block.type].append(tagged_cells)
-                labels[block.type].append(np.full(len(tagged_cells), name))
-    return TaggedMesh(
-        np.asarray(mesh.points, float),
-        np.concatenate(cells["triangle"]).astype(np.int64),
-        np.concatenate(cells["quad"]).astype(np.int64),
-        np.concatenate([*labels["triangle"], *labels["quad"]]),
-        nodes,
-        tags.tag_help,
-    )
-
-
-def _select_group(groups: list) -> str:
-    """Return the group of a family that is a tag of a piece, or its first group if none is."""
-    names = [name.strip().lower() for name in groups]
-    return next((name for name in names if name in CELL_TAGS | EDGE_TAGS), names[0])
+        codes, number = np.unique(codes, return_inverse=True)
+        names = [
+            tags.names.get((dimension, code), f"tag {code}" if code else "")
+            for code in map(int, codes)
+        ]
+        names = np.array(names, str)[number]
+        cells = np.asarray(block.data, np.int64)
+        if dimension == 2:
+            blocks.append(TaggedBlock(block.type, cells, names))
+            continue
+        for name in np.unique(names).tolist():
+            known_nodes = nodes.get(name, np.empty(0, np.int64))
+            nodes[name] = np.append(known_nodes, cells[names == name].ravel())
+    return TaggedMesh(np.asarray(mesh.points, float), blocks, nodes, tags.tag_help)
 
 
 def _read_with_meshio(path: Path):
@@ -237,7 +235,6 @@ def _read_with_meshio(path: Path):
 def _check_counts(path: Path) -> None:
     """Raise PatchfemError if a section of a .msh file declares more entries than fit in it."""
     content = path.read_bytes()
-    _check_node_numbers(path, content)
     for section, min_bytes in MIN_ENTRY_BYTES.items():
         start = content.find(section)
         lines = content[start + len(section) : start + len(section) + 80].split(b"\n")
@@ -250,23 +247,3 @@ def _check_counts(path: Path) -> None:
                 f"{path}: {section.decode()[1:]} announces {declared_count} entries, more than a "
                 f"file of {len(content)} bytes can hold"
             )
-
-
-def _check_node_numbers(path: Path, content: bytes) -> None:
-    """Raise PatchfemError if a cell of a text file of format 2 names a node below 1.
-
-    meshio would count such a number from the last node.
-    """
-    if not re.search(rb"\$MeshFormat\s+2\S* 0 ", content):
-        return
-    elements = content.partition(b"$Elements")[2].partition(b"$EndElements")[0]
-    for line in elements.splitlines()[2:]:
-        words = line.split()  # the fields are number, kind, number of tags, the tags, the nodes
-        if len(words) < 4 or not words[2].isdigit():
-            continue
-        for node in words[3 + int(words[2]) :]:
-            if node[:1] == b"-" or node.strip(b"0") == b"":
-                raise PatchfemError(
-                    f"{path}: cell {words[0].decode('ascii', 'replace')} names node "
-                    f"{node.decode('ascii', 'replace')}; nodes count from 1"
-                )

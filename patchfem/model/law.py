@@ -44,14 +44,12 @@ class InterfaceLaw:
     - load: normal load [N] of an interface between masses; None if the patch or the point of the
       model carries it.
     - patch: patch that carries `load`; None for a point.
-    - lateral: name of the pair of coordinates of its second direction, "" without one.
     """
 
     key: str
     numbers: Friction
     load: float | None
     patch: PatchModel | None = None
-    lateral: str = ""
 
     @property
     def partial_slip(self) -> str:
@@ -192,7 +190,6 @@ def _build_interface(scene: Scene, number: int) -> InterfaceLaw:
         numbers=make_effective_law(table, None, scene.where, table.normal_load),
         load=table.normal_load,
         patch=_build_interface_patch(scene, number),
-        lateral="-".join(map(str, table.lateral or ())),
     )
 
 

@@ -273,7 +273,7 @@ def _find_edge_motion(scene: Scene, rig_model: Rig | None) -> str:
 
 def _request_slip_mesh(model: PatchModel, path: SlidePath, law: Friction | None) -> PatchModel:
     """Request a mesh that resolves partial slip under a prescribed slide; bond laws need no such mesh."""
-    if not model.interface.partial_slip or path.across is not None:
+    if not model.interface.partial_slip:
         return model
     if law is None or law_has_trait(law.law, "bonds") or not law.static or law.static <= 0:
         return model

@@ -246,18 +246,13 @@ class PatchMesh:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class PatchModel:
-    """Two pieces that are pressed together.
-
-    - solved: solution that was computed together with other patches
-      (`runs.patch.static_batch.SolvedPatch`); it is dropped if another value changes.
-    """
+    """Two pieces that are pressed together."""
 
     pieces: PatchPieces
     gap: Gap
     loading: PatchLoading
     interface: PatchInterface
     mesh: PatchMesh
-    solved: object = None
 
     @property
     def has_singular_ends(self) -> bool:

@@ -5,8 +5,8 @@ from typing import NamedTuple
 from ..closed_forms import contact
 from ..core import PatchfemError
 from ..elasticity.elasticity import Layers
-from ..mesh import files, shaped
-from ..mesh.tensor import ROW_SLOPE, TensorGrid, graded_grid, row_scale
+from ..mesh import files
+from ..mesh.grid import ROW_SLOPE, TensorGrid, graded_grid, row_scale
 from ..scene.keys.quantities import UNIT_FACTORS
 from .patch import PatchModel, PatchPiece, PatchPieces
 
@@ -58,11 +58,9 @@ def extend_grid(patch: PatchModel, piece: PatchPiece, grid: TensorGrid, growth: 
 
     Returns
     -------
-    ShapedGrid, or the grid itself if no piece reaches beyond the interface.
+    TensorGrid
     """
-    if not patch.pieces.has_overhang:
-        return grid
-    return shaped.shaped_grid(grid, piece.length, piece.end, growth)
+    return grid.extend(piece.length, piece.end, growth) if patch.pieces.has_overhang else grid
 
 
 def find_rounded_edges(patch: PatchModel) -> RoundedEdges:
@@ -91,9 +89,8 @@ def make_piece_meshes(patch: PatchModel) -> tuple:
     Returns
     -------
     tuple
-        Meshes (lower, upper); upper is None if it is like the lower. They are grids, shaped if a
-        piece reaches beyond the interface, or the pieces of the file: tensor grids if they are
-        recognised, else any triangles and quads.
+        Meshes (lower, upper): TensorGrids, of which the upper one is None if it is like the lower, or the
+        PieceMeshes of the file.
 
     Raises
     ------
@@ -106,14 +103,12 @@ def make_piece_meshes(patch: PatchModel) -> tuple:
         return lower, None if pieces.are_alike else _make_flat_grid(patch, pieces.upper)
 
     try:
-        lower, upper = files.read_bodies(*patch.mesh.file)
+        pair = files.read_pieces(*patch.mesh.file)
     except PatchfemError as error:
         error.key = error.key or "contact.mesh"
         raise
-    check_mesh_size(pieces, lower, upper or lower, patch.mesh.file.unit)
-    if upper is None and not pieces.are_alike:
-        upper = lower
-    return lower, upper
+    check_mesh_size(pieces, pair.lower, pair.upper, patch.mesh.file.unit)
+    return pair.lower, pair.upper
 
 
 def check_mesh_size(pieces: PatchPieces, lower, upper, unit: float) -> None:

@@ -10,7 +10,6 @@ import numpy as np
 from ..core import Missing, PatchfemError
 from ..inputs import slides
 from ..scene.keys.quantities import UNIT_FACTORS
-from ..scene.rules.limits import find_lateral_slide_obstacle
 from .file_cache import cache_by_file
 
 # Smallest number of steps per straight leg; the coarsest run of the
@@ -57,7 +56,6 @@ class SlidePath:
     - run_in: distance [m] before a triangle starts.
     - cycles: number of cycles of a sine or a triangle, else None.
     - corners: time (k,) [s] and relative displacement (k,) [m] at the ends of straight legs, or None.
-    - across: lateral displacement (k,) [m] at the corners, or None.
     """
 
     kind: str
@@ -67,7 +65,6 @@ class SlidePath:
     run_in: float
     cycles: float | None
     corners: tuple | None
-    across: np.ndarray | None
 
     @property
     def peak_speed(self) -> float:
@@ -76,7 +73,7 @@ class SlidePath:
             return 2 * np.pi * self.frequency * self.amplitude
         if self.kind == "file":
             time, rel_disp = self.corners
-            return float((_compute_leg_lengths(rel_disp, self.across) / np.diff(time)).max())
+            return float((np.abs(np.diff(rel_disp)) / np.diff(time)).max())
         return self.speed
 
     @property
@@ -102,7 +99,7 @@ class SlidePath:
             time = fraction * self.amplitude / self.speed
             return SlideSamples(time, fraction * self.amplitude)
         if self.corners is not None:
-            return _sample_legs(*self.corners, steps, self.across)
+            return _sample_legs(*self.corners, steps)
         n_steps = max(1, round(self.cycles * steps))
         if n_steps > MAX_PATH_SAMPLES:
             raise Missing(
@@ -161,7 +158,7 @@ class SlidePath:
         per_cycle = REFERENCE_STEPS * sqrt(REFERENCE_ERROR / tolerance)
         cycles = 1.0
         if legs is not None:
-            path = float(_compute_leg_lengths(legs[1], self.across).sum())
+            path = float(np.abs(np.diff(legs[1])).sum())
             stroke = 2 * self.amplitude if self.kind == "file" else float(np.ptp(legs[1]))
             cycles = max(1.0, path / (2 * stroke))
             if length:
@@ -183,23 +180,17 @@ def build_slide(scene) -> SlidePath:
     Raises
     ------
     PatchfemError
-        If a path file cannot be used, or has a lateral column that this scene cannot follow.
+        If a path file cannot be used.
     """
     keys = scene.slide
-    corners = across = None
+    corners = None
     amplitude = keys.amplitude or keys.distance
     if keys.kind == "file":
         try:
-            time, *columns = read_path_file(scene.resolve_path(keys.file))
+            corners = read_path_file(scene.resolve_path(keys.file))
         except PatchfemError as error:
             raise type(error)(f"{scene.where('slide.file')}: {error}") from None
-        corners = (time, columns[0])
-        amplitude = float(max(np.ptp(column) for column in columns)) / 2
-        if len(columns) == 2:
-            across = columns[1]
-            reason = find_lateral_slide_obstacle(scene.tables())
-            if reason:
-                raise PatchfemError(f"{scene.where('slide.file')}: {reason}")
+        amplitude = float(np.ptp(corners[1])) / 2
     elif keys.kind == "dwell":
         corners = _list_dwell_corners(keys)
     run_in = (keys.distance or 0.0) if keys.kind == "triangle" else 0.0
@@ -211,7 +202,6 @@ def build_slide(scene) -> SlidePath:
         run_in=run_in,
         cycles=keys.cycles,
         corners=corners,
-        across=across,
     )
 
 
@@ -224,31 +214,23 @@ def _list_dwell_corners(keys) -> tuple:
     return time, np.append(0.0, np.cumsum(length[is_leg]))
 
 
-def _compute_leg_lengths(rel_disp, across=None) -> np.ndarray:
-    """Compute the lengths [m] of the straight segments between corners, in one or two directions."""
-    if across is None:
-        return np.abs(np.diff(rel_disp))
-    return np.hypot(np.diff(rel_disp), np.diff(across))
-
-
 @cache_by_file
 def read_path_file(path: Path) -> tuple:
     """Read the columns of a path file (`inputs.slides.read_slide`)."""
     units = {
         "time": UNIT_FACTORS["time"],
         "displacement": UNIT_FACTORS["length"],
-        "lateral": UNIT_FACTORS["length"],
     }
     return slides.read_slide(path, units)
 
 
-def _sample_legs(time, rel_disp, steps: int, across=None) -> SlideSamples:
-    """Sample the straight segments between corners; `across` is the lateral displacement at the corners.
+def _sample_legs(time, rel_disp, steps: int) -> SlideSamples:
+    """Sample the straight segments between corners.
 
     Half of the steps are spread by length, half evenly over the legs that move. A leg at rest gets
     `STEPS_PER_HOLD` steps.
     """
-    length = _compute_leg_lengths(rel_disp, across)
+    length = np.abs(np.diff(rel_disp))
     fraction = length / length.sum() / 2 + 1 / (2 * np.count_nonzero(length))
     moving_steps = np.maximum(1, np.ceil(steps * fraction * (1 - STEP_COUNT_TOL)))
     leg_steps = np.where(length > 0, moving_steps, STEPS_PER_HOLD).astype(int)

@@ -168,16 +168,14 @@ def _build_given_modes(scene) -> ModalBasis:
         return structure_reduced.build_reduced_modes(scene).modes
     if not structure.masses:
         return structure_files.read_scene_modes(scene).modes
-    pairs, laterals = structure_reduced.list_slide_pairs(structure)
-    modes = masses.build_basis(
+    return masses.build_basis(
         structure.masses,
         [(spring.between, spring.stiffness) for spring in structure.spring],
         [(damper.between, damper.coefficient) for damper in structure.damper],
-        pairs,
+        structure_reduced.list_slide_pairs(structure),
         structure.output_mass or 1,
         _find_driven_mass(scene) if scene.drive.kind == "force" else None,
     )
-    return masses.set_lateral_displacements(modes, laterals)
 
 
 def _split_into_strips(scene, modes: ModalBasis) -> ModalBasis:

@@ -10,7 +10,7 @@ import numpy as np
 from ..core import ModalBasis, PatchfemError
 from ..formatting import format_number
 from ..inputs import matrices
-from ..structure import masses, reduced
+from ..structure import reduced
 from ..structure.places import DIRECTION_NAMES
 
 # Smallest relative uncertainty of a frequency that is reported.
@@ -70,7 +70,7 @@ def build_reduced_modes(scene) -> ReducedModes:
             table.unit,
             is_base_driven,
         )
-        pairs, laterals = list_slide_pairs(structure)
+        pairs = list_slide_pairs(structure)
         driven_mass = None if is_base_driven else scene.drive.mass or output
         ratio = 0.0
         if table.damping is not None and not isinstance(table.damping, str):
@@ -78,8 +78,7 @@ def build_reduced_modes(scene) -> ReducedModes:
         names = [str(coordinate) for coordinate in table.boundary]
 
         def build(count: int) -> ModalBasis:
-            modes = reduced.build_basis(reduction, count, pairs, output, driven_mass, ratio, names)
-            return masses.set_lateral_displacements(modes, laterals)
+            return reduced.build_basis(reduction, count, pairs, output, driven_mass, ratio, names)
 
         modes = build(table.modes)
         n_computed = reduction.modes.omega.size
@@ -95,21 +94,12 @@ def build_reduced_modes(scene) -> ReducedModes:
     return ReducedModes(modes, other_modes, notes, max_modes)
 
 
-def list_slide_pairs(structure) -> tuple:
-    """List the pairs of coordinates between which the interfaces slide.
-
-    Returns
-    -------
-    pairs : list
-        Pairs of all interfaces, followed by those of their second directions.
-    laterals : list
-        Pair of the second direction of each interface, or None.
-    """
-    laterals = [interface.lateral for interface in structure.interface]
+def list_slide_pairs(structure) -> list[tuple[int, int]]:
+    """List the pairs of coordinates between which the interfaces slide."""
     pairs = [interface.between for interface in structure.interface]
     if not pairs and structure.reduced is not None and structure.reduced.slide is not None:
-        pairs = [structure.reduced.slide]
-    return pairs + [pair for pair in laterals if pair is not None], laterals
+        return [structure.reduced.slide]
+    return pairs
 
 
 def _describe_reduction(reduction, modes: ModalBasis, table) -> str:

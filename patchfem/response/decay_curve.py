@@ -42,9 +42,6 @@ MAX_SLOPE_DIFFERENCE = 2.0
 INTERVAL_DEVIATIONS = 2.5
 # Number of half cycles on either side from whose third differences the noise is estimated.
 NOISE_HALF_WIDTH = 8
-# Number of points on either side over which the maximum of the sampling error is taken.
-SAMPLING_HALF_WIDTH = 4
-N_NEWTON_STEPS = 3  # Number of Newton steps to find the time of a reversal.
 VALUE_ROUND_OFF = 1e-12  # Relative round-off error of a value.
 # Largest speed at which a sample counts as a reversal, relative to the largest speed.
 REST_SPEED_TOL = 1e-12
@@ -116,26 +113,6 @@ class DecayCurve(NamedTuple):
         return DecayCurve(
             **{name: np.where(inside, column, np.nan) for name, column in columns.items()}
         )._replace(amplitude=np.asarray(amplitudes))
-
-    def add_sampling_error(self, other: "DecayCurve") -> "DecayCurve":
-        """Return the curve with its errors increased by the error due to sampling the motion.
-
-        Parameters
-        ----------
-        other : DecayCurve
-            Curve from the reversals of `find_reversals_by_extrapolation`. The largest difference from
-            it at neighbouring points is added to the errors.
-        """
-        if not self.amplitude.size:
-            return self
-        interpolated = other.interpolate(self.amplitude)
-        errors = {}
-        for name in ("frequency", "damping"):
-            change = np.nan_to_num(np.abs(getattr(self, name) - getattr(interpolated, name)))
-            padded = np.pad(change, SAMPLING_HALF_WIDTH)
-            neighbourhoods = sliding_window_view(padded, 2 * SAMPLING_HALF_WIDTH + 1)
-            errors[f"{name}_error"] = getattr(self, f"{name}_error") + neighbourhoods.max(axis=1)
-        return self._replace(**errors)
 
     def add_difference(self, first_curve: "DecayCurve", second_curve: "DecayCurve") -> "DecayCurve":
         """Return the curve with its errors increased by the differences between two other curves.
@@ -231,48 +208,7 @@ def measure_last_cycle_amplitude(time, position, speed, period: float) -> float 
     return None
 
 
-def find_reversals_by_extrapolation(time, position, speed) -> tuple:
-    """Return the reversals of a motion, extrapolated from the steps before and after them.
-
-    The time of a reversal is the mean of the zeros of the speed on the cubics of the preceding and the
-    following step. If the friction force changes sign at the reversal within less than a step, these cubics
-    are smooth, whereas the cubic of the step itself is distorted by the jump.
-
-    Parameters
-    ----------
-    time, position, speed : (n,)
-        Samples, as in `locate_reversals`.
-    """
-    times, positions = locate_reversals(time, position, speed)
-    k = np.flatnonzero(speed[1:-2] * speed[2:-1] < 0) + 1
-    fraction = speed[k] / (speed[k] - speed[k + 1])
-
-    def find_zero(step, guess):
-        """Return the time [s] of zero speed on the extrapolated cubic of a step (Newton's method).
-
-        guess: initial guess as a fraction of the step, outside 0 to 1.
-        """
-        span = time[step + 1] - time[step]
-        start_position = position[step]
-        end_position = position[step + 1]
-        start_speed = speed[step] * span
-        end_speed = speed[step + 1] * span
-        quadratic = 2 * (3 * (end_position - start_position) - 2 * start_speed - end_speed)
-        cubic = 3 * (2 * (start_position - end_position) + start_speed + end_speed)
-        for _ in range(N_NEWTON_STEPS):
-            guess = guess - (start_speed + guess * (quadratic + guess * cubic)) / (
-                quadratic + 2 * guess * cubic
-            )
-        return time[step] + guess * span
-
-    reversal_times = (find_zero(k - 1, 1 + fraction) + find_zero(k + 1, fraction - 1)) / 2
-    # round-off may move a reversal to the preceding sample
-    is_inside = (reversal_times >= time[k]) & (reversal_times <= time[k + 1])
-    times[np.searchsorted(times, time[k])[is_inside]] = reversal_times[is_inside]
-    return times, positions
-
-
-def make_half_cycles(times, positions, size=None) -> HalfCycles:
+def make_half_cycles(times, positions) -> HalfCycles:
     """Return the half cycles between the reversals of a computed decay.
 
     The sequence ends before the first half cycle that is not smaller than its predecessor, or that is
@@ -282,9 +218,6 @@ def make_half_cycles(times, positions, size=None) -> HalfCycles:
     ----------
     times, positions : (k,)
         Reversals: times [s] and positions [m].
-    size : (k - 1,), optional
-        Sizes of the half cycles at another point of the structure [m]; None: distances between
-        `positions`.
     """
     distances = np.abs(np.diff(positions))
     ends = np.flatnonzero(
@@ -295,7 +228,7 @@ def make_half_cycles(times, positions, size=None) -> HalfCycles:
     no_noise = np.zeros(count)
     return HalfCycles(
         (times[1:] + times[:-1])[:count] / 2,
-        (distances if size is None else size)[:count],
+        distances[:count],
         no_noise,
         no_noise,
     )

@@ -33,13 +33,6 @@ def estimate_window_error(window: Response, period: float, offset: float) -> dic
     slips, slides = slips_and_displacements(window)
     forces = window.extra.get("forces", window.force[:, None])
     step_works = (forces[1:] + forces[:-1]) / 2 * np.diff(slides, axis=0)
-    if "lateral_slides" in window.extra:
-        lateral_forces = window.extra["lateral_forces"]
-        lateral_slides = window.extra["lateral_slides"]
-        step_works = step_works + (lateral_forces[1:] + lateral_forces[:-1]) / 2 * np.diff(
-            lateral_slides, axis=0
-        )
-        forces = np.hypot(forces, lateral_forces)
     changes = {
         "relative_displacement_amplitude": _change_of_maximum_at_end(window.output) / 2
         + _change_of_maximum_at_end(-window.output) / 2,

@@ -109,64 +109,12 @@ def compute_step_harmonic(time, means, omega) -> complex:
     return complex(2 / (time[-1] - time[0]) * np.sum(means * np.diff(phase_factor)) / (-1j * omega))
 
 
-def lateral_history(window: Response, name: str, interface: int = 0):
-    """Return a history (k,) of an interface in the lateral direction.
-
-    Parameters
-    ----------
-    window : Response
-    name : str
-        "slides", "slide_rates", "forces" or "slips".
-    interface : int
-        Index of the interface.
-
-    Returns
-    -------
-    (k,) array or None
-        None if the interface does not move in the lateral direction.
-    """
-    histories = window.extra.get(f"lateral_{name}")
-    return (
-        None if histories is None or not histories[:, interface].any() else histories[:, interface]
-    )
+def largest_distance(x) -> float:
+    """Return the largest distance [m] between two points of equally spaced samples (k,) (`interpolate_ranges`)."""
+    return float(interpolate_ranges(x[:, None])[0][0])
 
 
-def largest_distance(x, y=None) -> float:
-    """Return the largest distance [m] between two points of a path on a line or in a plane.
-
-    The samples (k,) of a path on a line are equally spaced in time (`interpolate_ranges`).
-    """
-    if y is None:
-        return float(interpolate_ranges(x[:, None])[0][0])
-    distance = 0.0
-    angle = 0.0
-    directions = np.pi * np.arange(180) / 180
-    iteration = 0
-    # The extent is computed in 180 directions, then in the direction of the most distant pair of points
-    # until it no longer increases.
-    while iteration < 200:
-        direction = directions[iteration] if iteration < directions.size else angle
-        projection = x * np.cos(direction) + y * np.sin(direction)
-        i = np.argmax(projection)
-        j = np.argmin(projection)
-        pair_distance = float(np.hypot(x[i] - x[j], y[i] - y[j]))
-        if pair_distance > distance:
-            distance = pair_distance
-            angle = np.arctan2(y[i] - y[j], x[i] - x[j])
-        elif iteration >= directions.size:
-            break
-        iteration += 1
-    return distance
-
-
-def path_increments(x, y=None) -> np.ndarray:
-    """Return the lengths (k - 1,) [m] of the segments of a path."""
-    return np.abs(np.diff(x)) if y is None else np.hypot(np.diff(x), np.diff(y))
-
-
-def compute_slip_measures(
-    window: Response, drive, steps_per_cycle: int, lateral=(None, None)
-) -> dict:
+def compute_slip_measures(window: Response, drive, steps_per_cycle: int) -> dict:
     """Return slip amplitude [m], stick fraction [1] and phase of slip onset [rad].
 
     The interface sticks while less than SLIP_FRACTION of the change of its relative displacement is
@@ -180,15 +128,12 @@ def compute_slip_measures(
     drive
         Drive with `period` [s].
     steps_per_cycle : int
-    lateral : tuple
-        Relative displacement and slip (k,) [m] in the lateral direction; None if there is none.
     """
-    lateral_slide, lateral_slip = lateral
-    if largest_distance(window.slide, lateral_slide) <= MIN_SLIDE_RANGE:
+    if largest_distance(window.slide) <= MIN_SLIDE_RANGE:
         # The slip of a law without stiffness changes with its traction, even at constant displacement.
         return {"slip_amplitude": 0.0, "stick_fraction": 1.0}
     slip = window.slip
-    measures = {"slip_amplitude": largest_distance(slip, lateral_slip) / 2}
+    measures = {"slip_amplitude": largest_distance(slip) / 2}
     # A single sample, or a slip within round-off, counts as stick.
     if slip.size < 2 or 2 * measures["slip_amplitude"] <= slip_round_off(window):
         return measures | {"stick_fraction": 1.0}
@@ -196,9 +141,8 @@ def compute_slip_measures(
     last_cycles = (
         slice(-cycles * steps_per_cycle - 1, None) if slip.size > steps_per_cycle else slice(None)
     )
-    lateral_slide, lateral_slip = (None if one is None else one[last_cycles] for one in lateral)
-    slip_steps = path_increments(slip[last_cycles], lateral_slip)
-    slide_steps = path_increments(window.slide[last_cycles], lateral_slide)
+    slip_steps = np.abs(np.diff(slip[last_cycles]))
+    slide_steps = np.abs(np.diff(window.slide[last_cycles]))
     time = window.time[last_cycles]
     is_at_rest = slide_steps <= COORDINATE_ROUND_OFF * np.abs(window.slide).max(initial=0.0)
     excess = compute_slip_excess(slip_steps, slide_steps, is_at_rest)
@@ -290,18 +234,9 @@ def work_difference(work, loops, jumps: bool = False) -> float:
     return relative_gap(total, float(work[-1]), float(np.abs(works).sum()))
 
 
-def compute_peak(values, lateral=None) -> float:
-    """Return the largest magnitude of a history, or of its resultant with a lateral history.
-
-    Parameters
-    ----------
-    values : (k,)
-        Equally spaced samples (`interpolate_peaks`).
-    lateral : (k,), optional
-        Samples in the lateral direction.
-    """
-    magnitude = np.abs(values) if lateral is None else np.hypot(values, lateral)
-    return float(interpolate_peaks(magnitude[:, None])[0][0])
+def compute_peak(values) -> float:
+    """Return the largest magnitude of equally spaced samples (k,) (`interpolate_peaks`)."""
+    return float(interpolate_peaks(np.abs(values)[:, None])[0][0])
 
 
 def interpolate_peaks(magnitude) -> tuple:
@@ -379,7 +314,7 @@ def peak_sampling_errors(window: Response) -> dict:
         Equally spaced samples.
     """
     forces = window.extra.get("forces", window.force[:, None])
-    forces = np.hypot(forces, window.extra.get("lateral_forces", 0.0))
+    forces = np.abs(forces)
     slips = window.extra.get("slips", window.slip[:, None])
     errors = {
         "absolute_acceleration_peak": interpolate_peaks(np.abs(window.acceleration)[:, None])[1][0]

@@ -297,12 +297,7 @@ def is_still_loading(window, period: float, tolerance: float) -> bool:
     tolerance : float
     """
     time = window.time
-    forces = np.column_stack(
-        [
-            window.extra.get("forces", window.force),
-            window.extra.get("lateral_forces", np.zeros((window.time.size, 0))),
-        ]
-    )
+    forces = np.column_stack([window.extra.get("forces", window.force)])
     largest_force = np.abs(forces).max(axis=0)
     if time[-1] - time[0] < 1.5 * period:
         magnitude = np.abs(forces)

@@ -11,16 +11,12 @@ import numpy as np
 from ..core import Measure, Outcome
 from ..formatting import format_number
 from ..structure import drive_sizes
-from .measures import lateral_history
 from .rows import TABLE
 
 ACCELERATIONS = ("absolute_acceleration_fundamental", "acceleration_distortion")
 # Largest contribution of other modes to the relative displacement, as a fraction, at which the
 # damping ratio is attributed to mode 1.
 MAX_OTHER_MODES_FRACTION = 0.05
-IN_PLANE_REASON = (
-    "the interface slides in a plane, but this measure is defined only for one direction"
-)
 CYCLE_MEASURES = ("equivalent_stiffness", "secant_stiffness", "equivalent_damping", *ACCELERATIONS)
 ALWAYS_STICKS_REASON = "the whole interface sticks throughout the last cycles"
 UNBOUNDED_REASON = "no bounded motion exists at this drive"
@@ -228,8 +224,6 @@ def _reason_for_missing_cycle_value(
         return OUTPUT_AT_REST_REASON
     if name in ACCELERATIONS:
         return "the output has no acceleration"
-    if lateral_history(window, "slides") is not None:
-        return IN_PLANE_REASON
     if "equivalent_stiffness" not in values:
         return f"{ALWAYS_STICKS_REASON}, so the slide does not change and the loop has no width"
     if name == "equivalent_damping":

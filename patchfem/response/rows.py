@@ -29,7 +29,6 @@ from .measures import (
     compute_peak,
     compute_slip_measures,
     energy_balance,
-    lateral_history,
     slip_start_measure,
 )
 from .spectrum import MIN_HARMONIC, harmonic_measures, odd_harmonics
@@ -106,12 +105,7 @@ class LastCycles:
         if first is None or first.stuck_time is None:
             window = self.uniform_window or self.samples
             steps = max(1, round((window.time.size - 1) * self.drive.period / self.span))
-            values = compute_slip_measures(
-                window,
-                self.drive,
-                steps,
-                [lateral_history(window, name, self.interface) for name in ("slides", "slips")],
-            )
+            values = compute_slip_measures(window, self.drive, steps)
         else:
             phases = self.integrated.slip_start_phases
             values = {"stick_fraction": stick_fraction(first.stuck_time, self.span)} | (
@@ -156,10 +150,8 @@ class LastCycles:
         """
         if self.loop_harmonics is None or self.load is None:
             return {}
-        is_moving = (
-            self.is_sine
-            and self.lateral_history("slides") is None
-            and np.ptp(self.window.slide) > max(2 * self.slide_round_off, MIN_SLIDE_RANGE)
+        is_moving = self.is_sine and np.ptp(self.window.slide) > max(
+            2 * self.slide_round_off, MIN_SLIDE_RANGE
         )
         if not is_moving:
             return interface_loop(0.0, *self.loop_harmonics, self.stiffness)
@@ -221,8 +213,6 @@ class LastCycles:
             )
             loops = self.integrated.loops[k : k + 1]
             work = loops[0].work if loops else float(np.trapezoid(window.force, window.slide))
-            if not loops:
-                work += lateral_work(self.window, k)
             interfaces.append(
                 replace(
                     self,
@@ -235,10 +225,6 @@ class LastCycles:
             )
         return interfaces
 
-    def lateral_history(self, name: str):
-        """Return a history of the interface in the lateral direction, or None."""
-        return lateral_history(self.window, name, self.interface)
-
     def evaluate_load(self, function: Callable) -> float | None:
         """Return the value of a function of the normal load (k,) [N]; None for a constant load.
 
@@ -246,38 +232,6 @@ class LastCycles:
         """
         load = self.window.extra.get("normal_load")
         return None if load is None or self.load is None else float(function(load))
-
-
-def lateral_work(window, number: int) -> float:
-    """Return the friction work [J] of the lateral motion of an interface in a window.
-
-    The work is computed by the trapezoidal rule; it is 0 if the interface slides along a line.
-    """
-    force, slide = (lateral_history(window, name, number) for name in ("forces", "slides"))
-    return 0.0 if force is None or slide is None else float(np.trapezoid(force, slide))
-
-
-def compute_drift(last_cycles: LastCycles) -> float:
-    """Return the drift of the relative displacement of an interface per cycle [m].
-
-    If the interface slides in a plane, the result is the magnitude of the drift vector.
-    """
-    w = last_cycles.window
-    lateral_slide = last_cycles.lateral_history("slides")
-    drift_along = mean_drift(w.time, w.slide, w.slide_rate, last_cycles.drive.period)
-    if lateral_slide is None:
-        return drift_along
-    return float(
-        np.hypot(
-            drift_along,
-            mean_drift(
-                w.time,
-                lateral_slide,
-                w.extra["lateral_slide_rates"][:, last_cycles.interface],
-                last_cycles.drive.period,
-            ),
-        )
-    )
 
 
 def _drift_scale(values: dict):
@@ -347,14 +301,13 @@ ROWS = (
         "friction_force_peak",
         "N",
         1e-6,
-        "largest friction force on the whole interface, of a bench during the whole "
-        "run; if the interface slides in a plane, the largest resultant of both directions",
+        "largest friction force on the whole interface, of a bench during the whole run",
         lambda s: (
             None
             if s.load is None
             else s.integrated.loops[0].max_force
             if s.integrated.loops
-            else compute_peak(s.samples.force, s.lateral_history("forces"))
+            else compute_peak(s.samples.force)
         ),
         group="friction",
     ),
@@ -388,9 +341,9 @@ ROWS = (
         "m",
         1e-11,
         "drift of the slide per cycle: (mean slide over the last cycle of the window - mean slide over the "
-        "first cycle of the window)/(number of cycles between these two cycles); if the interface slides in a plane, "
-        "the length of this vector; null if the drive is not periodic at the end of the run",
-        compute_drift,
+        "first cycle of the window)/(number of cycles between these two cycles); null if the drive is not periodic at "
+        "the end of the run",
+        lambda s: mean_drift(s.window.time, s.window.slide, s.window.slide_rate, s.drive.period),
         larger_term=("slip amplitude (without slip: amplitude of the motion)", _drift_scale),
         order=CUBIC_CONVERGENCE_ORDER,
     ),
@@ -399,8 +352,7 @@ ROWS = (
         "m",
         1e-10,
         "half the peak-to-peak value of the irreversible part of the slide; for a patch, the mean over its points, "
-        "weighted by the pressure; for law 'iwan', the mean over the sliders, weighted by their slip forces; if the "
-        "interface slides in a plane, half the largest distance between two points of the path of irreversible slide",
+        "weighted by the pressure; for law 'iwan', the mean over the sliders, weighted by their slip forces",
         lambda s: s.slip_measures.get("slip_amplitude"),
         group="friction",
     ),
@@ -441,9 +393,9 @@ ROWS = (
         "loop_area",
         "J",
         1e-10,
-        "friction work per cycle in this interface alone (the energy dissipated, if the loop closes), in both "
-        "directions if the interface slides in a plane; null if the drive is not periodic and the friction loop does "
-        "not close, because the interface then stores or returns more energy than it dissipates",
+        "friction work per cycle in this interface alone (the energy dissipated, if the loop closes); null if the drive "
+        "is not periodic and the friction loop does not close, because the interface then stores or returns more energy "
+        "than it dissipates",
         lambda s: s.loop_measures.get("loop_area"),
         group="energy",
     ),

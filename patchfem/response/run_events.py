@@ -6,7 +6,7 @@ In: the window of a run, its drive, and the EventLog if an event-driven engine r
 
 import numpy as np
 
-from ..dynamics.events import event_list as listed
+from ..dynamics import event_list as listed
 from . import ringing
 from .events import (
     MAX_EVENTS,
@@ -20,7 +20,7 @@ from .events import (
     find_stick_spans,
     sort_events,
 )
-from .measures import lateral_history, path_increments, slip_round_off
+from .measures import slip_round_off
 
 KIND_BY_LOG_NUMBER = {
     0: STOP,
@@ -41,18 +41,8 @@ EXACT_SOURCE = "the times of stick and slip are those of the exact solution"
 
 
 def slips_and_displacements(response) -> tuple:
-    """Return the slip and the relative displacement (k, i) [m] of each interface.
-
-    If an interface slides in a plane, the slip is the accumulated path length, and the displacement is that
-    in the main direction.
-    """
+    """Return the slip and the relative displacement (k, i) [m] of each interface."""
     extra = response.extra
-    if "lateral_slips" in extra:
-        slips = extra["slips"].copy()
-        for k in range(slips.shape[1]):
-            if (lateral_slip := lateral_history(response, "slips", k)) is not None:
-                slips[1:, k] = slips[0, k] + np.cumsum(path_increments(slips[:, k], lateral_slip))
-        return slips, extra["slides"]
     if "slides" in extra:
         return extra.get("slips", extra["slides"]), extra["slides"]
     return response.slip[:, None], response.slide[:, None]
@@ -205,7 +195,7 @@ def is_all_stuck(window, max_stick_slip: float) -> bool:
     The limit applies to half the range of the slip, and is at least its round-off.
     """
     slips = slips_and_displacements(window)[0]
-    slips = np.column_stack([*([] if "lateral_slips" in window.extra else [window.slip]), slips])
+    slips = np.column_stack([window.slip, slips])
     return bool(np.ptp(slips, axis=0).max() / 2 <= max(max_stick_slip, slip_round_off(window)))
 
 

@@ -26,7 +26,8 @@ it:
 PUBLIC = {
     "accuracy_curve": ("compute_accuracy_curve",),
     "batch.batches": (
-        "choose_batch",
+        "MIN_CHUNK_CASES",
+        "find_group",
         "solve_models",
     ),
     "batch.case_results": (
@@ -90,24 +91,20 @@ PUBLIC = {
         "tabulate_static_motions",
         "make_laws_on_mesh",
         "estimate_mesh_error",
-        "estimate_decay_mesh_errors",
-        "describe_unknown_mesh_errors",
         "compute_static_curve",
         "with_automatic_method",
     ),
     "rig.engines": (
         "ENGINES",
-        "PIECES",
-        "SMOOTH",
+        "HYBRID",
         "collect_motion_features",
+        "find_obstacle_of_map",
     ),
     "rig.numerics": ("choose_numerics",),
-    "rig.event_driven": ("YieldingElements",),
     "rig.plan": (
         "find_drive_and_knee",
         "stuck_stiffnesses",
     ),
-    "rig.solve": ("solve_rig",),
     "run": (
         "StateFile",
         "is_march",

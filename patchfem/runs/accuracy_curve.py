@@ -9,7 +9,6 @@ from typing import NamedTuple
 from ..response.errors import ERROR_MEASURES, MIN_ORDER, absolute_change
 from .accuracy_warnings import MAIN_MEASURES
 
-STEPS_KEY = "accuracy.steps_per_cycle"
 ROUND_OFF = 1e-9  # Largest relative error that counts as round-off in long sums.
 # Smallest ratio of the errors with finer and coarser steps at which the steps do not matter.
 NO_EFFECT_RATIO = 0.9

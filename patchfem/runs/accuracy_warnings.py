@@ -352,9 +352,9 @@ def _advise_steps(context: AccuracyContext, name: str, excess: dict, steps: int)
     if (
         model.kind == "rig"
         and model.accuracy.method != "exact"
-        and not engines.reason_not_event_driven(model)
+        and not engines.HYBRID.find_unsupported_feature(model)
     ):
-        exact = 'set accuracy.method = "exact", which has no steps'
+        exact = 'set accuracy.method = "exact", which chooses its own steps'
         if model.accuracy.steps_per_cycle is not None:
             exact = f"leave out accuracy.steps_per_cycle and {exact}"
     if order is None:

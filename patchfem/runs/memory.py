@@ -5,13 +5,16 @@ the scene key to change.
 """
 
 import os
+from functools import lru_cache
 from pathlib import Path
+from time import monotonic
 
 from ..core import Missing
 from .cost import COMPILED_CODE_LABEL
 
 MAPPED_BYTES = 60e6  # Address space [bytes] that the packages map in addition to the memory in use.
 COMPILER_BYTES = 150e6  # Address space [bytes] of the compiler library.
+READING_PERIOD = 0.5  # Time [s] for which the files of the system are not read again.
 # Smallest fraction of the total memory at which a plan names the largest contribution.
 MIN_NAMED_FRACTION = 0.3
 KEY_ADVICE = {
@@ -42,6 +45,12 @@ def free_bytes(*, needs_compiler: bool = False) -> float:
     known. needs_compiler: whether the compiler library is needed, which affects the address space
     only.
     """
+    return _read_free_bytes(needs_compiler, int(monotonic() / READING_PERIOD))
+
+
+@lru_cache(maxsize=2)
+def _read_free_bytes(needs_compiler: bool, period: int) -> float:
+    """Return `free_bytes`; `period` counts the readings, since cases of a sweep follow each other within milliseconds."""
     used, mapped = read_process_bytes()
     other_address_space = mapped - used + MAPPED_BYTES + (COMPILER_BYTES if needs_compiler else 0.0)
     return min(

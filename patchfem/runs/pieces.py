@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..elasticity import coating_traction, recovery
-from ..elasticity.elasticity import Piece, compute_displacement, von_mises
+from ..elasticity.elasticity import compute_displacement, von_mises
 from ..formatting import format_length
 from .patch.strength import YIELDING_NEGLECTED, min_von_mises_ratio, yield_strength
 from .results.result import patch_surface
@@ -97,10 +97,9 @@ def compute_pieces(result) -> Pieces:
     patch = result.patch
     fields = result.fields
     pair = patch.pair
-    upper_grid = pair.grid if pair.upper is pair.piece else pair.upper_grid
     low_forces, high_forces = _nodal_forces(patch, fields)
-    low = _load_piece(-1.0, pair.piece, pair.grid, *low_forces)
-    high = _load_piece(1.0, pair.upper, upper_grid, *high_forces)
+    low = _load_piece(-1.0, pair.piece, *low_forces)
+    high = _load_piece(1.0, pair.upper, *high_forces)
     held = _holder_motion(patch, fields, high.cells.points)
     lower = _make_piece(low, high.error, 0.0)
     upper = _make_piece(high, low.error, held)
@@ -135,18 +134,16 @@ def _nodal_forces(patch, fields: dict) -> list[tuple[np.ndarray, np.ndarray]]:
     return [(low_shear, low_normal), (-high_shear, high_normal)]
 
 
-def _load_piece(sign: float, piece, grid, shear, normal) -> _LoadedPiece:
+def _load_piece(sign: float, piece, shear, normal) -> _LoadedPiece:
     """Return a condensed piece with its displacement and stress under nodal forces [N/m]."""
     cells = recovery.get_cells(piece)
-    is_grid = isinstance(piece, Piece)  # its nodes are numbered column by column
-    interface = np.arange(0, len(cells.points), grid.depth.size) if is_grid else grid.interface
     u = compute_displacement(piece, shear, normal)
     motion = u[:1] + u[1:]
     stress = recovery.centre_stress(cells, motion)
     gauss_points = recovery.make_points(cells, "gauss")
     fit = recovery.fit_recovery(cells)
     error = recovery.estimate_error(fit, motion, stress, gauss_points)
-    return _LoadedPiece(sign, cells, interface, u, stress, error)
+    return _LoadedPiece(sign, cells, piece.mesh.pressure_nodes, u, stress, error)
 
 
 def _make_piece(piece: _LoadedPiece, other_error, held) -> PieceFields:

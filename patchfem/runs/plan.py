@@ -31,8 +31,7 @@ PACKAGE_BYTES = 80e6  # Memory of the packages that every run imports [bytes].
 MAX_CPU_SECONDS = 1e6  # Largest predicted CPU time [s] of a run that is started; twelve days.
 SKIPPING_ENGINES = (
     "march",
-    "exact",
-    "piecewise",
+    "hybrid",
 )  # Engines that skip cycles once the motion is periodic.
 # Smallest number of cycles at which a plan mentions that cycles may be skipped.
 MIN_SKIPPED_CYCLES = 100
@@ -242,7 +241,11 @@ def _make_plan(model: Model) -> Plan:
         law_sentences.append(UPPER_LIMIT_NOTE)
     # The forecast solves a contact, which a run with too little memory could not afford.
     forecast = Forecast(model.accuracy.tolerance, ())
-    if not memory.reason_for_refusal(cost.parts):
+    refusal = memory.reason_for_refusal(cost.parts)
+    memory_sentence = memory.describe_largest_part(cost.parts)
+    if refusal:
+        memory_sentence = f"`run` will refuse this scene: {refusal}"
+    else:
         forecast = forecast_tolerance(model)
     motion_sentences = [*([forecast.sentence()] if forecast.causes else []), *motion_sentences]
     is_compiled = cost.compile_seconds == 0 or compiled.has_run(
@@ -258,7 +261,7 @@ def _make_plan(model: Model) -> Plan:
         groups,
         tuple(
             _arrange_sentences(
-                model, groups, cost.parts, (motion_sentences, patch_sentences, law_sentences)
+                model, groups, memory_sentence, (motion_sentences, patch_sentences, law_sentences)
             )
         ),
         0.0 if is_compiled else cost.compile_seconds,
@@ -330,16 +333,16 @@ def compiled_code_key(model: Model, engine: str, unknowns: dict) -> str:
     return ", ".join([*words, *(name for name, holds in flags.items() if holds)])
 
 
-def _arrange_sentences(model: Model, groups: dict, parts: tuple, sentence_groups: tuple) -> list:
+def _arrange_sentences(
+    model: Model, groups: dict, memory_sentence: str, sentence_groups: tuple
+) -> list:
     """Return the sentences of a plan in their final order, with those on memory and shear.
 
     sentence_groups: sentences on the motion, on the patch, and on the friction law.
     """
     sentences = list(sentence_groups[0])
-    if text := memory.reason_for_refusal(parts):
-        sentences.append(f"`run` will refuse this scene: {text}")
-    elif text := memory.describe_largest_part(parts):
-        sentences.append(text)
+    if memory_sentence:
+        sentences.append(memory_sentence)
     sentences += [*sentence_groups[1], *sentence_groups[2]]
     if "slip_length" in groups:
         shear_phrase = (

@@ -20,7 +20,7 @@ from ..model.source import locate_errors
 from . import joint
 from .accuracy_warnings import AccuracyContext, tolerance_warnings
 from .bench import result as bench_result
-from .patch import faces, strength
+from .patch import faces, store, strength
 from .patch import result as patch_result
 from .plan import Plan, compiled_code_key, plan, refuse_large_run
 from .results.patch_rows import find_unknown_measures
@@ -120,10 +120,12 @@ def _run_plan(
     notes = list(model.source.notes)
     meshes = PatchMeshes()
     stiffer = None
+    if fresh:
+        store.clear_cache()
     if model.rig is not None:
         warnings += engines.describe_unused_settings(model, run_plan.engine)
     if model.patch is not None:
-        meshes = _solve_contact_patch(model, estimate=estimate, fresh=fresh)
+        meshes = _solve_contact_patch(model, estimate=estimate)
         seconds["contact"] = perf_counter() - start
         if model.has_bolted_patch:
             model, (patch, *coarse), stiffer = joint.remove_joint(
@@ -135,8 +137,6 @@ def _run_plan(
         notes += patch_result.notes_on_neglected_effects(model, meshes.patch, meshes.coarse)
     notes += model.describe_removed_joint()
     if model.has_interface_patches:
-        if fresh:
-            faces.recondense_interface_pieces(model)
         warnings += faces.collect_warnings(model)
         notes += faces.collect_notes(model)
         seconds["contact"] = perf_counter() - start
@@ -182,16 +182,16 @@ def _run_plan(
     return _complete_result(mark_failed_checks(result), notes, start, meshes)
 
 
-def _solve_contact_patch(model: Model, *, estimate: bool, fresh: bool) -> PatchMeshes:
+def _solve_contact_patch(model: Model, *, estimate: bool) -> PatchMeshes:
     """Solve the patch of [contact] on the meshes of the run and of its error estimate."""
     tolerance = model.accuracy.tolerance
-    if model.has_bolted_patch and not fresh:
+    if model.has_bolted_patch:
         patch, *coarse = joint.solve_patch(model)
     else:
-        patch, *coarse = patch_result.solve_with_coarser(model.patch, tolerance, estimate, fresh)
+        patch, *coarse = patch_result.solve_with_coarser(model.patch, tolerance, estimate)
     static = ()
     if model.kind == "bench" and not _is_open(patch):
-        static = patch_result.solve_on_static_meshes(model.patch, tolerance, estimate, fresh)
+        static = patch_result.solve_on_static_meshes(model.patch, tolerance, estimate)
     return PatchMeshes(patch, tuple(coarse), tuple(static))
 
 

@@ -47,7 +47,7 @@ PUBLIC = {
         "UNIT_FACTORS",
         "parse_quantity",
     ),
-    "keys.removed": ("describe_removed_option",),
+    "keys.removed": ("describe_removed",),
     "keys.tables": (
         "Drive",
         "Friction",
@@ -73,7 +73,6 @@ PUBLIC = {
         "has_effect",
         "list_fixed_settings",
     ),
-    "rules.limits": ("find_lateral_slide_obstacle",),
     "rules.methods": (
         "ENGINE_SUPPORT",
         "EngineSupport",

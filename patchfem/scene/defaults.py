@@ -7,18 +7,12 @@ from typing import Any
 
 from ..effects import law_takes_key
 from .keys import tables
+from .keys.choices import find_choices
 from .keys.memoize import memoize
 from .keys.types import attributes_by_key
 from .rules.accuracy import find_unused_settings
-from .rules.drive import list_unused_drive_keys
 from .rules.friction import is_kinetic_unused, is_rest_speed_unused, is_temperature_unused
 from .rules.methods import list_unused_methods
-from .rules.selectors import (
-    ASPERITY_LAW_SELECTOR,
-    LAW_SELECTOR,
-    SLIDE_KIND_SELECTOR,
-    list_unused_keys,
-)
 from .rules.structure import default_output
 
 SLIDE_DEFAULTS = {  # default values of the keys that each slide.kind uses
@@ -49,7 +43,7 @@ def complete_tables(scene: tables.Tables, kind: str) -> tables.Tables:
 
 @memoize
 def _complete_slide(slide: tables.Slide) -> tables.Slide:
-    slide = _reset_unused_keys(slide, list_unused_keys(slide, SLIDE_KIND_SELECTOR))
+    slide = _reset_unused_keys(slide, find_choices(slide).unused)
     return _fill_missing_values(slide, SLIDE_DEFAULTS.get(slide.kind, {}))
 
 
@@ -80,15 +74,13 @@ def _complete_mode(mode: tables.Mode, index: int) -> tables.Mode:
 
 @memoize
 def _complete_drive(drive: tables.Drive) -> tables.Drive:
-    return _reset_unused_keys(drive, list_unused_drive_keys(drive))
+    return _reset_unused_keys(drive, find_choices(drive).unused)
 
 
 @memoize
 def _complete_contact(contact: tables.Contact) -> tables.Contact:
     if contact.asperities:
-        asperities = _reset_unused_keys(
-            contact.asperities, list_unused_keys(contact.asperities, ASPERITY_LAW_SELECTOR)
-        )
+        asperities = _reset_unused_keys(contact.asperities, find_choices(contact.asperities).unused)
         contact = contact.model_copy(update={"asperities": asperities})
     return _reset_unused_keys(contact, ["element_size"]) if contact.mesh else contact
 
@@ -101,7 +93,7 @@ def _complete_law(law: tables.Friction) -> tables.Friction:
         "temperature": is_temperature_unused(law),
     }
     unused = [key for key, is_unused in without_effect.items() if is_unused]
-    law = _reset_unused_keys(law, {*list_unused_keys(law, LAW_SELECTOR), *unused})
+    law = _reset_unused_keys(law, {*find_choices(law).unused, *unused})
     if law_takes_key(law.law, "kinetic"):
         return _fill_missing_values(law, {"kinetic": law.static})
     return law

@@ -5,6 +5,7 @@ my joint?" of guide/friction.md come from it.
 """
 
 import textwrap
+import tomllib
 from collections.abc import Iterable
 from typing import NamedTuple
 
@@ -51,135 +52,17 @@ class JointLaw(NamedTuple):
     - scene: name of a template scene.
     """
 
-    known: tuple[str, ...]
-    wanted: tuple[str, ...]
+    known: list[str]
+    wanted: list[str]
     law: str
-    keys: tuple[str, ...]
+    keys: list[str]
     gives: str
     cannot: str
     scene: str
 
 
-# Friction laws; of several that answer as much and need as little, the first is chosen: laws from
-# measurements of the joint come first, then those from its parts, then those from single numbers.
-JOINT_LAWS = (
-    JointLaw(
-        ("damping",),
-        ("loss", "force-limit"),
-        "iwan",
-        ("stiffness", "chi", "beta"),
-        "in micro-slip the energy per cycle grows as amplitude^(chi + 3), the damping ratio as amplitude^(chi + 1)",
-        "no effect of speed or rest; one contact point or a rigid patch, under a constant load",
-        "joint_laws/iwan",
-    ),
-    JointLaw(
-        ("loop",),
-        ("loss", "force-limit", "reversal"),
-        "bouc-wen",
-        ("stiffness", "exponent", "shape"),
-        "the measured loop; in micro-slip the energy per cycle grows as amplitude^(exponent + 2)",
-        "small loops do not close, and the joint creeps under a mean force (law iwan does neither); no effect of speed; "
-        "constant load",
-        "joint_laws/bouc-wen",
-    ),
-    JointLaw(
-        ("coefficient", "material", "roughness"),
-        ("loss", "force-limit"),
-        "coulomb",
-        ("[contact.shear]", "[contact.asperities]"),
-        "slip that begins at the edges, from the stiffness of the pieces and of their rough faces",
-        "theories of rough contact differ (the run prints their range); the model is "
-        "two-dimensional, and everything outside the pieces is rigid",
-        "joint_laws/rough-plates",
-    ),
-    JointLaw(
-        ("coefficient", "material"),
-        ("loss", "force-limit"),
-        "coulomb",
-        ("[contact.shear]",),
-        "slip that begins at the edges, from the stiffness of the pieces",
-        "the faces are smooth, so the joint is too stiff where they are rough; the model is "
-        "two-dimensional, and everything outside the pieces is rigid",
-        "joint",
-    ),
-    JointLaw(
-        ("coefficient", "stiffness"),
-        ("loss", "force-limit"),
-        "elastic-plastic",
-        ("stiffness",),
-        "loop area within 1 % of that of law nonlocal at amplitudes above 2.5 bond lengths",
-        "no dissipation at amplitudes up to one bond length; the force just after a reversal is wrong (rms error 14 % of "
-        "the friction limit at an amplitude of 3 bond lengths)",
-        "joint_laws/elastic-plastic",
-    ),
-    JointLaw(
-        ("coefficient", "stiffness"),
-        ("reversal", "loss", "force-limit"),
-        "nonlocal",
-        ("bond_length",),
-        "smooth loops at amplitudes of about one bond length",
-        "small loops do not close; the joint creeps by 0.27 bond lengths per cycle under a force "
-        "of 0.4 to 0.6 of the limit, unless `breakaway` is set",
-        "joint_laws/nonlocal",
-    ),
-    JointLaw(
-        ("rest",),
-        ("ageing", "force-limit"),
-        "nonlocal",
-        ("bond_length", "kinetic", "rest_growth", "rest_speed", "slip_growth"),
-        "bonds that grow during a rest, exponentially with the time constant rest_speed / rest_growth",
-        "no ageing with the logarithm of time; the peak of the force shows only 28 to 92 % of the growth; without "
-        "`kinetic` nothing ages",
-        "joint_laws/ageing",
-    ),
-    JointLaw(
-        ("speed",),
-        ("squeal", "loss", "force-limit"),
-        "lugre",
-        ("kinetic", "stribeck_speed", "stiffness", "micro_damping", "viscous"),
-        "friction that falls with the speed: growth from steady sliding, and stick-slip",
-        "no ageing; no squeal by coupling of modes, because the load is constant; small loops do not "
-        "close; the joint creeps under a mean force",
-        "joint_laws/lugre",
-    ),
-    JointLaw(
-        ("coefficient",),
-        ("squeal", "force-limit"),
-        "coulomb",
-        ("kinetic",),
-        "stick-slip from a coefficient that is lower in slip; the motion is exact between events",
-        "friction does not fall with the speed, so no vibration grows from steady sliding",
-        "joint_laws/stick-slip",
-    ),
-    JointLaw(
-        ("coefficient",),
-        ("force-limit", "loss"),
-        "coulomb",
-        (),
-        "loop area too large by 1 % at an amplitude of 100 bond lengths, and by less at larger ones",
-        "no stiffness and no loss before slip; the force is wrong after each reversal (rms error 34 % of the friction limit "
-        "at an amplitude of 100 bond lengths)",
-        "joint_laws/coulomb",
-    ),
-    JointLaw(
-        ("speed",),
-        ("smooth",),
-        "tanh",
-        ("reference_speed",),
-        "the force is the friction limit times tanh(speed / reference_speed)",
-        "never sticks, so the joint creeps under any force; no stiffness before slip; friction does not fall with the speed",
-        "joint_laws/tanh",
-    ),
-    JointLaw(
-        ("coefficient", "material", "stiffness"),
-        ("averaging",),
-        "convolution",
-        ("bond_length",),
-        "friction from the pressure averaged over some bond lengths behind each point",
-        "no memory, no stiffness before slip; under an even pressure it is Coulomb's law; no `[contact.shear]`",
-        "joint_laws/convolution",
-    ),
-)
+_ROWS = tomllib.loads((TEMPLATE_FOLDER.parent / "joint_laws.toml").read_text(encoding="utf-8"))
+JOINT_LAWS = tuple(JointLaw(**row) for row in _ROWS["law"])
 
 
 class Choice(NamedTuple):

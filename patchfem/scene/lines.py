@@ -3,25 +3,29 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 
 # Largest number of parts in a dotted key; no key of a scene has more than five, and the run
 # time is quadratic in their number.
 MAX_KEY_PARTS = 50
-_BARE_KEY_PATTERN = re.compile(r"[A-Za-z0-9_-]+")
 _ITEM_PATTERN = re.compile(r"(.+)\[([1-9][0-9]{0,8})\]")
 _ITEM_IN_MESSAGE_PATTERN = re.compile(
     r"\b((?:structure|drive)(?:\.[a-z_]+(?:\[[0-9]+\])?)+)\.([0-9]{1,9})(?![0-9a-zA-Z_])"
 )
 _BLANK_PATTERN = re.compile(r"(?:[ \t]+|\r?\n|#[^\n]*)*")
-_SCALAR_PATTERN = re.compile(r"[^,\]}\n#]*")
-_STRING_PATTERNS = (
-    re.compile(r'"""(?:\\[\s\S]|[^\\])*?"{3,5}'),
-    re.compile(r"'''[\s\S]*?'{3,5}"),
-    re.compile(r'"(?:\\.|[^"\\\n])*"'),
-    re.compile(r"'[^'\n]*'"),
+_KEY_PART = r"""[A-Za-z0-9_-]+|"(?:\\.|[^"\\\n])*"|'[^'\n]*'"""
+_KEY = rf"((?:{_KEY_PART})(?:[ \t]*\.[ \t]*(?:{_KEY_PART}))*)[ \t]*"
+_KEY_PART_PATTERN = re.compile(_KEY_PART)
+_HEADER_PATTERN = re.compile(rf"\[(\[)?[ \t]*{_KEY}\](?(1)\])")
+_PAIR_PATTERN = re.compile(rf"{_KEY}=")
+# Value without inner values: a string in one of four kinds of quotes, a number, a date or a word.
+_VALUE_PATTERN = re.compile(
+    r'"""(?:\\[\s\S]|[^\\])*?"{3,5}|'
+    r"\'\'\'[\s\S]*?\'{3,5}|"
+    r'"(?:\\.|[^"\\\n])*"|'
+    r"\'[^\'\n]*\'|"
+    r"""[^,\]}\n#"'][^,\]}\n#]*"""
 )
 
 
@@ -59,30 +63,6 @@ def locate_key(path: str | Path, text: str, key: str) -> str:
     return f"{place}: {number_items_from_one(key)}"
 
 
-@lru_cache(16)
-def find_key_lines(text: str) -> dict[str, int]:
-    """Return the line number of every key of a TOML text.
-
-    A table has the line of its header; a table without a header that of the first key in it. Items of an array of
-    tables count from 0, as in ``structure.mode.0.name``. A string that is not TOML gives the keys before the first error.
-    Raises TooManyKeyParts for a key of more than MAX_KEY_PARTS parts.
-    """
-    scanner = _Scanner(text)
-    try:
-        scanner.scan_document()
-    except (_SyntaxError, RecursionError):
-        pass
-    for path, line in list(scanner.lines.items()):
-        while "." in path:
-            path = path.rpartition(".")[0]
-            scanner.lines.setdefault(path, line)
-    return scanner.lines
-
-
-class _SyntaxError(Exception):
-    """Exception for text at the cursor that is not valid TOML."""
-
-
 class TooManyKeyParts(ValueError):
     """Error for a key on `line`, counted from 1, that has more than MAX_KEY_PARTS parts."""
 
@@ -91,142 +71,88 @@ class TooManyKeyParts(ValueError):
         self.line = line
 
 
-class _Scanner:
-    """Parser of TOML text that records the line of each key."""
+@lru_cache(16)
+def find_key_lines(text: str) -> dict[str, int]:
+    """Return the line number of every key of a TOML text.
 
-    def __init__(self, text: str) -> None:
-        self.text = text
-        self.position = 0
-        self.lines: dict[str, int] = {}
-        self._line = 1
-        self._counted = 0  # text position up to which `_line` has counted the lines
-        self._last_item: dict[str, int] = {}  # index of the last item of each array of tables
+    A table has the line of its header; a table without a header that of the first key in it. Items of an array of
+    tables count from 0, as in ``structure.mode.0.name``. A string that is not TOML gives the keys before the first error.
+    Raises TooManyKeyParts for a key of more than MAX_KEY_PARTS parts.
+    """
+    lines: dict[str, int] = {}
+    last_item: dict[str, int] = {}  # index of the last item of each array of tables
+    table = ""  # dotted key of the table to which the pairs at this place belong
+    opened: list[tuple[str, int | None]] = []  # arrays and their next index, inline tables and None
+    line = 1
+    position = 0
+    while True:
+        start = position
+        position = _BLANK_PATTERN.match(text, position).end()
+        line += text.count("\n", start, position)
+        path, index = opened[-1] if opened else (table, None)
 
-    def scan_document(self) -> None:
-        """Scan a complete TOML text."""
-        prefix = ""
-        while self.peek():
-            if self.take("["):
-                prefix = self.scan_header()
-            else:
-                self.scan_pair(prefix)
+        if opened and text[position : position + 1] in ("]", "}", ","):
+            opened.pop()
+            if text[position] == ",":
+                opened.append((path, None if index is None else index + 1))
+            position += 1
+            continue
+        if not opened and (match := _HEADER_PATTERN.match(text, position)):
+            table = _record_header(
+                lines, last_item, _split_written_key(match[2], line), line, is_array=bool(match[1])
+            )
+            position = match.end()
+            continue
 
-    def scan_header(self) -> str:
-        """Read the header of a table and return its dotted key."""
-        is_array = self.text.startswith("[", self.position)
-        self.position += is_array
-        line = self.current_line()
-        *outer, name = self.scan_key()
-        path = ""
-        for part in outer:
-            path = self.last_item_path(_join_path(path, part))
-        path = _join_path(path, name)
-        self.expect("]]" if is_array else "]")
-        if is_array:
-            self.lines.setdefault(path, line)
-            self._last_item[path] = self._last_item.get(path, -1) + 1
-            path = self.last_item_path(path)
-        self.lines[path] = line
-        return path
-
-    def last_item_path(self, path: str) -> str:
-        """Return the dotted key of a table, with the index of its last item if it is an array."""
-        return f"{path}.{self._last_item[path]}" if path in self._last_item else path
-
-    def scan_pair(self, prefix: str) -> None:
-        """Read ``key = value`` inside the table `prefix`."""
-        self.peek()
-        line = self.current_line()
-        path = prefix
-        for part in self.scan_key():
-            path = _join_path(path, part)
-            self.lines.setdefault(path, line)
-        self.expect("=")
-        self.scan_value(path)
-
-    def scan_value(self, path: str) -> None:
-        """Skip a value, and record the keys inside it."""
-        start = self.peek()
-        if start == "[":
-            self.scan_items("]", lambda index: self.scan_item(f"{path}.{index}"))
-        elif start == "{":
-            self.scan_items("}", lambda _: self.scan_pair(path))
-        elif start in ('"', "'"):
-            self.scan_string()
+        # An item of an array or a pair, followed by its value.
+        if index is not None:
+            path = f"{path}.{index}"
+            lines.setdefault(path, line)
+        elif match := _PAIR_PATTERN.match(text, position):
+            for part in _split_written_key(match[1], line):
+                path = _join_path(path, part)
+                lines.setdefault(path, line)
+            position = _BLANK_PATTERN.match(text, match.end()).end()
         else:
-            self.match(_SCALAR_PATTERN)
+            break
+        if text[position : position + 1] in ("[", "{"):
+            opened.append((path, 0 if text[position] == "[" else None))
+            position += 1
+        elif match := _VALUE_PATTERN.match(text, position):
+            line += match[0].count("\n")
+            position = match.end()
+        else:
+            break
 
-    def scan_item(self, path: str) -> None:
-        """Scan one item of a TOML array."""
-        self.peek()
-        self.lines.setdefault(path, self.current_line())
-        self.scan_value(path)
+    for path, line in list(lines.items()):
+        while "." in path:
+            path = path.rpartition(".")[0]
+            lines.setdefault(path, line)
+    return lines
 
-    def scan_items(self, end: str, scan_one: Callable) -> None:
-        """Scan the items between brackets, separated by commas."""
-        self.position += 1
-        index = 0
-        while not (self.peek() and self.take(end)):
-            scan_one(index)
-            index += 1
-            self.peek()
-            if not self.take(","):
-                self.expect(end)
-                return
 
-    def scan_key(self) -> list[str]:
-        """Read a dotted key and return its parts."""
-        parts = []
-        while True:
-            if self.peek() in ('"', "'"):
-                parts.append(self.scan_string()[1:-1])
-            else:
-                parts.append(self.match(_BARE_KEY_PATTERN))
-            self.peek()
-            if not self.take("."):
-                return parts
-            if len(parts) >= MAX_KEY_PARTS:
-                raise TooManyKeyParts(self.current_line())
+def _record_header(
+    lines: dict[str, int], last_item: dict[str, int], parts: list[str], line: int, *, is_array: bool
+) -> str:
+    """Record the line of the header of a table, and return the dotted key of the table."""
+    path = ""
+    for part in parts:
+        item = f".{last_item[path]}" if path in last_item else ""
+        path = _join_path(f"{path}{item}", part)
+    if is_array:
+        lines.setdefault(path, line)
+        last_item[path] = last_item.get(path, -1) + 1
+        path = f"{path}.{last_item[path]}"
+    lines[path] = line
+    return path
 
-    def scan_string(self) -> str:
-        """Read a string and return it with its quotes."""
-        for pattern in _STRING_PATTERNS:
-            if match := pattern.match(self.text, self.position):
-                self.position = match.end()
-                return match[0]
-        raise _SyntaxError
 
-    def match(self, pattern: re.Pattern[str]) -> str:
-        """Consume the text that a pattern matches at the cursor."""
-        match = pattern.match(self.text, self.position)
-        if not match or not match[0]:
-            raise _SyntaxError
-        self.position = match.end()
-        return match[0]
-
-    def peek(self) -> str:
-        """Skip blanks and comments and return the next character, or "" at the end of the text."""
-        self.position = _BLANK_PATTERN.match(self.text, self.position).end()
-        return self.text[self.position : self.position + 1]
-
-    def take(self, mark: str) -> bool:
-        """Consume a token if it is at the cursor, and return whether it was there."""
-        if not self.text.startswith(mark, self.position):
-            return False
-        self.position += len(mark)
-        return True
-
-    def expect(self, mark: str) -> None:
-        """Skip blanks and the token that must follow them."""
-        self.peek()
-        if not self.take(mark):
-            raise _SyntaxError
-
-    def current_line(self) -> int:
-        """Return the number of the line at the cursor, counted from 1."""
-        self._line += self.text.count("\n", self._counted, self.position)
-        self._counted = self.position
-        return self._line
+def _split_written_key(key: str, line: int) -> list[str]:
+    """Return the parts of a key of a TOML text, without their quotes."""
+    parts = [part.strip("\"'") for part in _KEY_PART_PATTERN.findall(key)]
+    if len(parts) > MAX_KEY_PARTS:
+        raise TooManyKeyParts(line)
+    return parts
 
 
 def _join_path(path: str, name: str) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterable, Sequence
+from copy import deepcopy
 from dataclasses import dataclass, replace
 from math import inf
 from typing import Any, NamedTuple
@@ -13,9 +14,9 @@ import numpy as np
 from ..effects import find_waveform
 from .files import list_named_files, require_files
 from .lines import find_key_lines, split_key
-from .reader import apply_set, read_tables
+from .reader import apply_set
 from .rules.contact import MAX_SMALL_ANGLE, find_max_load
-from .rules.scene_draft import SceneDraft, find_item_or_value
+from .rules.scene_draft import SceneDraft
 from .rules.structure import MAX_USUAL_DAMPING
 from .rules.view import TableView
 from .scene import Scene, finish_scene
@@ -43,15 +44,6 @@ PLAIN_KEYS = {
 }
 
 
-class _ReadTable(NamedTuple):
-    """Cached result of reading a table under given assignments."""
-
-    name: str
-    raw: Any
-    read_values: tuple[dict, Any]
-    keys: set[str]
-
-
 class BaseScene:
     """Valid scene from which others that differ in a few keys are made; its text and tables are read only once.
 
@@ -66,9 +58,8 @@ class BaseScene:
         self._draft = SceneDraft(str(scene.path), self._lines, values)
         for assignment in scene.sets:
             apply_set(self._draft, assignment)
-        read_tables(self._draft)
-        # Table that results from each group of assignments to its keys.
-        self._known: dict[tuple[str, ...], _ReadTable] = {}
+        # Valid tables by name and plain values; equal tables of several scenes are the same object.
+        self._tables: dict[tuple[str, str], Any] = {}
 
     def override(self, sets: Iterable[str]) -> Scene:
         """Return a copy of the scene with further assignments `table.key=value`.
@@ -80,34 +71,21 @@ class BaseScene:
         base = self.scene
         draft = SceneDraft(str(base.path), self._lines, dict(self._draft.raw))
         draft.sets = set(self._draft.sets)
-        draft.read_before = dict(self._draft.read_now)
-        changed_groups = [group for group in _group_by_table(sets) if not self._reuse(draft, group)]
-        for assignment in sets:  # the mistakes are listed in the order of the assignments
-            if any(assignment in group for group in changed_groups):
-                _copy_tables(draft.raw, assignment.partition("=")[0])
-                apply_set(draft, assignment)
+        for name in {key.partition(".")[0].strip() for key in sets} & draft.raw.keys():
+            draft.raw[name] = deepcopy(draft.raw[name])
+        for assignment in sets:
+            apply_set(draft, assignment)
+        for name, values in draft.raw.items():
+            if (name, repr(values)) in self._tables:
+                draft.read_before[id(values)] = self._tables[name, repr(values)]
         scene = require_files(finish_scene(draft, base.path, base.text, (*base.sets, *sets)))
         if base.written is not None:
             scene = replace(scene, written=base.written)
-        for group in (
-            changed_groups
-        ):  # no SceneError was raised, so these tables are valid and can be reused
-            name = _find_table_name(group[0])
-            read = draft.read_now.get(id(draft.raw.get(name)))
-            if read is not None and len(self._known) < MAX_CACHED_TABLES:
-                keys = {key for key in draft.sets if _find_table_name(key) == name}
-                self._known[group] = _ReadTable(name, draft.raw[name], read, keys)
+        # No SceneError was raised, so these tables are valid and can be used again.
+        if len(self._tables) < MAX_CACHED_TABLES:
+            for name, values in draft.raw.items():
+                self._tables.setdefault((name, repr(values)), getattr(draft.tables, name))
         return scene
-
-    def _reuse(self, draft: SceneDraft, group: tuple[str, ...]) -> bool:
-        """Use a table again that was read before under the same assignments, if there is one."""
-        known = self._known.get(group)
-        if known is None:
-            return False
-        draft.raw[known.name] = known.raw
-        draft.read_before[id(known.raw)] = known.read_values
-        draft.sets |= known.keys
-        return True
 
     def plain_numbers(self, scene: Scene, keys: Sequence[str]) -> PlainNumbers | None:
         """Return a fast generator of scenes that differ only in numeric values that affect no check.
@@ -278,30 +256,3 @@ def _find_plain_key(scene: Scene, key: str) -> PlainKey | None:
     if value is None or not 0 < value < limit:
         return None
     return PlainKey(NumberLocation(pieces[0], part, pieces[-1]), limit)
-
-
-def _group_by_table(sets: tuple[str, ...]) -> list[tuple[str, ...]]:
-    """Return the assignments in groups, one for each table, in their original order."""
-    groups: dict[str, tuple[str, ...]] = {}
-    for assignment in sets:
-        name = _find_table_name(assignment)
-        groups[name] = (*groups.get(name, ()), assignment)
-    return list(groups.values())
-
-
-def _find_table_name(key: str) -> str:
-    """Return the name of the table to which a dotted key, or an assignment, belongs."""
-    return key.partition("=")[0].partition(".")[0].strip()
-
-
-def _copy_tables(raw: dict[str, Any], key: str) -> None:
-    """Copy the tables above a dotted key, so that the key can be set."""
-    holder: Any = raw
-    for piece in split_key(key)[:-1]:
-        inner = find_item_or_value(holder, piece)
-        if isinstance(holder, dict) and isinstance(inner, dict):
-            inner = holder[piece] = dict(inner)
-        elif isinstance(holder, dict) and isinstance(inner, list):
-            copies = [dict(item) if isinstance(item, dict) else item for item in inner]
-            inner = holder[piece] = copies
-        holder = inner

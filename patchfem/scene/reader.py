@@ -9,7 +9,6 @@ from typing import Any
 from pydantic import ValidationError
 
 from . import suggestions
-from .keys import removed
 from .keys.lookup import (
     LIMITS_BY_ERROR_TYPE,
     KeyDefinition,
@@ -18,6 +17,7 @@ from .keys.lookup import (
     format_for_message,
     is_table_or_value,
 )
+from .keys.removed import describe_removed
 from .keys.tables import Tables
 from .keys.types import (
     Table,
@@ -46,7 +46,7 @@ def read_tables(draft: SceneDraft) -> None:
 def _read_table(draft: SceneDraft, model: type[Table], raw: dict[str, Any], table_key: str) -> Any:
     """Read one table of a scene, and report missing or wrong values."""
     if id(raw) in draft.read_before:
-        return draft.read_before[id(raw)][1]
+        return draft.read_before[id(raw)]
     names = attributes_by_key(model)
     values = {}
     for key, value in raw.items():
@@ -65,9 +65,7 @@ def _read_table(draft: SceneDraft, model: type[Table], raw: dict[str, Any], tabl
         if key not in raw:
             draft.add_missing(f"{table_key}.{key}", "")
     unknown = {names[key]: None for key in (*raw, *list_required_keys(model)) if key in names}
-    table = build_table(model, unknown | valid)
-    draft.read_now[id(raw)] = raw, table
-    return table
+    return build_table(model, unknown | valid)
 
 
 def _read_inner(draft: SceneDraft, definition: KeyDefinition, value: Any, path: str) -> Any:
@@ -126,8 +124,8 @@ def _report_unknown(
     path = f"{table_key}.{key}" if table_key else key
     # The number of an item, as in structure.mode.0, is no part of the name of its keys.
     name = ".".join(piece for piece in path.split(".") if not piece.isdecimal())
-    if name in removed.REMOVED_KEYS:
-        draft.add_mistake(path, removed.REMOVED_KEYS[name])
+    if removed := describe_removed(name):
+        draft.add_mistake(path, removed)
         return
     is_table = _is_table(raw[key])
     known = list(attributes_by_key(model))
@@ -169,7 +167,7 @@ def _suggest_name(
     }
     if is_table:
         return suggestions.suggest_table(model, written_table, key)
-    return suggestions.suggest_key(model, table_key, written_table, key, is_set=is_set)
+    return suggestions.suggest_key(model, written_table, key, is_set=is_set)
 
 
 def _list_tables_with_key(model: type[Table], key: str) -> list[str]:

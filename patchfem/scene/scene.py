@@ -19,9 +19,9 @@ from .keys import tables
 from .lines import locate_key
 from .reader import apply_set, read_tables
 from .rules.check import check_scene
-from .rules.limits import check_combinations
 from .rules.scene_draft import SceneDraft, SceneError
 from .rules.structure import describe_default_outputs
+from .rules.support import check_combinations
 from .sets import format_assignments, require_units
 from .text import format_toml, list_named_effects
 from .toml_text import parse_text, read_text

@@ -5,6 +5,7 @@ A schema cannot express which keys go together and which files exist; `patchfem 
 
 import re
 
+from .keys.choices import find_selectors, format_keys, split_keys
 from .keys.contact import Material
 from .keys.materials import MATERIALS, SEPARATORS, is_case_sensitive, list_spellings
 from .keys.quantities import NUMBER_PATTERN, PERCENTAGE_PATTERN, UNIT_FACTORS, find_si_unit
@@ -17,7 +18,6 @@ from .keys.types import (
     find_quantity_kind,
     nested_validators,
 )
-from .rules.selectors import SELECTORS, split_keys
 
 SCHEMA_DIALECT = "https://json-schema.org/draft/2020-12/schema"
 # Words of a schema that restrict a number.
@@ -92,26 +92,21 @@ def _describe_key(model: type[Table], key: str, raw: dict) -> dict:
 
 def _describe_selection(model: type[Table], key: str) -> str:
     """Return which keys each value of a selector needs, or which values need a key, or "" if neither applies."""
-    selector = next((row for row in SELECTORS.values() if issubclass(model, row.model)), None)
-    if selector is None:
-        return ""
-    if key == selector.key:
-        needs = {value: required.split() for value, (required, _) in selector.choices.items()}
-        clauses = [
-            f"'{value}' needs {', '.join(words).replace('|', ' or ')}"
-            for value, words in needs.items()
-            if words
-        ]
-        return "; ".join(clauses)
     clauses = []
-    for place, verb in enumerate(("needed with", "used with")):
-        values = [
-            f"'{value}'"
-            for value, texts in selector.choices.items()
-            if key in split_keys(texts[place])
-        ]
-        if values:
-            clauses.append(f"{verb} {selector.key} {', '.join(values)}")
+    for selector in filter(lambda one: one.key, find_selectors(model)):
+        if key == selector.key:
+            needs = {value: required for value, (required, _) in selector.choices.items()}
+            clauses += [
+                f"'{value}' needs {format_keys(needs[value])}" for value in filter(needs.get, needs)
+            ]
+        for place, verb in enumerate(("needed with", "used with")):
+            values = [
+                f"'{value}'"
+                for value, texts in selector.choices.items()
+                if key in split_keys(texts[place])
+            ]
+            if values:
+                clauses.append(f"{verb} {selector.key} {', '.join(values)}")
     return "; ".join(clauses)
 
 

@@ -5,20 +5,17 @@ from difflib import get_close_matches
 
 from pydantic import ValidationError
 
+from .keys.choices import find_selectors, split_keys
 from .keys.types import (
     MIN_NAME_SIMILARITY,
     Table,
     attributes_by_key,
     find_inner_table,
-    find_key_record,
     list_required_keys,
 )
-from .rules.selectors import SELECTORS, split_keys
 
 
-def suggest_key(
-    model: type[Table], table_key: str, written_table: dict, key: str, *, is_set: bool = False
-) -> str:
+def suggest_key(model: type[Table], written_table: dict, key: str, *, is_set: bool = False) -> str:
     """Return the key of a table that is most similar to an unknown key, or "" if none is similar.
 
     A key with a similar name, or with a word in common, comes first, then a key that the table lacks. Keys that accept
@@ -28,8 +25,6 @@ def suggest_key(
     ----------
     model : type
         The table.
-    table_key : str
-        Its dotted key.
     written_table : dict
         What is written in the table. A key that is there already is hardly meant.
     key : str
@@ -40,7 +35,7 @@ def suggest_key(
     free = [name for name in attributes_by_key(model) if name not in written_table]
     fitting = [name for name in free if _accepts_value(model, name, written_table[key])]
     words = set(key.lower().split("_"))
-    needed = _list_missing_keys(model, table_key, written_table)
+    needed = _list_missing_keys(model, written_table)
     lacking = [name for name in fitting if name in needed]
     if is_set:
         required = [name for name in list_required_keys(model) if name in fitting]
@@ -105,16 +100,11 @@ def _accepts_value(model: type[Table], key: str, value: object) -> bool:
     return True
 
 
-def _list_missing_keys(model: type[Table], table_key: str, written_table: dict) -> list[str]:
-    """Return the keys that a table lacks: those needed always, by a selector or under a condition."""
+def _list_missing_keys(model: type[Table], written_table: dict) -> list[str]:
+    """Return the keys that a table lacks: those needed always or by a selector."""
     needed = list(list_required_keys(model))
-    if table_key in SELECTORS:
-        selector = SELECTORS[table_key]
-        value = written_table.get(selector.key)
+    for selector in find_selectors(model):
+        value = written_table.get(selector.key, "")
         if isinstance(value, str) and value in selector.choices:
             needed += split_keys(selector.choices[value][0])
-    for key in attributes_by_key(model):
-        record = find_key_record(model, key)
-        if record is not None and record.required:
-            needed.append(key)
     return [key for key in needed if key not in written_table]

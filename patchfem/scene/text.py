@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from functools import cache
 from typing import Any, NamedTuple
 
+from .keys.choices import find_choices
 from .keys.contact import Material, OnePiece
 from .keys.memoize import memoize
 from .keys.quantities import format_si
 from .keys.tables import Accuracy, Drive, Interface, Measured, Tables
 from .keys.types import Table, attributes_by_key, find_inner_table, find_quantity_kind
-from .rules.drive import list_unused_drive_keys
-from .rules.selectors import SELECTORS, list_unused_keys
 
 EFFECT_KEYS = ("kind", "law", "reading", "waveform")  # keys whose values are effects
 
@@ -51,7 +50,7 @@ def _iterate_effects(table: Any, table_key: str) -> Iterator[str]:
         yield from _iterate_effects_of_items(table, table_key)
     elif isinstance(table, Table) and not isinstance(table, Material):
         sources = _find_effect_sources(type(table))
-        unused = _list_unused_keys(table) if sources.selectors else ()
+        unused = find_choices(table).unused if sources.selectors else ()
         selectors = [key for key in sources.selectors if key not in unused]
         yield from (f"{table_key}.{key}={getattr(table, key)}" for key in selectors)
         if not selectors:
@@ -89,21 +88,9 @@ def _find_effect_sources(model: type[Table]) -> _EffectSources:
     return _EffectSources(selectors, [name for name in names if find_inner_table(model, name)])
 
 
-def _list_unused_keys(table: Table) -> Collection[str]:
-    """Return the keys of a table that its selectors do not use."""
-    for selector in SELECTORS.values():
-        if isinstance(table, selector.model):
-            return list_unused_keys(table, selector)
-    if isinstance(table, Measured) and table.reading != "lowpass":
-        return {"reading_cutoff"}
-    if isinstance(table, Drive):
-        return list_unused_drive_keys(table)
-    return ()
-
-
 def _format_lines(table: Table, table_key: str) -> Iterator[str]:
     """Yield the TOML lines of a table and of the tables inside it."""
-    unused = _list_unused_keys(table)
+    unused = find_choices(table).unused
     inner = []
     for key, name in attributes_by_key(type(table)).items():
         value = getattr(table, name)

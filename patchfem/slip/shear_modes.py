@@ -13,7 +13,6 @@ force of node j. Both forms hold while the contact set does not change:
   compliant modes determine the resultant.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -27,12 +26,8 @@ from ..elasticity.lapack import dpotrf, dpotrs, dtrsm, dtrtri, use_one_blas_thre
 # Largest relative difference of yield displacements of nodes that yield together, such as mirrored
 # nodes; the rounding errors of a patch with 801 nodes are 7e-13
 EQUAL_YIELD_TOL = 1e-11
-# Largest number of sorts of the nodes before neighbours are exchanged; sorting only corrects large
-# errors
+# Largest number of sorts of the nodes before they are eliminated one by one
 MAX_SORTING_PASSES = 2
-# Largest number of exchanges of neighbours per node before nodes are eliminated one by one; patches
-# need at most 1
-MAX_EXCHANGES = 20
 # Number of modes with which a reduction starts; without an asperity layer its error is 1e-6 of the
 # friction limit
 N_SHEAR_MODES = 4
@@ -40,14 +35,6 @@ N_REFERENCE_MODES = 16  # smallest number of modes of the reference for an error
 # Largest error of an accepted reduction relative to the tolerance; modes beyond the reference cause
 # the rest of the error
 MODE_ERROR_FRACTION = 0.8
-# Smallest number of nodes for which it is faster to compute only the most compliant modes
-MIN_LANCZOS_POINTS = 128
-# Largest number of matrix products of the Lanczos method, with two vectors each; only soft asperity
-# layers need more
-MAX_LANCZOS_PRODUCTS = 24
-# Largest residual of a mode relative to the largest eigenvalue; the relative error of an eigenvalue
-# is the square of this ratio
-MODE_TOL = 1e-6
 GAUSS_POINT_COUNTS = (16, 32, 64)  # numbers of Gauss points that may represent the nodes of a patch
 # Largest backward motion of a node in a Newton step, in bond lengths; the law there is exp(2) times
 # as steep as at rest
@@ -125,7 +112,6 @@ class Spectrum:
     - shape (a, n): relative displacement of a node per unit of a modal coordinate
     - compliance (n,): compliance [m/N] of the coordinates
     - length: bond length [m]
-    - tangential (m, m): compliance C [m/N] if only the most compliant modes are there; the others are computed on demand
     """
 
     points: np.ndarray
@@ -133,22 +119,11 @@ class Spectrum:
     shape: np.ndarray
     compliance: np.ndarray
     length: float
-    tangential: np.ndarray | None = None
-
-    @cached_property
-    def complete(self) -> "Spectrum":
-        """Spectrum that contains all modes."""
-        if self.tangential is None:
-            return self
-        return _all_modes(self.tangential, self.points, self.limit, self.length)
 
     @cached_property
     def displacements(self) -> np.ndarray:
         """Relative displacements [m] at which backbones are compared; small values are spaced more densely."""
-        if self.tangential is None:
-            displacement = self.shape @ (self.compliance * (self.shape.T @ self.limit))
-        else:
-            displacement = _submatrix(self.tangential, self.points) @ self.limit
+        displacement = self.shape @ (self.compliance * (self.shape.T @ self.limit))
         largest = MAX_BACKBONE_LENGTHS * self.length + 2 * np.abs(displacement).max()
         return (
             largest * (np.arange(1, N_BACKBONE_DISPLACEMENTS + 1) / N_BACKBONE_DISPLACEMENTS) ** 2
@@ -156,8 +131,6 @@ class Spectrum:
 
     def modes(self, count: int) -> "ShearModes":
         """Return the first `count` modes."""
-        if count > self.compliance.size and self.tangential is not None:
-            return self.complete.modes(count)
         return ShearModes(
             self.points,
             frozen_array(self.shape[:, :count]),
@@ -184,8 +157,6 @@ class Spectrum:
         limit : (k,) ndarray, optional
             Friction limits [N] of these points.
         """
-        if count > self.compliance.size and self.tangential is not None:
-            return self.complete.backbone(count, shape, limit)
         count = min(count, self.compliance.size)
         if shape is None and count in self.cache:
             return self.cache[count].force
@@ -284,7 +255,7 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
     # One thread is used because, on a loaded machine, waiting for a second one turns 5 ms into 270
     # ms.
     with use_one_blas_thread():
-        c = _submatrix(tangential, points)
+        c = tangential[np.ix_(points, points)]
         if local_length:
             c = c + np.diag(local_length / force)
         sequence, yield_displacements, n_reluctant = _find_order(c, force)
@@ -349,8 +320,7 @@ def _find_order(c: np.ndarray, force: np.ndarray) -> _YieldOrder:
     rates that all nodes lose by the yield of the m-th node are thus the m-th row of L^-1 times (L^-1 1)_m, and the yield
     displacements are (L' force)/(L^-1 1). An order is right if these increase, because the force rate of a node only
     grows until it yields. The first order is that of the force rates without yields, the next orders are those of the
-    displacements. Remaining errors are corrected by exchanging neighbours, and at last by eliminating the nodes one by
-    one.
+    displacements. If none of them is right, the nodes are eliminated one by one.
     """
     rate = dpotrs(_factorise(c), np.ones(force.size), lower=1)[0]
     order = np.arange(force.size)
@@ -362,10 +332,7 @@ def _find_order(c: np.ndarray, force: np.ndarray) -> _YieldOrder:
         if sequence.is_sorted:
             break
     else:
-        exchanged = _exchange_neighbours(sequence)
-        if exchanged is None:
-            exchanged = _yield_sequence(c, force, _eliminate_points(c, force))
-        sequence = exchanged
+        sequence = _yield_sequence(c, force, _eliminate_points(c, force))
     increasing = np.maximum.accumulate(sequence.displacements[::-1])
     return _YieldOrder(sequence, increasing, int((rate <= 0).sum()))
 
@@ -391,47 +358,6 @@ def _yield_sequence(c: np.ndarray, force: np.ndarray, order: np.ndarray) -> _Yie
         factored_force,
         _divide_or_inf(factored_force, inverse_ones),
     )
-
-
-def _exchange_neighbours(sequence: _YieldSequence) -> _YieldSequence | None:
-    """Exchange neighbours until the yield displacements are sorted; return None if MAX_EXCHANGES per node do not suffice.
-
-    An exchange changes the yields of these two nodes alone. L with two rows exchanged becomes lower triangular again by
-    a rotation of two of its columns, which also rotates L^-1 1 and L' force.
-    """
-    factor = sequence.cholesky_factor
-    order = sequence.order.tolist()
-    inverse_ones = sequence.inverse_ones.tolist()
-    factored_force = sequence.factored_force.tolist()
-    displacements = sequence.displacements.tolist()
-    pending = list(range(len(order) - 1))[::-1]
-    remaining = MAX_EXCHANGES * len(order)
-    while pending:
-        k = pending.pop()
-        is_neighbour = 0 <= k < len(order) - 1
-        if not (is_neighbour and displacements[k + 1] > displacements[k] * (1 + EQUAL_YIELD_TOL)):
-            continue
-        remaining -= 1
-        if remaining < 0:
-            return None
-        both = slice(k, k + 2)
-        factor[both, : k + 2] = factor[[k + 1, k], : k + 2]
-        size = np.hypot(factor[k, k], factor[k, k + 1])
-        c = float(factor[k, k] / size)
-        s = float(factor[k, k + 1] / size)
-        # This sign keeps the diagonal positive.
-        rotation = np.array([[c, s], [s, -c]])
-        factor[k:, both] = factor[k:, both] @ rotation
-        factor[k, k + 1] = 0.0
-        order[both] = order[both][::-1]
-        for part in (inverse_ones, factored_force):
-            part[both] = c * part[k] + s * part[k + 1], s * part[k] - c * part[k + 1]
-        for i in (k, k + 1):
-            is_positive = inverse_ones[i] > 0
-            displacements[i] = factored_force[i] / inverse_ones[i] if is_positive else np.inf
-        pending += [k + 1, k - 1]
-    arrays = (order, factor, inverse_ones, factored_force, displacements)
-    return _YieldSequence(*map(np.array, arrays))
 
 
 def _factorise(c: np.ndarray) -> np.ndarray:
@@ -502,19 +428,20 @@ def shear_modes(
     return _make_spectrum(tangential, limit, bond_length, weakening).modes(count)
 
 
-def _make_spectrum(
-    tangential, limit, bond_length: float, weakening: float, *, first_modes_only: bool = False
-) -> Spectrum:
-    """Return the Spectrum of the nodes that carry load; the parameters are as in `shear_modes`.
-
-    first_modes_only: whether the N_REFERENCE_MODES most compliant modes are enough if there are many nodes.
-    """
-    index = np.flatnonzero(limit > 0)
-    spectrum = None
-    if first_modes_only and index.size >= MIN_LANCZOS_POINTS:
-        spectrum = _first_modes(tangential, index, limit[index], bond_length)
-    if spectrum is None:
-        spectrum = _all_modes(tangential, index, limit[index], bond_length)
+def _make_spectrum(tangential, limit, bond_length: float, weakening: float) -> Spectrum:
+    """Return the Spectrum of the nodes that carry load; the parameters are as in `shear_modes`."""
+    points = frozen_array(np.flatnonzero(limit > 0), np.int64)
+    limit = limit[points]
+    if np.ptp(tangential) == 0:
+        # Rigid pieces in series with one spring have only one mode.
+        spectrum = Spectrum(
+            points, limit, np.ones((points.size, 1)), tangential[:1, 0], bond_length
+        )
+    else:
+        root = np.sqrt(limit)[:, None]
+        with use_one_blas_thread():
+            values, vectors = np.linalg.eigh(root * tangential[np.ix_(points, points)] * root.T)
+        spectrum = Spectrum(points, limit, vectors[:, ::-1] / root, values[::-1], bond_length)
     stability = spectrum.compliance[0] / bond_length * (weakening - 1)
     if stability >= 1:
         raise PatchfemError(
@@ -523,98 +450,6 @@ def _make_spectrum(
             "raise friction.bond_length or friction.kinetic"
         )
     return spectrum
-
-
-def _all_modes(tangential, index, limit, length: float) -> Spectrum:
-    """Return the Spectrum with all modes of the nodes `index` (a,), whose friction limits are (a,) [N]."""
-    points = frozen_array(index, np.int64)
-    if np.ptp(tangential) == 0:
-        # Rigid pieces in series with one spring have only one mode.
-        return Spectrum(points, limit, np.ones((index.size, 1)), tangential[:1, 0], length)
-    root = np.sqrt(limit)
-    with use_one_blas_thread():
-        values, vectors = np.linalg.eigh(root[:, None] * tangential[np.ix_(index, index)] * root)
-    return Spectrum(points, limit, vectors[:, ::-1] / root[:, None], values[::-1], length)
-
-
-def _first_modes(tangential, index, limit, length: float) -> Spectrum | None:
-    """Return the Spectrum with the N_REFERENCE_MODES most compliant modes.
-
-    It is None if Lanczos' method does not converge, as for a soft layer of asperities, whose eigenvalues lie close
-    together.
-    """
-    root = np.sqrt(limit)[:, None]
-    c = _submatrix(tangential, index)
-
-    def product(vectors: np.ndarray) -> np.ndarray:
-        """Multiply by D^1/2 C D^1/2."""
-        return root * (c @ (root * vectors))
-
-    with use_one_blas_thread():
-        values, vectors, residual = largest_eigenpairs(
-            product, root[:, 0], N_REFERENCE_MODES, MAX_LANCZOS_PRODUCTS
-        )
-    if not residual <= MODE_TOL * values[0]:
-        return None
-    points = frozen_array(index, np.int64)
-    return Spectrum(points, limit, vectors / root, values, length, tangential)
-
-
-def _submatrix(tangential, index) -> np.ndarray:
-    """Return the compliance (a, a) between the nodes `index` (a,), as a view if they are adjacent."""
-    if index[-1] - index[0] >= index.size:
-        return tangential[np.ix_(index, index)]
-    span = slice(index[0], index[-1] + 1)
-    return tangential[span, span]
-
-
-class EigenPairs(NamedTuple):
-    """Largest eigenvalues (count,), their eigenvectors (n, count) and the largest norm of a residual."""
-
-    values: np.ndarray
-    vectors: np.ndarray
-    residual: float
-
-
-def largest_eigenpairs(
-    product: Callable, start: np.ndarray, count: int, n_products: int
-) -> EigenPairs:
-    """Find the largest eigenvalues of a symmetric matrix by the block Lanczos method with two vectors.
-
-    Each vector is made orthogonal to all previous ones (Golub, Van Loan, Matrix Computations, section 10.3.6).
-
-    Parameters
-    ----------
-    product : callable
-        Function (n, 2) -> (n, 2) that multiplies by the matrix.
-    start : (n,) ndarray
-        First vector, whose entries have one sign.
-    count, n_products : int
-        Number of eigenvalues and of matrix products.
-
-    Returns
-    -------
-    EigenPairs
-    """
-    basis, images = np.empty((2, len(start), 2 * n_products))
-    new = np.stack([start, start * np.linspace(-1, 1, len(start))], axis=1)
-    for k in range(0, 2 * n_products, 2):
-        # The orthogonalization is repeated because rounding errors of the first pass remain.
-        for _ in range(2):
-            new = new - basis[:, :k] @ (basis[:, :k].T @ new)
-            first = new[:, 0] / np.sqrt(new[:, 0] @ new[:, 0])
-            second = new[:, 1] - first * (first @ new[:, 1])
-            new = np.stack([first, second / np.sqrt(second @ second)], axis=1)
-        basis[:, k : k + 2] = new
-        new = product(new)
-        images[:, k : k + 2] = new
-    projected = basis.T @ images
-    values, parts = np.linalg.eigh((projected + projected.T) / 2)
-    values = values[: -count - 1 : -1]
-    parts = parts[:, : -count - 1 : -1]
-    vectors = basis @ parts
-    residuals = ((images @ parts - vectors * values) ** 2).sum(axis=0)
-    return EigenPairs(values, vectors, float(np.sqrt(residuals.max())))
 
 
 def find_sufficient_modes(
@@ -679,7 +514,7 @@ def find_fewest_modes(
     -------
     ShearModes
     """
-    spectrum = _make_spectrum(tangential, limit, bond_length, weakening, first_modes_only=True)
+    spectrum = _make_spectrum(tangential, limit, bond_length, weakening)
     for count in range(2, max_modes):
         # The backbone of a few modes is the initial guess for that of the reference.
         backbone = spectrum.backbone(count)

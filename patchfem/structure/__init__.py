@@ -26,7 +26,6 @@ PUBLIC = {
         "is_sinusoidal",
     ),
     "drives": ("make_release",),
-    "masses": ("set_lateral_displacements",),
     "modal_fit": (
         "ModalFit",
         "add_mode",

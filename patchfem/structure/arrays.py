@@ -15,6 +15,7 @@ from zipfile import ZipFile
 
 import numpy as np
 from numpy.lib import format as npy
+from scipy.sparse import issparse
 
 from ..core import ModalBasis, PatchfemError, frozen_array
 from ..effects import MAX_COORDINATES
@@ -70,7 +71,7 @@ def read_arrays(path: Path) -> dict:
         names = [name for name in ARRAY_NAMES if name in variables]
         for name in names:
             _refuse_large(name, variables[name].shape)
-        return {name: _drop_dimensions(variables[name].values()) for name in names}
+        return {name: _drop_dimensions(variables[name]) for name in names}
     except PatchfemError as error:
         reason = str(error).removeprefix(f"{path}: ")
         raise PatchfemError(f"structure.file: {path} cannot be read ({reason})") from None
@@ -121,7 +122,8 @@ def _refuse_large(name: str, shape: tuple) -> None:
 
 
 def _drop_dimensions(values) -> np.ndarray:
-    """Convert a matrix of a .mat file that has a single row or column to a vector."""
+    """Return an array of a .mat file in full; a matrix that has a single row or column becomes a vector."""
+    values = values.toarray() if issparse(values) else values
     return values if values.ndim == 2 and min(values.shape) > 1 else values.ravel()
 
 

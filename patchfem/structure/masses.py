@@ -1,10 +1,8 @@
 """Modes of masses on springs and dampers between them and to the base (report, figure 16)."""
 
-from dataclasses import replace
-
 import numpy as np
 
-from ..core import ModalBasis, frozen_array
+from ..core import ModalBasis
 from . import matrices
 
 
@@ -65,30 +63,3 @@ def _make_weighted_rows(elements, n: int) -> np.ndarray:
     rows = make_slide_rows([pair for pair, _ in elements], n)
     coefficients = np.array([coefficient for _, coefficient in elements], float)
     return rows * np.sqrt(coefficients)[:, None]
-
-
-def set_lateral_displacements(basis: ModalBasis, laterals) -> ModalBasis:
-    """Declare the last interfaces of a basis to be the lateral directions of the first ones.
-
-    Parameters
-    ----------
-    basis : ModalBasis
-        Faces of all interfaces, followed by those of their second directions.
-    laterals : sequence
-        An entry per interface, None if it has no second direction.
-
-    Returns
-    -------
-    ModalBasis
-    """
-    n_interfaces = len(laterals)
-    has_lateral = [k for k, pair in enumerate(laterals) if pair is not None]
-    if not has_lateral:
-        return basis
-    lateral_faces = np.zeros((n_interfaces, basis.omega.size))
-    lateral_faces[has_lateral] = basis.faces[n_interfaces:]
-    return replace(
-        basis,
-        faces=None if n_interfaces == 1 else frozen_array(basis.faces[:n_interfaces]),
-        lateral_faces=frozen_array(lateral_faces),
-    )

@@ -20,8 +20,8 @@ from scipy.sparse.linalg import LinearOperator, eigsh
 
 from ..core import ModalBasis, NotConverged, PatchfemError, frozen_array
 from ..effects import MAX_COORDINATES
-from ..elasticity.fronts import SparseFactor, ZeroEnergyMotion
 from ..elasticity.lapack import use_one_blas_thread
+from ..elasticity.sparse_factor import SparseFactor, ZeroEnergyMotion
 from . import masses, matrices
 
 # Largest number of coordinates for a dense eigensolution; larger structures use Lanczos iteration

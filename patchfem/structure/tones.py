@@ -25,15 +25,21 @@ class TonesRecord(RecordedDrive):
 
     - beat: number of cycles after which all tones repeat.
     - max_frequency: highest frequency [Hz].
+    - tones (q, 3): amplitude [m s-2], circular frequency [rad/s] and phase [rad] of each tone.
     """
 
     beat: float = 1.0
     max_frequency: float = 0.0
+    tones: tuple = ()
 
     @property
     def max_frequency_ratio(self) -> float:
         """Ratio of the highest frequency to the frequency of the drive cycle."""
         return self.max_frequency * self.period
+
+    def values(self, t):
+        """Evaluate the sum of the tones [m s-2] at times t (k,) >= 0 [s]."""
+        return sum(a * np.sin(omega * np.asarray(t, float) + phi) for a, omega, phi in self.tones)
 
 
 def make_tones(frequencies, accelerations, phases, duration: float) -> TonesRecord:
@@ -63,6 +69,7 @@ def make_tones(frequencies, accelerations, phases, duration: float) -> TonesReco
         1 / frequencies[0],
         beat=count_beat_cycles(frequencies),
         max_frequency=max_frequency,
+        tones=tuple((a, 2 * np.pi * f, p) for f, a, p in zip(frequencies, accelerations, phases)),
     )
 
 

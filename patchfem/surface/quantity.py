@@ -8,8 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..formatting import format_length
-
 LEVEL = 0.95  # probability that the interval of a comparison contains the true value
 SIDE = 1.959964  # half-width of a normal interval of LEVEL, in standard deviations
 
@@ -27,47 +25,6 @@ class Quantity(NamedTuple):
     text: str
     reason: str = ""
     name: str = ""
-
-
-def make_quantity(
-    value: float, error: float, unit: str, text: str, min_value: float | None = None
-) -> Quantity:
-    """Return a quantity with the interval that follows from its standard deviation.
-
-    Parameters
-    ----------
-    value, error : float
-    unit, text : str
-    min_value : float, optional
-        Smallest possible value.
-
-    Returns
-    -------
-    Quantity
-    """
-    bounds = [float(value), float(value - SIDE * error), float(value + SIDE * error)]
-    if min_value is not None:
-        bounds = [max(bound, min_value) for bound in bounds]
-    return Quantity(*bounds, unit, text)
-
-
-def make_unknown(unit: str, text: str, reason: str) -> Quantity:
-    """Return a quantity whose value is unknown, with the reason.
-
-    Parameters
-    ----------
-    unit, text, reason : str
-
-    Returns
-    -------
-    Quantity
-    """
-    return Quantity(None, None, None, unit, text, reason)
-
-
-def format_interval(length: Quantity) -> str:
-    """Format a length with its interval."""
-    return f"{format_length(length.value)} ({format_length(length.low)} to {format_length(length.high)})"
 
 
 class Mean(NamedTuple):

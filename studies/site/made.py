@@ -278,10 +278,11 @@ def key_rows(name: str) -> list:
             "number of values."
         ]
     model = TABLES[table]
-    used = keys_page.NEEDS.get(f"{table}.{key}", {}).get(value, ("", ""))
-    named = [key, *" ".join(used).split()] if value else list(attributes_by_key(model))
+    choices = next((one.choices for one in keys_page.find_selectors(model) if one.key == key), {})
+    used = re.findall(r"\w+", " ".join(choices.get(value, ("", ""))))
+    named = [key, *used] if value else list(attributes_by_key(model))
     rows = [
-        keys_page._format_row(model, one, table)
+        keys_page._format_row(model, one)
         for one in named
         if one in attributes_by_key(model)
         and not keys_page._is_table(model, attributes_by_key(model)[one])

@@ -47,31 +47,6 @@ def test_exact_quasi_static_iwan_curve_agrees_with_segalman():
     assert backbone.frequencies.stuck == pytest.approx(np.sqrt(OMEGA**2 + 4e4) / (2 * np.pi))
 
 
-def test_balance_and_decay_of_iwan_joint_agree_within_errors():
-    """The damping of an Iwan joint by decay agrees with that by balance within their errors.
-
-    The difference may also contain the change of the damping over one cycle. In micro-slip a single
-    harmonic describes the motion, so the damping by balance agrees with the quasi-static one within
-    1e-3.
-    """
-    amplitudes = np.geomspace(2e-5, 2e-3, 6)
-    backbone = compute_backbone(build_block(IWAN), "", amplitudes)
-    static, balance, decay = (
-        backbone.curves[method] for method in ("quasi-static", "balance", "decay")
-    )
-    assert balance.damping[0] == pytest.approx(static.damping[0], rel=1e-3)
-    inside = np.isin(amplitudes, decay.amplitude)
-    change = (
-        np.gradient(balance.damping, np.log(amplitudes))[inside]
-        * 2
-        * np.pi
-        * balance.damping[inside]
-    )
-    off = np.abs(decay.damping - balance.damping[inside])
-    assert inside.sum() >= 4 and (off < decay.damping_error + 2 * change).all()
-    assert np.abs(decay.frequency - balance.frequency[inside]).max() < 0.1
-
-
 def test_exact_balanced_motion_repeats_after_a_cycle():
     """A motion with the damping of the balance returns to its amplitude after a cycle within 1e-9.
 
@@ -107,15 +82,11 @@ def test_exact_rigid_friction_damping_agrees_with_closed_form():
     """
     h = 30 / (0.5 * OMEGA**2)
     backbone = compute_backbone(build_block('law = "coulomb"'), "", np.geomspace(20 * h, 80 * h, 4))
-    decay = backbone.curves["decay"]
     balance = backbone.curves["balance"]
     assert list(backbone.missing) == ["quasi-static"]
     assert "has no finite stiffness" in backbone.missing["quasi-static"]
     first = 2 * h / (np.pi * balance.amplitude) + 0.002
     assert balance.damping == pytest.approx(first, rel=2e-2)
-    assert decay.damping == pytest.approx(
-        np.interp(decay.amplitude, balance.amplitude, balance.damping), rel=2e-2
-    )
     assert backbone.exponents.micro is None and backbone.exponents.gross == pytest.approx(1)
 
 
@@ -217,12 +188,8 @@ def test_refuses_modes_without_a_backbone(scene, message):
 def test_exact_rig_without_friction_has_constant_curves(scene):
     """Frequency and damping of a rig without friction do not depend on the amplitude, within 1e-9."""
     backbone = compute_backbone(pf.build(scene))
-    for method, f in (
-        ("balance", 100.0),
-        ("decay", 100 * np.sqrt(1 - 4e-6)),
-        ("quasi-static", 100.0),
-    ):
-        assert backbone.curves[method].frequency == pytest.approx(f, rel=1e-12)
+    for method in ("balance", "quasi-static"):
+        assert backbone.curves[method].frequency == pytest.approx(100.0, rel=1e-12)
         assert backbone.curves[method].damping == pytest.approx(0.002, rel=1e-9)
     assert not backbone.missing
     assert backbone.exponents.micro is None
@@ -255,23 +222,6 @@ coefficient = "40 N s/m"
     assert abs(
         np.linalg.det(k - m * w**2 + 1j * w * (c - 2 * zeta * w * m))
     ) < 1e-9 * np.linalg.det(k)
-    s = 2j * np.pi * curves["decay"].frequency[0]
-    s -= s.imag * curves["decay"].damping[0] / np.sqrt(1 - curves["decay"].damping[0] ** 2)
-    assert abs(np.linalg.det(k + c * s + m * s**2)) < 1e-9 * np.linalg.det(k)
-
-
-def test_decay_with_stiff_contact_includes_cycles_of_slip():
-    """The damping by decay with a stiff contact agrees with that of Coulomb friction within 2 %.
-
-    The duration was once 50 cycles of the stuck mode, which is 76 times as fast as the free one,
-    and contained no cycle of slip.
-    """
-    backbone = compute_backbone(pf.build(CROWNED), "", [2e-2, 3e-2], ("decay",)).curves["decay"]
-    assert backbone.amplitude.tolist() == [2e-2, 3e-2]
-    assert (backbone.frequency_error < 1e-3 * backbone.frequency).all()
-    # Damping of Coulomb friction in gross slip.
-    lost = 4 * 0.3 * 2e3 * 3e-2 / (2 * np.pi * 0.5 * OMEGA**2 * 3e-2**2)
-    assert backbone.damping[-1] == pytest.approx(0.002 + lost, rel=0.02)
 
 
 def test_amplitudes_stay_within_travel():
@@ -279,9 +229,8 @@ def test_amplitudes_stay_within_travel():
     stopped = pf.build(
         make_shaken_block(IWAN).replace("moving_mass", 'travel = "0.2 mm"\nmoving_mass')
     )
-    backbone = compute_backbone(stopped, methods=("decay", "quasi-static"))
+    backbone = compute_backbone(stopped, methods=("quasi-static",))
     assert backbone.curves["quasi-static"].amplitude[-1] == pytest.approx(0.2e-3 / 1.15)
-    assert 1.5e-4 < backbone.curves["decay"].amplitude[-1] < 0.2e-3
     with pytest.raises(
         pf.PatchfemError, match=r"structure\.travel: the largest amplitude, 300 um, is larger than"
     ):
@@ -389,85 +338,14 @@ output = 0.6
 def test_gross_slip_damping_of_two_modes_agrees_with_closed_form():
     """The gross-slip damping of two modes agrees with the closed form within 2 %.
 
-    The closed form is 4 F/(2 pi k A) plus the damping of the structure, for decay and balance; the
+    The closed form is 4 F/(2 pi k A) plus the damping of the structure, for the balance; the
     quasi-static curve has the requested amplitudes.
     """
     amplitudes = np.array([2e-3, 4e-3])
     curves = compute_backbone(pf.build(TWO), "", amplitudes).curves
     plain = 0.002 + 4 * 30 / (2 * np.pi * 0.5 * OMEGA**2 * amplitudes)
     assert curves["balance"].damping == pytest.approx(plain, rel=0.02)
-    assert curves["decay"].damping == pytest.approx(
-        np.interp(curves["decay"].amplitude, amplitudes, plain), rel=0.02
-    )
-    assert curves["decay"].amplitude.size == 2 and curves[
-        "quasi-static"
-    ].amplitude == pytest.approx(amplitudes, rel=1e-6)
-
-
-def test_exact_decay_continues_in_stick():
-    """A decay of two modes continues where the contact sticks, with the damping of the stuck modes within its errors."""
-    amplitudes = np.geomspace(1e-7, 2e-3, 13)
-    text = TWO.replace("1 um", "0.1 mm")
-    backbone = compute_backbone(pf.build(text), "", amplitudes, ("decay",))
-    curve = backbone.curves["decay"]
-    assert curve.amplitude.size == 13 and not any(
-        "have a result" in note for note in backbone.notes
-    )
-    # The other mode changes the damping ratio by up to 2e-4 there.
-    sticks = curve.amplitude < 1e-4
-    omegas = np.array([1, 4.7]) * OMEGA
-    shape = np.diag([0.004, 0.006 * 4.7]) * OMEGA
-    phi = np.array([1, 0.8])
-    stiff = np.diag(omegas**2) + 3e5 / 0.5 * np.outer(phi, phi)
-    roots = np.linalg.eigvals(np.block([[np.zeros((2, 2)), np.eye(2)], [-stiff, -shape]]))
-    root = roots[np.argmin(np.abs(roots))]
-    zeta = -root.real / abs(root)
-    omega = abs(root.imag)
-    assert sticks.sum() >= 3
-    for value, error, truth in (
-        (curve.damping, curve.damping_error, zeta),
-        (curve.frequency, curve.frequency_error, omega / (2 * np.pi)),
-    ):
-        assert (np.abs(value - truth) <= error + 1e-6 * truth)[sticks].all()
-    assert (curve.damping_error < 1e-4 * curve.damping)[sticks].all()
-
-
-NEAR = make_shaken_block(PLASTIC.replace("1 mm", "0.1 mm")).replace(
-    "[drive]",
-    """[[structure.mode]]
-name = "yaw"
-frequency = "102 Hz"
-damping = 0.002
-slide = 0.4
-[drive]""",
-)
-
-
-def test_decay_with_motion_of_another_mode_is_rejected():
-    """A decay with more than 10 % motion of another mode is no result, and the reason is stated.
-
-    Two modes 2 % apart exchange their energy after a release; the damping by decay was once 32
-    times that of the free motion, with an error estimate of 15 %.
-    """
-    methods = ("balance", "decay")
-    rig = pf.build(NEAR)
-    backbone = compute_backbone(rig, "axial", np.geomspace(1e-3, 1e-2, 5), methods, errors=False)
-    assert "decay" not in backbone.curves
-    assert "no longer a motion of this mode alone" in backbone.missing["decay"]
-    assert backbone.curves["balance"].damping[:3] == pytest.approx(0.002, rel=1e-3)
-    amplitudes = np.geomspace(2e-3, 6e-2, 7)
-    backbone = compute_backbone(rig, "axial", amplitudes, methods, errors=False)
-    balance = backbone.curves["balance"]
-    decay = backbone.curves["decay"]
-    assert balance.amplitude.size == amplitudes.size and decay.amplitude == pytest.approx(
-        amplitudes[4:]
-    )
-    assert decay.damping == pytest.approx(balance.damping[4:], rel=0.04)
-    assert (decay.other_modes > 0.01).all()
-    assert any(
-        "fallen to 11 mm, the motion of other modes is more than 10 % of its am" in one
-        for one in backbone.notes
-    )
+    assert curves["quasi-static"].amplitude == pytest.approx(amplitudes, rel=1e-6)
 
 
 CROWNED = """\

@@ -90,7 +90,7 @@ def test_exact_profile_report_lists_all_parameters(trace_file, tmp_path):
 
 
 def test_exact_profile_means_of_files(tmp_path, scan_file):
-    """The mean of three traces has the 95 % interval of Student's t (4.302653 for two degrees of freedom).
+    """The mean of three traces has the 95 % interval of Student's t of the logarithm (4.302653 for two degrees).
 
     The stored profile of a trace gives the same parameters within 1e-7.
     """
@@ -112,7 +112,9 @@ def test_exact_profile_means_of_files(tmp_path, scan_file):
     found = data["means"][0]["measures"]["Pq"]
     half_width = 4.302653 * np.std(heights, ddof=1) / np.sqrt(6)
     assert found["value"] == pytest.approx(np.mean(heights) * UM / np.sqrt(2), rel=2e-3)
-    assert found["high"] - found["value"] == pytest.approx(half_width * UM, rel=5e-3)
+    factor = np.exp(half_width * UM / found["value"])
+    assert found["high"] == pytest.approx(found["value"] * factor, rel=5e-3)
+    assert found["low"] == pytest.approx(found["value"] / factor, rel=5e-3)
     assert "Mean of 3 traces: Pa " in (out / "report.html").read_text()
     assert len(rows) == 5
     assert rows[0].startswith("file,Pa [m],Pa_low [m],Pa_high [m],")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -16,7 +15,6 @@ from patchfem.contact import (
     ExponentialAsperities,
     HertzAsperities,
     LinearAsperities,
-    asperity_layer,
     press,
 )
 from patchfem.contact.asperity_laws import peak_integral
@@ -199,27 +197,6 @@ def test_exact_approach_near_pressure_floor():
         assert max(state.residuals.values()) <= STRIP_RESIDUAL_TOL
         assert (state.outcome is Outcome.DONE) == (state.load > 0)
     assert state.outcome is Outcome.NO_CONTACT
-
-
-def test_exact_dual_descent_gives_newton_forces(monkeypatch):
-    """The dual descent without Newton steps for the load gives the same forces, in more iterations."""
-    compliance, x, weight = pair_arrays(40)
-    gap = 1e-5 * np.random.default_rng(9).normal(size=x.size)
-    newton = asperity_layer._solve_newton
-    for layer in (ExponentialAsperities(1e-8, MEAN_PRESSURE), replace(HERTZ_LAYER, deviation=1e-8)):
-        for moment in (None, 2e-3 * LOAD):
-            with_newton = press_layer(layer, compliance, x, weight, gap, LOAD, moment)
-            with (
-                monkeypatch.context() as patch
-            ):  # Newton steps are left only for the patch under a prescribed approach
-                patch.setattr(
-                    asperity_layer,
-                    "_solve_newton",
-                    lambda *a: None if a[0].contact.target.size else newton(*a),
-                )
-                without_newton = press_layer(layer, compliance, x, weight, gap, LOAD, moment)
-            assert without_newton.iterations > with_newton.iterations
-            assert np.abs(without_newton.force - with_newton.force).max() <= 1e-9 * LOAD
 
 
 # ---- refusals

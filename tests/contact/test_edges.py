@@ -38,11 +38,12 @@ def test_exact_wedge_on_springs_edge_and_stiffness(load):
     weight = pieces.interface.weight
     state = press(pieces, angle * x, load)
     force = state.sigma_n * weight
-    (end,) = edges.find_edges(pieces.normal, x, force, state.gap, softness=np.diag(pieces.normal))
+    pressed = edges.SetFactor(pieces.normal, force > 0)
+    (end,) = edges.find_edges(pressed, x, force, state.gap, softness=np.diag(pieces.normal))
     expected = state.approach / angle
     assert end.side == 1 and end.position == pytest.approx(expected, abs=1e-12)
     assert edges.contact_intervals(x, force, [end])[0] == pytest.approx([x[0], expected], abs=1e-12)
-    stiffness = edges.set_stiffness(pieces.normal, force > 0, np.ones(x.size), [end])
+    stiffness = edges.set_stiffness(pressed, np.ones((x.size, 1)), [end])[0]
     assert stiffness == pytest.approx(k * WIDTH * (expected - x[0]), rel=1e-9)
 
 
@@ -68,7 +69,8 @@ def find_hertz_edges(hertz_block, load: float, radius: float = 57.7e-3) -> tuple
     weight = pieces.interface.weight
     state = press(pieces, x**2 / (2 * radius), load)
     force = state.sigma_n * weight
-    return force, edges.find_edges(pieces.normal, x, force, state.gap, row_height=row_height)
+    pressed = edges.SetFactor(pieces.normal, force > 0)
+    return force, edges.find_edges(pressed, x, force, state.gap, row_height=row_height)
 
 
 def test_always_hertz_edges_are_accurate_to_fraction_of_element(hertz_block):
@@ -120,7 +122,9 @@ def test_always_edges_and_stiffness_vary_continuously(hertz_block):
         force, edge_list = find_hertz_edges(hertz_block, load)
         positions.append(edge_list[1].position)
         stiffnesses.append(
-            edges.set_stiffness(hertz_block[0].normal, force > 0, np.ones(x.size), edge_list)
+            edges.set_stiffness(
+                edges.SetFactor(hertz_block[0].normal, force > 0), np.ones((x.size, 1)), edge_list
+            )[0]
         )
         n_contact_nodes.append(np.count_nonzero(force))
     assert n_contact_nodes[-1] - n_contact_nodes[0] >= 2
@@ -148,7 +152,9 @@ def test_exact_edges_of_separate_zones_and_full_contact():
     x = np.linspace(-1.0, 1.0, 9)
     force = np.array([1.0, 1, 0, 0, 1, 1, 0, 1, 1])
     gap = np.where(force > 0, 0.0, 1e-6)
-    edge_list = edges.find_edges(np.eye(9) * 1e-6, x, force, gap, np.full(9, 1e-6))
+    pressed = edges.SetFactor(np.eye(9) * 1e-6, force > 0)
+    edge_list = edges.find_edges(pressed, x, force, gap, np.full(9, 1e-6))
     assert [(end.node, end.side) for end in edge_list] == [(1, 1), (4, -1), (5, 1), (7, -1)]
     assert edges.contact_intervals(x, force, edge_list).shape == (3, 2)
-    assert edges.find_edges(np.eye(9), x, np.ones(9), np.zeros(9)) == []
+    full = edges.SetFactor(np.eye(9), np.ones(9, bool))
+    assert edges.find_edges(full, x, np.ones(9), np.zeros(9)) == []

@@ -13,7 +13,7 @@ from patchfem.closed_forms import contact as exact
 from patchfem.contact import press
 from patchfem.contact.gaps import crown
 from patchfem.mesh import TensorGrid
-from patchfem.mesh.tensor import graded_rows
+from patchfem.mesh.grid import graded_rows
 
 halfspace = load_study("common/halfspace.py")
 press_periodic, wave_numbers = (

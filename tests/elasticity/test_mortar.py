@@ -8,17 +8,16 @@ from functools import cache
 import numpy as np
 import pytest
 from any_mesh_cases import mesh_of_grid
-from hypothesis import given
 from hypothesis import strategies as st
 from pieces import HEIGHT, LENGTH, TITANIUM, make_bare_layers, make_refined_grid
 
 from patchfem.contact import press
 from patchfem.contact.gaps import crown
-from patchfem.core import Compliance, Interface, PatchfemError
-from patchfem.elasticity import PieceInterface, elasticity, mortar, recovery, substructure
-from patchfem.elasticity.mortar import clip_nodes, transfer_matrix
+from patchfem.core import Compliance, Interface
+from patchfem.elasticity import PieceInterface, elasticity, mortar, recovery
+from patchfem.elasticity.mortar import transfer_matrix
 from patchfem.mesh import TensorGrid, tributary_lengths
-from patchfem.mesh.tensor import graded_rows
+from patchfem.mesh.grid import graded_rows
 
 HALF_WIDTH = 0.1e-3  # half-width of the Hertz contact [m]
 LOAD = 9107.0  # per metre of width [N/m]
@@ -76,8 +75,8 @@ def block_compliance(x, height, young, poisson=TITANIUM[1], plane="strain", grow
 
 def pair_compliance(low, x_low, high, x_high, x):
     """Return the normal compliance of the pair on a given grid, without checking its quality."""
-    lower_transfer = transfer_matrix(x, x_low).toarray()
-    upper_transfer = transfer_matrix(x, x_high).toarray()
+    lower_transfer = transfer_matrix(x, x_low)
+    upper_transfer = transfer_matrix(x, x_high)
     return lower_transfer @ low[0] @ lower_transfer.T + upper_transfer @ high[0] @ upper_transfer.T
 
 
@@ -102,7 +101,7 @@ def distorted_pair(poisson=0.0, stiff=100.0):
     """Return two distorted blocks of 12 and 9 columns, the upper one `stiff` times as stiff, and their compliances."""
     rng = np.random.default_rng(4)
     pair = [
-        substructure.Substructure(
+        elasticity.Piece(
             distorted_mesh(rng.uniform(0.5, 1.0, count), count), make_bare_layers((young, poisson))
         )
         for count, young in ((12, YOUNG), (9, stiff * YOUNG))
@@ -127,12 +126,11 @@ def test_exact_patch_test_with_distorted_blocks(stiff):
         assert np.abs(stress - [0, -LOAD / LENGTH, 0, 0]).max() <= 1e-11 * LOAD / LENGTH
 
 
-@pytest.mark.parametrize("side", ["both", "lower", "upper"])
-def test_exact_joined_compliance_equals_weighted_displacements(side):
+def test_exact_joined_compliance_equals_weighted_displacements():
     """The joined compliance equals the displacements of both bodies weighted by independent quadrature."""
     pair, (low, high) = distorted_pair(0.3, 2.0)
     bodies = PieceInterface(pair[0].mesh.x, low), PieceInterface(pair[1].mesh.x, high)
-    joined = mortar.join_on_grid(mortar.candidate_grids(*bodies), side, *bodies)
+    joined = mortar.join_pieces(*bodies)
     x = joined.x
     rng = np.random.default_rng(8)
     normal, shear = rng.normal(size=(2, x.size))
@@ -174,9 +172,9 @@ def test_exact_matching_nodes_add_compliances():
     for computed, reference in zip(
         (result.compliance.nn, result.compliance.tt, result.compliance.nt), expected
     ):
-        assert np.abs(computed - reference).max() <= 1e-14 * np.abs(reference).max()
+        assert np.abs(computed - reference).max() <= 1e-12 * np.abs(reference).max()
         assert not computed.flags.writeable
-    assert np.array_equal(result.x, x) and result.ripple == 0 and result.side == "lower"
+    assert np.array_equal(result.x, x)
     # a text file rounds the nodes
     rounded = mortar.join_pieces(PieceInterface(x, low), PieceInterface(x * (1 + 1e-12), high))
     assert (
@@ -222,31 +220,6 @@ def test_exact_hertz_pressure_on_nonmatching_meshes(fine, young_low, young_high)
         joined.x, joined.compliance.nn, young_low * YOUNG, young_high * YOUNG
     )
     assert ripple <= 4e-3 and peak <= 1e-3
-    assert joined.ripple <= 5e-3
-
-
-@pytest.mark.parametrize(
-    "fine, stiff, low, high",
-    [
-        (32, 1, 0.01, 0.05),
-        (64, 10, 0.2, 0.5),
-        (64, 100, 0.9, 4.0),
-    ],
-)
-def test_exact_unsuitable_side_ripples_and_is_rejected(fine, stiff, low, high):
-    """Pressure on the unsuitable side has the predicted ripple and is rejected; the chosen side is accurate."""
-    (x_low, soft), (x_high, hard) = hertz_block(16), hertz_block(fine, stiff * YOUNG)
-    measured = hertz_errors(
-        x_high, pair_compliance(soft, x_low, hard, x_high, x_high), YOUNG, stiff * YOUNG
-    )[0]
-    assert low <= measured <= high
-    pair = PieceInterface(x_low, soft), PieceInterface(x_high, hard)
-    refused = mortar.join_on_grid(mortar.candidate_grids(*pair), "upper", *pair)
-    assert refused.reason.startswith("with the pressure defined on the nodes of the upper piece")
-    assert 0.3 <= measured / refused.ripple <= 1.3
-    joined = mortar.join_pieces(*pair)
-    assert joined.side != "upper"
-    assert hertz_errors(joined.x, joined.compliance.nn, YOUNG, stiff * YOUNG)[0] <= 3e-3
 
 
 @pytest.mark.share(1)
@@ -262,7 +235,7 @@ def test_exact_grid_follows_coarser_side(stiff):
     low = block_compliance(x_low, 6e-3, YOUNG, growth=1.1)
     high = block_compliance(x_high, 6e-3, stiff * YOUNG, growth=1.1)
     joined = mortar.join_pieces(PieceInterface(x_low, low), PieceInterface(x_high, high))
-    assert joined.side == ("both" if stiff > 0.05 else "upper")
+    assert stiff > 0.05 or np.array_equal(joined.x, x_high)
     assert hertz_errors(joined.x, joined.compliance.nn, YOUNG, stiff * YOUNG)[0] <= 4e-3
     assert (
         hertz_errors(x_low, pair_compliance(low, x_low, high, x_high, x_low), YOUNG, stiff * YOUNG)[
@@ -270,92 +243,3 @@ def test_exact_grid_follows_coarser_side(stiff):
         ]
         >= 2e-2
     )
-
-
-@given(lower_sizes=cells, upper_sizes=cells, left=st.floats(-0.3, 0.3), right=st.floats(-0.3, 0.3))
-def test_always_overhanging_pieces_join_on_common_interval(lower_sizes, upper_sizes, left, right):
-    """Overhanging pieces are joined on their common interval, with transfer of forces and moments in balance."""
-    x_low = make_nodes(lower_sizes)
-    x_high = (
-        x_low[0]
-        + left * LENGTH
-        + (make_nodes(upper_sizes) - make_nodes(upper_sizes)[0]) * (1 + right - left)
-    )
-    start = max(x_low[0], x_high[0])
-    end = min(x_low[-1], x_high[-1])
-    for mesh_nodes in (x_low, x_high):
-        x = clip_nodes(mesh_nodes, start, end)
-        assert (x[0], x[-1]) == pytest.approx((start, end), abs=1e-9 * LENGTH) and np.all(
-            np.diff(x) > 0
-        )
-        assert np.diff(x).min() >= 0.49 * np.diff(mesh_nodes).min() or x.size == 2
-        for body in (x_low, x_high):
-            transfer = transfer_matrix(x, body)
-            assert np.abs(transfer.sum(axis=1) - 1).max() <= 1e-12
-            assert np.abs(transfer @ body - x).max() <= 1e-12 * LENGTH
-            # a uniform pressure on the common interval loads each node with the integral of its hat function
-            positions, weight = quadrature_rule(x, body)
-            expected = np.array(
-                [weight @ hat_function(body, j, positions) for j in range(body.size)]
-            )
-            assert np.abs(tributary_lengths(x) @ transfer - expected).max() <= 1e-12 * LENGTH
-
-
-def test_exact_patch_test_of_short_block_on_long_block():
-    """A uniform pressure of a short block on a long block has the exact nodal forces and moments (patch test)."""
-    x_low = make_nodes([1.0] * 23)
-    x_high = make_nodes([1.0] * 10, 0.6 * LENGTH) + 0.1 * LENGTH
-    joined = mortar.join_pieces(
-        PieceInterface(x_low, block_compliance(x_low, HEIGHT, YOUNG)),
-        PieceInterface(x_high, block_compliance(x_high, HEIGHT, YOUNG)),
-    )
-    assert (joined.x[0], joined.x[-1]) == pytest.approx((x_high[0], x_high[-1]))
-    assert joined.tributary_lengths.sum() == pytest.approx(0.6 * LENGTH, rel=1e-13)
-    low, high = joined.distribute_forces(joined.tributary_lengths)
-    assert high == pytest.approx(tributary_lengths(x_high), rel=1e-12)
-    assert np.all(low[x_low < x_high[0] - LENGTH / 23] == 0) and low.sum() == pytest.approx(
-        0.6 * LENGTH
-    )
-    assert low @ x_low == pytest.approx(high @ x_high, rel=1e-12)
-    assert np.linalg.eigvalsh(joined.compliance.nn).min() > 0
-
-
-def test_refuses_interfaces_that_cannot_be_joined():
-    """Interfaces that are reversed, incomplete, apart or with little overlap are refused with the reason."""
-    x = make_nodes([1.0] * 8)
-    other_nodes = make_nodes([1.0] * 5)
-    low = block_compliance(x, HEIGHT, YOUNG)
-    high = block_compliance(other_nodes, HEIGHT, YOUNG)
-    for bodies, message in (
-        (
-            (PieceInterface(x[::-1], low), PieceInterface(other_nodes, high)),
-            "the lower interface needs at least three nodes",
-        ),
-        (
-            (PieceInterface(x, low), PieceInterface(other_nodes, low)),
-            "the upper interface needs .* compliance",
-        ),
-        (
-            (PieceInterface(x, low), PieceInterface(other_nodes + LENGTH, high)),
-            "do not face one another: the lower interface",
-        ),
-        (
-            (PieceInterface(x, low), PieceInterface(other_nodes + 0.99 * LENGTH, high)),
-            "share 0.000127 m of the interface",
-        ),
-    ):
-        with pytest.raises(PatchfemError, match=r"contact\.mesh: .*" + message):
-            mortar.join_pieces(*bodies)
-
-
-def test_refuses_meshes_with_unavoidable_ripples():
-    """Meshes on which every choice of the pressure grid causes ripples are refused with advice."""
-    rng = np.random.default_rng(2)
-    x, other_nodes = (make_nodes(50.0 ** -rng.uniform(0, 1, n_elements)) for n_elements in (40, 30))
-    with pytest.raises(
-        PatchfemError, match=r"pressure ripples of \d+ % are .* cells of similar size that grow"
-    ):
-        mortar.join_pieces(
-            PieceInterface(x, block_compliance(x, HEIGHT, YOUNG)),
-            PieceInterface(other_nodes, block_compliance(other_nodes, HEIGHT, YOUNG)),
-        )

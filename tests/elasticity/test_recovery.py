@@ -22,11 +22,10 @@ from patchfem.elasticity import (
     get_cells,
     lame,
     make_points,
-    substructure,
 )
 from patchfem.elasticity.elasticity import hooke
 from patchfem.mesh import TensorGrid, graded_grid
-from patchfem.mesh.tensor import graded_rows
+from patchfem.mesh.grid import graded_rows
 
 HALF_WIDTH, LOAD = 0.1e-3, 9107.0
 P0 = 2 * LOAD / (np.pi * HALF_WIDTH)
@@ -36,12 +35,7 @@ SMALL = graded_grid(2e-3, 1e-3, 2e-4, COATING)
 
 def mesh_cells(mesh, layers=COATED) -> Cells:
     """Return the cells of a mesh."""
-    return Cells(
-        mesh.points,
-        tuple(b for b in (mesh.triangles, mesh.quads) if len(b)),
-        mesh.is_coating,
-        layers,
-    )
+    return Cells(mesh.points, mesh.blocks, mesh.is_coating, layers)
 
 
 def grid_piece(grid, layers=COATED):
@@ -82,8 +76,9 @@ def test_exact_linear_stress_is_recovered_at_each_node(mesh_index, seed):
         np.abs(recovered - field(cells.points[recovery.node], recovery.is_coating)).max()
         <= 1e-12 * np.abs(slopes[:, 0]).max() + 1e-12 * np.abs(slopes[:, 1:]).max() * 1e-3
     )
-    coating_nodes = np.unique(cells.corners()[cells.is_coating[cells.cell_of_corner()]])
-    substrate_nodes = np.unique(cells.corners()[~cells.is_coating[cells.cell_of_corner()]])
+    corners = np.concatenate([block.ravel() for block in cells.blocks])
+    is_coating = cells.is_coating[cells.cell_of_corner()]
+    coating_nodes, substrate_nodes = np.unique(corners[is_coating]), np.unique(corners[~is_coating])
     assert (
         recovery.node.size
         == len(cells.points) + np.intersect1d(coating_nodes, substrate_nodes).size
@@ -129,7 +124,7 @@ def test_exact_quadratic_displacement_has_exact_error_estimate(seed, plane):
         layers,
     )
     assert (
-        np.abs(recovery(stress)[0] - expected_stress).max() <= 1e-11 * np.abs(expected_stress).max()
+        np.abs(recovery(stress[0]) - expected_stress).max() <= 1e-11 * np.abs(expected_stress).max()
     )
     corner = cells.points[cells.blocks[0]]
     widths = corner[:, 1, 0] - corner[:, 0, 0]
@@ -158,14 +153,14 @@ def test_exact_strain_energy_equals_work_and_errors_add_up(split):
         face = np.arange(SMALL.x.size) * SMALL.depth.size
     else:
         mesh = mesh_of_grid(SMALL, split, seed=2)
-        piece = substructure.Substructure(mesh, COATED)
+        piece = elasticity.Piece(mesh, COATED)
         face = mesh.interface
     u = elasticity.compute_displacement(piece, *force)
     cells = get_cells(piece)
     rules = make_points(cells, "gauss")
     recovery = estimate_error(fit_recovery(cells), u, centre_stress(cells, u), rules)
     work = (force.transpose(1, 2, 0) * u[:, face]).sum(axis=(1, 2))
-    area = sum(rule.weight.sum() for rule in rules)
+    area = sum(rule.weights.sum() for rule in rules)
     assert area == pytest.approx(2e-3 * 1e-3, rel=1e-12)
     assert recovery.energy == pytest.approx(work, rel=1e-9)
     element_errors, total_error = recovery.relative_error(recovery)
@@ -255,7 +250,7 @@ def test_exact_coating_traction_balances_load_and_moment(mesh_kind, seed, plane)
             if mesh_kind == "mixed"
             else triangulate_graded_rows(1e-3, 1e-3, lambda x, y: 8e-5 + 0.1 * y + 0 * x, COATING)
         )
-        piece = substructure.Substructure(mesh, layers)
+        piece = elasticity.Piece(mesh, layers)
         x = mesh.x
     shear, normal = np.random.default_rng(seed).normal(size=(2, 2, x.size))
     cells = get_cells(piece)
@@ -288,7 +283,7 @@ def test_exact_traction_on_inclined_coating_under_uniform_stress(seed, slope):
     """Under uniform stress the traction on an inclined coating interface equals sigma n at every inner node."""
     mesh = mesh_of_grid(SMALL, 0.5, seed=2)
     points = mesh.points + np.outer(slope * mesh.points[:, 0], [0.0, 1.0])
-    cells = Cells(points, (mesh.triangles, mesh.quads), mesh.is_coating, make_bare_layers(TITANIUM))
+    cells = Cells(points, mesh.blocks, mesh.is_coating, make_bare_layers(TITANIUM))
     strain = np.random.default_rng(seed).normal(size=(2, 2))
     computed = compute_coating_traction(cells, (points @ strain.T)[None])
     (exx, exy), (eyx, eyy) = strain
@@ -320,9 +315,9 @@ def test_exact_error_estimate_agrees_with_refined_energy(split):
     force[:-1] += step * (2 * pressure[:-1] + pressure[1:]) / 6
     force[1:] += step * (2 * pressure[1:] + pressure[:-1]) / 6
     hats = np.array([np.interp(finest.x, mesh.x, unit) for unit in np.eye(mesh.x.size)])
-    fine = substructure.Substructure(finest, COATED)
+    fine = elasticity.Piece(finest, COATED)
     energy = force @ elasticity.compute_displacement(fine, 0 * force, force)[0, finest.interface, 1]
-    piece = substructure.Substructure(mesh, COATED)
+    piece = elasticity.Piece(mesh, COATED)
     load = hats @ force
     u = elasticity.compute_displacement(piece, 0 * load, load)
     expected = (energy - load @ u[0, mesh.interface, 1]) * 16 / 15

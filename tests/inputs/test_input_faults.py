@@ -7,14 +7,16 @@ from patchfem.inputs import matrices, parse_requests, read_records, read_slide
 from patchfem.inputs.records import MAX_BYTES
 
 
-def test_exact_path_file_with_lateral_column_in_metres(tmp_path):
-    """A path file with a lateral column is converted to seconds and metres."""
+def test_exact_path_file_is_read_in_seconds_and_metres(tmp_path):
+    """A path file is converted to seconds and metres; one with a second direction is refused."""
     path = tmp_path / "path.csv"
-    path.write_text("lateral [um],time [ms],displacement [mm]\n0,0,0\n4,500,0.25\n-2,1500,-0.5\n")
-    time, longitudinal, lateral = read_slide(path)
+    path.write_text("time [ms],displacement [mm]\n0,0\n500,0.25\n1500,-0.5\n")
+    time, displacement = read_slide(path)
     assert time == pytest.approx([0, 0.5, 1.5], rel=1e-15)
-    assert longitudinal == pytest.approx([0, 2.5e-4, -5e-4], rel=1e-15)
-    assert lateral == pytest.approx([0, 4e-6, -2e-6], rel=1e-15)
+    assert displacement == pytest.approx([0, 2.5e-4, -5e-4], rel=1e-15)
+    path.write_text("lateral [um],time [ms],displacement [mm]\n0,0,0\n4,500,0.25\n")
+    with pytest.raises(PatchfemError, match=r"two directions was removed in patchfem 2\.0"):
+        read_slide(path)
 
 
 def test_refuses_oversized_matlab_file_before_reading(tmp_path):

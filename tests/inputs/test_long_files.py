@@ -1,4 +1,4 @@
-"""Long files, and files that unpack to much more than their size, are read in blocks or refused by their headers."""
+"""Long files are read exactly; files that are too large, or unpack to much more than their size, are refused."""
 
 import tracemalloc
 import zipfile
@@ -44,25 +44,17 @@ def measure_peak_memory(call) -> tuple:
 
 
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
-def test_exact_reading_in_blocks_preserves_numbers(write_table, end):
-    """A file of several blocks, whose limits may lie inside a number or a line end, gives every number exactly."""
+def test_exact_numbers_of_long_table(write_table, end):
+    """Every number of a long file is read exactly, with any line end, blanks and blank lines at the end."""
     rng = np.random.default_rng(3)
     count = 20_000
     values = rng.standard_normal(count) * 10.0 ** rng.integers(-9, 9, count)
     rows = np.column_stack([np.arange(float(count)), values])
     path = write_table([f" {a!r},\t{b!r} " for a, b in rows.tolist()] + ["", "  ", ""], end=end)
-    assert path.stat().st_size > 4 * cells.BLOCK_BYTES
     columns = read_path_table(path)
     assert columns.rows == count
     assert columns.values["time"].tolist() == [a * 1e-3 for a in rows[:, 0]]
     assert columns.values["displacement"].tolist() == [b * 1e-6 for b in rows[:, 1]]
-
-
-def test_exact_line_longer_than_two_blocks(write_table):
-    """A line that is longer than two blocks is read as one line."""
-    blanks = " " * (3 * cells.BLOCK_BYTES)
-    columns = read_path_table(write_table(["0,1", f"1,{blanks}2", "2,3"]))
-    assert columns.values["displacement"].tolist() == [1e-6, 2e-6, 3e-6]
 
 
 @pytest.mark.parametrize("n_rows", [20, 40_000])
@@ -86,14 +78,6 @@ def test_refuses_invalid_cell_with_line_number(write_table, n_rows, cell, messag
     assert sentence.partition("a.csv:")[2].startswith(f"{n_rows + 2}: ") and message in sentence
 
 
-def test_always_long_table_needs_little_memory(write_table):
-    """Reading a long table needs little more memory than its numbers."""
-    path = write_table([f"{k}.000,{k % 100}e-3" for k in range(30_000)])
-    columns, peak = measure_peak_memory(lambda: read_path_table(path))
-    # the numbers take 0.5 MB; reading the whole file at once would take 67 MB
-    assert columns.rows == 30_000 and peak < 4e6
-
-
 def write_oversized_archive(path, shape):
     """Write an archive whose array unpacks to much more than its file and return its path."""
     with (
@@ -115,17 +99,6 @@ def test_refuses_oversized_array_before_unpacking(tmp_path, shape):
     )
     assert f"K of shape {shape[0]}x{shape[1]} is larger than 2000 coordinates" in error_message
     assert peak < 2e6
-
-
-def test_refuses_oversized_matlab_matrix_before_unpacking(tmp_path):
-    """An oversized MATLAB matrix is refused by its header, before it is unpacked."""
-    import scipy.io
-
-    scipy.io.savemat(
-        tmp_path / "a.mat", {"K": np.ones((2001, 2000), np.uint8)}, do_compression=True
-    )
-    error_message, peak = measure_peak_memory(lambda: arrays.read_arrays(tmp_path / "a.mat"))
-    assert "K of shape 2001x2000" in error_message and peak < 1e6
 
 
 def test_refuses_empty_matrices():
@@ -159,7 +132,7 @@ def test_exact_array_file_round_trip(tmp_path):
         ("a.csv", measured.read_table, "more than 64 MiB of text"),
         ("a.msh", meshes.read_pieces, "more than 256 MiB"),
         ("a.uff", universal.read_universal, "more than 256 MiB"),
-        ("a.mat", arrays.read_arrays, "is damaged or of version 4"),
+        ("a.mat", arrays.read_arrays, "more than 512 MiB"),
         ("a.csv", read_path_table, "more than 64 MiB of text"),
     ],
 )

@@ -1,87 +1,206 @@
-"""The reader of MATLAB files: arrays written by SciPy, and damaged files, some of which make SciPy's reader crash."""
+"""MATLAB files: arrays, texts and fields of structures, from files that MATLAB, SciPy or h5py wrote."""
 
 import io
+from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
-from scipy.io import loadmat, savemat
-from scipy.sparse import random as scattered
+import scipy
+from scipy import sparse
+from scipy.io import savemat
 
 from patchfem.core import PatchfemError
-from patchfem.inputs import read_variables
+from patchfem.inputs import parse_requests, read_real_arrays, read_records, read_variables
+from patchfem.structure import arrays
 
-SPARSE_MATRIX = scattered(7, 5, 0.4, "csc", random_state=3)
-TEXTS = np.array(["axial", "yaw", "é"], dtype=object)
-ARRAYS = {
-    "full": np.random.default_rng(1).normal(size=(4, 3)), "scalar": 2.0, "counts": np.arange(6, dtype="u1")[None],
-    "small": np.array([[1.5, -2.5]], "f4"), "scattered": SPARSE_MATRIX, "none": np.zeros((0, 3)), "cells": TEXTS,
-    "letters": np.array(["ab", "cde"]), "cube": np.arange(24.0).reshape(2, 3, 4), "waves": np.ones(3) * 1j,
-    "pair": {"x": 1.0}, "big": np.tile(np.arange(40.0), (300, 1)),
-}  # fmt: skip
+SCIPY_TEST_FILES = Path(scipy.__file__).parent / "io/matlab/tests/data"  # written by MATLAB itself
+TIME = np.linspace(0, 0.1, 51)
+FORCE = np.random.default_rng(2).normal(size=51)
+RUN = {
+    "load": {"F": FORCE[:, None], "all": np.column_stack([TIME, FORCE, -FORCE])},
+    "t": TIME[None],
+    "by": "bench 3",
+}
 
 
-def matlab5_bytes(packed: bool, names=tuple(ARRAYS)) -> bytes:
-    """Return the arrays as the content of a MATLAB file of version 5."""
+def add_matlab_value(group, name: str, value) -> None:
+    """Add a value to an HDF5 group as MATLAB 7.3 stores it."""
+    if isinstance(value, dict):
+        inner = group.create_group(name)
+        inner.attrs["MATLAB_class"] = np.bytes_("struct")
+        for key, item in value.items():
+            add_matlab_value(inner, key, item)
+        return
+    kind, value = (
+        ("char", np.array([list(map(ord, value))], "u2"))
+        if isinstance(value, str)
+        else ("double", np.asarray(value))
+    )
+    item = group.create_dataset(name, data=value.T)
+    item.attrs["MATLAB_class"] = np.bytes_(kind)
+
+
+def matlab73_bytes(values: dict, add_items=None) -> bytes:
+    """Return values as the content of a MATLAB file of version 7.3: HDF5 after a block of 512 bytes."""
+    buffer = io.BytesIO()
+    with h5py.File(buffer, "w", userblock_size=512) as file:
+        for name, value in values.items():
+            add_matlab_value(file, name, value)
+        if add_items is not None:
+            add_items(file)
+    return (
+        b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\0\2IM" + buffer.getvalue()[128:]
+    )
+
+
+def matlab5_bytes(values: dict, packed: bool = True) -> bytes:
+    """Return values as the content of a MATLAB file that SciPy writes."""
     out = io.BytesIO()
-    savemat(out, {name: ARRAYS[name] for name in names}, do_compression=packed)
+    savemat(out, values, do_compression=packed)
     return out.getvalue()
 
 
+ARRAYS = {
+    "full": np.random.default_rng(1).normal(size=(4, 3)), "counts": np.arange(6, dtype="u1")[None],
+    "small": np.array([[1.5, -2.5]], "f4"), "scattered": sparse.random(7, 5, 0.4, "csc", random_state=3),
+    "none": np.zeros((0, 3)), "cube": np.arange(24.0).reshape(2, 3, 4), "waves": np.ones((1, 3)) * 1j,
+}  # fmt: skip
+
+
 @pytest.mark.parametrize("packed", [False, True])
-def test_exact_matlab_arrays_equal_scipy_arrays(packed):
-    """Every array of a MATLAB file equals the array that SciPy reads."""
-    data = matlab5_bytes(packed)
-    variables = read_variables("a.mat", data)
-    by_scipy = loadmat(io.BytesIO(data))
-    assert {name: variable.kind for name, variable in variables.items()} == {
-        "full": "number",
-        "scalar": "number",
-        "counts": "number",
-        "small": "number",
-        "scattered": "sparse",
-        "none": "number",
-        "cells": "text",
-        "letters": "text",
-        "cube": "number",
-        "pair.x": "number",
-        "big": "number",
-    }
-    for name, variable in variables.items():
-        if variable.kind != "text":
-            expected = (
-                by_scipy[name].toarray()
-                if variable.kind == "sparse"
-                else by_scipy["pair"]["x"][0, 0]
-                if "." in name
-                else by_scipy[name]
-            )
-            assert variable.shape == expected.shape and np.array_equal(
-                variable.values(), expected.astype(float)
-            ), name
-    assert variables["cells"].values().tolist() == ["axial", "yaw", "é"]
-    assert variables["letters"].values().tolist() == ["ab", "cde"]
+def test_exact_arrays_and_texts(packed):
+    """Arrays of numbers, of any type and form, and texts are read with their values."""
+    texts = {"cells": np.array(["axial", "yaw", "é"], dtype=object), "letters": ["ab", "cde"]}
+    variables = read_variables("a.mat", matlab5_bytes(ARRAYS | texts, packed))
+    assert variables.keys() == ARRAYS.keys() | texts.keys()
+    for name, expected in ARRAYS.items():
+        assert (
+            abs(variables[name] - expected).sum() == 0 and variables[name].shape == expected.shape
+        )
+    assert variables["cells"].tolist() == ["axial", "yaw", "é"]
+    assert variables["letters"].tolist() == ["ab", "cde"]
+    assert "waves" not in read_real_arrays("a.mat", matlab5_bytes(ARRAYS, packed))
+
+
+@pytest.mark.skipif(not SCIPY_TEST_FILES.is_dir(), reason="SciPy was installed without its tests")
+def test_exact_files_written_by_matlab():
+    """Arrays and structures of files that MATLAB wrote are read exactly."""
+    read = lambda name: read_variables(name, (SCIPY_TEST_FILES / name).read_bytes())  # noqa: E731
+    assert np.array_equal(
+        read("testhdf5_7.4_GLNX86.mat")["testdouble"], np.arange(9)[None] * np.pi / 4
+    )
+    for version in ("6.1_SOL2", "6.5.1_GLNX86", "7.1_GLNX86", "7.4_GLNX86"):
+        variables = read(f"teststruct_{version}.mat")
+        assert np.allclose(variables["teststruct.doublefield"], [[2**0.5, np.e, np.pi]], rtol=1e-15)
+        assert variables["teststruct.stringfield"].tolist() == ["Rats live on no evil star."]
+        assert list(read(f"teststructnest_{version}.mat")) == [
+            "teststructnest.one",
+            "teststructnest.two.three",
+        ]
+        assert read(f"teststructarr_{version}.mat") == {}  # arrays of structures are not read
 
 
 @pytest.mark.parametrize(
-    "data, message",
+    "data",
     [
-        (b"", "damaged or of version 4"),
-        (b"MATLAB 5.0 MAT-file" + bytes(200), "damaged or of version 4"),
-        (b"MATLAB 7.3 MAT-file" + bytes(200), r"version 7\.3 is damaged"),
-        (matlab5_bytes(False)[:-4], "cut off or damaged"),
+        matlab73_bytes({"run": RUN, "g": 9.81}),
+        matlab5_bytes({"run": RUN, "g": 9.81}),
+        matlab5_bytes({"run": RUN, "g": 9.81}, False),
+    ],
+    ids=["7.3", "7", "6"],
+)
+def test_exact_structure_fields_are_named_and_mapped(data, tmp_path):
+    """Fields of structures have dotted names, which can be assigned to quantities."""
+    variables = read_variables("a.mat", data)
+    assert {name: variable.shape for name, variable in variables.items()} == {
+        "run.load.F": (51, 1),
+        "run.load.all": (51, 3),
+        "run.t": (1, 51),
+        "run.by": (1,),
+        "g": (1, 1),
+    }
+    assert np.array_equal(variables["run.load.all"], RUN["load"]["all"]) and variables["g"] == [
+        [9.81]
+    ]
+    assert variables["run.by"].tolist() == ["bench 3"]
+    (tmp_path / "a.mat").write_bytes(data)
+    for force in ("run.load.F", "run.load.all(:,2)"):
+        records = read_records(
+            tmp_path / "a.mat", parse_requests(["time=run.t [s]", f"force={force} [kN]"])
+        ).values
+        assert np.array_equal(records["time"], TIME) and np.array_equal(
+            records["force"], 1e3 * FORCE
+        )
+    with pytest.raises(
+        PatchfemError, match=r"no variable 'run.F'; the file contains .*run\.load\.F 51x1"
+    ):
+        read_records(tmp_path / "a.mat", parse_requests(["time=run.t [s]", "force=run.F [N]"]))
+
+
+def test_exact_matlab_73_structure_equals_version_7(tmp_path):
+    """A structure from a file of version 7.3 with texts and a sparse matrix equals that from version 7."""
+    matrices_of_rig = {"M": np.diag([1.0, 2.0]), "C": np.zeros((2, 2)), "slide": [[1.0, 0.0]]}
+    stiffness = np.array([[3e6, -1e6], [-1e6, 1e6]])
+    names = ("tip", "base é")
+
+    def add_items(file):
+        group = file.create_group("K")
+        group.attrs.update(MATLAB_class=np.bytes_("double"), MATLAB_sparse=np.uint64(2))
+        for name, values in (
+            ("data", stiffness.T.ravel()),
+            ("ir", np.array([0, 1, 0, 1], "u8")),
+            ("jc", np.array([0, 2, 4], "u8")),
+        ):
+            group[name] = values
+        add_matlab_value(file, "#refs#/a", names[0])
+        add_matlab_value(file, "#refs#/b", names[1])
+        cells = file.create_dataset("names", (2, 1), h5py.ref_dtype)
+        cells[0, 0] = file["#refs#/a"].ref
+        cells[1, 0] = file["#refs#/b"].ref
+        cells.attrs["MATLAB_class"] = np.bytes_("cell")
+
+    (tmp_path / "new.mat").write_bytes(matlab73_bytes(matrices_of_rig, add_items))
+    savemat(
+        tmp_path / "old.mat",
+        matrices_of_rig | {"K": stiffness, "names": np.array(names, dtype=object)},
+    )
+    basis_73, basis_7 = (
+        arrays.build_basis(arrays.read_arrays(tmp_path / f"{name}.mat")) for name in ("new", "old")
+    )
+    assert basis_73.names == basis_7.names
+    assert np.array_equal(basis_73.omega, basis_7.omega)
+    assert np.array_equal(basis_73.slide, basis_7.slide)
+
+
+def test_always_links_and_empty_items_are_ignored(tmp_path):
+    """Links, cycles and empty items of a file of version 7.3 are ignored."""
+    (tmp_path / "secret.h5").write_bytes(matlab73_bytes({"x": 1.0}))
+
+    def add_items(file):
+        file["out"] = h5py.ExternalLink(str(tmp_path / "secret.h5"), "/x")
+        file["ring"] = file["/"]
+        file["void"] = h5py.Empty("f8")
+        file.create_dataset("none", data=np.array([0, 3], "u8")).attrs.update(
+            MATLAB_class=np.bytes_("double"), MATLAB_empty=np.uint8(1)
+        )
+
+    variables = read_variables("a.mat", matlab73_bytes({"x": 2.0}, add_items))
+    shapes = {name: variable.shape for name, variable in variables.items()}
+    assert shapes == {"x": (1, 1), "none": (0, 3)}
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        b"",
+        b"MATLAB 5.0 MAT-file" + bytes(200),
+        b"MATLAB 7.3 MAT-file" + bytes(200),
+        matlab5_bytes({"x": 1.0}, False)[:-4],
+        matlab73_bytes({"x": 1.0})[:900],
     ],
 )
-def test_refuses_invalid_matlab_files(data, message):
-    """Files that are empty, truncated or not MATLAB files are refused."""
-    with pytest.raises(PatchfemError, match=message):
+def test_refuses_invalid_matlab_file(data):
+    """Files that are empty, cut off or not MATLAB files are refused."""
+    with pytest.raises(PatchfemError, match=r"^a\.mat: no readable MATLAB file"):
         read_variables("a.mat", data)
-
-
-def test_refuses_extreme_compression_ratio():
-    """A variable that unpacks to more than 200 times its packed size is refused."""
-    out = io.BytesIO()
-    savemat(out, {"zeros": np.zeros((1500, 1500))}, do_compression=True)
-    with pytest.raises(
-        PatchfemError, match="unpacks to more than 200 times its packed size; save it with"
-    ):
-        read_variables("a.mat", out.getvalue())["zeros"].values()

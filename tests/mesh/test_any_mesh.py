@@ -47,8 +47,9 @@ def test_exact_all_formats_give_same_pair(form, kind, tmp_path):
             len(piece.points) == GRID.x.size * GRID.depth.size and not piece.points.flags.writeable
         )
         split = {"quads": 0, "triangles": 1, "mixed": 0.5}[kind]
-        assert (len(piece.triangles), len(piece.quads)) == pytest.approx(
-            np.array([2 * split, 1 - split]) * GRID.is_coating_cell().size, abs=1
+        counts = [len(piece.blocks.get(kind, ())) for kind in ("triangle", "quad")]
+        assert counts == pytest.approx(
+            np.array([2 * split, 1 - split]) * GRID.is_coating.size, abs=1
         )
 
 
@@ -79,8 +80,11 @@ def test_exact_mesh_pair_round_trip(kind, name, tmp_path):
     write_mesh(pair.lower, tmp_path / name, pair.upper)
     read_pair = read_pieces(tmp_path / name)
     for piece, expected in ((read_pair.lower, pair.lower), (read_pair.upper, pair.upper)):
-        for part in ("points", "triangles", "quads", "is_coating", "interface", "far"):
+        for part in ("points", "is_coating", "interface", "far"):
             assert np.array_equal(getattr(piece, part), getattr(expected, part)), part
+        assert piece.blocks.keys() == expected.blocks.keys()
+        for kind, cells in expected.blocks.items():
+            assert np.array_equal(piece.blocks[kind], cells)
 
 
 @given(
@@ -308,7 +312,7 @@ def test_refuses_parts_joined_at_single_node(tmp_path):
 
 
 def test_refuses_curved_elements_nonplanar_meshes_and_unknown_tags(tmp_path):
-    """Quadratic elements, meshes that are not plane and unknown tags are refused."""
+    """Elements of other orders, meshes that are not plane and unknown tags are refused."""
     pair = make_pair("quads")
     path = tmp_path / "pair.vtu"
     mesh = meshio.Mesh(
@@ -327,9 +331,12 @@ def test_refuses_curved_elements_nonplanar_meshes_and_unknown_tags(tmp_path):
         read_pieces(path)
     meshio.write(
         path,
-        meshio.Mesh(pair.points @ np.eye(2, 3), [("triangle6", pair.quads[:, [0, 1, 2, 3, 0, 1]])]),
+        meshio.Mesh(
+            pair.points @ np.eye(2, 3),
+            [("tetra", pair.quads)],
+        ),
     )
-    with pytest.raises(PatchfemError, match="triangle6 cells; only linear"):
+    with pytest.raises(PatchfemError, match="tetra cells; only plane"):
         read_pieces(path)
     path = tmp_path / "pair.inp"
     write_inp(pair, path)
@@ -342,7 +349,7 @@ def test_refuses_curved_elements_nonplanar_meshes_and_unknown_tags(tmp_path):
     "text, message",
     [
         ("*NODE\n1,0,0\n1,1,0\n*NODE\n1,2,2\n", "given twice"),
-        ("*NODE\n1,0,0\n*ELEMENT,TYPE=C3D8\n1,1,1,1,1,1,1,1,1\n", "C3D8 elements; only linear"),
+        ("*NODE\n1,0,0\n*ELEMENT,TYPE=C3D8\n1,1,1,1,1,1,1,1,1\n", "C3D8 elements; only plane"),
         ("*NODE\n1,0,0\n*ELEMENT,TYPE=CPE3\n1,1,1\n", "do not all have 3 nodes"),
         ("*NODE\n1,0,0\n*NSET,NSET=upper_far,GENERATE\n1,2000000000,1\n", "longer than the deck"),
         ("*NODE\n1,0,0\n*NSET,NSET=upper_far\nnobody\n", "unknown set nobody"),

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from patchfem.mesh import SHARP_END, End, graded_grid, shaped_grid
+from patchfem.elasticity.elasticity import evaluate_cells
+from patchfem.mesh import ELEMENTS, SHARP_END, End, graded_grid
 from patchfem.mesh.ends import MAX_INTERFACE_SLOPE
-from patchfem.mesh.pairs import convert_to_piece_mesh
 
 LENGTH, HEIGHT, COATING = 10e-3, 4e-3, 0.2e-3
 ENDS = {"sharp": SHARP_END, "chamfer": End("chamfer", 0.7e-3), "radius": End("radius", 1.1e-3)}
@@ -17,13 +17,18 @@ ENDS = {"sharp": SHARP_END, "chamfer": End("chamfer", 0.7e-3), "radius": End("ra
 
 def make_shaped_piece(end, overhang=0.0, element_size=0.31e-3, coating=COATING):
     """Return a piece of the given length whose grid is `overhang` than its contact face at either end."""
-    return shaped_grid(
-        graded_grid(
-            2 * (end.half_contact_length(LENGTH) - overhang), HEIGHT, element_size, coating
-        ),
-        LENGTH,
-        end,
-    )
+    half_length = end.half_contact_length(LENGTH) - overhang
+    return graded_grid(2 * half_length, HEIGHT, element_size, coating).extend(LENGTH, end)
+
+
+def compute_areas(body):
+    """Return the areas of the elements by Gauss integration; all integration points have a positive area."""
+    quad = ELEMENTS["quad"]
+    weights = evaluate_cells(
+        body.points, body.blocks["quad"], quad, quad.gauss, quad.weights
+    ).weights
+    assert weights.min() > 0
+    return weights.sum(axis=1)
 
 
 def test_exact_rounded_end_is_circle_then_tangent():
@@ -69,41 +74,34 @@ def test_exact_elements_fill_outline_with_uniform_coating(kind, overhang):
     x = np.unique(body.points[:, 0])
     depth = ENDS[kind].face_depth(x, LENGTH)
     removed_area = ((depth[1:] + depth[:-1]) / 2 * np.diff(x)).sum()
-    assert body.areas().min() > 0
-    assert body.areas().sum() == pytest.approx(LENGTH * HEIGHT - removed_area, rel=1e-12)
-    assert body.areas()[body.is_coating].sum() == pytest.approx(LENGTH * COATING, rel=1e-12)
+    assert compute_areas(body).sum() == pytest.approx(LENGTH * HEIGHT - removed_area, rel=1e-12)
+    assert compute_areas(body)[body.is_coating].sum() == pytest.approx(LENGTH * COATING, rel=1e-12)
     assert body.coating_thickness == pytest.approx(COATING, rel=1e-12) and body.height == HEIGHT
     if kind == "chamfer":
         assert removed_area == pytest.approx(ENDS[kind].size ** 2, rel=1e-12)
 
 
-def test_exact_sharp_piece_without_overhang_equals_grid():
-    """A sharp piece without overhang equals the mesh of its tensor grid."""
+def test_exact_sharp_piece_without_overhang_is_rectangle():
+    """A sharp piece without overhang is the grid of a rectangle."""
     grid = graded_grid(LENGTH, HEIGHT, 0.31e-3, COATING)
-    body = shaped_grid(grid, LENGTH, SHARP_END)
-    expected = convert_to_piece_mesh(grid)
-    for name in ("points", "quads", "is_coating", "interface", "far"):
-        assert np.array_equal(getattr(body, name), getattr(expected, name)), name
-    assert body.base_grid is grid and expected.base_grid is None
+    body = grid.extend(LENGTH, SHARP_END)
+    assert body.is_rectangle and np.array_equal(body.points, grid.points)
+    assert np.array_equal(body.points[body.interface, 0], grid.x)
 
 
 @pytest.mark.parametrize("kind", ENDS)
 def test_exact_refinement_and_coarsening_preserve_outline(kind):
     """Refinement and coarsening preserve the outline and the interface nodes of the inner grid."""
     body = make_shaped_piece(ENDS[kind], 1.9e-3, 0.3e-3)
-    for changed, inner in (
-        (body.refine(), body.inner.refine()),
-        (body.coarsen(), body.inner.coarsen()),
-    ):
-        assert np.array_equal(changed.x, inner.x) and np.array_equal(
-            changed.inner.depth, inner.depth
+    for changed in (body.refine(), body.coarsen()):
+        assert changed.points[changed.interface] == pytest.approx(
+            np.stack([changed.x, ENDS[kind].face_depth(changed.x, LENGTH)], axis=1), abs=1e-15
         )
-        assert np.abs(changed.points).max() == np.abs(body.points).max()
-        assert changed.areas().min() > 0
+        assert np.abs(changed.points).max() == pytest.approx(np.abs(body.points).max(), rel=1e-14)
+        assert compute_areas(changed).min() > 0
     restored = body.refine().coarsen()
-    assert np.array_equal(restored.points, body.points) and np.array_equal(
-        restored.quads, body.quads
-    )
+    assert restored.points == pytest.approx(body.points, abs=1e-15)
+    assert np.array_equal(restored.blocks["quad"], body.blocks["quad"])
 
 
 @given(
@@ -116,20 +114,15 @@ def test_always_elements_are_convex_and_columns_grow_slowly(size, shorter, cell,
     """All elements are convex, and columns outside the interface grow by at most 11 %."""
     end = End(kind, size * min(LENGTH / 2, HEIGHT - COATING))
     half = end.half_contact_length(LENGTH) * (1 - shorter)
-    body = shaped_grid(
-        graded_grid(2 * half, HEIGHT, max(2 * half * cell, LENGTH / 60), COATING)
-        if half > LENGTH / 120
-        else graded_grid(2 * half, HEIGHT, half, COATING),
-        LENGTH,
-        end,
-    )
-    corner = body.points[body.quads]
+    size = max(2 * half * cell, LENGTH / 60) if half > LENGTH / 120 else half
+    body = graded_grid(2 * half, HEIGHT, size, COATING).extend(LENGTH, end)
+    corner = body.points[body.blocks["quad"]]
     side = np.roll(corner, -1, axis=1) - corner
     cross_products = (
         side[..., 0] * np.roll(side, -1, axis=1)[..., 1]
         - side[..., 1] * np.roll(side, -1, axis=1)[..., 0]
     )
     assert cross_products.min() > 0
-    widths = np.diff(np.concatenate([body.inner.x[-2:], body.inner.x[-1] + body.outer[1:]]))
+    widths = np.diff(np.concatenate([body.x[-2:], body.x[-1] + body.outer[1:]]))
     assert (widths[1:] <= 1.11 * np.maximum.accumulate(widths[:-1])).all()
-    assert np.abs(body.points[:, 0]).max() == LENGTH / 2
+    assert np.abs(body.points[:, 0]).max() == pytest.approx(LENGTH / 2, rel=1e-14)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from patchfem.core import PatchfemError
 from patchfem.mesh import ROW_SLOPE, graded_grid, row_scale
-from patchfem.mesh.tensor import MIN_ROWS
+from patchfem.mesh.grid import MIN_ROWS
 
 
 @st.composite
@@ -42,8 +42,8 @@ def test_always_grid_has_given_dimensions_and_coating_rows(piece):
     for layer in (rows[: grid.coating_rows], rows[grid.coating_rows :]):
         ratio = layer[1:] / layer[:-1]
         assert np.all(ratio <= growth) and np.all(ratio >= 1 / growth)
-    assert grid.is_coating_cell().shape == (grid.x.size - 1, rows.size)
-    assert np.all(grid.is_coating_cell() @ rows == pytest.approx(coating, rel=1e-12))
+    is_coating = grid.is_coating.reshape(grid.x.size - 1, rows.size)
+    assert np.all(is_coating @ rows == pytest.approx(coating, rel=1e-12))
 
 
 @pytest.mark.parametrize("coating", [0.0, 0.152e-3, 1.5e-3])

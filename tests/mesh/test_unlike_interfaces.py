@@ -9,9 +9,7 @@ import pytest
 from any_mesh_cases import (
     FORMATS,
     GRID,
-    find_interface_node,
     make_pair,
-    shift_points,
     write_and_read_pair,
 )
 
@@ -53,27 +51,13 @@ def test_exact_pieces_preserve_different_nodes(form, tmp_path):
     pair = write_and_read_pair(
         combine_pieces(make_pair("quads"), make_pair("triangles", FINE_GRID)), tmp_path, form
     )
-    assert not pair.has_matching_nodes
+    assert pair.lower.x.size != pair.upper.x.size
     for piece, grid in ((pair.lower, GRID), (pair.upper, FINE_GRID)):
         assert np.abs(piece.x - grid.x).max() <= 1e-12 * grid.length
         assert piece.areas().sum() == pytest.approx(grid.length * grid.height, rel=1e-12)
         assert piece.tributary_lengths().sum() == pytest.approx(grid.length, rel=1e-12)
     assert (pair.lower.height, pair.upper.height) == pytest.approx((1e-3, 1.5e-3))
     assert abs(pair.upper.refine().x[0] - pair.lower.refine().x[0]) <= 1e-12 * GRID.length
-
-
-def test_exact_matching_nodes_are_recognised(tmp_path):
-    """Nodes that differ by rounding match; a node shifted by 1e-7 m does not."""
-    assert write_and_read_pair(make_pair("mixed"), tmp_path).has_matching_nodes
-    rounded = make_pair("quads")
-    shifted = make_pair("quads")
-    shift_points(rounded, find_interface_node(rounded), (1e-13, 0))
-    shift_points(shifted, find_interface_node(shifted), (1e-7, 0))
-    assert write_and_read_pair(rounded, tmp_path).has_matching_nodes
-    pair = write_and_read_pair(shifted, tmp_path)
-    assert not pair.has_matching_nodes and np.abs(
-        pair.upper.x - pair.lower.x
-    ).max() == pytest.approx(1e-7, rel=1e-6)
 
 
 @pytest.mark.parametrize("factor", [1 + 1e-6, 1.05, 0.95, 1 - 1e-8])

@@ -43,7 +43,7 @@ def mesh_text(name="{}") -> str:
 
 
 FAULTS = {
-    "profile": (PROFILE, "a.csv", "0,1\n1,2\n", "contact.profile.file", "a.csv:1: there is no header, and units"),
+    "profile": (PROFILE, "a.csv", "0,1\n1,2\n", "contact.profile.file", "a.csv:1: the unit of x is not given"),
     "profile, short": (PROFILE, "a.csv", "x [mm],z [um]\n0,1\n2,2\n4,1\n", "contact.profile.file",
                        "the profile is 4 mm long, but the patch is 12.7 mm"),
     "profile, areal": (PROFILE, "a.x3p", write.heights_to_x3p(write.draw_scan()), "contact.profile.file",
@@ -79,16 +79,11 @@ def test_refuses_faulty_file_at_its_scene_line(tmp_path, text, name, content, ke
 
 
 def write_meshes(folder) -> None:
-    """Write meshes of the pieces of COATED: one in m, one in mm, one in mm with quadratic edges."""
+    """Write meshes of the pieces of COATED: one in m, one in mm."""
     write_mesh(graded_grid(12.7e-3, 6.35e-3, 1e-3, 152.4e-6), folder / "m.vtu")
     mesh = meshio.read(folder / "m.vtu")
     mesh.points *= 1e3
     mesh.write(folder / "mm.vtu")
-    for block in mesh.cells:
-        if block.type == "line":
-            block.type = "line3"
-            block.data = np.column_stack([block.data, block.data[:, 0]])
-    mesh.write(folder / "quadratic.vtu")
 
 
 MESH_FAULTS = [
@@ -98,14 +93,13 @@ MESH_FAULTS = [
                                          'the mesh: set contact.mesh_unit = "m"'),
     ("mm.vtu", ("contact.mesh_unit=mm", "contact.height=6 mm"),
      "contact.height: 0.006 m in the scene, but 0.00635 m in the lower piece of the mesh"),
-    ("quadratic.vtu", (), "contact.mesh: quadratic.vtu: line3 cells; only linear triangles, quads and lines"),
     ("m.vtu", ("contact.mesh_unit=furlong",), "contact.mesh_unit: unknown value 'furlong'; use one of m, km, cm, mm"),
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize("name, sets, message", MESH_FAULTS)
 def test_refuses_mesh_of_wrong_size_unit_or_order(tmp_path, name, sets, message):
-    """`check` and `run` report a mesh of another size, in another unit or of quadratic cells with the same line."""
+    """`check` and `run` report a mesh of another size, or in another unit with the same line."""
     write_meshes(tmp_path)
     (tmp_path / "scene.toml").write_text(mesh_text(name), "utf-8")
     options = [word for text in sets for word in ("--set", text)]
@@ -188,7 +182,7 @@ def test_refuses_all_faulty_files_at_once(tmp_path):
     )
     assert (
         code == 2
-        and "z.csv:1: column 'x' has no unit" in lines[0]
+        and "z.csv:1: the unit of x is not given" in lines[0]
         and "there is no file" in lines[1]
     )
     assert lines[2].startswith("--set: measured.file: there is no file")

@@ -12,7 +12,7 @@ def test_exact_path_samples_contain_extremes_of_varying_load(phase):
     """The refined samples of a slide path contain every extreme of the normal load within 1e-12
     s."""
     load = PointLoad(50.0, 20.0, 90.0, phase)
-    slide = SlidePath("constant", 1e-4, None, 2e-3, 0.0, None, None, None)
+    slide = SlidePath("constant", 1e-4, None, 2e-3, 0.0, None, None)
     time = np.linspace(0.0, 0.05, 12)
     samples, place = load.refine_samples(slide, time, 2e-3 * time, 16)
     np.testing.assert_allclose(place, 2e-3 * samples, rtol=1e-12)

@@ -7,14 +7,12 @@ from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
 import patchfem as pf
-from patchfem.campaigns import compute_backbone
 from patchfem.response import (
-    find_reversals_by_extrapolation,
     fit_decay_curve,
     locate_reversals,
     make_half_cycles,
 )
-from patchfem.runs import estimate_decay_mesh_errors
+from patchfem.runs.rig.decays import estimate_decay_mesh_errors
 
 RELEASED = DRIVE[: DRIVE.index("kind")] + 'kind = "free"\ndisplacement = "2 mm"\ncycles = 30\n'
 
@@ -232,23 +230,6 @@ def mindlin_damping(amplitude, stuck: float, slide: float):
     return np.array(out)
 
 
-@pytest.mark.parametrize("slide", [0.03])
-def test_always_decay_errors_cover_mindlin_damping(slide):
-    """The errors of a decay cover Mindlin's damping at amplitudes where no node of the mesh slips."""
-    a = np.array([9.13e-9, 6e-8]) / slide
-    found = compute_backbone(
-        pf.build(CROWNED.replace("slide = 1.0", f"slide = {slide}")), "", a, ("decay",)
-    )
-    one = found.curves["decay"]
-    law = mindlin_damping(a, found.frequencies.stuck, slide)
-    assert one.amplitude.size == a.size
-    assert (np.abs(one.damping - law) <= one.damping_error).all()
-    assert one.damping[0] == pytest.approx(0.002 * 150 / found.frequencies.stuck, rel=2e-3)
-    assert law[0] > 1.01 * one.damping[0]
-    assert (np.abs(one.frequency - found.frequencies.stuck) <= one.frequency_error)[0]
-    assert (one.damping_error < 0.1 * one.damping)[-1]
-
-
 def test_always_release_and_ringing_errors_cover_mindlin_damping():
     """The errors of the decay curve and of the ringing cover Mindlin's damping."""
     result = pf.run(CROWNED)
@@ -285,26 +266,3 @@ def test_always_missing_static_loop_gives_reason(old, new, why):
         pf.build(scene), None, None, np.array([1e-7, 1e-6]), int
     )
     assert said == why and not error.any()
-
-
-@pytest.mark.parametrize("begin", [100.0])
-def test_exact_reversal_with_force_jump_is_extrapolated(begin):
-    """A reversal at which the acceleration jumps is found within 1e-12 by extrapolation from both sides.
-
-    A cubic across the jump misses it by more than 2e-4.
-    """
-    crests = begin + np.array([0.2537, 0.7421])
-    time = begin + np.arange(0.0, 1.0, 0.02)
-    place = np.empty(time.size)
-    speed = np.empty(time.size)
-    for crest, sign, part in zip(crests, (1, -1), (time < begin + 0.5, time >= begin + 0.5)):
-        off = time[part] - crest
-        rate = np.where(off < 0, 1.0, 3.0)
-        place[part] = -sign * rate * off**2 / 2
-        speed[part] = -sign * rate * off
-    near, exact = (
-        one(time, place, speed)[0] for one in (locate_reversals, find_reversals_by_extrapolation)
-    )
-    inner = np.array([int(np.argmin(np.abs(near - crest))) for crest in crests])
-    assert np.abs(near[inner] - crests).min() > 2e-4
-    np.testing.assert_allclose(exact[inner], crests, rtol=0, atol=1e-12 + 1e-13 * begin)

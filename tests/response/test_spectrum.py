@@ -8,7 +8,8 @@ import pytest
 from patchfem import build
 from patchfem.core import Response, SineDrive
 from patchfem.response import spectrum
-from patchfem.runs import choose_numerics, solve_rig
+from patchfem.runs import choose_numerics
+from patchfem.runs.rig.solve import solve_rig
 
 OMEGA, PERIOD = 2.0, pi
 

@@ -162,7 +162,7 @@ def test_refuses_long_bond_list_and_unsupported_merging():
         match=f"more than the limit of {MAX_LIST_SECONDS:.0f} s; lower accuracy.steps_per_cycle",
     ):
         plan(model)
-    with pytest.raises(SceneError, match=r"'merged' with friction\.breakaway, or with a pressure"):
+    with pytest.raises(SceneError, match=r"'merged' with a shape on the lower piece"):
         plan(
             build_bench(
                 BONDS + "order = 2\n",

@@ -217,13 +217,13 @@ def test_always_accepted_combinations_without_friction_run(effect):
             POINT + COULOMB_LAW + SHAKEN_MODE,
             [*BONDS, "friction.breakaway=0.2", "accuracy.quadrature=direct"],
             "accuracy.quadrature",
-            "'direct' with friction.breakaway in a rig is not supported yet; use 'recursion' or 'auto'",
+            "'direct' with friction.breakaway is not supported yet; use 'recursion' or 'auto'",
         ),
         (
             PATCH + COULOMB_LAW + SHAKEN_MODE,
             [*BONDS, *LOWER, "accuracy.quadrature=merged"],
             "accuracy.quadrature",
-            "'merged' with a shape on the lower piece in a rig is not supported yet",
+            "'merged' with a shape on the lower piece is not supported yet",
         ),
         (
             MASSES.format(FACE.format(2)),

@@ -3,17 +3,9 @@ off the piece."""
 
 import numpy as np
 import pytest
-from any_mesh_cases import FORMATS, make_pair
-from scene_texts import COATED, COULOMB, MODE, NONLOCAL, PIECE
+from scene_texts import COATED, COULOMB, MODE, PIECE
 
-from patchfem import build, plan
-from patchfem.core import NotConverged, PatchfemError
-from patchfem.mesh import graded_grid
-from patchfem.mesh.files import EDGE_TAGS
-from patchfem.model import make_piece_meshes
-from patchfem.runs.patch.condensed import condense
-from patchfem.runs.patch.press import solve_patch_contact
-from patchfem.runs.patch.values import compute_static_values
+from patchfem import plan
 from patchfem.runs.run import run
 from patchfem.scene import loads
 
@@ -38,29 +30,6 @@ def run_text(text, estimate=True):
 
 
 # ---- mesh files, tall pieces
-def test_exact_partially_fixed_face_gives_note_in_two_formats(tmp_path):
-    """A mesh whose face `lower_far` is fixed on 2 of its 16 edges (1.6 of 12.8 mm) gives a note, in
-    two file formats."""
-    m = make_pair("quads", graded_grid(12.8e-3, 6.4e-3, 0.8e-3))
-    fixed_edges = np.flatnonzero(m.edge_tags == EDGE_TAGS["lower_far"])
-    removed = fixed_edges[np.argsort(m.points[m.edges[fixed_edges], 0].mean(axis=1))][2:]
-    m.edges, m.edge_tags = np.delete(m.edges, removed, axis=0), np.delete(m.edge_tags, removed)
-    approaches = []
-    for form in ("gmsh 2.2 binary", "inp lines"):
-        path = tmp_path / f"pair{FORMATS[form][0]}"
-        FORMATS[form][1](m, path)
-        result = run_text(FIXED_FACE.format(path))
-        approaches.append(result.measures["approach"].value)
-        notes = [text for text in result.extra["notes"] if "lower_far" in text]
-        assert notes == [
-            "contact.mesh: the held nodes `lower_far` cover 0.0016 m of a face "
-            "of 0.0128 m, 0.125 of the length of this face; the rest of the face is "
-            "free"
-        ]
-    assert approaches[1] == pytest.approx(approaches[0], rel=1e-9)
-    # Approach [m] of both pieces as bars.
-    flat = 115.654 / (12.8e-3 * 12.7e-3) * 2 * 6.4e-3 / 121e9
-    assert approaches[0] > 3 * flat
 
 
 def test_exact_note_states_fraction_of_buckling_load():
@@ -110,18 +79,6 @@ def test_exact_warning_states_contact_length_of_tilted_patch():
     assert 0.2 < fraction < 0.9 and length == pytest.approx(12.7 * fraction, abs=0.5)
 
 
-def test_exact_lateral_slide_beyond_width_leaves_contact(tmp_path):
-    """A lateral slide beyond the width has the outcome leaves_contact."""
-    for across, outcome in ((12.6, "done"), (12.8, "leaves_contact")):
-        path = tmp_path / "path.csv"
-        path.write_text(f"time [s],displacement [um],lateral [mm]\n0,0,0\n1,5,{across}\n", "utf-8")
-        law = NONLOCAL.replace("1 um", "1 mm")
-        assert (
-            run_text(COATED + law + f'[slide]\nkind = "file"\nfile = "{path}"\n', False).outcome
-            == outcome
-        )
-
-
 @pytest.mark.share(1, 2)
 @pytest.mark.parametrize(
     "law, accuracy, engine",
@@ -146,50 +103,6 @@ def test_exact_motion_beyond_piece_leaves_contact_in_every_engine(law, accuracy,
 
 
 # ---- approaches that no load reaches
-def test_refuses_approach_if_load_opens_middle_of_patch():
-    """With the load line 5 mm off the middle, twice the load opens the middle of flat pieces twice
-    as far; at 3 mm it closes the middle twice as far."""
-    with pytest.raises(
-        PatchfemError, match=r"contact\.approach\.distance: the line of the load lies -5 mm off"
-    ):
-        run_text(PRESCRIBED_APPROACH + LOAD_LINE.format(-5), False)
-    approaches = []
-    for load in (100.0, 200.0):
-        for line in (-5, -3):
-            model = build(
-                loads(
-                    PRESCRIBED_APPROACH.replace(
-                        '[contact.approach]\ndistance = "0.2 um"', f'load = "{load} N"'
-                    )
-                    + LOAD_LINE.format(line)
-                )
-            ).patch
-            approaches.append(
-                compute_static_values(
-                    solve_patch_contact(model, condense(model, *make_piece_meshes(model)))
-                )["approach"]
-            )
-    assert approaches[2:] == pytest.approx(2 * np.array(approaches[:2]), rel=1e-9)
-    assert approaches[0] < 0 < approaches[1]
-    assert run_text(PRESCRIBED_APPROACH + LOAD_LINE.format(3), False).measures[
-        "approach"
-    ].value == pytest.approx(2e-7, rel=1e-9)
-
-
-def test_refuses_approach_within_jump_between_contact_nodes():
-    """A crown of radius 18 mm on elements of 1 mm touches at one node and rolls from node to node
-    under a moment, so that the approach jumps by about h^2/2R = 28 um. On finer elements the
-    prescribed approach is reached."""
-    text = (
-        PRESCRIBED_APPROACH.replace("0.2 um", "2.509 um") + '[contact.crown]\nradius = "18.18 mm"\n'
-        '[contact.load_line]\nmoment = "0.0001782 N m"\n'
-    )
-    with pytest.raises(
-        NotConverged, match=r"contact\.approach\.distance: an approach of 2\.509e-06 m cannot be"
-    ):
-        run_text(text.replace('"0.2 mm"', '"1 mm"'), False)
-    result = run_text(text.replace('"0.2 mm"', '"0.02 mm"'), False)
-    assert result.measures["approach"].value == pytest.approx(2.509e-6, rel=1e-6)
 
 
 @pytest.mark.parametrize(

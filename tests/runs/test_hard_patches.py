@@ -250,7 +250,7 @@ def test_always_automatic_mesh_stays_within_cost(name, coarse_meshes):
     )
     result = run_and_check(*SCENE_SETTINGS.get(name, (TILT,)), "accuracy.tolerance=1e-2", text=text)
     grids = {id(g): g for g in (result.patch.pair.grid, result.patch.pair.upper_grid)}.values()
-    assert predict_condensing_seconds(grids) <= 0.15 and np.diff(result.patch.x).min() > 0
+    assert predict_condensing_seconds(grids) <= 0.4 and np.diff(result.patch.x).min() > 0
     if name in ("corner", "billionth"):  # The contact lies at the corner where the wedge closes.
         assert measure_value(result, "pressure_centre") == pytest.approx(-SIZE / 2, rel=5e-3)
 

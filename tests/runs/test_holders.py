@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scene_texts import COATING, PIECE
 
 from patchfem import build
-from patchfem.core import Outcome
+from patchfem.core import PatchfemError
 from patchfem.runs import solve_with_coarser
 from patchfem.runs.patch.values import compute_static_values
 from patchfem.scene import scene
@@ -122,24 +122,8 @@ ROTATION_TABLES = {
 }
 
 
-@pytest.mark.share(2, 5)
-@pytest.mark.parametrize("tables", ROTATION_TABLES.values(), ids=ROTATION_TABLES.keys())
-def test_exact_approach_with_rotation_returns_load(tables):
-    """The approach that results from a load, prescribed instead of the load, returns this load, its
-    rotation and its pressure."""
-    _, by_load = solve_patch(tables=tables)
-    by_approach = solve_patch(
-        "", tables + f'[contact.approach]\ndistance = "{by_load["approach"]!r} m"\n'
-    )[1]
-    assert by_approach["normal_load"] == pytest.approx(by_load["normal_load"], rel=1e-7)
-    for name in ("rotation", "moment", "pressure_peak", "approach"):
-        assert by_approach[name] == pytest.approx(by_load[name], rel=1e-6, abs=1e-13), name
-
-
-def test_exact_rotating_piece_before_contact_has_no_load():
-    """An approach of 0 on a piece that can rotate has the outcome no_contact and no load."""
-    tables = ROTATION_TABLES["spring"]
-    patch, patch_values = solve_patch(
-        "", tables.replace("0.01 mrad", "0 mrad") + '[contact.approach]\ndistance = "0 m"\n'
-    )
-    assert patch.pressure.outcome is Outcome.NO_CONTACT and patch_values["normal_load"] == 0
+@pytest.mark.parametrize("tables", ROTATION_TABLES.values(), ids=ROTATION_TABLES)
+def test_refuses_approach_of_piece_that_can_rotate(tables):
+    """A prescribed approach of a piece that can rotate is refused with the remedy."""
+    with pytest.raises(PatchfemError, match=r"removed in patchfem 2\.0: give contact\.load"):
+        solve_patch("", tables + '[contact.approach]\ndistance = "1 um"\n')

@@ -367,7 +367,7 @@ def test_always_coarse_interface_mesh_gives_no_motion_errors():
         (
             "static = 0.3\n[structure",
             'static = 0.3\nload = "5 N"\n[structure',
-            "has its own load; leave this key out",
+            "`load` and `contact` exclude each other",
         ),
         ('radius = "2.0 m"', 'radius = "2.0 m"\non = "lower"', "put the shapes on the upper piece"),
         (

@@ -15,7 +15,8 @@ from patchfem.core import PatchfemError
 from patchfem.mesh import graded_grid, write_mesh
 from patchfem.model import make_piece_meshes
 from patchfem.runs import solve_with_coarser
-from patchfem.runs.patch.press import solve
+from patchfem.runs.patch.condensed import condense
+from patchfem.runs.patch.press import solve_patch_contact
 from patchfem.runs.patch.values import compute_static_values
 from patchfem.runs.run import run
 from patchfem.scene import loads
@@ -56,7 +57,7 @@ def build_patch_model(*args, **kwargs):
 def solve_patch(*args, **kwargs) -> tuple:
     """Return the solved patch of a scene and its values."""
     model = build_patch_model(*args, **kwargs)
-    patch = solve(model, *make_piece_meshes(model))
+    patch = solve_patch_contact(model, condense(model, *make_piece_meshes(model)))
     return patch, compute_static_values(patch)
 
 
@@ -229,17 +230,17 @@ def test_exact_unlike_meshes_transfer_load_to_both_pieces(tmp_path):
         )
     ).patch
     lower, upper = make_piece_meshes(model)
-    patch = solve(model, lower, upper)
+    patch = solve_patch_contact(model, condense(model, lower, upper))
     assert patch.pair.joint is not None and (lower.x.size, upper.x.size) == (61, 97)
     forces = patch.pair.forces(patch.pressure.sigma_n * patch.pieces.interface.weight)
     for body, force in zip((lower, upper), forces):
         assert force.sum() == pytest.approx(LOAD, rel=1e-10) and force.size == body.x.size
         assert force @ body.x == pytest.approx(patch.pressure.moment, rel=1e-9)
+    like_model = build_patch_model(
+        TILT.format(1e-4), 'load = "26 lbf"\nelement_size = "0.21167 mm"'
+    )
     like_meshes = compute_static_values(
-        solve(
-            build_patch_model(TILT.format(1e-4), 'load = "26 lbf"\nelement_size = "0.21167 mm"'),
-            coarse,
-        )
+        solve_patch_contact(like_model, condense(like_model, coarse))
     )
     unlike_meshes = compute_static_values(patch)
     for name in ("approach", "normal_stiffness", "tangential_stiffness", "pressure_centre"):

@@ -39,19 +39,6 @@ tolerance = 0.003
 """
 
 
-def test_always_plan_load_includes_moment_with_approach():
-    """The plan of a patch with a prescribed approach and a moment estimates the load within 10 %
-    and the steps within a factor of 1.5. Without the moment it estimated 155 N instead of 2.6e6 N.
-    """
-    scene = load(APPROACH_WITH_MOMENT)
-    run_plan = plan(scene)
-    result = run(scene, estimate=False)
-    assert run_plan.model.nominal_load == pytest.approx(
-        result.measures["normal_load"].value, rel=0.1
-    )
-    assert result.extra["book"]["iterations"] <= 1.5 * run_plan.steps
-
-
 BARELY_STUCK = """[normal]
 load = "12.9 N"
 [friction]

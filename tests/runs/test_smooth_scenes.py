@@ -30,20 +30,20 @@ ACCURACY_TABLE = "cycles = 30\n[accuracy]\n"
 @pytest.mark.parametrize(
     "name, old, new",
     [
-        ("smooth", CONSTANT_BONDS, GROWING_BONDS),
-        ("smooth", CONSTANT_BONDS, CONSTANT_BONDS + "\nbreakaway = 0.3"),
-        ("smooth", LAW_NAME, 'law = "lugre"\nstiffness = "1e7 N/m"\nstribeck_speed = "1 cm/s"'),
+        ("hybrid", CONSTANT_BONDS, GROWING_BONDS),
+        ("march", CONSTANT_BONDS, CONSTANT_BONDS + "\nbreakaway = 0.3"),
+        ("hybrid", LAW_NAME, 'law = "lugre"\nstiffness = "1e7 N/m"\nstribeck_speed = "1 cm/s"'),
         ("march", CONSTANT_BONDS, SHORT_BONDS),
         ("march", CONSTANT_BONDS, GROWING_BONDS + "\nbreakaway = 0.3"),
         ("march", CONSTANT_BONDS, CONSTANT_BONDS + "\norder = 0.5"),
         ("march", "cycles = 30", ACCURACY_TABLE + "steps_per_cycle = 400"),
-        ("march", 'waveform = "sine"', 'waveform = "levels"\nlevels = ["3 g", "5 g"]'),
-        ("march", "slide = 1.0", 'slide = 1.0\n[structure.stiffening]\ncubic = "1e12 N/m^3"'),
+        ("hybrid", 'waveform = "sine"', 'waveform = "levels"\nlevels = ["3 g", "5 g"]'),
+        ("hybrid", "slide = 1.0", 'slide = 1.0\n[structure.stiffening]\ncubic = "1e12 N/m^3"'),
     ],
 )
 def test_exact_smooth_laws_use_high_order_integrator(name, old, new):
-    """Smooth friction laws are integrated by the engine `smooth`; laws and drives with jumps, and
-    prescribed steps, by the march."""
+    """Smooth friction laws are integrated by the engine `hybrid`; laws without a finite set of states,
+    laws that are too stiff, and prescribed steps, by the march."""
     text = SCENE.replace(old, new)
     text = text.replace(CONSTANT_BONDS, "") if old == LAW_NAME else text
     text = text.replace('acceleration = "5 g"\n', "") if "levels" in new else text
@@ -57,7 +57,7 @@ def test_always_smooth_engine_and_march_agree_within_errors(law):
     smooth = pf.run(text)
     march = pf.run(text, **{"accuracy.steps_per_cycle": 1600})
     assert (smooth.extra["engine"], march.extra["engine"]) == (
-        "smooth",
+        "hybrid",
         "march",
     ) and smooth.outcome == march.outcome
     assert smooth.measures.keys() == march.measures.keys()
@@ -69,9 +69,9 @@ def test_always_smooth_engine_and_march_agree_within_errors(law):
                 <= smooth_measure.error + 2 * march_measure.error + march_measure.floor
             ), name
     main = smooth.measures["relative_displacement_amplitude"]
-    assert main.error < 1e-6 * main.value and smooth.measures["energy_balance"].value < 1e-8
+    assert main.error < 1e-5 * main.value and smooth.measures["energy_balance"].value < 1e-8
     times = smooth.window.time
-    assert np.allclose(np.diff(times), times[1] - times[0], rtol=1e-6) and times.size > 400
+    assert np.diff(times).max() <= (times[1] - times[0]) * (1 + 1e-6) and times.size > 400
 
 
 def test_always_vanishing_acceleration_at_reversal_agrees_with_march():
@@ -98,7 +98,7 @@ cycles = 20
     smooth_measure, march_measure = (
         run.measures["relative_displacement_amplitude"] for run in (smooth, marched)
     )
-    assert smooth.extra["engine"] == "smooth"
+    assert smooth.extra["engine"] == "hybrid"
     assert (
         abs(smooth_measure.value - march_measure.value)
         <= smooth_measure.error + march_measure.error

@@ -3,9 +3,7 @@ independent program."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cache
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,10 +11,6 @@ from scene_texts import PIECE
 from static_scenes import JUDGED, KINDS, draw_scene, format_scene, reliable_rows, solve_reference
 
 import patchfem as pf
-from patchfem import build
-from patchfem.model import make_piece_meshes
-from patchfem.runs.patch.condensed import condense
-from patchfem.runs.patch.press import solve_patch_contact
 
 TITANIUM = 'substrate = {young = "120 GPa", poisson = 0.32, density = "4370 kg/m^3"}\n'
 NARROW = (
@@ -206,20 +200,3 @@ def test_always_error_of_single_wear_step_covers_peak():
     the error covers the difference."""
     peak = pf.run(WORN).measures["pressure_peak"]
     assert abs(peak.value - 30.56e6) <= peak.error <= 0.5 * peak.value
-
-
-@pytest.mark.parametrize("amplitude, n_notes", [(0.0, 0), (4e-9, 1)])
-def test_always_alternating_pressure_gives_ripple_note(amplitude, n_notes):
-    """A joint of unlike meshes is expected to have a ripple of 6.7 %: a smooth pressure gives no
-    note, a pressure that alternates between nodes gives one."""
-    patch_model = build(PIECE + 'load = "2000 N"\nelement_size = "0.5 mm"\n' + TITANIUM).patch
-    pair = condense(patch_model, *make_piece_meshes(patch_model))
-    pair = replace(
-        pair, joint=SimpleNamespace(ripple=0.067, reason="is expected to ripple by 6.7 %")
-    )
-    patch = solve_patch_contact(
-        patch_model, pair, amplitude * (-1.0) ** np.arange(pair.compliance.interface.x.size)
-    )
-    assert [text for text in patch.notes if "ripple" in text] == n_notes * [
-        "contact.mesh: is expected to ripple by 6.7 %"
-    ]

@@ -75,7 +75,7 @@ def test_exact_point_of_curve_agrees_with_sine_run(law):
     for k in (0, len(curve["level"]) // 2, -1):
         run = pf.run(POINT + law + MODE + drive.format(float(curve["frequency"][k])), **STEADY)
         for column, name in COLUMN_MEASURES.items():
-            assert curve[column][k] == pytest.approx(run.measures[name].value, rel=1e-9), (
+            assert curve[column][k] == pytest.approx(run.measures[name].value, rel=1e-8), (
                 k,
                 column,
             )
@@ -103,7 +103,7 @@ def test_exact_levels_agree_with_long_exact_run(law):
         == pytest.approx(G * np.array([3, 5, 7, 5]))
     )
     assert [level.stuck for level in steady_levels] == [level.stuck for level in run_levels]
-    round_off = {"equivalent_damping": 1e-14, "loop_area": 1e-18}
+    round_off = {"equivalent_damping": 1e-11, "loop_area": 1e-17}
     for a, b in zip(steady_levels, run_levels):
         assert (
             set(a.errors)
@@ -113,7 +113,7 @@ def test_exact_levels_agree_with_long_exact_run(law):
         )
         for name, value in a.values.items():
             assert value == pytest.approx(
-                b.values[name], rel=1e-8, abs=round_off.get(name, 1e-12)
+                b.values[name], rel=1e-8, abs=round_off.get(name, 1e-10)
             ), (b.drive, name)
     # The motion at each level is unique.
     assert abs(steady.measures["level_hysteresis"].value) < 1e-12

@@ -81,7 +81,7 @@ def test_exact_load_sweep_keeps_stiffness():
         (
             ["friction.bond_length=1 um"],
             "friction.stiffness",
-            "takes either this key or bond_length",
+            "`bond_length` and `stiffness` exclude each other",
         ),
         (
             ["normal.amplitude=3 N", "normal.frequency=50 Hz"],

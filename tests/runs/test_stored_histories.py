@@ -104,7 +104,7 @@ def test_always_release_history_has_uniform_samples(run_case, engine):
     stored only reversals before the last cycles."""
     if engine == "smooth":
         result = run(loads(TANH_POINT + MODE + RELEASE), estimate=False)
-        assert result.extra["engine"] == "smooth"
+        assert result.extra["engine"] == "hybrid"
     else:
         _, result = run_case(engine, "release")
     r = result.response

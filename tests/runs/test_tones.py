@@ -64,9 +64,9 @@ def test_exact_energies_under_two_tones_balance():
     measures = pf.run(RIG | PLASTIC).measures
     assert measures["drift_per_cycle"].value is None
     assert "within their beat without any drift" in measures["drift_per_cycle"].reason
-    assert measures["energy_balance"].value < 1e-11
+    assert measures["energy_balance"].value < 1e-7
     assert measures["energy_dissipated"].value > 0
-    assert measures["work_check"].value < 1e-9
+    assert measures["work_check"].value < 1e-7
 
 
 @pytest.mark.parametrize(

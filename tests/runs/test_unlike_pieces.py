@@ -15,10 +15,11 @@ from patchfem.closed_forms.contact import rounded_punch_pressure
 from patchfem.core import PatchfemError, frozen_array
 from patchfem.elasticity import compute_coating_traction, compute_displacement, get_cells
 from patchfem.mesh import TensorGrid, write_mesh
-from patchfem.mesh.tensor import graded_rows
+from patchfem.mesh.grid import graded_rows
 from patchfem.model import extend_grid, find_file_faults, find_rounded_edges, make_piece_meshes
 from patchfem.runs import solve_with_coarser
-from patchfem.runs.patch.press import solve
+from patchfem.runs.patch.condensed import condense
+from patchfem.runs.patch.press import solve_patch_contact
 from patchfem.runs.patch.result import patch_warnings
 from patchfem.runs.patch.values import compute_static_values
 from patchfem.scene import loads
@@ -46,7 +47,7 @@ def build_patch_model(text: str):
 def solve_on_uniform_mesh(text: str):
     """Return the solved patch of a scene on its uniform interface mesh."""
     model = build_patch_model(text)
-    return solve(model, *make_piece_meshes(model))
+    return solve_patch_contact(model, condense(model, *make_piece_meshes(model)))
 
 
 def graded_columns(place: float, half: float, smallest: float, growth: float = 1.2) -> np.ndarray:
@@ -76,7 +77,7 @@ def solve_on_columns(patch, x, growth: float = 1.2, halvings: int = 0):
     bodies = [extend_grid(patch, piece, grid, growth) for piece, grid in zip(pieces, grids)]
     for _ in range(halvings):
         bodies = [body.refine() for body in bodies]
-    return solve(patch, *bodies)
+    return solve_patch_contact(patch, condense(patch, *bodies))
 
 
 @pytest.mark.share(0)
@@ -149,7 +150,7 @@ def test_exact_load_is_transferred_at_interface_and_bond_lines():
     """The pressure on the interface and the tractions on the bond line of each coating add up to
     the normal load."""
     model = build_patch_model(COATED + OUTLINE.format("upper", "lower") + TILT.format(""))
-    patch = solve(model, *make_piece_meshes(model))
+    patch = solve_patch_contact(model, condense(model, *make_piece_meshes(model)))
     force = patch.pressure.sigma_n * patch.pieces.interface.weight
     assert force.sum() == pytest.approx(model.loading.load, rel=1e-10)
     assert patch.pieces.interface.weight.sum() == pytest.approx(
@@ -179,8 +180,10 @@ def test_exact_written_mesh_of_shaped_pieces_gives_same_patch(tmp_path):
             tmp_path / "scene.toml",
         )
     ).patch
-    a = compute_static_values(solve(model, *bodies))
-    b = compute_static_values(solve(read_model, *make_piece_meshes(read_model)))
+    a = compute_static_values(solve_patch_contact(model, condense(model, *bodies)))
+    b = compute_static_values(
+        solve_patch_contact(read_model, condense(read_model, *make_piece_meshes(read_model)))
+    )
     assert b == pytest.approx(a, rel=1e-8)
 
 
@@ -230,12 +233,12 @@ def test_refuses_profile_shorter_than_interface(tmp_path):
     profile = '[contact.profile]\nfile = "before.csv"\n'
     scene = loads(BLOCK + NARROW.format("upper") + profile, tmp_path / "scene.toml")
     model = build(scene).patch
-    patch = solve(model, *make_piece_meshes(model))
+    patch = solve_patch_contact(model, condense(model, *make_piece_meshes(model)))
     assert patch.x[-1] == 4e-3 and np.ptp(patch.unloaded_gap) > 0
     assert find_file_faults(scene, tmp_path) == []
     for text in (BLOCK, BLOCK + NARROW.format("upper").replace("8 mm", "8.3 mm")):
         scene = loads(text + profile, tmp_path / "scene.toml")
         model = build(scene).patch
         with pytest.raises(PatchfemError, match="trace"):
-            solve(model, *make_piece_meshes(model))
+            solve_patch_contact(model, condense(model, *make_piece_meshes(model)))
         assert [key for key, _ in find_file_faults(scene, tmp_path)] == ["contact.profile.file"]

@@ -81,13 +81,10 @@ def test_exact_holder_spring_acts_in_series_with_pitch():
 
 
 def test_refuses_normal_motion_of_point_contact():
-    """Modes with normal motion are refused with a point contact, and an exact method with a varying load."""
+    """Modes with normal motion are refused with a point contact."""
     message = get_only_mistake(POINT, "structure.mode.axial.normal=0.1")
     assert message.startswith("--set: structure.mode.axial.normal: ")
     assert "use [contact] in place of" in message
-    assert "no exact solution exists with normal.amplitude" in get_only_mistake(
-        POINT, *VARYING_LOAD, "accuracy.method=exact"
-    )
 
 
 # Rigs whose friction force and secant stiffness had the same samples in all coarser runs.

@@ -111,4 +111,4 @@ def test_exact_strips_of_rig_wear_by_their_own_slip():
 def test_refuses_wear_of_strips_with_shear():
     """Wear of strips with [contact.shear] is refused."""
     sheared = TILTED + STRIPS + "[contact.shear]\n" + COULOMB + MODE + BASE_DRIVE + WEAR
-    assert any("contact.strips with [contact.shear]" in line for line in list_mistakes(sheared))
+    assert any("contact.strips and [contact.shear]" in line for line in list_mistakes(sheared))

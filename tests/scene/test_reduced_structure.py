@@ -362,9 +362,7 @@ def test_exact_sweep_over_modes_reduces_each_case(matrix_folder):
     [
         ("balance", False),
         ("quasi-static", False),
-        ("decay", False),
-        # The band of the ring-down near a resonance of another mode takes half a minute.
-        pytest.param("balance", True, marks=pytest.mark.slow),
+        ("balance", True),
         ("quasi-static", True),
     ],
 )

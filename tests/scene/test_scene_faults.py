@@ -35,7 +35,7 @@ SHAKEN = POINT + COULOMB + MODE + DRIVE
     [
         (
             POINT + PLASTIC + 'stiffness = "1e7 N/m"\n' + TRIANGLE,
-            [r"a\.toml:7: friction\.stiffness: .*either this key or bond_length, not both"],
+            [r"a\.toml:7: friction\.stiffness: `bond_length` and `stiffness` exclude each other"],
         ),
         (
             POINT + COULOMB + TRIANGLE + WORN_FRICTION,
@@ -50,7 +50,7 @@ SHAKEN = POINT + COULOMB + MODE + DRIVE
             [
                 r"a\.toml:13: drive\.from: missing; .*waveform 'sweep' needs this key",
                 r"a\.toml:13: drive\.to: missing; .*waveform 'sweep' needs this key",
-                r"a\.toml:13: drive\.rate: missing; .*drive\.log_rate instead",
+                r"a\.toml:13: drive\.rate: missing; .*waveform 'sweep' needs this key or log_rate",
             ],
         ),
     ],

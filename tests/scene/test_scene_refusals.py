@@ -122,8 +122,8 @@ MISSING = [
     (RIG, r"^static.*\n", "[friction]", "friction.static", "missing; a plain number is needed"),
     (RIG, r"^bond_length.*\n", "[friction]", "friction.bond_length", "law 'nonlocal' needs this key"),
     (RIG, r"^slide = 0.1\n", "[[structure.mode]]", "structure.mode.second.slide", "missing; a plain number"),
-    (RIG, r"^cycles.*\n", "[drive]", "drive.cycles", "missing; a plain number is needed; or drive.duration instead"),
-    (LINEAR, r"^\[\[(.|\n)*(?=\[drive)", "[structure]", "structure.mode", "at least one [[structure.mode]] is needed"),
+    (RIG, r"^cycles.*\n", "[drive]", "drive.cycles", "waveform 'sine' needs this key or duration"),
+    (LINEAR, r"^\[\[(.|\n)*(?=\[drive)", "[structure]", "structure.mode", "this key or masses or file or reduced is needed"),
     (BENCH, r"^kind.*\n", "[slide]", "slide.kind", "missing; one of constant, sine, triangle, dwell, file"),
     (BENCH, r"^amplitude.*\n", "[slide]", "slide.amplitude", "kind 'triangle' needs this key"),
 ]  # fmt: skip
@@ -170,8 +170,8 @@ def test_refuses_kinetic_for_laws_with_one_coefficient(law):
     """A kinetic coefficient is refused for laws that have only one coefficient of friction."""
     found = list_mistakes(BENCH, f"friction.law={law}", "friction.kinetic=0.2", "friction.bond_length=1 um",
                      "friction.reference_speed=1 mm/s")  # fmt: skip
-    assert found == [f"--set: friction.kinetic: law '{law}' has only one coefficient of friction; laws with a kinetic "
-                     f"coefficient are {name_laws_with_key('kinetic')}"]  # fmt: skip
+    assert found == [f"--set: friction.kinetic: law '{law}' has no key kinetic; laws with it are "
+                     f"{name_laws_with_key('kinetic')}"]  # fmt: skip
 
 
 def test_refuses_unbreakable_initial_bonds_with_shear():

@@ -165,7 +165,7 @@ def test_exact_initial_conditions_of_scene():
     (["structure.masses=[]"], "structure.masses", "at least one mass is needed"),
     (["structure.start.displacement=['1 mm']"], "structure.start.displacement", "1 value for 2 masses; give one value "
                                                                                 "for each"),
-    (["structure.start={}"], "structure.start.displacement", "or structure.start.velocity"),
+    (["structure.start={}"], "structure.start.displacement", "this key or velocity is needed"),
     (["structure.slide_at=12:+x"], "structure.slide_at", "names a place in a file"),
     (["drive={kind = 'force', mass = 3, force = '1 N', frequency = '1 Hz', cycles = 9}"], "drive.mass", "no mass 3"),
     (["drive={kind = 'free', displacement = '1 mm', cycles = 9}", "structure.start.velocity=['1 m/s', '0 m/s']"],

@@ -12,8 +12,6 @@ from scipy.spatial import Delaunay
 from patchfem.mesh import PieceMesh, graded_grid, read_pieces
 from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS
 
-NO_QUADS = np.empty((0, 4), np.int64)
-
 
 def mesh_of_grid(grid, split=0.0, seed=None):
     """Return a structured grid as an unstructured mesh.
@@ -33,13 +31,13 @@ def mesh_of_grid(grid, split=0.0, seed=None):
         [part.ravel() for part in (node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:])],
         axis=1,
     )
-    is_coating = grid.is_coating_cell().ravel()
+    is_coating = grid.is_coating
     is_split = np.random.default_rng(1).random(len(quads)) < split
     triangles = quads[is_split][:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
+    blocks = {"triangle": triangles, "quad": quads[~is_split]}
     return PieceMesh(
         renumbered,
-        triangles,
-        quads[~is_split],
+        {kind: cells for kind, cells in blocks.items() if len(cells)},
         np.concatenate([np.repeat(is_coating[is_split], 2), is_coating[~is_split]]),
         node[:, 0],
         node[:, -1],
@@ -85,7 +83,7 @@ def triangulate_graded_rows(half_length, height, size, coating=0.0):
     middle = points[cells][:, :, 1].mean(axis=1)
     order = np.argsort(rows[0][:, 0])
     return PieceMesh(
-        points, cells, NO_QUADS, middle < coating, order, np.flatnonzero(points[:, 1] == height)
+        points, {"triangle": cells}, middle < coating, order, np.flatnonzero(points[:, 1] == height)
     )
 
 

@@ -307,7 +307,7 @@ def march_steady_points(joint: Joint, curve) -> list:
 
 
 def compare_band(seed: int, folder: Path, earlier: dict | None = None) -> dict:
-    """Compare the band of a joint with steady responses and a decay; see `campaigns`."""
+    """Compare the band of a joint with steady responses; see `campaigns`."""
     joint = draw_joint(seed)
     scene = scene_of_joint(joint)
     model = pf.build(
@@ -325,12 +325,4 @@ def compare_band(seed: int, folder: Path, earlier: dict | None = None) -> dict:
     curve = backbone.curves["balance"]
     points = march_steady_points(joint, curve)
     line["rows"] += band_rows(band_at(model, points), "steady", points)
-    begin = process_time()
-    decay = compute_backbone(model, "mode1", curve.amplitude[::N_DECAY], ("decay",), errors=False)
-    line["decay_seconds"] = process_time() - begin
-    if "decay" in decay.curves:
-        names = ("amplitude", "frequency", "damping", "frequency_error", "damping_error")
-        columns = [getattr(decay.curves["decay"], name) for name in names]
-        points = list(zip(*columns))
-        line["rows"] += band_rows(band_at(model, points), "decay", points)
     return line

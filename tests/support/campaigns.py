@@ -29,7 +29,6 @@ KINDS = {  # Name on the command line -> module and function.
     "rigs": ("random_rigs", "compare_rig"),
     "harmonic": ("random_rigs", "compare_harmonic_rig"),
     "reduced": ("reduced_chains", "compare_chain"),
-    "planes": ("plane_chains", "compare_chain"),
     "point-benches": ("point_benches", "compare_bench"),
     "partial-slip": ("micro_slip", "compare_bench"),
     "shear-joints": ("shear_scenes", "compare_joint"),

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from patchfem.dynamics import make_coulomb_elements
-from patchfem.dynamics.events import histories, stick_steady
+from patchfem.dynamics.events import histories
 from patchfem.dynamics.events.positions_kernels import ROW_BEGIN, Column
 
 
@@ -25,20 +25,6 @@ def simulate(
     """Call `histories.simulate` with Coulomb friction."""
     groups = make_groups(modes, static, kinetic)
     return histories.simulate(modes, drive, groups, cycles, window, travel, 0, progress, start)
-
-
-def solve_steady(modes, drive, static, kinetic, start=None, cycles=30, periods=1):
-    """Call `stick_steady.solve_steady` with Coulomb friction."""
-    return stick_steady.solve_steady(
-        modes, drive, make_groups(modes, static, kinetic), start, cycles, periods
-    )
-
-
-def map_period(modes, drive, static, kinetic, state, periods=1):
-    """Call `stick_steady.map_period` with Coulomb friction."""
-    return stick_steady.map_period(
-        modes, drive, make_groups(modes, static, kinetic), state, periods
-    )
 
 
 @dataclass(frozen=True)

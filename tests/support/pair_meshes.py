@@ -3,8 +3,7 @@
 import numpy as np
 
 from patchfem.mesh import TensorGrid
-from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS
-from patchfem.mesh.pairs import join_meshes
+from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS, join_meshes
 
 
 def make_pair_mesh(grid: TensorGrid) -> dict:

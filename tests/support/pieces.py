@@ -9,7 +9,7 @@ import numpy as np
 from patchfem.core import Compliance, Interface
 from patchfem.elasticity import Layers, Piece, interface_compliance
 from patchfem.mesh import TensorGrid, graded_grid
-from patchfem.mesh.tensor import graded_rows
+from patchfem.mesh.grid import graded_rows
 
 TITANIUM = (121e9, 0.32)
 CARBIDE = (250e9, 0.24)  # Sprayed WC-Co; this is the value that the project assumes.

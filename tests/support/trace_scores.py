@@ -1,6 +1,7 @@
 """Score of the comparison on pairs of traces with known wear, from eight generators.
 
     python tests/support/trace_scores.py SEED COUNT NAME=MODULE.py:FUNCTION ...
+    python tests/support/trace_scores.py SEED COUNT ratios
 
 Four generators belong to the tests: `known_pairs`, `worn_kinds`, `track_pairs` (kinds in turn), and tracks of 0.3 to 8
 standard deviations of the depth noise over the middle third. The others are functions `FUNCTION(seed, count)` of
@@ -199,6 +200,10 @@ def draw_made(make: Callable, seed: int, count: int) -> Iterator[ScoredPair]:
         pair = make(seed + k)
         truth = pair["truth"]
         area = truth["removed_area"]
+        # What traces show of the loss, with the radius of the tip, is a right answer too.
+        means = [area / truth["common_length"]]
+        if truth.get("depth_mean_traced") is not None and not truth["built_up_area"]:
+            means.append(truth["depth_mean_traced"])
         is_single = truth["ends"] is not None and len(truth["tracks"]) == 1
         # A loss below the noise of a single point cannot be decided.
         is_hidden = truth["worn"] and area < 1.5 * truth["noise"] * max(truth["width"], 1e-12)
@@ -210,8 +215,8 @@ def draw_made(make: Callable, seed: int, count: int) -> Iterator[ScoredPair]:
             has_grown=truth["built_up_area"] > 0,
             noise=np.sqrt(2) * truth["noise"],
             truths={
-                "mean": (area / truth["common_length"],),
-                "area": (area,),
+                "mean": tuple(means),
+                "area": tuple(mean * truth["common_length"] for mean in means),
                 "largest": (truth["largest_depth"],),
             },
             ends=tuple((end, end) for end in truth["ends"]) if is_single else None,
@@ -315,6 +320,42 @@ def score_pair(pair: ScoredPair, judge: Callable = judge) -> dict:
     return row
 
 
+def score_ratios(seed: int, count: int) -> dict[str, list[int]]:
+    """Score the intervals of the ratios of waves: {quantity: [held, stated]}.
+
+    The second trace shows the same or another place of a polished surface. A true ratio is that of the whole surface,
+    which is 20 times longer than the traces.
+    """
+    from patchfem.surface.compare.compare import compare_surfaces
+    from patchfem.surface.compare.waves import compare_waves
+
+    scores = {"amplitude_ratio": [0, 0], "slope_ratio": [0, 0]}
+    for k in range(count):
+        draw = np.random.default_rng([seed, k])
+        length, step = draw.uniform(2e-3, 6e-3), 0.5e-6
+        x, new = known_pairs.draw_surface(
+            draw, 20 * length, ("self-affine", "turned", "plateau")[k % 3]
+        )
+        x, new = x[::2], new[::2]
+        old = new - draw.uniform(0, 0.6) * (new - gaussian_filter1d(new, draw.uniform(5, 60)))
+        part = slice(0, int(20 * length / step))
+        truths = compare_waves([z[None, part] for z in (new, old)], step, 0.0)
+        n = int(length / step)
+        starts = draw.integers(0, part.stop - n, 2)
+        starts[1] = starts[draw.integers(2)]
+        traces = []
+        for name, z, start in zip(("before", "after"), (new, old), starts, strict=True):
+            noise = draw.normal(0, 3e-9, n)
+            traces.append(_make_profile(x[:n], np.round(z[start : start + n] + noise, 9), name))
+        values = compare_surfaces(*traces).values
+        for name, score in scores.items():
+            bounds = values[name]
+            if bounds.value is not None:
+                score[1] += 1
+                score[0] += bounds.low <= truths[name].value <= bounds.high
+    return scores
+
+
 def draw_generators(seed: int, count: int, others: list[str]) -> Iterator[tuple[str, Iterator]]:
     """Yield the name of each generator with its pairs."""
     own = {"known": draw_known, "kinds": draw_kinds, "tracks": draw_tracks, "shallow": draw_shallow}
@@ -356,10 +397,13 @@ def score_all(seed: int, count: int, others: list[str], judge: Callable = judge)
                 print(f"   {row['name']} | {row['code']} | {' '.join(words)}")
             for fault in faults:
                 value, low, high, *true = row[f"{fault}_interval"]
-                print(f"      {fault} {value:.6g} ({low:.6g}..{high:.6g}), true {true}")
+                print(f"      {fault} {value} ({low}..{high}), true {true}")
     print(format_scores("all", every))
     return every
 
 
 if __name__ == "__main__":
-    score_all(int(sys.argv[1]), int(sys.argv[2]), sys.argv[3:])
+    if sys.argv[3:] == ["ratios"]:
+        print(score_ratios(int(sys.argv[1]), int(sys.argv[2])))
+    else:
+        score_all(int(sys.argv[1]), int(sys.argv[2]), sys.argv[3:])

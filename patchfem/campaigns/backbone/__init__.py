@@ -1,4 +1,4 @@
-"""Backbone of a jointed mode: frequency and damping against amplitude by three methods.
+"""Backbone of a jointed mode: frequency and damping against amplitude by two methods.
 
 In: a rig, a mode, amplitudes at the output. Out: a `records.Backbone`, one `records.Curve` per method.
 
@@ -12,9 +12,6 @@ module         equation                      what it neglects         where it h
                negative damping -g q' that   within a cycle           have a closed form; rigid
                keeps the motion up; the                               friction, for motion that
                damping ratio is g/(2 omega)                           never sticks
-`decay`        the equation itself, released nothing; its values are  amplitudes from which the 0.02..0.10
-               from the largest amplitude    means over a cycle       motion falls and stays
-                                                                      one of this mode
 `quasi_static` Omega^2 q + B^T f[B q] = P s, the bending of the force laws of finite stiffness; 0.0001..
                s the shape of the sticking   by friction, harmonics   closest in micro-slip     0.003
                mode; secant and loop area
@@ -24,10 +21,11 @@ The last column is the time of a point for one mode with law "elastic-plastic" o
 A static curve of a law without a closed loop is run on a bench and takes longer.
 
 - `balance`: extended periodic motion (Krack, Comput. Struct. 154, 59, 2015). A slow decay shows this curve.
-- `decay`: also contains what a swing loses within a cycle.
 - `quasi_static`: quasi-static modal analysis (Festjens, Chevallier and Dion, Int. J. Mech. Sci. 75,
   170, 2013). Laws whose loops have no closed form are run on a bench (`bench_loops`).
 - `linear`: a rig on which no friction acts has the same values at all amplitudes.
+
+A release (`drive.kind = "free"`) neglects nothing; it is a run, whose result has frequency and damping over the amplitude.
 
 Read `curves` first, then `joint`, which has the mode with its contact and the scales of its amplitudes.
 """

@@ -4,9 +4,8 @@ import numpy as np
 
 from ...effects import law_has_trait
 from ...formatting import format_length, format_quantity
-from .band import Band, forced_mode_ratio
+from .band import Band
 from .joint import JointMode
-from .notes import REPORT_OTHER_MODES
 from .records import ROUND_OFF_ERROR, match_amplitudes
 
 AGREEMENT = 0.02  # Largest relative difference of the damping at which two methods agree.
@@ -15,7 +14,6 @@ MIN_REPORTED_RATIO = 0.05  # Smallest relative motion of other modes that is rep
 PURPOSES = {
     "balance": "it is the steady vibration in resonance, such as a test in phase resonance or a response near its peak",
     "quasi-static": "no curve of the steady vibration is known here, and in micro-slip both agree",
-    "decay": "no curve of the steady vibration is known here; the damping of a ring-down may differ from it",
 }
 
 
@@ -32,20 +30,20 @@ def write_advice(joint: JointMode, band: Band | None, curves: dict, missing: dic
         By method, the reason why it has no curve.
     """
     if band is None:
-        if "decay" in missing:
-            return ("No method gives a curve at these amplitudes; give others with --amplitudes.",)
-        return ("No method gives a curve here; try --method decay, which neglects nothing.",)
+        return (
+            "No method gives a curve at these amplitudes; give others with --amplitudes, or run a release with "
+            'drive.kind = "free".',
+        )
     if joint.is_linear:
         return ("All methods agree: no friction acts, so frequency and damping are constant.",)
     curve = curves[band.method]
     sentences = [
         f"Use the curve of method {band.method}: {PURPOSES[band.method]}.",
         *_describe_slip(joint, curve),
-        _describe_band_width(band, curve),
-        *_describe_agreement(band, curves),
-        *_describe_ring_down(joint, band, curves, has_failed="decay" in missing),
+        _describe_band_width(band, curve, len(curves)),
         *_describe_static_curve(band, curves),
-        *_describe_coupling(joint, band, curve),
+        *_describe_coupling(joint, curve),
+        *_describe_fast_decay(curve),
     ]
     for method, reason in missing.items():
         sentences.append(f"Method {method} has no curve here: {reason}.")
@@ -79,97 +77,24 @@ def _describe_slip(joint: JointMode, curve) -> list:
     return sentences
 
 
-def _describe_band_width(band: Band, curve) -> str:
+def _describe_band_width(band: Band, curve, n_curves: int) -> str:
     """Describe where the band of the damping ratio is widest, and the largest deviation of the frequency."""
     frequency = _largest_distance(curve.frequency, band.frequency_low, band.frequency_high)
     damping = _largest_distance(curve.damping, band.damping_low, band.damping_high)
     k = int(np.argmax(damping))
     content = "the numerical error"
-    if band.ring_down is not None:
-        content += " and what the other kinds of test read"
+    if n_curves > 1:
+        content += " and the difference of the two methods"
     return (
-        f"Its band contains {content}; it is widest at "
-        f"{format_length(curve.amplitude[k], 3)}, where the damping ratio is {band.damping_low[k]:.3g} to "
-        f"{band.damping_high[k]:.3g} beside {curve.damping[k]:.3g}, and the frequency is within "
-        f"{100 * frequency.max():.2g} % everywhere."
+        f"Its band is {content}; it is widest at {format_length(curve.amplitude[k], 3)}, where the damping ratio is "
+        f"{band.damping_low[k]:.3g} to {band.damping_high[k]:.3g} beside {curve.damping[k]:.3g}, and the frequency is "
+        f"within {100 * frequency.max():.2g} % everywhere."
     )
 
 
 def _largest_distance(value, low, high) -> np.ndarray:
     """Return the largest relative deviation (k,) of a value from the limits of its band."""
     return np.maximum(high - value, value - low) / np.maximum(np.abs(value), 1e-300)
-
-
-def _describe_agreement(band: Band, curves: dict) -> list:
-    """State the largest amplitude up to which the methods agree within the numerical error."""
-    if band.ring_down is None:
-        return []
-    curve = curves[band.method]
-    distance = np.maximum(band.damping_high - curve.damping, curve.damping - band.damping_low)
-    beyond = np.flatnonzero(distance > AGREEMENT * np.abs(curve.damping) + curve.damping_error)
-    within = f"within {100 * AGREEMENT:g} % of the damping, apart from the numerical error"
-    if not beyond.size:
-        return [
-            f"The computed methods and the predicted ring-down agree {within}, at all amplitudes."
-        ]
-    if not beyond[0]:
-        return []
-    edge = format_length(curve.amplitude[beyond[0] - 1], 3)
-    return [f"Up to {edge} the computed methods and the predicted ring-down agree {within}."]
-
-
-def _describe_ring_down(joint: JointMode, band: Band, curves: dict, *, has_failed: bool) -> list:
-    """Describe how the damping of a ring-down differs from that of the curve, and why.
-
-    has_failed: whether method decay was tried and has no curve.
-    """
-    curve = curves[band.method]
-    if band.ring_down is None:
-        return []
-    damping = band.ring_down.damping
-    errors = np.zeros(curve.amplitude.size)
-    is_computed = "decay" in curves
-    if is_computed:
-        here, there = match_amplitudes(curve, curves["decay"])
-        damping = np.full(curve.amplitude.size, np.nan)
-        damping[here] = curves["decay"].damping[there]
-        errors[here] = curves["decay"].damping_error[there] + curve.damping_error[here]
-    is_known = (damping > 0) & (curve.damping > curve.damping_error + ROUND_OFF_ERROR)
-    if not is_known.any():
-        return ["How the damping of a ring-down differs is not known at these amplitudes."]
-    is_known &= np.abs(damping - curve.damping) > errors
-    ratio = np.where(is_known, damping / curve.damping, 1.0)
-    k = int(np.argmax(np.abs(ratio - 1)))
-    if abs(ratio[k] - 1) <= AGREEMENT:
-        verb = "has" if is_computed else "is predicted to have"
-        return [
-            f"A ring-down (method decay) {verb} the same damping within {100 * AGREEMENT:g} % and the numerical error."
-        ]
-    reasons = []
-    if ratio[k] > 1 and not joint.is_rigid:
-        reasons.append(
-            "the joint stiffens as the amplitude falls, so the amplitude loses more than the energy"
-        )
-    lost_fraction = -np.expm1(-2 * np.pi * damping[k])
-    if lost_fraction > MIN_REPORTED_LOSS:
-        reasons.append(
-            f"a cycle takes {100 * lost_fraction:.2g} % of the amplitude, so the decay gives means over unequal motions"
-        )
-    size = f"{100 * abs(ratio[k] - 1):.2g} % {'more' if ratio[k] > 1 else 'less'}"
-    because = f": {'; '.join(reasons)}" if reasons else ""
-    place = format_length(curve.amplitude[k], 3)
-    if is_computed:
-        return [
-            f"The ring-down (method decay) reads {size} damping at {place}, where it differs most{because}."
-        ]
-    coupled = ""
-    if joint.modes.omega.size > 1:
-        coupled = ", and neglects the exchange of energy between the modes"
-    return [
-        f"A ring-down (method decay) is predicted to read {size} damping at {place}, where it differs most{because}. "
-        f"This is an estimate without a run of the decay{coupled}; the band allows for its error."
-        + ("" if has_failed else " For the curve of a ring-down, run --method decay.")
-    ]
 
 
 def _describe_static_curve(band: Band, curves: dict) -> list:
@@ -202,31 +127,55 @@ def _describe_static_curve(band: Band, curves: dict) -> list:
     ]
 
 
-def _describe_coupling(joint: JointMode, band: Band, curve) -> list:
+def _describe_fast_decay(curve) -> list:
+    """Say where a ring-down loses so much in a cycle that it reads means over unequal motions."""
+    lost_fraction = -np.expm1(-2 * np.pi * curve.damping)
+    k = int(np.argmax(lost_fraction))
+    if lost_fraction[k] <= MIN_REPORTED_LOSS:
+        return []
+    return [
+        f"A ring-down reads other values where it decays fast: at {format_length(curve.amplitude[k], 3)} a cycle takes "
+        f"{100 * lost_fraction[k]:.2g} % of the amplitude."
+    ]
+
+
+def _describe_coupling(joint: JointMode, curve) -> list:
     """Describe the coupling of the mode with the other modes."""
     modes = joint.modes
     if modes.omega.size == 1:
         return []
-    ratio = forced_mode_ratio(joint, curve)
-    change = 0.0
-    if band.ring_down is not None:
-        change = float(np.nan_to_num(band.ring_down.shape_change).max())
+    ratio = _forced_mode_ratio(joint, curve).max()
     omega = 2 * np.pi * curve.frequency[-1]
     others = np.delete(modes.omega, joint.mode)
     nearest = others[np.argmin(np.abs(others - omega))] / (2 * np.pi)
     name = format_quantity(float(nearest), "Hz", 4)
-    if max(ratio.max(), change) < MIN_REPORTED_RATIO:
+    if ratio < MIN_REPORTED_RATIO:
         return [f"The coupling with the other modes (nearest: {name} without the contact) is weak."]
-    size = f"by up to {100 * ratio.max():.2g} % of its motion"
-    if ratio.max() >= 1:
-        size = "as much as the mode itself"
-    shape = ""
-    if change > REPORT_OTHER_MODES and not joint.is_rigid:
-        shape = (
-            f", and a cycle of a ring-down changes its shape by up to {100 * change:.2g} %, so that the modes "
-            "exchange energy"
-        )
+    size = "as much as the mode itself"
+    if ratio < 1:
+        size = f"by up to {100 * ratio:.2g} % of its motion"
     return [
         f"The mode is coupled with the one of {name} (without the contact): a force at the output moves other modes "
-        f"{size}{shape}; a test reads the curve only if it isolates the mode."
+        f"{size}; a test reads the curve only if it isolates the mode."
     ]
+
+
+def _forced_mode_ratio(joint: JointMode, curve) -> np.ndarray:
+    """Return the ratio (k,) of the motion of other modes to that of the mode under a force at the output.
+
+    The force acts at the output and the friction at the contact, so each of them moves the other modes.
+    """
+    modes = joint.modes
+    square = (2 * np.pi * curve.frequency) ** 2
+    own = modes.output[joint.mode]
+    row = modes.interfaces[joint.face] if len(modes.interfaces) else modes.output
+    ratio = np.zeros(curve.amplitude.size)
+    for k, omega in enumerate(modes.omega):
+        if k == joint.mode or not own:
+            continue
+        participation = np.abs(modes.output[k] / own)
+        if row[joint.mode]:
+            participation += np.abs(row[k] / row[joint.mode])
+        distance = np.maximum(np.abs(omega**2 - square), ROUND_OFF_ERROR * square)
+        ratio += participation**2 * 2 * np.abs(curve.damping) * square / distance
+    return np.minimum(ratio, 1.0)

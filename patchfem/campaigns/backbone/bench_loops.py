@@ -58,7 +58,7 @@ def run_friction_loop(
     -------
     BenchLoop
     """
-    path = SlidePath("sine", slide, frequency, None, 0.0, cycles, None, None)
+    path = SlidePath("sine", slide, frequency, None, 0.0, cycles, None)
     contact = replace(decays.with_automatic_method(model), kind="bench", rig=None, slide=path)
     steps = steps_per_cycle(contact)
     return BenchLoop(bench.run_bench(contact, patch, steps), contact, steps)

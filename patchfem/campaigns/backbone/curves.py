@@ -16,13 +16,11 @@ from . import notes
 from .advice import write_advice
 from .balance import compute_balance_curve
 from .band import make_band
-from .decay import compute_decay_curve
 from .joint import JointMode, build_joint
 from .linear import compute_constant_curve
 from .quasi_static import compute_static_curve
 from .records import (
     AMPLITUDE_TOL,
-    DEFAULT_METHODS,
     METHODS,
     ROUND_OFF_ERROR,
     Answer,
@@ -35,12 +33,17 @@ from .records import (
 # Ratio of the smallest amplitude of gross slip to the amplitude at which the complete contact
 # begins to slip.
 MIN_GROSS_SLIP_RATIO = 3.0
+REMOVED_METHODS = {
+    "decay": 'was removed in patchfem 2.0; run a release with drive.kind = "free", whose result has frequency and damping '
+    "over the amplitude",
+    "all": "was removed in patchfem 2.0; leave it out: both methods are the default",
+}
 # Relative error of the flutter amplitude, smaller than the digits that are printed.
 FLUTTER_TOL = 1e-8
 
 
 def choose_methods(method: str | None) -> tuple:
-    """Return the methods of a given name or of "all"; the default ones for "" and None.
+    """Return the method of a given name; all methods for "" and None.
 
     Raises
     ------
@@ -48,12 +51,12 @@ def choose_methods(method: str | None) -> tuple:
         If no method has this name.
     """
     if not method:
-        return DEFAULT_METHODS
-    if method == "all":
         return METHODS
+    if method in REMOVED_METHODS:
+        raise PatchfemError(f"backbone: method {method!r} {REMOVED_METHODS[method]}")
     if method not in METHODS:
         raise PatchfemError(
-            f"backbone: method {method!r} does not exist; use one of {', '.join(METHODS)}, or 'all'"
+            f"backbone: method {method!r} does not exist; use one of {', '.join(METHODS)}"
         )
     return (method,)
 
@@ -82,7 +85,7 @@ def compute_backbone(
     methods : sequence of str
         From METHODS.
     progress : callable, optional
-        Takes the name of a method that begins, and a sentence about the time of a long decay.
+        Takes the name of a method that begins.
     errors : bool
         Whether the errors of the mesh, of the cells of a law and of missing modes are computed; the
         values are the same without them, in less than half the time. Without them there is no band.
@@ -116,21 +119,21 @@ def compute_backbone(
             if progress is not None:
                 progress(method)
             try:
-                curve = compute_curve(joint, amplitudes, method, progress)
+                curve = compute_curve(joint, amplitudes, method)
                 if richer is not None:
-                    richer_curve = compute_curve(richer, amplitudes, method, progress)
+                    richer_curve = compute_curve(richer, amplitudes, method)
                     curve = _widen_by_missing_modes(curve, richer_curve)
                 curves[method] = curve
             except (NotConverged, PatchfemError) as reason:
                 missing[method] = str(reason).removeprefix("backbone: ")
         answer = Answer()
         if errors:
-            band = make_band(joint, curves)
+            band = make_band(curves)
             answer = Answer(band, write_advice(joint, band, curves, missing))
     return _assemble_backbone(joint, amplitudes, curves, missing)._replace(answer=answer)
 
 
-def compute_curve(joint: JointMode, amplitudes, method: str, progress=None) -> Curve:
+def compute_curve(joint: JointMode, amplitudes, method: str) -> Curve:
     """Compute the frequency and damping curve of a mode by a given method.
 
     Parameters
@@ -140,8 +143,6 @@ def compute_curve(joint: JointMode, amplitudes, method: str, progress=None) -> C
         Increasing, at the output [m].
     method : str
         One of METHODS.
-    progress : callable, optional
-        Takes a sentence about the time of a long decay.
 
     Returns
     -------
@@ -153,9 +154,7 @@ def compute_curve(joint: JointMode, amplitudes, method: str, progress=None) -> C
         If there is no curve.
     """
     if joint.is_linear:
-        return compute_constant_curve(joint, amplitudes, method)
-    if method == "decay":
-        return compute_decay_curve(joint, amplitudes, progress)
+        return compute_constant_curve(joint, amplitudes)
     if method == "balance":
         return compute_balance_curve(joint, amplitudes)
     return compute_static_curve(joint, amplitudes)

@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import PatchfemError
-from ...dynamics.events.elements import CELL_MERGES, join_cells
 from ...dynamics.harmonic.forces import LawGroup
-from ...effects import describe_unsupported, law_has_trait
+from ...effects import law_has_trait
+from ...friction.cells import CELL_MERGES, join_cells
 from ...model.model import Model
 from ...response.errors import convergence_error
 from ...runs.joint import FreeRig, solve_without_joint
@@ -318,10 +318,6 @@ def build_joint(model: Model, name: str) -> JointMode:
         coarser = (*others, None)
     number = _find_mode(model.rig, name)
     modes = model.rig.modes
-    if modes.lateral_faces is not None:
-        lateral = [face for face in model.rig.friction.interfaces if face.lateral]
-        refusal = describe_unsupported("a backbone with interfaces that slide in a plane", "out")
-        raise PatchfemError(refusal, f"{lateral[0].key}.lateral")
     free_mode = StuckMode(None, np.eye(modes.omega.size)[number])
     joint = JointMode(
         model, patch, coarser, number, free_mode, np.zeros(len(modes.interfaces)), stiffer=stiffer

@@ -10,20 +10,11 @@ from .records import ROUND_OFF_ERROR, Curve, make_curve
 N_STEPS = 8
 
 
-def compute_constant_curve(joint: JointMode, amplitudes, method: str) -> Curve:
-    """Return frequency and damping of a mode of a linear rig, the same at all amplitudes.
+def compute_constant_curve(joint: JointMode, amplitudes) -> Curve:
+    """Return frequency and damping of a mode of a linear rig, the same at all amplitudes (k,) [m].
 
-    By decay, frequency and damping ratio are those of the damped mode. For the other methods, a
-    negative damping g of every coordinate maintains the motion: the frequency is that of this
-    motion, and the damping ratio is g/(2 omega).
-
-    Parameters
-    ----------
-    joint : JointMode
-    amplitudes : (k,) array
-        At the output [m].
-    method : str
-        One of METHODS.
+    A negative damping g of every coordinate maintains the motion: the frequency is that of this motion, and the damping
+    ratio is g/(2 omega).
     """
     negative_damping = 0.0
     for _ in range(N_STEPS):
@@ -33,9 +24,6 @@ def compute_constant_curve(joint: JointMode, amplitudes, method: str) -> Curve:
     if not (damped_root.imag and negative_damping < 2 * omega):
         raise NotConverged("the mode does not oscillate: its damping ratio is 1 or more")
     damping = negative_damping / (2 * omega)
-    if method == "decay":
-        omega = abs(damped_root.imag)
-        damping = -damped_root.real / abs(damped_root)
     values = np.outer([omega / (2 * np.pi), damping], np.ones(amplitudes.size))
     return make_curve(amplitudes, values, ROUND_OFF_ERROR * np.abs(values))
 

@@ -13,8 +13,6 @@ MAX_MICRO_SLIP_RATIO = 0.3
 # Smallest ratio of a loss to its error at which the loss is used to determine an exponent.
 MIN_LOSS_RATIO = 4.0
 MAX_LISTED_AMPLITUDES = 6  # Largest number of amplitudes that a sentence lists individually.
-# Smallest ratio of the motion of other modes to the amplitude that is reported.
-REPORT_OTHER_MODES = 1e-3
 # Smallest ratio of two values that is reported as a ratio and not as a percentage.
 MIN_REPORTED_RATIO = 2.0
 MISSING_ERRORS = (
@@ -24,15 +22,11 @@ REASONS_OF_GAPS = {
     "balance": "harmonic balance did not converge at these amplitudes; the curve may turn back to "
     "smaller amplitudes, or the mode may stop oscillating",
     "quasi-static": "the static curve does not reach these amplitudes",
-    "decay": "at these amplitudes the free decay, or a coarser decay computed as a check, gave no "
-    "frequency and damping, or the decay was no longer a motion of this mode alone",
 }
-REASONS_OF_DIFFERENCES = {
-    "decay": "a decay gives mean values over a cycle, and at this amplitude one cycle reduces the "
-    "amplitude by the fraction {:.2g}",
-    "quasi-static": "the static curve uses the secant stiffness between the turning points; "
-    "harmonic balance uses the first harmonic of the force",
-}
+REASON_OF_DIFFERENCE = (
+    "the static curve uses the secant stiffness between the turning points; harmonic balance uses the first harmonic of "
+    "the force"
+)
 
 
 def note_linear_rig(joint: JointMode) -> list:
@@ -128,38 +122,23 @@ def note_secant_stiffness(joint: JointMode, amplitudes, curves: dict) -> list:
 
 def note_differences(curves: dict) -> list:
     """Return a list of notes on curves that differ from harmonic balance by more than the errors of both."""
-    if "balance" not in curves:
+    if not {"balance", "quasi-static"} <= curves.keys():
         return []
-    balance = curves["balance"]
-    sentences = []
-    for method, reason in REASONS_OF_DIFFERENCES.items():
-        if method not in curves:
-            continue
-        here, there = match_amplitudes(curves[method], balance)
-        curve = curves[method].at(here)
-        other = balance.at(there)
-        for name in ("frequency", "damping"):
-            sentences += _note_largest_difference(method, name, curve, other, reason)
-    return sentences
+    here, there = match_amplitudes(curves["quasi-static"], curves["balance"])
+    static = curves["quasi-static"].at(here)
+    balance = curves["balance"].at(there)
+    return [
+        sentence
+        for name in ("frequency", "damping")
+        for sentence in _note_largest_difference(name, static, balance)
+    ]
 
 
-def _note_largest_difference(
-    method: str, name: str, curve: Curve, balance: Curve, reason: str
-) -> list:
-    """Return a list of notes on the largest difference between two curves at equal amplitudes.
-
-    Parameters
-    ----------
-    method : str
-        Method of the curve.
-    name : {"frequency", "damping"}
-    curve, balance : Curve
-    reason : str
-        Reason of the difference, a format string; {} stands for the fraction that a cycle loses.
-    """
-    value = getattr(curve, name)
+def _note_largest_difference(name: str, static: Curve, balance: Curve) -> list:
+    """Return a list of notes on the largest difference of "frequency" or "damping" between curves at equal amplitudes."""
+    value = getattr(static, name)
     balance_value = getattr(balance, name)
-    errors = getattr(curve, f"{name}_error") + getattr(balance, f"{name}_error")
+    errors = getattr(static, f"{name}_error") + getattr(balance, f"{name}_error")
     difference = np.abs(value - balance_value)
     relative = np.where(difference > errors, difference / np.abs(balance_value), 0.0)
     if not relative.size or not relative.max() > 0:
@@ -168,15 +147,8 @@ def _note_largest_difference(
     ratio = value[k] / balance_value[k]
     size = f"by {100 * relative[k]:.2g} %"
     if ratio >= MIN_REPORTED_RATIO:
-        size = f"where the value by {method} is {ratio:.2g} times the value by balance"
-    others = ""
-    if curve.other_modes is not None and curve.other_modes[k] > REPORT_OTHER_MODES:
-        others = (
-            "; the motion of other modes in the decay is "
-            f"{100 * curve.other_modes[k]:.2g} % of its amplitude"
-        )
-    lost_fraction = -np.expm1(-2 * np.pi * curve.damping[k])
+        size = f"where the value by quasi-static is {ratio:.2g} times the value by balance"
     return [
-        f"the values of {name} by {method} and by balance differ most at the amplitude "
-        f"{format_length(curve.amplitude[k], 3)}, {size}: {reason.format(lost_fraction)}{others}"
+        f"the values of {name} by quasi-static and by balance differ most at the amplitude "
+        f"{format_length(static.amplitude[k], 3)}, {size}: {REASON_OF_DIFFERENCE}"
     ]

@@ -4,9 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-METHODS = ("balance", "decay", "quasi-static")
-# Methods that are computed by default: the recommended one, and another that costs little beside it.
-DEFAULT_METHODS = ("balance", "quasi-static")
+METHODS = ("balance", "quasi-static")  # methods, the recommended one first
 ROUND_OFF_ERROR = 1e-9  # Relative round-off error of a computed value.
 AMPLITUDE_TOL = 1e-7  # Amplitudes with a smaller relative difference count as equal.
 COLUMNS = ("amplitude", "frequency", "frequency_error", "damping", "damping_error", "loss")
@@ -27,8 +25,6 @@ class Curve(NamedTuple):
         Energy that the contact dissipates per cycle [J]; NaN if it is not known.
     notes : tuple of str
         Sentences about the errors.
-    other_modes : (k,) array or None
-        For a decay, the motion of other modes / amplitude; NaN if it is not known.
     """
 
     amplitude: np.ndarray
@@ -38,13 +34,10 @@ class Curve(NamedTuple):
     damping_error: np.ndarray
     loss: np.ndarray
     notes: tuple = ()
-    other_modes: np.ndarray | None = None
 
     def at(self, points) -> "Curve":
         """Return the curve at selected points, given by bools (k,), indices or a slice."""
         columns = {name: getattr(self, name)[points] for name in COLUMNS}
-        if self.other_modes is not None:
-            columns["other_modes"] = self.other_modes[points]
         return self._replace(**columns)
 
     def interpolate(self, amplitudes) -> dict:

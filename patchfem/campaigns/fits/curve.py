@@ -407,8 +407,8 @@ def _note_different_methods(path, method: str, measured: MeasuredCurve) -> tuple
         f"the measured curve is compared with the curve by {method} at the same amplitudes, not "
         "with a computed decay; a decay gives mean values over a cycle, so the two differ most "
         f"where the damping is largest: at {amplitude} one cycle reduces the amplitude by "
-        f"{100 * amplitude_loss:.2g} %. The intervals do not contain this difference; `patchfem backbone "
-        "scene.fitted.toml` computes both curves",
+        f"{100 * amplitude_loss:.2g} %. The intervals do not contain this difference; a run of a release "
+        "computes the decay",
     )
 
 

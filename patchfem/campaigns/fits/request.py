@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 
 from ...core import PatchfemError
-from ...inputs.cells import read_text
+from ...inputs.cells import read_lines
 from ...inputs.measured import COLUMN_UNITS, TABLE_FORMAT
 from ...model.model import build
 from ...scene.scene import Scene
@@ -172,7 +172,7 @@ def choose_kind(scene: Scene, to: str) -> str:
     path = Path(to)
     if path.suffix.lower() != ".csv" or not path.is_file():
         return "rows"
-    head = read_text(path, "a measured table").split("\n", 1)[0]
+    head = read_lines(path, "a measured table")[0]
     names = (cell.partition("[")[0].strip().lower() for cell in head.split(","))
     columns = {name.removeprefix("decay_") for name in names}
     if columns & (UNITS.keys() - COLUMN_UNITS.keys()):

@@ -163,15 +163,14 @@ def choose_shared_meshes(work: WorkerData) -> WorkerData:
 
 
 def _find_min_chunk_size(work: WorkerData) -> int:
-    """Return the smallest number of cases per chunk for which a batch is efficient.
+    """Return the smallest number of cases per chunk, for which computing them together is efficient.
 
     The time of a smaller chunk does not predict the time of a large one.
     """
-    try:
-        batch = batches.choose_batch(_build_case_model(work, 0), len(work.cases))
-    except Exception:  # The run of the case reports its error.
+    model = _build_case_model(work, 0)
+    if work.keep is not None or not isinstance(model, Model):  # The run of the case reports its error.
         return 1
-    return batch.min_chunk_cases if work.keep is None and batch is not None else 1
+    return batches.MIN_CHUNK_CASES if batches.find_group(model, len(work.cases)).key else 1
 
 
 class ChunkQueue:

@@ -30,5 +30,4 @@ fastest rate)/2 pieces and one for each event.
 | which interfaces stick | `stick_kernels` |
 | motion of a piece, roots of polynomials | `series_kernels`, `search_kernels` |
 | a run with its histories | `histories` |
-| periodic motions and multipliers | `period`, `steady`, `stick_steady`, `orbits` |
 """

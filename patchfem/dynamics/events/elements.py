@@ -10,10 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import PatchfemError, frozen_array
+from ...friction.cells import join_cells
 
-# Coarser discretizations for the error estimate: number of adjacent cells that are merged, and
-# index of the first merged cell.
-CELL_MERGES = tuple((4, first_cell) for first_cell in range(4))
 # Largest relative difference of two yield displacements that are treated
 # as equal; it exceeds round-off.
 YIELD_TOL = 1e-14
@@ -129,42 +127,16 @@ def merge_elements(elements: Elements, count: int = 2, first: int = 0) -> Elemen
     -------
     Elements
     """
-    k = elements.stiffness
-    if not k.size:
+    if not elements.stiffness.size:
         return elements
-    n_last = k.size % 2
-    begins = np.r_[0, np.arange(first, k.size - n_last, count), [k.size - 1] * n_last]
-    begins = np.unique(begins).astype(int)
-    stiffness = np.add.reduceat(k, begins)
-    # The yield displacement of a merged element lies between those of its
-    # members, so the order is preserved.
-    yield_slide = np.add.reduceat(k * elements.yield_displacement, begins) / stiffness
+    stiffness, yield_slide = join_cells(
+        count, first, elements.stiffness, elements.yield_displacement
+    )
     return Elements(
         frozen_array(stiffness),
         frozen_array(yield_slide),
-        frozen_array(np.arange(begins.size), np.int64),
+        frozen_array(np.arange(stiffness.size), np.int64),
     )
-
-
-def join_cells(count: int, first: int, stiffness, yield_displacement) -> tuple:
-    """Return the stiffness [N/m] and yield displacement [m] of the merged friction elements.
-
-    See `merge_elements`.
-
-    Parameters
-    ----------
-    count, first : int
-        See `merge_elements`.
-    stiffness, yield_displacement : ndarray
-        (t,) of the elements, in increasing order of the yield slide.
-
-    Returns
-    -------
-    stiffness, yield_displacement : ndarray
-    """
-    elements = Elements(stiffness, yield_displacement, np.arange(stiffness.size))
-    merged = merge_elements(elements, count, first)
-    return merged.stiffness, merged.yield_displacement
 
 
 class ElementTable(NamedTuple):

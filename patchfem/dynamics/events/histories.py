@@ -18,6 +18,7 @@ from ...core import (
 from ...cost_model import PYTHON_READ_TIME_RATIO
 from ...structure.drive_sizes import choose_samples_per_cycle
 from ..cycles import SAMPLES_PER_CYCLE, choose_sample_times
+from ..event_list import DRIVE_CHANGE, MAX_EVENTS, RELEASE, REVERSAL, STOP, EventLog
 from .cost import estimate_cycle_time, estimate_sample_time
 from .elements import (
     element_stretches,
@@ -25,7 +26,6 @@ from .elements import (
     make_element_table,
     make_unstretched_memory,
 )
-from .event_list import DRIVE_CHANGE, MAX_EVENTS, RELEASE, REVERSAL, STOP, EventLog
 from .modal_system import (
     RunArrays,
     clear_workspace,

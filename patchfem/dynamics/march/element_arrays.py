@@ -7,16 +7,14 @@ import numpy as np
 
 
 class LinkRow(IntEnum):
-    """Row indices of `PortElements.links`: port, type, and partner in a plane for each element.
+    """Row indices of `PortElements.links`: port and type of each element.
 
     - PORT: port on which the element acts
     - IS_FRICTION: 1 for friction, 0 for a spring
-    - MATE: element of the other direction of a slide in a plane, otherwise the number of the element itself
     """
 
     PORT = 0
     IS_FRICTION = 1
-    MATE = 2
 
 
 class ElementRow(IntEnum):

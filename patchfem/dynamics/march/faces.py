@@ -50,10 +50,9 @@ def make_element_arrays(model, prop, modal_system, mass: float):
         num[k, : element.numbers.size] = element.numbers
         mem[k, : element.memory.size] = element.memory
         num[k, 0] = law_numbers[element.kernels or COULOMB_LAW]
-    links = np.zeros((3, e), np.int64)
+    links = np.zeros((len(LinkRow), e), np.int64)
     links[LinkRow.PORT] = [joint.port for joint in model.joints]
     links[LinkRow.IS_FRICTION] = [joint.potential is None for joint in model.joints]
-    links[LinkRow.MATE] = [k + joint.mate for k, joint in enumerate(model.joints)]
     state = np.zeros((len(ElementRow), e))
     scale = max(getattr(model, "scale", 0.0), TINY_FORCE)
     for k, element in enumerate(elements):

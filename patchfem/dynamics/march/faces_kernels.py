@@ -15,7 +15,6 @@ import numpy as np
 from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_INTERNAL
 from ...friction.laws import elastic_plastic_kernels as law
-from ...friction.laws import plane_kernels as plane
 from ...friction.laws.coulomb_kernels import solve_coulomb_step
 from ...friction.protocol_kernels import Reading
 from ..interfaces import element_kernels as contact
@@ -44,7 +43,6 @@ HAS_STOPS = parts.HAS_STOPS
 HAS_SLOPES = parts.HAS_SLOPES
 HAS_CONTACT = parts.HAS_CONTACT
 IS_COUPLED = parts.IS_COUPLED
-HAS_PLANES = parts.HAS_PLANES
 # Largest number of sweeps of the block descent over all elements; it has then failed.
 MAX_SWEEPS = 1000
 # Largest number of sweeps if stops and releases lie inside the step; the
@@ -276,8 +274,6 @@ def find_slide_by_others(element, port, elements):
 def solve_element(e, sweep, elements, dt):
     """Solve the step of one element under fixed forces of all others.
 
-    The first direction of an element in a plane is solved together with its second one.
-
     Parameters
     ----------
     e : int
@@ -295,12 +291,6 @@ def solve_element(e, sweep, elements, dt):
     int
         Number of iterations.
     """
-    if HAS_PLANES:
-        mate = elements.links[LinkRow.MATE, e]
-        if mate > e:
-            return solve_plane_element(e, sweep, elements)
-        if mate < e:
-            return 0.0, 0
     p = elements.links[LinkRow.PORT, e]
     beta = elements.compliances[ComplianceRow.SLIDE, p, p]
     state = elements.state
@@ -361,65 +351,6 @@ def find_force_change(force, last_force, free_force, e, elements):
     """
     tolerance = elements.state[ElementRow.FORCE_TOL, e] + ROUND_OFF * (free_force + abs(force))
     return abs(force - last_force) / tolerance
-
-
-@njit(error_model="numpy", **NJIT_INTERNAL)
-def solve_plane_element(e, sweep, elements):
-    """Solve the step of an element with slides in a plane, in both directions together.
-
-    Parameters and results are those of `solve_element`.
-
-    Parameters
-    ----------
-    e : int
-        Number of the element.
-    sweep : int
-        Number of the sweep, from 0.
-    elements : element_arrays.PortElements
-
-    Returns
-    -------
-    float
-    int
-    """
-    f = elements.links[LinkRow.MATE, e]
-    p = elements.links[LinkRow.PORT, e]
-    r = elements.links[LinkRow.PORT, f]
-    xx = elements.compliances[ComplianceRow.SLIDE, p, p]
-    xy = elements.compliances[ComplianceRow.SLIDE, p, r]
-    yy = elements.compliances[ComplianceRow.SLIDE, r, r]
-    x = (
-        elements.port[PortRow.FREE_SLIDE, p]
-        - find_slide_by_others(e, p, elements)
-        + xy * elements.state[ElementRow.FORCE, f]
-    )
-    y = (
-        elements.port[PortRow.FREE_SLIDE, r]
-        - find_slide_by_others(f, r, elements)
-        + xy * elements.state[ElementRow.FORCE, e]
-    )
-    dx = elements.state[ElementRow.INCREMENT, e]
-    dy = elements.state[ElementRow.INCREMENT, f]
-    if sweep == 0:
-        dx = extrapolate_increment(e, elements)
-        dy = extrapolate_increment(f, elements)
-    dx, dy, force_x, force_y, iterations = plane.solve_plane_step(
-        (x, y),
-        (xx, xy, yy),
-        (elements.num[e, 2], elements.num[e, 3]),
-        (elements.mem[e, 3], elements.mem[f, 3]),
-        (dx, dy),
-        FORCE_GOAL_FRACTION * elements.state[ElementRow.FORCE_TOL, e],
-    )
-    change = max(
-        find_force_change(force_x, elements.state[ElementRow.FORCE, e], abs(x) / xx, e, elements),
-        find_force_change(force_y, elements.state[ElementRow.FORCE, f], abs(y) / yy, e, elements),
-    )
-    elements.state[ElementRow.INCREMENT, e] = dx
-    elements.state[ElementRow.INCREMENT, f] = dy
-    elements.state[ElementRow.FORCE, e] = force_x
-    elements.state[ElementRow.FORCE, f] = force_y
-    return change if iterations >= 0 else np.inf, abs(iterations)
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
@@ -567,9 +498,7 @@ def accelerate_sweeps(sweep, max_change, last_max_change, schedule, modal_system
     if HAS_CONTACT:
         return schedule, 0
     elif HAS_SLOPES:
-        if HAS_PLANES:  # the force of an element in a plane has no potential
-            pass
-        elif elements.stops.names.size == 0 and modal_system.dense.size == 0:
+        if elements.stops.names.size == 0 and modal_system.dense.size == 0:
             return schedule, abs(together.solve_smooth(elements, modal_system.dt))
     if sweep >= schedule.next_turn and max_change > SLOW_CONVERGENCE_RATIO * last_max_change:
         together.take_newton_step(elements, modal_system.dt, False)
@@ -903,28 +832,16 @@ def commit_step(start, increment, system):
         )
         elements.contact[ContactIndex.INCREMENT] = increment
     for e in range(elements.links.shape[1]):
-        is_single = True
-        if HAS_PLANES:
-            mate = elements.links[LinkRow.MATE, e]
-            is_single = mate == e
-            if mate > e:
-                loss += plane.update_plane_memory(
-                    elements.num[e],
-                    elements.mem[e],
-                    elements.mem[mate],
-                    (state[ElementRow.INCREMENT, e], state[ElementRow.INCREMENT, mate]),
-                )
-        if is_single:
-            loss += law.update_memory(
-                elements.num[e],
-                elements.mem[e],
-                state[ElementRow.INCREMENT, e],
-                state[ElementRow.FORCE, e],
-                state[ElementRow.SPEED, e],
-                project_modes(elements.rows[elements.links[LinkRow.PORT, e]], rates),
-                start.dt,
-                state[ElementRow.BOND_LENGTH, e],
-            )
+        loss += law.update_memory(
+            elements.num[e],
+            elements.mem[e],
+            state[ElementRow.INCREMENT, e],
+            state[ElementRow.FORCE, e],
+            state[ElementRow.SPEED, e],
+            project_modes(elements.rows[elements.links[LinkRow.PORT, e]], rates),
+            start.dt,
+            state[ElementRow.BOND_LENGTH, e],
+        )
         state[ElementRow.INCREMENT_BEFORE, e] = state[ElementRow.LAST_INCREMENT, e]
         state[ElementRow.LAST_INCREMENT, e] = state[ElementRow.INCREMENT, e]
     return loss, has_room

@@ -47,7 +47,6 @@ def load_loop(
     *,
     has_contact: bool = True,
     is_coupled: bool = False,
-    has_planes: bool = False,
 ):
     """Load the compiled loop of a march, which has the functions `march` and `follow`.
 
@@ -63,8 +62,6 @@ def load_loop(
         Whether there is a contact.
     is_coupled : bool
         Whether there is more than one element or contact.
-    has_planes : bool
-        Whether an element slides in a plane.
 
     Returns
     -------
@@ -78,7 +75,6 @@ def load_loop(
         "HAS_SLOPES": {*laws} > {COULOMB_LAW} or COULOMB_LAW not in laws,
         "HAS_CONTACT": has_contact,
         "IS_COUPLED": is_coupled,
-        "HAS_PLANES": has_planes,
         "LOAD_VARIES": load != CONSTANT_LOAD,
         "HAS_POINTS": load == POINT_LOADS,
         "HAS_LISTS": kind[0] == SHEARED_LISTS_MODULE,
@@ -100,9 +96,7 @@ def load_loop(
                 "solver": compiled.instantiate(
                     "dynamics.interfaces.element_solve_kernels", {"law": law}
                 ),
-                "together": compiled.instantiate(
-                    f"{PACKAGE}.together_kernels", {"law": law, "parts": parts}
-                ),
+                "together": compiled.instantiate(f"{PACKAGE}.together_kernels", {"law": law}),
             },
         )
     if load != CONSTANT_LOAD:
@@ -140,7 +134,6 @@ def march(model, *arguments) -> tuple:
         has_contact=has_contact,
         # Several laws of elements are combined in one loop.
         is_coupled=len(model.joints) + has_contact > 1 or len(model.laws) > 1,
-        has_planes=any(joint.mate for joint in model.joints),
     )
     return loop.march(*arguments)
 

@@ -1,6 +1,6 @@
 """Models of interfaces and nonlinear springs that supplement or replace a patch."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -48,21 +48,6 @@ def _make_spring(port: int, numbers, potential) -> Joint:
     return Joint(port, Element(law, np.array(numbers), np.zeros(0), 0.0, 0.0, False), potential)
 
 
-def pair_plane_joints(joints, planes) -> list:
-    """Return the joints of interfaces (i,), and a second joint for each interface that slides in a plane.
-
-    The first directions act on the ports 0 to i - 1, the second directions on ports from i on; planes (i,) states
-    which interfaces slide in a plane.
-    """
-    count = len(joints)
-    second = [k for k, plane in enumerate(planes) if plane]
-    out = list(joints)
-    for at, k in enumerate(second, count):
-        out[k] = replace(joints[k], mate=at - k)
-        out.append(replace(joints[k], port=at, mate=k - at))
-    return out
-
-
 @dataclass(frozen=True, eq=False, slots=True)
 class JointsModel:
     """Model of friction elements and springs that supplement or replace a patch.
@@ -94,7 +79,7 @@ class JointsModel:
     def limit(self) -> float:
         """Sum of the friction limits of patch and joints [N]."""
         patch_limit = self.patch.limit if self.patch is not None else 0.0
-        return patch_limit + sum(joint.element.limit for joint in self.joints if joint.mate >= 0)
+        return patch_limit + sum(joint.element.limit for joint in self.joints)
 
     @property
     def length(self) -> float:

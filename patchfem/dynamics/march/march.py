@@ -63,9 +63,8 @@ def warm_up(modes: ModalBasis, drive: SineDrive, model: ContactModel, say=None) 
     runner = _get_run_class(model)
     kind = None
     if runner is Run:
-        slides_in_plane = any(joint.mate for joint in model.joints)
         is_damping_diagonal = modes.damping is None
-        kind = model.kind, model.laws, model.loading, is_damping_diagonal, slides_in_plane
+        kind = model.kind, model.laws, model.loading, is_damping_diagonal
     if kind not in _LOADED_KINDS:
         run = runner(modes, drive, model, 4, np.inf, load_instances(say))
         run.march_cycle(0, 0, [])

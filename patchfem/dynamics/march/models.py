@@ -47,14 +47,11 @@ class Joint:
     - `port`: number of the row of slides.
     - `element`: the law under its load.
     - `potential`: function of the slide [m] that returns the energy of a spring [J]; None for friction.
-    - `mate`: for an element that slides in a plane, the distance in the list to the joint of its second
-      direction, negative for that joint itself; 0 for all others.
     """
 
     port: int
     element: Element
     potential: Callable | None = None
-    mate: int = 0
 
 
 @dataclass(frozen=True, eq=False, slots=True)

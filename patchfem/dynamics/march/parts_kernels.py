@@ -9,7 +9,6 @@ HAS_STOPS = False  # whether some elements are set-valued
 HAS_SLOPES = False  # whether the force of some elements has a slope with respect to the slide
 HAS_CONTACT = True  # whether there is a contact on port 0; otherwise elements replace it
 IS_COUPLED = False  # whether there is more than one element or contact
-HAS_PLANES = False  # whether some elements slide in a plane, with two directions each
 LOAD_VARIES = False  # whether the normal load varies
 HAS_POINTS = False  # whether each point carries its own varying load
 HAS_LISTS = False  # whether the points have bond lists

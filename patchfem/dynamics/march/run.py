@@ -310,28 +310,22 @@ class Run:
     def _add_elements(self, response, rows) -> Response:
         """Add the relative displacements, forces and slips of the elements to the time histories.
 
-        `extra` gets slides, slide_rates, forces and slips (k, i) of the interfaces, spring_forces (k, s), and
-        for elements in a plane lateral_slides and so on (k, i), which are 0 for the other elements.
+        `extra` gets slides, slide_rates, forces and slips (k, i) of the interfaces, and spring_forces (k, s).
         """
         modes = self.modes
         faces = self.faces
         columns = self._element_columns(rows)
-        ports, is_friction, mates = faces.links
-        is_second = mates < np.arange(mates.size)
-        is_interface = (is_friction == 1) & ~is_second
+        ports, is_friction = faces.links
+        is_interface = is_friction == 1
         forces = columns[:, :, SampleColumn.FORCE]
         element_acceleration = -np.einsum("ke,en->kn", forces, faces.rows[ports]) / modes.mass
         if self.model.patch is None:
             # The histories already include the force of the first element.
             element_acceleration += np.outer(response.force, modes.slide) / modes.mass
-        extra = response.extra | {"spring_forces": forces[:, ~(is_interface | is_second)]}
+        extra = response.extra | {"spring_forces": forces[:, ~is_interface]}
         names = ("slides", "slide_rates", "forces", "slips")
         if is_interface.any():
             extra |= {name: columns[:, is_interface, k] for k, name in enumerate(names)}
-        for k, name in enumerate(names if is_second.any() else ()):
-            lateral = np.zeros((len(rows), is_interface.sum()))
-            lateral[:, mates[is_second]] = columns[:, is_second, k]
-            extra[f"lateral_{name}"] = lateral
         return replace(
             response,
             acceleration=response.acceleration + element_acceleration @ modes.output,

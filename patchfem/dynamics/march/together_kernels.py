@@ -12,13 +12,9 @@ import numpy as np
 from ...compiled.jit import njit
 from ...friction.flags_kernels import NJIT_INTERNAL
 from ...friction.laws import elastic_plastic_kernels as law
-from ...friction.laws import plane_kernels as plane
 from ..dense_kernels import factorise, solve_by_elimination, solve_factorised
-from . import parts_kernels as parts
 from .element_arrays import ComplianceRow, ElementRow, FaceRow, LinkRow, ModalRow, PortRow
 from .stops_kernels import SET_VALUED
-
-HAS_PLANES = parts.HAS_PLANES
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)
@@ -222,11 +218,6 @@ def write_force_equations(elements, dt, known):
                 )
             elements.system[e, e] += 1e-9 if holds else 1.0
             continue
-        if HAS_PLANES:
-            if elements.links[LinkRow.MATE, e] != e:
-                if elements.links[LinkRow.MATE, e] > e:
-                    write_plane_equations(e, elements.links[LinkRow.MATE, e], dq, elements)
-                continue
         force, slope = law.mean_force(
             elements.num[e],
             elements.mem[e],
@@ -239,41 +230,6 @@ def write_force_equations(elements, dt, known):
         for k in range(count):
             elements.system[e, k] = slope * beta[p, elements.links[LinkRow.PORT, k]]
         elements.system[e, e] += 1.0
-
-
-@njit(error_model="numpy", **NJIT_INTERNAL)
-def write_plane_equations(e, f, dx, elements):
-    """Write the two Newton equations of an element that slides in a plane.
-
-    Parameters
-    ----------
-    e : int
-        Number of the element.
-    f : int
-        Number of the element of its second direction.
-    dx : float
-        Increment of the slide of e [m].
-    elements : element_arrays.PortElements
-    """
-    force = elements.state[ElementRow.FORCE]
-    beta = elements.compliances[ComplianceRow.SLIDE]
-    p = elements.links[LinkRow.PORT, e]
-    r = elements.links[LinkRow.PORT, f]
-    dy = elements.port[PortRow.FREE_SLIDE, r]
-    for k in range(elements.links.shape[1]):
-        dy -= beta[r, elements.links[LinkRow.PORT, k]] * force[k]
-    slide = plane.advance_straight(
-        (elements.num[e, 2], elements.num[e, 3]), (elements.mem[e, 3], elements.mem[f, 3]), (dx, dy)
-    )
-    elements.state[ElementRow.RESIDUAL, e] = slide.mean_x - force[e]
-    elements.state[ElementRow.RESIDUAL, f] = slide.mean_y - force[f]
-    for k in range(elements.links.shape[1]):
-        one = beta[p, elements.links[LinkRow.PORT, k]]
-        other = beta[r, elements.links[LinkRow.PORT, k]]
-        elements.system[e, k] = slide.slope.xx * one + slide.slope.xy * other
-        elements.system[f, k] = slide.slope.yx * one + slide.slope.yy * other
-    elements.system[e, e] += 1.0
-    elements.system[f, f] += 1.0
 
 
 @njit(error_model="numpy", **NJIT_INTERNAL)

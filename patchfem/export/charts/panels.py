@@ -179,7 +179,7 @@ def _select(data: dict[str, Variable], chart: Chart) -> dict[str, Variable]:
     if chart.style == "line" and np.ptp(np.asarray(data[x_name].values, float)) == 0:
         return {}  # a single point, or a curve over another variable
     if chart.style == "map" and "frame_time" in data:
-        # the first frame is the pressed state, and the slip of the second one has no frame before it
+        # frame 0 is the pressed state; the slip rate of frame 1 would need an earlier frame of the motion
         motion = np.arange(2, data["frame_time"].values.size)
         data = {name: _take(variable, "frame", motion) for name, variable in data.items()}
     keep = _find_span(data, chart, x_name)

@@ -166,13 +166,6 @@ RUN = (
         caption="Last cycles: resultant of the frictional shear stress.",
     ),
     Chart(
-        "Friction force across the sliding direction",
-        "time",
-        ("lateral_force",),
-        span="cycles",
-        caption="Last cycles: second component of the friction force of an interface in a plane.",
-    ),
-    Chart(
         "Steady motions",
         "curve_frequency",
         ("curve_amplitude",),
@@ -498,8 +491,7 @@ COMPARE = (
         ("depth", "hidden_depth"),
         marks=("track_end",),
         labels=("", "worn depth"),
-        caption="Depth of the surface after wear below the one before. Band: 95 % noise of a single depth. Vertical "
-        "lines: ends of the worn parts.",
+        caption="Depth of the surface after wear below the one before. Vertical lines: ends of the worn parts.",
     ),
     Chart(
         "Both traces, each about its own line",

@@ -12,18 +12,18 @@ limit) or tanhDryFriction (limit, speed as eps). TMDSimPy takes one JenkinsForce
 its transpose as T. `structure.file` reads M, C, K, slide, output and base or force.
 """
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from ...core import Outcome, PatchfemError, SineDrive
 from ...disk.atomic_write import write_atomically
+from ...friction.cells import join_cells
 from ...model.model import Model
 from ...model.rig import MAX_TRAVEL
 from ...model.source import locate_errors
 from ...runs.patch import result as patch_result
-from ...runs.rig import costs, engines, event_driven, numerics
+from ...runs.rig import costs, engines, hybrid_laws, numerics
 from ...scene.rules import methods
 
 # ratio of the smallest to the largest singular value of the slides below which they are linearly dependent
@@ -141,7 +141,7 @@ def _refuse_unsupported(model: Model) -> None:
         features = engines.collect_motion_features(model, steady=True)
         reason = methods.find_unsupported_feature(SPEED_LAW_SUPPORT, features)
     else:
-        reason = engines.PIECES.find_unsupported_feature(model, steady=True)
+        reason = engines.find_obstacle_of_map("piecewise", model)
     if reason.startswith("for law"):
         raise PatchfemError(
             f"{reason.removeprefix('for ')} cannot be written as friction elements that stretch and slip; "
@@ -182,9 +182,17 @@ def make_elements(model: Model, basis: np.ndarray) -> dict[str, np.ndarray | str
         patch = patch_result.solve_with_coarser(model.patch, model.accuracy.tolerance)[0]
         if patch.pressure.outcome is Outcome.NO_CONTACT:
             raise PatchfemError("the pieces do not touch, so no friction acts", "contact")
-    settings = replace(numerics.choose_numerics(model), pairs=costs.count_cell_merges(model))
-    groups = event_driven.YieldingElements(model, settings, patch).groups
-    stiffness = np.concatenate([group.stiffness for group in groups])
-    yields = np.concatenate([group.yield_displacement for group in groups])
-    direction = np.repeat(rows, [group.stiffness.size for group in groups], axis=0)
+    settings = numerics.choose_numerics(model)
+    groups = [_sort_elements(*one) for one in hybrid_laws.list_elements(model, settings, patch)]
+    for _ in range(costs.count_cell_merges(model)):
+        groups = [join_cells(2, 0, *group) for group in groups]
+    stiffness, yields = (np.concatenate(parts) for parts in zip(*groups))
+    direction = np.repeat(rows, [group[0].size for group in groups], axis=0)
     return elements | {"limit": stiffness * yields, "stiffness": stiffness, "direction": direction}
+
+
+def _sort_elements(stiffness, yields) -> tuple[np.ndarray, np.ndarray]:
+    """Return stiffness [N/m] and yield displacement [m] of elements in increasing order, equal ones as one."""
+    is_used = (stiffness > 0) & (yields > 0)
+    steps, number = np.unique(yields[is_used], return_inverse=True)
+    return np.bincount(number, stiffness[is_used]), steps

@@ -22,15 +22,18 @@ CONFIDENCE = 0.9  # probability of the interval of a parameter of a single trace
 MAX_SIZE_RATIO = (
     1.001  # of lengths or steps of several files, above which their means mix quantities
 )
+MAX_FACTOR = (
+    2.0  # largest ratio of the end of an interval of a mean to the mean that says something
+)
 # parameters in the headline: those of a scan, of a trace with a cut-off, and of one without
 MAIN = (("Sa", "Sq", "Sz"), ("Ra", "Rq", "Rz"), ("Pa", "Pq", "Pt"))
 INTERVAL_NOTE = (
-    "Intervals of a single trace are 90 % intervals (5 to 95 %) of the mean over its sections, by Student's t from their "
-    "scatter."
+    "Intervals of a single trace are 90 % intervals (5 to 95 %) of the mean over its sections of one cut-off, by Student's "
+    "t from the scatter of their logarithms."
 )
 MEANS_NOTE = (
-    "Means have equal weights, and 95 % intervals by Student's t from the scatter of the files; an error that all files "
-    "share, such as calibration, is not included."
+    "Means have equal weights, and 95 % intervals by Student's t from the scatter of the files, where these determine the "
+    "mean within a factor of two; an error that all files share, such as calibration, is not included."
 )
 SIZES_NOTE = "The files differ in length or step, so that the means of extremes and slopes mix different quantities."
 TWICE_NOTE = "One file is given twice, so that it counts twice in the means."
@@ -67,15 +70,15 @@ def make_answer(reports: list[RoughnessReport]) -> Answer:
         if not members:
             continue
         values = {value.name: value for value in members[0].values}
-        of = ""
+        state = ""
         if len(members) > 1:
             averages = _average(members)
             caution = _find_caution(members)
             cautions += caution
             means.append(_means_to_dict(kind, len(members), averages, caution))
             values = {key: mean.mean for key, mean in averages.items()}
-            of = f"Mean of {len(members)} {name}: "
-        headlines.append(f"{of}{_state_main(values)}.")
+            state = f"Mean of {len(members)} {name}: "
+        headlines.append(f"{state}{_state_main(values, members)}.")
         quantities |= {key: sentences.to_answer(value) for key, value in values.items()}
 
     notes = [text for each in reports for text in each.notes]
@@ -96,14 +99,26 @@ def make_answer(reports: list[RoughnessReport]) -> Answer:
 
 
 def _average(members: list[RoughnessReport]) -> dict[str, Mean]:
-    """Return the means of the parameters that all files have; the interval comes from their scatter alone."""
+    """Return the means of the parameters that all files have; the interval comes from their scatter alone.
+
+    Student's t of the logarithm keeps the interval of a positive parameter above 0. An interval that is wider than
+    a factor of two either way, such as that of most pairs of files, is left out with the reason.
+    """
     means = {}
     for name in (value.name for value in members[0].values):
-        # only a skewness may be negative
-        low = None if name.endswith("sk") else 0.0
-        values = [each[name]._replace(low=low, high=None) for each in members]
-        if all(value.value is not None for value in values):
-            means[name] = average_quantities(values, values[0].text)
+        values = [each[name]._replace(low=None, high=None) for each in members]
+        if any(value.value is None for value in values):
+            continue
+        mean = average_quantities(values, values[0].text)
+        quantity = mean.mean
+        if not name.endswith("sk") and quantity.value > 0:
+            factor = float(np.exp(quantity.high / quantity.value - 1))
+            ends = (quantity.value / factor, quantity.value * factor)
+            if factor > MAX_FACTOR:
+                ends = (None, None)
+                quantity = quantity._replace(reason="few_files")
+            quantity = quantity._replace(low=ends[0], high=ends[1])
+        means[name] = mean._replace(mean=quantity)
     return means
 
 
@@ -124,12 +139,20 @@ def _means_to_dict(kind: str, count: int, means: dict[str, Mean], notes: list[st
     return content | {"measures": measures}
 
 
-def _state_main(values: dict[str, Quantity]) -> str:
-    """Return the main parameters as text."""
+def _state_main(values: dict[str, Quantity], members: list[RoughnessReport]) -> str:
+    """Return the main parameters as text; a mean without an interval has the range of the files."""
+    parts = []
     names = next(names for names in MAIN if names[0] in values)
-    return ", ".join(
-        f"{name} {sentences.format_value(name, values[name])}" for name in names if name in values
-    )
+    for name in names:
+        if name not in values:
+            continue
+        text = f"{name} {sentences.format_value(name, values[name])}"
+        if values[name].reason == "few_files":
+            found = [each[name].value for each in members]
+            ends = [sentences.format_rounded(end, "m", 3) for end in (min(found), max(found))]
+            text += f" ({ends[0]} to {ends[1]} in the files)"
+        parts.append(text)
+    return ", ".join(parts)
 
 
 def describe_treatment(each: RoughnessReport) -> str:
@@ -170,7 +193,7 @@ def report_to_dict(each: RoughnessReport) -> dict:
         "window": None if treatment.window is None else list(treatment.window),
         "form": treatment.form,
         "s_filter": treatment.short,
-        "confidence": CONFIDENCE,
+        "confidence": CONFIDENCE if any(value.low is not None for value in each.values) else None,
         "measures": sentences.to_json({value.name: value for value in each.values}),
         "notes": list(each.notes),
     }

@@ -23,9 +23,11 @@ VERDICTS = {
     "worn_and_grown": "Worn depth {mean}, the mean over {region}, and material grew: {lost} lost, {grown} grown.",
     "growth_at_ends": "Either a scar of {scar_depth} over nearly all of the surface, or {growth_height} of material that "
     "grew at the ends: both are possible.",
+    "scar_or_bow": "Either a scar over all of the surface, up to {scar_depth} deep on average, or a bent datum of the "
+    "instrument: both are possible.",
     "elsewhere": "Not comparable: the two surfaces have no part in common, and no unworn flanks of a track show a depth.",
     "no_datum": "No worn depth: the place is the same, but too few heights agree ({unworn} of all) to measure depths from.",
-    "mirror_finish": "Not comparable: the surface (rms height {rq}) is no rougher than the noise ({noise}).",
+    "mirror_finish": "Not comparable: the short waves of the surface (rms height {rq}) hardly exceed the noise ({noise}).",
     "identical": "No wear: both files hold the same heights; was the same file given twice?",
 }
 
@@ -34,16 +36,27 @@ ADVICE = {
     "no_wear": "A track over the middle third with unworn flanks is found from a mean depth of {detection_limit} on.",
     "elsewhere": "Measure the same place again, or across the whole track with unworn surface on both sides.",
     "no_datum": "Measure a longer part, so that more of the unworn surface is on both traces.",
-    "mirror_finish": "Mark the start of the traces on the part, and give the known shift of the second one.",
-    "growth_at_ends": "Traces that end on unworn surface on both sides would decide.",
+    "mirror_finish": "Measure with less noise; for traces, the start may be marked on the part and its shift given.",
+    "growth_at_ends": "Measurements that end on unworn surface on both sides would decide.",
+    "scar_or_bow": "Longer traces with unworn surface on both sides, or a datum that is known to be straight, would decide.",
+}
+
+# Headline and advice of scans where they differ; flanks are those of a track in a trace.
+SCANS = {
+    "elsewhere": (
+        "Not comparable: no part of the first scan is found in the second one.",
+        "Measure the same place again, with more of the unworn surface beside the track.",
+    )
 }
 
 # Sentences on findings: further sentences of the verdict, warnings, and notes.
 IN_VERDICT = {
     "no_old_surface_left": "From {from} to {to} nothing of the first surface is left; the depth is measured below "
     "the unworn flanks.",
-    "hidden_even_wear": "Even or wedge-shaped wear of both surfaces{limit} looks like a shift of the datum and is not in "
-    "these depths.",
+    "bow_subtracted": "A bow of {height} over the common length was subtracted, because a bent datum and wear of this shape "
+    "look alike; it would be a worn area of {area}.",
+    "hidden_even_wear": "Wear that is even or wedge-shaped over all of {region}{limit} looks like a shift or tilt of the "
+    "datum and is not in these depths.",
     "worn_tops": "Only the tops are lost; the valleys between them are those of the first surface.",
 }
 WARNINGS = {
@@ -60,8 +73,6 @@ NOTES = {
     "other_tracks": "{count} more tracks were found; compare.json lists them.",
     "track_cut": "The track leaves the common part, so that it may be wider than stated.",
     "deposits": "{amount} of material lie above the first surface: deposits or pile-up.",
-    "bow_subtracted": "A bow of {height} over the common length was subtracted, because a bent datum and wear of this shape "
-    "look alike; it would be a worn area of {area}.",
     "mirrored": "The second surface was measured in the opposite direction; it was mirrored, so that its x counts from "
     "the other end.",
     "turned": "The second scan is a replica: its heights were turned upside down.",
@@ -82,11 +93,14 @@ REASONS = {
     "identical": "both files hold the same heights",
     "no_datum": "too few heights agree to measure depths from",
     "growth_at_ends": "a scar and growth at the ends are both possible",
+    "scar_or_bow": "a scar and a bent datum are both possible",
     "flat": "the surface is flat",
     "undetermined": "the heights do not determine it",
     "holes": "missing heights prevent it",
     "band": "the surface is too short, or its step too long, for the waves of the band",
     "strips": "the patch is in strips",
+    "sections": "no interval from fewer than five sections",
+    "few_files": "no interval from so few files",
 }
 
 # SI units of the numbers of findings other than lengths; of areas between traces, and of volumes between scans
@@ -153,11 +167,14 @@ def describe(comparison: Comparison) -> Words:
     fields["region"] = describe_region(comparison)
     if is_known(values.get("worn_depth_mean")):
         fields["mean"] = format_value("worn_depth_mean", values["worn_depth_mean"])
-    verdict = [VERDICTS[code].format_map(fields)]
+    headline, advice = VERDICTS[code], ADVICE.get(code, "")
+    if comparison.is_areal:
+        headline, advice = SCANS.get(code, (headline, advice))
+    verdict = [headline.format_map(fields)]
     if code in ADVICE:
         # the limit of a track that would be found may be unknown
         if code != "no_wear" or numbers.get("detection_limit") is not None:
-            verdict.append(ADVICE[code].format_map(fields))
+            verdict.append(advice.format_map(fields))
     elif is_known(values.get("worn_depth_max")):
         verdict.append(_describe_loss(comparison))
     verdict += describe_waves(values.get("amplitude_ratio"))
@@ -165,6 +182,7 @@ def describe(comparison: Comparison) -> Words:
     warnings, notes = [], []
     for code, numbers in comparison.findings:
         fields = _format_numbers(numbers, comparison.is_areal)
+        fields["region"] = describe_region(comparison)
         if code in WARNINGS:
             warnings.append(WARNINGS[code].format_map(fields))
         elif code in NOTES:
@@ -221,7 +239,8 @@ def _format_numbers(numbers: dict, is_areal: bool) -> dict[str, str]:
             unit = "m3" if is_areal else "m2"
         if isinstance(number, float):
             # a ratio of lengths differs from 1 in its last digits
-            fields[name] = format_rounded(number, unit, digits=6 if unit == "1" else 4)
+            digits = 6 if name in ("scale", "low", "high") else 4
+            fields[name] = format_rounded(number, unit, digits)
         elif number is not None:
             fields[name] = str(number)
     fields["amount"] = fields.get("volume", fields["area"])

@@ -2,7 +2,7 @@
 
 In: bond parameters, relative displacement and pressure. Out: traction and energies. Read `parameters`, then
 `recursion`, which is exact for reading="stretch" with p = 1, then `quadrature`, the direct sum for every order and
-reading over the `strips` of a path. These are NumPy, along a line and in a plane alike.
+reading over the `strips` of a path. These are NumPy.
 
 Compiled, along a line: `point_kernels` has the recursion, `list_kernels` the sum as one list of strips. `engines`
 chooses between them by error and cost. `list_numbers` makes the arrays of a list, whose positions `list_rows_kernels`

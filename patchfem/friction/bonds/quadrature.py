@@ -1,8 +1,7 @@
-"""Direct sum over all bonds along the path of a point (eq. 2.17), on a line or in a plane.
+"""Direct sum over all bonds along the path of a point (eq. 2.17).
 
-Each step of the path leaves one straight strip of bonds, which formed under the mean pressure of the step (`strips`). In
-rigid sliding all points have the same path, so a strip has scalars of the path and one pressure per point. A line is a
-plane with one component: displacements, directions and tractions have d = 1 or 2 components.
+Each step of the path leaves one strip of bonds, which formed under the mean pressure of the step (`strips`). In
+rigid sliding all points have the same path, so a strip has scalars of the path and one pressure per point.
 
 The two readings of eq. 2.17 (`Bonds.reading`):
 
@@ -29,7 +28,7 @@ import numpy as np
 from ..protocol import Step
 from .list_numbers import cutoff_age
 from .parameters import Bonds, grow, growth_exponents, split_elastic
-from .recursion import BondState, length_and_direction, move_bonds, press_bonds, refuse_directions
+from .recursion import BondState, move_bonds, press_bonds
 from .strips import PathState, Strip, Strips, strip_weights, surviving_density
 
 N_POINTS = 5  # number of Gauss points in a panel of a step
@@ -46,17 +45,17 @@ class _DamagingPart(NamedTuple):
     """Part of a displacement increment in which bonds form and break.
 
     - length: its length [m]
-    - direction: its unit vector (d,)
+    - direction: its sign
     - play: play after the increment, as in `parameters.split_elastic`
     """
 
     length: float
-    direction: np.ndarray
+    direction: float
     play: float
 
 
 class _StepIntegrals(NamedTuple):
-    """Mean traction (d, m) [Pa] over an increment, and energy (m,) [J/m2] that damage dissipates."""
+    """Mean traction (m,) [Pa] over an increment, and energy (m,) [J/m2] that damage dissipates."""
 
     mean: np.ndarray
     dissipated: np.ndarray
@@ -80,39 +79,29 @@ class Quadrature:
     - law: parameters of the bonds
     - tail: largest fraction of the friction limit that the cut-off may leave out; 0 keeps every bond
 
-    Along a line increments are numbers and tractions (m,) [Pa]; in a plane they are (2,) and (2, m). Tractions are
-    positive against slip.
+    Tractions (m,) [Pa] are positive against slip.
     """
 
     law: Bonds
     tail: float = 1e-9
 
-    def initial_state(self, sigma, directions: int = 1) -> Strips:
+    def initial_state(self, sigma) -> Strips:
         """Return the initial state: unstretched and fully grown bonds of a given density.
 
         Parameters
         ----------
         sigma : (m,) array
             Pressure [Pa].
-        directions : int
-            Number d of directions.
 
         Returns
         -------
         Strips
-
-        Raises
-        ------
-        PatchfemError
-            If the law is not defined in two directions.
         """
-        refuse_directions(self.law, directions)
         zero = np.zeros(1)
         length = np.full(1, self.law.length)
-        position = np.zeros((1, directions))
         cohort = Strip(
-            end=PathState(position, zero, zero, zero, length),
-            direction=position,
+            end=PathState(zero, zero, zero, zero, length),
+            direction=zero,
             length=zero,
             bond_length=length,
             growth=zero,
@@ -121,7 +110,7 @@ class Quadrature:
         return Strips(
             strips=cohort,
             pressure=self.law.initial * np.array(sigma, float)[None],
-            now=PathState(np.zeros(directions), 0.0, 0.0, 0.0, self.law.length),
+            now=PathState(0.0, 0.0, 0.0, 0.0, self.law.length),
             first_active=np.zeros(len(sigma), np.int64),
         )
 
@@ -129,12 +118,12 @@ class Quadrature:
         """Advance the bonds by an increment; return mean traction and dissipated energy.
 
         The mean traction is exact for reading="stretch" and p = 1, and else comes from Gauss points. For
-        reading="stretch" its component along the increment comes from the energy balance, so no step creates energy.
+        reading="stretch" it comes from the energy balance, so no step creates energy.
 
         Parameters
         ----------
         state : Strips
-        dq : float or (2,) array
+        dq : float
             Increment [m].
         s0, s1 : (m,) array
             Pressures [Pa] at the ends.
@@ -145,7 +134,6 @@ class Quadrature:
         -------
         Step
         """
-        dq = np.atleast_1d(np.asarray(dq, float))
         after = self.advance(state, dq, s0, s1, dt)
         # Bonds that were lost have no pressure any more, so that all of a point act, or none.
         after = replace(
@@ -153,7 +141,7 @@ class Quadrature:
         )
         stored = self.stored_energy(state)
         energy_gain = self.stored_energy(after) - stored
-        if not dq.any():
+        if not dq:
             return Step(self.traction(after), -energy_gain, after)
         if self._has_moments:
             mean = self._mean_from_moments(state, dq, (s0 + s1) / 2, dt)
@@ -169,24 +157,18 @@ class Quadrature:
                 )
                 gain_before_loss = self.stored_energy(before_loss) - stored
             mean = self._mean_from_energy(state, gain_before_loss, dq, s0, s1, dt)
-        return Step(_drop_single_axis(mean), dq @ mean - energy_gain, after)
+        return Step(mean, dq * mean - energy_gain, after)
 
     def _mean_from_moments(self, state: Strips, dq, sigma, dt: float) -> np.ndarray:
-        """Compute the mean traction (d, m) [Pa] by the closed form in `recursion`."""
+        """Compute the mean traction (m,) [Pa] by the closed form in `recursion`."""
         middle = self._middle_length(state, dq, dt)
         bonds = BondState(self._moments(state), middle, state.play)
-        increment = dq[0] if len(dq) == 1 else dq
-        mean = move_bonds(self.law, bonds, increment, sigma, middle).mean
-        return self.law.static / self.law.length * np.reshape(mean, (len(dq), -1))
+        mean = move_bonds(self.law, bonds, dq, sigma, middle).mean
+        return self.law.static / self.law.length * mean
 
     def _mean_from_energy(self, state: Strips, energy_gain, dq, s0, s1, dt: float) -> np.ndarray:
-        """Compute the mean traction (d, m) [Pa] in an increment from the energy balance."""
-        mean, dissipated = self._integrate_step(state, dq, s0, s1, dt)
-        path, direction = length_and_direction(dq)
-        along = (dissipated + energy_gain) / path
-        if len(dq) == 1:
-            return direction[:, None] * along
-        return mean + direction[:, None] * (along - direction @ mean)
+        """Compute the mean traction (m,) [Pa] in an increment from the energy balance."""
+        return (self._integrate_step(state, dq, s0, s1, dt).dissipated + energy_gain) / dq
 
     def _integrate_step(self, state: Strips, dq, s0, s1, dt: float) -> _StepIntegrals:
         """Integrate traction and dissipation over an increment, divided into panels with Gauss points.
@@ -199,13 +181,12 @@ class Quadrature:
             panel_ends = np.array([0.0, 1.0])
         else:
             middle = self._middle_length(state, dq, dt)
-            path = length_and_direction(dq)[0]
+            path = abs(dq)
             damage = self._damaging_part(state, dq, middle).length / middle
             elastic = 1 - damage * middle / path
             panel_ends = np.unique(np.append(np.minimum(PANEL_ENDS, damage), damage))
         points, weights = _gauss_points(N_SHORT_POINTS if damage <= SHORT_STEP else N_POINTS)
-        mean = np.zeros((len(dq), len(s0)))
-        dissipated = np.zeros(len(s0))
+        mean, dissipated = np.zeros((2, len(s0)))
         for low, high in pairwise(panel_ends):
             for point, weight in zip(
                 (low + high + (high - low) * points) / 2, (high - low) / 2 * weights
@@ -220,7 +201,7 @@ class Quadrature:
                     forming=(s0 + s1) / 2,
                 )
                 sums = self.law.static * self._sums(point_state)
-                mean = mean + weight / damage * sums[:-1]
+                mean = mean + weight / damage * sums[0]
                 dissipated = dissipated + weight * sums[-1]
         return _StepIntegrals(mean, dissipated)
 
@@ -247,7 +228,7 @@ class Quadrature:
             release = self._release_by_moments if self._has_moments else self._release_last_formed
             kept_fraction, formed_pressure = release(after, s0, s1)
             now = state.now
-            cohort = Strip(now, np.zeros_like(now.displacement), 0.0, now.mature_length, 0.0, 0.0)
+            cohort = Strip(now, 0.0, 0.0, now.mature_length, 0.0, 0.0)
             pressure = np.vstack(
                 [state.pressure * kept_fraction, np.where(s1 > 0, formed_pressure, 0.0)]
             )
@@ -299,7 +280,7 @@ class Quadrature:
         return self.law.order == 1 and self.law.reading == "stretch"
 
     def _moments(self, state: Strips) -> np.ndarray:
-        """Return the moments m, z and s2 of `recursion` as an array (d + 2, m)."""
+        """Return the moments m, z and s2 of `recursion` as an array (3, m)."""
         moments = self._sums(state) * self.law.length
         moments[-1] *= 2
         return np.vstack([_sum_strips(state, surviving_density(state)[:, None]), moments])
@@ -322,8 +303,7 @@ class Quadrature:
         """
         law = self.law
         now = state.now
-        dq = np.atleast_1d(np.asarray(dq, float))
-        path = length_and_direction(dq)[0]
+        path = abs(dq)
         speed = path / dt if dt > 0 else 0.0
         middle = self._middle_length(state, dq, dt)
         part = self._damaging_part(state, dq, middle)
@@ -350,14 +330,12 @@ class Quadrature:
 
     def _damaging_part(self, state: Strips, dq, middle: float) -> _DamagingPart:
         """Return the part of an increment in which bonds form and break, for a bond length [m]."""
-        if len(dq) > 1:
-            return _DamagingPart(*length_and_direction(dq), state.play)
-        _, damaging, play = split_elastic(self.law, state.play, float(dq[0]), middle)
-        return _DamagingPart(abs(damaging), np.sign([damaging]), play)
+        _, damaging, play = split_elastic(self.law, state.play, float(dq), middle)
+        return _DamagingPart(abs(damaging), np.sign(damaging), play)
 
     def _middle_length(self, state: Strips, dq, dt: float) -> float:
         """Return the bond length [m] in the middle of an increment, which is assigned to new bonds."""
-        half = length_and_direction(dq)[0] / 2
+        half = abs(dq) / 2
         speed = 2 * half / dt if dt > 0 else 0.0
         return grow(self.law, state.now.mature_length, speed, speed, half, dt / 2)
 
@@ -383,19 +361,19 @@ class Quadrature:
         )
 
     def weights(self, state: Strips) -> np.ndarray:
-        """Return the signed force [1] and the stored energy [m] of each strip, (k, d + 1).
+        """Return the signed force [1] and the stored energy [m] of each strip, (k, 2).
 
         The traction is mu_s times the sum of force times pressure, and so is the stored energy per area.
         """
         return strip_weights(state, self.law)
 
     def _sums(self, state: Strips) -> np.ndarray:
-        """Return traction / mu_s [Pa] and stored energy / mu_s [J/m2] as an array (d + 1, m)."""
+        """Return traction / mu_s [Pa] and stored energy / mu_s [J/m2] as an array (2, m)."""
         return _sum_law(state, self.law)
 
     def traction(self, state: Strips) -> np.ndarray:
-        """Return the traction [Pa], positive against slip: (m,) on a line, (2, m) in a plane."""
-        return self.law.static * _drop_single_axis(self._sums(state)[:-1])
+        """Return the traction (m,) [Pa], positive against slip."""
+        return self.law.static * self._sums(state)[0]
 
     def stored_energy(self, state: Strips) -> np.ndarray:
         """Return the elastic energy per area (m,) [J/m2] with the present damage of the bonds."""
@@ -425,8 +403,3 @@ def _sum_strips(state: Strips, weights) -> np.ndarray:
     if ((state.first_active > 0) & (state.first_active < count)).any():
         return weights.T @ _active_pressure(state)
     return (weights.T @ state.pressure) * (state.first_active < count)
-
-
-def _drop_single_axis(vectors):
-    """Return vectors (d, m) as an array (m,) if d = 1 (motion on a line), and unchanged if d = 2."""
-    return vectors[0] if len(vectors) == 1 else vectors

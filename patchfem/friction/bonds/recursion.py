@@ -1,20 +1,19 @@
-"""Bond law for friction.reading = "stretch" and p = 1, summed exactly by its moments, on a line or in a plane.
+"""Bond law for friction.reading = "stretch" and p = 1, summed exactly by its moments.
 
 With k = exp(-int dR/eps) the surviving fraction of a bond, u its stretch and 1/eps frozen when it forms, the sums over
 all bonds
 
     m = sum sigma k dL/eps,   z = sum sigma k u dL/eps,   s2 = sum sigma k u^2 dL/eps        [Pa, Pa m, Pa m2]
 
-obey, per unit of path in the direction e, m' = (sigma - m)/eps, z' = m e - z/eps, s2' = 2 z.e - s2/eps; the traction is
-mu_s z/eps_0. A step is exact for a bond length that is constant in it. Stored energy mu_s s2/(2 eps_0) and dissipation
-mu_s s2/(2 eps_0 eps) per path are never negative: passive for every path, pressure and bond length, and for every part
-of the path that is counted as damaging.
+obey, per unit of path in the direction e = +-1, m' = (sigma - m)/eps, z' = m e - z/eps, s2' = 2 z e - s2/eps; the
+traction is mu_s z/eps_0. A step is exact for a bond length that is constant in it. Stored energy mu_s s2/(2 eps_0) and
+dissipation mu_s s2/(2 eps_0 eps) per path are never negative: passive for every path, pressure and bond length, and for
+every part of the path that is counted as damaging.
 
-Directions. A line is a plane with one component: u and z are vectors of d = 1 or 2 components, the part of z along the
-increment steps as on a line and the part across it decays. Bonds are arrays (d + 2, m) of m, the components of z, s2.
+Bonds are arrays (3, m) of m, z and s2.
 
-Breakaway (on a line). The path counts only where the displacement moves its elastic range along
-(`parameters.split_elastic`); inside it z' = m e and s2' = 2 z.e. With a fraction b of the bond length, an oscillation of
+Breakaway. The path counts only where the displacement moves its elastic range along
+(`parameters.split_elastic`); inside it z' = m e and s2' = 2 z e. With a fraction b of the bond length, an oscillation of
 the force by less than 2 b mu_s sigma from end to end drifts in its first cycle only; b = 0 is Dahl's law, and b -> 1
 the elastic-plastic one.
 
@@ -31,8 +30,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import PatchfemError
-from ...effects import describe_unsupported
 from ..protocol import Step
 from .parameters import Bonds, grow, split_elastic
 
@@ -46,7 +43,7 @@ MIN_DIVISOR = 1e-300  # smallest divisor; it keeps quotients finite where no bon
 class BondState(NamedTuple):
     """State of the bonds at all points.
 
-    - bonds: m [Pa], the components of z [Pa m] and s2 [Pa m2], (d + 2, m)
+    - bonds: m [Pa], z [Pa m] and s2 [Pa m2], (3, m)
     - eps: bond length [m], common or per point (m,)
     - play: position in the elastic range [1], see `parameters.split_elastic`
     """
@@ -90,7 +87,7 @@ class LineIncrement(NamedTuple):
 
 
 class BondIncrement(NamedTuple):
-    """Displacement increment on a line or in a plane: as in `LineIncrement`, and the play after it."""
+    """Displacement increment: as in `LineIncrement`, and the play after it."""
 
     bonds: np.ndarray
     mean: np.ndarray
@@ -120,14 +117,6 @@ def integrate_powers(x, decay) -> PowerIntegrals:
     cubic = np.where(x < MAX_POWER_SERIES_PATH, x**4 * series, closed)
     second = (cubic + x**3 * decay) / 3
     return PowerIntegrals((second + x * x * decay) / 2, second, x * second - cubic)
-
-
-def length_and_direction(increment) -> tuple:
-    """Return the length [m] and unit vector (d,) of an increment (d,) [m]; the vector is 0 if the length is 0."""
-    path = float(abs(increment[0]) if len(increment) == 1 else np.hypot(*increment))
-    if path > 0:
-        return path, np.asarray(increment, float) / path
-    return path, np.zeros(len(increment))
 
 
 def advance_bonds(bonds, increment, sigma, eps) -> LineIncrement:
@@ -178,17 +167,14 @@ def stretch_bonds(bonds, increment):
 
 
 def move_bonds(law: Bonds, state: BondState, increment, sigma, eps) -> BondIncrement:
-    """Advance the bonds by an increment along a line or in a plane.
-
-    Along a line the elastic range of the law comes first. In a plane the part of z along the increment moves as on a
-    line, and the part across it decays.
+    """Advance the bonds by an increment; the elastic range of the law comes first.
 
     Parameters
     ----------
     law : Bonds
     state : BondState
         Bonds before; its bond length is not used.
-    increment : float or (2,) array
+    increment : float
         Increment [m].
     sigma : (m,) array
         Pressure [Pa] under which the new bonds form.
@@ -198,27 +184,16 @@ def move_bonds(law: Bonds, state: BondState, increment, sigma, eps) -> BondIncre
     Returns
     -------
     BondIncrement
-        Its mean is (m,) along a line and (2, m) in a plane.
     """
     bonds = state.bonds
-    if len(bonds) == 3:
-        elastic, damaging, play = split_elastic(law, state.play, increment, eps)
-        stretched = stretch_bonds(bonds, elastic)
-        line_increment = advance_bonds(stretched, damaging, sigma, eps)
-        mean = line_increment.mean
-        if np.any(elastic):
-            elastic_mean = (bonds[1] + stretched[1]) / 2
-            mean = elastic / increment * elastic_mean + damaging / increment * mean
-        return BondIncrement(line_increment.bonds, mean, line_increment.damage_integral, play)
-    path, unit = length_and_direction(increment)
-    along = unit @ bonds[1:3]
-    across = bonds[1:3] - unit[:, None] * along
-    f1, _, decay = shape_functions(path / eps)
-    line_increment = advance_bonds(np.stack([bonds[0], along, bonds[3]]), path, sigma, eps)
-    z = unit[:, None] * line_increment.bonds[1] + across * decay
-    after = np.stack([line_increment.bonds[0], *z, line_increment.bonds[2]])
-    mean = unit[:, None] * line_increment.mean + across * f1
-    return BondIncrement(after, mean, line_increment.damage_integral, state.play)
+    elastic, damaging, play = split_elastic(law, state.play, increment, eps)
+    stretched = stretch_bonds(bonds, elastic)
+    line_increment = advance_bonds(stretched, damaging, sigma, eps)
+    mean = line_increment.mean
+    if np.any(elastic):
+        elastic_mean = (bonds[1] + stretched[1]) / 2
+        mean = elastic / increment * elastic_mean + damaging / increment * mean
+    return BondIncrement(line_increment.bonds, mean, line_increment.damage_integral, play)
 
 
 def press_bonds(law: Bonds, bonds, s0, s1):
@@ -253,31 +228,21 @@ def press_bonds(law: Bonds, bonds, s0, s1):
     return np.stack([density, z * factor, s2 * factor])
 
 
-def refuse_directions(law: Bonds, directions: int) -> None:
-    """Raise PatchfemError if a law with breakaway is used in a plane, where it is not defined."""
-    if directions > 1 and law.breakaway:
-        raise PatchfemError(describe_unsupported("breakaway in two directions", "elastic range"))
-
-
 @dataclass(frozen=True, slots=True)
 class FirstOrderBonds:
     """Bonds of order p = 1 for friction.reading = "stretch", updated incrementally.
 
     The pressure may vary within an increment and from one increment to the next.
 
-    Along a line increments are numbers and tractions (m,) [Pa]; in a plane they are (2,) and (2, m), positive against
-    slip. If the rates of growth of `law` are arrays (m,), every point has a bond length of its own.
+    Tractions (m,) [Pa] are positive against slip. If the rates of growth of `law` are arrays (m,), every point has a bond
+    length of its own.
     """
 
     law: Bonds
 
-    def initial_state(self, sigma, directions: int = 1) -> BondState:
-        """Return unstressed bonds of density m_0 under a pressure (m,) [Pa].
-
-        PatchfemError is raised for a law that is not defined in two directions.
-        """
-        refuse_directions(self.law, directions)
-        bonds = np.zeros((2 + directions, np.size(sigma)))
+    def initial_state(self, sigma) -> BondState:
+        """Return unstressed bonds of density m_0 under a pressure (m,) [Pa]."""
+        bonds = np.zeros((3, np.size(sigma)))
         bonds[0] = self.law.initial * sigma
         return BondState(bonds, self.law.length)
 
@@ -289,8 +254,8 @@ class FirstOrderBonds:
         Parameters
         ----------
         state : BondState
-        dq : float or (2,) array
-            Straight increment [m].
+        dq : float
+            Increment [m].
         s0, s1 : (m,) array
             Pressures at the ends [Pa].
         dt : float
@@ -301,7 +266,7 @@ class FirstOrderBonds:
         Step
         """
         law = self.law
-        path = length_and_direction(np.atleast_1d(dq))[0]
+        path = abs(dq)
         speed = path / dt if dt > 0 else 0.0
         middle = grow(law, state.eps, speed, speed, path / 2, dt / 2)
         bond_increment = move_bonds(law, state, dq, (s0 + s1) / 2, middle)
@@ -339,9 +304,8 @@ class FirstOrderBonds:
         return Step(scale * bonds[1], released, state._replace(bonds=bonds))
 
     def traction(self, state: BondState):
-        """Return the traction mu_s z/eps_0 [Pa], positive against slip: (m,) on a line, (2, m) in a plane."""
-        z = state.bonds[1] if len(state.bonds) == 3 else state.bonds[1:-1]
-        return self.law.static / self.law.length * z
+        """Return the traction mu_s z/eps_0 (m,) [Pa], positive against slip."""
+        return self.law.static / self.law.length * state.bonds[1]
 
     def stored_energy(self, state: BondState):
         """Return the elastic energy per area mu_s s2/(2 eps_0) (m,) [J/m2]."""

@@ -1,8 +1,8 @@
-"""Force and stored energy of straight strips of bonds (eq. 2.17), on a line or in a plane.
+"""Force and stored energy of straight strips of bonds (eq. 2.17).
 
-A step of the path is straight, and the bonds that form on it are a strip. At a distance y from the end of a strip with
-the direction e, a bond has the stretch u = a + y e and the path R = R_end + y since it formed; a and R_end are those of
-a bond at the end of the strip. Per mu_s sigma_n the strip carries the sum over y of
+The bonds that form in a step of the path are a strip. At a distance y from the end of a strip with the direction
+e = +-1, a bond has the stretch u = a + y e and the path R = R_end + y since it formed; a and R_end are those of a bond at
+the end of the strip. Per mu_s sigma_n the strip carries the sum over y of
 
     (|u|/eps)^p exp(-D) u/|u| dy/(eps_0 Gamma(p + 1))        reading="stretch", D the damage since the bond formed
     (R/eps)^p exp(-R/eps) u/|u| dy/(eps_0 Gamma(p + 1))      reading="report", eq. 2.14
@@ -10,14 +10,13 @@ a bond at the end of the strip. Per mu_s sigma_n the strip carries the sum over 
 with the path element dy > 0 in place of the signed dX1 of the report. These integrals are evaluated
 
 - in closed form for reading="stretch" and p = 1, for any history of the bond length;
-- in closed form, by the incomplete gamma function, for reading="report" at a constant bond length if u is along the
-  strip;
+- in closed form, by the incomplete gamma function, for reading="report" at a constant bond length;
 - otherwise by Gauss points on pieces of the strip.
 
 A piece is at most a quarter of a bond length long, and not longer than its distance from any point at which the
-integrand is not smooth: |u|^p for a fractional p (reading="stretch"), the direction u/|u| off the line of the strip, and
-R^p for a fractional p (reading="report"). No piece contains u = 0. Where the integrand grows as |u|^p or R^p from an end
-of a piece, this power is the weight of the Gauss rule.
+integrand is not smooth: |u|^p for a fractional p (reading="stretch"), and R^p for a fractional p (reading="report"). No
+piece contains u = 0. Where the integrand grows as |u|^p or R^p from an end of a piece, this power is the weight of the
+Gauss rule.
 """
 
 from dataclasses import dataclass
@@ -45,9 +44,9 @@ MIN_POSITIVE = 1e-300  # smallest argument of a logarithm and smallest divisor
 
 
 class PathState(NamedTuple):
-    """State of the path at one point (scalars and (d,) vectors) or at k points ((k,) and (k, d) arrays).
+    """State of the path at one point (scalars) or at k points (arrays (k,)).
 
-    - displacement: relative displacement [m] along the d = 1 or 2 directions
+    - displacement: relative displacement [m]
     - path: total path [m]
     - damage: damage D, the integral of dR/eps along the path
     - growth: growth J, the exponent by which bonds approach their target length (eq. 2.10)
@@ -62,10 +61,10 @@ class PathState(NamedTuple):
 
 
 class Strip(NamedTuple):
-    """Straight strip of bonds, or k strips as arrays whose first axis has length k.
+    """Strip of bonds, or k strips as arrays (k,).
 
     - end: state of the path at the end of the strip
-    - direction, length: unit vector (d,) and length [m]
+    - direction, length: sign of its direction, and length [m]
     - bond_length: bond length eps [m] when the bonds formed
     - growth, mature_gain: growth J, and change [m] of the mature length, while the strip formed
 
@@ -110,13 +109,6 @@ class Strips:
     first_active: np.ndarray
     n_dropped: int = 0
     play: float = 0.0
-
-
-class _StretchComponents(NamedTuple):
-    """Bond stretch at the end of strips (k,) [m]: component along the strip, distance from its line."""
-
-    along: np.ndarray
-    across: np.ndarray
 
 
 class _StripParts(NamedTuple):
@@ -187,11 +179,11 @@ def strip_weights(state: Strips, law: Bonds) -> np.ndarray:
 
     Returns
     -------
-    (k, d + 1) array
-        Signed force [1] along each of the d directions, then stored energy [m].
+    (k, 2) array
+        Signed force [1], then stored energy [m].
     """
     strips = state.strips
-    weights = np.empty((len(strips.length), strips.direction.shape[1] + 1))
+    weights = np.empty((len(strips.length), 2))
     is_cohort = strips.length == 0
     weights[is_cohort] = _cohort_weights(strips.select(is_cohort), state.now, law)
     index = np.flatnonzero(~is_cohort)
@@ -199,27 +191,15 @@ def strip_weights(state: Strips, law: Bonds) -> np.ndarray:
         weights[index] = _linear_weights(strips.select(index), state.now, law)
         return weights
     if law.reading == "report" and not law.has_growth:
-        is_straight = _resolve_stretch(strips.select(index), state.now).across == 0
-        straight = index[is_straight]
-        weights[straight] = _report_weights(strips.select(straight), state.now, law)
-        index = index[~is_straight]
-    if index.size:
+        weights[index] = _report_weights(strips.select(index), state.now, law)
+    elif index.size:
         weights[index] = _gauss_weights(strips.select(index), state.now, law)
     return weights
 
 
-def _vector_norms(vectors) -> np.ndarray:
-    """Return the norms (...) of vectors (..., d)."""
-    if vectors.shape[-1] == 1:
-        return np.abs(vectors[..., 0])
-    return np.sqrt((vectors * vectors).sum(axis=-1))
-
-
-def _resolve_stretch(strips: Strip, path_state: PathState) -> _StretchComponents:
-    """Resolve the stretch of bonds at the end of strips into the components along and across them."""
-    stretch = path_state.displacement - strips.end.displacement
-    along = (stretch * strips.direction).sum(axis=1)
-    return _StretchComponents(along, _vector_norms(stretch - strips.direction * along[:, None]))
+def _stretch_along(strips: Strip, path_state: PathState) -> np.ndarray:
+    """Return the stretch (k,) [m] of the bonds at the end of strips, positive along the strip."""
+    return (path_state.displacement - strips.end.displacement) * strips.direction
 
 
 def _weight_function(law: Bonds, x, damage) -> np.ndarray:
@@ -236,7 +216,7 @@ def _work_to_energy_ratio(law: Bonds) -> float:
 def _cohort_weights(cohorts: Strip, path_state: PathState, law: Bonds) -> np.ndarray:
     """Return force and energy of bonds formed together: (|u|/eps_0)^p exp(-D) or phi(R/eps_0), along u."""
     stretch = path_state.displacement - cohorts.end.displacement
-    size = _vector_norms(stretch)
+    size = np.abs(stretch)
     path = path_state.path - cohorts.end.path
     if law.reading == "stretch":
         force = _weight_function(law, size / law.length, path_state.damage - cohorts.end.damage)
@@ -244,8 +224,7 @@ def _cohort_weights(cohorts: Strip, path_state: PathState, law: Bonds) -> np.nda
         force = _weight_function(law, path / law.length, path / law.length)
     # The force jumps where the stretch changes sign; the mean of both sides is 0.
     force = np.where(size <= UNSTRESSED_TOL * path, 0.0, force)
-    unit = stretch / np.where(size > 0, size, 1.0)[:, None]
-    return np.column_stack([force[:, None] * unit, force * size / _work_to_energy_ratio(law)])
+    return np.column_stack([force * np.sign(stretch), force * size / _work_to_energy_ratio(law)])
 
 
 def _linear_weights(strips: Strip, path_state: PathState, law: Bonds) -> np.ndarray:
@@ -259,22 +238,18 @@ def _linear_weights(strips: Strip, path_state: PathState, law: Bonds) -> np.ndar
     first = 1 - decay * (1 + x)
     second = 2 - decay * (x * x + 2 * x + 2)
     remaining = np.exp(-(path_state.damage - strips.end.damage))
-    along = (stretch * strips.direction).sum(axis=1)
-    square = (stretch * stretch).sum(axis=1)
-    force = stretch * zeroth[:, None] + strips.direction * (eps * first)[:, None]
-    energy = square * zeroth + 2 * along * eps * first + eps**2 * second
-    return np.column_stack(
-        [remaining[:, None] * force / law.length, remaining * energy / (2 * law.length)]
-    )
+    force = stretch * zeroth + strips.direction * eps * first
+    energy = stretch**2 * zeroth + 2 * stretch * strips.direction * eps * first + eps**2 * second
+    return np.column_stack([remaining * force / law.length, remaining * energy / (2 * law.length)])
 
 
 def _report_weights(strips: Strip, path_state: PathState, law: Bonds) -> np.ndarray:
     """Integrate over strips in closed form for friction.reading = "report" and a constant bond length.
 
-    The stretch is along the strips. The integrals are differences of P(p + 1, R/eps) and P(p + 2, R/eps), the
+    The integrals are differences of P(p + 1, R/eps) and P(p + 2, R/eps), the
     regularised lower incomplete gamma function, on both sides of u = 0.
     """
-    along = _resolve_stretch(strips, path_state).along
+    along = _stretch_along(strips, path_state)
     path = path_state.path - strips.end.path
     cut = np.clip(-along, 0.0, strips.length)
     borders = [np.maximum(path + y, 0) / law.length for y in (0.0, cut, strips.length)]
@@ -285,7 +260,7 @@ def _report_weights(strips: Strip, path_state: PathState, law: Bonds) -> np.ndar
     signed = p_end - p_cut + (p_start - p_cut)
     moment = q_end - q_cut + (q_start - q_cut)
     energy = (along - path) * signed + moment
-    return np.column_stack([strips.direction * signed[:, None], energy])
+    return np.column_stack([strips.direction * signed, energy])
 
 
 def _gauss_weights(strips: Strip, path_state: PathState, law: Bonds) -> np.ndarray:
@@ -309,8 +284,8 @@ def _sum_points(strips: Strip, path_state: PathState, distance, weight, law: Bon
     distance: distance (n, points) [m] of the points from the end of their strip; weight (n, points) [m].
     """
     at_end = (path_state.displacement - strips.end.displacement)[:, None]
-    stretch = at_end + distance[..., None] * strips.direction[:, None]
-    size = _vector_norms(stretch)
+    stretch = at_end + distance * strips.direction[:, None]
+    size = np.abs(stretch)
     if law.reading == "stretch":
         eps = strips.bond_length[:, None]
         x = size / eps
@@ -321,9 +296,8 @@ def _sum_points(strips: Strip, path_state: PathState, distance, weight, law: Bon
         damage = x
     with np.errstate(under="ignore"):
         force = weight / law.length * _weight_function(law, x, damage)
-    unit = stretch / np.maximum(size, MIN_POSITIVE)[..., None]
     energy = (size * force).sum(axis=1) / _work_to_energy_ratio(law)
-    return np.column_stack([(unit * force[..., None]).sum(axis=1), energy])
+    return np.column_stack([(np.sign(stretch) * force).sum(axis=1), energy])
 
 
 def _bond_lengths(strips: Strip, path_state: PathState, distance, law: Bonds):
@@ -340,9 +314,9 @@ def _bond_lengths(strips: Strip, path_state: PathState, distance, law: Bonds):
 
 def _divide_strips(strips: Strip, path_state: PathState, law: Bonds) -> _IntegrationPieces:
     """Divide strips into pieces on which a Gauss rule is accurate, by the rules of the module."""
-    stretch = _resolve_stretch(strips, path_state)
-    parts = _split_at_zero_stretch(strips, stretch)
-    distances = _singularity_distances(strips, path_state, law, stretch, parts)
+    along = _stretch_along(strips, path_state)
+    parts = _split_at_zero_stretch(strips, along)
+    distances = _singularity_distances(strips, path_state, law, along, parts)
     eps = strips.bond_length[parts.strip]
     growth = _active_growth(strips, path_state, law, parts)
     # For reading="report" the integrand only changes sign at u = 0.
@@ -367,10 +341,9 @@ def _divide_strips(strips: Strip, path_state: PathState, law: Bonds) -> _Integra
         origin = distances.origin[k]
         singular_points = []
         if not (parts.is_zero_at_start[k] or parts.is_zero_at_end[k]):
-            zero = complex(-stretch.along[strip] - parts.start[k], stretch.across[strip])
-            singular_points.append(zero)
+            singular_points.append(-along[strip] - parts.start[k])
         if np.isfinite(origin):
-            singular_points.append(complex(-origin - parts.start[k], 0.0))
+            singular_points.append(-origin - parts.start[k])
         cuts = _subdivide_near_singularities(
             parts.length[k], MAX_PIECE_LENGTH * eps[k], singular_points
         )
@@ -386,10 +359,9 @@ def _divide_strips(strips: Strip, path_state: PathState, law: Bonds) -> _Integra
     return _IntegrationPieces(parts.strip[part], start, length, steep_end)
 
 
-def _split_at_zero_stretch(strips: Strip, stretch: _StretchComponents) -> _StripParts:
-    """Split strips of bonds at the position where the stretch is zero."""
-    is_straight = stretch.across == 0
-    cut = np.where(is_straight, np.clip(-stretch.along, 0.0, strips.length), 0.0)
+def _split_at_zero_stretch(strips: Strip, along) -> _StripParts:
+    """Split strips of bonds at the position where the stretch is zero; along: stretch (k,) [m] at their ends."""
+    cut = np.clip(-along, 0.0, strips.length)
     strip = np.tile(np.arange(cut.size), 2)
     start = np.concatenate([np.zeros_like(cut), cut])
     length = np.concatenate([cut, strips.length - cut])
@@ -398,7 +370,7 @@ def _split_at_zero_stretch(strips: Strip, stretch: _StretchComponents) -> _Strip
     start = start[has_length]
     length = length[has_length]
     # The cut of these strips is at u = 0; it may also be an end of the strip.
-    has_zero = is_straight & (np.abs(cut + stretch.along) <= REVERSAL_TOL * strips.length)
+    has_zero = np.abs(cut + along) <= REVERSAL_TOL * strips.length
     return _StripParts(
         strip,
         start,
@@ -423,7 +395,7 @@ def _singularity_distances(
     strips: Strip,
     path_state: PathState,
     law: Bonds,
-    stretch: _StretchComponents,
+    along,
     parts: _StripParts,
 ) -> _SingularityDistances:
     """Return the distances from parts of strips to points where the integrand is not smooth.
@@ -431,12 +403,11 @@ def _singularity_distances(
     The point u = 0 at an end of a part does not count.
     """
     is_fractional = law.order != int(law.order)
-    along = stretch.along[parts.strip]
-    across = stretch.across[parts.strip]
+    along = along[parts.strip]
     gap = np.maximum(np.maximum(-along - parts.start - parts.length, parts.start + along), 0.0)
-    is_smooth = (across == 0) & (law.reading == "report" or not is_fractional)
-    is_smooth |= parts.is_zero_at_start | parts.is_zero_at_end
-    nearest = np.where(is_smooth, np.inf, np.hypot(across, gap))
+    is_smooth = parts.is_zero_at_start | parts.is_zero_at_end
+    is_smooth |= law.reading == "report" or not is_fractional
+    nearest = np.where(is_smooth, np.inf, gap)
     origin = np.full(parts.strip.size, np.inf)
     if law.reading == "report" and is_fractional:
         origin = path_state.path - strips.end.path[parts.strip]
@@ -469,22 +440,18 @@ def _rules_of_pieces(steep_end, order: float) -> _GaussRule:
 
 
 def _subdivide_near_singularities(
-    length: float, max_length: float, singular_points: list[complex]
+    length: float, max_length: float, singular_points: list[float]
 ) -> np.ndarray:
     """Divide [0, length] into pieces that are not longer than their distance from any singular point.
 
-    The points are complex: position along the interval, and distance from its line. No piece is longer than
-    `max_length`. Returns the ends (k,) of the pieces in increasing order.
+    No piece is longer than `max_length`. Returns the ends (k,) of the pieces in increasing order.
     """
-    inside = [point.real for point in singular_points if 0 < point.real < length]
+    inside = [point for point in singular_points if 0 < point < length]
     intervals = list(pairwise(sorted({0.0, length, *inside})))[::-1]
     cuts = [0.0]
     while intervals:
         low, high = intervals.pop()
-        gaps = (
-            abs(complex(max(low - point.real, point.real - high, 0.0), point.imag))
-            for point in singular_points
-        )
+        gaps = (max(low - point, point - high, 0.0) for point in singular_points)
         if high - low > max(
             min(max_length, min(gaps, default=np.inf)), MIN_PIECE_FRACTION * length
         ):

@@ -14,16 +14,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...core import NotConverged, Outcome, Response
-from ...dynamics.events import orbits as event_orbits
 from ...dynamics.harmonic import balance as point_balance
 from ...dynamics.harmonic import harmonic, point
 from ...response import measures
 from ...response.measures import measure_half_range
-from ..rig import event_driven, march, solve
+from ..rig import march, solve
 from ..rig.engines import ENGINES, MARCH, choose_steady_method
 from ..rig.numerics import choose_numerics
 from ..rig.steady import balance as rig_balance
-from ..rig.steady import maps
+from ..rig.steady import shooting
 
 SAMPLES_PER_CYCLE = 400  # samples per cycle of a motion without friction
 UNBOUNDED_OUTCOMES = (
@@ -109,9 +108,8 @@ class MotionObserver:
         try:
             return self._with_gauge_displacement(
                 {
-                    "yields": self._compute_by_yield_events,
+                    "shooting": self._compute_by_shooting,
                     "balance": self._compute_by_balance,
-                    "events": self._compute_by_events,
                     "line": self._compute_linear,
                 }.get(self.method, self._compute_by_run)(drive, initial_guess)
             )
@@ -174,29 +172,14 @@ class MotionObserver:
             float(abs(modes.output @ z)),
         )
 
-    def _compute_by_yield_events(self, drive, initial_guess) -> ObservedMotion:
-        """Compute the motion of elastic-plastic elements by the event map, else by harmonic balance."""
-        search = self._get_or_create("yields", self._make_periodic_motion_finder)
-        try:
-            motion = search(drive, initial_guess)
-        except NotConverged:
-            if initial_guess is not None or len(self.model.rig.friction.interfaces) > 1:
-                raise
-            # the solution of harmonic balance is no initial guess for the event map
-            return self._compute_by_balance(drive, None)._replace(initial_guess=None)
-        window = search.window(drive, motion.point) if self.needs_histories else None
-        return ObservedMotion(
-            window, motion.acceleration, motion.displacement, motion.point, motion.fundamental
+    def _compute_by_shooting(self, drive, initial_guess) -> ObservedMotion | None:
+        """Compute the motion by Newton's method on the map of a period."""
+        finder = self._get_or_create(
+            "shooting",
+            lambda: shooting.ShootingFinder(self.model, self.numerics, self.patch, 0, self.report),
         )
-
-    def _make_periodic_motion_finder(self):
-        """Return the solver for periodic motions of elastic-plastic elements, reused if possible."""
-        modes = self.model.rig.modes
-        element_groups = event_driven.YieldingElements(self.model, self.numerics, self.patch).groups
-        finder = self.previous_objects.pop("yields", None)
-        if finder is not None and finder.replace_system(modes, element_groups):
-            return finder
-        return event_orbits.PeriodicMotionFinder(modes, element_groups)
+        seen = finder.observe(drive, initial_guess, needs_histories=self.needs_histories)
+        return None if seen is None else ObservedMotion(*seen)
 
     def _compute_by_balance(self, drive, initial_guess) -> ObservedMotion:
         """Compute the motion by harmonic balance."""
@@ -223,14 +206,6 @@ class MotionObserver:
             solution.amplitude(solver.modes.output),
             solution,
         )
-
-    def _compute_by_events(self, drive, initial_guess) -> ObservedMotion | None:
-        """Compute the motion of Coulomb interfaces by the event map."""
-        solver = self._get_or_create(
-            "events",
-            lambda: maps.EventFinder(self.model, self.numerics, self.patch, 0, self.report),
-        )
-        return _observe_solution(solver.compute_steady_motion(drive)[0])
 
     def _compute_by_run(self, drive, initial_guess) -> ObservedMotion | None:
         """Compute the last cycles of the motion by a run from rest."""

@@ -26,7 +26,7 @@ from . import rigid, shear
 from .closed_form import slide_in_closed_form
 from .engine import BenchEngine, Method, choose_bench_engine
 from .ledger import DEFAULT_OPTIONS, BenchOptions, SlideHistories, SlideTask
-from .step_by_step import slide_in_plane, slide_step_by_step
+from .step_by_step import slide_step_by_step
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -41,8 +41,6 @@ class BenchRun:
     - seconds: CPU time [s].
     - first: index of the sample at which the last cycle starts.
     - engine: method that computed the friction force.
-    - lateral, lateral_force, yaw_moment (k,): lateral displacement [m], force [N] and yaw moment [N
-      m] of a motion in two directions; otherwise None.
     """
 
     time: np.ndarray
@@ -59,9 +57,6 @@ class BenchRun:
     seconds: float
     first: int
     engine: BenchEngine
-    lateral: np.ndarray | None = None
-    lateral_force: np.ndarray | None = None
-    yaw_moment: np.ndarray | None = None
 
 
 def run_bench(
@@ -94,36 +89,27 @@ def run_bench(
         time, slide = model.point.refine_samples(model.slide, time, slide, steps)
         first = int(np.searchsorted(time, start))
     engine = choose_bench_engine(model, slide, 1 if patch is None else patch.x.size, options.choice)
-    histories, lateral = _compute_histories(
-        SlideTask(model, patch, time, slide, frames, engine, options)
-    )
-    loops = [(slide, histories.force)]
-    if lateral:
-        loops.append((lateral["lateral"], lateral["lateral_force"]))
+    histories = _compute_histories(SlideTask(model, patch, time, slide, frames, engine, options))
     jumps = reversal_force_rule(model) == "jumps"
     values = _compute_measures(model, time, slide, histories, first)
     values |= _compute_loop_measures(model, time, slide, histories, first, omega) if omega else {}
-    values["work_check"] = work_difference(histories.ledger[0], loops, jumps)
+    values["work_check"] = work_difference(histories.ledger[0], [(slide, histories.force)], jumps)
     span = time[-1]  # Scaling by the time span avoids overflow for extremely slow motions.
     rate = np.zeros(time.size)
     if time.size > 2:
         rate = np.gradient(slide, time / span) / span
-    return BenchRun(
-        time, slide, rate, *histories, values, perf_counter() - begin, first, engine, **lateral
-    )
+    return BenchRun(time, slide, rate, *histories, values, perf_counter() - begin, first, engine)
 
 
-def _compute_histories(task: SlideTask) -> tuple[SlideHistories, dict]:
-    """Compute the friction histories and a dict of the lateral histories of a bench run."""
-    if task.model.slide.across is not None:
-        return slide_in_plane(task)
+def _compute_histories(task: SlideTask) -> SlideHistories:
+    """Compute the friction histories of a bench run."""
     if task.model.partial_slip:
-        return shear.slide_in_shear(task), {}
+        return shear.slide_in_shear(task)
     if task.engine.method is Method.STEPPED:
-        return slide_step_by_step(task), {}
+        return slide_step_by_step(task)
     if task.engine.method is Method.CLOSED:
-        return slide_in_closed_form(task), {}
-    return rigid.slide_rigidly(task), {}
+        return slide_in_closed_form(task)
+    return rigid.slide_rigidly(task)
 
 
 def _compute_measures(model, time, slide, histories: SlideHistories, cycle_start: int) -> dict:

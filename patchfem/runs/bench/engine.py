@@ -41,7 +41,6 @@ class Method(Enum):
     LIST = "bond list"
     LISTS = "bond lists"
     STEPPED = "law step by step"
-    PLANE = "two directions"
 
 
 LIST_METHODS = (Method.LIST, Method.LISTS)
@@ -98,8 +97,6 @@ def choose_bench_engine(
         If the sum over bonds would take too long.
     """
     f = model.friction
-    if model.slide.across is not None:
-        return BenchEngine(Method.PLANE, _predict_step_seconds(model, slide, 1))
     if model.partial_slip and (law_has_trait(f.law, "bonds") or model.grooves is not None):
         modes = model.accuracy.shear_modes or shear_modes.N_SHEAR_MODES
         varies = model.grooves is not None or has_changing_pressure(model)
@@ -261,8 +258,11 @@ def _predict_step_seconds(model, slide, n_points: int) -> float:
 
 def uses_parallel_elements(model) -> bool:
     """Return whether the partial slip of a bench run is computed by parallel elements."""
-    simple = model.grooves is None and model.slide.across is None
-    return model.partial_slip and simple and not law_has_trait(model.friction.law, "bonds")
+    return (
+        model.partial_slip
+        and model.grooves is None
+        and not law_has_trait(model.friction.law, "bonds")
+    )
 
 
 def predict_cost(model, n_points: int) -> Cost:

@@ -153,7 +153,7 @@ def find_bond_sum_error(model, engine) -> float:
     """Return the error of bond summation relative to the friction limit; 0 without bonds."""
     if engine.method in LIST_METHODS:
         return engine.choice.error
-    if engine.method in (Method.STEPPED, Method.PLANE) and needs_bond_list(model.friction):
+    if engine.method is Method.STEPPED and needs_bond_list(model.friction):
         return estimate_tail_loss(model)
     return 0.0
 

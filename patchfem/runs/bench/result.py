@@ -30,9 +30,7 @@ from ..results.result import (
     make_interface_frames,
 )
 from ..results.travel import (
-    MAX_SLIDE_FRACTION,
     check_pieces_overlap,
-    find_max_displacement,
     warn_of_large_slide,
 )
 from . import bench, shear
@@ -94,7 +92,7 @@ def run_prescribed(inputs: RunInputs) -> Result:
         extra["shear_modes"] = count
     return Result(
         inputs.plan,
-        check_pieces_overlap(Outcome.DONE, model.patch, patch, fine.slide, fine.lateral),
+        check_pieces_overlap(Outcome.DONE, model.patch, patch, fine.slide),
         set_final_floors(measures, model.accuracy.tolerance),
         fine,
         fine,
@@ -205,14 +203,6 @@ def _warn_of_open_loop(model, patch, fine, steps: int) -> list:
 def _warn_of_overhang(patch_model, patch, fine) -> list:
     """Return warnings if the upper piece leaves the loaded area or the lower piece."""
     warnings = []
-    lateral = 0.0
-    if fine.lateral is not None:
-        lateral = find_max_displacement(fine.lateral) / patch_model.pieces.width
-    if lateral > MAX_SLIDE_FRACTION:
-        warnings.append(
-            f"the slide across the sliding direction is {lateral:.2g} of the width of the pieces, but the "
-            "computation assumes that the pieces still overlap over their whole width"
-        )
     load_loss = 1 - float(fine.load.min() / fine.load[0]) if fine.load[0] > 0 else 0.0
     if load_loss > 0.01:
         warnings.append(

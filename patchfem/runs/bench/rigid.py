@@ -10,11 +10,11 @@ from functools import partial
 
 import numpy as np
 
-from ...dynamics.events.elements import CELL_MERGES, join_cells
 from ...dynamics.grooves import climbing as flank_climbing
 from ...dynamics.march import varying_load
 from ...dynamics.march.models import ContactModel, bond_list_model, element_model, points_model
 from ...effects import law_has_trait
+from ...friction.cells import CELL_MERGES, join_cells
 from ...friction.laws.elastic_plastic import parallel_element
 from ...friction.record import make_law
 from ...response.coarser import CoarserRuns

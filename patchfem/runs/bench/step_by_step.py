@@ -1,4 +1,4 @@
-"""Rigid sliding with NumPy laws, sample by sample, for varying pressure or two directions.
+"""Rigid sliding with NumPy laws, sample by sample, for varying pressure.
 
 In: a `SlideTask`. Out: `SlideHistories`. This implementation accepts every law and every bench run with
 rigid sliding; it is the reference for the compiled engines.
@@ -42,66 +42,18 @@ def slide_step_by_step(task: SlideTask) -> SlideHistories:
     points = _make_pressed_points(task)
     refuse_expensive_sum(model, law, slide.size, points.weight.size, slide)
     take_step = _step_under_changing_load if model.load_varies else _step_law
-    histories = _evaluate_law(
-        task, law, take_step, slide[:, None], points, find_rest_ends(model, slide)
-    )
+    histories = _evaluate_law(task, law, take_step, points, find_rest_ends(model, slide))
     frames = task.frame_indices
-    force = histories.force[:, 0]
-    tau = histories.tau[:, 0]
-    sigma = np.array([points.pressure(sample) for sample in frames]).reshape(tau.shape)
+    sigma = np.array([points.pressure(sample) for sample in frames]).reshape(histories.tau.shape)
     return SlideHistories(
-        force,
+        histories.force,
         histories.load,
-        compute_interface_slip(model, slide, force, histories.load),
+        compute_interface_slip(model, slide, histories.force, histories.load),
         histories.ledger,
         frames,
-        tau,
-        compute_local_slip(model, slide[frames], tau, sigma),
+        histories.tau,
+        compute_local_slip(model, slide[frames], histories.tau, sigma),
     )
-
-
-def slide_in_plane(task: SlideTask) -> tuple[SlideHistories, dict]:
-    """Compute the friction histories of rigid sliding in two directions.
-
-    The file of `slide.file` gives the displacements along x and in the lateral direction. The law
-    is linear in the pressure, which is constant at every point of the upper piece. Therefore, the
-    law is evaluated once at unit pressure, and the traction of each point is the result times its
-    pressure. The yaw moment [N m] is the sum of y f_x - x f_y over the points, where f is the
-    resistance to slip of the upper piece. Strips have lateral positions y.
-
-    Returns
-    -------
-    tuple
-        SlideHistories along x, and histories of the lateral direction by name.
-    """
-    model = task.model
-    patch = task.patch
-    slide = task.slide
-    law = make_numpy_law(model)
-    refuse_expensive_sum(model, law, slide.size, 1, slide)
-    lateral = np.interp(task.time, model.slide.corners[0], model.slide.across)
-    unit_point = _PressedPoints(np.ones(1), lambda sample: np.ones(1))
-    unit = _evaluate_law(task, law, _step_law, np.stack([slide, lateral], axis=1), unit_point, {})
-    sums = _sum_pressure(model, patch)
-    sigma = np.array([sums.load]) if patch is None else patch.pressure.sigma_n
-    compliance = law.law.length / law.law.static if law.law.static > 0 else 0.0
-    slip = slide - compliance * unit.force[:, 0]
-    frames = task.frame_indices
-    histories = SlideHistories(
-        sums.load * unit.force[:, 0],
-        np.full(slide.size, sums.load),
-        slip,
-        sums.load * unit.ledger,
-        frames,
-        np.outer(unit.force[frames, 0], sigma),
-        np.where(sigma > 0, slip[frames, None], slide[frames, None]),
-    )
-    lateral_histories = {"lateral": lateral, "lateral_force": sums.load * unit.force[:, 1]}
-    if patch is not None:
-        lateral_histories["yaw_moment"] = (
-            sums.roll * unit.force[:, 0] - sums.moment * unit.force[:, 1]
-        )
-    return histories, lateral_histories
 
 
 class _PressedPoints(NamedTuple):
@@ -116,11 +68,11 @@ class _PressedPoints(NamedTuple):
 
 
 class _LawHistories(NamedTuple):
-    """Histories of a friction law for slip in d directions, at k samples.
+    """Histories of a friction law at k samples.
 
-    - force (k, d), load (k,): friction force and normal load [N].
+    - force, load (k,): friction force and normal load [N].
     - ledger (4, k): energies [J], see `stack_energies`.
-    - tau (f, d, m): tractions in each frame [Pa].
+    - tau (f, m): tractions in each frame [Pa].
     """
 
     force: np.ndarray
@@ -130,9 +82,9 @@ class _LawHistories(NamedTuple):
 
 
 def _evaluate_law(
-    task: SlideTask, law, take_step: Callable, path, points: _PressedPoints, breakaways: dict
+    task: SlideTask, law, take_step: Callable, points: _PressedPoints, breakaways: dict
 ) -> _LawHistories:
-    """Evaluate a friction law along a displacement path, sample by sample.
+    """Evaluate a friction law along the displacement of a task, sample by sample.
 
     Parameters
     ----------
@@ -140,46 +92,34 @@ def _evaluate_law(
     law
     take_step : callable
         Function that computes one step of the law.
-    path : (k, d)
-        Relative displacement in d directions [m].
     points : _PressedPoints
     breakaways : dict
         Sign of the velocity after each rest, by the sample at which the rest ends.
     """
     weight = points.weight
-    size, n_directions = path.shape
+    slide = task.slide
+    size = slide.size
     frames = set(task.frame_indices.tolist())
     sigma = points.pressure(0)
-    if n_directions == 1:
-        state = law.initial_state(sigma)
-    else:
-        state = law.initial_state(sigma, n_directions)
-    force = np.zeros((size, n_directions))
-    load = np.zeros(size)
-    work = np.zeros(size)
-    stored = np.zeros(size)
+    state = law.initial_state(sigma)
+    force, load, work, stored = np.zeros((4, size))
     losses = np.zeros((size, 2))
     tau = []
     for sample in range(size):
         if sample:
-            increment = path[sample] - path[sample - 1]
+            increment = slide[sample] - slide[sample - 1]
             before = sigma
             sigma = points.pressure(sample)
-            mean, dissipated, state = take_step(
-                law,
-                state,
-                increment if n_directions > 1 else increment[0],
-                before,
-                sigma,
-                task.time[sample] - task.time[sample - 1],
-            )
+            duration = task.time[sample] - task.time[sample - 1]
+            mean, dissipated, state = take_step(law, state, increment, before, sigma, duration)
             losses[sample] = sum_losses_by_sign(weight * dissipated)
-            work[sample] = work[sample - 1] + increment @ np.atleast_2d(mean) @ weight
+            work[sample] = work[sample - 1] + increment * (mean @ weight)
+
+        # the traction at the end of a rest is that of the motion that begins there
         if sample in breakaways:
             traction = law.breakaway_traction(sigma, breakaways[sample])
         else:
             traction = law.traction(state)
-        traction = np.atleast_2d(traction)
         force[sample] = traction @ weight
         load[sample] = weight @ sigma
         stored[sample] = weight @ law.stored_energy(state)
@@ -191,7 +131,7 @@ def _evaluate_law(
         force,
         load,
         stack_energies(work, stored, losses),
-        np.array(tau).reshape(len(tau), n_directions, weight.size),
+        np.array(tau).reshape(len(tau), weight.size),
     )
 
 
@@ -260,23 +200,3 @@ def _step_under_changing_load(law, state, increment: float, before, after, durat
     step = law.step(first.state, increment, half, half, duration)
     last = law.press(step.state, half, after)
     return Step(step.mean, first.dissipated + step.dissipated + last.dissipated, last.state)
-
-
-class _PressureSums(NamedTuple):
-    """Resultant of the pressure [N] and its first moments in x (moment) and y (roll) [N m]."""
-
-    load: float
-    moment: float = 0.0
-    roll: float = 0.0
-
-
-def _sum_pressure(model, patch) -> _PressureSums:
-    """Return the resultant [N] and the first moments [N m] of the pressure.
-
-    The moment in y is 0 without strips.
-    """
-    if patch is None:
-        return _PressureSums(model.point.load)
-    force = patch.pressure.sigma_n * patch.pieces.interface.weight
-    roll = 0.0 if patch.strips is None else patch.strips.roll_moment
-    return _PressureSums(float(force.sum()), float(force @ patch.x), roll)

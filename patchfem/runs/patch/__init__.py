@@ -3,6 +3,6 @@
 In: a `PatchModel`. Out: patches on nested meshes, and static measures with errors. `grids`
 chooses the mesh, for plans and for runs; `condensed` condenses the pieces to their interface;
 `press` computes the pressure; `profile_points` adds more accurate measures for profiles. `sweep_meshes`
-and `static_batch` solve the patches of a sweep in one batch, and `store` caches results that
-several runs of a patch need. Read `press` first, then `grids`, `mesh_levels` and `measures`.
+chooses meshes for all cases of a sweep, and `store` caches results that several runs of a patch need.
+Read `press` first, then `grids`, `mesh_levels` and `measures`.
 """

@@ -1,8 +1,7 @@
 """Compliance of the two pieces of a patch, condensed to their common interface.
 
 In: a `PatchModel` and the meshes of its pieces. Out: a `CondensedPair` with the meshes, the
-assembled pieces and their compliance. Large compliance matrices are cached on disk. A mortar method
-joins pieces whose interface nodes do not match.
+pieces and their compliance. A mortar method joins pieces whose interface nodes do not match.
 """
 
 from dataclasses import dataclass
@@ -11,27 +10,23 @@ from time import perf_counter
 import numpy as np
 
 from ...core import Compliance, Interface, frozen_array
-from ...elasticity import cache, mortar, substructure
+from ...elasticity import mortar
 from ...elasticity.elasticity import (
-    InterfaceCompliance,
-    Layers,
     Piece,
     interface_compliance,
 )
-from ...mesh.tensor import TensorGrid
 from ...model.pieces import make_elastic_layers
 from . import store
 
-# Smallest number of interface nodes at which the compliance is cached on disk.
-MIN_CACHED_NODES = 150
+# Largest coupling of equal pieces, relative to their compliance, that is round-off of the coordinates in a mesh file
+COUPLING_ROUND_OFF = 1e-7
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class CondensedPair:
     """Two elastic pieces condensed to their interface, independent of load and surface shape.
 
-    - grid, piece: mesh and assembled piece on the lower side: TensorGrid with Piece, or PieceMesh
-      with Substructure.
+    - grid, piece: mesh and piece on the lower side.
     - upper_grid, upper: the same on the upper side; identical objects if the pieces are identical.
     - compliance: sum of the compliances of both pieces, for all contact pairs together.
     - closing (m, m): normal approach of the surfaces per shear force [m/N]; zero for alike
@@ -65,6 +60,11 @@ class CondensedPair:
         return float(self.grid.first_row_height + self.upper_grid.first_row_height) / 2
 
     @property
+    def is_quadratic(self) -> bool:
+        """Whether a piece has elements of second order, whose interface has nodes between the pressure nodes."""
+        return any(mesh.interface.size > mesh.x.size for mesh in (self.grid, self.upper_grid))
+
+    @property
     def round_off_error(self) -> float:
         """Relative round-off error of the compliance; 0 if it is negligible."""
         return max(self.piece.round_off_error, self.upper.round_off_error)
@@ -81,41 +81,7 @@ class CondensedPair:
         return self.joint.distribute_forces(nodal)
 
 
-def condense_piece(body, layers: Layers, ignore_cache: bool) -> tuple:
-    """Condense a piece to its interface, or read its compliance from the disk cache.
-
-    Parameters
-    ----------
-    body : TensorGrid or PieceMesh
-    layers : Layers
-    ignore_cache : bool
-        Whether to ignore the disk cache.
-
-    Returns
-    -------
-    piece : Piece or Substructure
-        Not yet factorised if its compliance was in the cache.
-    compliance : InterfaceCompliance
-    """
-    is_grid = isinstance(body, TensorGrid)
-    piece = Piece(body, layers) if is_grid else substructure.Substructure(body, layers)
-    if (body.x.size if is_grid else len(body.points) ** 0.5) < MIN_CACHED_NODES:
-        return piece, interface_compliance(piece)
-    if is_grid:
-        key = cache.grid_key(body.x, body.depth, body.coating_rows, layers)
-    else:
-        key = cache.mesh_key(body, layers)
-    shapes = dict.fromkeys(InterfaceCompliance._fields, 2 * (body.x.size,))
-    cached_arrays = None if ignore_cache else cache.load_arrays(key, shapes)
-    if cached_arrays is not None:
-        return piece, InterfaceCompliance(**cached_arrays)
-    compliance = interface_compliance(piece)
-    if not piece.round_off_error:
-        cache.store_arrays(key, compliance._asdict())
-    return piece, compliance
-
-
-def condense(patch_model, grid, upper_grid=None, ignore_cache: bool = False) -> CondensedPair:
+def condense(patch_model, grid, upper_grid=None) -> CondensedPair:
     """Assemble the two pieces of a `PatchModel` and condense them to their interface.
 
     Parameters
@@ -123,8 +89,6 @@ def condense(patch_model, grid, upper_grid=None, ignore_cache: bool = False) -> 
     patch_model : PatchModel
     grid, upper_grid : TensorGrid or PieceMesh
         Meshes from `make_piece_meshes`; the upper one is None if the pieces are identical.
-    ignore_cache : bool
-        Whether to ignore the disk cache.
 
     Returns
     -------
@@ -132,13 +96,11 @@ def condense(patch_model, grid, upper_grid=None, ignore_cache: bool = False) -> 
     """
     width = patch_model.pieces.width * patch_model.pieces.pairs
     start = perf_counter()
-    layers = make_elastic_layers(patch_model, patch_model.pieces.lower)
-    piece, lower_compliance = condense_piece(grid, layers, ignore_cache)
-    upper = piece
-    upper_compliance = lower_compliance
+    piece = upper = Piece(grid, make_elastic_layers(patch_model, patch_model.pieces.lower))
+    lower_compliance = upper_compliance = interface_compliance(piece)
     if upper_grid is not None:
-        layers = make_elastic_layers(patch_model, patch_model.pieces.upper)
-        upper, upper_compliance = condense_piece(upper_grid, layers, ignore_cache)
+        upper = Piece(upper_grid, make_elastic_layers(patch_model, patch_model.pieces.upper))
+        upper_compliance = interface_compliance(upper)
     joint = None
     x = grid.x
     tributary_lengths = grid.tributary_lengths()
@@ -159,8 +121,12 @@ def condense(patch_model, grid, upper_grid=None, ignore_cache: bool = False) -> 
             lower_compliance.nt - upper_compliance.nt,
         )
     normal, tangential, closing = (frozen_array(part / width) for part in compliances)
+    if np.abs(closing).max() <= COUPLING_ROUND_OFF * np.abs(tangential).max():
+        closing = frozen_array(np.zeros(closing.shape))
     interface = Interface(frozen_array(x), frozen_array(tributary_lengths * width), width)
-    end_gap = sum(_rounded_end_gap(body, interface.x) for body in (grid, upper_grid or grid))
+    # Rounded ends of the pieces open the gap.
+    bodies = (grid, upper_grid or grid)
+    end_gap = sum(np.interp(interface.x, body.x, body.interface_depths) for body in bodies)
     seconds = {"condense": perf_counter() - start}
     pieces = Compliance(interface, normal, tangential)
     return CondensedPair(
@@ -228,7 +194,7 @@ def delete_matrix_factors(pair: CondensedPair) -> CondensedPair:
     needed.
     """
     for piece in (pair.piece, pair.upper):
-        if isinstance(piece, Piece) and not piece.round_off_error:
+        if not piece.round_off_error:
             piece.computed.clear()
     return pair
 
@@ -246,12 +212,6 @@ def condense_on_same_meshes(patch_model, pair: CondensedPair) -> CondensedPair:
         ):
             return condense_on_shared_level(patch_model, k)
     return condense(patch_model, *pair.meshes)
-
-
-def _rounded_end_gap(body, x) -> np.ndarray:
-    """Return the gap (m,) [m] at positions x (m,) [m] due to the rounded ends of a piece."""
-    depths = getattr(body, "interface_depths", None)
-    return np.zeros(x.size) if depths is None else np.interp(x, body.x, depths)
 
 
 def _nodes_match(lower_x, upper_x) -> bool:

@@ -99,14 +99,6 @@ def solve_contact_on_meshes(interface, tolerance: float) -> tuple:
         raise
 
 
-def recondense_interface_pieces(model) -> None:
-    """Condense the pieces of all interfaces again, without cached stiffness matrices."""
-    store.clear_cache()
-    for interface in model.rig.friction.interfaces if model.rig is not None else ():
-        if interface.patch is not None:
-            result.solve_with_coarser(interface.patch, model.accuracy.tolerance, ignore_cache=True)
-
-
 def make_patch_elements(interface, tolerance: float, coarser: bool = False) -> tuple:
     """Return the parallel Jenkins elements of an interface with partial slip.
 

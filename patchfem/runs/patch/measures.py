@@ -15,6 +15,7 @@ import numpy as np
 from ...contact import edges
 from ...core import Measure, PatchfemError, compute_allowed_error
 from ...formatting import format_length
+from ...mesh.grid import TensorGrid
 from ...response import errors
 from ...scene.keys.contact import compute_outermost_strip_distance
 from ..results import patch_rows
@@ -55,9 +56,9 @@ PEAK_MEASURES = (
 
 
 class Estimate(NamedTuple):
-    """Value and error estimate of a static measure, for one patch or for q patches.
+    """Value and error estimate of a static measure.
 
-    - value: number or (q,).
+    - value: number.
     - error: error estimate; None without a coarser mesh.
     - is_extrapolated: whether the value is extrapolated over the nested meshes; otherwise it is
       that of the finest mesh.
@@ -67,26 +68,14 @@ class Estimate(NamedTuple):
     error: float | None
     is_extrapolated: bool = False
 
-    def select(self, case: int) -> "Estimate":
-        """Return the estimate of a single patch out of q patches."""
-        return Estimate(self.value[case], self.error[case], self.is_extrapolated[case])
-
-    def to_measure(self, name: str, floor: float | None = None) -> Measure:
-        """Convert the estimate of a single patch to a Measure.
-
-        If `floor` is None, the floor of the measure table is used.
-        """
+    def to_measure(self, name: str) -> Measure:
+        """Convert the estimate to a Measure with the floor of the measure table."""
         row = TABLE[name]
         engine = patch_rows.FINEST_MESH_SOURCE
         if self.is_extrapolated:
             engine = patch_rows.EXTRAPOLATED_SOURCE
-        return Measure(
-            float(self.value),
-            row.unit,
-            None if self.error is None else float(self.error),
-            row.floor if floor is None else floor,
-            engine=engine,
-        )
+        error = None if self.error is None else float(self.error)
+        return Measure(float(self.value), row.unit, error, row.floor, engine=engine)
 
 
 def estimate_static_measures(
@@ -101,7 +90,7 @@ def estimate_static_measures(
 
     The pressure peak on a mesh is the vertex of the parabola through the largest nodal pressure and its
     neighbours, or at an end of the interface the end value of the curve whose cell means are the nodal
-    pressures (`values.estimate_peak_pressures`). Lengths and stiffnesses include the part of a cell
+    pressures (`values.estimate_peak_pressure`). Lengths and stiffnesses include the part of a cell
     beyond the last loaded node (`contact.edges`).
 
     Parameters
@@ -125,7 +114,7 @@ def estimate_static_measures(
         missed_peak = unresolved_edge_rounding_pressure(fine)
         estimates = extrapolate_static_measures(
             [*(compute_static_values(patch) for patch in reversed(coarse)), finest],
-            estimate_hidden_errors(_compute_patch_resolution(fine, missed_peak), finest),
+            estimate_hidden_errors(_compute_resolution(fine, missed_peak), finest),
             tolerance,
             all(are_cells_halved(a.pair, b.pair) for a, b in pairwise((fine, *coarse))),
             max(MIN_ERROR, fine.pair.round_off_error),
@@ -267,7 +256,7 @@ def extrapolate_static_measures(
     Parameters
     ----------
     values_by_mesh : list of dict
-        Values on two meshes or more by name, coarse to fine; numbers or (q,).
+        Values on two meshes or more by name, coarse to fine.
     hidden_errors : dict
         Errors by name that no refinement shows (`estimate_hidden_errors`).
     tolerance : float or None
@@ -365,10 +354,8 @@ def _reason_for_unbounded_pressure(patch: Patch) -> str:
 def are_cells_halved(fine, coarse) -> bool:
     """Return whether the finer of two Pairs halves every cell of the coarser one."""
     bodies = ((fine.grid, coarse.grid), (fine.upper_grid, coarse.upper_grid))
-    for fine_body, coarse_body in bodies:
-        halved = fine_body.base_grid
-        grid = coarse_body.base_grid
-        if halved is None or grid is None:
+    for halved, grid in bodies:
+        if not (isinstance(halved, TensorGrid) and isinstance(grid, TensorGrid)):
             return False
         if halved.x.size != 2 * grid.x.size - 1 or halved.depth.size != 2 * grid.depth.size - 1:
             return False
@@ -408,29 +395,19 @@ class Resolution(NamedTuple):
     inner_cells: float = 0.0
 
 
-def compute_contact_resolution(pair, pieces, force, gap_range, can_rotate: bool) -> Resolution:
-    """Return what the hidden errors of q patches follow from: cells at contact edges, and missed pressures.
+def _compute_resolution(patch: Patch, missed_peak: float) -> Resolution:
+    """Return how well the mesh of a solved patch resolves its contact.
 
-    Parameters
-    ----------
-    pair : CondensedPair
-    pieces : Compliance
-        Compliance of the pieces with their asperity layer.
-    force : (q, m) ndarray
-        Nodal forces [N].
-    gap_range : float or (q,) ndarray
-        Range of the gap [m].
-    can_rotate : bool
-        Whether the upper piece is free to rotate.
-
-    Returns
-    -------
-    Resolution
+    missed_peak: `unresolved_edge_rounding_pressure` [Pa].
     """
+    pair = patch.pair
+    pieces = patch.pieces
+    active = patch.active
     interface = pieces.interface
-    active = force > 0
-    cells = np.where(active[:, 1:] != active[:, :-1], np.diff(interface.x), 0.0)
-    longest = cells.max(axis=1)
+    sigma = patch.pressure.sigma_n
+    all_cells = np.diff(interface.x)
+    cells = edge_cell_lengths(patch.x, active)
+    longest_cell = float(cells.max(initial=0.0))
     corner_pressure = 0.0
     if pieces is pair.compliance:  # An asperity layer (skin) bounds the pressure.
         # The free end of a coating raises the pressure in a layer as long as the coating is thick.
@@ -438,37 +415,26 @@ def compute_contact_resolution(pair, pieces, force, gap_range, can_rotate: bool)
         # with the square of their length.
         thicknesses = [grid.coating_thickness for grid in (pair.grid, pair.upper_grid)]
         thinnest = min((thickness for thickness in thicknesses if thickness > 0), default=np.inf)
-        fraction = np.minimum(1.0, (np.diff(interface.x)[[0, -1]] / thinnest) ** 2)
-        ends = (force / interface.weight)[:, [0, -1]]
-        corner_pressure = (CORNER_LAYER_FRACTION * ends * fraction).max(axis=1)
+        fraction = np.minimum(1.0, (all_cells[[0, -1]] / thinnest) ** 2)
+        corner_pressure = float((CORNER_LAYER_FRACTION * sigma[[0, -1]] * fraction).max())
+
+    first, last = ~active[[0, -1]]
+    n_nodes = max(int(active.sum()), 1)
+    is_unresolved = n_nodes <= MAX_UNRESOLVED_NODES and cells.any()
+    edge_offset = None
+    if patch.skin is None:
+        edge_offset = _contact_edge_position_error(pair, longest_cell)
     return Resolution(
         length=interface.length,
-        n_nodes=np.maximum(active.sum(axis=1), 1),
-        longest_cell=longest,
-        edge_cells=cells.sum(axis=1),
-        edge_offset=_contact_edge_position_error(pair, longest),
-        can_rotate=can_rotate,
-        closing=gap_range + np.abs(force @ pieces.normal).max(axis=1),
+        n_nodes=n_nodes,
+        longest_cell=longest_cell,
+        edge_cells=float(cells.sum()),
+        edge_offset=edge_offset,
+        can_rotate="moment_balance" in patch.pressure.residuals,
+        closing=float(
+            np.ptp(patch.unloaded_gap) + np.abs(pieces.normal @ (sigma * interface.weight)).max()
+        ),
         corner_pressure=corner_pressure,
-    )
-
-
-def _compute_patch_resolution(patch: Patch, missed_peak: float) -> Resolution:
-    """Return how well the mesh of a solved patch resolves its contact.
-
-    missed_peak: pressure [Pa] from `unresolved_edge_rounding_pressure`.
-    """
-    force = patch.pressure.sigma_n * patch.pieces.interface.weight
-    can_rotate = "moment_balance" in patch.pressure.residuals
-    out = compute_contact_resolution(
-        patch.pair, patch.pieces, force[None], np.ptp(patch.unloaded_gap), can_rotate
-    )
-    out = Resolution(*(np.ravel(value)[0] for value in out))
-    cells = edge_cell_lengths(patch.x, patch.active)
-    first, last = ~patch.active[[0, -1]]
-    is_unresolved = out.n_nodes <= MAX_UNRESOLVED_NODES and cells.any()
-    return out._replace(
-        edge_offset=out.edge_offset if patch.skin is None else None,
         wedge_pressure=_wedge_indentation_pressure(patch) if is_unresolved else 0.0,
         rounding_pressure=missed_peak,
         open_ends=float(open_rounded_length(patch)),
@@ -512,9 +478,7 @@ def estimate_hidden_errors(resolution: Resolution, finest: dict) -> dict:
         ROUND_OFF_FRACTION * (np.abs(finest["approach"]) + resolution.closing)
         + np.abs(finest["rotation"]) * centre_error * resolution.can_rotate
     )
-    fraction_per_pressure = np.divide(
-        finest["loaded_fraction"], peak, out=np.zeros(np.shape(peak)), where=peak != 0
-    )
+    fraction_per_pressure = finest["loaded_fraction"] / peak if peak else 0.0
     edge_offset = 0.0
     if resolution.edge_offset is not None:
         # In a contact of few nodes, an edge may lie anywhere in its cell.
@@ -542,7 +506,8 @@ def _contact_edge_position_error(pair, cell):
     A soft coating thinner than the cells acts as a Winkler foundation, whose contact ends where the
     nodal pressure vanishes. cell: longest cell in which the contact ends [m].
     """
-    out = MIN_EDGE_OFFSET
+    # The first row of a mesh file has no single height, on which the offset of an edge depends.
+    out = MIN_EDGE_OFFSET if isinstance(pair.grid, TensorGrid) else 0.1
     for grid, piece in ((pair.grid, pair.piece), (pair.upper_grid, pair.upper)):
         if grid.coating_thickness > 0:
             ratio = piece.layers.coating[0] / piece.layers.substrate[0]
@@ -580,7 +545,9 @@ def note_on_plane_state(patch_model, patch: Patch) -> list:
         own_values = compute_static_values(patch)
         pair = condense_on_same_meshes(other_model, patch.pair)
         return note_on_plane_state_changes(
-            patch_model, own_values, compute_static_values(solve_patch_contact(other_model, pair))
+            patch_model,
+            own_values,
+            compute_static_values(solve_patch_contact(other_model, pair, coarse=patch)),
         )
     except PatchfemError as error:
         return [

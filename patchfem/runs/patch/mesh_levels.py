@@ -8,12 +8,13 @@ expensive (`solve_on_refined_meshes`).
 from functools import partial
 
 from ...core import NotConverged, Outcome
+from ...mesh.grid import TensorGrid
 from ...model.pieces import make_piece_meshes
 from . import profile_points, slip_zones, store
 from .condensed import condense, condense_on_shared_meshes
 from .grids import MAX_CONDENSING_SECONDS, MIN_LEVELS, make_base_grids, predict_condensing_seconds
 from .measures import estimate_static_measures, max_mesh_error_ratio, with_static_measures
-from .press import solve, solve_patch_contact
+from .press import solve_patch_contact
 
 # Tolerance at which a patch with prescribed partial slip may take as much CPU time as a patch in a
 # rig. The allowed time is proportional to tolerance^-0.5: a tenth of the tolerance allows 3.2 times
@@ -44,12 +45,10 @@ def solve_on_split_mesh(patch_model, level: int, estimate: bool) -> tuple:
     bodies = make_piece_meshes(patch_model)
     for _ in range(level):
         bodies = tuple(None if body is None else body.refine() for body in bodies)
-    return _solve_on_given_meshes(patch_model, bodies, None, estimate, ignore_cache=True)
+    return _solve_on_given_meshes(patch_model, bodies, None, estimate)
 
 
-def solve_with_coarser(
-    patch_model, tolerance: float, estimate: bool = True, ignore_cache: bool = False
-) -> tuple:
+def solve_with_coarser(patch_model, tolerance: float, estimate: bool = True) -> tuple:
     """Solve a patch on its mesh and on the coarser meshes of its error estimate.
 
     On each mesh the pieces are condensed to the nodes of the interface, so that a compliance [m/N]
@@ -68,8 +67,6 @@ def solve_with_coarser(
     tolerance : float
     estimate : bool
         Whether to solve the coarser meshes as well.
-    ignore_cache : bool
-        Whether to ignore compliance matrices cached on disk.
 
     Returns
     -------
@@ -77,18 +74,13 @@ def solve_with_coarser(
         Patches from fine to coarse, at least two; None for each mesh that is not solved. The first
         has the static measures with the errors that follow from all of them (`Patch.measures`).
     """
-    if patch_model.solved is not None and not ignore_cache:
-        return patch_model.solved.patches
     mesh = patch_model.mesh
     tolerance = mesh.tolerance or tolerance
     if mesh.shared is None:
         if mesh.is_automatic:
-            return solve_on_refined_meshes(patch_model, tolerance, estimate, ignore_cache)
+            return solve_on_refined_meshes(patch_model, tolerance, estimate)
         bodies = make_piece_meshes(patch_model)
-        return _solve_on_given_meshes(patch_model, bodies, tolerance, estimate, ignore_cache)
-    if ignore_cache:
-        pairs = [condense(patch_model, *level, ignore_cache=True) for level in mesh.shared.levels]
-        return solve_on_pairs(patch_model, pairs, tolerance, estimate)
+        return _solve_on_given_meshes(patch_model, bodies, tolerance, estimate)
     patches = store.get_or_compute_in_sweep(
         patch_model,
         ("patches", store.content_key(patch_model), tolerance, estimate),
@@ -120,17 +112,19 @@ def solve_on_pairs(patch_model, pairs, tolerance: float, estimate: bool = True) 
     tuple
         Patches as in `solve_with_coarser`.
     """
-    needed_pairs = pairs if estimate else pairs[:1]
-    patches = [solve_patch_contact(patch_model, pair) for pair in needed_pairs]
+    patches = []
+    for pair in reversed(pairs if estimate else pairs[:1]):
+        coarse = patches[0] if patches else None
+        patches.insert(0, solve_patch_contact(patch_model, pair, coarse=coarse))
     return with_static_measures((*patches, *(3 - len(patches)) * [None]), tolerance)
 
 
 def _solve_on_given_meshes(
-    patch_model, bodies: tuple, tolerance: float | None, estimate: bool, ignore_cache: bool
+    patch_model, bodies: tuple, tolerance: float | None, estimate: bool
 ) -> tuple:
     """Solve a patch on given meshes and on the meshes of its error estimate."""
     levels = [bodies, *(make_comparison_meshes(*bodies) if estimate else ())]
-    pairs = [condense(patch_model, *level, ignore_cache=ignore_cache) for level in levels]
+    pairs = [condense(patch_model, *level) for level in levels]
     return solve_on_pairs(patch_model, pairs, tolerance)
 
 
@@ -151,7 +145,7 @@ def make_comparison_meshes(lower, upper) -> list:
     """
     if lower.x.size <= MAX_COLUMNS_WITHOUT_COARSER:
         return []
-    if lower.base_grid is None:
+    if not isinstance(lower, TensorGrid):
         return [tuple(None if body is None else body.refine() for body in (lower, upper))]
     out = []
     while len(out) < 2 and lower.x.size > MAX_COLUMNS_WITHOUT_COARSER:
@@ -161,9 +155,7 @@ def make_comparison_meshes(lower, upper) -> list:
     return out
 
 
-def solve_on_refined_meshes(
-    patch_model, tolerance: float, estimate: bool = True, ignore_cache: bool = False
-) -> tuple:
+def solve_on_refined_meshes(patch_model, tolerance: float, estimate: bool = True) -> tuple:
     """Solve a patch on successively finer meshes until it meets the tolerance.
 
     At least MIN_LEVELS meshes are solved, because the error follows from the changes between them. Each
@@ -178,8 +170,6 @@ def solve_on_refined_meshes(
     tolerance : float
     estimate : bool
         If False, only the third mesh is solved.
-    ignore_cache : bool
-        Whether to ignore compliance matrices cached on disk.
 
     Returns
     -------
@@ -195,7 +185,9 @@ def solve_on_refined_meshes(
         patch = None
         if estimate or len(patches) == MIN_LEVELS - 1:
             try:
-                patch = solve(patch_model, *grids, ignore_cache=ignore_cache)
+                coarse = patches[0] if patches else None
+                pair = condense(patch_model, *grids)
+                patch = solve_patch_contact(patch_model, pair, coarse=coarse)
             # The cells are too short for double precision, so that the finest mesh is left out.
             except NotConverged:
                 if not patches or patches[0] is None:
@@ -252,14 +244,12 @@ def max_condensing_seconds(patch_model, tolerance: float | None = None) -> float
     )
 
 
-def solve_on_static_meshes(
-    patch_model, tolerance: float, estimate: bool = True, ignore_cache: bool = False
-) -> tuple:
+def solve_on_static_meshes(patch_model, tolerance: float, estimate: bool = True) -> tuple:
     """Solve a bench patch with partial slip on the meshes of a static run.
 
     Parameters
     ----------
-    patch_model, tolerance, estimate, ignore_cache
+    patch_model, tolerance, estimate
         See `solve_on_refined_meshes`.
 
     Returns
@@ -270,15 +260,12 @@ def solve_on_static_meshes(
     """
     if (
         not patch_model.interface.partial_slip
-        or patch_model.solved is not None
         or patch_model.mesh.shared is not None
         or not patch_model.mesh.is_automatic
     ):
         return ()
     static = patch_model.with_mesh(is_static=True, slip=None)
-    return solve_on_refined_meshes(
-        static, patch_model.mesh.tolerance or tolerance, estimate, ignore_cache
-    )
+    return solve_on_refined_meshes(static, patch_model.mesh.tolerance or tolerance, estimate)
 
 
 def _resolves_slip_work(patch_model, patches, tolerance: float) -> bool:

@@ -9,7 +9,6 @@ from math import sqrt
 from typing import NamedTuple
 
 from ... import cost_model
-from ...elasticity.grid_fronts import predict_bytes
 from ...formatting import format_length
 from ...model.model import Model
 from ...model.pieces import make_piece_meshes
@@ -18,18 +17,13 @@ from . import profile_points, skin, store
 from .grids import (
     MAX_CONDENSING_SECONDS,
     MIN_LEVELS,
-    UNSTRUCTURED_COST_FACTOR,
-    count_nodes,
-    is_mirror_symmetric,
     make_base_grids,
     predict_condensing_seconds,
 )
 from .mesh_levels import make_comparison_meshes
 
 PACKAGE_BYTES = 2e7  # Memory of the packages that a run with elastic pieces imports [bytes].
-CONDENSING_BYTES_RATIO = 0.8  # Ratio of measured to predicted memory of condensing.
-# Memory per node of pieces that extend beyond the interface [bytes].
-BYTES_PER_OVERHANG_NODE = 4.6e3
+BYTES_PER_NODE = 4.6e3  # Memory of condensing a piece per node [bytes].
 FRAME_BYTES_PER_NODE = 3.5e3  # Memory of the frames of a motion per node [bytes].
 BYTES_PER_STRIP_NODE = 3000.0  # Memory per strip and interface node [bytes].
 # Tolerance below which a contact that ends inside the interface or at a step needs another
@@ -44,24 +38,15 @@ class GridSizes(NamedTuple):
     """Predicted number of nodes and CPU time of the nested grids of a patch.
 
     - points: nodes of the interface.
-    - finest: (columns, rows) of nodes of the finest grid of each piece; a single entry for alike
-      pieces.
+    - nodes: nodes of the finest grids of both pieces; alike pieces share one grid.
     - levels: number of nested grids.
-    - seconds, bytes: predicted CPU time [s] and memory [bytes] of condensing all grids.
-    - outlined: whether the pieces extend beyond the interface.
+    - seconds: predicted CPU time [s] of condensing all grids.
     """
 
     points: int
-    finest: tuple
+    nodes: int
     levels: int
     seconds: float
-    bytes: float
-    outlined: bool
-
-    @property
-    def nodes(self) -> float:
-        """Number of nodes of the finest grids of both pieces."""
-        return float(sum(columns * rows for columns, rows in self.finest))
 
 
 def predict_grid_sizes(patch_model, tolerance: float) -> GridSizes:
@@ -72,17 +57,11 @@ def predict_grid_sizes(patch_model, tolerance: float) -> GridSizes:
     """
     levels = _predict_mesh_levels(patch_model, tolerance)
     bodies = [body for body in levels[0] if body is not None]
-    finest = tuple(map(count_nodes, bodies))
-    are_mirrored = map(is_mirror_symmetric, bodies)
-    n_bytes = sum(predict_bytes(*nodes, mirrored) for nodes, mirrored in zip(finest, are_mirrored))
     return GridSizes(
-        (bodies[0].base_grid or bodies[0]).x.size,
-        finest,
+        bodies[0].x.size,
+        sum(body.n_nodes for body in bodies),
         len(levels),
-        sum(map(predict_condensing_seconds, levels))
-        * (UNSTRUCTURED_COST_FACTOR if patch_model.mesh.file is not None else 1.0),
-        n_bytes,
-        patch_model.pieces.has_overhang or patch_model.mesh.file is not None,
+        sum(map(predict_condensing_seconds, levels)),
     )
 
 
@@ -162,19 +141,12 @@ def predict_contact_cost(patch_model, tolerance: float) -> Cost:
     that of the fields and files of the finest grid, were measured for random patches.
     """
     grids = predict_grid_sizes(patch_model, tolerance)
-    condensing_factor = (
-        cost_model.OUTLINE_CONDENSING_FACTOR if grids.outlined else cost_model.CONDENSING_FACTOR
-    )
     times = {
         "pressing": cost_model.PATCH_SECONDS - cost_model.FIELDS_SECONDS,
-        "condensing": condensing_factor * grids.seconds,
+        "condensing": cost_model.CONDENSING_FACTOR * grids.seconds,
         "fields": cost_model.FIELDS_SECONDS,
     }
-    n_bytes = PACKAGE_BYTES
-    if grids.outlined:
-        n_bytes += BYTES_PER_OVERHANG_NODE * grids.nodes
-    else:
-        n_bytes += CONDENSING_BYTES_RATIO * grids.bytes
+    n_bytes = PACKAGE_BYTES + BYTES_PER_NODE * grids.nodes
     if not patch_model.mesh.is_static:
         times["fields"] += cost_model.FRAMES_SECONDS + cost_model.FRAME_NODE_SECONDS * grids.nodes
         n_bytes += FRAME_BYTES_PER_NODE * grids.nodes
@@ -276,20 +248,8 @@ def describe_interface_patch(name: str, interface) -> list:
     return [f"interface {name} has a patch of its own: {sentence}"]
 
 
-def describe_assembly(patch_model) -> str:
-    """Describe how the stiffness matrices of the pieces are assembled."""
-    if patch_model.mesh.file is not None:
-        return (
-            "scikit-fem assembles the stiffness of a piece in contact.mesh cell by cell, or, if the mesh of the "
-            "piece is a tensor grid, from the matrices of three reference cells"
-        )
-    if patch_model.pieces.has_overhang:
-        return "scikit-fem assembles the stiffness cell by cell, because the mesh of the shaped ends is not a tensor grid"
-    return "the stiffness of the tensor grids is assembled from scikit-fem's matrices of three reference cells"
-
-
 def describe_patch_plan(dimensionless_groups: dict, patch_model) -> list:
-    """Describe tilt, asperity layer and assembly of a patch in sentences for a plan.
+    """Describe tilt and asperity layer of a patch in sentences for a plan.
 
     The tilt is compared with the opening tilt for flat pieces only.
     """
@@ -298,11 +258,7 @@ def describe_patch_plan(dimensionless_groups: dict, patch_model) -> list:
         pieces = patch_model.pieces
         mean_pressure = patch_model.nominal_load / (pieces.length * pieces.width * pieces.pairs)
         rough = skin.note_on_asperity_stiffness(patch_model, mean_pressure)
-    return [
-        *_describe_tilt(dimensionless_groups, patch_model),
-        *rough,
-        describe_assembly(patch_model),
-    ]
+    return [*_describe_tilt(dimensionless_groups, patch_model), *rough]
 
 
 def _describe_tilt(dimensionless_groups: dict, patch_model) -> list:

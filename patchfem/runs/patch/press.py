@@ -5,7 +5,6 @@ compliance.
 """
 
 from dataclasses import dataclass, field, replace
-from functools import partial
 from time import perf_counter
 from typing import NamedTuple
 
@@ -18,12 +17,7 @@ from ...core import Compliance, ContactState, PatchfemError, frozen_array
 from ...exceptions import UnresolvedTrace
 from . import skin as skin_press
 from . import strips as strip_press
-from .approach import solve_contact_at_approach
-from .condensed import CondensedPair, condense
-
-# Smallest ratio of pressure ripple to peak pressure that a note reports, for pieces with
-# non-matching nodes.
-MIN_RIPPLE = 1e-2
+from .condensed import CondensedPair
 
 
 class Surface(NamedTuple):
@@ -187,30 +181,7 @@ class Patch:
         return self.pressure.sigma_n > 0
 
 
-def solve(patch_model, grid, upper_grid=None, ignore_cache: bool = False) -> Patch:
-    """Assemble and condense the pieces of a `PatchModel`, and solve its contact problem.
-
-    Parameters
-    ----------
-    patch_model : PatchModel
-    grid, upper_grid : TensorGrid or PieceMesh
-        Meshes from `make_piece_meshes`; the upper one is None if the pieces are identical.
-    ignore_cache : bool
-        Whether to ignore compliance matrices cached on disk.
-
-    Returns
-    -------
-    Patch
-
-    Raises
-    ------
-    PatchfemError
-        See `solve_patch_contact` and the contact solver.
-    """
-    return solve_patch_contact(patch_model, condense(patch_model, grid, upper_grid, ignore_cache))
-
-
-def solve_patch_contact(patch_model, pair: CondensedPair, worn=None) -> Patch:
+def solve_patch_contact(patch_model, pair: CondensedPair, worn=None, coarse=None) -> Patch:
     """Solve the contact problem of condensed pieces with the gap and the load of a model.
 
     Many models can use the same condensed pieces.
@@ -221,6 +192,8 @@ def solve_patch_contact(patch_model, pair: CondensedPair, worn=None) -> Patch:
     pair : CondensedPair
     worn : (m,) or (s, m), optional
         Worn depth [m], which is added to the gap.
+    coarse : Patch, optional
+        Solution on another mesh, from whose contact set the search starts.
 
     Returns
     -------
@@ -241,21 +214,16 @@ def solve_patch_contact(patch_model, pair: CondensedPair, worn=None) -> Patch:
         raise PatchfemError("; or ".join(sentences), error.key) from None
     gap = heights + pair.end_gap if worn is None else heights + pair.end_gap + worn
 
+    start = None if coarse is None else np.interp(x, coarse.x, coarse.active.astype(float)) > 0.5
+
     def solve_gap(unloaded_gap) -> Patch:
         """Solve the contact problem for an unloaded gap (m,) [m]."""
         begin = perf_counter()
-        contact = solve_contact(patch_model, pair.compliance, unloaded_gap)
+        contact = solve_contact(patch_model, pair.compliance, unloaded_gap, start=start)
         times = seconds | {"press": perf_counter() - begin}
         return make_patch(patch_model, pair, unloaded_gap, contact, notes, times)
 
     patch = solve_gap(gap)
-    has_ripple = (
-        pair.joint is not None
-        and pair.joint.ripple > MIN_RIPPLE
-        and relative_pressure_ripple(x, patch.normal_stress) > MIN_RIPPLE
-    )
-    if has_ripple:
-        patch = replace(patch, notes=(*notes, f"contact.mesh: {pair.joint.reason}"))
     half_steps = patch_model.gap.half_step_heights(x)
     if not half_steps.any():
         return patch
@@ -291,22 +259,6 @@ def _gap_variants_at_step(node: int, gap, half_steps, worn) -> tuple:
     return tuple(shifts)
 
 
-def relative_pressure_ripple(x, sigma) -> float:
-    """Return the largest ripple of nodal pressures (m,) [Pa] relative to their peak.
-
-    A ripple is three successive loaded nodes that lie above, below and above the lines through
-    their neighbours, or vice versa. Its size is half the smallest distance from these lines.
-    """
-    fraction = np.diff(x)[:-1] / (x[2:] - x[:-2])
-    distance = sigma[1:-1] - (1 - fraction) * sigma[:-2] - fraction * sigma[2:]
-    distances = np.stack([distance[:-2], -distance[1:-1], distance[2:]])
-    windows = [sigma[k : sigma.size - 4 + k] for k in range(5)]
-    is_loaded = np.min(windows, axis=0, initial=np.inf) > 0
-    is_zigzag = is_loaded & ((distances > 0).all(axis=0) | (distances < 0).all(axis=0))
-    smallest = np.abs(distances[:, is_zigzag]).min(axis=0)
-    return float(smallest.max(initial=0.0) / 2 / sigma.max(initial=1e-300))
-
-
 def make_patch(
     patch_model, pair: CondensedPair, gap, contact: SolvedContact, notes: tuple, seconds: dict
 ) -> Patch:
@@ -329,11 +281,10 @@ def make_patch(
     """
     slip_compliance = contact.pieces.tangential
     if not patch_model.interface.has_shear:
-        slip_compliance = frozen_array(slip_compliance - pair.compliance.tangential)
+        slip_compliance = slip_compliance - pair.compliance.tangential
     if patch_model.loading.tangential_stiffness:
-        slip_compliance = frozen_array(
-            slip_compliance + 1 / patch_model.loading.tangential_stiffness
-        )
+        slip_compliance = slip_compliance + 1 / patch_model.loading.tangential_stiffness
+    slip_compliance.setflags(write=False)
     x = contact.pieces.interface.x
     averaging = patch_model.gap.averaging_length(x, contact.pressure.sigma_n > 0)
     return Patch(
@@ -411,14 +362,13 @@ class StripForceSolver:
 
 
 def solve_contact(
-    patch_model, pieces: Compliance, gap, added=None, warm_start=None
+    patch_model, pieces: Compliance, gap, added=None, warm_start=None, start=None
 ) -> SolvedContact:
     """Solve the contact of condensed pieces with the asperity layer, load and holder of a model.
 
     The conditions are pressure >= 0, gap >= 0 and pressure times gap = 0 at every node. They are solved
     by an active set (`contact.unilateral`). A patch in strips and one with a nonlinear asperity layer
-    have solvers of their own; a prescribed approach of pieces that rotate is found by a search over the
-    load.
+    have solvers of their own.
 
     Parameters
     ----------
@@ -427,8 +377,12 @@ def solve_contact(
         Compliance of the pieces without asperity layer.
     gap : (m,) or (s, m)
         Unloaded gap [m].
-    added, warm_start
-        See `StripCompliance`; for strips only.
+    added : (s, m) ndarray, optional
+        What each strip adds to the diagonal of its compliance [m/N].
+    warm_start : WarmStart, optional
+        Results of the previous solution of the strips.
+    start : (m,) ndarray of bool, optional
+        Contact set of a similar patch without strips, from which the search starts.
 
     Returns
     -------
@@ -436,12 +390,12 @@ def solve_contact(
     """
     loading = patch_model.loading
     skin = patch_model.interface.skin
-    can_rotate = loading.can_rotate or loading.rotational_stiffness > 0
-    if loading.approach is not None and can_rotate:
-        # The load that gives the prescribed approach is found by a search.
-        under_load = partial(solve_contact, added=added, warm_start=warm_start)
-        stiff = add_linear_skin_compliance(skin, pieces)
-        return solve_contact_at_approach(patch_model, pieces, gap, under_load, stiff)
+    if loading.approach is not None and (loading.can_rotate or loading.rotational_stiffness > 0):
+        raise PatchfemError(
+            "an approach of a piece that can rotate was removed in patchfem 2.0: give contact.load, or leave out "
+            "[contact.load_line] and [contact.holder]",
+            "contact.approach.distance",
+        )
     if patch_model.interface.strips is not None:
         return SolvedContact(
             pieces, *strip_press.solve_strip_contact(patch_model, pieces, gap, added, warm_start)
@@ -453,9 +407,10 @@ def solve_contact(
     pieces = add_linear_skin_compliance(skin, pieces)
     angle = patch_model.gap.angle
     if loading.approach is not None:
-        return SolvedContact(pieces, press_to_approach(pieces, gap, loading.approach, angle))
+        pressure = press_to_approach(pieces, gap, loading.approach, angle, start)
+        return SolvedContact(pieces, pressure)
     spring = loading.rotational_stiffness
-    pressure = press(pieces, gap, loading.load, loading.moment, angle, spring=spring)
+    pressure = press(pieces, gap, loading.load, loading.moment, angle, start, spring)
     return SolvedContact(pieces, pressure)
 
 

@@ -25,7 +25,7 @@ from ...core import NotConverged
 from ...elasticity.elasticity import Piece
 from ...elasticity.lapack import use_one_blas_thread
 from ...mesh.grading import Layout, divide_into_columns, divide_into_rows
-from ...mesh.tensor import TensorGrid
+from ...mesh.grid import TensorGrid
 from ...model import profile
 from ...model.pieces import make_elastic_layers
 from .edge_values import EdgeValues
@@ -39,7 +39,7 @@ from .measures import (
     increase_error_by_peak_error,
 )
 from .press import PointSolution, Surface
-from .values import assemble_static_values, estimate_peak_pressures
+from .values import assemble_static_values, estimate_peak_pressure
 
 MIN_LEVELS = 3  # Smallest number of refinement levels at which the order of convergence is known.
 # Largest number of points of a level; more would exceed the CPU time of a patch.
@@ -345,7 +345,7 @@ def _solve_level(patch_model, ends: FreeEnds, count: int, start=None) -> PointLe
         rotational=set_stiffness(normal, active, x, contact_edges),
     )
     # At an end of the interface the pressure is that of the point there.
-    peak = float(estimate_peak_pressures(x, sigma[None], node_fraction=unit)[0])
+    peak = estimate_peak_pressure(x, sigma, node_fraction=unit)
     values = assemble_static_values(length, normal.area * count, state, peak, edge_values)
     if np.isnan(tangential):
         del values["tangential_stiffness"]

@@ -11,8 +11,6 @@ import numpy as np
 
 from ...core import Outcome
 from ...formatting import format_length, format_quantity
-from ...mesh import recognise
-from ...mesh.tensor import TensorGrid
 from ...model.pieces import make_piece_meshes
 from ...model.source import locate_errors
 from ...surface import nodes
@@ -43,8 +41,6 @@ MIN_COUPLING_RATIO = 0.02
 # Smallest ratio of load to buckling load that a note reports; it is about the relative error of the
 # sideways motion of a tall piece.
 MIN_BUCKLING_RATIO = 0.02
-# Smallest clamped fraction of a far face that counts as complete; mesh files have few digits.
-MIN_COMPLETE_FRACTION = 1 - 1e-6
 
 
 def static_measures_without_errors(model) -> dict:
@@ -210,26 +206,6 @@ def strain_warnings(
     return out
 
 
-def exceeds_small_strains(patch_model, largest_pressure, approach):
-    """Return whether the strains of one patch, or of each of q patches, may cause a warning.
-
-    Parameters
-    ----------
-    patch_model : PatchModel
-    largest_pressure, approach : float or (q,)
-        Largest pressure [Pa] and approach [m].
-
-    Returns
-    -------
-    bool or (q,) of bool
-    """
-    if not patch_model.mesh.is_automatic:
-        return np.ones(np.shape(largest_pressure), bool)
-    return (
-        np.maximum(*_estimate_strains(patch_model, largest_pressure, approach)) > MAX_SMALL_STRAIN
-    )
-
-
 def _estimate_strains(patch_model, largest_pressure, approach) -> tuple:
     """Return two estimates of the strain: peak pressure/modulus and approach/height."""
     young = min(material.young for material in _list_materials(patch_model))
@@ -259,14 +235,7 @@ def notes_on_neglected_effects(model, patch, coarse) -> list:
         the plane state.
     """
     patch_model = model.patch
-    bodies_by_side = {"lower": patch.pair.grid, "upper": patch.pair.upper_grid}
-    sides = [side for side, body in bodies_by_side.items() if not isinstance(body, TensorGrid)]
     out = [text for text in patch.notes if nodes.is_note(text)]
-    if sides:
-        out.append(
-            f"scikit-fem assembles the stiffness of the {' and the '.join(sides)} piece cell by cell"
-        )
-    out += notes_on_mesh_file(patch.pair)
     out += notes_on_tall_pieces(
         patch_model, patch.pressure.load / patch.pieces.interface.weight.sum()
     )
@@ -297,16 +266,17 @@ def notes_on_neglected_effects(model, patch, coarse) -> list:
             "the largest slide"
         )
     if coarse[0] is not None and patch.pressure.outcome is not Outcome.NO_CONTACT:
-        # An unstructured mesh has no coarser one: its second mesh is finer than its first.
-        other = patch if coarse[-1] is None else coarse[0]
-        if patch_model.solved is not None:
-            out += patch_model.solved.plane_sentences
-        else:
-            out += store.get_or_compute_in_sweep(
-                patch_model,
-                ("plane band", other),
-                lambda: note_on_plane_state(patch_model, other),
-            )
+        # An unstructured mesh has no coarser one: its second mesh is finer than its first. Even the
+        # coarsest mesh of a static patch has 20 cells along the contact, which is enough for the change.
+        other = patch
+        if coarse[-1] is not None:
+            mesh = patch_model.mesh
+            other = coarse[-1] if mesh.is_automatic and mesh.is_static else coarse[0]
+        out += store.get_or_compute_in_sweep(
+            patch_model,
+            ("plane band", other),
+            lambda: note_on_plane_state(patch_model, other),
+        )
     return out
 
 
@@ -361,29 +331,6 @@ def _compute_dundurs_beta(patch_model) -> float:
     lower = shear[0] * (kappa[1] - 1), shear[0] * (kappa[1] + 1)
     upper = shear[1] * (kappa[0] - 1), shear[1] * (kappa[0] + 1)
     return (lower[0] - upper[0]) / (lower[1] + upper[1])
-
-
-def notes_on_mesh_file(pair) -> list:
-    """Return notes on holes and on partly clamped far faces of the pieces of a mesh file."""
-    out = []
-    for side, body in (("lower", pair.grid), ("upper", pair.upper_grid)):
-        # A tensor grid has no holes, and its last row is clamped over the whole length.
-        if body.base_grid is not None:
-            continue
-
-        count, area = recognise.find_holes(body)
-        if count:
-            out.append(
-                f"contact.mesh: the {side} piece has {count} hole{'s' * (count > 1)} inside, {area:.3g} m2 in "
-                "all; if a hole is not intended, close it in the mesh"
-            )
-        fixed_length, face_length = recognise.measure_clamped_length(body)
-        if fixed_length < MIN_COMPLETE_FRACTION * face_length:
-            out.append(
-                f"contact.mesh: the held nodes `{side}_far` cover {fixed_length:.6g} m of a face of {face_length:.6g} m, "
-                f"{fixed_length / face_length:.3g} of the length of this face; the rest of the face is free"
-            )
-    return out
 
 
 def notes_on_tall_pieces(patch_model, mean_pressure: float) -> list:

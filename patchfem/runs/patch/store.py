@@ -66,7 +66,6 @@ def content_key(patch_model) -> tuple:
         interface.skin and tuple(interface.skin),
         replace(mesh, shared=None),
         mesh.shared and mesh.shared.name,
-        patch_model.solved,
         shapes,
         heights,
     )

@@ -147,18 +147,29 @@ def _edge_values_between_nodes(patch, weight) -> EdgeValues:
         if ratio is not None:
             tangential = tangential + np.diag(softness / ratio)
     unit = np.ones(x.size)
-    stiffnesses = np.zeros(3)
-    length = 0.0
+    stiffnesses = np.zeros(2)
+    shear_stiffness = length = 0.0
     first = x[-1]
     last = x[0]
     for force, gap in zip(state.force, state.gap, strict=True):
         if not force.any():
             continue
-        ends = edges.find_edges(normal, x, force, gap, softness, patch.pair.row)
+        pressed = edges.SetFactor(normal, force > 0)
+        ends = edges.find_edges(
+            pressed, x, force, gap, softness, patch.pair.row, is_quadratic=patch.pair.is_quadratic
+        )
         intervals = edges.contact_intervals(x, force, ends)
         length += np.diff(intervals).sum()
         first = min(first, intervals[0, 0])
         last = max(last, intervals[-1, 1])
-        motions = ((normal, unit), (tangential, unit), (normal, x))
-        stiffnesses += [edges.set_stiffness(c, force > 0, motion, ends) for c, motion in motions]
-    return EdgeValues(float(length / count), float(last - first), *map(float, stiffnesses))
+        stiffnesses += edges.set_stiffness(pressed, np.stack([unit, x], axis=1), ends)
+        sheared = edges.SetFactor(tangential, force > 0)
+        shear_stiffness += edges.set_stiffness(sheared, unit[:, None], ends)[0]
+    normal_stiffness, rotational_stiffness = map(float, stiffnesses)
+    return EdgeValues(
+        length=float(length / count),
+        width=float(last - first),
+        normal=normal_stiffness,
+        tangential=float(shear_stiffness),
+        rotational=rotational_stiffness,
+    )

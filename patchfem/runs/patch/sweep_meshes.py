@@ -14,13 +14,11 @@ import numpy as np
 
 from ...core import PatchfemError
 from ...mesh.grading import Layout
-from ...mesh.tensor import TensorGrid
 from ...model.patch import SharedMeshes
 from . import grids, mesh_levels
 from .condensed import cache_condensed_pairs, condense
 from .measures import max_mesh_error_ratio
 from .press import solve_patch_contact
-from .static_batch import max_mesh_error_ratios, solve_patches_on_pair
 
 # Largest number of cases that determine the mesh; of more cases, the most different ones are
 # selected.
@@ -32,12 +30,10 @@ N_SINGLE_CASES = 5
 MAX_SEARCHES = 4
 # Largest number of interface nodes of the finest mesh; a finer mesh slows down every case.
 MAX_INTERFACE_NODES = 400
-# Highest convergence order of static measures; meshes that would be too coarse even at this order
-# are not tried.
-MAX_ORDER = 3.0
-# Factors on the cell lengths that the cases need, in the order of trial: the longest cells are the
-# cheapest. Factors that the last trial shows to be too large are skipped.
-CELL_FACTORS = (4.0, 2.8, 2.0, 1.5, 1.0)
+# Tolerance that needs the cells of a single case; a larger one needs longer cells, because the errors
+# are of second order in their length.
+SINGLE_CASE_TOL = 1e-3
+MAX_CELL_FACTOR = 4.0  # Largest factor on the cell lengths.
 # Largest ratio of the cell lengths of neighbouring cases that are joined by a single band.
 MAX_CELL_RATIO = 2.0
 
@@ -88,6 +84,7 @@ def choose_shared_meshes(
     patch_model = patches[0]
     if not patch_model.mesh.is_automatic:
         return name_shared_meshes(mesh_levels.make_file_meshes(patch_model))
+    tolerance = patch_model.mesh.tolerance or tolerance
     cases, are_all_patches = select_distinct_patches(patches)
     load_variants = chain.from_iterable(map(grids.make_load_variants, cases))
     has_partial_slip = any(patch.interface.partial_slip for patch in patches)
@@ -99,49 +96,34 @@ def choose_shared_meshes(
         not (are_all_patches and is_complete),
         {key: one - common_halvings for key, one in halvings.items()},
     )
-    # If the contact edges move or the patch slips partially, the initial contact does not determine
-    # the measures, so that only the shortest cells are used.
-    cell_factors = (
-        CELL_FACTORS[-1:] if patch_model.mesh.edge_motion or has_partial_slip else CELL_FACTORS
-    )
-    unscaled_bodies = None
     if layout is None:
         return None
-    while True:
-        cell_factor = cell_factors[0]
-        cell_factors = cell_factors[1:]
-        bodies = grids.make_grids(patch_model, layout.scale_cells(cell_factor))
-        if cell_factors:
-            unscaled_bodies = unscaled_bodies or grids.make_grids(patch_model, layout)
-            # Both layouts already have the maximum allowed number of columns.
-            if bodies[0].x.size >= unscaled_bodies[0].x.size:
-                continue
-        pairs, error_ratio = _refine_until_tolerance_is_met(
-            cases, bodies, tolerance, bool(cell_factors), grids.MIN_LEVELS + common_halvings
-        )
-        if error_ratio <= 1 or not cell_factors:
-            meshes = name_shared_meshes([pair.meshes for pair in pairs])
-            cache_condensed_pairs(cases[0], meshes, pairs)
-            return meshes
-        # Largest factor on the cell lengths at which a mesh can meet the tolerance.
-        max_factor = max(cell_factor * error_ratio ** (-1 / MAX_ORDER), CELL_FACTORS[-1])
-        cell_factors = tuple(factor for factor in cell_factors if factor <= max_factor)
+    # If the contact edges move or the patch slips partially, the initial contact does not determine
+    # the measures.
+    cell_factor = 1.0
+    if not (patch_model.mesh.edge_motion or has_partial_slip):
+        cell_factor = np.clip((tolerance / SINGLE_CASE_TOL) ** 0.5, 1.0, MAX_CELL_FACTOR)
+    pairs = _refine_until_tolerance_is_met(
+        cases,
+        grids.make_grids(patch_model, layout.scale_cells(float(cell_factor))),
+        tolerance,
+        grids.MIN_LEVELS + common_halvings,
+    )
+    meshes = name_shared_meshes([pair.meshes for pair in pairs])
+    cache_condensed_pairs(cases[0], meshes, pairs)
+    return meshes
 
 
 def name_shared_meshes(levels) -> SharedMeshes:
     """Return SharedMeshes whose name is the hash of their contents."""
     digest = sha256()
     for body in chain.from_iterable(levels):
-        if body is None:
-            arrays = ()
-        elif isinstance(body, TensorGrid):
-            arrays = (body.x, body.depth)
-        else:
-            mesh = (body.points, body.triangles, body.quads, body.is_coating)
-            arrays = (*mesh, body.interface, body.far)
+        arrays = ()
+        if body is not None:
+            nodes = (body.interface, body.far, *body.blocks.values())
+            arrays = (body.points, body.is_coating, *nodes)
         for array in arrays:
             digest.update(repr(array.shape).encode() + np.ascontiguousarray(array).tobytes())
-        digest.update(repr(getattr(body, "coating_rows", None)).encode())
     return SharedMeshes(tuple(levels), digest.hexdigest()[:32])
 
 
@@ -235,8 +217,8 @@ def _make_common_layout(
         pair = condense(first, *grids.make_grids(first, layout))
         layouts = []
         largest_ratio = 0.0
-        for case, patch in zip(cases, solve_patches_on_pair(cases, pair)):
-            extent = _find_contact_extent(case, pair, patch)
+        for case in cases:
+            extent = _find_contact_extent(case, pair)
             if extent is not None:
                 n_halvings = halvings_by_case.get(_load_and_shape_parameters(case), 0)
                 case_layout = grids.make_column_layout(case, [extent])
@@ -250,15 +232,14 @@ def _make_common_layout(
     return layout
 
 
-def _find_contact_extent(patch_model, pair, patch):
+def _find_contact_extent(patch_model, pair):
     """Return the contact region of a patch, which is solved first if needed; None on failure.
 
     In that case the single run reports the error.
     """
     try:
-        return grids.find_contact_extent(
-            patch or solve_patch_contact(patch_model, pair), patch_model.mesh.slip
-        )
+        patch = solve_patch_contact(patch_model, pair)
+        return grids.find_contact_extent(patch, patch_model.mesh.slip)
     except PatchfemError:
         return None
 
@@ -313,9 +294,7 @@ def _interpolate_bands(layouts: list) -> list:
     return bands
 
 
-def _refine_until_tolerance_is_met(
-    cases: list, bodies, tolerance: float, is_level_count_fixed: bool, min_levels: int
-) -> tuple:
+def _refine_until_tolerance_is_met(cases: list, bodies, tolerance: float, min_levels: int) -> list:
     """Refine nested meshes until all patches meet the tolerance or the mesh is too expensive.
 
     Parameters
@@ -324,40 +303,28 @@ def _refine_until_tolerance_is_met(
     bodies : list
         Meshes of the pieces on the coarsest level.
     tolerance : float
-    is_level_count_fixed : bool
-        Whether to use exactly `min_levels` levels.
     min_levels : int
         Smallest number of levels.
 
     Returns
     -------
-    tuple
-        Condensed pieces, from fine to coarse, and the largest ratio of error to allowed error. If
-        all patches of the batches meet the tolerance, it is the ratio of the first other patch that
-        does not.
+    list of CondensedPair
+        From fine to coarse.
     """
     pairs = []
-    tolerance = cases[0].mesh.tolerance or tolerance
     while True:
         pairs.insert(0, condense(cases[0], *bodies))
         bodies = [body.refine() for body in bodies]
         if len(pairs) < min_levels:
             continue
-        batch_ratios = max_mesh_error_ratios(cases, pairs, tolerance)
-        largest_ratio = max((ratio for ratio in batch_ratios if ratio is not None), default=0.0)
-        if largest_ratio <= 1:
-            for case, batch_ratio in zip(cases, batch_ratios):
-                if batch_ratio is None:
-                    ratio = _max_mesh_error_ratio(case, pairs, tolerance)
-                    if ratio > 1:
-                        largest_ratio = ratio
-                        break
-        n_nodes = bodies[0].x.size
         seconds = grids.predict_condensing_seconds(bodies)
         max_seconds = mesh_levels.max_condensing_seconds(cases[0], tolerance)
-        is_too_expensive = n_nodes > MAX_INTERFACE_NODES or seconds > max_seconds
-        if largest_ratio <= 1 or is_level_count_fixed or is_too_expensive:
-            return pairs, largest_ratio
+        is_too_expensive = bodies[0].x.size > MAX_INTERFACE_NODES or seconds > max_seconds
+        # The refinement goes on as soon as one case misses the tolerance.
+        if is_too_expensive or all(
+            _max_mesh_error_ratio(case, pairs, tolerance) <= 1 for case in cases
+        ):
+            return pairs
 
 
 def _max_mesh_error_ratio(patch_model, pairs: list, tolerance: float) -> float:

@@ -4,12 +4,15 @@ In: a `Patch`. Out: values by name, such as peak pressure, contact length and st
 peak pressure at rounded ends that the mesh does not resolve.
 """
 
+from weakref import WeakKeyDictionary
+
 import numpy as np
 
 from ...closed_forms import contact
 from ...contact import edges, stiffness
 from ...core import Outcome
 from ...elasticity.lapack import use_one_blas_thread
+from ...mesh.grid import TensorGrid
 from . import strips
 from .edge_values import EdgeValues
 from .press import Patch
@@ -20,9 +23,12 @@ MAX_CURVATURE_RATIO = 2.0
 # Smallest number of contact cells on a rounded end at which its pressure peak is resolved.
 MIN_ROUNDING_CELLS = 4
 
+# Values of the patches in use: refinement, error estimates and notes need the same ones
+_VALUES_BY_PATCH: WeakKeyDictionary = WeakKeyDictionary()
 
-def estimate_peak_pressures(x, sigma, node_fraction=None) -> np.ndarray:
-    """Estimate the peak pressures (q,) [Pa] of q patches from their nodal pressures.
+
+def estimate_peak_pressure(x, sigma, node_fraction=None) -> float:
+    """Estimate the peak pressure [Pa] of a patch from its nodal pressures.
 
     Inside the interface, the peak is the vertex of the parabola through the largest nodal pressure
     and its neighbours. At an end of the interface, the nodal pressures of bare pieces are means
@@ -31,108 +37,85 @@ def estimate_peak_pressures(x, sigma, node_fraction=None) -> np.ndarray:
 
     Parameters
     ----------
-    x : (m,) ndarray
-        Positions of the nodes [m].
-    sigma : (q, m) ndarray
-        Nodal pressures [Pa].
+    x, sigma : (m,) ndarray
+        Positions [m] and pressures [Pa] of the nodes.
     node_fraction : (m,) ndarray or None
         Weight of the nodal pressure at an end of the interface: the fraction of the asperity layer
         in the nodal compliance. None for bare pieces.
     """
-    peak_node = np.argmax(sigma, axis=1)
-    peaks = sigma.max(axis=1)
-    is_inner = (peak_node > 0) & (peak_node < x.size - 1)
-    peaks[is_inner] = _parabola_vertices(x, sigma[is_inner], peak_node[is_inner])
-    for border, step in ((0, 1), (x.size - 1, -1)):
-        rows = np.flatnonzero(peak_node == border)
-        bare = _extrapolate_pressure_to_ends(np.abs(x[::step] - x[border]), sigma[rows, ::step])
-        fraction = 0.0 if node_fraction is None else node_fraction[border]
-        peaks[rows] = fraction * peaks[rows] + (1 - fraction) * bare
-    return peaks
+    node = int(np.argmax(sigma))
+    largest = float(sigma[node])
+    if 0 < node < x.size - 1:
+        return largest + _vertex_height(x, sigma, node)
+    step = 1 if node == 0 else -1
+    bare = _extrapolate_pressure_to_end(np.abs(x[::step] - x[node]), sigma[::step])
+    fraction = 0.0 if node_fraction is None else float(node_fraction[node])
+    return fraction * largest + (1 - fraction) * bare
 
 
-def _parabola_vertices(x, sigma, peak_node) -> np.ndarray:
-    """Return the vertices (q,) [Pa] of parabolas through the largest nodal pressures.
+def _vertex_height(x, sigma, node: int) -> float:
+    """Return by how much the parabola through a node and its neighbours rises above the pressure of the node [Pa].
 
-    The parabola passes through the largest nodal pressure and its neighbours. If the neighbouring
-    parabolas have a much smaller curvature, as beside a jump, the value is moved towards the nodal
-    pressure.
-
-    Parameters
-    ----------
-    x : (m,)
-        Positions of the nodes [m].
-    sigma : (q, m)
-        Nodal pressures [Pa].
-    peak_node : (q,)
-        Index of the largest nodal pressure; an inner node.
+    If the neighbouring parabolas have a much smaller curvature, as beside a jump, the height is reduced.
     """
-    # At an end of the interface, the value of the missing neighbour is extrapolated with the
-    # parabola.
-    rows = np.arange(peak_node.size)
-    nodes = np.clip(peak_node[:, None] + [-1, 0, 1], 1, x.size - 2)
-    left = x[nodes] - x[nodes - 1]
-    right = x[nodes + 1] - x[nodes]
-    pressure = sigma[rows[:, None], nodes]
-    slope_left = (pressure - sigma[rows[:, None], nodes - 1]) / left
-    slope_right = (sigma[rows[:, None], nodes + 1] - pressure) / right
-    curvature = (slope_right - slope_left) / (left + right)
-    slope = (slope_left * right + slope_right * left)[:, 1] / (left + right)[:, 1]
-    has_vertex = (
-        (sigma[rows, peak_node - 1] > 0) & (sigma[rows, peak_node + 1] > 0) & (curvature[:, 1] < 0)
-    )
-    middle = np.where(has_vertex, curvature[:, 1], -1.0)
-    similar = np.minimum(curvature[:, 0] / middle, curvature[:, 2] / middle)
-    fraction = np.clip(MAX_CURVATURE_RATIO * similar, 0.0, 1.0)
-    rise = np.where(has_vertex, fraction * slope**2 / (-4 * middle), 0.0)
-    return sigma[rows, peak_node] + rise
+    if not (sigma[node - 1] > 0 and sigma[node + 1] > 0):
+        return 0.0
+
+    def fit_parabola(middle: int) -> tuple[float, float]:
+        """Return the slope at the middle of three nodes, and half the second derivative."""
+        left = x[middle] - x[middle - 1]
+        right = x[middle + 1] - x[middle]
+        slope_left = (sigma[middle] - sigma[middle - 1]) / left
+        slope_right = (sigma[middle + 1] - sigma[middle]) / right
+        slope = (slope_left * right + slope_right * left) / (left + right)
+        return slope, (slope_right - slope_left) / (left + right)
+
+    slope, curvature = fit_parabola(node)
+    if not curvature < 0:
+        return 0.0
+    # At an end of the interface, the parabola itself stands in for the missing neighbour.
+    neighbours = [min(max(k, 1), x.size - 2) for k in (node - 1, node + 1)]
+    similar = min(1.0, *(fit_parabola(k)[1] / curvature for k in neighbours))
+    fraction = min(max(MAX_CURVATURE_RATIO * similar, 0.0), 1.0)
+    return float(fraction * slope**2 / (-4 * curvature))
 
 
-def _extrapolate_pressure_to_ends(x, sigma) -> np.ndarray:
-    """Extrapolate cell-averaged nodal pressures to the ends of the interface; return (q,) [Pa].
+def _extrapolate_pressure_to_end(x, sigma) -> float:
+    """Extrapolate cell-averaged nodal pressures to the end of the interface [Pa].
 
-    The curve with these means is a parabola if three nodes are loaded, or a line if two are.
+    The curve with these means is a parabola if three nodes are loaded, or a line if two are. `x` (m,) [m] is the
+    distance from the end.
     """
-    peaks = sigma[:, 0].copy()
-    # The first False follows the loaded nodes, so that its index is their number.
-    n_loaded = np.argmin(np.pad(sigma > 0, ((0, 0), (0, 1))), axis=1)
-    n_used = np.minimum(n_loaded, min(3, x.size - 1))
-    for count in (2, 3):
-        rows = n_used == count
-        if rows.any():
-            borders = np.concatenate([[0.0], (x[1 : count + 1] + x[:count]) / 2]) / x[1]
-            power = np.arange(1, count + 1)
-            means = np.diff(borders[:, None] ** power, axis=0) / power / np.diff(borders)[:, None]
-            peaks[rows] = np.linalg.solve(means, sigma[rows, :count].T)[0]
-    return peaks
+    is_open = np.append(sigma[:3] <= 0, True)
+    count = min(int(np.argmax(is_open)), x.size - 1)
+    if count < 2:
+        return float(sigma[0])
+    borders = np.concatenate([[0.0], (x[1 : count + 1] + x[:count]) / 2]) / x[1]
+    power = np.arange(1, count + 1)
+    means = np.diff(borders[:, None] ** power, axis=0) / power / np.diff(borders)[:, None]
+    return float(np.linalg.solve(means, sigma[:count])[0])
 
 
 def assemble_static_values(
     length: float, area: float, state, peak, edge_values: EdgeValues
 ) -> dict:
-    """Return the static measures as a dict of numbers, or of arrays (q,) for q patches.
+    """Return the static measures by name.
 
     Parameters
     ----------
     length, area : float
         Length [m] and area [m2] of the interface.
     state : object
-        Has load, moment, rotation and approach, as a ContactState; numbers or (q,).
-    peak : float or (q,) ndarray
+        Has load, moment, rotation and approach, as a ContactState.
+    peak : float
         Largest pressure [Pa].
     edge_values : EdgeValues
 
     Returns
     -------
-    dict
+    dict of float
     """
-    is_loaded = np.greater(state.load, 0)
-
-    def quotient(divisor, numerator):
-        """Return numerator/divisor; 0 for patches without load."""
-        zero = np.zeros(np.shape(peak))
-        return np.divide(numerator, divisor, out=zero, where=is_loaded)[()]
-
+    is_loaded = state.load > 0
     return {
         "normal_load": state.load,
         "contact_fraction": edge_values.length / length,
@@ -141,8 +124,8 @@ def assemble_static_values(
         "rotation": state.rotation,
         "approach": state.approach,
         "contact_half_width": edge_values.width / 2,
-        "pressure_centre": quotient(state.load, state.moment),
-        "loaded_fraction": quotient(area * peak, state.load),
+        "pressure_centre": state.moment / state.load if is_loaded else 0.0,
+        "loaded_fraction": state.load / (area * peak) if is_loaded else 0.0,
         "normal_stiffness": edge_values.normal,
         "tangential_stiffness": edge_values.tangential,
         "rotational_stiffness": edge_values.rotational,
@@ -155,6 +138,13 @@ def compute_static_values(patch: Patch) -> dict:
     If a node lies at the edge of a step, the values are the weighted mean of the two solutions with
     this node on either side of the step. `patch_rows` defines the measures.
     """
+    if patch not in _VALUES_BY_PATCH:
+        _VALUES_BY_PATCH[patch] = _compute_static_values(patch)
+    return _VALUES_BY_PATCH[patch].copy()
+
+
+def _compute_static_values(patch: Patch) -> dict:
+    """Return the values of all static measures of a solved patch by name, in SI units."""
     if patch.step_variants:
         parts = [(weight, compute_static_values(part)) for weight, part in patch.step_variants]
         names = parts[0][1]
@@ -171,7 +161,7 @@ def compute_static_values(patch: Patch) -> dict:
         np.ptp(patch.x),
         patch.pieces.interface.weight.sum(),
         patch.pressure,
-        estimate_peak_pressures(patch.x, sigma, patch.skin_fraction).max(),
+        max(estimate_peak_pressure(patch.x, row, patch.skin_fraction) for row in sigma),
         edge_values,
     )
     if state is not None:
@@ -185,15 +175,17 @@ def compute_static_values(patch: Patch) -> dict:
 
 def _compute_edge_values(patch: Patch) -> EdgeValues:
     """Return contact length and contact stiffnesses of a patch without strips."""
-    x = patch.x
-    ends = contact_ends(patch)
+    pressed = edges.SetFactor(patch.pieces.normal, patch.active)
+    ends = contact_ends(patch, pressed)
     intervals = contact_intervals(patch, ends)
+    motions = np.stack([np.ones(patch.x.size), patch.x], axis=1)
+    normal, rotational = edges.set_stiffness(pressed, motions, ends)
     return EdgeValues(
         length=float(np.diff(intervals).sum()),
         width=float(intervals[-1, 1] - intervals[0, 0]),
-        normal=edges.set_stiffness(patch.pieces.normal, patch.active, np.ones(x.size), ends),
+        normal=float(normal),
         tangential=_full_stick_stiffness(patch, ends),
-        rotational=edges.set_stiffness(patch.pieces.normal, patch.active, x, ends),
+        rotational=float(rotational),
     )
 
 
@@ -206,10 +198,10 @@ def contact_intervals(patch: Patch, ends: list) -> np.ndarray:
     return edges.contact_intervals(patch.x, force, ends)
 
 
-def contact_ends(patch: Patch) -> list:
+def contact_ends(patch: Patch, pressed: edges.SetFactor | None = None) -> list:
     """Return the contact edges between nodes as a list of `ContactEdge`.
 
-    The list is empty for a patch in strips.
+    The list is empty for a patch in strips. `pressed` is the factor of the nodes in contact, if it is known.
     """
     if patch.strips is not None:
         return []
@@ -222,7 +214,16 @@ def contact_ends(patch: Patch) -> list:
         bare = patch.pair.compliance.normal
         softness = None if normal is bare else np.diag(normal) - np.diag(bare)
         force = patch.pressure.sigma_n * patch.pieces.interface.weight
-        ends = edges.find_edges(normal, x, force, patch.gap, softness, patch.pair.row)
+        pressed = pressed or edges.SetFactor(normal, patch.active)
+        ends = edges.find_edges(
+            pressed,
+            x,
+            force,
+            patch.gap,
+            softness,
+            patch.pair.row,
+            is_quadratic=patch.pair.is_quadratic,
+        )
     jumps = patch.model.gap.jumps
     return edges.snap_to_steps(ends, x, patch.unloaded_gap, jumps) if jumps else ends
 
@@ -235,7 +236,8 @@ def _full_stick_stiffness(patch: Patch, ends: list) -> float:
     """
     active = patch.active
     if not patch.pair.closing.any():
-        return edges.set_stiffness(patch.pieces.tangential, active, np.ones(patch.x.size), ends)
+        sheared = edges.SetFactor(patch.pieces.tangential, active)
+        return float(edges.set_stiffness(sheared, np.ones((patch.x.size, 1)), ends)[0])
 
     def coupled_stiffness(contact_set) -> float:
         """Return the tangential stiffness [N/m] for a contact set (m,)."""
@@ -319,7 +321,7 @@ def _rounded_bodies(pair) -> list:
     """Return the meshes of the pieces whose interface ends are rounded."""
     bodies = []
     for body in (pair.grid, pair.upper_grid):
-        end = getattr(body, "end", None)
-        if end is not None and end.kind == "radius" and body.interface_depths[-1] > 0:
+        is_rounded = isinstance(body, TensorGrid) and body.end.kind == "radius"
+        if is_rounded and body.interface_depths[-1] > 0:
             bodies.append(body)
     return bodies

@@ -63,8 +63,6 @@ def note_on_heating(model, patch, response, work: float | None = None) -> list:
         return []
     if work is None:
         work = float(np.trapezoid(response.force, response.slide))
-        if response.lateral is not None:
-            work += float(np.trapezoid(response.lateral_force, response.lateral))
     return note_on_surface_temperature(model, patch, work, float(response.time[-1]))
 
 

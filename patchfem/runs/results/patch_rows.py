@@ -4,9 +4,6 @@ In: a name. Out: its unit, floor and definition; and the names of the methods th
 measures.
 """
 
-from math import inf
-from re import sub
-
 from ...core import MeasureDefinition
 
 ROWS = (
@@ -183,15 +180,6 @@ MESH_MEASURES = (
 )
 TABLE = {row.name: row for row in ROWS}
 POSITIVE_MESH_MEASURES = tuple(name for name in MESH_MEASURES if TABLE[name].minimum == 0.0)
-
-
-def minimum_value(name: str) -> float:
-    """Return the smallest value [SI] that a static measure can have; -inf if there is none.
-
-    The name may end with the number of an interface.
-    """
-    row = TABLE.get(sub(r"_\d+$", "", name))
-    return -inf if row is None else row.minimum
 
 
 def find_unknown_measures(measures: dict) -> list:

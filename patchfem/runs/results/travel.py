@@ -47,7 +47,7 @@ def warn_of_large_slide(patch, slide) -> list:
     ]
 
 
-def check_pieces_overlap(outcome, patch_model, patch, slide, lateral=None):
+def check_pieces_overlap(outcome, patch_model, patch, slide):
     """Return LEAVES_CONTACT if one piece slides off the other, else the given outcome.
 
     See `response.outcome.check_piece_length`.
@@ -60,14 +60,9 @@ def check_pieces_overlap(outcome, patch_model, patch, slide, lateral=None):
         None for [normal], which has no length.
     slide : (k,)
         Relative displacement [m].
-    lateral : (k,), optional
-        Lateral displacement [m].
     """
     if patch is None:
         return outcome
     pieces = patch_model.pieces
     mean_length = (pieces.lower.length + pieces.upper.length) / 2
-    outcome = check_piece_length(outcome, find_max_displacement(slide), mean_length)
-    if lateral is None:
-        return outcome
-    return check_piece_length(outcome, find_max_displacement(lateral), pieces.width)
+    return check_piece_length(outcome, find_max_displacement(slide), mean_length)

@@ -1,56 +1,43 @@
 """Predicted cost of the engines of a rig, for the choice of an engine, for plans and for refusals.
 
-In: a Model. Out: CPU times, numbers of steps, memory (`Cost`), and reasons for time
-integration with constant steps instead of an exact solution.
+In: a Model. Out: CPU times, numbers of steps, memory (`Cost`), and reasons for a time integration with constant steps
+instead of steps from event to event.
 
-The cost of an event-driven run is counted in time intervals of one power series, that of a time
-integration or of the smooth engine in steps; `cost_model` has the CPU time of each. The free
-vibration of the modes on a stuck element needs intervals only during stick. The fraction of time in
-stick is about 1 if the friction limit exceeds the force of the drive, and nearly 0 if it is half of
-it.
+The steps of the engine `hybrid` follow from the fastest vibration of the modes, also with stuck interfaces, from the lengths
+over which a law forgets, and from the events of friction elements.
 """
 
-from dataclasses import replace
 from functools import lru_cache
 from math import inf, log2, pi, sqrt
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from ... import compiled, cost_model
+from ... import cost_model
 from ...core import Missing
 from ...dynamics import checkpoint
-from ...dynamics.events import cost as events_cost
-from ...dynamics.events import modal_system
 from ...effects import law_has_trait
-from ...friction import record
-from ...friction.bonds import engines
-from ...friction.laws import stretch
 from ...model import patch as patch_model
 from ...model.model import Model
 from ...structure.drive_sizes import (
-    find_drive_omega,
     find_max_acceleration,
     find_max_frequency_ratio,
-    find_min_decay_rate,
-    is_sinusoidal,
 )
-from ..cost import EVENT_CODE, SMOOTH_CODE, Cost, MemoryPart
+from ..cost import HYBRID_CODE, Cost, MemoryPart
 
-if TYPE_CHECKING:
-    from ...friction.protocol import Element
-
-# Largest CPU time [s] of an exact solution if time integration, which has discretization errors,
-# takes less.
-MAX_EXACT_SECONDS_OVER_MARCH = 5.0
-# Largest CPU time [s] of an exact solution if time steps cannot resolve the modes.
-MAX_EXACT_SECONDS_UNRESOLVED = 60.0
-MAX_EXACT_SECONDS = 600.0  # Largest CPU time [s] of an exact solution; a longer one is refused.
+# Largest CPU time [s] of a motion from event to event if a time integration, which has larger errors, takes less.
+MAX_HYBRID_SECONDS = 5.0
+MAX_UNRESOLVED_SECONDS = 60.0  # The same if time steps cannot resolve the modes.
+MAX_EXACT_SECONDS = (
+    600.0  # Largest CPU time [s] of a motion from event to event; a longer one is refused.
+)
+HYBRID_RUNS = 1.7  # Steps of a run and its comparison run, relative to those of the run.
+MIN_STEPS = 12  # Smallest number of steps of `hybrid` per shortest period of the drive.
+STEPS_PER_PHASE = 0.8  # Steps of `hybrid` per radian of the fastest vibration.
+STEPS_PER_EVENT = 3.0
+MAX_STEP_RELAXATION_TIMES = 4.0  # Largest stable step of `hybrid` in relaxation times of a law.
 MAX_MARCH_STEPS = 6400  # Largest automatically chosen number of time steps per cycle.
 MAX_RUN_STEPS = 1e7  # Largest number of time steps of a run after its steps were doubled.
-# Exponent of the ratio of friction limit to drive force, which estimates the fraction of time in
-# stick. At a ratio of 1/2, a fraction of 0.01 was measured.
-STICKING_EXPONENT = 6
 # Largest number of times that neighbouring cells are merged in pairs: 49 of 769 cells remain, with
 # an error of 2e-4 of the motion of a slipping joint.
 MAX_MERGES = 4
@@ -58,31 +45,19 @@ MERGE_TOLERANCE = 1e-3  # Smallest tolerance at which cells are merged MAX_MERGE
 # Largest phase [rad] of the fastest vibration in a time interval, as in
 # `dynamics.events.series_kernels`.
 MAX_INTERVAL_PHASE = 2.0
-# Keys of [accuracy] that select constant time steps instead of the smooth engine.
+# Keys of [accuracy] that select constant time steps.
 MARCH_SETTINGS = (
     "steps_per_cycle",
     "tail",
     "merge",
     "shear_modes",
 )
-# Number of decay times of the slowest mode after which a motion is periodic up to round-off
-# (e^-30).
-N_DECAY_TIMES_TO_REPEAT = 30.0
-# Largest ratio of the steps of the smooth engine to constant time steps at which the smooth engine
-# is used.
-MAX_STEP_RATIO = 3.5
 # A speed-dependent law is stiff for the fraction exp(STIFF_TIME_EXPONENT (1 - r)) of the time,
 # where r is the ratio of drive force to friction limit. Fractions of 0.5 at r = 1.07 and 0.1 at r =
 # 1.26 were measured.
 STIFF_TIME_EXPONENT = 9.0
-# Largest stable step in relaxation lengths of a state variable of the friction law.
-MAX_STEP_RELAXATION_LENGTHS = 3.0
 # Engines whose number of stored samples per cycle does not depend on their steps.
-RESAMPLING_ENGINES = (
-    "exact",
-    "piecewise",
-    "smooth",
-)
+RESAMPLING_ENGINES = ("hybrid",)
 SAMPLES_PER_CYCLE = 400  # Number of samples of a stored cycle, as in `dynamics.cycles`.
 # Expected number of reversals per cycle, which are also stored for the cycles before the window.
 REVERSALS_PER_CYCLE = 4.0
@@ -109,8 +84,7 @@ class HistoryBytes(NamedTuple):
     turn: float
 
 
-EVENT_HISTORY = HistoryBytes(32.0, 85.0, 6.0)
-SMOOTH_HISTORY = HistoryBytes(80.0, 140.0, 16.0)
+HYBRID_HISTORY = HistoryBytes(80.0, 140.0, 16.0)
 MARCH_HISTORY = HistoryBytes(45.0, 50.0, 18.0)
 
 
@@ -174,16 +148,16 @@ def estimate_element_count_and_stiffness(model: Model) -> tuple:
     max_stiffness = 0.0
     for interface in model.rig.friction.interfaces:
         load = find_interface_load(model, interface)
-        if law_has_trait(interface.numbers.law, "set-valued"):
+        keys = interface.numbers
+        n_elements = 1
+        stiffness = keys.stiffness or 0.0
+        if law_has_trait(keys.law, "set-valued"):
             stiffness = inf
-            n_elements = 1
-        else:
-            element = record.make_law(interface.numbers, load).element(load)
-            n_elements = int(element.numbers[1]) >> count_cell_merges(model)
-            stiffness = float(element.numbers[2 : 2 + int(element.numbers[1])].sum())
+        elif keys.bond_length:
+            stiffness = keys.static * load / keys.bond_length
         if model.partial_slip or interface.partial_slip:
             patch = interface.patch or model.patch
-            stiffness = 1 / (1 / stiffness + 1 / patch.pieces.shear_stiffness)
+            stiffness = 1 / (1 / max(stiffness, 1e-300) + 1 / patch.pieces.shear_stiffness)
             n_elements = patch_model.TYPICAL_N_NODES
             if not patch.mesh.is_automatic:
                 n_elements = round(patch.pieces.length / patch.uniform_element_size) + 1
@@ -205,13 +179,13 @@ def count_intervals_by_cause(model: Model) -> tuple:
     modes = model.rig.modes
     drive = model.rig.drive.signal
     count, stiff = estimate_element_count_and_stiffness(model)
-    modal = modal_system.make_modal_system(modes)
-    n_interfaces = len(modal.interfaces)
-    damping = modal.damping_norm
-    rate = damping / 2 + sqrt(
-        damping**2 / 4 + modal.max_omega_squared + stiff * max(modal.inverse_mass, default=0.0)
+    n_interfaces = len(modes.interfaces)
+    damping = float(np.linalg.norm(modes.damping_matrix, 2))
+    inverse_mass = (
+        float((np.asarray(modes.interfaces) ** 2).sum(axis=1).max(initial=0.0)) / modes.mass
     )
-    n_rows = 0 if drive.segments else len(drive.breaks) / model.rig.drive.cycles
+    rate = damping / 2 + sqrt(damping**2 / 4 + float(modes.omega.max()) ** 2 + stiff * inverse_mass)
+    n_rows = _count_rows_per_cycle(model)
     vibration = (
         max(rate * drive.period, 2 * pi * find_max_frequency_ratio(drive)) / MAX_INTERVAL_PHASE
     )
@@ -220,50 +194,75 @@ def count_intervals_by_cause(model: Model) -> tuple:
     return vibration, events
 
 
-def estimate_max_event_driven_seconds(model: Model) -> float:
-    """Return an upper estimate of the CPU time [s] of an event-driven run.
-
-    All elements are assumed to stick all the time. The choice of an engine is based on this
-    estimate.
-    """
-    cycles = model.rig.drive.cycles
-    each = cost_model.MAX_PIECE_SECONDS + _estimate_extra_interval_seconds(model)
-    return (
-        each * cycles + cost_model.READ_PIECE_SECONDS * min(cycles, 10.0)
-    ) * intervals_per_cycle(model)
+def _count_rows_per_cycle(model: Model) -> float:
+    """Return the number of rows of a recorded drive per cycle, 0 for other drives."""
+    drive = model.rig.drive.signal
+    return 0.0 if drive.segments else len(drive.breaks) / model.rig.drive.cycles
 
 
-def _estimate_extra_interval_seconds(model: Model) -> float:
-    """Return the CPU time [s] per time interval for further modes and interfaces."""
-    modes = model.rig.modes
-    return cost_model.PIECE_MODE_SECONDS * (
-        modes.omega.size - 1
-    ) + cost_model.PIECE_INTERFACE_SECONDS * max(0, len(modes.interfaces) - 1)
-
-
-def estimate_event_driven_seconds(model: Model) -> float:
-    """Estimate the CPU time [s] of an event-driven run.
-
-    The intervals due to vibration count only for the expected fraction of time in stick.
-    """
+def estimate_hybrid_steps(model: Model) -> float:
+    """Estimate the number of steps per cycle of the engine `hybrid`."""
     rig = model.rig
-    count, stiff = estimate_element_count_and_stiffness(model)
-    laws = rig.friction.interfaces
-    limit = sum(law.numbers.static * find_interface_load(model, law) for law in laws)
-    drive_force = rig.drive.force or rig.first_mode.mass * find_max_acceleration(rig.drive.signal)
+    modes = rig.modes
+    period = rig.drive.signal.period
     vibration, events = count_intervals_by_cause(model)
-    stick_fraction = (
-        min(1.0, limit / drive_force) ** STICKING_EXPONENT if stiff and drive_force else 1.0
-    )
+    n_rows = _count_rows_per_cycle(model)
+    events = events - n_rows if rig.friction.interfaces else 0.0
+    damping = float(np.abs(modes.damping_matrix).sum(axis=1).max())
+    shortest = find_max_frequency_ratio(rig.drive.signal)
+    if model.load_varies:
+        shortest = max(shortest, model.point.frequency * period)
+
+    # The explicit method follows the fastest decay of a law.
+    rate = 0.0
+    for interface in rig.friction.interfaces:
+        keys = interface.numbers
+        load = find_interface_load(model, interface)
+        limit = keys.static * load
+        inverse_mass = float((modes.interfaces**2).sum(axis=1).max()) / modes.mass
+        if keys.reference_speed:
+            slope = limit / keys.reference_speed * inverse_mass
+            rate = max(rate, slope * _estimate_stiff_fraction(model, limit))
+        elif law_has_trait(keys.law, "bonds") or keys.law in ("bouc-wen", "lugre"):
+            length = keys.bond_length or limit / keys.stiffness
+            speed = 4 * rig.displacement_scale / period
+            rate = max(rate, speed / min(length, keys.slip_growth or inf))
+        rate = max(rate, ((keys.micro_damping or 0.0) + (keys.viscous or 0.0)) * inverse_mass)
     return (
-        (
-            cost_model.PIECE_SECONDS
-            + _estimate_extra_interval_seconds(model)
-            + cost_model.PIECE_ELEMENT_SECONDS * count
-        )
-        * (vibration * stick_fraction + events)
-        * rig.drive.cycles
+        max(n_rows or MIN_STEPS * shortest, STEPS_PER_PHASE * (vibration * MAX_INTERVAL_PHASE))
+        + (rate + damping) * period / MAX_STEP_RELAXATION_TIMES
+        + STEPS_PER_EVENT * events
     )
+
+
+def _estimate_stiff_fraction(model: Model, limit: float) -> float:
+    """Estimate the fraction of time in which a speed-dependent law makes the equations stiff.
+
+    It is 1 if there are several modes or if the drive force is below the friction limit, and smaller otherwise.
+
+    Parameters
+    ----------
+    model : Model
+    limit : float
+        Largest friction force [N].
+    """
+    modes = model.rig.modes
+    if modes.omega.size > 1 or not modes.slide[0] or not limit:
+        return 1.0
+    push = find_max_acceleration(model.rig.drive.signal) * abs(modes.base[0] / modes.slide[0])
+    return min(1.0, float(np.exp(STIFF_TIME_EXPONENT * (1 - modes.mass * push / limit))))
+
+
+def estimate_hybrid_seconds(model: Model) -> float:
+    """Estimate the CPU time [s] of a run of the engine `hybrid` and its comparison run."""
+    n_modes = model.rig.modes.omega.size
+    n_interfaces = len(model.rig.modes.interfaces) if model.rig.friction.interfaces else 0
+    each = (
+        cost_model.HYBRID_STEP_SECONDS
+        + cost_model.HYBRID_MODES_SECONDS * n_modes**2
+        + cost_model.HYBRID_INTERFACES_SECONDS * n_interfaces**2
+    )
+    return HYBRID_RUNS * each * estimate_hybrid_steps(model) * model.rig.drive.cycles
 
 
 def estimate_march_seconds(model: Model) -> float:
@@ -278,47 +277,46 @@ def estimate_march_seconds(model: Model) -> float:
     )
 
 
-def explain_time_steps_over_events(model: Model) -> str:
-    """Return why time integration is chosen over the event-driven engine, or "" if it is not.
+def explain_time_steps(model: Model) -> str:
+    """Return why a time integration is chosen over the engine `hybrid`, or "" if it is not.
 
-    The reason is that the events cost more CPU time than time steps, and more than an exact
-    solution is worth.
+    The reason is a setting of the time integration in the scene, or that the steps of `hybrid` cost more CPU time than
+    those of the time integration and than its smaller errors are worth.
     """
-    if required_steps_per_cycle(model) > MAX_MARCH_STEPS:
-        max_seconds = MAX_EXACT_SECONDS_UNRESOLVED
-    else:
-        max_seconds = max(MAX_EXACT_SECONDS_OVER_MARCH, estimate_march_seconds(model))
-    if estimate_max_event_driven_seconds(model) <= max_seconds:
+    accuracy = model.accuracy
+    is_rigid = all(
+        law_has_trait(law.numbers.law, "set-valued") and not law.partial_slip
+        for law in model.rig.friction.interfaces
+    )
+    if not (is_rigid and not model.partial_slip):
+        for key in MARCH_SETTINGS:
+            if getattr(accuracy, key) is not None:
+                return f"accuracy.{key} is set"
+        if accuracy.quadrature not in ("auto", "recursion"):
+            return "accuracy.quadrature is set"
+    is_resolved = required_steps_per_cycle(model) <= MAX_MARCH_STEPS
+    seconds = MAX_HYBRID_SECONDS if is_resolved else MAX_UNRESOLVED_SECONDS
+    if estimate_hybrid_seconds(model) <= max(seconds, estimate_march_seconds(model)):
         return ""
-    return "time steps are faster than the exact solution"
+    return "time steps are faster than steps from event to event"
 
 
-def explain_time_steps_over_element_events(model: Model) -> str:
-    """Return why time integration is chosen for elastic-plastic elements, or "" if it is not.
-
-    The reason is a fixed number of steps in the scene, or that of `explain_time_steps_over_events`.
-    """
-    if model.accuracy.steps_per_cycle is not None:
-        return "accuracy.steps_per_cycle is set"
-    return explain_time_steps_over_events(model)
-
-
-def refuse_long_event_driven_run(model: Model, numerics=None) -> None:
-    """Raise Missing if an event-driven run would take more than the allowed CPU time."""
-    seconds = estimate_max_event_driven_seconds(model)
+def refuse_long_hybrid_run(model: Model) -> None:
+    """Raise Missing if a run of the engine `hybrid` would take more than the allowed CPU time."""
+    seconds = estimate_hybrid_seconds(model)
     if seconds > MAX_EXACT_SECONDS:
         march = ', or use accuracy.method = "march"' * (estimate_march_seconds(model) < seconds)
         raise Missing(
-            f"the exact solution (about {intervals_per_cycle(model):.2g} time intervals per cycle, set by "
-            "events, rows of the drive and the fastest free vibration) would need a computing time of about "
-            f"{seconds:.0f} s, more than the limit of {MAX_EXACT_SECONDS:.0f} s; lower drive.cycles or the stiffness "
-            f"of modes and elements{march}",
+            f"the motion from event to event (about {estimate_hybrid_steps(model):.2g} steps per cycle, set by events, "
+            f"the fastest free vibration and the friction law) would need a computing time of about {seconds:.0f} s, "
+            f"more than the limit of {MAX_EXACT_SECONDS:.0f} s; lower drive.cycles or the stiffness of modes and "
+            f"elements{march}",
             "",
         )
 
 
-def predict_event_driven_cost(model: Model, numerics, n_points: int) -> Cost:
-    """Predict the cost of an event-driven run.
+def predict_hybrid_cost(model: Model, numerics, n_points: int) -> Cost:
+    """Predict the cost of a run of the engine `hybrid` and its comparison run.
 
     Parameters
     ----------
@@ -327,39 +325,13 @@ def predict_event_driven_cost(model: Model, numerics, n_points: int) -> Cost:
     n_points : int
         Number of interface nodes; not used.
     """
-    steps = int(intervals_per_cycle(model) * numerics.cycles)
+    steps = HYBRID_RUNS * estimate_hybrid_steps(model) * model.rig.drive.cycles
     times = {
-        "motion": estimate_event_driven_seconds(model),
-        "histories": cost_model.KEPT_EVENT_SAMPLE_SECONDS * count_stored_samples(numerics),
+        "motion": estimate_hybrid_seconds(model),
+        "histories": cost_model.KEPT_SAMPLE_SECONDS * count_stored_samples(numerics),
     }
-    code = EVENT_CODE
-    if _estimate_python_loop_seconds(model) <= compiled.MAX_PYTHON_SECONDS:
-        # A run in interpreted Python takes 86 MB without compiled code, and 152 MB with it, because
-        # compiled code loads the LLVM library.
-        if not _is_event_loop_cached(model):
-            code = code._replace(bytes=0.0)
-        loading = replace(code.cost(), compile_seconds=0.0)
-    else:
-        loading = code.cost()
-    return Cost(times, predict_history_memory(model, numerics, EVENT_HISTORY), (), steps) + loading
-
-
-def _estimate_python_loop_seconds(model: Model) -> float:
-    """Estimate the CPU time [s] of an event-driven run in interpreted Python, without merged cells."""
-    count, stiffness = estimate_element_count_and_stiffness(model)
-    each = events_cost.estimate_cycle_time(
-        model.rig.modes, model.rig.drive.signal, stiffness, count if stiffness else 0
-    )
-    return model.rig.drive.cycles * each * 2 ** count_cell_merges(model)
-
-
-def _is_event_loop_cached(model: Model) -> bool:
-    """Return whether the compiled event loop for the number of modes of a rig is cached."""
-    from ...dynamics.events.histories import (
-        is_loop_cached,  # The engine is imported here, because a plan needs nothing else from it.
-    )
-
-    return is_loop_cached(model.rig.modes, model.rig.drive.signal)
+    memory = predict_history_memory(model, numerics, HYBRID_HISTORY)
+    return Cost(times, memory, (), int(steps)) + HYBRID_CODE.cost()
 
 
 def count_stored_samples(numerics) -> float:
@@ -395,130 +367,8 @@ def predict_history_memory(model: Model, numerics, history: HistoryBytes) -> tup
 def describe_element_engine(model: Model, engine: str) -> list:
     """Describe the engine of friction elements and its CPU time in a sentence for a plan."""
     count = estimate_element_count_and_stiffness(model)[0]
-    exact = estimate_event_driven_seconds(model)
-    march = estimate_march_seconds(model)
     return [
-        f"{count} element{'s' * (count > 1)} by engine {engine}; computing time: about {exact:.2g} s with the "
-        f"exact solution between yield events, about {march:.2g} s with time steps at this tolerance"
+        f"{count} element{'s' * (count > 1)} by engine {engine}; computing time: about "
+        f"{estimate_hybrid_seconds(model):.2g} s from event to event, about {estimate_march_seconds(model):.2g} s with "
+        "time steps at this tolerance"
     ]
-
-
-def explain_time_steps_over_smooth_engine(model: Model) -> str:
-    """Return why time integration is chosen over the smooth engine, or "" if it is not."""
-    rig = model.rig
-    accuracy = model.accuracy
-    for key in MARCH_SETTINGS:
-        if getattr(accuracy, key) is not None:
-            return f"with accuracy.{key}"
-    if accuracy.quadrature not in ("auto", "recursion"):
-        return "with accuracy.quadrature"
-    if len(rig.modes.interfaces) > 1:
-        return "with other forces"
-    if model.side == "lower" and law_has_trait(model.friction.law, "bonds"):
-        return "under a pressure that stays"
-    element = make_smooth_element(model)
-    if element is None or element.state_scales is None:
-        return f"for law '{model.friction.law}'"
-    if estimate_smooth_steps(model, element) > MAX_STEP_RATIO * max(steps_per_cycle(model), 400):
-        return "in so many steps"
-    return ""
-
-
-def make_smooth_element(model: Model) -> "Element | None":
-    """Return the friction law as an Element for the smooth engine; None if not supported.
-
-    It is None if the bonds are summed in a list, or if the law averages the pressure over all
-    points.
-    """
-    f = model.friction
-    load = model.nominal_load
-    if law_has_trait(f.law, "averaged"):
-        return None
-    if not law_has_trait(f.law, "bonds"):
-        return record.make_law(f, load).element(load)
-    if engines.unsupported_reason("recursion", f.reading, 1.0 if f.order is None else f.order):
-        return None
-    return stretch.points_element(model.bonds, [1.0], [load])
-
-
-def estimate_smooth_steps(model: Model, element: "Element") -> float:
-    """Estimate the number of steps per cycle of the smooth engine.
-
-    It is the sum of steps for the phase of the fastest motion, for each reversal, and for the
-    stability of state variables with a short relaxation length.
-    """
-    rig = model.rig
-    modes = model.rig.modes
-    omega = find_drive_omega(rig.drive.signal)
-    period = rig.drive.signal.period
-    damping = modes.damping_matrix
-    max_rate = max(
-        float(modes.omega.max()),
-        float(np.abs(damping).sum(axis=1).max()),
-        omega * find_max_frequency_ratio(rig.drive.signal),
-    )
-    inverse_mass = float((modes.slide**2).sum()) / modes.mass
-    stiff_rate = 0.0
-    if not element.length:
-        slope = element.limit / model.friction.reference_speed
-        stiff_rate = slope * inverse_mass * estimate_stiff_time_fraction(model, element)
-    path = 4 * model.speed_scale / omega
-    states = path / element.length if element.state_scales and element.length else 0.0
-    growth_length = (
-        model.friction.slip_growth if law_has_trait(model.friction.law, "bonds") else None
-    )
-    if growth_length:
-        states = max(states, path / growth_length)
-    return (
-        24 + 1.2 * max_rate * period + (states + stiff_rate * period) / MAX_STEP_RELAXATION_LENGTHS
-    )
-
-
-def estimate_stiff_time_fraction(model: Model, element: "Element") -> float:
-    """Estimate the fraction of time in which a speed-dependent law makes the equations stiff.
-
-    It is 1 if there are several modes or if the drive force is below the friction limit, and
-    smaller otherwise.
-    """
-    rig = model.rig
-    modes = model.rig.modes
-    if modes.omega.size > 1 or not modes.slide[0]:
-        return 1.0
-    if not element.limit:
-        return 0.0
-    r = (
-        modes.mass
-        * find_max_acceleration(rig.drive.signal)
-        * abs(modes.base[0] / modes.slide[0])
-        / element.limit
-    )
-    return min(1.0, float(np.exp(STIFF_TIME_EXPONENT * (1 - r))))
-
-
-def predict_smooth_cost(model: Model, numerics, n_points: int) -> Cost:
-    """Predict the cost of a run of the smooth engine and its coarse run.
-
-    Parameters
-    ----------
-    model : Model
-    numerics : Numerics
-    n_points : int
-        Number of interface nodes; not used.
-    """
-    rig = model.rig
-    cycles = model.rig.drive.cycles
-    # Cycles after the motion has become periodic are not computed.
-    if (
-        is_sinusoidal(rig.drive.signal)
-        and (decay := find_min_decay_rate(rig.modes) * rig.drive.signal.period) > 0
-    ):
-        cycles = min(cycles, 20 + N_DECAY_TIMES_TO_REPEAT / decay)
-    steps = 2 * cycles * estimate_smooth_steps(model, make_smooth_element(model))
-    times = {
-        "motion": cost_model.SMOOTH_RUN_SECONDS + cost_model.SMOOTH_STEP_SECONDS * steps,
-        "histories": cost_model.KEPT_SAMPLE_SECONDS * count_stored_samples(numerics),
-    }
-    return (
-        Cost(times, predict_history_memory(model, numerics, SMOOTH_HISTORY), (), int(steps))
-        + SMOOTH_CODE.cost()
-    )

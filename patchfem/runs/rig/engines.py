@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...dynamics.events.elements import CELL_MERGES
 from ...effects import NO_WAVEFORM, law_has_trait
+from ...hybrid import runs as hybrid_runs
 from ...model.model import Model
 from ...response.coarser import CoarserRuns, second_order_errors
 from ...response.errors import (
@@ -21,18 +21,12 @@ from ...response.errors import (
     convergence_errors,
     finer_errors,
     friction_errors,
-    merged_cell_errors,
 )
 from ...scene.rules import methods
 from ...scene.rules.accuracy import has_effect, list_fixed_settings
 from ...slip import shear_modes
 from ..patch import faces
-from .costs import (
-    explain_time_steps_over_element_events,
-    explain_time_steps_over_events,
-    explain_time_steps_over_smooth_engine,
-    intervals_per_cycle,
-)
+from .costs import explain_time_steps
 
 # Ratio of the width within which bonds are merged in the comparison run to that in the run itself.
 MERGE_WIDTH_FACTOR = 0.5
@@ -40,10 +34,6 @@ MERGE_WIDTH_FACTOR = 0.5
 # smaller tail is made; the automatic tail is a tenth of this.
 MAX_UNCHECKED_TAIL_RATIO = 1e-2
 TAIL_FACTOR = 0.1  # Ratio of the neglected tail in the comparison run to that in the run itself.
-# Largest number of time intervals per period at which the map of yield events is used.
-MAX_MAPPED_INTERVALS = 1e5
-
-
 # Largest relative error of an energy balance due to round-off; a billion steps have less.
 BALANCE_ROUND_OFF = 1e-8
 
@@ -57,8 +47,6 @@ class Engine(NamedTuple):
     - coarser_in_time: function (model, numerics) -> list of `CoarserRuns`.
     - coarser_in_space: function (model, numerics, patch, coarse, solution) -> list of
       `CoarserRuns`; coarse is the Patch of [contact] on a coarser mesh, or None.
-    - why_not_cheapest: function (model) -> reason to prefer the next engine for method = "auto", or
-      "".
     - min_relative_error: relative error of every measure, such as round-off, which is added to the
       errors from comparison runs.
     - max_balance_error: largest error of the energy balance of a converged run; None if it follows
@@ -72,7 +60,6 @@ class Engine(NamedTuple):
     method: str
     coarser_in_time: Callable
     coarser_in_space: Callable
-    why_not_cheapest: Callable = lambda model: ""
     min_relative_error: float = 1e-9
     max_balance_error: float | None = BALANCE_ROUND_OFF
     summary_numbers: tuple = ()
@@ -107,14 +94,11 @@ class Engine(NamedTuple):
         )
 
 
-def reason_not_event_driven(model: Model, *, steady: bool = False) -> str:
-    """Return why no event-driven engine can compute a model; "" if one can.
-
-    See `Engine.find_unsupported_feature` for `steady`.
-    """
-    engines = [engine for engine in ENGINES.values() if engine.method == EXACT.method]
-    reasons = [engine.find_unsupported_feature(model, steady=steady) for engine in engines]
-    return reasons[-1] if all(reasons) else ""
+def find_obstacle_of_map(name: str, model: Model) -> str:
+    """Describe a property of a model for which the map of a period "exact" or "piecewise" does not exist, or ""."""
+    return methods.find_unsupported_feature(
+        methods.ENGINE_SUPPORT[name], collect_motion_features(model, steady=True)
+    )
 
 
 def collect_motion_features(model: Model, *, steady: bool = False) -> methods.MotionFeatures:
@@ -131,12 +115,20 @@ def collect_motion_features(model: Model, *, steady: bool = False) -> methods.Mo
     laws = rig.friction.interfaces
     return methods.MotionFeatures(
         [methods.Joint(law.numbers, model.partial_slip or law.partial_slip) for law in laws],
-        "under a load that changes" if rig.friction.load_varies else "",
+        _describe_load_change(model),
         rig.friction.strips_slide_apart,
         spring,
         waveform,
-        is_plane=rig.modes.lateral_faces is not None,
+        lower_shape=model.side if model.side == "lower" else "",
     )
+
+
+def _describe_load_change(model: Model) -> str:
+    """Return the cause of a load that changes, "" for a constant load."""
+    if not model.rig.friction.load_varies:
+        return ""
+    cause = "normal.amplitude" if model.load_varies else "the motion"
+    return f"under a load that changes with {cause}"
 
 
 class SteadyMethod(NamedTuple):
@@ -154,13 +146,12 @@ class SteadyMethod(NamedTuple):
 STEADY_METHODS = {
     finder.name: finder
     for finder in (
-        SteadyMethod("events", "the exact solution from event to event", "exact"),
-        SteadyMethod("yields", "the exact solution between yield events", "piecewise"),
         SteadyMethod(
             "march",
             "a time integration whose initial state is corrected until the motion repeats",
             "march",
         ),
+        SteadyMethod("shooting", "Newton's method on the map of a period", "hybrid"),
         SteadyMethod("balance", "harmonic balance", "harmonic"),
     )
 }
@@ -169,22 +160,17 @@ STEADY_METHODS = {
 def choose_steady_method(model: Model) -> SteadyMethod:
     """Choose the method that computes the steady motion of a model.
 
-    The maps of events or of yield events are exact. Grooves need a time integration whose initial
-    state is corrected to be periodic. Harmonic balance is used for all other models, for scenes that set
-    `harmonics`, and if the map of yield events would need too many time intervals.
+    Coulomb friction, elastic-plastic elements and grooves need Newton's method on the map of a period, because their
+    forces change their slope or jump. Harmonic balance is used for all other models, and for elements in scenes that set
+    `harmonics`. A law with memory on grooves needs a time integration.
     """
-    if not EXACT.find_unsupported_feature(model, steady=True):
-        return STEADY_METHODS["events"]
     if model.grooves is not None:
-        return STEADY_METHODS["march"]
-    has_harmonics = model.accuracy.harmonics is not None
-    if (
-        has_harmonics
-        or PIECES.find_unsupported_feature(model)
-        or intervals_per_cycle(model) > MAX_MAPPED_INTERVALS
-    ):
-        return STEADY_METHODS["balance"]
-    return STEADY_METHODS["yields"]
+        is_shot = not HYBRID.find_unsupported_feature(model, steady=True)
+        return STEADY_METHODS["shooting" if is_shot else "march"]
+    is_shot = not find_obstacle_of_map("exact", model)
+    if model.accuracy.harmonics is None:
+        is_shot |= not find_obstacle_of_map("piecewise", model)
+    return STEADY_METHODS["shooting" if is_shot else "balance"]
 
 
 def _no_comparison_runs(*_) -> list:
@@ -217,37 +203,6 @@ def estimate_sampling_errors(values: dict) -> dict:
         else:
             errors[name] = MOTION_SAMPLING_ERROR * abs(value)
     return errors
-
-
-def _list_exact_space_runs(model: Model, numerics, patch, coarse, solution) -> list:
-    """List the comparison runs of the engine of Coulomb friction on coarser meshes.
-
-    The mesh matters only for the loads of strips and the slip force of an averaged law. The
-    measures of independent strips also have the error of the trapezoidal rule with 400 samples per
-    cycle.
-    """
-    averaged = model.friction is not None and law_has_trait(model.friction.law, "averaged")
-    has_coarser_mesh = coarse is not None and (model.rig.friction.strips_slide_apart or averaged)
-    samples = (
-        [CoarserRuns((), estimate_sampling_errors)] if model.rig.friction.strips_slide_apart else []
-    )
-    if not has_coarser_mesh:
-        return samples
-    coarser = replace(numerics, coarse_patch=True)
-    return [*samples, CoarserRuns((coarser,), second_order_errors, source="mesh")]
-
-
-def _list_element_space_runs(model: Model, numerics, patch, coarse, solution) -> list:
-    """List the comparison runs of elastic-plastic elements with coarser meshes and slider cells."""
-    meshes = _list_coarse_mesh_numerics(model, numerics)
-    if coarse is not None and model.partial_slip:
-        meshes = [replace(numerics, coarse_patch=True), *meshes]
-    coarser_runs = [CoarserRuns((mesh,), convergence_errors, source="mesh") for mesh in meshes]
-    laws = [interface.numbers.law for interface in model.rig.friction.interfaces]
-    if any(law_has_trait(law, "cells") for law in laws):
-        merged = tuple(replace(numerics, joined=cells) for cells in CELL_MERGES)
-        coarser_runs.append(CoarserRuns(merged, merged_cell_errors, source="cells"))
-    return coarser_runs
 
 
 def _list_coarse_mesh_numerics(model: Model, numerics) -> list:
@@ -358,49 +313,56 @@ def _list_engine_errors(model: Model, numerics, patch, coarse, solution) -> list
 def _list_steady_space_runs(model: Model, numerics, patch, coarse, solution) -> list:
     """List the comparison runs of a steady motion on coarser meshes, and the errors by its engine."""
     coarser_runs = _list_engine_errors(model, numerics, patch, coarse, solution)
-    if choose_steady_method(model).engine == PIECES.name:
-        coarser_runs += _list_element_space_runs(model, numerics, patch, coarse, solution)
+    if choose_steady_method(model).name == "shooting":
+        coarser_runs += _list_hybrid_space_runs(model, numerics, patch, coarse, solution)
     return coarser_runs
 
 
-# Tolerance factor for the time steps of the coarse run of the smooth engine.
-STEP_TOLERANCE_FACTOR = 30.0
-estimate_smooth_errors = partial(convergence_errors, ratio=STEP_TOLERANCE_FACTOR)
+def _list_hybrid_time_runs(model: Model, numerics) -> list:
+    """List the comparison run of the engine `hybrid` with larger steps."""
+    coarse = replace(
+        numerics,
+        local=hybrid_runs.COARSE * numerics.local,
+        steps=numerics.steps / hybrid_runs.COARSE_STEP,
+    )
+
+    def find_errors(values: dict, coarse_values: dict) -> dict:
+        """Return the errors of the measures that both runs have."""
+        shared = {name: value for name, value in values.items() if name in coarse_values}
+        return hybrid_runs.estimate_errors(shared, coarse_values, numerics.local)
+
+    return [CoarserRuns((coarse,), find_errors)]
 
 
-def _list_smooth_time_runs(model: Model, numerics) -> list:
-    """List the comparison run of the smooth engine with a larger step tolerance.
+def _list_hybrid_space_runs(model: Model, numerics, patch, coarse, solution) -> list:
+    """List the comparison runs of the engine `hybrid` on coarser meshes.
 
-    A step may have STEP_TOLERANCE_FACTOR times the error, and the error of a run is proportional to
-    that of its steps.
+    The mesh matters only for patches that slip part by part, for the loads of strips, and for the slip force of an
+    averaged law. The measures of independent strips also have the error of the trapezoidal rule with 400 samples per
+    cycle.
     """
-    wider = replace(numerics, local=numerics.local * STEP_TOLERANCE_FACTOR)
-    return [CoarserRuns((wider,), estimate_smooth_errors)]
+    meshes = _list_coarse_mesh_numerics(model, numerics)
+    averaged = model.friction is not None and law_has_trait(model.friction.law, "averaged")
+    strips_slide_apart = model.rig.friction.strips_slide_apart
+    coarser_runs = []
+    if strips_slide_apart:
+        coarser_runs.append(CoarserRuns((), estimate_sampling_errors))
+    if coarse is not None and (model.partial_slip or strips_slide_apart or averaged):
+        meshes = [replace(numerics, coarse_patch=True), *meshes]
+    rule = (
+        convergence_errors
+        if model.partial_slip or not (strips_slide_apart or averaged)
+        else second_order_errors
+    )
+    return coarser_runs + [CoarserRuns((mesh,), rule, source="mesh") for mesh in meshes]
 
 
-EXACT = Engine(
+HYBRID = Engine(
+    "hybrid",
     "exact",
-    "exact",
-    _no_comparison_runs,
-    _list_exact_space_runs,
-    why_not_cheapest=explain_time_steps_over_events,
-)
-PIECES = Engine(
-    "piecewise",
-    "exact",
-    _no_comparison_runs,
-    _list_element_space_runs,
-    why_not_cheapest=explain_time_steps_over_element_events,
-)
-SMOOTH = Engine(
-    "smooth",
-    "",
-    _list_smooth_time_runs,
-    _list_engine_errors,
-    why_not_cheapest=explain_time_steps_over_smooth_engine,
-    min_relative_error=3e-8,
+    _list_hybrid_time_runs,
+    _list_hybrid_space_runs,
     max_balance_error=None,
-    summary_numbers=("iterations",),
 )
 MARCH = Engine(
     "march",
@@ -418,14 +380,7 @@ HARMONIC = Engine(
     max_balance_error=None,
     finds_periodic_motion=True,
 )
-ENGINES = {engine.name: engine for engine in (EXACT, PIECES, SMOOTH, MARCH, HARMONIC)}
-# Engines in the order of preference for method = "auto".
-AUTOMATIC_ENGINES = (
-    EXACT,
-    PIECES,
-    SMOOTH,
-    MARCH,
-)
+ENGINES = {engine.name: engine for engine in (HYBRID, MARCH, HARMONIC)}
 
 
 def describe_balance_error(engine: Engine, measures: dict) -> str:
@@ -451,27 +406,17 @@ def describe_balance_error(engine: Engine, measures: dict) -> str:
 def choose_engine(model: Model) -> Engine:
     """Choose the engine that computes the motion of a model.
 
-    The method of the scene selects its engine; if several have this method, the first one that can
-    compute the model. For method = "auto" it is the first of AUTOMATIC_ENGINES that can compute the
-    model and is not more expensive than the next one. All engines solve the same equations, so the
-    choice affects the time and the errors of a run, but not its meaning; the summary of a run names
-    its engine.
-
-    Returns
-    -------
-    Engine
-        Record with the comparison runs from which the errors of its measures are estimated.
+    The method of the scene selects its engine. For method = "auto" the motion is computed from event to event if
+    possible, else in time steps. All engines solve the same equations, so the choice affects the time and the errors of a
+    run, but not its meaning; the summary of a run names its engine.
     """
-    named = [engine for engine in ENGINES.values() if engine.method == model.accuracy.method]
-    for engine in named[:-1]:
-        if not engine.find_unsupported_feature(model):
+    for engine in ENGINES.values():
+        if engine.method == model.accuracy.method:
             return engine
-    if named:
-        return named[-1]
-    for engine in AUTOMATIC_ENGINES[:-1]:
-        if not engine.find_unsupported_feature(model) and not engine.why_not_cheapest(model):
-            return engine
-    return AUTOMATIC_ENGINES[-1]
+    if HYBRID.find_unsupported_feature(model):
+        return MARCH
+    is_only_engine = model.grooves is not None
+    return HYBRID if is_only_engine or not explain_time_steps(model) else MARCH
 
 
 def describe_unused_settings(model: Model, engine: str) -> list:

@@ -6,7 +6,6 @@ several joints, grooves, varying load), or the Elements of every interface.
 
 import numpy as np
 
-from ...dynamics.grooves import run
 from ...dynamics.march import joints, models
 from ...effects import law_has_trait
 from ...friction.laws.elastic_plastic import parallel_element
@@ -50,10 +49,10 @@ def make_contact(model: Model, numerics: Numerics, patch):
         If the law cannot be combined with other joints.
     """
     rig = model.rig
-    lateral_rows = model.rig.modes.lateral_faces
-    has_joints = len(rig.modes.interfaces) > 1 or lateral_rows is not None
+    has_joints = len(rig.modes.interfaces) > 1
     if model.grooves is not None:
-        return _make_groove_contact(model, patch, numerics.shear_modes)
+        load = patch.pressure.load if patch is not None else model.point.load
+        return rigid.make_climbing_model(model, load, patch, numerics.shear_modes)
     alone = None if has_joints else make_single_contact(model, numerics, patch)
     if not has_joints and not rig.springs.is_nonlinear:
         return alone
@@ -63,10 +62,6 @@ def make_contact(model: Model, numerics: Numerics, patch):
     if has_joints:
         elements = _make_independent_elements(model, numerics, patch)
         all_joints = [joints.Joint(k, element) for k, element in enumerate(elements)]
-    if lateral_rows is not None:
-        is_lateral = [bool(interface.lateral) for interface in rig.friction.interfaces]
-        all_joints = joints.pair_plane_joints(all_joints, is_lateral)
-        rows += [row for row, lateral in zip(lateral_rows, is_lateral) if lateral]
     if rig.springs.interlock is not None:
         all_joints.append(joints.make_interlocking_spring(0, *rig.springs.interlock))
     if rig.springs.cubic is not None:
@@ -104,18 +99,6 @@ def make_interface_elements(model: Model, meshed: tuple) -> list:
         else:
             elements.append(make_element(interface, interface.load, model.rig.speed_scale))
     return elements
-
-
-def _make_groove_contact(model: Model, patch, n_modes: int | None = None):
-    """Return the contact model of an interface over grooves."""
-    f = model.friction
-    load = patch.pressure.load if patch is not None else model.point.load
-    if model.partial_slip or not law_has_trait(f.law, "memoryless"):
-        return rigid.make_climbing_model(model, load, patch, n_modes)
-
-    speed = None if law_has_trait(f.law, "set-valued") else f.reference_speed
-    kinetic = f.static if f.kinetic is None else f.kinetic
-    return run.make_model(model.grooves, load, f.static, kinetic, speed, model.rig.modes)
 
 
 def make_element(interface: InterfaceLaw, load: float, speed: float) -> Element:

@@ -285,7 +285,7 @@ def join_runs(runs: list, duration: float):
         response=_join_histories([run.response for run in runs], shifts),
         window=window,
         ledger=ledger,
-        log=run_events.join_logs([run.log for run in runs], shifts),
+        log=None if last.log is None else run_events.join_logs([run.log for run in runs], shifts),
         extremes=np.concatenate([run.extremes for run in runs]),
         phasors=np.concatenate([run.phasors for run in runs]),
         events=sum(run.events for run in runs),

@@ -16,7 +16,7 @@ from ...friction.record import make_law
 from ...response.ends import estimate_window_error
 from ...response.inside_steps import add_substep_samples
 from ...response.measures import compute_step_harmonic, peak_sampling_errors
-from ...response.rows import ROWS_NEEDING_RUN, lateral_work
+from ...response.rows import ROWS_NEEDING_RUN
 from ...response.spectrum import friction_harmonic, motion_harmonic
 from ...structure.drive_sizes import (
     estimate_peak_speed,
@@ -243,14 +243,13 @@ class MarchEvaluator(RunEvaluator):
         together = self.contact.set_valued and not rig.friction.strips_slide_apart
         # The friction work of this interface excludes other interfaces and impacts at stops.
         if len(rig.friction.names) > 1 or together:
-            work = float(run.step_force @ np.diff(window.slide)) + lateral_work(window, 0)
+            work = float(run.step_force @ np.diff(window.slide))
         span = window.time[-1] - window.time[0]
         work *= drive.period / span if span > 0 else 0.0
         alone = len(rig.modes.interfaces) == 1 and not (
             (rig.friction.load_varies and not self.model.load_varies)
             or rig.friction.strips_slide_apart
             or rig.springs.is_nonlinear
-            or rig.modes.lateral_faces is not None
         )
         if alone and is_sinusoidal(drive) and has_full_cycle(span, drive):
             slide = motion_harmonic(window.time, window.slide, window.slide_rate, omega)

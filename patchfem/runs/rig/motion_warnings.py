@@ -21,9 +21,10 @@ from ..results.notes import (
     warn_of_work_check,
 )
 from ..results.travel import warn_of_large_slide
-from . import event_driven, strips
-from .costs import explain_time_steps_over_element_events
-from .engines import ENGINES, PIECES
+from . import strips
+from .costs import explain_time_steps
+from .engines import ENGINES, find_obstacle_of_map
+from .hybrid_laws import list_elements
 from .solution import first_interface_load
 
 # The motion after a release counts as still decaying if its largest amplitude in the window exceeds
@@ -282,7 +283,7 @@ def _note_on_bond_growth(model, patch, solution) -> list:
 
 def _note_on_elements(run) -> list:
     """Return a list with a note on the method that computes the motion of friction elements."""
-    if PIECES.find_unsupported_feature(run.model):
+    if find_obstacle_of_map("piecewise", run.model):
         return []
     if run.numerics.engine == "march":
         return _note_on_marched_elements(run)
@@ -298,7 +299,7 @@ def _note_on_marched_elements(run) -> list:
         return []
     pinned = run.patch is not None and not model.patch.mesh.is_automatic
     return [
-        f"time stepping is used, because {explain_time_steps_over_element_events(model)}; "
+        f"time stepping is used, because {explain_time_steps(model)}; "
         f'{"on a coarser mesh, or " * pinned}with accuracy.method = "exact" the motion is computed exactly'
     ]
 
@@ -309,16 +310,14 @@ def _note_on_elements_without_slip(run) -> list:
         return []
     window = run.solution.window
     slides = window.extra.get("slides", window.slide[:, None])
-    elements = event_driven.YieldingElements(run.model, run.numerics, run.patch)
-    for group, slide in zip(elements.groups, slides.T):
-        largest_yield = float(group.yield_displacement.max(initial=0.0))
+    for (_, yields), slide in zip(list_elements(run.model, run.numerics, run.patch), slides.T):
+        largest_yield = float(yields.max(initial=0.0))
         amplitude = float(np.ptp(slide)) / 2
         if largest_yield > amplitude:
             return [
                 f"a part of the joint slips only at a slide above {format_length(largest_yield)}, but the slide in this "
                 f"motion is {format_length(amplitude)}, so this part never slips and keeps the force that earlier "
-                "motion left in it; the steady motion is therefore not unique; the motion given here has no "
-                "mean force; for the motion "
+                "motion left in it; the steady motion is therefore not unique; for the motion "
                 'that is reached from rest set accuracy.method = "auto"'
             ]
     return []

@@ -19,7 +19,7 @@ from ...slip import shear_modes
 from ...structure.drive_sizes import find_drive_omega, find_max_acceleration
 from ..cost import (
     BALANCE_CODE,
-    EVENT_CODE,
+    HYBRID_CODE,
     MARCH_CODE,
     SHEAR_MARCH_CODE,
     Cost,
@@ -33,12 +33,11 @@ from .costs import (
     count_stored_samples,
     describe_element_engine,
     find_interface_load,
-    predict_event_driven_cost,
     predict_history_memory,
-    predict_smooth_cost,
+    predict_hybrid_cost,
     steps_per_cycle,
 )
-from .engines import ENGINES, PIECES, choose_steady_method
+from .engines import ENGINES, choose_steady_method, find_obstacle_of_map
 from .numerics import choose_numerics
 
 # Memory [bytes] per pair of modes: matrices, mode shapes and workspace of the eigenvalue solver.
@@ -49,8 +48,9 @@ HARMONIC_PAIR_BYTES = 94.0
 MODE_NODE_BYTES = 24.0  # Memory per shear mode and interface node [bytes].
 DRIVE_ROW_BYTES = 400.0  # Memory per row of a recorded drive [bytes].
 STEADY_CODES = {
-    "exact": EVENT_CODE,
-    "piecewise": EVENT_CODE,
+    "exact": HYBRID_CODE,
+    "piecewise": HYBRID_CODE,
+    "hybrid": HYBRID_CODE,
     "harmonic": BALANCE_CODE,
     "march": None,
 }
@@ -124,9 +124,6 @@ def mode_frequencies(rig, chain: dict) -> list:
     modes = rig.modes
     rows = rig.modes.interfaces
     stiffness = stuck_stiffnesses(rig, chain)
-    if modes.lateral_faces is not None:
-        rows = np.concatenate([rows, modes.lateral_faces])
-        stiffness = np.tile(stiffness, 2)
     has_names = rig.structure.lists_modes and modes.shapes is None
     frequencies = []
     for k, omega in enumerate(modes.omega):
@@ -396,7 +393,7 @@ def _describe_sliding(friction_ratio: float) -> str:
 def describe_bond_summation(model: Model, numerics) -> list:
     """Describe the bond summation or the engine of friction elements in sentences for a plan."""
     if not law_has_trait(model.friction.law, "bonds"):
-        if PIECES.find_unsupported_feature(model):
+        if find_obstacle_of_map("piecewise", model):
             return []
         return describe_element_engine(model, numerics.engine)
     choice = bond_lists.choose_bond_summation(model, numerics)
@@ -484,7 +481,7 @@ def _estimate_point_seconds(model: Model, method_name: str) -> float:
             + cost_model.BALANCE_UNKNOWN_SECONDS * size**3
             + _estimate_smooth_law_seconds(rig)
         )
-    if method_name == "march":
+    if method_name in ("march", "shooting"):
         return N_MARCHED_CYCLES * steps_per_cycle(model) * cost_model.GROOVE_STEP_SECONDS
     if not rig.friction.interfaces:
         return cost_model.CLOSED_POINT_SECONDS
@@ -521,9 +518,7 @@ def _estimate_smooth_law_seconds(rig) -> float:
 
 # Function (model, numerics, points) -> Cost of each engine.
 COSTS = {
-    "exact": predict_event_driven_cost,
-    "piecewise": predict_event_driven_cost,
-    "smooth": predict_smooth_cost,
+    "hybrid": predict_hybrid_cost,
     "march": predict_march_cost,
     "harmonic": predict_steady_cost,
 }

@@ -34,6 +34,9 @@ from .solve import refuse_long_run
 # Outcomes of runs that ended early; more steps do not change them.
 EARLY_OUTCOMES = (Outcome.EXCEEDS_TRAVEL, Outcome.LEAVES_GROOVES)
 MIN_STEP_ERROR = 1e-12  # Smallest relative error per step; below it round-off dominates.
+MIN_OWN_FRACTION = (
+    0.1  # Fraction of the error due to the steps of `hybrid` below which smaller steps are no use.
+)
 # Largest predicted CPU time [s] of a run that is repeated with more steps although its displacement
 # meets the tolerance.
 MAX_REFINED_SECONDS = 10.0
@@ -156,8 +159,6 @@ def run_refined(inputs: RunInputs, numerics: Numerics) -> RefinedRun:
             min_relative_error=engine.min_relative_error,
             size=size,
         )
-        if numerics.pairs and not are_tolerances_met(measures, model.accuracy.tolerance):
-            return run_refined(inputs, numerics.finer())
         if solution.levels or model.rig.drive.kind == "free":
             solution = _add_level_errors(solution, coarser_runs, runner.solutions)
         displacement_errors.append(measures["relative_displacement_amplitude"].error or 0.0)
@@ -246,6 +247,11 @@ def _meets_tolerance(run: CoupledRun, excesses: list) -> bool:
         Result of `_find_step_excess` of the coarser runs; that of the run is added.
     """
     displacement = run.measures["relative_displacement_amplitude"]
+    if run.numerics.local and displacement.causes is not None:
+        # Smaller steps do not reduce the errors of meshes and samples.
+        own = displacement.causes.parts.get("own", 0.0)
+        if own <= MIN_OWN_FRACTION * (displacement.error or 0.0):
+            return True
     if displacement.error_ratio(run.model.accuracy.tolerance) > 1:
         return False
     excesses.append(_find_step_excess(run))
@@ -268,7 +274,7 @@ def _is_finest(model, run: RefinedRun, displacement_errors: list) -> bool:
     """
     numerics = run.numerics
     if numerics.local:
-        return numerics.local < MIN_STEP_ERROR
+        return 0.01 * numerics.local < MIN_STEP_ERROR
     steps = numerics.steps * 2
     book = run.solution.book
     return (

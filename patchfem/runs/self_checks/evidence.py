@@ -74,15 +74,11 @@ class Evidence:
         rig = model.rig
         if model.load_varies if rig is None else rig.friction.load_varies:
             return False
-        is_two_dimensional = model.slide is not None and model.slide.across is not None
         has_several_interfaces = rig is not None and (
             len(rig.modes.interfaces) > 1 or bool(rig.friction.names)
         )
-        has_lateral_motion = rig is not None and rig.modes.lateral_faces is not None
         has_varying_bonds = "temperature" in friction or "spread" in friction
-        return not (
-            is_two_dimensional or has_several_interfaces or has_lateral_motion or has_varying_bonds
-        )
+        return not (has_several_interfaces or has_varying_bonds)
 
     @cached_property
     def modes(self) -> "SceneModes | None":

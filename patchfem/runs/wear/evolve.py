@@ -19,7 +19,6 @@ import numpy as np
 from ...contact import strips
 from ...core import PatchfemError, frozen_array
 from ...disk.atomic_write import write_atomically
-from ...effects import describe_unsupported
 from ...wear.depth import wear_rates
 from ...wear.jumps import WearProblem, WearState, make_initial_wear_state, replay_jumps, take_jump
 from ..patch.measures import with_other_strip_count, with_static_measures
@@ -197,18 +196,7 @@ def compute_wear(
     Returns
     -------
     WornPatch
-
-    Raises
-    ------
-    PatchfemError
-        For a prescribed displacement in two directions.
     """
-    if model.slide is not None and model.slide.across is not None:
-        text = describe_unsupported(
-            "with a slide in two directions",
-            "leave out [wear], or leave the column `lateral` out of slide.file",
-        )
-        raise PatchfemError(text, "wear")
     clock = perf_counter()
     patch_model = model.patch
     n_cycles = model.wear.cycles

@@ -3,7 +3,8 @@
 The attribute is the only place where a key is described, and everything that reads, checks or documents scenes is made
 from it. Read `tables` first: it holds all tables but those under [contact] (`contact`) and [accuracy] (`accuracy`).
 `types` has the types of keys, `quantities` the units of each kind of quantity, `materials` the named materials,
-`lookup` finds a dotted key, and `removed` has the sentences about keys and options of earlier versions.
+`choices` says which keys a table needs, takes and excludes, `lookup` finds a dotted key, and `removed` has the sentences
+about keys and options of earlier versions.
 
 How to add a key
 ----------------
@@ -14,19 +15,18 @@ How to add a key
        spacing: key(quantity("length", gt=0) | None, "distance between two bolts; default: one bolt") = None
 
    If the help text or the `required` text of another key lists the kinds or waveforms with which a key is used, extend
-   these texts by hand. A new kind of quantity needs its units in `UNIT_FACTORS` and an example in
-   `EXAMPLE_QUANTITIES` of `quantities`.
-2. If the key needs or excludes another key, add a row to the rules of its table in `scene.rules`; the rules of [normal],
-   [slide] and [measured] stand in `rules.check`, those of the other tables in the module of their name. The condition
-   reads the values of the table in SI and the sentence names them in braces::
+   these texts by hand. A new kind of quantity needs its units and an example in units.toml.
+2. If the value of the key must agree with another key, add a row to the rules of its table in `scene.rules`; the rules
+   of [normal], [slide] and [measured] stand in `rules.check`, those of the other tables in the module of their name. The
+   condition reads the values of the table in SI and the sentence names them in braces::
 
        MistakeRule(lambda p: p.spacing < p.length, "contact.spacing", "{spacing:g} m is less than contact.length")
 
-   If only some values of a selector such as `slide.kind` use the key, add it to these values in
-   `scene.rules.selectors`; the keys of friction laws and waveforms stand in `effects`. These lists, and
-   `KEYS_UNUSED_BY_KIND` in `rules.drive`, only cause a remark that the key is not used; a key that must be refused needs
-   a `MistakeRule` as well. A key whose default is not None must stand in one of these lists for every kind and waveform
-   that does not use it. Otherwise `scene.resolved.toml` contains its default and is refused when it is read again.
+   If the table always needs the key or an alternative, or if only some values of a selector such as `slide.kind` use it,
+   add it to `SELECTORS` of `choices`; the keys of friction laws and waveforms stand in `effects`. A key that another key
+   needs goes into `NEEDS`. Missing keys, keys that exclude one another and keys without meaning are then reported. A key
+   whose default is not None must stand with the values of a selector that use it. Otherwise `scene.resolved.toml`
+   contains its default where it has no meaning.
 3. Read the value where the model is built (folder `model`). No other code reads keys of a scene. In a sweep over a key
    of `overrides.PLAIN_KEYS`, such as normal.load, these functions get arrays in place of the swept numbers
    (`model.similar_models`), so their formulas must take arrays as well.
@@ -35,5 +35,5 @@ How to add a key
    key that changes no result and causes no sentence; such a key needs a `RemarkRule` in its rules. `patchfem run` prints
    remarks, `patchfem plan` does not.
 
-A key that is removed gets a row in `removed.REMOVED_KEYS` with the sentence that the user reads.
+A key that is removed gets a row in `removed.REMOVED_NAMES` with the sentence that the user reads.
 """

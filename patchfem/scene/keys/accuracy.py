@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator
 
-from . import removed
+from .removed import describe_removed
 from .types import Fraction, Table, key, number, whole_number
 
 # Largest number of time steps per cycle; more would take days for a single cycle.
@@ -15,9 +15,9 @@ MAX_MODES = 10_000
 
 def _refuse_removed(value: object) -> object:
     """Return a value of a key; raise ValueError for a removed value, with the replacement."""
-    for values in (removed.REMOVED_METHODS, removed.REMOVED_QUADRATURES):
-        if isinstance(value, str) and value in values:
-            raise ValueError(values[value])
+    for name in ("accuracy.method", "accuracy.quadrature"):
+        if sentence := describe_removed(f"{name}={value}", f"'{value}'"):
+            raise ValueError(sentence)
     return value
 
 

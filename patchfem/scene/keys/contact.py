@@ -125,7 +125,6 @@ class LoadLine(Table):
         Position | None,
         "distance of the load line from the middle of the patch; an offset > 0 moves the "
         "pressure towards +x",
-        "unless `moment` is given",
     ) = None
     moment: key(
         quantity("moment") | None,
@@ -149,7 +148,6 @@ class Holder(Table):
     rotational_stiffness: key(
         quantity("rotational stiffness", gt=0) | None,
         "rotational stiffness of the spring between the far face of the piece and its holder",
-        "unless `tangential_stiffness` is given",
     ) = None
     tangential_stiffness: key(
         quantity("stiffness", gt=0) | None,
@@ -236,34 +234,24 @@ class Asperities(Table):
     radius: key(
         Length | None,
         "tip radius of the peaks",
-        "with law `hertz`, unless `from` or `rms_height` is given",
     ) = None
-    density: key(
-        quantity("areal density", gt=0) | None, "number of peaks per area", "with `radius`"
-    ) = None
-    height_deviation: key(
-        Length | None, "standard deviation of the peak heights", "with `radius`"
-    ) = None
+    density: key(quantity("areal density", gt=0) | None, "number of peaks per area") = None
+    height_deviation: key(Length | None, "standard deviation of the peak heights") = None
     from_: key(
         Text | None,
         "file of a height trace of a rough piece, from which the peaks are computed; the other "
         "piece is taken as smooth",
-        "with law `hertz`, unless `radius` or `rms_height` is given",
     ) = Field(None, alias="from")
     rms_height: key(
         Length | None,
         "root mean square height of the rough piece; if both pieces are rough, the root of "
         "the sum of the squares of their two values; the same rule holds for `rms_slope` and "
         "`rms_curvature`",
-        "with law `hertz`, unless `radius` or `from` is given",
     ) = None
-    rms_slope: key(
-        Positive | None, "root mean square slope of the rough piece", "with `rms_height`"
-    ) = None
+    rms_slope: key(Positive | None, "root mean square slope of the rough piece") = None
     rms_curvature: key(
         quantity("curvature", gt=0) | None,
         "root mean square curvature of the rough piece",
-        "with `rms_height`",
     ) = None
     cutoff: key(
         Length | None,
@@ -342,7 +330,6 @@ class Contact(Table):
         Force | None,
         "total normal force on the interface, weight included; [contact.approach] may be given in "
         "place of this key",
-        "unless [contact.approach] is given",
     ) = None
     pairs: key(
         whole_number(1, MAX_PAIRS),

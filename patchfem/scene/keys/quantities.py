@@ -7,139 +7,16 @@ from __future__ import annotations
 
 import math
 import re
+import tomllib
 from decimal import MAX_EMAX, MIN_EMIN, Context, Decimal
 from functools import cache, lru_cache
+from pathlib import Path
 
-_POUND_FORCE = 4.4482216152605  # one pound-force in N, exact: 0.45359237 kg times standard gravity
-
+_KINDS = tomllib.loads(Path(__file__).with_name("units.toml").read_text(encoding="utf-8"))
 # Factors to SI by unit for each kind of quantity; the first unit of each kind is its SI unit.
-UNIT_FACTORS: dict[str, dict[str, float]] = {
-    "length": {
-        "m": 1.0,
-        "km": 1e3,
-        "cm": 1e-2,
-        "mm": 1e-3,
-        "um": 1e-6,
-        "nm": 1e-9,
-        "in": 0.0254,
-        "ft": 0.3048,
-        "mil": 25.4e-6,
-    },
-    "area": {"m^2": 1.0, "cm^2": 1e-4, "mm^2": 1e-6, "um^2": 1e-12, "in^2": 6.4516e-4},
-    "force": {"N": 1.0, "kN": 1e3, "lbf": _POUND_FORCE, "kgf": 9.80665},
-    "moment": {
-        "N m": 1.0,
-        "N mm": 1e-3,
-        "kN m": 1e3,
-        "lbf in": 0.1129848290276167,
-        "lbf ft": 1.3558179483314003,
-    },
-    "mass": {"kg": 1.0, "g": 1e-3, "mg": 1e-6, "lb": 0.45359237},
-    "density": {"kg/m^3": 1.0, "g/cm^3": 1e3, "lb/in^3": 27679.90471020312},
-    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0},
-    "frequency": {"Hz": 1.0, "kHz": 1e3},
-    "acceleration": {
-        "m/s^2": 1.0,
-        "mm/s^2": 1e-3,
-        "g": 9.80665,
-        "in/s^2": 0.0254,
-        "ft/s^2": 0.3048,
-    },
-    "acceleration spectrum": {"m^2/s^3": 1.0, "(m/s^2)^2/Hz": 1.0, "g^2/Hz": 9.80665**2},
-    "velocity": {
-        "m/s": 1.0,
-        "cm/s": 1e-2,
-        "mm/s": 1e-3,
-        "um/s": 1e-6,
-        "nm/s": 1e-9,
-        "in/s": 0.0254,
-    },
-    "pressure": {
-        "Pa": 1.0,
-        "kPa": 1e3,
-        "MPa": 1e6,
-        "GPa": 1e9,
-        "psi": 6894.757293168362,
-        "ksi": 6894757.293168361,
-        "Msi": 6894757293.168362,
-    },
-    "angle": {"rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "deg": math.pi / 180.0},
-    "temperature": {"K": 1.0},
-    "stiffness": {
-        "N/m": 1.0,
-        "kN/m": 1e3,
-        "MN/m": 1e6,
-        "N/mm": 1e3,
-        "kN/mm": 1e6,
-        "N/um": 1e6,
-        "lbf/in": 175.1268352464764,
-    },
-    "rotational stiffness": {
-        "N m/rad": 1.0,
-        "N mm/rad": 1e-3,
-        "kN m/rad": 1e3,
-        "lbf in/rad": 0.1129848290276167,
-    },
-    "foundation stiffness": {
-        "Pa/m": 1.0,
-        "MPa/m": 1e6,
-        "GPa/m": 1e9,
-        "MPa/mm": 1e9,
-        "MPa/um": 1e12,
-        "GPa/mm": 1e12,
-    },
-    "damping": {"N s/m": 1.0, "N s/mm": 1e3, "kN s/m": 1e3, "lbf s/in": 175.1268352464764},
-    "cubic stiffness": {"N/m^3": 1.0, "kN/m^3": 1e3, "MN/m^3": 1e6, "N/mm^3": 1e9},
-    "wear coefficient": {
-        "m^2/N": 1.0,
-        "mm^2/N": 1e-6,
-        "mm^3/(N m)": 1e-9,
-        "mm^3/Nm": 1e-9,
-        "mm3/Nm": 1e-9,
-        "mm^3/N/m": 1e-9,
-        "1/Pa": 1.0,
-        "1/MPa": 1e-6,
-    },
-    "sweep rate": {"Hz/s": 1.0, "Hz/min": 1.0 / 60.0, "kHz/s": 1e3},
-    "logarithmic sweep rate": {
-        "oct/s": 1.0,
-        "oct/min": 1.0 / 60.0,
-        "dec/min": math.log2(10.0) / 60.0,
-    },
-    "participation": {"rad/m": 1.0, "rad/mm": 1e3},
-    "areal density": {"1/m^2": 1.0, "1/cm^2": 1e4, "1/mm^2": 1e6, "1/um^2": 1e12},
-    "curvature": {"1/m": 1.0, "1/mm": 1e3, "1/um": 1e6},
-}
-
+UNIT_FACTORS: dict[str, dict[str, float]] = {kind: row["units"] for kind, row in _KINDS.items()}
 # Example of each kind of quantity for messages and the schema.
-EXAMPLE_QUANTITIES: dict[str, str] = {
-    "length": "12.7 mm",
-    "area": "161 mm^2",
-    "force": "26 lbf",
-    "moment": "0.05 N m",
-    "mass": "0.884 kg",
-    "density": "4370 kg/m^3",
-    "time": "2 s",
-    "frequency": "143 Hz",
-    "acceleration": "5 g",
-    "acceleration spectrum": "0.01 g^2/Hz",
-    "velocity": "5 mm/s",
-    "pressure": "121 GPa",
-    "angle": "0.1 mrad",
-    "temperature": "293.15 K",
-    "stiffness": "5e6 N/m",
-    "rotational stiffness": "1e4 N m/rad",
-    "foundation stiffness": "1e13 Pa/m",
-    "damping": "10 N s/m",
-    "cubic stiffness": "1e12 N/m^3",
-    "wear coefficient": "1e-14 m^2/N",
-    "sweep rate": "0.5 Hz/s",
-    "logarithmic sweep rate": "1 oct/min",
-    "participation": "2 rad/m",
-    "areal density": "1e10 1/m^2",
-    "curvature": "0.05 1/um",
-}
-
+EXAMPLE_QUANTITIES: dict[str, str] = {kind: row["example"] for kind, row in _KINDS.items()}
 # Regular expression of a number.
 NUMBER_PATTERN = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 _QUANTITY_PATTERN = re.compile(rf"({NUMBER_PATTERN})[ \t]+(\S.*)")

@@ -1,77 +1,71 @@
-"""Options, keys and values that patchfem no longer takes, and what to use instead."""
+"""Keys, values, files and options that patchfem no longer takes: one table, with what to use instead."""
 
-REMOVING_VERSION = "patchfem 1.0"
-REMOVED_METHODS = {  # removed values of accuracy.method
-    name: f"'{name}' was removed in {REMOVING_VERSION}; use 'march' (studies/integrators compares the methods)"
-    for name in ("duhamel", "newmark", "euler")
-}
-LAWS_REMOVED_OVER_GROOVES = ("iwan", "bouc-wen", "lugre")
-# Removed values of accuracy.quadrature.
-REMOVED_QUADRATURES = {
-    "exponential": f"'exponential' was removed in {REMOVING_VERSION}; use 'merged'"
-}
-REMOVED_KEYS = {
-    f"accuracy.{name}": f"this key of method '{method}' was removed in {REMOVING_VERSION}; use method 'march' without it"
-    for name, method in (
-        ("convergence", "duhamel"),
-        ("convergence_tolerance", "duhamel"),
-        ("stick_speed", "newmark"),
-    )
-}
-REMOVED_KEYS["wear.scheme"] = (
-    f"this key was removed in {REMOVING_VERSION}; leave it out: contact and wear are always solved together in each jump"
-)
-REMOVED_KEYS["structure.mode.lateral"] = (
-    "this key was removed in patchfem 1.1, because no run could use it; leave it out: the patch slides along x alone"
-)
-REMOVED_OPTIONS = {  # advice for each removed (verb, option)
-    (
-        "profile",
-        "--level",
-    ): "read the material ratio of a level from the Abbott curve of the page (-o)",
-    (
-        "profile",
-        "--ratios",
-    ): "read the heights of two material ratios from the Abbott curve of the page (-o)",
-    ("profile", "--tip"): "compare the tip radius with 1/rms_curvature, which profile prints",
-    (
-        "report",
-        "--measured",
-    ): "convert the file with `patchfem import FILE -o table.csv` and plot table.csv together "
-    "with result.nc of the run in a plotting program",
-    (
-        "sweep",
-        "--device",
-    ): "batches of cases run on the processor; share them by -j N or --executor dask",
-}
-
-# advice for each (verb, option) that 2.0 removed
-REMOVED_OPTIONS_2 = {
-    (
-        "fit",
-        "--placebo",
-    ): "set another value of the key with --set and compare the scores of the fits",
-    (
-        "fit",
-        "--from-patch",
-    ): "run the scene with its patch, or fit the law of a point to a loop that `run` and `export` wrote",
-    ("fit", "--amplitudes"): "leave it out: it belonged to --from-patch",
-    ("export", "--of"): "leave it out: choose the field in ParaView",
+_OTHER_METHOD = "use 'march' (studies/integrators compares the methods)"
+_WITHOUT_KEY = "use method 'march' without it"
+# Version that removed a key, a value (key=value), files or an option of a verb, and what to use instead.
+REMOVED_NAMES = {
+    "accuracy.method=duhamel": ("1.0", _OTHER_METHOD),
+    "accuracy.method=newmark": ("1.0", _OTHER_METHOD),
+    "accuracy.method=euler": ("1.0", _OTHER_METHOD),
+    "accuracy.quadrature=exponential": ("1.0", "use 'merged'"),
+    "accuracy.convergence": ("1.0", _WITHOUT_KEY),
+    "accuracy.convergence_tolerance": ("1.0", _WITHOUT_KEY),
+    "accuracy.stick_speed": ("1.0", _WITHOUT_KEY),
+    "wear.scheme": (
+        "1.0",
+        "leave it out: contact and wear are always solved together in each jump",
+    ),
+    "structure.interface.lateral": (
+        "2.0",
+        "leave it out: an interface slides along x alone",
+    ),
+    "structure.mode.lateral": (
+        "1.1",
+        "no run could use it; leave it out: the patch slides along x alone",
+    ),
+    "files of Nastran": ("2.0", "convert the matrix, with pyNastran for example"),
+    "profile --level": (
+        "1.0",
+        "read the material ratio of a level from the Abbott curve of the page (-o)",
+    ),
+    "profile --ratios": (
+        "1.0",
+        "read the heights of two material ratios from the Abbott curve of the page (-o)",
+    ),
+    "profile --tip": ("1.0", "compare the tip radius with 1/rms_curvature, which profile prints"),
+    "report --measured": (
+        "1.0",
+        "convert the file with `patchfem import FILE -o table.csv` "
+        "and plot table.csv together with result.nc of the run in a plotting program",
+    ),
+    "sweep --device": (
+        "1.0",
+        "batches of cases run on the processor; share them by -j N or --executor dask",
+    ),
+    "fit --placebo": (
+        "2.0",
+        "set another value of the key with --set and compare the scores of the fits",
+    ),
+    "fit --from-patch": (
+        "2.0",
+        "run the scene with its patch, or fit the law of a point to a loop that `run` and `export` wrote",
+    ),
+    "fit --amplitudes": ("2.0", "leave it out: it belonged to --from-patch"),
+    "export --of": ("2.0", "leave it out: choose the field in ParaView"),
 }
 
 
-def describe_removed_option(verb: str, option: str, name: str) -> str:
-    """State that an option was removed and what to do instead, or return "" if it was not removed.
+def describe_removed(name: str, shown: str = "this key") -> str:
+    """State that something was removed and what to do instead, or return "" if it was not removed.
 
     Parameters
     ----------
-    verb, option : str
-        Words of the command line, such as "profile" and "--tip".
     name : str
-        Option as the sentence calls it, such as "profile --tip" or, in Python, "profile: tip".
+        Key of REMOVED_NAMES, such as "accuracy.method=euler" or "profile --tip".
+    shown : str
+        What the sentence calls it, such as "profile --tip" or, in Python, "profile: tip".
     """
-    if (verb, option) in REMOVED_OPTIONS_2:
-        return f"{name} was removed in patchfem 2.0; {REMOVED_OPTIONS_2[verb, option]}"
-    if (verb, option) not in REMOVED_OPTIONS:
+    if name not in REMOVED_NAMES:
         return ""
-    return f"{name} was removed in {REMOVING_VERSION}; {REMOVED_OPTIONS[verb, option]}"
+    version, instead = REMOVED_NAMES[name]
+    return f"{shown} was removed in patchfem {version}; {instead}"

@@ -51,9 +51,8 @@ class Normal(Table):
         Force | None,
         "amplitude of the oscillating load `load` + `amplitude` cos(2 pi `frequency` t + "
         "`phase`); while this expression is negative, the load is 0",
-        "with `frequency`",
     ) = None
-    frequency: key(Frequency | None, "frequency of the oscillating load", "with `amplitude`") = None
+    frequency: key(Frequency | None, "frequency of the oscillating load") = None
     phase: key(quantity("angle") | None, "phase of the oscillating load at t = 0") = None
     width: key(
         Length | None,
@@ -153,13 +152,11 @@ class Friction(Table):
         "growth a_s of the bond length at rest (equation 2.10); without "
         "`rest_growth` "
         "and `slip_growth` the bond length is constant",
-        "with `slip_growth`",
     ) = None
     slip_growth: key(
         Length | None,
         "slip length l_k over which the bond length approaches its value in fast slip "
         "(equation 2.10)",
-        "with `rest_growth`",
     ) = None
     rest_speed: key(
         Speed | None,
@@ -210,8 +207,7 @@ class Slide(Table):
     )
     file: key(
         Text | None,
-        "table with the columns time and displacement; a third column, lateral, makes the slide "
-        "two-dimensional",
+        "table with the columns time and displacement",
     ) = None
 
 
@@ -312,13 +308,6 @@ class Interface(Friction):
         "numbers of the two masses that rub, counted from 1; 0 is the base; the slide is the motion "
         "of the first mass minus the motion of the second",
     )
-    lateral: key(
-        MassPair | None,
-        "for an interface that slides in a plane: numbers of a second pair of masses or "
-        "boundary coordinates; the motion of the first minus the motion of the second is the slide "
-        "perpendicular to the slide of the pair `between`; the friction force, which is the resultant of both "
-        "directions, is at most `static` times `load`",
-    ) = None
     load: key(
         Force | None,
         "normal force on the interface; a patch, [structure.interface.contact], may be given in "
@@ -348,7 +337,7 @@ class Reduced(Table):
     stiffness: key(
         Text,
         "file of the stiffness matrix: Matrix Market or Abaqus text (.mtx), MATLAB (.mat), NumPy or "
-        "SciPy (.npz), Nastran (.op4, .pch)",
+        "SciPy (.npz)",
     )
     mass: key(Text, "file of the mass matrix; may be the same file as for the stiffness matrix")
     damping: key(
@@ -492,13 +481,11 @@ class Drive(Table):
         quantity("acceleration spectrum", gt=0) | None,
         "one-sided spectral density of a random base "
         "acceleration, constant between `from` and `to`",
-        "with waveform `random`, unless `file` is given",
     ) = None
     seed: key(whole_number(0, 2**32 - 1) | None, "seed of the random record; default: 0") = None
     rate: key(
         quantity("sweep rate", gt=0) | None,
         "rate at which the frequency of a linear sweep changes",
-        "with waveform `sweep`, unless `log_rate` is given",
     ) = None
     log_rate: key(
         quantity("logarithmic sweep rate", gt=0) | None,
@@ -515,7 +502,7 @@ class Drive(Table):
         "`acceleration`; with kind 'free', the displacement of the output at release: a static force at "
         "the output holds the structure, the interfaces free of force, and lets go; in a rig of masses, "
         "and if `mass` is given, that mass or coordinate alone is displaced",
-        "with kind `free`, unless [structure.start] is given",
+        "with kind `free`, unless [structure.start] is given; with kind `base`, as `acceleration`",
     ) = None
     levels: key(
         Annotated[tuple[quantity("acceleration", ge=0), ...], Field(min_length=1)] | None,
@@ -544,7 +531,6 @@ class Drive(Table):
     onset_length: key(
         Length | None,
         "smallest motion at the output that the gauge can show, half peak-to-peak",
-        "with onset `gauge`",
     ) = None
     force: key(
         Force | None,
@@ -559,7 +545,6 @@ class Drive(Table):
         Positive | None,
         "length of the run, or of each level, in cycles of the drive; with kind 'free', in "
         "cycles of the first mode that is not rigid",
-        "unless `duration` is given or the waveform is `sweep` or `file`",
     ) = None
     duration: key(
         Duration | None, "length of the run, or of each level, as a time; replaces `cycles`"
@@ -591,12 +576,10 @@ class WornFriction(Table):
     coefficient_factor: key(
         Annotated[tuple[Positive, ...], Field(min_length=2)] | None,
         "factor on `static` and `kinetic` at each depth; must be 1 at depth 0",
-        "unless `bond_length_factor` is given",
     ) = None
     bond_length_factor: key(
         Annotated[tuple[Positive, ...], Field(min_length=2)] | None,
         "factor on `bond_length` at each depth; must be 1 at depth 0",
-        "unless `coefficient_factor` is given",
     ) = None
 
 
@@ -650,9 +633,7 @@ class Measured(Table):
         "'rms', the root mean square of the acceleration; 'lowpass', the largest acceleration after a "
         "second-order low-pass filter",
     ) = "peak"
-    reading_cutoff: key(
-        Frequency | None, "cut-off frequency of the low-pass filter", "with reading `lowpass`"
-    ) = None
+    reading_cutoff: key(Frequency | None, "cut-off frequency of the low-pass filter") = None
 
 
 class Tables(Table):

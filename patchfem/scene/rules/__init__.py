@@ -2,6 +2,6 @@
 
 In: a `SceneDraft`, which holds what was written and what could be read. Out: mistakes and remarks, each with its key; the
 draft finds the line, and nothing is raised here. Read `rule_table` first: most rules are rows of tables, with a
-condition, a key and a sentence. `check_scene` calls the modules of all tables; `limits` and `methods` say what effects and
-engines cannot do together yet; `selectors` says which keys each value of a selector such as friction.law needs.
+condition, a key and a sentence. `check_scene` calls the modules of all tables; `support` and `methods` say what effects and
+engines cannot do together yet; `needed_keys` reports the keys that `keys.choices` requires, excludes or does not use.
 """

@@ -12,9 +12,9 @@ from .contact import check_patches
 from .drive import check_drive, check_length
 from .friction import check_laws
 from .grooves import check_grooves
-from .rule_table import MissingKeyRule, MistakeRule, RemarkRule, Rule, TableFacts, apply_rules
+from .needed_keys import check_needed_keys
+from .rule_table import MistakeRule, RemarkRule, Rule, TableFacts, apply_rules
 from .scene_draft import SceneDraft
-from .selectors import SLIDE_KIND_SELECTOR, check_selector
 from .structure import advise_modes, check_energy_gain, check_structure
 from .wear import check_wear
 
@@ -37,19 +37,6 @@ class SimpleFacts(TableFacts):
 
 
 NORMAL_RULES = (
-    MissingKeyRule(
-        lambda n: n.has("amplitude") and not n.has("frequency"),
-        "normal.frequency",
-        "normal.amplitude needs this key",
-    ),
-    *(
-        MissingKeyRule(
-            lambda n, key=key: n.has(key) and not n.has("amplitude"),
-            "normal.amplitude",
-            f"{key} needs this key",
-        )
-        for key in ("frequency", "phase")
-    ),
     RemarkRule(
         lambda n: n.has("width") and not n.draft.has("friction.spread"),
         "normal.width",
@@ -57,20 +44,10 @@ NORMAL_RULES = (
     ),
 )
 MEASURED_RULES = (
-    MissingKeyRule(
-        lambda m: m.reading == "lowpass" and not m.has("reading_cutoff"),
-        "measured.reading_cutoff",
-        "reading 'lowpass' needs this key, such as '600 Hz'",
-    ),
     RemarkRule(
         lambda m: m.reading in ("fundamental", "rms", "lowpass") and not m.is_sine,
         "measured.reading",
         "has a meaning only under a sine drive and is not used",
-    ),
-    RemarkRule(
-        lambda m: m.has("reading_cutoff") and m.reading in ("peak", "fundamental", "rms"),
-        "measured.reading_cutoff",
-        "has no meaning for reading '{reading}' and is not used",
     ),
 )
 SLIDE_RULES = (
@@ -89,6 +66,7 @@ SLIDE_RULES = (
 
 def check_scene(draft: SceneDraft) -> str:
     """Report all mistakes of a scene; return the kind of scene, or "" if the tables define none."""
+    check_needed_keys(draft)
     check_patches(draft)
     _check_table(draft, "normal", NORMAL_RULES)
     check_laws(draft)
@@ -117,8 +95,6 @@ def _check_table(draft: SceneDraft, name: str, rules: tuple[Rule, ...]) -> None:
     if table is None:
         return
     facts = SimpleFacts(draft, name, table)
-    if name == "slide":
-        check_selector(facts, SLIDE_KIND_SELECTOR)
     apply_rules(draft, rules, facts)
 
 

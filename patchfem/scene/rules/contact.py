@@ -9,7 +9,6 @@ from ..keys.contact import Contact, compute_outermost_strip_distance
 from .outlines import PIECE_NAMES, check_outlines, find_flat_length
 from .rule_table import MissingKeyRule, MistakeRule, RemarkRule, TableFacts, apply_rules
 from .scene_draft import SceneDraft
-from .selectors import ASPERITY_LAW_SELECTOR, HERTZ_PEAK_DESCRIPTIONS, check_selector
 from .view import TableView
 
 # Largest ratio of the height of a piece to its length; from 80 000 on, the stiffness of
@@ -75,16 +74,6 @@ class PatchFacts(TableFacts):
 
 PATCH_RULES = (
     MistakeRule(
-        lambda p: p.has("load", "approach"),
-        "{table_key}.approach",
-        "[contact.approach] and contact.load exclude each other: keep one",
-    ),
-    MissingKeyRule(
-        lambda p: not p.has_any("load", "approach"),
-        "{table_key}.load",
-        "or [contact.approach] instead",
-    ),
-    MistakeRule(
         lambda p: p.load >= p.max_load,
         "{table_key}.load",
         "{load:.3g} N is a mean pressure above Young's modulus, but the pieces are elastic and strain little; less than "
@@ -129,13 +118,6 @@ PATCH_RULES = (
         lambda p: p.element_size and p.mesh,
         "{table_key}.element_size",
         "is not used, because the file of contact.mesh gives the elements",
-    ),
-    MistakeRule(
-        lambda p: (
-            p.holder and not p.has_any("holder.rotational_stiffness", "holder.tangential_stiffness")
-        ),
-        "{table_key}.holder",
-        "rotational_stiffness, tangential_stiffness or both are needed",
     ),
     MistakeRule(
         lambda p: abs(p.step.at) >= p.half_length,
@@ -187,16 +169,6 @@ PATCH_RULES = (
 )
 LOAD_LINE_RULES = (
     MistakeRule(
-        lambda p: p.has("load_line.offset", "load_line.moment"),
-        "{table_key}.load_line.moment",
-        "offset and moment exclude each other: keep one",
-    ),
-    MissingKeyRule(
-        lambda p: not p.has_any("load_line.offset", "load_line.moment"),
-        "{table_key}.load_line.offset",
-        "or load_line.moment instead",
-    ),
-    MistakeRule(
         lambda p: p.has("tilt.angle") and not p.has("holder"),
         "{table_key}.load_line",
         "cannot be used with contact.tilt.angle unless [contact.holder] is given: a piece that is free to rotate has "
@@ -233,13 +205,6 @@ def check_patches(draft: SceneDraft) -> None:
         apply_rules(draft, PATCH_RULES, facts)
         _check_shapes_have_a_piece(draft, table_key, contact)
         _check_coatings(facts)
-        if contact.asperities is not None:
-            check_selector(
-                TableFacts(draft, f"{table_key}.asperities", contact.asperities),
-                ASPERITY_LAW_SELECTOR,
-            )
-        if facts.asperities.law == "hertz":
-            _check_peaks(facts)
         if contact.load_line is not None:
             apply_rules(draft, LOAD_LINE_RULES, facts)
 
@@ -274,26 +239,3 @@ def _check_coatings(patch: PatchFacts) -> None:
                 key,
                 f"the coating of {coating.thickness} m must be thinner than its piece, which is {height} m high",
             )
-
-
-def _check_peaks(patch: PatchFacts) -> None:
-    """Report asperity peaks of law 'hertz' that are not described, only partly described, or described twice."""
-    table_key = f"{patch.table_key}.asperities"
-    used = [
-        keys
-        for keys in HERTZ_PEAK_DESCRIPTIONS
-        if patch.has_any(*(f"asperities.{key}" for key in keys))
-    ]
-    if len(used) > 1:
-        second = next(key for key in used[1] if patch.has(f"asperities.{key}"))
-        patch.draft.add_mistake(
-            f"{table_key}.{second}",
-            f"describes the same peaks as {', '.join(used[0])}; keep only one description of the peaks",
-        )
-        return
-    others = (
-        "" if used else "; instead you can give `from`, or rms_height, rms_slope and rms_curvature"
-    )
-    for key in used[0] if used else HERTZ_PEAK_DESCRIPTIONS[0]:
-        if not patch.has(f"asperities.{key}"):
-            patch.draft.add_missing(f"{table_key}.{key}", f"law 'hertz' needs this key{others}")

@@ -6,14 +6,12 @@ from ...effects import (
     law_has_trait,
     law_takes_key,
     law_takes_stiffness_or_length,
-    name_laws_with_key,
 )
 from ..keys.contact import Contact
 from ..keys.tables import Friction
 from .methods import find_climbed_grooves
 from .rule_table import MissingKeyRule, MistakeRule, RemarkRule, TableFacts, apply_rules
 from .scene_draft import SceneDraft
-from .selectors import LAW_SELECTOR, check_selector
 from .view import UNKNOWN_VALUE, TableView
 
 
@@ -85,12 +83,6 @@ class LawFacts(TableFacts):
 
 LAW_RULES = (
     MistakeRule(
-        lambda law: law.has_unsupported_kinetic,
-        "{table_key}.kinetic",
-        f"law '{{law}}' has only one coefficient of friction; laws with a kinetic coefficient are "
-        f"{name_laws_with_key('kinetic')}",
-    ),
-    MistakeRule(
         lambda law: law.is_kinetic_larger,
         "{table_key}.kinetic",
         "{kinetic} is larger than static = {static}; kinetic <= static is needed",
@@ -109,11 +101,6 @@ LAW_RULES = (
         "{table_key}.rest_speed",
         "has no effect while the bond length is constant; add rest_growth and slip_growth",
     ),
-    MistakeRule(
-        lambda law: law.spread and not law.has_key("spread"),
-        "{table_key}.spread",
-        f"law '{{law}}' has no spread; laws with a spread are {name_laws_with_key('spread')}",
-    ),
     MissingKeyRule(
         lambda law: (
             law.spread
@@ -129,14 +116,6 @@ LAW_RULES = (
         lambda law: is_temperature_unused(law.table),
         "{table_key}.temperature",
         "has no effect without {missing_temperature_keys}",
-    ),
-    *(
-        MissingKeyRule(
-            lambda law, key=key, other=other: law.has(key) and not law.has(other),
-            f"{{table_key}}.{other}",
-            f"{key} needs this key; for a constant bond length leave out both keys",
-        )
-        for key, other in (("rest_growth", "slip_growth"), ("slip_growth", "rest_growth"))
     ),
     MistakeRule(
         lambda law: law.is_order_wrong,
@@ -190,7 +169,6 @@ def check_laws(draft: SceneDraft) -> None:
 
 def _check_law(draft: SceneDraft, table_key: str, law: Friction, contact: Contact | None) -> None:
     facts = LawFacts(draft, table_key, law, contact)
-    check_selector(facts, LAW_SELECTOR)
     apply_rules(draft, LAW_RULES, facts)
 
 

@@ -11,6 +11,7 @@ from ...effects import (
     find_waveform,
     law_has_trait,
     law_supports,
+    needs_bond_list,
     suggest_laws,
 )
 from ..keys.tables import Interface, Tables
@@ -41,7 +42,6 @@ class MotionFeatures(NamedTuple):
     - waveform: NO_WAVEFORM of a release and of the sine of a response curve.
     - drive: the table [drive].
     - lower_shape: shape that moves the pressure with the lower piece, such as "contact.crown.on = 'lower'".
-    - is_plane: whether an interface slides in two directions.
     """
 
     joints: list[Joint]
@@ -51,7 +51,6 @@ class MotionFeatures(NamedTuple):
     waveform: Waveform
     drive: Any = None
     lower_shape: str = ""
-    is_plane: bool = False
 
     @property
     def compliance(self) -> str:
@@ -91,19 +90,22 @@ FEATURE_FINDERS = {
     "spring": lambda motion: (
         f"with {motion.spring}" if motion.spring and not motion.has_grooves else ""
     ),
-    "plane": lambda motion: "with structure.interface.lateral" if motion.is_plane else "",
     "faces": lambda motion: "with several interfaces" if len(motion.joints) > 1 else "",
     "levels": lambda motion: "with waveform 'levels'" if motion.waveform.has_levels else "",
+    "pressed": lambda motion: motion.load_change if _is_pressed_by_motion(motion) else "",
 }
-# Features that each engine of a rig supports; `runs.rig.engines` refers to these names.
+# Laws of the engine `hybrid` under a load that varies in time.
+VARYING_LAWS = ("coulomb", "tanh", "elastic-plastic")
+# Features that each engine of a rig supports; `runs.rig.engines` refers to these names. The rows "exact" and "piecewise"
+# are the maps of a period by which a steady motion is found.
 ENGINE_SUPPORT = {
+    "hybrid": EngineSupport("events", "no-law yaw faces levels parts spring load grooves"),
     "exact": EngineSupport("exact", "no-law yaw faces levels"),
     "piecewise": EngineSupport("pieces", "parts faces levels"),
-    "smooth": EngineSupport("", ""),
     "march": EngineSupport("", " ".join(FEATURE_FINDERS)),
     "harmonic": EngineSupport("", "no-law parts grooves spring faces levels"),
 }
-# Support of the engines of accuracy.method = "exact".
+# Support of the maps of a period by which method "harmonic" finds steady motions exactly.
 EXACT_SUPPORTS = (ENGINE_SUPPORT["exact"], ENGINE_SUPPORT["piecewise"])
 METHOD_KEY = "accuracy.method"
 
@@ -136,11 +138,15 @@ def find_unsupported_feature(support: EngineSupport, motion: MotionFeatures) -> 
 def _find_unsupported_joint(support: EngineSupport, motion: MotionFeatures) -> Joint | None:
     """Return the first interface whose friction law is not supported, or None if all are supported.
 
-    The event-driven solution ("exact") needs patches that slip as a whole. A law that sticks without
-    displacement becomes spring-slider elements ("pieces") only with a compliance in series.
+    The map of events ("exact") needs patches that slip as a whole. A law that sticks without displacement becomes
+    spring-slider elements ("pieces") only with a compliance in series. Motions from event to event ("events") exist for
+    all laws with a finite number of states, and for the elements of a patch that slips part by part.
     """
     for joint in motion.joints:
-        is_supported = not support.law or law_supports(joint.law, support.law)
+        if support.law == "events":
+            is_supported = _has_finite_state(joint, motion)
+        else:
+            is_supported = not support.law or law_supports(joint.law, support.law)
         if support.law == "exact":
             is_supported &= not joint.compliance
         elif support.law == "pieces" and not joint.compliance:
@@ -150,6 +156,26 @@ def _find_unsupported_joint(support: EngineSupport, motion: MotionFeatures) -> J
     return None
 
 
+def _has_finite_state(joint: Joint, motion: MotionFeatures) -> bool:
+    """Return whether the engine `hybrid` has the law of an interface."""
+    law = joint.law.law
+    if motion.has_grooves:
+        return law_has_trait(law, "memoryless") and not joint.compliance
+    if joint.compliance:
+        return law_supports(joint.law, "pieces")
+    if motion.load_change:
+        return law in VARYING_LAWS
+    if law_has_trait(law, "bonds"):
+        moves = bool(motion.lower_shape)
+        return not (needs_bond_list(joint.law) or joint.law.breakaway or moves)
+    return True
+
+
+def _is_pressed_by_motion(motion: MotionFeatures) -> bool:
+    """Return whether the pressure of a patch changes with the motion."""
+    return bool(motion.load_change) and "normal.amplitude" not in motion.load_change
+
+
 def check_method(draft: SceneDraft, kind: str) -> None:
     """Report an accuracy.method that cannot solve the scene; add a remark on a method that is not used."""
     method = draft.values.accuracy.method
@@ -157,7 +183,11 @@ def check_method(draft: SceneDraft, kind: str) -> None:
         draft.add_remark(
             METHOD_KEY, f"= '{method}' has no meaning in a {kind} scene and is not used"
         )
-    check = {"exact": _find_exact_obstacle, "harmonic": _find_harmonic_obstacle}.get(method)
+    check = {
+        "exact": _find_exact_obstacle,
+        "march": _find_march_obstacle,
+        "harmonic": _find_harmonic_obstacle,
+    }.get(method)
     if check and kind in ("rig", "linear"):
         reason = check(find_motion_features(draft.tables, kind))
         if reason:
@@ -188,7 +218,6 @@ def find_motion_features(tables: Tables, kind: str) -> MotionFeatures:
         waveform=find_waveform(tables.drive),
         drive=tables.drive,
         lower_shape=f"{lower[0]} = 'lower'" if lower else "",
-        is_plane=any(getattr(law, "lateral", None) is not None for law in laws),
     )
 
 
@@ -246,17 +275,24 @@ def describe_load_change(key: str) -> str:
 
 
 def _find_exact_obstacle(motion: MotionFeatures) -> str:
-    """Return why no exact solution of a motion exists, or "" if there is one."""
-    reasons = [find_unsupported_feature(support, motion) for support in EXACT_SUPPORTS]
-    if not all(reasons):
+    """Return why a motion cannot be computed from event to event, or "" if it can."""
+    why = find_unsupported_feature(ENGINE_SUPPORT["hybrid"], motion)
+    if not why:
         return ""
-    carried = [
-        reason
-        for support, reason in zip(EXACT_SUPPORTS, reasons)
-        if _find_unsupported_joint(support, motion) is None
-    ]
-    why = (carried or reasons)[0]
-    return f"no exact solution exists {why}; use 'march' or leave `method` out"
+    return f"the motion cannot be computed from event to event {why}; use 'march' or leave `method` out"
+
+
+def _find_march_obstacle(motion: MotionFeatures) -> str:
+    """Return why a motion cannot be computed in time steps, or "" if it can."""
+    laws = [joint.law.law for joint in motion.joints]
+    if not motion.has_grooves or not laws or not law_has_trait(laws[0], "memoryless"):
+        return ""
+    if motion.compliance:
+        return ""
+    return (
+        f"the motion over grooves under law '{laws[0]}' is computed from event to event since 2.0; use 'exact' or leave "
+        "`method` out"
+    )
 
 
 def _find_harmonic_obstacle(motion: MotionFeatures) -> str:

@@ -74,10 +74,6 @@ def _check_ends(patch: TableFacts, name: str) -> None:
     coating = piece.coating or patch.coating
     thickness = getattr(coating, "thickness", None) or 0.0
     written = [key for key in END_KEYS if patch.has(f"{name}.{key}")]
-    if len(written) == 2:
-        draft.add_mistake(
-            f"{table_key}.end_radius", "`chamfer` and `end_radius` exclude each other: keep one"
-        )
     for key in written:
         end = piece[key]
         if 2 * end >= length:

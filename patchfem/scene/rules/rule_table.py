@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterable
 from functools import cached_property, partial
 from typing import Any, NamedTuple
 
-from ...effects import describe_unsupported
 from ..keys.types import Table
 from .methods import find_compliance_key, find_load_change_key
 from .scene_draft import SceneDraft, find_value
@@ -83,19 +82,6 @@ class Rule(NamedTuple):
 MistakeRule = partial(Rule, SceneDraft.add_mistake)
 MissingKeyRule = partial(Rule, SceneDraft.add_missing)
 RemarkRule = partial(Rule, SceneDraft.add_remark)
-
-
-def make_unsupported_rule(condition: Callable, key: str, feature: str, instead: str) -> Rule:
-    """Return the rule for a combination that is not supported yet.
-
-    Parameters
-    ----------
-    condition, key
-        As in `Rule`.
-    feature, instead : str
-        As in `effects.describe_unsupported`, with facts in braces.
-    """
-    return MistakeRule(condition, key, describe_unsupported(feature, instead))
 
 
 def apply_rules(draft: SceneDraft, rules: Iterable[Rule], facts: Any) -> None:

@@ -48,8 +48,7 @@ class SceneDraft:
     - sets: dotted keys that --set wrote.
     - tables: the tables as far as they could be read; a value that is missing or wrong is None.
     - remarks: sentences for the user that are not mistakes.
-    - read_before, read_now: id of a plain table -> (the plain table, the table that was read from it): tables
-      that need not be read again, and tables that this draft has read.
+    - read_before: id of a plain table of `raw` -> the table that it gives, which need not be read again.
     """
 
     def __init__(self, path: str, lines: dict[str, int], raw: dict[str, Any]) -> None:
@@ -60,8 +59,7 @@ class SceneDraft:
         self.tables = build_table(Tables, {})
         self._values = TableView(self.tables)
         self.remarks: list[str] = []
-        self.read_before: dict[int, tuple[dict, Any]] = {}
-        self.read_now: dict[int, tuple[dict, Any]] = {}
+        self.read_before: dict[int, Any] = {}
         # Keys that an unknown key probably means; they are not reported as missing.
         self.suggested_keys: set[str] = set()
         # Keys (order, line of text); a dict lists each mistake only once.

@@ -6,7 +6,7 @@ from functools import cached_property
 from math import pi, sqrt
 from typing import Any, NamedTuple
 
-from ...effects import describe_unsupported, find_waveform
+from ..keys.removed import describe_removed
 from ..keys.tables import Tables
 from ..keys.types import advise_on_name
 from .rule_table import MissingKeyRule, MistakeRule, RemarkRule, TableFacts, apply_rules
@@ -15,15 +15,8 @@ from .scene_draft import SceneDraft
 ARRAY_EXTENSIONS = (".npz", ".mat")
 UNIVERSAL_EXTENSIONS = (".uff", ".unv")
 # File extensions of matrices from finite-element programs, for [structure.reduced].
-MATRIX_EXTENSIONS = (
-    ".mtx",
-    ".mat",
-    ".npz",
-    ".op4",
-    ".pch",
-    ".bdf",
-    ".dat",
-)
+NASTRAN_EXTENSIONS = (".op4", ".pch", ".bdf", ".dat")  # files that are no longer read
+MATRIX_EXTENSIONS = (".mtx", ".mat", ".npz")
 # Largest plausible damping ratio, at which a free oscillation decays to a few per cent within one
 # cycle; a larger value probably has a wrong unit, because 1 % is 0.01.
 MAX_USUAL_DAMPING = 0.5
@@ -65,16 +58,6 @@ class StructureFacts(TableFacts):
     def descriptions(self) -> list[str]:
         """Keys of DESCRIPTION_KEYS that the scene sets."""
         return [key for key in DESCRIPTION_KEYS if self.has(key)]
-
-    @property
-    def second_description(self) -> str:
-        """Second of the DESCRIPTION_KEYS that the scene sets, or "" if it sets at most one."""
-        return self.descriptions[1] if len(self.descriptions) > 1 else ""
-
-    @property
-    def joined_descriptions(self) -> str:
-        """Ways in which the structure is described, joined as text."""
-        return " and ".join(self.descriptions)
 
     @property
     def description(self) -> str:
@@ -127,24 +110,8 @@ class StructureFacts(TableFacts):
         """Whether the scene has a joint."""
         return bool(self.scene.friction or self.interface)
 
-    @property
-    def has_changing_load(self) -> bool:
-        """Whether the normal load of the joint changes."""
-        has_motion = any(mode.normal or mode.pitch for mode in self.mode)
-        return bool(self.scene.normal.amplitude) or has_motion
-
 
 DESCRIPTION_RULES = (
-    MistakeRule(
-        lambda s: s.second_description,
-        "structure.{second_description}",
-        "{joined_descriptions} exclude each other: keep one description of the rig",
-    ),
-    MissingKeyRule(
-        lambda s: not s.descriptions,
-        "structure.mode",
-        "at least one [[structure.mode]] is needed; a mass on a spring is a mode with the frequency sqrt(k/m)/(2 pi)",
-    ),
     MissingKeyRule(
         lambda s: not s.has("moving_mass") and s.descriptions in ([], ["mode"]),
         "structure.moving_mass",
@@ -165,16 +132,6 @@ DESCRIPTION_RULES = (
             f"structure.{key} needs this key",
         )
         for key in ("spring", "damper")
-    ),
-    MissingKeyRule(
-        lambda s: s.has("output_mass") and not s.has_any("masses", "reduced"),
-        "structure.masses",
-        "structure.output_mass needs this key",
-    ),
-    MissingKeyRule(
-        lambda s: s.has("interface") and not s.has_any("masses", "file", "reduced"),
-        "structure.masses",
-        "structure.interface needs this key, or structure.file or [structure.reduced]",
     ),
     *(
         MistakeRule(
@@ -220,15 +177,13 @@ FILE_RULES = (
         "a universal file has nodes, not masses; use slide_at with [friction]",
     ),
 )
-BONDED_RULES = (
+JOINT_RULES = (
     MistakeRule(
         lambda s: s.bonded and s.has_masses and s.n_interfaces != 1,
         "structure.bonded",
         "applies only to a single contact, but there are {n_interfaces} interfaces; instead write a "
         "[[structure.spring]] between the masses of the interface",
     ),
-)
-STUCK_RULES = (
     MistakeRule(
         lambda s: s.measured_joint and not s.is_stuck,
         "structure.measured_joint",
@@ -240,36 +195,6 @@ STUCK_RULES = (
         "structure.measured",
         "'stuck' subtracts the stiffness of the joint from the modes, but this scene has no joint; add [friction] and "
         "its load, or leave `measured` out",
-    ),
-    *(
-        MistakeRule(
-            lambda s, is_there=is_there: s.is_stuck and is_there(s),
-            "structure.measured",
-            f"'stuck' cannot be used with {description}, because only modes can be measured with the joint; leave "
-            "`measured` out",
-        )
-        for description, is_there in (
-            ("structure.masses", lambda s: s.has_masses),
-            ("structure.reduced", lambda s: s.reduced),
-        )
-    ),
-    *(
-        MistakeRule(
-            lambda s, is_there=is_there: s.is_stuck and is_there(s),
-            "structure.measured",
-            f"'stuck' cannot be used with {cause}, because the joint then has no single stiffness to subtract from the "
-            "modes; give the modes without the joint",
-        )
-        for cause, is_there in (
-            ("a spring of structure.bonded.wavelength", lambda s: s.bonded.wavelength),
-            ("grooves", lambda s: (s.scene.contact or s.scene.normal).grooves),
-            ("a normal load that changes", lambda s: s.has_changing_load),
-            ("strips that yaw", lambda s: any(mode.yaw for mode in s.mode)),
-            (
-                "[structure.interface.contact]",
-                lambda s: any(face.contact for face in s.interface),
-            ),
-        )
     ),
 )
 REDUCED_RULES = (
@@ -312,8 +237,7 @@ def check_structure(draft: SceneDraft) -> None:
         _check_matrix_files(draft)
         _check_mass_pair(draft, "structure.reduced.slide", structure.reduced.slide)
         apply_rules(draft, REDUCED_RULES, facts)
-    apply_rules(draft, BONDED_RULES, facts)
-    apply_rules(draft, STUCK_RULES, facts)
+    apply_rules(draft, JOINT_RULES, facts)
     if structure.start is not None:
         _check_start(draft)
 
@@ -363,7 +287,6 @@ def _check_modes(draft: SceneDraft) -> None:
                 f"structure.mode.{index}.damping",
                 f"= {mode.damping:g} is a damping ratio: 1 means critical damping, and 1 % is written 0.01",
             )
-    _check_instruments(draft, modes)
     _check_base(draft, modes)
 
 
@@ -428,38 +351,13 @@ def describe_default_outputs(tables: Tables) -> list[str]:
     return sentences
 
 
-def _check_instruments(draft: SceneDraft, modes: tuple) -> None:
-    """Report sensors whose motion differs from that of the output, if any key refers to the output."""
-    written = []
-    for index, mode in enumerate(modes):
+def find_instrument_key(draft: SceneDraft) -> str:
+    """Return the key of the first sensor whose motion differs from that of the output, or "" if there is none."""
+    for index, mode in enumerate(draft.values.structure.mode):
         output = default_output(index) if mode.table.output is None else mode.output
         for key in ("accelerometer", "gauge"):
             if getattr(mode.table, key) is not None and mode[key] != output:
-                written.append(f"structure.mode.{index}.{key}")
-    beside = _find_output_dependent_key(draft)
-    if written and beside:
-        draft.add_mistake(
-            written[0],
-            describe_unsupported(
-                f"with {beside}", "give `accelerometer` and `gauge` the value of `output`"
-            ),
-        )
-
-
-def _find_output_dependent_key(draft: SceneDraft) -> str:
-    """Return the key whose effect depends on the motion of the output, or "" if there is none."""
-    for key in ("structure.travel", "structure.stiffening"):
-        if draft.has(key):
-            return key
-    drive = draft.tables.drive
-    if drive is None:
-        return ""
-    if drive.kind == "free":
-        return "drive.kind = 'free'"
-    waveform = find_waveform(drive)
-    is_marched = draft.values.accuracy.method != "harmonic"
-    if is_marched and (waveform.is_swept or waveform.has_levels):
-        return f"drive.waveform = '{drive.waveform}'"
+                return f"structure.mode.{index}.{key}"
     return ""
 
 
@@ -474,8 +372,6 @@ def _check_masses(draft: SceneDraft) -> None:
     for name in ("spring", "damper", "interface"):
         for index, item in enumerate(getattr(structure, name) or ()):
             _check_mass_pair(draft, f"structure.{name}.{index}.between", item.between)
-    for index, interface in enumerate(structure.interface or ()):
-        _check_lateral(draft, f"structure.interface.{index}.lateral", interface)
     _check_mass_number(draft, "structure.output_mass", structure.output_mass)
 
 
@@ -494,37 +390,13 @@ def _check_mass_pair(draft: SceneDraft, key: str, pair: tuple | None) -> None:
         _check_mass_number(draft, key, number)
 
 
-def _check_lateral(draft: SceneDraft, key: str, interface: Any) -> None:
-    """Report a second direction that has a coordinate in common with the first or cannot be used."""
-    pair = interface.lateral
-    _check_mass_pair(draft, key, pair)
-    if pair is None:
-        return
-    shared = sorted({*pair} & {*(interface.between or ())} - {0})
-    if shared:
-        noun = CoordinateNumbers.from_structure(draft.tables.structure).noun
-        draft.add_mistake(
-            key,
-            f"{noun} {shared[0]} is already in `between`; the second direction needs coordinates of its own, which "
-            "must move at right angles to the coordinates of `between`",
-        )
-    if draft.has("structure.file"):
-        instead = "use structure.masses or [structure.reduced], or leave this key out"
-        draft.add_mistake(key, describe_unsupported("with structure.file", instead))
-    if draft.has("structure.bonded"):
-        instead = "either"
-        if draft.has("structure.masses"):
-            instead = "write a [[structure.spring]] between the same places"
-        draft.add_mistake(key, describe_unsupported("with [structure.bonded]", instead))
-
-
 def _check_mass_number(draft: SceneDraft, key: str, number: int | None) -> None:
     """Report the number of a mass that does not exist."""
     coordinates = CoordinateNumbers.from_structure(draft.tables.structure)
     if coordinates.number is None or number is None or number <= coordinates.number:
         return
     base = ""
-    if key.endswith(("between", "lateral", "slide")):
+    if key.endswith(("between", "slide")):
         base = "; 0 stands for the base"
     draft.add_mistake(
         key,
@@ -554,9 +426,12 @@ def _check_matrix_files(draft: SceneDraft) -> None:
         file = getattr(reduced, key)
         if isinstance(file, str) and find_file_extension(file) not in MATRIX_EXTENSIONS:
             extension = find_file_extension(file)
+            advice = advise_on_name(extension, MATRIX_EXTENSIONS)
+            if extension in NASTRAN_EXTENSIONS:
+                removed = describe_removed("files of Nastran", "reading files of Nastran")
+                advice = f"{removed}; {advice}"
             draft.add_mistake(
-                f"structure.reduced.{key}",
-                f"the name ends in '{extension}'; {advise_on_name(extension, MATRIX_EXTENSIONS)}",
+                f"structure.reduced.{key}", f"the name ends in '{extension}'; {advice}"
             )
 
 
@@ -568,11 +443,6 @@ def find_file_extension(name: str) -> str:
 def _check_start(draft: SceneDraft) -> None:
     """Report missing initial values, and lists without one value for each mode or mass."""
     structure = draft.tables.structure
-    if not draft.has("structure.start.displacement") and not draft.has("structure.start.velocity"):
-        draft.add_missing(
-            "structure.start.displacement",
-            "or structure.start.velocity, one value per mode or mass",
-        )
     count = CoordinateNumbers.from_structure(structure).number or len(structure.mode or ())
     noun = "mode" if count == 1 else "modes"
     if structure.reduced is not None:

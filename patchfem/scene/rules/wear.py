@@ -1,17 +1,15 @@
-"""Rules of [wear]: what wear needs, and what it cannot be combined with yet."""
+"""Rules of [wear]: what wear needs."""
 
 from itertools import pairwise
 from math import pi
 
-from ...effects import Waveform, find_waveform, law_has_trait, law_takes_key, name_laws_with_key
+from ...effects import law_takes_key, name_laws_with_key
 from .grooves import find_groove_key, find_groove_table
 from .rule_table import (
-    MissingKeyRule,
     MistakeRule,
     RemarkRule,
     TableFacts,
     apply_rules,
-    make_unsupported_rule,
 )
 from .scene_draft import SceneDraft
 from .view import UNKNOWN_VALUE, TableView
@@ -43,22 +41,6 @@ class WearFacts(TableFacts):
         return bool(contact.coating or contact.upper.coating or contact.lower.coating)
 
     @property
-    def strip_compliance(self) -> str:
-        """Key of the compliance that enables partial slip of the strips, or "" if there is no such key."""
-        return self.compliance if self.scene.contact.strips else ""
-
-    @property
-    def has_lower_shape(self) -> bool:
-        """Whether a shape of a patch with strips lies on the lower piece."""
-        shapes = self.draft.tables.contact.shapes if self.scene.contact.strips else {}
-        return any(shape.on == "lower" for shape in shapes.values())
-
-    @property
-    def wave(self) -> Waveform:
-        """Record of the waveform of the drive."""
-        return find_waveform(self.draft.tables.drive)
-
-    @property
     def depths(self) -> tuple:
         """Worn depths [m] at which factors are given, or () if they are not known."""
         return self.friction.depth or ()
@@ -85,77 +67,11 @@ class WearFacts(TableFacts):
         return 1 / self.slope / self.law.static
 
 
-COMBINATION_RULES = (
+MOTION_RULES = (
     MistakeRule(
         lambda w: w.kind == "patch",
         "wear",
         "wear needs a slide: add [friction] with [slide], or with [structure] and [drive]",
-    ),
-    make_unsupported_rule(
-        lambda w: w.groove_key and w.scene.normal and find_groove_table(w.draft).amplitude,
-        "wear",
-        "with [{groove_key}]",
-        "a [normal] contact has no area, so its wear has no depth: use [contact]",
-    ),
-    make_unsupported_rule(
-        lambda w: w.strip_compliance,
-        "wear",
-        "with contact.strips with {strip_compliance}",
-        "leave out [wear] or {strip_compliance}",
-    ),
-    make_unsupported_rule(
-        lambda w: w.has_lower_shape,
-        "wear",
-        "with contact.strips with a shape on the lower piece",
-        "leave out [wear] or put all shapes on the upper piece",
-    ),
-    make_unsupported_rule(
-        lambda w: w.scene.contact.strips and w.has("start"),
-        "wear",
-        "with contact.strips with wear.start",
-        "leave out [wear] or leave out wear.start",
-    ),
-    make_unsupported_rule(
-        lambda w: w.kind == "rig" and w.scene.normal.amplitude,
-        "wear",
-        "with normal.amplitude",
-        "leave out [wear] or the amplitude",
-    ),
-    make_unsupported_rule(
-        lambda w: w.scene.structure.interface,
-        "wear",
-        "with [[structure.interface]]",
-        "leave out [wear] or describe a single interface by [friction] and [normal]",
-    ),
-    make_unsupported_rule(
-        lambda w: any(mode.normal or mode.pitch for mode in w.scene.structure.mode),
-        "wear",
-        "with modes with `normal` or `pitch`",
-        "leave out [wear] or these keys",
-    ),
-    make_unsupported_rule(
-        lambda w: w.kind == "rig" and w.scene.drive.kind == "free",
-        "wear",
-        "with drive.kind = 'free'",
-        "wear is computed from the last cycle of a steady motion: use kind 'base' or 'force'",
-    ),
-    make_unsupported_rule(
-        lambda w: w.kind == "rig" and w.wave.name and not w.wave.is_sine,
-        "wear",
-        "with drive.waveform = '{scene.drive.waveform}'",
-        "wear is computed from the last cycle of a steady motion: use waveform 'sine'",
-    ),
-    make_unsupported_rule(
-        lambda w: w.kind == "rig" and w.scene.accuracy.method == "harmonic",
-        "wear",
-        "with accuracy.method 'harmonic'",
-        "use 'auto', 'exact' or 'march'",
-    ),
-    make_unsupported_rule(
-        lambda w: law_has_trait(w.scene.friction.law, "averaged"),
-        "wear",
-        "with law '{law.law}'",
-        "leave out [wear] or use law 'coulomb'",
     ),
 )
 FRICTION_RULES = (
@@ -168,11 +84,6 @@ FRICTION_RULES = (
         lambda w: w.depths and not _increases_from_zero(w.depths),
         "wear.friction.depth",
         'depths that rise from 0 are needed, such as ["0 um", "1 um", "5 um"]',
-    ),
-    MissingKeyRule(
-        lambda w: not w.has_any(*(f"friction.{key}" for key in FACTOR_KEYS)),
-        "wear.friction.coefficient_factor",
-        "the table needs a factor: coefficient_factor, bond_length_factor or both",
     ),
 )
 LAW_RULES = (
@@ -233,7 +144,7 @@ def check_wear(draft: SceneDraft, kind: str) -> None:
     if draft.tables.wear is None:
         return
     facts = WearFacts(draft, kind)
-    apply_rules(draft, COMBINATION_RULES, facts)
+    apply_rules(draft, MOTION_RULES, facts)
     if facts.friction:
         apply_rules(draft, FRICTION_RULES, facts)
         _check_factors(facts)

@@ -6,13 +6,21 @@ import numpy as np
 from scipy import ndimage
 
 from ...core import PatchfemError
-from ..profile import Profile, remove_spikes, robust_deviation
+from ..profile import Profile, remove_spikes
 from . import changes
 from .fit import Fit, fit_unworn
-from .statistics import UNWORN_LIMIT, find_mode
+from .statistics import (
+    MAX_GAINS,
+    UNWORN_LIMIT,
+    WAVES_PER_TRACE,
+    estimate_gain,
+    find_mirror_finish,
+    find_mode,
+    is_other_gain,
+    remove_long_waves,
+)
 from .traces import (
     MIN_SIGNIFICANCE,
-    WAVES_PER_TRACE,
     Place,
     TraceModel,
     find_places,
@@ -34,9 +42,10 @@ MAX_STRETCH = 0.015  # largest error of length of a place
 N_OTHER_PLACES = 15  # number of other places that show how many heights agree by chance
 MIN_NOISE = 1e-15  # smallest standard deviation of a depth [m]; flat traces have none
 EVEN_DEVIATION = 1 / np.sqrt(12)  # standard deviation of a uniform error of one digit
-MIN_GAIN_ERROR = 0.003  # smallest error of the gain that is corrected
+MAX_MORE_CHANGED = (
+    1.1  # changed heights with a gain relative to those without it; less noise shows more
+)
 MAX_GAIN_ERROR = 0.01  # standard deviation of the gain of two calibrated measurements
-MAX_FINISH = 1.5  # short waves of a trace relative to its noise, below which no place can be found
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,12 +125,10 @@ def align_traces(
     digit = EVEN_DEVIATION * float(np.hypot(_find_digit(first.z), _find_digit(second.z)))
     digit = max(digit, MIN_NOISE)
     fit = _fit_datum(model, state, digit, is_straight=is_straight)
-    gain, gain_error = _measure_gain(model, fit)
-    if abs(gain - 1) > max(5 * gain_error, MIN_GAIN_ERROR):
-        scaled = _fit_scaled(model, fit, gain, digit, is_straight=is_straight)
-        if scaled is not None:
-            error = min(gain_error, MAX_GAIN_ERROR)
-            return Aligned(model, scaled, "", place.is_mirrored, gain, error)
+    gain, calibrated, gain_error = _calibrate(model, fit, digit, is_straight=is_straight)
+    if gain != 1.0:
+        error = min(gain_error, MAX_GAIN_ERROR)
+        return Aligned(model, calibrated, "", place.is_mirrored, gain, error)
     is_speck = changes.find_specks(
         model.x, model.second + fit.depth, model.second, fit.worn, fit.grown
     )
@@ -131,10 +138,10 @@ def align_traces(
 
     agreeing = fit.unworn.mean()
     if shift is None and not _is_same_place(places, place, model, fit):
-        reason = "mirror_finish" if _has_mirror_finish(first, second) else "elsewhere"
+        reason = "mirror_finish" if find_mirror_finish((first.z, second.z)) else "elsewhere"
         return Aligned(model, fit, reason, place.is_mirrored)
     reason = "" if agreeing > MIN_AGREEING else "no_datum"
-    error = min(float(np.hypot(gain_error, gain - 1)), MAX_GAIN_ERROR)
+    error = min(gain_error, MAX_GAIN_ERROR)
     return Aligned(model, fit, reason, place.is_mirrored, gain_error=error)
 
 
@@ -142,9 +149,7 @@ def _is_same_place(places: list[Place], place: Place, model: TraceModel, fit: Fi
     """Return whether the traces have a place in common: by its significance, or by the heights that agree."""
     chance = _estimate_chance(model.second + fit.depth, model.second, float(np.median(fit.noise)))
     agreeing = fit.unworn.mean()
-    waves = model.second - ndimage.gaussian_filter1d(
-        model.second, model.second.size / WAVES_PER_TRACE
-    )
+    waves = remove_long_waves(model.second)
     if abs(fit.state[1]) > MAX_STRETCH or np.median(fit.noise) > waves.std():
         return False
     is_clear = len(places) == 1
@@ -178,7 +183,7 @@ def _estimate_chance(first, second, noise: float) -> float:
 
     They are those of both traces at other places, without their long waves.
     """
-    waves = [z - ndimage.gaussian_filter1d(z, z.size / 40) for z in (first, second)]
+    waves = [remove_long_waves(z) for z in (first, second)]
     fractions = []
     for k in range(1, N_OTHER_PLACES + 1):
         depth = np.roll(waves[0], k * first.size // (N_OTHER_PLACES + 1)) - waves[1]
@@ -202,46 +207,34 @@ def _measure_gain(model: TraceModel, fit: Fit) -> tuple[float, float]:
     noise = float(np.median(fit.noise))
     use = (np.abs(fit.depth) < 4 * UNWORN_LIMIT * noise) & (first + second < 0)
     use &= ~fit.worn & ~fit.grown
-    if use.sum() < MIN_SAMPLES:
-        return 1.0, np.inf
-    first = first[use] - first[use].mean()
-    second = second[use] - second[use].mean()
-    # The noise of the first trace, half of the variance of a depth, lowers a regression on its heights.
-    power = first @ first - first.size * noise**2 / 2
-    if not power > 0:
-        return 1.0, np.inf
-    gain = float(first @ second / power)
-    blocks = np.array_split(np.arange(first.size), 10)
-    influence = [first[b] @ (second[b] - gain * first[b]) for b in blocks]
-    return gain, float(np.sqrt(10) * np.std(influence) / power)
+    return estimate_gain(first[use], second[use], noise)
 
 
-def _fit_scaled(
-    model: TraceModel, fit: Fit, gain: float, digit: float, *, is_straight: bool
-) -> Fit | None:
-    """Divide the second trace by its gain; return the fit if it explains the depths better, else None."""
-    second = model.second
-    mean = second.mean()
-    model.second = mean + (second - mean) / gain
-    scaled = _fit_datum(
-        model, np.append(fit.state[:2], [0.0, 0.0, 0.0]), digit, is_straight=is_straight
-    )
-    is_quieter = np.median(scaled.noise) < np.median(fit.noise)
-    changed, before = ((each.worn | each.grown).sum() for each in (scaled, fit))
-    if is_quieter and changed <= before:
-        return scaled
-    model.second = second
-    return None
+def _calibrate(
+    model: TraceModel, fit: Fit, digit: float, *, is_straight: bool
+) -> tuple[float, Fit, float]:
+    """Divide the second trace by its gain, if that explains the depths better; return gain, fit and error of the gain.
 
-
-def _has_mirror_finish(first: Profile, second: Profile) -> bool:
-    """Return whether a trace is hardly rougher than its white noise."""
-    for trace in (first, second):
-        noise = robust_deviation(np.diff(trace.z, 2)) / np.sqrt(6)
-        waves = trace.z - ndimage.gaussian_filter1d(trace.z, trace.z.size / WAVES_PER_TRACE)
-        if robust_deviation(waves) < MAX_FINISH * noise:
-            return True
-    return False
+    Heights that agree show only a part of a large gain, so gains are measured in turn until none is left.
+    """
+    uncalibrated = model.second, fit
+    total = 1.0
+    for _ in range(MAX_GAINS):
+        gain, error = _measure_gain(model, fit)
+        if not is_other_gain(gain, error):
+            return total, fit, float(np.hypot(error, gain - 1))
+        total *= gain
+        mean = model.second.mean()
+        model.second = mean + (model.second - mean) / gain
+        state = np.append(fit.state[:2], [0.0, 0.0, 0.0])
+        scaled = _fit_datum(model, state, digit, is_straight=is_straight)
+        is_quieter = np.median(scaled.noise) < np.median(fit.noise)
+        changed, before = ((each.worn | each.grown).sum() for each in (scaled, fit))
+        fit = scaled
+        if not is_quieter or changed > MAX_MORE_CHANGED * before:
+            break
+    model.second, fit = uncalibrated
+    return 1.0, fit, float(np.hypot(error, gain - 1))
 
 
 def _find_digit(z) -> float:

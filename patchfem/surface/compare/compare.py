@@ -1,7 +1,7 @@
 """Comparison of two surfaces before and after wear: place, datum, worn parts, verdict, numbers.
 
-Codes of the verdict: "worn", "no_wear", "grown", "worn_and_grown", "growth_at_ends", "elsewhere",
-"no_datum", "mirror_finish", "identical".
+Codes of the verdict: "worn", "no_wear", "grown", "worn_and_grown", "growth_at_ends", "scar_or_bow",
+"elsewhere", "no_datum", "mirror_finish", "identical".
 """
 
 from dataclasses import replace
@@ -13,7 +13,7 @@ import numpy as np
 from ...core import PatchfemError
 from ..areal import Areal
 from ..files.read import read_surface
-from ..profile import Profile, resample_evenly
+from ..profile import Profile, resample_evenly, robust_deviation
 from ..quantity import SIDE, Quantity
 from . import changes, waves
 from .alignment import Aligned, align_traces, clean_trace
@@ -30,15 +30,18 @@ from .records import (
     name_unknown,
 )
 from .section import Section, make_section, measure_hidden_area, measure_largest
-from .statistics import UNWORN_LIMIT
+from .statistics import UNWORN_LIMIT, find_mirror_finish, remove_long_waves
 from .track import cover_spans, find_spans, measure_track
-from .verdict import judge_change
+from .verdict import judge_change, limit_wear
 
 END_SAMPLES = 5  # number of samples from an end at which growth includes it
 MAX_TRACK_FRACTION = (
     0.8  # width of a track relative to the common part, beyond which it may be growth at its ends
 )
 MIN_SCAR_FRACTION = 0.9  # fraction of worn heights in such a scar; worn tops have a smaller one
+MIN_BOW = (
+    3.0  # mean height of a bow relative to the detection limit, from which on it may be a scar
+)
 MIN_DEPOSITS = 0.05  # smallest grown area that is reported, relative to the lost area
 MIN_OTHER_LENGTH = 5e-4  # smallest error of length that is reported
 MAX_STEP_RATIO = 1.01  # ratio of two sampling intervals that counts as equal
@@ -145,8 +148,8 @@ def _compare_traces(before: Profile, after: Profile, options: Options) -> Compar
     aligned = align_traces(first, second, options.shift, is_straight=bool(options.datum))
     if aligned.reason:
         section = find_flanked_track(first, second)
-        noise = 0.0
         result = _compose_unplaced(cleaned, aligned, section)
+        noise = np.sqrt(2) * result.verdict.numbers.get("noise", 0.0)
         lines = [resample_evenly(trace) for trace in cleaned]
         step = max(line.step for line in lines)
         lines = [_resample(line, step) for line in lines]
@@ -215,14 +218,16 @@ def _compose_placed(traces: list[Profile], aligned: Aligned) -> Comparison:
     curves = _draw_curves(section, model.second + fit.depth)
     place = Placement(placement, "x" if aligned.is_mirrored else "")
 
-    findings = [Finding("hidden_even_wear", {"limit": None})]
+    findings = []
+    if bend:
+        # A scar is deepest in the middle of its parabola, wear of both ends at its ends.
+        area = abs(bend) * (2 if bend > 0 else 1) / 3 * float(np.ptp(section.x))
+        findings.append(Finding("bow_subtracted", {"height": abs(bend), "area": area}))
+    findings.append(Finding("hidden_even_wear", {"limit": None}))
     if aligned.is_mirrored:
         findings.append(Finding("mirrored", {}))
     if aligned.gain != 1.0:
         findings.append(Finding("other_gain", {"gain": aligned.gain}))
-    if bend:
-        area = abs(bend) * 2 / 3 * float(np.ptp(section.x))
-        findings.append(Finding("bow_subtracted", {"height": abs(bend), "area": area}))
     scale = placement["scale"]
     if (
         min(abs(scale.low - 1), abs(scale.high - 1)) > MIN_OTHER_LENGTH
@@ -247,6 +252,8 @@ def _compose_unplaced(
         numbers = {}
         if aligned.reason == "no_datum":
             numbers["unworn"] = float(aligned.fit.unworn.mean())
+        if aligned.reason == "mirror_finish":
+            numbers = find_mirror_finish([trace.z for trace in traces])
         return Comparison(*traces, Finding(aligned.reason, numbers), values)
     placement = {name: name_unknown(name, "elsewhere") for name in ("shift", "scale", "tilt")}
     noise = float(section.noise[0])
@@ -293,8 +300,11 @@ def _compose(
     if placement.basis == "flanks" and code != "worn":
         code = "elsewhere"
     numbers = {"lost": area, "grown": grown, "basis": placement.basis}
-    numbers |= {"detection_limit": evidence.datum.detection_limit, "at_most": bounds[2] / length}
+    numbers |= limit_wear(bounds[2] / length, evidence.datum.detection_limit)
 
+    bow = 2 / 3 * max(evidence.datum.bend, 0.0) * length
+    waves_height = robust_deviation(remove_long_waves(section.after))
+    is_bow_large = bow > area and evidence.datum.bend > MIN_BOW * waves_height
     values = _name_unknowns("no_wear") | placement.values
     low = max(grown - SIDE * grown_error, 0.0)
     values["grown_area"] = name_quantity("grown_area", grown, low, grown + SIDE * grown_error)
@@ -309,12 +319,20 @@ def _compose(
             }
             tracks = ()
             values = _name_unknowns("growth_at_ends") | placement.values
+        elif is_bow_large and (not tracks or any(tracks[0].cut)):
+            code = "scar_or_bow"
+    elif code == "no_wear" and is_bow_large:
+        code = "scar_or_bow"
     elif (
         code == "grown" and section.grown[:END_SAMPLES].any() and section.grown[-END_SAMPLES:].any()
     ):
         code = "growth_at_ends"
         height = grown / float(section.widths[section.grown].sum())
         numbers |= {"scar_depth": height, "growth_height": height}
+    if code == "scar_or_bow":
+        numbers["scar_depth"] = (bow + area) / length
+        tracks = ()
+        values = _name_unknowns("scar_or_bow") | placement.values
     if code.startswith("worn"):
         values["worn_area"] = name_quantity("worn_area", *bounds)
         means = (bound / length for bound in bounds)

@@ -18,6 +18,7 @@ from .statistics import (
     compute_threshold,
     estimate_one_sided_scale,
     find_mode,
+    remove_long_waves,
     solve_biweight_step,
 )
 
@@ -29,10 +30,15 @@ WAVES_PER_SIDE = (
     20  # side of a scan relative to the deviation of the Gaussian that removes long waves
 )
 MIN_OVERLAP = 0.3  # smallest common region relative to the smaller scan
+BORDER_POINTS = (
+    3  # distance from the border of a scan, in points, from which on its spline is accurate
+)
+KINK_POINTS = 5  # side of the square over which an error of interpolation at a kink spreads
 N_TILES = 8  # number of tiles along each side, whose modes span the planes
 MAX_PLANES = 3000  # number of planes through three tiles that are compared
 MIN_TILE_POINTS = 20  # smallest number of known heights in a tile
 SQUARES = (1, 3, 9, 25)  # sides of the squares whose mean depth is tested
+UNCHANGED_FRACTION = 0.25  # fraction of the squares above or below zero that are unchanged at least
 MAX_PULL = 8.0  # standard deviations to which a single depth counts in a mean
 REFINE_WIDTHS = (
     4,
@@ -53,11 +59,6 @@ class ScanPlace(NamedTuple):
     shift_y: float
     rotation: float
     significance: float
-
-
-def remove_long_waves(z, part: float = WAVES_PER_SIDE) -> np.ndarray:
-    """Subtract the Gaussian mean surface from heights (m, n) without gaps."""
-    return z - ndimage.gaussian_filter(z, np.array(z.shape) / part)
 
 
 def find_scan_place(before: Areal, after: Areal) -> ScanPlace:
@@ -146,10 +147,13 @@ class ScanModel:
         self.keep_common(state, np.isfinite(after.z))
 
     def keep_common(self, state, is_measured) -> None:
-        """Keep the points that both scans show at a state."""
+        """Keep the points that both scans show at a state; `common` has those at the border of the second one too."""
         pixels = self._map_pixels(state)
         weights = ndimage.map_coordinates(is_measured.astype(float), pixels, order=1, cval=0.0)
-        self.known = np.isfinite(self.z) & (weights > 0.99)
+        self.common = np.isfinite(self.z) & (weights > 0.99)
+        # The spline has larger errors of interpolation at its border.
+        last = np.array(is_measured.shape)[:, None, None] - 1 - BORDER_POINTS
+        self.known = self.common & ((pixels >= BORDER_POINTS) & (pixels <= last)).all(axis=0)
 
     def _map_pixels(self, state) -> np.ndarray:
         """Return the rows and columns (2, m, n) of the points in the second scan."""
@@ -168,7 +172,8 @@ class ScanModel:
     def compute_depth(self, state) -> np.ndarray:
         """Return the depth (n,) [m] of the known points."""
         pixels = self._map_pixels(state)[:, self.known]
-        second = ndimage.map_coordinates(self.spline, pixels, prefilter=False, mode="nearest")
+        # The coefficients of a spline are those of a mirrored border.
+        second = ndimage.map_coordinates(self.spline, pixels, prefilter=False, mode="mirror")
         return self.z[self.known] + state[3:] @ self.plane[:, self.known] - second
 
     def compute_jacobian(self, state) -> np.ndarray:
@@ -184,14 +189,15 @@ class ScanModel:
         return np.column_stack((-gx, -gy, -turn, *self.plane[:, self.known]))
 
     def compute_noise_terms(self, jacobian) -> np.ndarray:
-        """Return terms (n, 2) of the variance: of the instrument, and of positions on slopes."""
-        return np.column_stack((np.ones(len(jacobian)), jacobian[:, 0] ** 2 + jacobian[:, 1] ** 2))
+        """Return terms (n, 3) of the variance: of the instrument, of positions on slopes, at kinks."""
+        slopes = jacobian[:, 0] ** 2 + jacobian[:, 1] ** 2
+        return np.column_stack((np.ones(len(jacobian)), slopes, self.kinks[self.known] ** 2))
 
     def find_changed(self, depth, noise) -> np.ndarray:
         """Return the points (n,) bool whose mean depth over a square noise does not explain."""
         relative = np.full(self.shape, np.nan)
         relative[self.known] = depth / noise
-        return find_changed_points(relative, self.known)[self.known]
+        return find_changed_points(relative, self.known).points[self.known]
 
     def refine_place(self, state) -> np.ndarray:
         """Improve shift and rotation by biweight steps on the short waves, smoothed less and less."""
@@ -211,7 +217,14 @@ class ScanModel:
     def _remove_waves(self, values, width: float) -> np.ndarray:
         image = np.full(self.shape, np.nan)
         image[self.known] = values
-        return remove_long_waves(ndimage.gaussian_filter(fill_nearest(image), width))[self.known]
+        smooth = ndimage.gaussian_filter(fill_nearest(image), width)
+        return remove_long_waves(smooth, WAVES_PER_SIDE)[self.known]
+
+    @cached_property
+    def kinks(self) -> np.ndarray:
+        """Largest second difference (m, n) [m] of the first scan near each point."""
+        bend = np.abs(ndimage.laplace(fill_nearest(self.z)))
+        return ndimage.maximum_filter(bend, KINK_POINTS)
 
     @cached_property
     def tiles(self) -> list[tuple[slice, slice]]:
@@ -254,8 +267,15 @@ class ScanModel:
         return state
 
 
-def find_changed_points(relative, known) -> np.ndarray:
-    """Return the points (m, n) bool whose mean relative depth over squares exceeds their scatter.
+class ChangedPoints(NamedTuple):
+    """Changed points (m, n) bool, and the mean depth, in standard deviations, from which on a large square is found."""
+
+    points: np.ndarray
+    limit: float
+
+
+def find_changed_points(relative, known) -> ChangedPoints:
+    """Find the points whose mean relative depth over squares exceeds their scatter.
 
     Parameters
     ----------
@@ -265,20 +285,23 @@ def find_changed_points(relative, known) -> np.ndarray:
         Points whose depth is known.
     """
     limit = compute_threshold(len(SQUARES) * relative.size)
-    remainder = np.where(known, np.clip(relative, -MAX_PULL, MAX_PULL), 0.0)
+    single = np.where(known, relative, 0.0)
+    remainder = np.clip(single, -MAX_PULL, MAX_PULL)
     changed = np.zeros(relative.shape, bool)
     for side in SQUARES:
         if side > min(relative.shape) / 4:
             break
         use = known & ~changed
         weight = ndimage.uniform_filter(use.astype(float), side)
-        mean = ndimage.uniform_filter(np.where(use, remainder, 0.0), side) / np.maximum(
-            weight, 0.25
-        )
-        scatter = max(estimate_one_sided_scale(mean[use & (weight > 0.5)]), 1 / side)
+        values = single if side == 1 else remainder
+        mean = ndimage.uniform_filter(np.where(use, values, 0.0), side) / np.maximum(weight, 0.25)
+        scatter = estimate_one_sided_scale(mean[use & (weight > 0.5)], UNCHANGED_FRACTION)
+        scatter = max(scatter, 1 / side)
         high = (mean > limit * scatter) & (weight > 0.25)
+        lowest = limit * scatter
         if side == 1:
             changed |= ndimage.binary_opening(high, np.ones((3, 3)))
         else:
             changed |= ndimage.binary_dilation(high, np.ones((side, side)))
-    return ndimage.binary_opening(changed, np.ones((4, 4))) & known
+    points = ndimage.binary_opening(changed, np.ones((4, 4))) & known
+    return ChangedPoints(points, float(lowest))

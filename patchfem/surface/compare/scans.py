@@ -22,11 +22,26 @@ from .records import (
     name_quantity,
     name_unknown,
 )
-from .scan_model import ScanModel, ScanPlace, find_scan_place, remove_long_waves
+from .scan_model import (
+    WAVES_PER_SIDE,
+    ScanModel,
+    ScanPlace,
+    find_changed_points,
+    find_scan_place,
+)
 from .section import make_section
-from .statistics import UNWORN_LIMIT, estimate_correlation, estimate_one_sided_scale
+from .statistics import (
+    MAX_GAINS,
+    UNWORN_LIMIT,
+    estimate_correlation,
+    estimate_gain,
+    estimate_one_sided_scale,
+    find_mirror_finish,
+    is_other_gain,
+    remove_long_waves,
+)
 from .track import find_spans, measure_track
-from .verdict import judge_change
+from .verdict import judge_change, limit_wear
 
 MIN_SIDE = 16  # smallest number of points along each side of a scan
 MAX_FIT_POINTS = (
@@ -40,6 +55,7 @@ MARGIN = 7  # side of the square by which worn places are enlarged, so that thei
 MIN_TILE_FRACTION = 0.3  # fraction of unworn points in a tile whose mean shows slow errors
 MIN_TILES = 6  # smallest number of such tiles
 MIN_ELONGATION = 2.0  # length of a worn place relative to its width, from which on it is a track
+MIN_GROWN_BORDER = 0.5  # fraction of a line near a border that grew, from which on the border grew
 MIN_SECTIONS = 8  # smallest number of sections across a track
 MODEL_ERROR = 0.01  # relative standard deviation of a volume: gain of two calibrated instruments
 VARIANTS = (("", False), ("x", False), ("", True), ("x", True))  # mirrored along, heights inverted
@@ -71,15 +87,18 @@ def compare_scans(
         findings = (Finding("identical_files", {}),)
         return Comparison(before, after, verdict, values, (), findings, direction=direction)
 
-    model, fit, variant = _align(*cleaned)
+    model, fit, variant, gain = _align_calibrated(*cleaned)
     ratios = _compare_lines(*cleaned, direction, fit)
     if fit is None:
-        verdict = Finding("elsewhere", {})
-        values = {name: name_unknown(name, "elsewhere") for name in (*NAMES, "hidden_wear")}
+        finish = find_mirror_finish([fill_nearest(scan.z) for scan in cleaned])
+        verdict = Finding("mirror_finish" if finish else "elsewhere", finish)
+        values = {name: name_unknown(name, verdict.code) for name in (*NAMES, "hidden_wear")}
         evidence = Evidence(removed=tuple(counts))
         return Comparison(before, after, verdict, values | ratios, (), (), evidence, direction)
     result = _measure(cleaned, model, fit, variant)
     evidence = replace(result.evidence, removed=tuple(counts))
+    if gain != 1.0:
+        result = replace(result, findings=(*result.findings, Finding("other_gain", {"gain": gain})))
     return replace(
         result,
         before=before,
@@ -133,7 +152,7 @@ def _align(before: Areal, after: Areal) -> tuple[ScanModel | None, Fit | None, t
     state = coarse.find_plane(state)
     digit = 1e-4 * max(float(np.nanstd(before.z)), 1e-15)
     fit = fit_unworn(coarse, state, slice(0, 6), digit)
-    waves_size = remove_long_waves(fill_nearest(before.z)).std()
+    waves_size = remove_long_waves(fill_nearest(before.z), WAVES_PER_SIDE).std()
     chance = UNWORN_LIMIT * np.median(fit.noise) / max(waves_size * np.sqrt(np.pi), 1e-15)
     is_same = fit.unworn.mean() > MIN_AGREEMENT * chance + MIN_AGREEING
     if not is_same and not (place.significance > MIN_SIGNIFICANCE and fit.unworn.mean() > 0.3):
@@ -159,9 +178,8 @@ def _measure(
     """Measure volumes and the track of aligned scans, and find the verdict."""
     maps = _draw_maps(scans[0], model, fit)
     cell = float(np.diff(model.x).mean() * np.diff(model.y).mean())
-    inside = (
-        ndimage.binary_closing(np.pad(model.known, 8), np.ones((9, 9)))[8:-8, 8:-8] | model.known
-    )
+    closed = ndimage.binary_closing(np.pad(model.common, 8), np.ones((9, 9)))[8:-8, 8:-8]
+    inside = closed | model.common
     volumes = []
     for part, sign in ((maps.worn, 1.0), (maps.grown, -1.0)):
         near = ndimage.binary_dilation(part, np.ones((MARGIN, MARGIN))) & inside
@@ -175,6 +193,8 @@ def _measure(
     bounds = (lost, max(lost - SIDE * error, 0.0), lost + SIDE * error)
     code = judge_change(bounds, lost, error, grown, grown_error)
 
+    if code == "grown" and _has_grown_at_ends(maps, inside):
+        code = "growth_at_ends"
     region = float(inside.sum()) * cell
     values: dict[str, Quantity] = {name: name_unknown(name, "no_wear") for name in NAMES}
     low = max(grown - SIDE * grown_error, 0.0)
@@ -207,11 +227,57 @@ def _measure(
         name: name_quantity(name, value, value - SIDE * deviation, value + SIDE * deviation)
         for name, value, deviation in zip(PLACEMENT_NAMES, fit.state, errors)
     }
-    datum = Datum(float(fit.unworn.mean()), float(np.median(fit.noise)), 0.0, 1.0)
+    noise = float(np.median(fit.noise))
+    limit = noise * find_changed_points(maps.depth / maps.noise, model.known).limit
+    datum = Datum(float(fit.unworn.mean()), noise, 0.0, 1.0, limit)
     evidence = Evidence(Placement(placed, variant[0], variant[1]), datum, maps)
-    numbers = {"lost": lost, "grown": grown, "basis": "place", "at_most": bounds[2] / region}
-    numbers["detection_limit"] = None
+    numbers = {"lost": lost, "grown": grown, "basis": "place"}
+    numbers |= limit_wear(bounds[2] / region, limit)
+    if code == "growth_at_ends":
+        height = grown / (float(maps.grown.sum()) * cell)
+        numbers |= {"scar_depth": height, "growth_height": height}
     return Comparison(*scans, Finding(code, numbers), values, tracks, tuple(findings), evidence)
+
+
+def _align_calibrated(
+    before: Areal, after: Areal
+) -> tuple[ScanModel | None, Fit | None, tuple[str, bool], float]:
+    """Align two scans; returns the gain of the instrument too, by which the heights of the second one are divided."""
+    total = 1.0
+    for _ in range(MAX_GAINS):
+        model, fit, variant = _align(before, replace(after, z=after.z / total))
+        if fit is None:
+            break
+        gain, error = _measure_gain(model, fit)
+        if not is_other_gain(gain, error):
+            break
+        total *= gain
+    return model, fit, variant, total
+
+
+def _measure_gain(model: ScanModel, fit: Fit) -> tuple[float, float]:
+    """Return the ratio of the depths of unworn valleys, second to first scan, and its error."""
+    first = model.z[model.known]
+    second = first - fit.depth
+    base = model.plane[:, model.known].T
+    use = fit.unworn & ~fit.grown
+    first, second = (
+        z - base @ np.linalg.lstsq(base[use], z[use], rcond=None)[0] for z in (first, second)
+    )
+    use &= first + second < 0
+    return estimate_gain(first[use], second[use], float(np.median(fit.noise)))
+
+
+def _has_grown_at_ends(maps: ScanMaps, inside) -> bool:
+    """Return whether material grew along two opposite borders, which a scar between them resembles."""
+    for axis in (0, 1):
+        ends = np.flatnonzero(inside.any(axis=axis))[[0, -1]]
+        # Most of the border lines near both ends have grown.
+        counts = maps.grown.sum(axis=axis) / np.maximum(inside.sum(axis=axis), 1)
+        near = [counts[ends[0] : ends[0] + MARGIN], counts[ends[1] - MARGIN : ends[1] + 1]]
+        if min(part.max() for part in near) > MIN_GROWN_BORDER:
+            return True
+    return False
 
 
 def _draw_maps(before: Areal, model: ScanModel, fit: Fit) -> ScanMaps:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy import ndimage, signal
+from scipy import signal
 
 from ..quantity import SIDE, Quantity
 from .fit import Fit
@@ -24,6 +24,8 @@ MIN_WALL = 10.0  # second difference of the depth, in standard deviations, at a 
 WALL_ERROR = 0.2
 PARABOLA_SAMPLES = 5  # samples of the parabolas whose largest value is the largest depth
 PARABOLA_ERROR = 0.7  # standard deviation of its middle relative to that of a sample
+# Errors relative to those that the blocks show. Without it, intervals of 161 pairs of development held in 91 %.
+SCATTER_FACTOR = 1.3
 MAX_NOISE_RATIO = 4.0  # noise relative to the median above which a depth cannot be the largest
 
 
@@ -83,7 +85,7 @@ class Section:
         gaps = self.gap_errors[inside[1:] & inside[:-1]]
         walls = self.wall_errors[inside]
         variance = np.var(self.draws @ weights) + gaps @ gaps + walls @ walls
-        error = np.sqrt(variance + self.drift * weights.sum())
+        error = SCATTER_FACTOR * np.sqrt(variance + self.drift * weights.sum())
         return sign * float(weights @ self.depth), float(error)
 
 
@@ -184,16 +186,7 @@ def measure_largest(section: Section, name: str) -> Quantity:
     near = max((smooth > smooth[top] - 2 * sigma).sum() / section.correlation, 1.0)
     bias = float(np.sqrt(2 * np.log(near)) / 2 * sigma)
     value = smooth[top] - bias
-    sigma = float(np.hypot(sigma, section.model_error * abs(value)))
+    sigma = float(np.hypot(SCATTER_FACTOR * sigma, section.model_error * abs(value)))
     raw = depth[max(top - 2, 0) : top + 3].max()
     low = value - bias - SIDE * sigma
     return name_quantity(name, value, max(low, 0.0), max(raw, value) + SIDE * sigma)
-
-
-def close_gaps(mask, count: int) -> np.ndarray:
-    """Join runs of true values that are at most `count` samples apart."""
-    if count < 1:
-        return mask
-    padded = np.pad(mask, count + 1)
-    closed = ndimage.binary_closing(padded, np.ones(count + 1))
-    return closed[count + 1 : -count - 1]

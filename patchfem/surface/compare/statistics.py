@@ -1,8 +1,9 @@
 """Robust statistics of depths, of which some are worn: scale, mode, correlation, thresholds."""
 
 import numpy as np
+from scipy import ndimage, special
 
-from ..profile import MAD_TO_DEVIATION, robust_deviation
+from ..profile import robust_deviation
 
 UNWORN_LIMIT = 2.5  # standard deviations within which a depth counts as unworn
 BIWEIGHT = 4.685  # tuning constant of Tukey's biweight; 95 % efficient for normal noise
@@ -14,14 +15,31 @@ FALSE_POSITIVE_RATE = 1e-3
 # Mean square of normal values of variance one that lie within UNWORN_LIMIT.
 TRUNCATED_VARIANCE = 0.911
 TINY = 1e-300  # keeps divisions by zero noise finite
+WAVES_PER_TRACE = (
+    40  # length of a surface relative to the deviation of the Gaussian of its long waves
+)
+MAX_FINISH = 1.5  # short waves relative to the noise, below which no place can be found
+MIN_GAIN_HEIGHTS = 40  # smallest number of heights that show the gain of the instrument
+MAX_GAINS = 8  # number of gains in turn; heights that agree show only a part of a large one
+MIN_GAIN_ERROR = 0.003  # smallest error of the gain that is corrected
 
 
-def estimate_one_sided_scale(depth) -> float:
-    """Estimate the noise of depths from the side of zero that wear (or growth) does not touch."""
+def estimate_one_sided_scale(depth, fraction: float = 0.5) -> float:
+    """Estimate the noise of depths from the side of zero that wear (or growth) does not touch.
+
+    Parameters
+    ----------
+    depth : (n,) array
+        Depths about the unworn surface.
+    fraction : float, optional
+        Quantile of the sizes on one side, which that of normal values scales. More than this fraction of
+        them must be unchanged.
+    """
     sides = [np.abs(side) for side in (depth[depth > 0], depth[depth < 0]) if side.size >= MIN_SIDE]
     if not sides:
         return max(robust_deviation(depth), TINY) if depth.size else TINY
-    return max(MAD_TO_DEVIATION * min(float(np.median(side)) for side in sides), TINY)
+    smallest = min(float(np.quantile(side, fraction)) for side in sides)
+    return max(smallest / float(special.ndtri(0.5 + fraction / 2)), TINY)
 
 
 def solve_biweight_step(depth, jacobian, sigma: float, excluded=None) -> np.ndarray:
@@ -72,6 +90,42 @@ def estimate_correlation(values) -> float:
 
 def compute_threshold(n_tests: float) -> float:
     """Return the number of standard deviations that noise exceeds in 1 of 1000 sets of tests."""
-    from scipy.special import ndtri
+    return float(-special.ndtri(FALSE_POSITIVE_RATE / max(n_tests, 1)))
 
-    return float(-ndtri(FALSE_POSITIVE_RATE / max(n_tests, 1)))
+
+def remove_long_waves(z, part: float = WAVES_PER_TRACE) -> np.ndarray:
+    """Subtract the Gaussian mean line or surface from heights (n,) or (m, n) without gaps."""
+    return z - ndimage.gaussian_filter(z, np.array(z.shape) / part)
+
+
+def find_mirror_finish(surfaces) -> dict[str, float]:
+    """Return rms height and noise [m] of heights (n,) or (m, n) that are hardly rougher than their white noise, else {}."""
+    for z in surfaces:
+        noise = robust_deviation(np.diff(z, 2)) / np.sqrt(6)
+        height = robust_deviation(remove_long_waves(z))
+        if height <= MAX_FINISH * noise:
+            return {"rq": float(height), "noise": float(noise)}
+    return {}
+
+
+def estimate_gain(first, second, noise: float) -> tuple[float, float]:
+    """Return the ratio of heights (n,) of two surfaces, second to first one, and its error; (1, inf) for too few.
+
+    The noise [m] of the first surface, half of the variance of a depth, lowers a regression on its heights.
+    """
+    if first.size < MIN_GAIN_HEIGHTS:
+        return 1.0, np.inf
+    first = first - first.mean()
+    second = second - second.mean()
+    power = first @ first - first.size * noise**2 / 2
+    if not power > 0:
+        return 1.0, np.inf
+    gain = float(first @ second / power)
+    blocks = np.array_split(np.arange(first.size), 10)
+    influence = [first[b] @ (second[b] - gain * first[b]) for b in blocks]
+    return gain, float(np.sqrt(10) * np.std(influence) / power)
+
+
+def is_other_gain(gain: float, error: float) -> bool:
+    """Return whether a gain differs from 1 by more than its error."""
+    return abs(gain - 1) > max(5 * error, MIN_GAIN_ERROR)

@@ -15,11 +15,17 @@ from scipy.interpolate import CubicSpline
 
 from ..profile import Profile, robust_deviation
 from . import changes
-from .statistics import TINY, UNWORN_LIMIT, estimate_correlation, find_mode, solve_biweight_step
+from .statistics import (
+    TINY,
+    UNWORN_LIMIT,
+    estimate_correlation,
+    find_mode,
+    remove_long_waves,
+    solve_biweight_step,
+)
 
 STRETCHES = np.linspace(-0.01, 0.01, 21)  # relative errors of length that the search tries
 MIN_OVERLAP = 0.33  # common part relative to the shorter trace
-WAVES_PER_TRACE = 40  # deviations of the Gaussian that separates the waves of the search
 KINK_SAMPLES = 7  # number of samples over which an error of interpolation at a kink spreads
 MIN_QUIET = 40  # smallest number of unworn depths that show their correlation
 N_BLOCKS = 20  # number of parts whose own shifts and modes are found
@@ -123,7 +129,7 @@ def _search_shift(first: Waves, second: Waves, stretch: float, *, is_mirrored: b
 def _filter_waves(x, z, step: float) -> Waves:
     places = np.arange(x[0], x[-1], step)
     z = np.interp(places, x, z)
-    z = z - ndimage.gaussian_filter1d(z, z.size / WAVES_PER_TRACE)
+    z = remove_long_waves(z)
     sigma = z.std()
     whole = np.clip(z, -3 * sigma, 3 * sigma)
     valleys = np.minimum(whole, np.median(z))
@@ -213,8 +219,7 @@ class TraceModel:
     def find_changed(self, depth, noise) -> np.ndarray:
         """Return the samples (n,) bool that noise does not explain."""
         changed = changes.find_changed(depth, noise)
-        heights = self.second + self.last_depth / 2
-        heights = heights - ndimage.gaussian_filter1d(heights, heights.size / WAVES_PER_TRACE)
+        heights = remove_long_waves(self.second + self.last_depth / 2)
         relative = depth / noise
         quiet = relative[np.abs(relative) < UNWORN_LIMIT]
         if changed.any() or quiet.size < MIN_QUIET:

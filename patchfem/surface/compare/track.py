@@ -36,6 +36,7 @@ MIN_FLANK_SAMPLES = 12  # smallest number of samples of a flank, and of the surf
 MAX_FLANK_SAMPLES = 400  # largest number of samples in which a flank reaches FLANK_HEIGHT
 SHALLOW_SAMPLES = 60  # number of samples of a flank that stays below FLANK_HEIGHT
 MAX_CANDIDATES = 80  # number of places that are tried as an end
+END_STEPS = 2  # number of samples beyond the likely places that belong to the interval of an end
 MAX_SQUARE = 16.0  # squared residual of a single depth beyond which it counts no more
 N_FIFTHS = 5  # number of parts of a track, of which the deepest is the floor
 
@@ -102,8 +103,9 @@ def cover_spans(section: Section, spans: list[tuple[int, int]]) -> np.ndarray:
 
 def find_ends(section: Section, span: tuple[int, int]) -> tuple[End, End]:
     """Find where a track begins and ends."""
-    # Pile-up beside a track is no flank.
-    relative = np.where(section.grown, 0.0, section.depth / section.noise)
+    # Pile-up beside a track is no flank; the windows that found the worn samples may reach into it.
+    relative = section.depth / section.noise
+    relative = np.where(section.grown | (relative < -UNWORN_LIMIT), 0.0, relative)
     first, last = span
     middle = (first + last) // 2 + 1
     start = _find_change_point(section.x[:middle], relative[:middle], first, section)
@@ -177,15 +179,16 @@ def _find_change_point(x, relative, worn: int, section: Section) -> End:
     # The level of the unworn heights is uncertain, so the change point is sought for three levels.
     level = SIDE * float(section.draws.mean(axis=1).std() / np.median(section.noise))
     stride = max(part.size // MAX_CANDIDATES, 1)
-    places = part[2:-1:stride]
+    # A flank begins between two samples.
+    places = part[2:-1:stride] - step / 2
     levels = np.array([depths, depths + level, depths - level])
-    deviance = _fit_flanks(part, levels, places - step / 2, section.correlation)
+    deviance = _fit_flanks(part, levels, places, section.correlation)
     lowest = deviance.min(axis=2, keepdims=True)
     is_likely = deviance < lowest + SIDE**2
     is_likely &= lowest < lowest.min(axis=1, keepdims=True) + CLEAR_DEVIANCE
     ends = np.flatnonzero(is_likely.any(axis=(0, 1)))
     best = int(np.argmin(deviance[0].min(axis=0)))
-    margin = stride * step
+    margin = END_STEPS * stride * step
     return End(
         float(places[best]), float(places[ends[0]] - margin), float(places[ends[-1]] + margin)
     )
@@ -213,8 +216,9 @@ def measure_track(section: Section, span: tuple[int, int]) -> Track:
     start, end = find_ends(section, span)
     x = section.x
     width = max(end.value - start.value, float(np.median(section.widths)))
-    shorter = np.hypot(start.high - start.value, end.value - end.low)
-    longer = np.hypot(start.value - start.low, end.high - end.value)
+    # An error of the level of the datum moves both ends outwards, or both inwards.
+    shorter = start.high - start.value + end.value - end.low
+    longer = start.value - start.low + end.high - end.value
     widths = name_quantity("width", width, max(width - shorter, 0.0), width + longer)
 
     # The ends are uncertain by the area between the bounds of their intervals.
@@ -233,8 +237,8 @@ def measure_track(section: Section, span: tuple[int, int]) -> Track:
         "step": _average(section, "step", start.value + width / 3, end.value - width / 3),
         "area_gross": _bound("area_gross", area, error),
     }
-    left = _measure_pile_up(section, "pile_up_left", start.value - width, start.value)
-    right = _measure_pile_up(section, "pile_up_right", end.value, end.value + width)
+    left = _measure_pile_up(section, "pile_up_left", start.value, -width)
+    right = _measure_pile_up(section, "pile_up_right", end.value, width)
     piled = left.value + right.value
     piled_error = float(np.hypot(left.high - left.value, right.high - right.value)) / SIDE
     values |= {
@@ -283,8 +287,27 @@ def _measure_floor(section: Section, start: float, width: float) -> Quantity:
     return max(parts, key=lambda part: part.value)
 
 
-def _measure_pile_up(section: Section, name: str, first: float, last: float) -> Quantity:
-    """Return the area above the first surface between two places."""
-    inside = (section.x >= first) & (section.x <= last) & section.grown
-    area, error = section.integrate(inside, -1.0) if inside.any() else (0.0, 0.0)
+def _measure_pile_up(section: Section, name: str, end: float, width: float) -> Quantity:
+    """Return the area above the first surface beside a track.
+
+    The flanks of the ridge, which are too low to be found as grown, count as well: the one towards the track, and one of
+    the same length behind the ridge.
+
+    Parameters
+    ----------
+    section : Section
+    name : str
+    end : float
+        End of the track [m].
+    width : float
+        Length [m] beside the track that is searched, negative before the track.
+    """
+    low, high = sorted((end, end + width))
+    side = (section.x >= low) & (section.x <= high)
+    grown = section.x[side & section.grown]
+    if not grown.size:
+        return _bound(name, 0.0, 0.0)
+    flank = float(np.abs(grown - end).min())
+    inside = side & (section.x >= grown.min() - flank) & (section.x <= grown.max() + flank)
+    area, error = section.integrate(inside, -1.0)
     return _bound(name, area, error)

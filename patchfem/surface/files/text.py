@@ -1,4 +1,4 @@
-"""Text files whose header names the units.
+"""Text files of columns or of a matrix of heights.
 
 The header `x [um],z [um]` is that of a trace, `x [um],y [um],z [um]` that of a raster.
 The columns stand in any order; `x (um)`, `x_um`, `x/um` and `x in um` mean the same, and names and
@@ -6,211 +6,278 @@ units may stand in a line each. Columns are separated by commas, semicolons, tab
 The decimal sign is a point, or a comma if columns are separated by something else or cells are
 quoted. Lines that start with #, % or // are comments, and the header itself may be one. A height
 that is empty, `nan`, `bad` or `***` is missing. The encoding is UTF-8, UTF-16 with its mark, or
-else Latin-1.
+else Latin-1. An export of Dektak has a header of its own.
 """
 
+import io
+import math
 import re
-from dataclasses import replace
-from typing import NamedTuple
+from collections.abc import Iterator
 
 import numpy as np
 
 from ...core import PatchfemError
-from ..areal import Areal
-from ..profile import Profile
-from ..samples import GIVEN_UNITS_NOTE, make_trace
-from .head import HEADER_EXAMPLE, ColumnNames, Fact, parse_column, read_head
-from .matrix import is_matrix, read_scan
-from .raster import make_scan_from_points
-from .raw import RawFile, shorten
-from .rows import read_columns
-from .units import GIVE_UNITS, UNIT_LIST, parse_length_unit, parse_pixel_size
+from ...formatting import format_length
+from .content import Content
+from .header import Fact, Header, has_column_names, parse_column, read_facts, read_header
+from .rows import read_rows
+from .spellings import HEADER_EXAMPLE, SIZE_LINES, parse_length_unit, shorten
+from .table import Table, find_printed_digit
 
+NOT_TEXT = f"export the profile as text with two columns and {HEADER_EXAMPLE}"
+# Largest relative range of the steps of coordinates; the steps of heights vary more.
+MAX_UNEVEN = 1e-6
+MIN_DIGIT = 1e-5  # smallest printed digit of x of a Dektak export, in the unit of the file
+# Largest distance of a rounded position from the true one, in printed digits: a half, and round-off.
+MAX_STEP_ERROR = 0.6
+UNKNOWN = Fact()
 _QUOTED_NUMBER = re.compile(r'"\s*([+-]?[0-9]*),([0-9]+(?:[eE][+-]?[0-9]+)?)\s*"')
-_CONTROL = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f]")
+_CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
+_DEKTAK_START = "Scan Parameters"
+_DEKTAK_HEADER = re.compile(r"^\s*Lateral\s+(\w+)\s*,\s*Raw\s+(\w+)[^\n]*$", re.MULTILINE)
+_DEKTAK_LENGTH = re.compile(r"^Length,\s*([0-9]*\.?[0-9]+)\s*(\w+)\s*$", re.MULTILINE)
 
 
-class Places(NamedTuple):
-    """Indices of the columns to read from a text file, with notes on how they were found."""
+def read_text(content: Content, units: tuple[str, str] | None = None) -> Table:
+    """Read the columns or the matrix of a text file.
 
-    columns: dict
-    notes: tuple = ()
-
-
-class Factors(NamedTuple):
-    """Factors that convert the columns of a text file to metres, with notes."""
-
-    values: tuple
-    notes: tuple
-
-
-def read_text(raw: RawFile, units: tuple | None = None) -> Profile | Areal:
-    """Read the trace or areal scan in a text file of two or three columns or a matrix.
-
-    units: units of x (and y) and of z, which complete what the file states and overrule it with a
-    note. Samples at one x become their mean, and x that are even but for their printed digits are
-    made even, both with a note. A million samples take 0.3 s. Raises PatchfemError that names the
-    line.
+    units: those that the user states; with them, columns of unknown names are taken in their order.
     """
-    path = raw.path
-    text = decode_text(raw)
-    is_pixel = units is not None and parse_pixel_size(units[0]) is not None
-    for unit in (units or ())[is_pixel:]:
-        if parse_length_unit(unit) is None:
-            raise PatchfemError(f"{path}: unknown unit '{shorten(unit)}'; use one of {UNIT_LIST}")
-    head = read_head(path, text)
-    facts = {} if head.names else head.facts(path)
-    named = head.column_names()
-    body = text[head.start :]
-    if not head.names and is_matrix(len(head.row), named.names, facts):
-        return read_scan(path, head, facts, units, body)
-    if is_pixel:
-        raise PatchfemError(
-            f"{path}: '{shorten(units[0])}' is a pixel size, which is needed only for a matrix of "
-            "heights, but this file has columns; give the units of the columns"
-        )
-    width = len(named.names or head.row)
-    if width < 2:
-        raise PatchfemError(
-            f"{path}:{head.number + 1}: only one column, '{shorten(head.row[0])}', but x and z are "
-            f"needed; {HEADER_EXAMPLE}"
-        )
-    line = f"{path}:{named.number or head.number + 1}"
-    if not (named.names or units or named.units or "lateral" in facts):
-        example = HEADER_EXAMPLE if width == 2 else HEADER_EXAMPLE.replace(",", ",y [um],")
-        raise PatchfemError(
-            f"{line}: there is no header, and units are never guessed; {example} above the first "
-            f"sample, or {GIVE_UNITS}"
-        )
-    names = named.names or list("xz" if width == 2 else "xyz")
-    places = _find_places(line, names, has_units=units is not None)
-    values, lines = read_columns(path, body, head, places.columns, width)
-    columns = dict(places.columns)
-    notes = places.notes
-    if "valid" in columns:
-        values["z"] = np.where(values.pop("valid") == 0, np.nan, values["z"])
-        del columns["valid"]
-    roles = {parse_column(name).role for name in named.names}
-    if "y" in columns and not roles >= {"x", "y"} and _is_sample_count(values):
-        columns = {"x": columns["y"], "z": columns["z"]}
-        values = {"x": values["y"], "z": values["z"]}
-        notes += (
-            f"{path}: the first column numbers the samples; x and z are taken from the other "
-            "columns",
-        )
-    factors = _find_factors(line, columns, named, facts, units)
-    stated = GIVEN_UNITS_NOTE if units else ""
-    if "y" in columns:
-        surface = make_scan_from_points(
-            path, [values[name] for name in "xyz"], lines, factors.values, stated
-        )
-    else:
-        surface = make_trace(path, values["x"], values["z"], lines, factors.values, stated)
-    return replace(surface, notes=(*notes, *factors.notes, *surface.notes))
+    path = content.path
+    text = _decode(content)
+    length = None
+    if text.startswith(_DEKTAK_START):
+        text, length = _translate_dektak(path, text)
+    header, lines = read_header(path, enumerate(io.StringIO(text), 1))
+    facts = read_facts(path, header) if header.row else {}
+    if header.row and _is_matrix(len(header.row), header.names, facts):
+        return _read_matrix(path, header, facts, lines)
+    table = _read_columns(path, header, facts, lines, has_units=units is not None)
+    return table if length is None else _restore_step(table, length)
 
 
-def decode_text(raw: RawFile) -> str:
+def _decode(content: Content) -> str:
     """Decode a text file, with \\n at the ends of lines and without quotes."""
-    path = raw.path
-    data = raw.data
-    if not data.strip(b"\xef\xbb\xbf \t\r\n"):
-        raise PatchfemError(
-            f"{path}: the profile is empty; export it again as text with two columns and {HEADER_EXAMPLE}"
-        )
-    text = (
-        data.decode(_find_encoding(raw), errors="replace").replace("\r\n", "\n").replace("\r", "\n")
-    )
+    data = content.data
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        text = data.decode("utf-16", errors="replace")
+    else:
+        try:
+            text = data.decode("utf-8-sig")
+        except UnicodeDecodeError:
+            text = data.decode("latin-1")
+    if not text.strip():
+        raise PatchfemError(f"{content.path}: the profile is empty; {NOT_TEXT}")
+    if _CONTROL.search(text):
+        raise PatchfemError(f"{content.path}: not a text file; {NOT_TEXT}")
+    text = text.replace("\r\n", "\n").replace("\r", "\n")
     return _QUOTED_NUMBER.sub(r"\1.\2", text).replace('"', "") if '"' in text else text
 
 
-def _find_encoding(raw: RawFile) -> str:
-    if raw.data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return "utf-16"
-    if raw.kind != "text" or _CONTROL.search(raw.data):
+def _read_columns(
+    path,
+    header: Header,
+    facts: dict[str, Fact],
+    lines: Iterator[tuple[int, str]],
+    *,
+    has_units: bool,
+) -> Table:
+    """Read columns x, (y) and z."""
+    names = header.names
+    width = len(names or header.row)
+    place = f"{path}:{header.number}"
+    if width < 2:
         raise PatchfemError(
-            f"{raw.path}: not a text file; export the profile as text with two columns and "
-            f"{HEADER_EXAMPLE}"
+            f"{place}: only one column, '{shorten(header.row[0])}', but x and z are needed; {HEADER_EXAMPLE}"
         )
-    try:
-        raw.data.decode("utf-8")
-    except UnicodeDecodeError:
-        return "latin-1"
-    return "utf-8-sig"
+    names = names or (["x", "z"] if width == 2 else ["x", "y", "z"])
+    roles, notes = _find_roles(place, names, has_units=has_units)
+    numbers, row_lines = read_rows(path, lines, roles, header.delimiter)
+
+    columns = {}
+    units = {}
+    for k, role in enumerate(roles):
+        columns[role] = numbers[:, k]
+        units[role] = parse_column(names[k]).unit
+        if units[role] is None:
+            fact = facts.get("value" if role == "z" else "lateral", UNKNOWN).word or None
+            units[role] = header.units[k] if header.units else fact
+    columns = {role: columns[role] for role in ("x", "y", "z", "valid") if role in columns}
+    if "valid" in columns:
+        columns["z"] = np.where(columns.pop("valid") == 0, np.nan, columns["z"])
+    named = {parse_column(name).role for name in header.names}
+    if "y" in columns and not named >= {"x", "y"} and _is_sample_count(columns["x"], columns["y"]):
+        columns["x"] = columns.pop("y")
+        units["x"] = units["y"]
+        notes += (
+            f"{path}: the first column numbers the samples; x and z are taken from the other columns",
+        )
+    return Table(path, columns, units, place, row_lines, notes)
 
 
-def _find_places(line: str, names: list, *, has_units: bool) -> Places:
-    """Find the columns to read by name, or by order if units are given and names are unknown."""
-    roles = {k: parse_column(name).role for k, name in enumerate(names)}
-    valid = {role: k for k, role in roles.items() if role == "valid"}
-    data = {k: role for k, role in roles.items() if role not in ("valid", "index")}
-    if not 1 < len(data) < 4:
-        listed = (
-            f"{len(names)} columns" if len(data) == len(names) else ", ".join(map(shorten, names))
-        )
+def _find_roles(
+    place: str, names: list[str], *, has_units: bool
+) -> tuple[list[str], tuple[str, ...]]:
+    """Find the role of each column by its name, or by order if units are given and names are unknown."""
+    roles = [parse_column(name).role for name in names]
+    data = [k for k, role in enumerate(roles) if role not in ("valid", "index")]
+    known = ("x", "z") if len(data) == 2 else ("x", "y", "z")
+    if len(data) != len(known):
+        listed = f"{len(names)} columns" if len(data) == len(names) else ", ".join(names)
         raise PatchfemError(
-            f"{line}: {listed}, but x and z, or x, y and z, are needed; keep one trace of two "
+            f"{place}: {shorten(listed)}, but x and z, or x, y and z, are needed; keep one trace of two "
             f"columns and {HEADER_EXAMPLE}"
         )
-    known = ("x", "z") if len(data) == 2 else ("x", "y", "z")
-    notes = ()
-    if sorted(data.values()) == ["x", "y"]:
+    if sorted(roles[k] for k in data) == ["x", "y"]:
         # Columns x and y are a trace whose heights are named y.
-        data = {k: role.replace("y", "z") for k, role in data.items()}
-    strange = next((names[k] for k, role in data.items() if role not in known), None)
+        roles = [role.replace("y", "z") for role in roles]
+    strange = next((names[k] for k in data if roles[k] not in known), None)
+    notes = ()
     if strange is not None and not has_units:
-        required = "x and z" if len(data) == 2 else "x, y and z"
         raise PatchfemError(
-            f"{line}: column '{shorten(strange.partition('[')[0].strip())}' is not known; the "
-            f"columns {required} are needed; {HEADER_EXAMPLE}"
+            f"{place}: column '{shorten(strange.partition('[')[0])}' is not known; the columns "
+            f"{' and '.join(', '.join(known).rsplit(', ', 1))} are needed; {HEADER_EXAMPLE}"
         )
     if strange is not None:
         listed = ", ".join(f"'{shorten(names[k])}'" for k in data)
-        data = dict(zip(data, known))
-        notes = (f"{line}: columns {listed} are taken as {', '.join(known)} in this order",)
-    places = {role: k for k, role in data.items()}
-    if len(places) < len(data):
-        twice = next(role for role in known if list(data.values()).count(role) > 1)
-        raise PatchfemError(f"{line}: two columns are named {twice}; {HEADER_EXAMPLE}")
-    return Places({role: places[role] for role in known} | valid, notes)
+        notes = (f"{place}: columns {listed} are taken as {', '.join(known)} in this order",)
+        for k, role in zip(data, known):
+            roles[k] = role
+    for role in known:
+        if roles.count(role) != 1:
+            raise PatchfemError(f"{place}: two columns are named {role}; {HEADER_EXAMPLE}")
+    return roles, notes
 
 
-def _find_factors(
-    line: str, columns: dict, named: ColumnNames, facts: dict, given: tuple | None
-) -> Factors:
-    """Find the factors that convert the columns to metres; a unit of the user overrules the file, with a note."""
-    factors = []
-    notes = ()
-    for role, k in columns.items():
-        stated = parse_column(named.names[k]).unit if named.names else None
-        if stated is None and named.units:
-            stated = named.units[k]
-        if stated is None:
-            fact = "value" if role == "z" else "lateral"
-            stated = facts.get(fact, Fact(word=None)).word
-        unit = given[role == "z"] if given else stated
-        if unit is None:
-            name = named.names[k] if named.names else role
-            raise PatchfemError(
-                f"{line}: column '{shorten(name)}' has no unit, and units are never guessed; "
-                f"{HEADER_EXAMPLE}, or {GIVE_UNITS}"
-            )
-        factor = parse_length_unit(unit)
-        if factor is None:
-            raise PatchfemError(
-                f"{line}: unknown unit '{shorten(unit)}' of {role}; use one of {UNIT_LIST}"
-            )
-        if stated is not None and parse_length_unit(stated) != factor:
-            notes += (
-                f"{line}: the header gives {role} in {shorten(stated)}, but {unit} is used, as "
-                "given by --units",
-            )
-        factors.append(factor)
-    return Factors(tuple(factors), notes)
-
-
-def _is_sample_count(values: dict) -> bool:
-    """Return whether the first column of a file only numbers the samples."""
-    x = values["x"]
-    steps = np.diff(values["y"])
-    is_count = x.size > 2 and x[0] in (0, 1) and (np.diff(x) == 1).all()
+def _is_sample_count(first, second) -> bool:
+    """Return whether the first column of a file only numbers the samples, whose places the second one gives."""
+    steps = np.diff(second)
+    is_count = first.size > 2 and first[0] in (0, 1) and (np.diff(first) == 1).all()
     return bool(is_count and ((steps > 0).all() or (steps < 0).all()))
+
+
+def _is_matrix(count: int, names: list[str], facts: dict[str, Fact]) -> bool:
+    """Return whether rows of `count` numbers are a matrix of heights instead of columns of points."""
+    if has_column_names(names):
+        return False
+    has_size = {"width", "height"} <= facts.keys()
+    is_column = count == 1 and ("width" in facts or "step_x" in facts)
+    return count > 3 or has_size or is_column or facts.get("columns", UNKNOWN).number == count
+
+
+def _read_matrix(
+    path, header: Header, facts: dict[str, Fact], lines: Iterator[tuple[int, str]]
+) -> Table:
+    """Read a matrix of heights, with the steps and units that its header states."""
+    z = read_rows(path, lines, ["z"] * len(header.row), header.delimiter).numbers
+    if z.shape[1] == 1 and not {"height", "step_y"} & facts.keys():
+        z = z.T  # a trace with one height in each line
+    for name, axis, count in zip(("rows", "columns"), ("rows", "numbers per row"), z.shape):
+        stated = facts.get(name, UNKNOWN).number
+        if stated is not None and stated != count:
+            raise PatchfemError(
+                f"{path}: {count} {axis}, but the header says {stated:g}; the file is cut off or joined from "
+                "parts: export the scan anew"
+            )
+    has_axes = min(z.shape) > 3 and _is_even(z[0, 1:]) and _is_even(z[1:, 0])
+    if has_axes and not _is_even(z[1, 1:]):
+        raise PatchfemError(
+            f"{path}: the first row and the first column of the matrix grow evenly, like coordinates and not "
+            "heights; leave out this row and this column"
+        )
+
+    columns = {}
+    units = {}
+    for role, size, step, count in (
+        ("x", "width", "step_x", z.shape[1]),
+        ("y", "height", "step_y", z.shape[0]),
+    ):
+        if role == "y" and not {size, step} & facts.keys():
+            step = (
+                "step_x"  # a single pixel size holds for both axes, because the pixels are square
+            )
+        number, word = facts.get(step, facts.get(size, UNKNOWN))
+        if number is None or not 0 < number < math.inf:
+            continue
+        columns[role] = np.arange(count) * (number if step in facts else number / count)
+        word = word or (role == "y" and facts.get("lateral_y", UNKNOWN).word)
+        word = word or facts.get("lateral", UNKNOWN).word
+        if not word and facts.get("format", UNKNOWN).word.lower() == "ascii":
+            word = "nm"  # SPIP writes coordinates in nanometres
+        units[role] = word or None
+    factor, units["z"] = _find_scale(path, facts)
+    columns["z"] = z * factor
+    remedy = f"write {SIZE_LINES} and `# Value units: um` above its rows"
+    return Table(path, columns, units, str(path), remedy=remedy)
+
+
+def _find_scale(path, facts: dict[str, Fact]) -> tuple[float, str | None]:
+    """Return the factor and the unit of the heights of a matrix."""
+    unit = facts.get("value", UNKNOWN).word or facts.get("factor", UNKNOWN).word or None
+    scale = facts.get("factor", UNKNOWN).number
+    if facts.get("is_scaled", UNKNOWN).word.lower() == "yes":
+        scale = facts.get("scale", UNKNOWN).number
+    bit = facts.get("bit2nm", UNKNOWN).number
+    if unit is None and bit:
+        unit = "nm"
+        scale = bit
+    scale = 1.0 if scale is None else scale
+    if not 0 < abs(scale) < math.inf:
+        raise PatchfemError(
+            f"{path}: the factor of the heights in the header is {scale:g}, which is not possible; export the "
+            "scan anew"
+        )
+    return scale, unit
+
+
+def _is_even(values) -> bool:
+    """Return whether numbers (n,) increase by equal steps."""
+    steps = np.diff(values)
+    return bool(steps[0] > 0 and np.ptp(steps) < MAX_UNEVEN * steps[0])
+
+
+def _translate_dektak(path, text: str) -> tuple[str, float | None]:
+    """Give an export of Dektak the header of a trace; returns the length [m] in its settings too."""
+    header = _DEKTAK_HEADER.search(text)
+    if header is None:
+        raise PatchfemError(
+            f"{path}: a Dektak export without the columns `Lateral um,Raw Micrometer`; export the scan data "
+            "as CSV"
+        )
+    x_unit, z_unit = ("Angstrom" if word == "A" else word for word in header.groups())
+    settings = text[: header.start()]
+    length = _DEKTAK_LENGTH.search(settings)
+    number = parse_length_unit(length[2]) if length else None
+    blank_lines = "\n" * settings.count("\n")  # lines keep their numbers for messages
+    text = f"{blank_lines}x [{x_unit}],z [{z_unit}]{text[header.end() :]}"
+    return text, None if number is None else float(length[1]) * number
+
+
+def _restore_step(table: Table, length: float) -> Table:
+    """Replace the rounded positions of a Dektak export by even ones that fit the length [m] in its settings.
+
+    The lateral column is printed to 0.1 um, so the step that it shows is wrong; the true step is the length of
+    the scan over the number of its points. The printed positions stay if the steps do not fit them.
+    """
+    table = table._replace(are_units_fixed=True)
+    x = table.columns["x"]
+    factor = parse_length_unit(table.units["x"])
+    if factor is None or x.size < 3 or not np.isfinite(x).all() or not x[-1] > x[0]:
+        return table
+    digit = max(find_printed_digit(x), MIN_DIGIT)
+    note = (
+        f"the length of {format_length(length)} in the header does not fit {x.size} samples that end at "
+        f"{format_length(x[-1] * factor)}: the x values of the samples are used"
+    )
+    for count in (x.size, x.size - 1):
+        step = length / factor / count
+        places = x[0] + step * np.arange(x.size)
+        if np.abs(x - places).max() <= MAX_STEP_ERROR * digit:
+            x = places
+            note = (
+                f"x is rounded to {format_length(digit * factor)} in the file; the step "
+                f"{format_length(length)}/{count} = {format_length(step * factor)} of the header is used"
+            )
+            break
+    notes = (f"{table.path}: {note}", *table.notes)
+    return table._replace(columns=table.columns | {"x": x}, notes=notes)

@@ -11,6 +11,10 @@ MIN_SAMPLES = 16
 ROUND_OFF = 1e-12  # largest heights of a straight line after levelling, relative to those before
 MIN_HEIGHT_FRACTION = 0.10  # smallest height of hills and dales that count, relative to Rz
 MIN_WIDTH_FRACTION = 0.01  # smallest width of hills and dales that count, relative to the section
+MIN_SECTIONS = 5  # smallest number of sections whose scatter gives intervals
+# Parameters without an interval: extremes and high moments of a whole trace depend on single heights, so that the
+# scatter of sections does not show their errors.
+WITHOUT_INTERVAL = ("t", "sk", "ku")
 CORE_FRACTION = 0.40  # fraction of the length under the secant of the core (ISO 13565-2)
 
 # Unit and definition of the parameters of a profile, whose names begin with P or R.
@@ -149,11 +153,11 @@ def abbott_curve(z, count: int = 501) -> tuple[np.ndarray, np.ndarray]:
 def estimate_errors(z, step: float, section: float) -> dict[str, float]:
     """Estimate the standard errors of the parameters by the jackknife over the sections.
 
-    It is {} for fewer than five sections.
+    It is {} for fewer than MIN_SECTIONS.
     """
     size = round(section / step)
     count = z.size // size
-    if count < 5:
+    if count < MIN_SECTIONS:
         return {}
     sections = z[: count * size].reshape(count, size)
     remainders = [
@@ -162,6 +166,6 @@ def estimate_errors(z, step: float, section: float) -> dict[str, float]:
     errors = {}
     for name in PROFILE:
         values = [values[name] for values in remainders]
-        if None not in values:
+        if None not in values and name not in WITHOUT_INTERVAL:
             errors[name] = float(np.sqrt((count - 1) * np.var(values)))
     return errors

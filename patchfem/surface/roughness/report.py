@@ -13,7 +13,14 @@ from ..quantity import Quantity
 from .areal import AREAL, compute_areal_parameters
 from .filter import filter_scan, filter_trace
 from .form import subtract_form
-from .parameters import MIN_SAMPLES, PROFILE, ROUND_OFF, compute_parameters, estimate_errors
+from .parameters import (
+    MIN_SAMPLES,
+    MIN_SECTIONS,
+    PROFILE,
+    ROUND_OFF,
+    compute_parameters,
+    estimate_errors,
+)
 from .spectrum import BAND, Spectrum, band_amplitude, estimate_spectrum, refuse_band
 
 # Standard cut-offs [m]: those of ISO 21920-3 and one more at each end.
@@ -127,6 +134,7 @@ def _report_trace(part: Profile, cutoff, window, form, short) -> RoughnessReport
     spectrum = estimate_spectrum(primary.z, trace.step)
     quantities += _measure_waves(primary, spectrum)
 
+    notes = trace.notes + _describe_spikes(part)
     waviness = None
     roughness = None
     heights = primary.z
@@ -140,7 +148,13 @@ def _report_trace(part: Profile, cutoff, window, form, short) -> RoughnessReport
             long_name = name if name.startswith("Mr") else f"R{name}"
             quantity = _name_value(long_name, value, PROFILE[name], "the roughness profile")
             quantities.append(_add_interval(quantity, errors.get(name), n_sections))
-    notes = trace.notes + _describe_spikes(part)
+        if n_sections < MIN_SECTIONS:
+            needed = format_length((MIN_SECTIONS + 1) * cutoff)
+            notes += (
+                f"{trace.source}: the {format_length(roughness.length)} within half a cut-off of the ends hold "
+                f"{n_sections} sections of {format_length(cutoff)}, and intervals need {MIN_SECTIONS}: evaluate "
+                f"at least {needed}, or take a shorter cut-off",
+            )
     if roughness is not None and roughness.length < cutoff * (1 - 1e-9):
         notes += (
             f"{trace.source}: half a cut-off is trimmed at each end, and the "
@@ -185,13 +199,18 @@ def _name_value(name: str, value, definition: tuple[str, str], of: str) -> Quant
 
 
 def _add_interval(quantity: Quantity, error: float | None, n_sections: int) -> Quantity:
-    """Add the 90 % interval of a mean over sections by Student's t."""
+    """Add the 90 % interval of a mean over sections by Student's t of its logarithm; without errors, the reason."""
     from scipy.special import stdtrit
 
-    if quantity.value is None or not error:
+    if error is None and n_sections < MIN_SECTIONS and not quantity.reason:
+        return quantity._replace(reason="sections")
+    if not quantity.value or not error:
         return quantity
-    width = float(stdtrit(n_sections - 1, 1 - CONFIDENCE_TAIL)) * error
-    return quantity._replace(low=quantity.value - width, high=quantity.value + width)
+    width = float(stdtrit(n_sections - 1, 1 - CONFIDENCE_TAIL)) * error / quantity.value
+    low, high = quantity.value * np.exp([-width, width])
+    # a material ratio is at most 1
+    high = min(high, 1.0) if quantity.name.startswith("Mr") else high
+    return quantity._replace(low=float(low), high=float(high))
 
 
 def _report_scan(scan: Areal, cutoff, window, form, short) -> RoughnessReport:

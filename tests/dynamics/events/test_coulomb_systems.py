@@ -20,7 +20,7 @@ from patchfem.core import (
     SineDrive,
 )
 from patchfem.dynamics import DRIVE_CHANGE
-from patchfem.dynamics.events.event_list import RELEASE, STOP
+from patchfem.dynamics.event_list import RELEASE, STOP
 from patchfem.dynamics.events.positions_kernels import N_COLUMNS, Column
 from patchfem.response import energy_balance
 from patchfem.structure import drives

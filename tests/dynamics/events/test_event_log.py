@@ -9,7 +9,7 @@ from scene_texts import COULOMB, MODE, POINT
 
 from patchfem import plan
 from patchfem.core import SineDrive
-from patchfem.dynamics.events import event_list
+from patchfem.dynamics import event_list
 from patchfem.response.run_events import convert_event_log
 from patchfem.runs.run import run
 from patchfem.structure.drives import PiecewiseDrive
@@ -36,7 +36,7 @@ def make_mode(zeta=0.003):
 
 def test_exact_events_of_scene_levels_agree_with_single_run():
     """The events of a scene that runs level by level agree with a single run over all levels within
-    1e-10 s."""
+    1e-8 s."""
     result = run(plan(RIG), estimate=False)
     events = result.extra["events"]
     model = result.plan.model
@@ -47,8 +47,8 @@ def test_exact_events_of_scene_levels_agree_with_single_run():
         event_run.simulate(model.rig.modes, drive, limit, limit, 100, 10).log
     )
     assert events.count == expected.count and events.kind.tolist() == expected.kind.tolist()
-    assert events.time == pytest.approx(expected.time, abs=1e-10)
-    assert events.slide == pytest.approx(expected.slide, abs=1e-12, nan_ok=True)
+    assert events.time == pytest.approx(expected.time, abs=1e-8)
+    assert events.slide == pytest.approx(expected.slide, abs=1e-11, nan_ok=True)
 
 
 def test_exact_last_events_are_stored_and_all_are_counted():

@@ -22,9 +22,10 @@ STATED = {
     "grown": "40 um^2 stand above the first surface, 0 um^2 are lost",
     "worn_and_grown": "(596.0 to 604.0), the mean over the common length, and material grew: 35 um^2 lost",
     "growth_at_ends": "a scar of 2 um over nearly all of the surface, or 2.1 um of material that grew at the ends: both are",
+    "scar_or_bow": "Either a scar over all of the surface, up to 2 um deep on average, or a bent datum",
     "elsewhere": "Not comparable: the two surfaces have no part in common",
     "no_datum": "too few heights agree (0.12 of all)",
-    "mirror_finish": "(rms height 2 nm) is no rougher than the noise (3 nm)",
+    "mirror_finish": "(rms height 2 nm) hardly exceed the noise (3 nm)",
     "identical": "both files hold the same heights",
 }
 
@@ -80,7 +81,7 @@ def test_exact_finding_without_a_limit_says_so():
     """Hidden wear without a limit, and no track that would be found, are stated without a number."""
     answer = compare.make_answer(compare_traces(findings={"hidden_even_wear": {"limit": None}}))
     assert answer.verdict[3].startswith(
-        "Even or wedge-shaped wear of both surfaces looks like a shift"
+        "Wear that is even or wedge-shaped over all of the common length looks like a shift or tilt"
     )
     comparison = compare_traces("no_wear")
     comparison.verdict.numbers["detection_limit"] = None

@@ -87,7 +87,7 @@ def test_exact_page_of_roughness_is_made_again(sine_folder):
 
 
 def test_exact_mean_of_files_uses_student_t():
-    """The means over three traces are those of their values, with the interval of Student's t."""
+    """The means over three traces are those of their values, with the interval of Student's t of the logarithm."""
     sizes = (1.0, 1.1, 1.3)
     traces = [make_sine(size * AMPLITUDE, f"{size}.csv") for size in sizes]
     answer = roughness.make_answer([make_report(trace) for trace in traces])
@@ -96,11 +96,34 @@ def test_exact_mean_of_files_uses_student_t():
     mean = means["measures"]["Pa"]
     half = t.ppf(0.975, 2) * values.std(ddof=1) / np.sqrt(3)
     assert mean["value"] == pytest.approx(values.mean(), rel=1e-12)
-    assert mean["high"] - mean["value"] == pytest.approx(half, rel=1e-9)
+    factor = np.exp(half / values.mean())
+    assert mean["high"] == pytest.approx(values.mean() * factor, rel=1e-9)
+    assert mean["low"] == pytest.approx(values.mean() / factor, rel=1e-9)
     assert mean["scatter"] == pytest.approx(values.std(ddof=1), rel=1e-12)
     assert answer.verdict[0].startswith("Mean of 3 traces: Pa ")
     assert answer.quantities["Pa"].value == mean["value"]
     assert answer.data["abbott"].values.shape[0] == 3 and not answer.remarks.warnings
+
+
+def test_always_intervals_that_say_nothing_are_left_out():
+    """Two files of different roughness, and four sections, give no interval but the range or the reason."""
+    traces = [make_sine(size * AMPLITUDE, f"{size}.csv") for size in (1.0, 1.5)]
+    answer = roughness.make_answer([make_report(trace) for trace in traces])
+    assert answer.quantities["Pa"].low is None and answer.quantities["Pa"].high is None
+    assert answer.quantities["Pa"].reason == "no interval from so few files"
+    assert " nm in the files)" in answer.verdict[0] and "(0 to" not in answer.verdict[0]
+
+    trace = make_sine()
+    report = make_report(trace, trace.length / 5)
+    answer = roughness.make_answer([report])
+    assert answer.details["profiles"][0]["confidence"] is None
+    assert answer.quantities["Ra"].reason == "no interval from fewer than five sections"
+    assert any("hold 4 sections of" in note for note in answer.remarks.notes)
+    # extremes and high moments of the whole trace never have an interval
+    answer = roughness.make_answer([make_report(trace, trace.length / 10)])
+    assert answer.details["profiles"][0]["confidence"] == 0.9
+    assert answer.quantities["Rz"].low > 0
+    assert [answer.quantities[name].low for name in ("Rt", "Rsk", "Rku")] == [None] * 3
 
 
 def test_always_doubtful_means_are_warned_of():

@@ -108,7 +108,7 @@ def test_refuses_spread_without_width_or_bonds():
         loads(POINT + NONLOCAL_2UM + TRIANGLE, sets=SPREAD)
     for law in ("coulomb", "tanh", "elastic-plastic"):
         with pytest.raises(
-            SceneError, match=f"friction.spread: law '{law}' has no spread"
+            SceneError, match=f"friction.spread: law '{law}' has no key spread"
         ) as caught:
             loads(
                 SMALL_PATCH + NONLOCAL_2UM + TRIANGLE,

@@ -291,7 +291,7 @@ def test_refuses_asymmetric_pressure_on_rig():
             [SHEAR],
             "friction.law: 'convolution' with \\[contact.shear\\] is not supported yet; leave",
         ),
-        (SHORT, ["contact.tilt.on=lower"], "'lower' in a rig with law 'convolution'"),
+        (SHORT, ["contact.tilt.on=lower"], "a shape on the lower piece with law 'convolution'"),
         (
             SLIDE,
             ["contact.strips.count=4"],
@@ -301,7 +301,7 @@ def test_refuses_asymmetric_pressure_on_rig():
         (
             SLIDE,
             ["friction.kinetic=0.2"],
-            "laws with a kinetic coefficient are coulomb, nonlocal and lugre",
+            "laws with it are coulomb, nonlocal and lugre",
         ),
     ],
 )

@@ -168,7 +168,7 @@ def test_refuses_law_without_required_key(law, keys):
         (IWAN, "chi=-1", "friction.chi"),
         (IWAN, "stiffness=3", "5e6 N/m"),
         (IWAN, "static=0", "static: must be > 0"),
-        (IWAN, "kinetic=0.2", "laws with a kinetic coefficient are coulomb"),
+        (IWAN, "kinetic=0.2", "laws with it are coulomb"),
         (POWER, "exponent=0", "friction.exponent"),
         (POWER, "shape=0", "friction.shape"),
         (POWER, "shape=1.1", "friction.shape"),

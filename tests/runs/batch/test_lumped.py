@@ -44,7 +44,7 @@ def test_exact_chunks_of_study_agree_with_whole():
 def test_exact_few_cases_equal_single_runs():
     """Fewer than 32 cases run one by one, so that they equal single runs to the last bit."""
     cases = draw_points("elastic-plastic", 8, 3)
-    assert batches.choose_batch(cases[0], 31) is None
+    assert batches.find_group(cases[0], 31).key is None
     results, singles = batches.solve_models(cases), one_by_one.solve(cases)
     assert results.numerics == singles.numerics
     for name, values in singles.values.items():

@@ -4,8 +4,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal, get_args, get_origin
 
-from patchfem.effects import EFFECTS, WAVEFORMS
+from patchfem.effects import EFFECTS
 from patchfem.scene import UNIT_FACTORS, Coating, Material, Tables, find_meaning
+from patchfem.scene.keys.choices import NEEDS, SELECTORS, find_selectors, format_keys, parse_needs
 from patchfem.scene.keys.lookup import is_table_or_value
 from patchfem.scene.keys.quantities import EXAMPLE_QUANTITIES
 from patchfem.scene.keys.tables import Interface
@@ -16,12 +17,19 @@ from patchfem.scene.keys.types import (
     find_quantity_kind,
     iterate_annotation_parts,
 )
-from patchfem.scene.rules.selectors import SELECTORS, split_keys
 
 FOLDER = Path(__file__).parents[3] / "patchfem" / "scene"
 FILE = FOLDER / "README.md"
-NEEDS = {f"{table}.{one.key}": one.choices for table, one in SELECTORS.items()} | {
-    "drive.waveform": {name: one.keys for name, one in WAVEFORMS.items()}
+TABLE_NAMES = {
+    "Friction": "friction",
+    "Slide": "slide",
+    "Asperities": "contact.asperities",
+    "Drive": "drive",
+}
+CHOICES = {
+    f"{TABLE_NAMES.get(one.model.__name__)}.{one.key}": one.choices
+    for one in SELECTORS
+    if one.key != "kind" or one.model.__name__ == "Slide"
 }
 SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
 HEAD = """\
@@ -104,17 +112,16 @@ def _format_sections() -> list:
             out.append(
                 format_table(
                     ("key", "kind", "default", "required", "meaning"),
-                    [_format_row(model, key, named[0].strip("[]")) for key in own],
+                    [_format_row(model, key) for key in own],
                 )
             )
     return out
 
 
-def _format_row(model: type, key: str, at: str) -> tuple:
+def _format_row(model: type, key: str) -> tuple:
     """Return the row of a key: name, kind, default, condition and meaning."""
     name = attributes_by_key(model)[key]
     field = model.model_fields[name]
-    path = f"{at}.{key}".strip(".")
     default = "" if field.is_required() or field.default in (None, "") else field.default
     if isinstance(default, int | float):
         default = " ".join(
@@ -122,21 +129,34 @@ def _format_row(model: type, key: str, at: str) -> tuple:
         )
     elif default:
         default = f"`{default}`"
-    required = (
-        "yes" if field.is_required() else _format_condition(model, key, path.rpartition(".")[0])
-    )
+    required = "yes" if field.is_required() else _format_condition(model, key)
     return f"`{key}`", _format_kind(model, name), default, required, find_meaning(model, key)
 
 
-def _format_condition(model: type, key: str, table: str) -> str:
-    """Return the condition that makes a key necessary: "with law `tanh`", the values of a selector, or a sentence."""
+def _format_condition(model: type, key: str) -> str:
+    """Return the condition that makes a key necessary: "with law `tanh`", "unless `to` is given", or a sentence."""
     record = find_key_record(model, key)
-    conditions = [record.required] if record and record.required else []
-    for selector, options in NEEDS.items():
-        values = [f"`{value}`" for value, (needs, _) in options.items() if key in split_keys(needs)]
-        if values and selector.rpartition(".")[0] == table:
-            conditions.append(f"with {selector.rpartition('.')[2]} {', '.join(values)}")
-    return "; ".join(conditions)
+    if record and record.required:
+        return record.required
+    conditions = []
+    for selector in find_selectors(model):
+        values = {}  # other keys in place of this one -> values of the selector
+        for value, (required, _) in selector.choices.items():
+            for need in parse_needs(required):
+                for bundle in need.bundles:
+                    if key in bundle[1:]:
+                        conditions += [f"with `{bundle[0]}`"]
+                    elif key in bundle:
+                        others = [f"`{other[0]}`" for other in need.bundles if other != bundle]
+                        values.setdefault(" or ".join(others), []).append(f"`{value}`")
+        for others, names in values.items():
+            condition = f"with {selector.key} {', '.join(names)}" if selector.key else ""
+            condition += f"{', ' if condition else ''}unless {others} is given" if others else ""
+            conditions.append(condition)
+    for name, needed in NEEDS.get(model, {}).items():
+        if needed == key:
+            conditions.append(f"with `{name}`")
+    return "; ".join(dict.fromkeys(conditions))
 
 
 def _format_kind(model: type, name: str) -> str:
@@ -224,10 +244,7 @@ def format_effects() -> str:
     rows = []
     for name, effect in EFFECTS.items():
         selector, _, value = name.partition("=")
-        used = [
-            words.replace(" ", ", ").replace("|", " or ")
-            for words in NEEDS.get(selector, {}).get(value, ("", ""))
-        ]
+        used = [format_keys(words) for words in CHOICES.get(selector, {}).get(value, ("", ""))]
         rows += (
             [(f"`{name}`", *used, effect.equations)]
             if not name.startswith("structure.interface.")

@@ -14,7 +14,6 @@ from .tried import (
     RIG,
     RIGS,
     SceneColumn,
-    find_lateral_refusal,
     find_refusal,
     list_laws,
 )
@@ -39,10 +38,9 @@ SIZES = {  # Constant -> description of the quantity that it bounds.
     "inputs.cells.MAX_BYTES": "bytes of a text file with a table",
     "inputs.records.MAX_BYTES": "bytes of a laboratory file",
     "inputs.matlab.MAX_BYTES": "bytes of a .mat file",
-    "inputs.matlab5.MAX_NUMBERS": "number of elements of one variable in a .mat file",
     "mesh.files.MAX_FILE_BYTES": "bytes of a mesh file",
-    "surface.files.raw.MAX_BYTES": "bytes of the file of a scan, also after decompression",
-    "surface.samples.MAX_LENGTH": "length of a trace [m]",
+    "surface.files.content.MAX_BYTES": "bytes of the file of a scan, also after decompression",
+    "surface.files.table.MAX_LENGTH": "length of a trace [m]",
     "model.slide.MAX_STEPS_PER_CYCLE": "steps per cycle of a prescribed slide",
     "runs.rig.costs.MAX_MARCH_STEPS": "steps per cycle of a time integration, if the tolerance determines the steps",
     "dynamics.march.capacity.MAX_ENTRIES": "number of entries in a list of bonds",
@@ -94,9 +92,7 @@ weaken, equation 2.17 as printed), several states can be in equilibrium. The run
 states that lie in the direction of its last time steps, and continues from the state with the lower energy. The energy
 difference between the states counts as dissipated.
 
-**Directions.** An interface that slides in a plane (`structure.interface.lateral`) has the same stiffness and the same
-coefficient of friction in every direction. The interface is assumed not to rotate about its normal, and its load is
-constant.
+**Directions.** The surfaces of an interface slide along one direction.
 
 **Modes.** The rig is linear except for its joints, `[structure.stiffening]` and an interlocking spring of
 `[structure.bonded]`. Damping is viscous; hysteretic damping that a file contains is treated as viscous damping. A
@@ -130,11 +126,6 @@ def text() -> str:
     for title, columns in TABLES:
         body += [f"## {title}", _format_compatibility(columns)]
     body += [
-        "On a bench, the prescribed displacement can be two-dimensional with these laws: "
-        + _join_names(name for name, one in list_laws().items() if not find_lateral_refusal(one))
-        + ". It cannot be two-dimensional with these laws: "
-        + _join_names(name for name, one in list_laws().items() if find_lateral_refusal(one))
-        + ".",
         "## Methods",
         "In this table each scene is a rig with a single contact point under a sine drive. The "
         "heading of a column is the value of `accuracy.method`; `auto` chooses a method that supports the law.",

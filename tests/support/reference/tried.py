@@ -5,7 +5,7 @@ from functools import cache
 from typing import NamedTuple
 
 from patchfem.effects import LAWS
-from patchfem.scene import Friction, find_lateral_slide_obstacle, loads
+from patchfem.scene import Friction, loads
 from patchfem.scene.scene import SceneError
 
 from .keys import find_example
@@ -113,7 +113,6 @@ MORE = (
     SceneColumn(
         "a patch with shear at each interface", MASSES + "# each presses a patch that gives way\n"
     ),
-    SceneColumn("an interface that slides in a plane", MASSES + "# each slides in a plane\n"),
     SceneColumn("`[wear]`", PATCH + RIG + '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1000\n'),
 )
 BENCHES = (
@@ -156,10 +155,8 @@ def find_refusal(keys: str, beside: SceneColumn) -> tuple:
             load = (PATCH + "[contact.shear]\n" * ("gives" in beside.text)).replace(
                 "[contact", "[structure.interface.contact"
             )
-        lateral = {k: f"lateral = [{3 - k}, 0]\n" * ("plane" in beside.text) for k in (1, 2)}
         text = beside.text + "".join(
-            f"[[structure.interface]]\nbetween = [{k}, 0]\n{lateral[k]}{keys}{load}"
-            for k in lateral
+            f"[[structure.interface]]\nbetween = [{k}, 0]\n{keys}{load}" for k in (1, 2)
         )
     else:
         text = beside.text + f"[friction]\n{keys}"
@@ -168,9 +165,3 @@ def find_refusal(keys: str, beside: SceneColumn) -> tuple:
     except SceneError as error:
         return tuple(re.sub(r"^[^:]*(?::\d+)?: ", "", line) for line in error.mistakes)
     return ()
-
-
-def find_lateral_refusal(keys: str) -> tuple:
-    """Return why a bench with one point and this law cannot slide in two directions; () if it can."""
-    reason = find_lateral_slide_obstacle(loads(POINT + BENCH + f"[friction]\n{keys}").tables())
-    return (f"slide.file: {reason}",) if reason else ()

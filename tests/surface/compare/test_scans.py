@@ -99,6 +99,21 @@ def test_exact_missing_heights_and_spikes_do_not_count():
     assert found.evidence.removed[1] >= 1
 
 
+def test_always_gain_and_transfer_of_scans_are_named():
+    """A gain of 3 % is named and not in the volume; equal lost and grown volumes are both stated."""
+    worn = make_crater(2 * UM, 60 * UM)
+    before, after = make_pair(worn, 6)
+    found = compare_surfaces(before, Areal(after.x, after.y, 1.03 * after.z, "after"))
+    gains = [finding.numbers["gain"] for finding in found.findings if finding.code == "other_gain"]
+    assert gains == [pytest.approx(1.03, abs=0.005)]
+    true = worn.sum() * STEP**2
+    assert found.values["worn_volume"].low <= true <= found.values["worn_volume"].high
+
+    found = compare_surfaces(*make_pair(worn - np.roll(worn, 60, axis=1), 7))
+    assert found.verdict.code == "worn_and_grown"
+    assert found.values["grown_volume"].value == pytest.approx(true, rel=0.1)
+
+
 @pytest.mark.parametrize("kind", ["smooth track", "crater", "deposits", "remounted", "exchanged"])
 def test_always_kinds_of_change_have_right_verdict(kind):
     """Rotated and shifted scans of five kinds of change have no false verdict, and the volume lies in its interval."""

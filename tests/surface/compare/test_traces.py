@@ -164,6 +164,37 @@ def test_always_scar_over_ninety_percent_may_be_growth_at_ends():
     assert found.verdict.numbers["growth_height"] == pytest.approx(UM, rel=0.1)
 
 
+def test_always_scar_like_a_parabola_may_be_a_bow():
+    """A parabola of 2 um over 90 % of the trace is no wear of nanometres; a straight datum is no bow.
+
+    The scar is at most as deep as the subtracted parabola. A least-squares parabola has the mean depth c L^2/6 below its
+    ends; the robust one that is subtracted gives the unworn ends less weight.
+    """
+    worn = make_parabola(2 * UM, 200, 3800)
+    pair = make_pair(worn)
+    found = compare_surfaces(*pair)
+    assert found.verdict.code == "scar_or_bow"
+    x = np.arange(worn.size)
+    bow_depth = abs(np.polyfit(x, worn, 2)[0]) * worn.size**2 / 6
+    assert found.verdict.numbers["scar_depth"] == pytest.approx(bow_depth, rel=0.1)
+    assert found.verdict.numbers["scar_depth"] > worn.mean()
+    assert found.values["worn_depth_mean"].reason == "scar_or_bow"
+    found = compare_surfaces(*pair, Options(datum="straight"))
+    assert found.verdict.code in ("worn", "growth_at_ends")
+
+
+@pytest.mark.parametrize("gain", [0.9, 0.97, 1.03, 1.1])
+def test_always_gain_is_found_beside_wear(gain):
+    """A gain of the instrument does not change the worn area."""
+    worn = make_parabola(1.5 * UM, 1200, 2800)
+    before, after = make_pair(worn)
+    found = compare_surfaces(before, Profile(after.x, gain * after.z, "after"))
+    gains = [finding.numbers["gain"] for finding in found.findings if finding.code == "other_gain"]
+    assert found.verdict.code == "worn"
+    assert gains == [pytest.approx(gain, rel=0.01)]
+    assert found.values["worn_area"].value == pytest.approx(worn.sum() * UM, rel=0.02)
+
+
 def test_always_transfer_of_equal_area_is_worn_and_grown():
     """Material lost at one place and built up at another one is stated as both."""
     change = make_parabola(UM, 600, 1400) - make_parabola(UM, 2400, 3200)
@@ -194,9 +225,21 @@ def test_exact_pile_up_is_measured_beside_the_track():
     worn = make_parabola(2 * UM, 1600, 2400)
     ridges = make_parabola(0.5 * UM, 1400, 1600) + make_parabola(0.5 * UM, 2400, 2600)
     track = compare_surfaces(*make_pair(worn - ridges)).track.values
-    assert track["pile_up"].value == pytest.approx(ridges.sum() * UM, rel=0.15)
+    assert track["pile_up"].value == pytest.approx(ridges.sum() * UM, rel=0.03)
+    for name, place in (("from", 1600 * UM), ("to", 2400 * UM)):
+        assert track[name].low <= place <= track[name].high
     net = track["area_gross"].value - track["pile_up"].value
     assert track["area_net"].value == pytest.approx(net, rel=1e-9)
+
+
+def test_always_low_ridge_at_the_end_of_a_track_is_measured_whole():
+    """The interval of the pile-up contains the area of a low ridge of which part is below the noise."""
+    worn = make_parabola(1.35 * UM, 1600, 2400)
+    ridge = make_parabola(0.28 * UM, 2400, 2520)
+    for seed in range(4):
+        track = compare_surfaces(*make_pair(worn - ridge, seed, noise=12 * NM)).track.values
+        assert track["pile_up_right"].low <= ridge.sum() * UM <= track["pile_up_right"].high
+        assert track["pile_up_left"].value == 0
 
 
 def test_exact_cut_track_has_no_end_beyond_the_trace():

@@ -4,8 +4,6 @@ The layouts are those of ASCII exports of Gwyddion, SPIP, Attocube, Nova and HFM
 refused with a remedy is read after the remedy is applied.
 """
 
-import os
-
 import numpy as np
 import pytest
 import surfaces as write
@@ -13,8 +11,9 @@ import surfaces as write
 from patchfem.core import PatchfemError
 from patchfem.surface import Profile, read_surface
 from patchfem.surface.areal import Areal
-from patchfem.surface.files import instruments
-from patchfem.surface.files.raw import fetch
+from patchfem.surface.files.content import fetch
+from patchfem.surface.files.instruments import read_instrument
+from patchfem.surface.files.table import make_surface
 
 Z = np.arange(1.0, 13.0).reshape(3, 4)
 ROWS = "1 2 3 4\n5 6 7 8\n9 10 11 12\n"
@@ -138,18 +137,12 @@ def test_exact_headers_of_other_programs(tmp_path, header, steps, unit):
     assert_scan_equal(read_text(tmp_path, header + ROWS), steps, Z * unit)
 
 
-@pytest.mark.skipif(
-    "PATCHFEM_TOPOGRAPHY_PYTHON" not in os.environ,
-    reason="PATCHFEM_TOPOGRAPHY_PYTHON names no interpreter that has SurfaceTopography",
-)
-def test_exact_headers_agree_with_surface_topography(tmp_path, use_interpreter):
+def test_exact_headers_agree_with_surface_topography(tmp_path):
     """Text files of other programs give the same scans as SurfaceTopography within 1e-12.
 
     Headers with features that it does not support are left out.
-
-    Headers with features that it does not support are left out.
     """
-    use_interpreter(os.environ["PATCHFEM_TOPOGRAPHY_PYTHON"])
+    pytest.importorskip("SurfaceTopography")
     for name in (
         "spip",
         "spip with a unit",
@@ -159,11 +152,20 @@ def test_exact_headers_agree_with_surface_topography(tmp_path, use_interpreter):
         "sizes of SurfaceTopography",
     ):
         ours = read_text(tmp_path, HEADERS[name][0] + ROWS)
-        theirs = instruments.read_instrument(fetch(tmp_path / "scan.txt"), None)
+        theirs = make_surface(read_instrument(fetch(tmp_path / "scan.txt")))
         assert ours.z == pytest.approx(theirs.z, rel=1e-12), name
         assert ours.x == pytest.approx(theirs.x, rel=1e-12) and ours.y == pytest.approx(
             theirs.y, rel=1e-12
         ), name
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_exact_matrix_of_few_columns(tmp_path, count):
+    """Two or three numbers in a row are a matrix if the header states width and height."""
+    rows = "".join(" ".join(map(str, row[:count])) + "\n" for row in Z.tolist())
+    header = f"# Width: {count} µm\n# Height: 6 µm\n# Value units: nm\n"
+    found = read_text(tmp_path, header + rows)
+    assert_scan_equal(found, (1e-6, 2e-6), Z[:, :count] * 1e-9)
 
 
 def test_exact_line_scan_in_column_or_row(tmp_path):
@@ -212,6 +214,7 @@ PAIRS = "".join(f"{a}\t{b}\n" for a, b in zip(X, H))
 COUNTED = "".join(f"{k}\t{a}\t{b}\n" for k, (a, b) in enumerate(zip(X, H), 1))
 QUOTED = "".join(f'"{a}","{b}"\n'.replace(".", ",") for a, b in zip(X, H))
 TRACES = {
+    "underscores and brackets": (f"X_(mm)\tHeight_(um)\n{PAIRS}", None),
     "x in um": (f"x in mm\tz in um\n{PAIRS}", None),
     "words and in": (f"Distance in mm\tHeight in µm\n{PAIRS}", None),
     "blanks and in": (f"x in mm z in um\n{PAIRS}".replace("\t", " "), None),
@@ -261,9 +264,9 @@ def test_exact_given_units_override_header_with_note(tmp_path):
     )
     assert_scan_equal(scan, (1e-3, 1e-3), Z * 1e-6)
     assert scan.notes == (
-        f"{path}: the header gives places along x in um, but mm is used, as given by --units",
-        f"{path}: the header gives places along y in um, but mm is used, as given by --units",
-        f"{path}: the header gives the heights in V, but um is used, as given by --units",
+        f"{path}: the header gives x in um, but mm is used, as given by --units",
+        f"{path}: the header gives y in um, but mm is used, as given by --units",
+        f"{path}: the header gives z in V, but um is used, as given by --units",
     )
     unknown_columns = read_text(tmp_path, f"Kanal A\tKanal B\n{PAIRS}", ("mm", "um"))
     assert unknown_columns.notes == (
@@ -311,7 +314,7 @@ REMEDIES = {  # refused text, message, text after the remedy, and given units
     ),
     "no unit of the heights": (
         "# Width: 4 um\n# Height: 3 um\n" + ROWS,
-        "whose unit is not given; write `# Value",
+        "the unit of z is not given, and units are never guessed; write `# Width: 1.2 mm`",
         "# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS,
         None,
     ),
@@ -323,19 +326,19 @@ REMEDIES = {  # refused text, message, text after the remedy, and given units
     ),
     "a width without unit": (
         "# Width: 4\n# Height: 3\n# Value units: um\n" + ROWS,
-        "the unit of the scan's width and height, '', is not known; write",
+        "the unit of x is not given, and units are never guessed; write `# Width: 1.2 mm`",
         "# Width: 1.2 mm\n# Height: 0.8 mm\n# Value units: um\n" + ROWS,
         None,
     ),
     "volts": (
         "# Width: 4 um\n# Height: 3 um\n# Value units: V\n" + ROWS,
-        "in 'V', which is not a unit of length; export the",
+        "unknown unit 'V' of z; use one of m, km",
         "# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS,
         None,
     ),
     "a row cut off": (
         "# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS[:-6],
-        ":6: 2 numbers, but the first row of the matrix has 4; write nan for a missing height",
+        ":6: '9 10': 4 numbers are needed; write nan for a missing height",
         "# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS[:-6] + " nan nan\n",
         None,
     ),
@@ -377,13 +380,13 @@ REMEDIES = {  # refused text, message, text after the remedy, and given units
     ),
     "names without units": (
         f"Distance\tProfile\n{PAIRS}",
-        "column 'Distance' has no unit, and units are never guessed",
+        ":1: the unit of x is not given, and units are never guessed",
         f"Distance\tProfile\n{PAIRS}",
         ("um", "um"),
     ),
     "one unit for two columns": (
         f"µm\n{PAIRS}",
-        "no header, and units are never guessed",
+        ":2: the unit of x is not given, and units are never guessed",
         f"µm\n{PAIRS}",
         ("um", "um"),
     ),

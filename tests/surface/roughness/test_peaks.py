@@ -186,10 +186,10 @@ def test_exact_note_gives_stiffness_of_persson_theory():
 @pytest.mark.parametrize(
     "keys, message",
     [
-        ("", "you can give `from`, or rms_height, rms_slope and rms_curvature"),
+        ("", "needs this key or from or rms_height, rms_slope, rms_curvature"),
         ('radius = "1 um"\n', "contact.asperities.density: missing"),
         ('rms_height = "1 um"\nrms_slope = 0.1\n', "contact.asperities.rms_curvature: missing"),
-        (RMS + 'radius = "1 um"\n', "keep only one"),
+        (RMS + 'radius = "1 um"\n', "exclude each other"),
         (RMS.replace("0.05", "0.5"), "at least 1.22"),
         (RMS.replace("0.02 1/um", "0.02"), "1/um"),
         ('from = "nowhere.csv"\n', "there is no file"),

@@ -112,7 +112,6 @@ class BalanceFinder:
     If several motions exist, the iteration starts from a given point of the response curve.
     """
 
-    has_fallback = False
     peak_tolerances = (1e-2, 0.1)
 
     def __init__(self, model, numerics, patch, frames: int = 0, say=None):

@@ -287,8 +287,6 @@ def solve_drive_levels(finder, drive):
         try:
             solution, guess = finder.compute_steady_motion(sine, guess)
         except NotConverged as failure:
-            if finder.has_fallback:
-                raise
             points.append(make_missing_curve_point(sine))
             failures.append(failure)
             continue

@@ -106,7 +106,6 @@ class MarchFinder(TracedCurve):
 
     # The points of the curve have errors of the size of the tolerance, so that a refined peak
     # cannot have a smaller error.
-    has_fallback = True
     peak_tolerances = (0.3, 30.0)
 
     def __init__(self, model, numerics, patch, frames: int = 0, say=None):

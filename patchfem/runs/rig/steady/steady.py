@@ -1,17 +1,21 @@
 """Steady motion of a rig under a sine, and the largest one over a sweep or drive levels.
 
 In: a Model, its Numerics and its Patch. Out: the Solution of the periodic motion with its regime,
-Floquet multipliers and stability. Coulomb interfaces and elastic-plastic elements are solved by
-shooting with the map of a period (`maps`), grooves by marching (`periodic_march`), and other laws
-by harmonic balance (`balance`).
+Floquet multipliers and stability. Coulomb interfaces, elastic-plastic elements and grooves are solved by shooting with
+the map of a period (`shooting`), laws with memory on grooves by marching (`periodic_march`), and other laws by harmonic
+balance (`balance`).
 """
 
-from ....core import NotConverged, SineDrive
-from ..engines import PIECES, choose_steady_method
+from ....core import SineDrive
+from ..engines import choose_steady_method
 from ..solution import Solution
-from . import balance, maps, periodic_march
+from .balance import BalanceFinder
 from .curves import solve_drive_levels
 from .peak import solve_peak
+from .periodic_march import MarchFinder
+from .shooting import ShootingFinder
+
+FINDERS = {"shooting": ShootingFinder, "march": MarchFinder, "balance": BalanceFinder}
 
 
 def solve_steady_motion(
@@ -19,8 +23,7 @@ def solve_steady_motion(
 ) -> Solution:
     """Compute the steady motion under a sine, or the largest one over a sweep or drive levels.
 
-    The drive of the largest motion is extra["at"]. If the map of yield events does not converge,
-    harmonic balance is tried.
+    The drive of the largest motion is extra["at"].
 
     Parameters
     ----------
@@ -36,21 +39,8 @@ def solve_steady_motion(
     -------
     Solution
     """
-    method = choose_steady_method(model)
-    if method.name == "events":
-        finder_class = maps.EventFinder
-    elif method.name == "yields":
-        finder_class = maps.YieldFinder
-    elif method.name == "march":
-        finder_class = periodic_march.MarchFinder
-    else:
-        finder_class = balance.BalanceFinder
-    try:
-        return _solve_drive(finder_class(model, numerics, patch, frames, say), model)
-    except NotConverged:
-        if method.engine != PIECES.name or len(model.rig.friction.interfaces) > 1:
-            raise
-    return _solve_drive(balance.BalanceFinder(model, numerics, patch, frames, say), model)
+    finder_class = FINDERS[choose_steady_method(model).name]
+    return _solve_drive(finder_class(model, numerics, patch, frames, say), model)
 
 
 def _solve_drive(finder, model) -> Solution:

@@ -1,0 +1,402 @@
+"""Arrays of a case from modes, interfaces and a drive, and a whole case from the records of a rig or bench."""
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ..core import ModalBasis
+from ..structure.drive_sizes import find_max_acceleration
+from .drives import Signal, make_signal, make_slide
+from .laws import LAWS, MIN_LOAD, is_rigid
+from .laws.springs import make_cubic, make_interlocking
+from .records import (
+    N_INTEGRALS,
+    Clock,
+    Cycle,
+    Face,
+    LawNumbers,
+    Memory,
+    Mode,
+    Probe,
+    Record,
+    Rig,
+    Setting,
+    State,
+    Whole,
+    Window,
+)
+
+MIN_STEPS = 12  # steps per shortest period of drive and load, so that no short slip is missed
+MIN_SCALE = 1e-3  # smallest magnitudes of a motion relative to those expected
+REVERSALS = 48  # reversal points that a law keeps
+MAX_STEPS = 3e6  # steps of a run; with the comparison run they take up to 50 CPU seconds
+MAX_CYCLE_STEPS = 100  # further steps per cycle that a run may take
+DEFAULT_RTOL = 1e-7  # tolerance of a step
+EXACT_RTOL = 1e-12  # the same for accuracy.method = "exact"
+MIN_COMPUTED = 3  # cycles at the end of which each is computed
+N_ROWS = 30  # rows of `State.rows`
+
+
+class Load(NamedTuple):
+    """Normal load max(0, mean + amplitude cos(omega t + phase) - stiffness heave) of an interface.
+
+    - mean, amplitude: [N]
+    - omega, phase: [rad/s], [rad]
+    - stiffness: of the contact in normal direction [N/m]; 0 if the load does not follow the motion
+    - heave (n,): motion that opens the contact per unit of the modes, () without it
+    """
+
+    mean: float
+    amplitude: float = 0.0
+    omega: float = 0.0
+    phase: float = 0.0
+    stiffness: float = 0.0
+    heave: tuple = ()
+
+    @property
+    def varies(self) -> bool:
+        """Whether the load changes with time or motion."""
+        return self.amplitude != 0 or self.stiffness != 0
+
+
+class Interface(NamedTuple):
+    """Law and load of an interface with its slide (n,) per unit of the modes."""
+
+    law: LawNumbers
+    load: Load
+    slide: np.ndarray
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Case:
+    """A rig or bench with its start and schedule.
+
+    - rig: arrays of the engine
+    - y (n,): state at the start
+    - ends (C,): ends of the cycles [s]
+    - windows (C,): number of the window that a cycle belongs to, -1 for none
+    - samples (S,): rising times [s] at which the motion is stored
+    - n_friction: number of friction interfaces; the others are springs
+    - first_stiffness: stiffness [N/m] of the first mode at the contact, 0 if unknown
+    """
+
+    rig: Rig
+    y: np.ndarray
+    ends: np.ndarray
+    windows: np.ndarray
+    samples: np.ndarray
+    n_friction: int
+    first_stiffness: float = 0.0
+
+    def with_tolerance(self, rtol: float, step_ratio: float = 1.0) -> "Case":
+        """Return the case with another step tolerance and a longest step that is longer by a factor."""
+        settings = self.rig.settings.copy()
+        settings[Setting.RTOL] = rtol
+        settings[Setting.LONGEST_STEP] *= step_ratio
+        return replace(self, rig=self.rig._replace(settings=settings))
+
+
+class Options(NamedTuple):
+    """What a rig has besides modes, drive and interfaces.
+
+    - moves_base: whether the drive is the acceleration of the base
+    - travel: largest output [m]
+    - rtol, max_steps: tolerance of a step, largest number of steps
+    - n_steps: smallest number of steps per shortest period of drive and load
+    """
+
+    moves_base: bool = False
+    travel: float = np.inf
+    rtol: float = DEFAULT_RTOL
+    max_steps: float = MAX_STEPS
+    n_steps: float = MIN_STEPS
+
+
+def make_rig(
+    modes: ModalBasis | None,
+    signal: Signal,
+    interfaces,
+    sizes: tuple[float, float],
+    options: Options,
+) -> Rig:
+    """Return the arrays of a rig, or of a bench.
+
+    Parameters
+    ----------
+    modes : ModalBasis or None
+        None for a bench, whose slide is the signal.
+    signal : Signal
+    interfaces : sequence of Interface
+    sizes : (float, float)
+        Expected slide [m] and its speed [m/s].
+    options : Options
+    """
+    # A bench has one mode without stiffness, which its slide replaces.
+    n = 1 if modes is None else modes.omega.size
+    rows = np.zeros((2, len(interfaces), n))
+    n_numbers = max([1, *(len(one.law.numbers) for one in interfaces)])
+    faces = np.zeros((len(interfaces), Face.NUMBERS + n_numbers))
+    scales = [MIN_SCALE * (sizes[0] or 1.0)] * n + [MIN_SCALE * (sizes[1] or 1.0)] * n
+    shortest = signal.shortest_period
+    repeat = signal.repeat
+    n_states = 0
+
+    for i, (law, load, slide) in enumerate(interfaces):
+        rows[0, i] = slide
+        face = faces[i]
+        face[Face.LAW] = LAWS.index(law.law)
+        face[Face.FIRST_STATE] = n_states
+        face[Face.N_STATES] = len(law.states)
+        face[Face.RIGID] = is_rigid(law.law)
+        face[Face.LENGTH] = law.length
+
+        # Loads, and magnitudes of loads and their rates for the margins.
+        face[Face.MEAN : Face.STIFFNESS + 1] = load[:5]
+        face[Face.LOAD] = max(abs(load.mean), load.amplitude, MIN_LOAD)
+        face[Face.LOAD_RATE] = load.amplitude * load.omega
+        if load.stiffness:
+            rows[1, i] = load.heave
+            face[Face.LOAD_RATE] += load.stiffness * sizes[1] * np.abs(load.heave).max()
+        face[Face.LOAD_RATE] = face[Face.LOAD_RATE] or 1.0
+
+        face[Face.NUMBERS : Face.NUMBERS + len(law.numbers)] = law.numbers
+        n_states += len(law.states)
+        scales += law.scales
+        if load.amplitude and load.omega:
+            shortest = min(shortest, 2 * np.pi / load.omega)
+            ratio = load.omega * signal.period / (2 * np.pi)
+            repeat = repeat if abs(ratio - round(ratio)) < 1e-12 * ratio else 0
+
+    settings = np.zeros(len(Setting))
+    settings[Setting.MASS] = 1.0 if modes is None else modes.mass
+    settings[Setting.LONGEST_STEP] = shortest / options.n_steps
+    settings[Setting.TRAVEL] = options.travel
+    settings[Setting.OMEGA] = 2 * np.pi / signal.period
+    settings[Setting.PERIOD] = signal.period
+    settings[Setting.BASE_MOVES] = options.moves_base
+    settings[Setting.IS_BENCH] = modes is None
+    settings[Setting.RTOL] = options.rtol
+    settings[Setting.REPEAT] = repeat
+    settings[Setting.MAX_STEPS] = options.max_steps
+    settings[Setting.HAS_RIGID] = faces[:, Face.RIGID].any()
+    table = np.zeros((len(Mode), n))
+    damping = np.zeros((n, n))
+    if modes is not None:
+        gauge = modes.output if modes.gauge is None else modes.gauge
+        table = np.array([modes.omega**2, -modes.base, modes.output, gauge], float)
+        damping = np.array(modes.damping_matrix, float, order="C")
+    for load in faces[:, Face.LOAD]:
+        work = load * scales[0]
+        scales += [work, scales[0], work]
+    scales = np.append(scales, np.ones(N_INTEGRALS))
+    return Rig(table, damping, rows, faces, signal.pieces, signal.tones, scales, settings)
+
+
+def make_start(rig: Rig, interfaces, start=None) -> np.ndarray:
+    """Return the state (n,) at the start; `start` has modal coordinates z and velocities v.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    interfaces : sequence of Interface
+    start : InitialState, optional
+        Modal coordinates [m] and velocities [m/s].
+    """
+    n = rig.modes.shape[1]
+    y = np.zeros(rig.scales.size)
+    if start is not None:
+        y[:n] = start.z
+        y[n : 2 * n] = start.v
+    states = [state for one in interfaces for state in one.law.states]
+    y[2 * n : 2 * n + len(states)] = states
+    for i, (law, load, _) in enumerate(interfaces):
+        if law.law == "pressed_springs":
+            first = 2 * n + int(rig.faces[i, Face.FIRST_STATE])
+            now = load.mean + load.amplitude * np.cos(load.phase)
+            if load.stiffness:
+                now -= load.stiffness * float(np.dot(load.heave, y[:n]))
+            y[first + 1] = max(now, 0.0)
+    return y
+
+
+def make_schedule(cycles: float, period: float, window: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the ends of the cycles [s], and their windows.
+
+    The window is 0 for the last cycles, -1 for the others, and -2 for the cycles before the window of which each is
+    computed, even if the motion repeats.
+
+    Parameters
+    ----------
+    cycles : float
+        Cycles of the run.
+    period : float
+        Duration of a cycle [s].
+    window : int
+        Cycles of the window.
+    """
+    count = max(1, int(np.ceil(cycles - 1e-9)))
+    number = np.arange(count)
+    # Whole cycles are counted from the end of the run, so that the first one may be a part.
+    ends = period * (cycles - (count - 1 - number))
+    windows = np.where(number >= count - MIN_COMPUTED, -2.0, -1.0)
+    windows[max(0, count - window) :] = 0.0
+    return ends, windows
+
+
+class Schedule(NamedTuple):
+    """Cycles of a run.
+
+    - cycles: number of drive cycles, which may be fractional
+    - window: cycles at the end whose measures are recorded
+    - samples (S,): rising times [s] at which the motion is stored
+    - travel: largest output [m]
+    """
+
+    cycles: float
+    window: int
+    samples: np.ndarray
+    travel: float = np.inf
+
+
+def make_rig_case(
+    rig, joints, schedule: Schedule, *, signal=None, rtol: float = DEFAULT_RTOL, n_steps=MIN_STEPS
+) -> Case:
+    """Return the case of the records of a rig.
+
+    Parameters
+    ----------
+    rig : model.rig.Rig
+    joints : sequence of (LawNumbers, Load)
+        Law and load of each interface.
+    schedule : Schedule
+    signal : optional
+        Drive in place of that of the rig.
+    rtol : float
+        Tolerance of a step.
+    n_steps : float
+        Smallest number of steps per shortest period of drive and load.
+    """
+    modes = rig.modes
+    drive = rig.drive.signal if signal is None else signal
+    signal = make_signal(drive)
+    interfaces = [Interface(*joint, row) for joint, row in zip(joints, modes.interfaces)]
+    n_friction = len(interfaces)
+
+    # Springs act before rigid friction on grooves, which needs the acceleration without it.
+    if rig.springs.cubic is not None:
+        interfaces.append(Interface(make_cubic(rig.springs.cubic), Load(1.0), modes.output))
+    if rig.springs.interlock is not None:
+        spring = make_interlocking(*rig.springs.interlock)
+        interfaces.append(Interface(spring, Load(1.0), modes.interfaces[0]))
+
+    max_steps = MAX_STEPS + MAX_CYCLE_STEPS * schedule.cycles
+    options = Options(drive.moving, schedule.travel, rtol, max_steps, n_steps)
+    arrays = make_rig(modes, signal, interfaces, find_sizes(rig, signal, drive), options)
+    ends = make_schedule(schedule.cycles, signal.period, schedule.window)
+    return Case(
+        arrays, make_start(arrays, interfaces, rig.start), *ends, np.asarray(schedule.samples, float),
+        n_friction, rig.first_mode.stiffness,
+    )  # fmt: skip
+
+
+def find_sizes(rig, signal: Signal, drive) -> tuple[float, float]:
+    """Return the displacement [m] and speed [m/s] that drive and start alone give to slides and output.
+
+    A mode above the frequency of the drive follows it by its stiffness, one below by its inertia.
+    """
+    modes = rig.modes
+    rows = np.vstack([modes.interfaces, modes.output])
+    omega = 2 * np.pi / signal.period
+    response = np.abs(modes.base) / np.maximum(omega, modes.omega) ** 2
+    size = find_max_acceleration(drive) * (np.abs(rows) @ response).max(initial=0.0)
+    speed = omega * size
+    if rig.start is not None:
+        speeds = np.append(rows @ np.asarray(rig.start.v), omega * (rows @ np.asarray(rig.start.z)))
+        speed = max(speed, np.abs(speeds).max())
+    return speed / omega, speed
+
+
+def make_bench_case(path, law: LawNumbers, load: Load, *, samples=(), rtol=DEFAULT_RTOL) -> Case:
+    """Return the case of a prescribed slide `path` (model.slide.SlidePath) under a law.
+
+    Parameters
+    ----------
+    path : SlidePath
+    law : LawNumbers
+    load : Load
+    samples : (S,) array_like
+        Times [s] at which the motion is stored.
+    rtol : float
+        Tolerance of a step.
+    """
+    signal = make_slide(path)
+    interface = Interface(law, load, np.ones(1))
+    speed = path.peak_speed
+    arrays = make_rig(None, signal, [interface], (path.amplitude, speed), Options(rtol=rtol))
+    duration = signal.pieces[-1, 0] if len(signal.pieces) else path.cycles * signal.period
+    ends, windows = make_schedule(duration / signal.period, signal.period, 1)
+    return Case(
+        arrays, make_start(arrays, [interface]), ends, windows, np.asarray(samples, float), 1
+    )
+
+
+def stack(arrays) -> tuple:
+    """Return records of arrays as one record with a leading axis of cases."""
+    first = arrays[0]
+    return type(first)(*(np.ascontiguousarray(np.stack(parts)) for parts in zip(*arrays)))
+
+
+def make_batch(cases, n_events: int = 0) -> tuple[Rig, State, Record]:
+    """Return rigs, states and empty records of cases whose arrays have the same shapes.
+
+    Parameters
+    ----------
+    cases : sequence of Case
+    n_events : int
+        Number of events that a case can store.
+    """
+    rig = cases[0].rig
+    n_cases, n_faces, n = len(cases), rig.faces.shape[0], cases[0].y.size
+    clock = np.zeros((n_cases, len(Clock)))
+    clock[:, Clock.STEP] = [0.1 * case.rig.settings[Setting.LONGEST_STEP] for case in cases]
+
+    # Memories of laws that have not moved.
+    memory = np.zeros((n_cases, n_faces, Memory.STACK + 2 * REVERSALS))
+    memory[..., [Memory.CONTACT, Memory.COUNT, Memory.VIRGIN]] = 1.0
+    for i in range(n_faces):
+        law = LAWS[int(rig.faces[i, Face.LAW])]
+        memory[:, i, Memory.FLAG] = law in ("bouc_wen",)
+        memory[:, i, Memory.COUNT] = law in ("pressed_springs",)
+        if law == "bonds":
+            memory[:, i, Memory.FLAG] = -1.0
+
+    # Workspaces are shared by all cases, which run one after the other.
+    state = State(
+        np.array([case.y for case in cases]),
+        memory,
+        clock,
+        np.zeros((N_ROWS, n)),
+        np.full((5, n_faces, 4), np.inf),
+        np.zeros((6, Probe.FACES + Probe.COUNT * n_faces)),
+        np.zeros((n_faces, n_faces)),
+    )
+
+    # Schedules and samples hold their times already.
+    n_cycles = cases[0].ends.size
+    n_windows = int(cases[0].windows.max()) + 1
+    cycles = np.zeros((n_cases, n_cycles, len(Cycle)))
+    cycles[..., Cycle.END] = [case.ends for case in cases]
+    cycles[..., Cycle.WINDOW] = [case.windows for case in cases]
+    width = 1 + n + 3 * n_faces + 2
+    samples = np.zeros((n_cases, cases[0].samples.size, width))
+    samples[..., 0] = [case.samples for case in cases]
+    record = Record(
+        cycles,
+        np.zeros((n_cases, n_windows, len(Whole))),
+        np.zeros((n_cases, n_windows, n_faces, len(Window))),
+        samples,
+        np.zeros((n_cases, n_events, width)),
+    )
+    return stack([case.rig for case in cases]), state, record

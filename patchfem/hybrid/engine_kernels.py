@@ -1,0 +1,547 @@
+"""Motion from event to event over a schedule of cycles, and the loop over cases (compiled).
+
+In every regime the equations are smooth. A step that leaves the regime is cut at the first zero of a margin on its dense
+output, and the regime is switched there.
+"""
+
+import numpy as np
+
+from ..compiled.jit import njit
+from ..friction.flags_kernels import NJIT_KERNEL
+from .event_kernels import (
+    N_CHECKS,
+    change_regime,
+    copy_margins,
+    find_event,
+    hold_or_release,
+    start_directions,
+)
+from .motion_kernels import find_integrals, look, project
+from .records import (
+    N_FACE_INTEGRALS,
+    Clock,
+    Cycle,
+    Face,
+    Memory,
+    Mode,
+    Piece,
+    Record,
+    Rig,
+    Setting,
+    State,
+    Status,
+    Whole,
+    Window,
+)
+from .step_kernels import CYCLE, N_STAGES, SCALE, WINDOW, read_curve, step_factor, take_step
+from .window_kernels import (
+    add_output,
+    find_output,
+    observe_cycle,
+    observe_window,
+    write_directions,
+    write_event,
+    write_samples,
+)
+
+MIN_CUT_SPEED = (
+    1e-6  # speed, relative to the largest one, above which an interface does not reverse
+)
+SAME_SLIDE_TOL = 1e-9  # difference of slides that are equal, relative to their range
+MIN_SEEN = 1e-6  # fraction of a cycle before which an end of motion belongs to the cycle before
+MAX_EMPTY_STEPS = 100  # events in a row without progress
+MIN_PROGRESS = 1e-13  # fraction of a step that counts as progress
+MIN_STEP = 1e-15  # relative to the end of the run
+REJECTED_FACTOR = 0.1  # ratio of steps after one without a finite error
+MAX_LENGTHS = 100.0  # lengths of a law to which the error of a slide is relative at most
+MAX_STIFFNESS = (
+    1e8  # slide over the length of a law, above which round-off of the slide moves its force
+)
+MIN_PARTICIPATION = (
+    1e-150  # of a mode in a slide or in the output, so that a mode without any has no error
+)
+MIN_CONTRACTION = 1e-3  # smallest ratio of two changes over a cycle that is assumed
+MAX_CONTRACTION = 0.9999
+TRAVEL_TOL = 1e-12  # error of the end of travel, relative to its step
+REPEAT_TOL = (
+    1.0  # largest remaining change of a motion that repeats, relative to the step tolerance
+)
+
+
+@njit(**NJIT_KERNEL)
+def update_scales(rig, state):
+    """Raise the scales of the errors to the magnitudes of a state.
+
+    The error of a mode counts by what it adds to the slides and to the output, relative to their magnitudes, and to the
+    friction force of laws without states.
+    """
+    n = rig.modes.shape[1]
+    y = state.y
+    scale = state.rows[SCALE]
+    output = rig.modes[Mode.OUTPUT]
+    clock = state.clock
+
+    # Magnitudes of the output, and the errors of the modes that they allow.
+    clock[Clock.OUTPUT_SIZE] = max(clock[Clock.OUTPUT_SIZE], abs(project(output, y[:n])))
+    clock[Clock.OUTPUT_SPEED] = max(clock[Clock.OUTPUT_SPEED], abs(project(output, y[n : 2 * n])))
+    for j in range(n):
+        scale[j] = clock[Clock.OUTPUT_SIZE] / max(abs(output[j]), MIN_PARTICIPATION)
+        scale[n + j] = clock[Clock.OUTPUT_SPEED] / max(abs(output[j]), MIN_PARTICIPATION)
+
+    # The same for every slide; the smaller error counts.
+    for i in range(rig.faces.shape[0]):
+        row = rig.rows[0, i]
+        memory = state.memory[i]
+        memory[Memory.SIZE] = max(memory[Memory.SIZE], abs(project(row, y[:n])))
+        memory[Memory.SPEED] = max(memory[Memory.SPEED], abs(project(row, y[n : 2 * n])))
+        size = min(memory[Memory.SIZE], MAX_LENGTHS * rig.faces[i, Face.LENGTH])
+        for j in range(n):
+            part = max(abs(row[j]), MIN_PARTICIPATION)
+            scale[j] = min(scale[j], size / part)
+            scale[n + j] = min(scale[n + j], memory[Memory.SPEED] / part)
+    for k in range(2 * n, y.size):
+        scale[k] = max(scale[k], abs(y[k]))
+
+
+@njit(**NJIT_KERNEL)
+def begin_scales(rig, state):
+    """Set the scales of the errors at the start of a run."""
+    n = rig.modes.shape[1]
+    for k in range(state.y.size):
+        state.rows[SCALE, k] = rig.scales[k]
+    state.clock[Clock.OUTPUT_SIZE] = max(state.clock[Clock.OUTPUT_SIZE], rig.scales[0])
+    state.clock[Clock.OUTPUT_SPEED] = max(state.clock[Clock.OUTPUT_SPEED], rig.scales[n])
+    for i in range(rig.faces.shape[0]):
+        state.memory[i, Memory.SIZE] = max(state.memory[i, Memory.SIZE], rig.scales[0])
+        state.memory[i, Memory.SPEED] = max(state.memory[i, Memory.SPEED], rig.scales[n])
+    update_scales(rig, state)
+
+
+@njit(**NJIT_KERNEL)
+def add_energies(rig, state, before):
+    """Update the exchanged energy and the largest energy of the modes after a step.
+
+    `before`: work of the drive before it [J].
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion, which is updated.
+    before : float
+        Work of the drive before the step [J].
+    """
+    n = rig.modes.shape[1]
+    y = state.y
+    energy = 0.0
+    for j in range(n):
+        energy += y[n + j] ** 2 + rig.modes[Mode.STIFFNESS, j] * y[j] ** 2
+    energy *= 0.5 * rig.settings[Setting.MASS]
+    state.clock[Clock.EXCHANGED] += abs(y[y.size - 4] - before)
+    state.clock[Clock.STORED] = max(state.clock[Clock.STORED], energy)
+
+
+@njit(**NJIT_KERNEL)
+def find_travel_end(rig, state, fraction):
+    """Return the fraction of a step at which the output reaches the stop, or 2 (bisection).
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion, which is updated.
+    fraction : float
+        Fraction of the step at which its motion ends.
+    """
+    limit = rig.settings[Setting.TRAVEL]
+    if limit == np.inf or abs(find_output(rig, state, fraction)) <= limit:
+        return 2.0
+    left = 0.0
+    right = fraction
+    while right - left > TRAVEL_TOL:
+        middle = 0.5 * (left + right)
+        if abs(find_output(rig, state, middle)) <= limit:
+            left = middle
+        else:
+            right = middle
+    return right
+
+
+@njit(**NJIT_KERNEL)
+def advance(rig, state, record, t_end, cycle):
+    """Advance a motion within a piece of the drive to a time; return its `Status`.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion, which is updated.
+    record : Record
+        What the run records.
+    t_end : float
+        Time at the end [s].
+    cycle : int
+        Number of the cycle.
+    """
+    clock = state.clock
+    rtol = rig.settings[Setting.RTOL]
+    longest = rig.settings[Setting.LONGEST_STEP]
+    in_window = record.cycles[cycle, Cycle.WINDOW] >= 0
+    # A motion that ends with the cycle before ends by the error of the step in this one.
+    first_seen = MIN_SEEN * rig.settings[Setting.PERIOD]
+    if cycle > 0:
+        first_seen += record.cycles[cycle - 1, Cycle.END]
+    # The step error of a bench includes its integrals: besides the friction work no state may depend on the path.
+    n_checked = find_integrals(rig, state.y)
+    if rig.settings[Setting.IS_BENCH] > 0:
+        n_checked += N_FACE_INTEGRALS * rig.faces.shape[0]
+    n_empty = 0
+    while clock[Clock.TIME] < t_end:
+        if n_empty > MAX_EMPTY_STEPS:
+            return Status.NO_PROGRESS
+        if clock[Clock.N_STEPS] > rig.settings[Setting.MAX_STEPS]:
+            return Status.TOO_MANY_STEPS
+        h = min(clock[Clock.STEP], longest, t_end - clock[Clock.TIME])
+        norm = take_step(rig, state, h, rtol, n_checked)
+        clock[Clock.N_STEPS] += 1
+        if not norm <= 1:
+            clock[Clock.STEP] = h * (step_factor(norm) if norm > 1 else REJECTED_FACTOR)
+            if clock[Clock.STEP] < MIN_STEP * t_end:
+                return Status.STEP_TOO_SMALL
+            continue
+
+        # The part of the step up to its first event is the motion.
+        event = find_event(rig, state)
+        fraction = event.fraction
+        face = event.face
+        travel_end = find_travel_end(rig, state, fraction)
+        if travel_end < fraction:
+            fraction = travel_end
+            face = -1
+        if fraction > 0:
+            observe_cycle(rig, state, fraction, record.cycles[cycle])
+            if in_window and clock[Clock.TIME] + fraction * h > first_seen:
+                observe_window(rig, state, record, cycle, fraction)
+        write_samples(rig, state, record, fraction)
+        before = state.y[state.y.size - 4]
+        if fraction == 1:
+            # The last stage and the last margins are those of the start of the next step.
+            for k in range(state.y.size):
+                state.rows[0, k] = state.rows[N_STAGES, k]
+            copy_margins(state, N_CHECKS)
+        else:
+            clock[Clock.IS_SMOOTH] = 0.0
+        is_end = face < 0 and fraction == 1 and h == t_end - clock[Clock.TIME]
+        read_curve(state, fraction, state.y)
+        update_scales(rig, state)
+        add_energies(rig, state, before)
+        clock[Clock.TIME] = t_end if is_end else clock[Clock.TIME] + fraction * h
+        if travel_end <= 1 and face < 0:
+            return Status.EXCEEDS_TRAVEL
+
+        n_empty = 0 if fraction > MIN_PROGRESS else n_empty + 1
+        if face >= 0:
+            clock[Clock.IS_SMOOTH] = 0.0
+            write_event(rig, state, record, face, event.which)
+            if change_regime(rig, state, face, event.which):
+                return Status.LEAVES_GROOVES
+            number = int(clock[Clock.N_EVENTS]) - 1
+            if number < record.events.shape[0]:
+                write_directions(state, record.events[number])
+        elif h == clock[Clock.STEP] or h == longest:
+            clock[Clock.STEP] = h * step_factor(norm)
+    return Status.DONE
+
+
+@njit(**NJIT_KERNEL)
+def advance_over_pieces(rig, state, record, t_end, cycle):
+    """Advance a motion to a time over the pieces of the drive; return its `Status`.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion, which is updated.
+    record : Record
+        What the run records.
+    t_end : float
+        Time at the end [s].
+    cycle : int
+        Number of the cycle.
+    """
+    clock = state.clock
+    while True:
+        number = int(clock[Clock.PIECE])
+        is_last = number + 1 >= rig.pieces.shape[0]
+        piece_end = t_end if is_last else rig.pieces[number + 1, Piece.START]
+        status = advance(rig, state, record, min(piece_end, t_end), cycle)
+        if status != Status.DONE or is_last or piece_end > t_end:
+            return status
+        clock[Clock.PIECE] += 1
+        clock[Clock.IS_SMOOTH] = 0.0
+        hold_or_release(rig, state)
+        if piece_end == t_end:
+            return status
+
+
+@njit(**NJIT_KERNEL)
+def find_change(rig, state):
+    """Return the largest change of the state since the last cycle, relative to the scales."""
+    largest = 0.0
+    for k in range(find_integrals(rig, state.y)):
+        change = abs(state.y[k] - state.rows[CYCLE, k]) / state.rows[SCALE, k]
+        largest = max(largest, change)
+    return largest
+
+
+@njit(**NJIT_KERNEL)
+def skip_cycles(rig, state, record, cycle, count):
+    """Continue a motion that repeats after this cycle by the next `count` cycles, up to their end.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion, which is updated.
+    record : Record
+        What the run records.
+    cycle : int
+        Number of the cycle.
+    count : int
+        Number of cycles.
+    """
+    columns = record.cycles.shape[1]
+    for c in range(cycle + 1, cycle + 1 + count):
+        for k in range(Cycle.MIN, columns):
+            record.cycles[c, k] = record.cycles[cycle, k]
+        record.cycles[c, Cycle.REPEATS] = 1.0
+    for k in range(find_integrals(rig, state.y), state.y.size):
+        state.y[k] += count * (state.y[k] - state.rows[CYCLE, k])
+    clock = state.clock
+    clock[Clock.EXCHANGED] += count * (clock[Clock.EXCHANGED] - clock[Clock.EXCHANGED_BEFORE])
+    clock[Clock.TIME] = record.cycles[cycle + count, Cycle.END]
+    state.clock[Clock.IS_SMOOTH] = 0.0
+    while state.clock[Clock.SAMPLE] < record.samples.shape[0]:
+        if record.samples[int(state.clock[Clock.SAMPLE]), 0] >= state.clock[Clock.TIME]:
+            break
+        record.samples[int(state.clock[Clock.SAMPLE]), 0] = np.nan
+        state.clock[Clock.SAMPLE] += 1
+
+
+@njit(**NJIT_KERNEL)
+def count_repeated(rig, state, record, cycle):
+    """Return the number of cycles without a window that follow in the same piece of the drive.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion, which is updated.
+    record : Record
+        What the run records.
+    cycle : int
+        Number of the cycle.
+    """
+    count = 0
+    end = np.inf
+    if state.clock[Clock.PIECE] + 1 < rig.pieces.shape[0]:
+        end = rig.pieces[int(state.clock[Clock.PIECE]) + 1, Piece.START]
+    while cycle + count + 1 < record.cycles.shape[0]:
+        row = record.cycles[cycle + count + 1]
+        if row[Cycle.WINDOW] != -1 or row[Cycle.END] > end:
+            break
+        count += 1
+    return count
+
+
+@njit(**NJIT_KERNEL)
+def begin_window(rig, state, record, cycle):
+    """Start the sums of a window; the scales of extremes begin without any value.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion, which is updated.
+    record : Record
+        What the run records.
+    cycle : int
+        Number of the cycle.
+    """
+    w = int(record.cycles[cycle, Cycle.WINDOW])
+    for k in range(state.y.size):
+        state.rows[WINDOW, k] = state.y[k]
+    for k in (Whole.MIN, Whole.MIN_ACCELERATION):
+        record.whole[w, k] = np.inf
+        record.whole[w, k + 1] = -np.inf
+    for i in range(rig.faces.shape[0]):
+        for k in range(Window.MIN_FORCE, Window.STUCK, 2):
+            record.faces[w, i, k] = np.inf
+            record.faces[w, i, k + 1] = -np.inf
+
+
+@njit(**NJIT_KERNEL)
+def end_window(rig, state, record, cycle):
+    """Write the friction works of a window.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion, which is updated.
+    record : Record
+        What the run records.
+    cycle : int
+        Number of the cycle.
+    """
+    w = int(record.cycles[cycle, Cycle.WINDOW])
+    first = find_integrals(rig, state.y)
+    for i in range(rig.faces.shape[0]):
+        k = first + N_FACE_INTEGRALS * i
+        record.faces[w, i, Window.WORK] = state.y[k] - state.rows[WINDOW, k]
+
+
+@njit(**NJIT_KERNEL)
+def drop_cut_extremes(cycle, point):
+    """Remove the friction force at an extreme slide that lies at an end of a cycle, but is no reversal.
+
+    Parameters
+    ----------
+    cycle : (12,) array
+        Row of `records.Record.cycles`.
+    point : Point
+        Motion of the first interface at this end.
+    """
+    if abs(point.velocity) <= MIN_CUT_SPEED * point.speed_scale:
+        return
+    size = SAME_SLIDE_TOL * (cycle[Cycle.MAX_SLIDE] - cycle[Cycle.MIN_SLIDE])
+    for k in (Cycle.MIN_SLIDE, Cycle.MAX_SLIDE):
+        if abs(point.slide - cycle[k]) <= size:
+            cycle[k + 1] = np.nan
+
+
+@njit(**NJIT_KERNEL)
+def run_case(rig, state, record):
+    """Run the cycles of a case; return its `Status`.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion, which is updated.
+    record : Record
+        What the run records.
+    """
+    clock = state.clock
+    begin_scales(rig, state)
+    clock[Clock.IS_SMOOTH] = 0.0
+    start_directions(rig, state)
+    add_energies(rig, state, state.y[state.y.size - 4])
+    n_cycles = record.cycles.shape[0]
+    repeat = int(rig.settings[Setting.REPEAT])
+    last_change = np.inf
+    cycle = 0
+    while cycle < n_cycles:
+        row = record.cycles[cycle]
+        window = row[Cycle.WINDOW]
+        if window >= 0 and (cycle == 0 or record.cycles[cycle - 1, Cycle.WINDOW] != window):
+            begin_window(rig, state, record, cycle)
+
+        # Start of a cycle: empty sums, extremes without a value, and the state for the check of repetition.
+        for k in range(Cycle.MIN, record.cycles.shape[1]):
+            row[k] = 0.0
+        row[Cycle.MIN] = row[Cycle.MIN_SLIDE] = np.inf
+        row[Cycle.MAX] = row[Cycle.MAX_SLIDE] = -np.inf
+        add_output(rig, state.y, row)
+        if repeat and cycle % repeat == 0:
+            for k in range(state.y.size):
+                state.rows[CYCLE, k] = state.y[k]
+        clock[Clock.EXCHANGED_BEFORE] = clock[Clock.EXCHANGED]
+        if rig.faces.shape[0]:
+            start = look(rig, state, 0, clock[Clock.TIME], state.y)
+        cosine = state.y[state.y.size - 2]
+        sine = state.y[state.y.size - 1]
+
+        status = advance_over_pieces(rig, state, record, row[Cycle.END], cycle)
+        for i in range(rig.faces.shape[0]):
+            if state.memory[i, Memory.SIZE] > MAX_STIFFNESS * rig.faces[i, Face.LENGTH]:
+                status = Status.TOO_STIFF
+        if rig.faces.shape[0]:
+            drop_cut_extremes(row, start)
+            drop_cut_extremes(row, look(rig, state, 0, clock[Clock.TIME], state.y))
+        row[Cycle.COS] = state.y[state.y.size - 2] - cosine
+        row[Cycle.SIN] = state.y[state.y.size - 1] - sine
+        clock[Clock.N_CYCLES] = cycle + 1
+        if status != Status.DONE:
+            return status
+        if window >= 0 and (
+            cycle + 1 == n_cycles or record.cycles[cycle + 1, Cycle.WINDOW] != window
+        ):
+            end_window(rig, state, record, cycle)
+
+        # The remaining change is that of a geometric series of the last two changes.
+        if repeat == 1 and window < 0:
+            change = find_change(rig, state)
+            ratio = min(max(change / last_change, MIN_CONTRACTION), MAX_CONTRACTION)
+            last_change = max(change, 1e-300)
+            if change * ratio / (1 - ratio) < REPEAT_TOL * rig.settings[Setting.RTOL]:
+                count = count_repeated(rig, state, record, cycle)
+                skip_cycles(rig, state, record, cycle, count)
+                cycle += count
+        cycle += 1
+    return Status.DONE
+
+
+@njit(**NJIT_KERNEL)
+def run_cases(rigs, states, records):
+    """Run all cases of a batch, whose arrays have a leading axis, except the workspaces of the state.
+
+    Parameters
+    ----------
+    rigs : Rig
+        Arrays of a batch.
+    states : State
+        Arrays of a batch.
+    records : Record
+        Arrays of a batch.
+    """
+    for c in range(rigs.faces.shape[0]):
+        rig = Rig(
+            rigs.modes[c],
+            rigs.damping[c],
+            rigs.rows[c],
+            rigs.faces[c],
+            rigs.pieces[c],
+            rigs.tones[c],
+            rigs.scales[c],
+            rigs.settings[c],
+        )
+
+        # Workspaces are shared, because the cases run one after the other.
+        state = State(
+            states.y[c],
+            states.memory[c],
+            states.clock[c],
+            states.rows,
+            states.margins,
+            states.probes,
+            states.grip,
+        )
+
+        record = Record(
+            records.cycles[c],
+            records.whole[c],
+            records.faces[c],
+            records.samples[c],
+            records.events[c],
+        )
+        states.clock[c, Clock.STATUS] = run_case(rig, state, record)

@@ -1,0 +1,357 @@
+"""First zero of a margin within a step, and the change of regime there (compiled).
+
+The margins are evaluated on the dense output at N_CHECKS points of a step, and at the vertex of the parabola through
+three of them where a margin nearly vanishes between two points.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..compiled.jit import njit
+from ..friction.flags_kernels import NJIT_KERNEL
+from .motion_kernels import find_rates, look, project, rests, update_grip
+from .records import Clock, Face, Margin, Memory, Setting
+from .step_kernels import POINT, RATES, read_curve
+from .table_kernels import switch_law, write_law_margins
+
+
+class StepEvent(NamedTuple):
+    """Fraction of a step at an event, its interface (-1: there is no event) and its margin."""
+
+    fraction: float
+    face: int
+    which: int
+
+
+N_CHECKS = 3  # points of a step at which margins are evaluated, besides its start
+N_MARGINS = 4
+LAST_MARGINS = 4  # row of `State.margins` of the last evaluation
+MARGIN_TOL = 1e-11  # margins are relative; above minus this they count as positive
+MAX_PIVOTS = 100
+MAX_OVERLOAD = 1e-9  # relative excess over the static friction that is attributed to round-off
+SAME_SPEED_TOL = 1e-12  # relative velocity below which an interface stops together with another one
+VERTEX_FRACTION = (
+    0.2  # a vertex is evaluated if it lies below this fraction of the margins beside it
+)
+ROOT_TOL = 1e-14  # error of an event, relative to its step
+MAX_ROOT_STEPS = 60
+FIRST_LOOK = 1e-5  # fraction of an interval, behind a margin that starts at 0
+
+
+@njit(**NJIT_KERNEL)
+def write_margins(rig, state, t, y, margins):
+    """Write the margins of all interfaces at a state; those of rigid laws need the accelerations.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion, which is updated.
+    t : float
+        Time [s].
+    y : (n,) array
+        State.
+    margins : array
+        Margins, which are written.
+    """
+    n = rig.modes.shape[1]
+    if rig.settings[Setting.HAS_RIGID] > 0:
+        find_rates(rig, state, t, y, state.rows[RATES])
+    for i in range(rig.faces.shape[0]):
+        face = rig.faces[i]
+        first = 2 * n + int(face[Face.FIRST_STATE])
+        for k in range(N_MARGINS):
+            margins[i, k] = np.inf
+        point = look(rig, state, i, t, y)
+        write_law_margins(
+            int(face[Face.LAW]),
+            face[Face.NUMBERS :],
+            state.memory[i],
+            point,
+            y[first : first + int(face[Face.N_STATES])],
+            margins[i],
+        )
+
+
+@njit(**NJIT_KERNEL)
+def copy_margins(state, row):
+    """Copy a row of the margins to row 0, that of the start of the next step."""
+    for i in range(state.margins.shape[1]):
+        for k in range(N_MARGINS):
+            state.margins[0, i, k] = state.margins[row, i, k]
+
+
+@njit(**NJIT_KERNEL)
+def write_margins_inside(rig, state, x, row):
+    """Write the margins at the fraction x of a step into a row of `State.margins`.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion, which is updated.
+    x : float
+        Fraction of the step.
+    row : int
+        Row of `State.margins` that is written.
+    """
+    y = state.rows[POINT]
+    read_curve(state, x, y)
+    t = state.clock[Clock.TIME] + x * state.clock[Clock.LENGTH]
+    write_margins(rig, state, t, y, state.margins[row])
+
+
+@njit(**NJIT_KERNEL)
+def find_margin(rig, state, x, i, k):
+    """Return a margin at the fraction x of a step.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion, which is updated.
+    x : float
+        Fraction of the step.
+    i : int
+        Number of the interface.
+    k : int
+        Number of the margin (`records.Margin`).
+    """
+    write_margins_inside(rig, state, x, LAST_MARGINS)
+    return state.margins[LAST_MARGINS, i, k]
+
+
+@njit(**NJIT_KERNEL)
+def find_root(rig, state, i, k, left, right):
+    """Return the fraction of a step at which a margin vanishes between two fractions (Illinois rule).
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion, which is updated.
+    i : int
+        Number of the interface.
+    k : int
+        Number of the margin (`records.Margin`).
+    left : float
+        Fraction of the step before the root.
+    right : float
+        Fraction of the step after the root.
+    """
+    f_left = find_margin(rig, state, left, i, k)
+    f_right = find_margin(rig, state, right, i, k)
+    if f_left < -MARGIN_TOL:
+        return left
+    # A margin that starts at 0 may first increase.
+    inside = FIRST_LOOK
+    while f_left * f_right >= 0:
+        if inside > 1:
+            return left
+        f_left = find_margin(rig, state, left + inside * (right - left), i, k)
+        if f_left * f_right < 0:
+            left += inside * (right - left)
+        inside *= 4
+
+    for _ in range(MAX_ROOT_STEPS):
+        middle = (left * f_right - right * f_left) / (f_right - f_left)
+        f_middle = find_margin(rig, state, middle, i, k)
+        if f_middle * f_right < 0:
+            left = right
+            f_left = f_right
+        else:
+            f_left *= 0.5
+        right = middle
+        f_right = f_middle
+        if f_middle == 0 or abs(right - left) < ROOT_TOL:
+            break
+    return right
+
+
+@njit(**NJIT_KERNEL)
+def find_vertex(a, b, c):
+    """Return the position in [0, 2] of the minimum of a parabola through (0, a), (1, b), (2, c), and its value.
+
+    The position is -1 without a minimum inside.
+
+    Parameters
+    ----------
+    a : float
+        Value at 0.
+    b : float
+        Value at 1.
+    c : float
+        Value at 2.
+    """
+    bend = a - 2 * b + c
+    slope = 0.5 * (c - a)
+    if not bend > 0 or abs(slope) >= bend:
+        return -1.0, 0.0
+    return 1 - slope / bend, b - 0.5 * slope * slope / bend
+
+
+@njit(**NJIT_KERNEL)
+def find_event(rig, state):
+    """Return the first event of a step.
+
+    Row 0 of the margins is that of the start of the step.
+    """
+    event = StepEvent(1.0, -1, -1)
+    n_faces = rig.faces.shape[0]
+
+    # Margins that are negative at a point, or at the vertex of the parabola through three points.
+    for check in range(1, N_CHECKS + 1):
+        write_margins_inside(rig, state, check / N_CHECKS, check)
+        for i in range(n_faces):
+            for k in range(N_MARGINS):
+                left = (check - 1) / N_CHECKS
+                right = check / N_CHECKS
+                is_negative = state.margins[check, i, k] < -MARGIN_TOL
+                if check > 1 and not is_negative:
+                    # A short excursion below 0 between the points shows as a minimum close to 0.
+                    a = state.margins[check - 2, i, k]
+                    b = state.margins[check - 1, i, k]
+                    c = state.margins[check, i, k]
+                    vertex, value = find_vertex(a, b, c)
+                    if vertex >= 0 and value < VERTEX_FRACTION * max(a, c):
+                        right = (check - 2 + vertex) / N_CHECKS
+                        left = (check - 2 + int(vertex)) / N_CHECKS
+                        is_negative = find_margin(rig, state, right, i, k) < -MARGIN_TOL
+
+                if is_negative and left < event.fraction:
+                    root = find_root(rig, state, i, k, left, right)
+                    if event.face < 0 or root < event.fraction:
+                        event = StepEvent(root, i, k)
+        if event.face >= 0:
+            break
+    return event
+
+
+@njit(**NJIT_KERNEL)
+def change_regime(rig, state, i, which):
+    """Switch the regime of an interface at an event; return whether the run ends.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion, which is updated.
+    i : int
+        Number of the interface.
+    which : int
+        Margin that has vanished (`records.Margin`).
+    """
+    n = rig.modes.shape[1]
+    face = rig.faces[i]
+    t = state.clock[Clock.TIME]
+    first = 2 * n + int(face[Face.FIRST_STATE])
+    find_rates(rig, state, t, state.y, state.rows[RATES])
+    point = look(rig, state, i, t, state.y)
+    ends = switch_law(
+        int(face[Face.LAW]),
+        face[Face.NUMBERS :],
+        state.memory[i],
+        point,
+        state.y[first : first + int(face[Face.N_STATES])],
+        which,
+    )
+    if face[Face.RIGID] and rests(state.memory[i]):
+        stop_together(rig, state)
+    hold_or_release(rig, state)
+    return ends
+
+
+@njit(**NJIT_KERNEL)
+def stop_together(rig, state):
+    """Bring all rigid interfaces without velocity to rest; the modes lose the round-off of these velocities."""
+    n = rig.modes.shape[1]
+    v = state.y[n : 2 * n]
+    for i in range(rig.faces.shape[0]):
+        row = rig.rows[0, i]
+        velocity = project(row, v)
+        is_stopping = abs(velocity) < SAME_SPEED_TOL * state.memory[i, Memory.SPEED]
+        if rig.faces[i, Face.RIGID] and state.memory[i, Memory.CONTACT] > 0 and is_stopping:
+            state.memory[i, Memory.DIRECTION] = 0.0
+        if rests(state.memory[i]):
+            square = project(row, row)
+            for j in range(n):
+                v[j] -= row[j] * velocity / square
+
+
+@njit(**NJIT_KERNEL)
+def hold_or_release(rig, state):
+    """Find which rigid interfaces without velocity rest and which slip (Murty's principal pivoting).
+
+    Rest must not need more than the static friction, and an interface that begins to slip must accelerate in the
+    direction of its slip. The first interface that violates its condition changes sides, until none does.
+    """
+    for _ in range(MAX_PIVOTS):
+        update_grip(rig, state)
+        write_margins(rig, state, state.clock[Clock.TIME], state.y, state.margins[LAST_MARGINS])
+        i = find_violation(rig, state)
+        if i < 0:
+            break
+        memory = state.memory[i]
+        if rests(memory):
+            memory[Memory.DIRECTION] = 1.0 if memory[Memory.FORCE] > 0 else -1.0
+        else:
+            memory[Memory.DIRECTION] = 0.0
+    copy_margins(state, LAST_MARGINS)
+
+
+@njit(**NJIT_KERNEL)
+def find_violation(rig, state):
+    """Return the first rigid interface that can neither stay at rest nor begin to slip as it does, or -1."""
+    n = rig.modes.shape[1]
+    for i in range(rig.faces.shape[0]):
+        memory = state.memory[i]
+        if not rig.faces[i, Face.RIGID] or memory[Memory.CONTACT] < 0:
+            continue
+        if rests(memory):
+            if state.margins[LAST_MARGINS, i, Margin.MOTION] < -MAX_OVERLOAD:
+                return i
+        elif rig.settings[Setting.IS_BENCH] == 0:
+            row = rig.rows[0, i]
+            velocity = project(row, state.y[n : 2 * n])
+            inertia = rig.settings[Setting.MASS] / project(row, row)
+            push = memory[Memory.DIRECTION] * project(row, state.rows[RATES, n : 2 * n]) * inertia
+            is_still = abs(velocity) < SAME_SPEED_TOL * memory[Memory.SPEED]
+            if is_still and push < -MAX_OVERLOAD * rig.faces[i, Face.LOAD]:
+                return i
+    return -1
+
+
+@njit(**NJIT_KERNEL)
+def start_directions(rig, state):
+    """Set the directions of motion at the start of a run; a law keeps a direction that it has.
+
+    A new law has that of the velocity, or of the acceleration if there is no velocity. A rigid interface without a
+    velocity is at rest.
+    """
+    n = rig.modes.shape[1]
+    t = state.clock[Clock.TIME]
+    acceleration = state.rows[RATES, n : 2 * n]
+    is_bench = rig.settings[Setting.IS_BENCH] > 0
+    for i in range(rig.faces.shape[0]):
+        point = look(rig, state, i, t, state.y)
+        velocity = point.velocity
+        is_new = state.memory[i, Memory.DIRECTION] == 0
+        if is_new and point.load < 0:
+            state.memory[i, Memory.CONTACT] = -1.0
+        if is_new:
+            state.memory[i, Memory.ORIGIN] = point.slide
+        if is_new and (is_bench or abs(velocity) > SAME_SPEED_TOL * point.speed_scale):
+            state.memory[i, Memory.DIRECTION] = 1.0 if velocity >= 0 else -1.0
+        elif is_new and not rig.faces[i, Face.RIGID]:
+            # The acceleration under all other forces, because a law has no force without a motion.
+            state.memory[i, Memory.DIRECTION] = 1.0
+            find_rates(rig, state, t, state.y, state.rows[RATES])
+            if project(rig.rows[0, i], acceleration) < 0:
+                state.memory[i, Memory.DIRECTION] = -1.0
+    hold_or_release(rig, state)

@@ -1,0 +1,123 @@
+"""Bonds of order 1 with reading = "stretch" (eq. 2.17), summed by their moments, with growth (eq. 2.10).
+
+With the bond length eps of new bonds, the density m, the mean stretch z and the mean square stretch w of the bonds per
+load obey, along the path |v| dt,
+
+    m' = (1 - m)|v|/eps,   z' = m v - z|v|/eps,   w' = 2 z v - w|v|/eps,   F = mu N z/eps_0,
+
+and eps' = a_s/max(|v|, v_h) (eps_0 - eps) + |v|/l_k (eps_k - eps). Stored energy: mu N w/(2 eps_0). States: m, z, w, eps.
+Numbers: mu, eps_0, eps_k [m], a_s [m/s2] (0: eps is constant), l_k [m], v_h [m/s]. `memory[FLAG]` is 1 above the
+speed v_h.
+"""
+
+from ...exceptions import PatchfemError
+from ..records import Friction, LawNumbers, Margin, Memory
+
+RIGID = False
+MIN_DENSITY = 1e-30  # density below which no bond exists that could slip
+REST_SPEED_FRACTION = 1e-3  # default of the speed v_h relative to the expected peak speed
+MIN_REST_SPEED = 1e-12  # smallest default of v_h [m/s]
+DENSITY_SCALE = 1.0  # largest density, to which its error is relative
+
+
+def force_and_rates(p, memory, point, s, rates):
+    """Write the rates of the moments; slip is the displacement less the mean stretch z/m.
+
+    Parameters
+    ----------
+    p : (k,) array
+        Numbers of the law.
+    memory : (l,) array
+        Row of `records.State.memory`.
+    point : Point
+        Load and motion of the interface.
+    s : (j,) array
+        States of the law.
+    rates : (n,) array
+        Rates, which are written.
+    """
+    v = point.velocity
+    speed = memory[Memory.DIRECTION] * v
+    if p[3] > 0:
+        healing_speed = speed if memory[Memory.FLAG] > 0 else p[5]
+        rates[3] = p[3] / healing_speed * (p[1] - s[3]) + speed / p[4] * (p[2] - s[3])
+    breaking = speed / s[3]
+    rates[0] = (1 - s[0]) * breaking
+    rates[1] = s[0] * v - s[1] * breaking
+    rates[2] = 2 * s[1] * v - s[2] * breaking
+
+    stiffness = p[0] * point.load / p[1]
+    slip_rate = s[1] * breaking / s[0] ** 2 if s[0] > MIN_DENSITY else 0.0
+    return Friction(stiffness * s[1], slip_rate, 0.5 * stiffness * s[2] * breaking)
+
+
+def write_margins(p, memory, point, s, margins):
+    """Write the velocity in the direction of motion, and the side of the speed v_h.
+
+    Parameters
+    ----------
+    p : (k,) array
+        Numbers of the law.
+    memory : (l,) array
+        Row of `records.State.memory`.
+    point : Point
+        Load and motion of the interface.
+    s : (j,) array
+        States of the law.
+    margins : array
+        Margins, which are written.
+    """
+    speed = memory[Memory.DIRECTION] * point.velocity
+    margins[Margin.MOTION] = speed / point.speed_scale
+    if p[3] > 0:
+        margins[Margin.BRANCH] = memory[Memory.FLAG] * (speed - p[5]) / p[5]
+
+
+def switch(p, memory, point, s, which):
+    """Change the direction of motion or the side of the speed v_h.
+
+    Parameters
+    ----------
+    p : (k,) array
+        Numbers of the law.
+    memory : (l,) array
+        Row of `records.State.memory`.
+    point : Point
+        Load and motion of the interface.
+    s : (j,) array
+        States of the law.
+    which : int
+        Margin that has vanished (`records.Margin`).
+    """
+    column = Memory.DIRECTION if which == Margin.MOTION else Memory.FLAG
+    memory[column] = -memory[column]
+    return False
+
+
+def from_keys(friction, load, speed):
+    """Return the law of a constant load; only order 1 with reading = "stretch" has moments that close.
+
+    Parameters
+    ----------
+    friction : table
+        Keys of [friction] in SI units.
+    load : float
+        Mean load [N].
+    speed : float
+        Expected peak speed [m/s].
+    """
+    if friction.reading != "stretch" or friction.order != 1 or friction.breakaway:
+        raise PatchfemError(
+            "bonds with reading = 'report', an order other than 1 or a breakaway have no finite set of rates, so "
+            "their motion is not computed from event to event",
+            "friction.reading",
+        )
+    length = friction.bond_length
+    ratio = friction.kinetic / friction.static if friction.static > 0 else 1.0
+    growth = (0.0, 1.0, 1.0)
+    if friction.rest_growth is not None:
+        rest_speed = friction.rest_speed or max(REST_SPEED_FRACTION * speed, MIN_REST_SPEED)
+        growth = (friction.rest_growth, friction.slip_growth, rest_speed)
+    numbers = (friction.static, length, ratio * length, *growth)
+    scales = (DENSITY_SCALE, 1e-2 * length, 1e-4 * length**2, length)
+    return LawNumbers("bonds", numbers, (friction.initial_bonds, 0.0, 0.0, length), scales)

@@ -1,0 +1,91 @@
+"""Bouc-Wen law: F = mu N z, z' = v/eps (1 - |z|^n (s sgn(v z) + 1 - s)) (Wen 1976). Numbers: mu, eps [m], n, s.
+
+`memory[FLAG]` is the sign of z.
+"""
+
+from ..records import Friction, LawNumbers, Margin, Memory
+
+RIGID = False
+
+
+def force_and_rates(p, memory, point, s, rates):
+    """Write the rate of z; the loss is the work that its spring does not store.
+
+    Parameters
+    ----------
+    p : (k,) array
+        Numbers of the law.
+    memory : (l,) array
+        Row of `records.State.memory`.
+    point : Point
+        Load and motion of the interface.
+    s : (j,) array
+        States of the law.
+    rates : (n,) array
+        Rates, which are written.
+    """
+    side = memory[Memory.FLAG]
+    size = (side * s[0]) ** p[2] if side * s[0] > 0 else 0.0
+    fraction = size * (p[3] * side * memory[Memory.DIRECTION] + 1 - p[3])
+    rates[0] = point.velocity / p[1] * (1 - fraction)
+    force = p[0] * point.load * s[0]
+    slip_rate = fraction * point.velocity
+    return Friction(force, slip_rate, force * slip_rate)
+
+
+def write_margins(p, memory, point, s, margins):
+    """Write the velocity in the direction of motion, and z on its side.
+
+    Parameters
+    ----------
+    p : (k,) array
+        Numbers of the law.
+    memory : (l,) array
+        Row of `records.State.memory`.
+    point : Point
+        Load and motion of the interface.
+    s : (j,) array
+        States of the law.
+    margins : array
+        Margins, which are written.
+    """
+    margins[Margin.MOTION] = memory[Memory.DIRECTION] * point.velocity / point.speed_scale
+    margins[Margin.BRANCH] = memory[Memory.FLAG] * s[0]
+
+
+def switch(p, memory, point, s, which):
+    """Change the sign of the velocity or of z.
+
+    Parameters
+    ----------
+    p : (k,) array
+        Numbers of the law.
+    memory : (l,) array
+        Row of `records.State.memory`.
+    point : Point
+        Load and motion of the interface.
+    s : (j,) array
+        States of the law.
+    which : int
+        Margin that has vanished (`records.Margin`).
+    """
+    column = Memory.DIRECTION if which == Margin.MOTION else Memory.FLAG
+    memory[column] = -memory[column]
+    return False
+
+
+def from_keys(friction, load, speed):
+    """Return the law of a constant load [N].
+
+    Parameters
+    ----------
+    friction : table
+        Keys of [friction] in SI units.
+    load : float
+        Mean load [N].
+    speed : float
+        Expected peak speed [m/s].
+    """
+    length = friction.static * load / friction.stiffness
+    numbers = friction.static, length, friction.exponent, friction.shape
+    return LawNumbers("bouc_wen", numbers, (0.0,), (1e-2,))

@@ -1,0 +1,99 @@
+"""Coulomb friction with mu_s >= mu_k: a constraint at rest, mu_k N against the motion otherwise (eq. 2.1).
+
+Numbers: mu_s, mu_k. The averaged law of Oden and Pires is Coulomb friction with the average pressure.
+"""
+
+from ..records import Friction, LawNumbers, Margin, Memory
+
+RIGID = True
+
+
+def force_and_rates(p, memory, point, s, rates):
+    """Return the kinetic friction force; it dissipates all of its work.
+
+    Parameters
+    ----------
+    p : (k,) array
+        Numbers of the law.
+    memory : (l,) array
+        Row of `records.State.memory`.
+    point : Point
+        Load and motion of the interface.
+    s : (j,) array
+        States of the law.
+    rates : (n,) array
+        Rates, which are written.
+    """
+    if memory[Memory.CONTACT] < 0:
+        return Friction(0.0, point.velocity, 0.0)
+    force = memory[Memory.DIRECTION] * p[1] * point.load
+    return Friction(force, point.velocity, force * point.velocity)
+
+
+def write_margins(p, memory, point, s, margins):
+    """Write static friction less the holding force, or the velocity in the direction of slip, and the load.
+
+    Parameters
+    ----------
+    p : (k,) array
+        Numbers of the law.
+    memory : (l,) array
+        Row of `records.State.memory`.
+    point : Point
+        Load and motion of the interface.
+    s : (j,) array
+        States of the law.
+    margins : array
+        Margins, which are written.
+    """
+    contact = memory[Memory.CONTACT]
+    margins[Margin.CONTACT] = contact * point.load / point.load_scale
+    direction = memory[Memory.DIRECTION]
+    if direction != 0:
+        margins[Margin.MOTION] = direction * point.velocity / point.speed_scale
+    elif contact > 0:
+        margins[Margin.MOTION] = (p[0] * point.load - abs(point.held)) / (p[0] * point.load_scale)
+
+
+def switch(p, memory, point, s, which):
+    """Start, stop or reverse the slip, or change the contact.
+
+    Parameters
+    ----------
+    p : (k,) array
+        Numbers of the law.
+    memory : (l,) array
+        Row of `records.State.memory`.
+    point : Point
+        Load and motion of the interface.
+    s : (j,) array
+        States of the law.
+    which : int
+        Margin that has vanished (`records.Margin`).
+    """
+    if which == Margin.CONTACT:
+        memory[Memory.CONTACT] = -memory[Memory.CONTACT]
+        memory[Memory.DIRECTION] = 1.0 if point.velocity >= 0 else -1.0
+    elif memory[Memory.DIRECTION] == 0:
+        memory[Memory.DIRECTION] = 1.0 if point.held > 0 else -1.0
+    elif point.compliance == 0 or memory[Memory.CONTACT] < 0:
+        memory[Memory.DIRECTION] = -memory[Memory.DIRECTION]
+    else:
+        memory[Memory.DIRECTION] = 0.0
+    return False
+
+
+def from_keys(friction, load, speed):
+    """Return Coulomb's law; without a kinetic coefficient it is the static one.
+
+    Parameters
+    ----------
+    friction : table
+        Keys of [friction] in SI units.
+    load : float
+        Mean load [N].
+    speed : float
+        Expected peak speed [m/s].
+    """
+    kinetic = friction.static if friction.kinetic is None else friction.kinetic
+    return LawNumbers("coulomb", (friction.static, kinetic))

@@ -1,0 +1,95 @@
+"""LuGre law (Canudas de Wit et al. 1995): F = N (c z + b z' + d v), z' = v - c |v| z/g(v).
+
+g(v) = mu_k + (mu_s - mu_k) exp(-(v/v_s)^2). Numbers: mu_s, mu_k, c [1/m], v_s [m/s], b, d [s/m], per load.
+"""
+
+from math import exp
+
+from ..records import Friction, LawNumbers, Margin, Memory
+
+RIGID = False
+MIN_LIMIT = 1e-9  # smallest g relative to mu_s; the rate of z divides by it
+
+
+def force_and_rates(p, memory, point, s, rates):
+    """Write the rate of z; the loss is the work that the bristles do not store.
+
+    Parameters
+    ----------
+    p : (k,) array
+        Numbers of the law.
+    memory : (l,) array
+        Row of `records.State.memory`.
+    point : Point
+        Load and motion of the interface.
+    s : (j,) array
+        States of the law.
+    rates : (n,) array
+        Rates, which are written.
+    """
+    v = point.velocity
+    limit = max(p[1] + (p[0] - p[1]) * exp(-((v / p[3]) ** 2)), MIN_LIMIT * p[0])
+    slip_rate = memory[Memory.DIRECTION] * p[2] * s[0] / limit * v
+    rates[0] = v - slip_rate
+    force = point.load * (p[2] * s[0] + p[4] * rates[0] + p[5] * v)
+    return Friction(force, slip_rate, force * v - point.load * p[2] * s[0] * rates[0])
+
+
+def write_margins(p, memory, point, s, margins):
+    """Write the velocity in the direction of motion.
+
+    Parameters
+    ----------
+    p : (k,) array
+        Numbers of the law.
+    memory : (l,) array
+        Row of `records.State.memory`.
+    point : Point
+        Load and motion of the interface.
+    s : (j,) array
+        States of the law.
+    margins : array
+        Margins, which are written.
+    """
+    margins[Margin.MOTION] = memory[Memory.DIRECTION] * point.velocity / point.speed_scale
+
+
+def switch(p, memory, point, s, which):
+    """Change the direction of motion.
+
+    Parameters
+    ----------
+    p : (k,) array
+        Numbers of the law.
+    memory : (l,) array
+        Row of `records.State.memory`.
+    point : Point
+        Load and motion of the interface.
+    s : (j,) array
+        States of the law.
+    which : int
+        Margin that has vanished (`records.Margin`).
+    """
+    memory[Memory.DIRECTION] = -memory[Memory.DIRECTION]
+    return False
+
+
+def from_keys(friction, load, speed):
+    """Return the law of a constant load [N], to which stiffness and damping refer.
+
+    Parameters
+    ----------
+    friction : table
+        Keys of [friction] in SI units.
+    load : float
+        Mean load [N].
+    speed : float
+        Expected peak speed [m/s].
+    """
+    kinetic = friction.static if friction.kinetic is None else friction.kinetic
+    stiffness = friction.stiffness / load
+    numbers = (
+        friction.static, kinetic, stiffness, friction.stribeck_speed,
+        friction.micro_damping / load, friction.viscous / load,
+    )  # fmt: skip
+    return LawNumbers("lugre", numbers, (0.0,), (1e-2 * friction.static / stiffness,))

@@ -1,0 +1,217 @@
+"""Parallel Jenkins elements under a constant load: curve of first loading and a stack of reversals (Masing's rules).
+
+With B(x) the force of first loading to the displacement x, the branch from a reversal at (q_r, F_r) is
+F = F_r + 2 d B(d (q - q_r)/2). It ends where it meets the branch before the last one (Madelung's rule). The elements
+that slip carry B - x B' of the force; their power is dissipated, and the slip is the mean over the elements, weighted by
+their slip forces.
+
+Numbers: chi, beta, slip force F_S [N], phi_max [m], number n of pieces of the curve, then n + 1 displacements and
+n + 1 forces. With beta >= 0 the curve is Segalman's (2005) power law below phi_max; otherwise it is linear between
+its n + 1 points. Beyond the last point the force is F_S. One piece is the elastic-plastic law (eq. 3.12).
+`memory[FLAG]` is the number of the piece.
+"""
+
+from ..records import Friction, LawNumbers, Margin, Memory
+
+RIGID = False
+POINTS = 5  # first of the n + 1 displacements among the numbers
+MIN_BRANCH = 1e-13  # shortest branch between two reversals, relative to phi_max
+
+
+def force_and_rates(p, memory, point, s, rates):
+    """Return the force on the current branch; slip and loss are those of the elements that slip.
+
+    Parameters
+    ----------
+    p : (k,) array
+        Numbers of the law.
+    memory : (l,) array
+        Row of `records.State.memory`.
+    point : Point
+        Load and motion of the interface.
+    s : (j,) array
+        States of the law.
+    rates : (n,) array
+        Rates, which are written.
+    """
+    direction = memory[Memory.DIRECTION]
+    if memory[Memory.CONTACT] < 0:
+        return Friction(0.0, point.velocity, 0.0)
+
+    # Displacement x on the curve of first loading, from the last reversal at half the scale.
+    n = int(memory[Memory.COUNT])
+    half = 1.0
+    start = start_force = 0.0
+    if n > 0:
+        half = 0.5
+        start = memory[Memory.STACK + 2 * n - 2]
+        start_force = memory[Memory.STACK + 2 * n - 1]
+    x = half * direction * (point.slide - memory[Memory.ORIGIN] - start)
+
+    # Force and slope of first loading.
+    pieces = int(p[4])
+    k = int(memory[Memory.FLAG])
+    force = p[2]
+    slope = 0.0
+    if k < pieces and p[1] >= 0:
+        scale = p[2] / (p[1] + (p[0] + 1) / (p[0] + 2)) / p[3]
+        power = max(x / p[3], 0.0) ** (p[0] + 1)
+        slope = scale * (p[1] + 1 - power)
+        force = scale * x * (p[1] + 1 - power / (p[0] + 2))
+    elif k < pieces:
+        first = POINTS + k
+        values = first + pieces + 1
+        slope = (p[values + 1] - p[values]) / (p[first + 1] - p[first])
+        force = p[values] + slope * (x - p[first])
+
+    slipping = force - x * slope
+    speed = direction * point.velocity
+    return Friction(
+        start_force + direction / half * force, slipping / p[2] * point.velocity, slipping * speed
+    )
+
+
+def write_margins(p, memory, point, s, margins):
+    """Write the velocity along the branch, the distances to its end and to that of a piece, and the load.
+
+    Parameters
+    ----------
+    p : (k,) array
+        Numbers of the law.
+    memory : (l,) array
+        Row of `records.State.memory`.
+    point : Point
+        Load and motion of the interface.
+    s : (j,) array
+        States of the law.
+    margins : array
+        Margins, which are written.
+    """
+    direction = memory[Memory.DIRECTION]
+    margins[Margin.CONTACT] = memory[Memory.CONTACT] * point.load / point.load_scale
+    margins[Margin.MOTION] = direction * point.velocity / point.speed_scale
+    n = int(memory[Memory.COUNT])
+    k = int(memory[Memory.FLAG])
+    if k >= int(p[4]):
+        return
+    q = point.slide - memory[Memory.ORIGIN]
+    half = 0.5 if n > 0 else 1.0
+    start = memory[Memory.STACK + 2 * n - 2] if n > 0 else 0.0
+    margins[Margin.LIMIT] = (p[POINTS + k + 1] - half * direction * (q - start)) / p[3]
+    if n > 2 or (n == 2 and memory[Memory.VIRGIN] > 0):
+        end = memory[Memory.STACK + 2 * n - 4]
+        margins[Margin.BRANCH] = direction * (end - q) / p[3]
+
+
+def switch(p, memory, point, s, which):
+    """Reverse, return to an earlier branch, or enter the next piece of the curve.
+
+    Parameters
+    ----------
+    p : (k,) array
+        Numbers of the law.
+    memory : (l,) array
+        Row of `records.State.memory`.
+    point : Point
+        Load and motion of the interface.
+    s : (j,) array
+        States of the law.
+    which : int
+        Margin that has vanished (`records.Margin`).
+    """
+    direction = memory[Memory.DIRECTION]
+    n = int(memory[Memory.COUNT])
+    pieces = int(p[4])
+    q = point.slide - memory[Memory.ORIGIN]
+    if which == Margin.CONTACT:
+        memory[Memory.CONTACT] = -memory[Memory.CONTACT]
+        return False
+    if which == Margin.LIMIT:
+        memory[Memory.FLAG] += 1
+        return False
+
+    if which == Margin.BRANCH:
+        # The two last reversals are forgotten (Madelung's rule).
+        n = max(n - 2, 0)
+    else:
+        force = memory[Memory.FORCE]
+        last = memory[Memory.STACK + 2 * n - 2] if n > 0 else 0.0
+        if n > 0 and abs(q - last) <= MIN_BRANCH * p[3]:
+            n -= 1
+        else:
+            if int(memory[Memory.FLAG]) >= pieces:
+                # All elements slip: only this reversal matters, and its branch ends after 2 phi_max.
+                n = 1
+                memory[Memory.STACK] = q - 2 * direction * p[3]
+                memory[Memory.STACK + 1] = -force
+                memory[Memory.VIRGIN] = -1.0
+            elif n == 0:
+                # The curve of first loading is met again at -q.
+                n = 1
+                memory[Memory.STACK] = -q
+                memory[Memory.STACK + 1] = -force
+            if Memory.STACK + 2 * n + 2 > memory.size:
+                # The stack is full: the two innermost reversals of the oldest are given up.
+                for j in range(Memory.STACK + 2, memory.size - 4):
+                    memory[j] = memory[j + 4]
+                n -= 2
+            memory[Memory.STACK + 2 * n] = q
+            memory[Memory.STACK + 2 * n + 1] = force
+            n += 1
+        direction = -direction
+        memory[Memory.DIRECTION] = direction
+    if n == 1 and memory[Memory.VIRGIN] > 0:
+        # The loop of the largest displacement is closed; the curve of first loading goes on.
+        n = 0
+    memory[Memory.COUNT] = n
+
+    # Piece of the curve on the new branch.
+    half = 0.5 if n > 0 else 1.0
+    start = memory[Memory.STACK + 2 * n - 2] if n > 0 else 0.0
+    x = half * direction * (q - start)
+    k = 0
+    while k < pieces and x >= p[POINTS + k + 1]:
+        k += 1
+    memory[Memory.FLAG] = k
+    return False
+
+
+def from_elements(stiffness, yield_displacement):
+    """Return the law of parallel Jenkins elements of given stiffness [N/m] and yield displacement [m].
+
+    Elements that yield at the same displacement form one point of the curve.
+    """
+    pairs = {}
+    for k, x in zip(stiffness, yield_displacement):
+        pairs[float(x)] = pairs.get(float(x), 0.0) + float(k)
+    points = sorted(pairs)
+    edges, forces = [0.0], [0.0]
+    slope = sum(pairs.values())
+    for x in points:
+        forces.append(forces[-1] + slope * (x - edges[-1]))
+        edges.append(x)
+        slope -= pairs[x]
+    numbers = (0.0, -1.0, forces[-1], edges[-1], len(points), *edges, *forces)
+    return LawNumbers("masing", numbers, length=forces[-1] / sum(pairs.values()))
+
+
+def from_keys(friction, load, speed):
+    """Return the elastic-plastic law, or Segalman's for law "iwan".
+
+    Parameters
+    ----------
+    friction : table
+        Keys of [friction] in SI units.
+    load : float
+        Mean load [N].
+    speed : float
+        Expected peak speed [m/s].
+    """
+    limit = friction.static * load
+    if friction.law == "iwan":
+        chi, beta = friction.chi, friction.beta
+        length = limit * (1 + beta) / (friction.stiffness * (beta + (chi + 1) / (chi + 2)))
+        numbers = (chi, beta, limit, length, 1, 0.0, length, 0.0, limit)
+        return LawNumbers("masing", numbers, length=limit / friction.stiffness)
+    length = friction.bond_length or limit / friction.stiffness
+    return from_elements([limit / length], [length])

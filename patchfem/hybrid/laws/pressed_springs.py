@@ -1,0 +1,129 @@
+"""Elastic-plastic contact whose springs come with the load (eq. 3.12 under a load that varies).
+
+A load N has springs of density s [N] with stiffness mu s/eps. More load adds unstretched springs; springs beyond a load
+that falls break as the contact slips. States: y (force over mu [N]) and s. Numbers: mu, eps [m].
+
+`memory[FLAG]` is the side on which the contact slips (0: it sticks), `memory[COUNT]` is 1 while the density grows with the
+load and -1 while it does not.
+"""
+
+from ..records import Friction, LawNumbers, Margin, Memory
+
+RIGID = False
+
+
+def force_and_rates(p, memory, point, s, rates):
+    """Write the rates of force and density; the rates are continuous where slip starts and ends.
+
+    Parameters
+    ----------
+    p : (k,) array
+        Numbers of the law.
+    memory : (l,) array
+        Row of `records.State.memory`.
+    point : Point
+        Load and motion of the interface.
+    s : (j,) array
+        States of the law.
+    rates : (n,) array
+        Rates, which are written.
+    """
+    if memory[Memory.CONTACT] < 0:
+        return Friction(0.0, point.velocity, 0.0)
+    side = memory[Memory.FLAG]
+    growth = point.load_rate if memory[Memory.COUNT] > 0 else 0.0
+    v = point.velocity
+    if side == 0:
+        rates[0] = s[1] * v / p[1]
+        rates[1] = growth
+        return Friction(p[0] * s[0], 0.0, 0.0)
+
+    # The force follows the load; only a rising load stretches the springs further.
+    elastic = side * max(point.load_rate, 0.0) * p[1] / s[1] if s[1] > 0 else 0.0
+    slip_rate = v - elastic
+    rates[0] = side * point.load_rate
+    rates[1] = growth - max(s[1] - point.load, 0.0) * max(side * slip_rate, 0.0) / p[1]
+    force = side * p[0] * point.load
+    return Friction(force, slip_rate, force * slip_rate)
+
+
+def write_margins(p, memory, point, s, margins):
+    """Write the distance to slip or the rate of slip, the growth of the density, and the load.
+
+    Parameters
+    ----------
+    p : (k,) array
+        Numbers of the law.
+    memory : (l,) array
+        Row of `records.State.memory`.
+    point : Point
+        Load and motion of the interface.
+    s : (j,) array
+        States of the law.
+    margins : array
+        Margins, which are written.
+    """
+    contact = memory[Memory.CONTACT]
+    margins[Margin.CONTACT] = contact * point.load / point.load_scale
+    if contact < 0:
+        return
+    if memory[Memory.COUNT] > 0:
+        margins[Margin.LIMIT] = point.load_rate / point.load_rate_scale
+    else:
+        margins[Margin.LIMIT] = (s[1] - point.load) / point.load_scale
+    side = memory[Memory.FLAG]
+    if side == 0:
+        margins[Margin.BRANCH] = (point.load - abs(s[0])) / point.load_scale
+    else:
+        stretch_rate = side * s[1] * point.velocity / p[1]
+        margins[Margin.BRANCH] = (stretch_rate - point.load_rate) / point.load_rate_scale
+
+
+def switch(p, memory, point, s, which):
+    """Start or end slip or growth, or change the contact, which breaks all springs.
+
+    Parameters
+    ----------
+    p : (k,) array
+        Numbers of the law.
+    memory : (l,) array
+        Row of `records.State.memory`.
+    point : Point
+        Load and motion of the interface.
+    s : (j,) array
+        States of the law.
+    which : int
+        Margin that has vanished (`records.Margin`).
+    """
+    if which == Margin.CONTACT:
+        memory[Memory.CONTACT] = -memory[Memory.CONTACT]
+        s[0] = 0.0
+        s[1] = 0.0
+        memory[Memory.FLAG] = 0.0
+        memory[Memory.COUNT] = 1.0
+    elif which == Margin.LIMIT:
+        # The density is that of the load where growth starts or ends, whatever the error of its integral.
+        memory[Memory.COUNT] = -memory[Memory.COUNT]
+        s[1] = point.load
+    elif memory[Memory.FLAG] == 0:
+        memory[Memory.FLAG] = 1.0 if s[0] > 0 else -1.0
+    else:
+        s[0] = memory[Memory.FLAG] * point.load
+        memory[Memory.FLAG] = 0.0
+    return False
+
+
+def from_keys(friction, load, speed):
+    """Return the elastic-plastic law of a load that varies around `load` [N].
+
+    Parameters
+    ----------
+    friction : table
+        Keys of [friction] in SI units.
+    load : float
+        Mean load [N].
+    speed : float
+        Expected peak speed [m/s].
+    """
+    length = friction.bond_length or friction.static * load / friction.stiffness
+    return LawNumbers("pressed_springs", (friction.static, length), (0.0, load), (load, load))

@@ -1,0 +1,78 @@
+"""Springs beside the friction interfaces, which have no memory and no loss.
+
+F = k_3 q^3 + k/turn sin(turn q). Numbers: k_3 [N/m3] (structure.stiffening), k [N/m] and turn = 2 pi/wavelength [1/m]
+(interlocking peaks of a bonded spring).
+"""
+
+from math import sin
+
+from ..records import Friction, LawNumbers
+
+RIGID = False
+
+
+def force_and_rates(p, memory, point, s, rates):
+    """Return the force of the springs.
+
+    Parameters
+    ----------
+    p : (k,) array
+        Numbers of the law.
+    memory : (l,) array
+        Row of `records.State.memory`.
+    point : Point
+        Load and motion of the interface.
+    s : (j,) array
+        States of the law.
+    rates : (n,) array
+        Rates, which are written.
+    """
+    q = point.slide
+    return Friction(p[0] * q**3 + p[1] / p[2] * sin(p[2] * q), 0.0, 0.0)
+
+
+def write_margins(p, memory, point, s, margins):
+    """Write nothing, because a spring has a single regime.
+
+    Parameters
+    ----------
+    p : (k,) array
+        Numbers of the law.
+    memory : (l,) array
+        Row of `records.State.memory`.
+    point : Point
+        Load and motion of the interface.
+    s : (j,) array
+        States of the law.
+    margins : array
+        Margins, which are written.
+    """
+
+
+def switch(p, memory, point, s, which):
+    """Change nothing.
+
+    Parameters
+    ----------
+    p : (k,) array
+        Numbers of the law.
+    memory : (l,) array
+        Row of `records.State.memory`.
+    point : Point
+        Load and motion of the interface.
+    s : (j,) array
+        States of the law.
+    which : int
+        Margin that has vanished (`records.Margin`).
+    """
+    return False
+
+
+def make_cubic(stiffness):
+    """Return a spring of the force k_3 q^3; stiffness: k_3 [N/m3]."""
+    return LawNumbers("springs", (stiffness, 0.0, 1.0))
+
+
+def make_interlocking(stiffness, wavelength):
+    """Return a sinusoidal spring of stiffness [N/m] at rest and wavelength [m]."""
+    return LawNumbers("springs", (0.0, stiffness, 2 * 3.141592653589793 / wavelength))

@@ -1,0 +1,83 @@
+"""Rate law mu N tanh(v/v_0) (eq. 2.4), which never sticks. Numbers: mu, v_0 [m/s]."""
+
+from math import tanh
+
+from ..records import Friction, LawNumbers, Margin, Memory
+
+RIGID = False
+
+
+def force_and_rates(p, memory, point, s, rates):
+    """Return the force, which is a function of the velocity and dissipates all of its work.
+
+    Parameters
+    ----------
+    p : (k,) array
+        Numbers of the law.
+    memory : (l,) array
+        Row of `records.State.memory`.
+    point : Point
+        Load and motion of the interface.
+    s : (j,) array
+        States of the law.
+    rates : (n,) array
+        Rates, which are written.
+    """
+    if memory[Memory.CONTACT] < 0:
+        return Friction(0.0, point.velocity, 0.0)
+    force = p[0] * point.load * tanh(point.velocity / p[1])
+    return Friction(force, point.velocity, force * point.velocity)
+
+
+def write_margins(p, memory, point, s, margins):
+    """Write the load; the law has a single regime in contact.
+
+    Parameters
+    ----------
+    p : (k,) array
+        Numbers of the law.
+    memory : (l,) array
+        Row of `records.State.memory`.
+    point : Point
+        Load and motion of the interface.
+    s : (j,) array
+        States of the law.
+    margins : array
+        Margins, which are written.
+    """
+    margins[Margin.CONTACT] = memory[Memory.CONTACT] * point.load / point.load_scale
+
+
+def switch(p, memory, point, s, which):
+    """Change the contact.
+
+    Parameters
+    ----------
+    p : (k,) array
+        Numbers of the law.
+    memory : (l,) array
+        Row of `records.State.memory`.
+    point : Point
+        Load and motion of the interface.
+    s : (j,) array
+        States of the law.
+    which : int
+        Margin that has vanished (`records.Margin`).
+    """
+    memory[Memory.CONTACT] = -memory[Memory.CONTACT]
+    return False
+
+
+def from_keys(friction, load, speed):
+    """Return the rate law.
+
+    Parameters
+    ----------
+    friction : table
+        Keys of [friction] in SI units.
+    load : float
+        Mean load [N].
+    speed : float
+        Expected peak speed [m/s].
+    """
+    return LawNumbers("tanh", (friction.static, friction.reference_speed))

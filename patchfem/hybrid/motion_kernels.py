@@ -1,0 +1,310 @@
+"""Rates of the state of a motion: modes, drive, friction, work and slip (compiled)."""
+
+import numpy as np
+
+from ..compiled.jit import njit
+from ..friction.flags_kernels import NJIT_KERNEL
+from .records import N_FACE_INTEGRALS, N_INTEGRALS, Clock, Face, Memory, Mode, Piece, Point, Setting
+from .table_kernels import force_and_rates
+
+SHARED_GRIP = 1e-7  # relative compliance by which more interfaces than modes share their forces
+N_GRIP_PASSES = 3  # each pass removes the acceleration that this compliance leaves
+
+
+@njit(**NJIT_KERNEL)
+def project(row, vector):
+    """Return the product of a row of participations and a vector of the modes."""
+    total = 0.0
+    for j in range(row.size):
+        total += row[j] * vector[j]
+    return total
+
+
+@njit(**NJIT_KERNEL)
+def find_integrals(rig, y):
+    """Return the index of the first integral of the first interface in the state."""
+    return y.size - N_INTEGRALS - N_FACE_INTEGRALS * rig.faces.shape[0]
+
+
+@njit(**NJIT_KERNEL)
+def find_phase(piece, tau):
+    """Return phase and circular frequency of a piece of the drive at a time tau after its start."""
+    growth = piece[Piece.GROWTH]
+    grown = piece[Piece.OMEGA]
+    turned = grown * tau
+    if growth != 0:
+        turned = grown * np.expm1(growth * tau) / growth
+        grown *= np.exp(growth * tau)
+    chirp = piece[Piece.CHIRP] * tau
+    return piece[Piece.PHASE] + turned + 0.5 * chirp * tau, grown + chirp
+
+
+@njit(**NJIT_KERNEL)
+def find_drive(rig, clock, t):
+    """Return the drive and its rate at a time in the current piece.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    clock : (14,) array
+        Row of `records.State.clock`.
+    t : float
+        Time [s], in the current piece.
+    """
+    value = rate = 0.0
+    if rig.pieces.shape[0]:
+        piece = rig.pieces[int(clock[Clock.PIECE])]
+        tau = t - piece[Piece.START]
+        value = piece[Piece.CONSTANT] + piece[Piece.SLOPE] * tau
+        rate = piece[Piece.SLOPE]
+        if piece[Piece.AMPLITUDE] != 0:
+            phase, omega = find_phase(piece, tau)
+            size = piece[Piece.AMPLITUDE] * (omega * omega if piece[Piece.SQUARED] else 1.0)
+            value += size * np.sin(phase)
+            rate += size * omega * np.cos(phase)
+    for k in range(rig.tones.shape[0]):
+        phase = rig.tones[k, 1] * t + rig.tones[k, 2]
+        value += rig.tones[k, 0] * np.sin(phase)
+        rate += rig.tones[k, 0] * rig.tones[k, 1] * np.cos(phase)
+    return value, rate
+
+
+@njit(**NJIT_KERNEL)
+def prescribed_load(face, t):
+    """Return the normal load [N] at a time without heave, which may be negative, and its rate."""
+    phase = face[Face.RATE] * t + face[Face.PHASE]
+    return (
+        face[Face.MEAN] + face[Face.SWING] * np.cos(phase),
+        -face[Face.SWING] * face[Face.RATE] * np.sin(phase),
+    )
+
+
+@njit(**NJIT_KERNEL)
+def look(rig, state, i, t, y):
+    """Return the `Point` of an interface at a state.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion, which is updated.
+    i : int
+        Number of the interface.
+    t : float
+        Time [s].
+    y : (n,) array
+        State.
+    """
+    n = rig.modes.shape[1]
+    face = rig.faces[i]
+    memory = state.memory[i]
+    load, load_rate = prescribed_load(face, t)
+
+    # The slide of a bench is the drive; that of a rig follows from the modes, whose heave changes the load.
+    if rig.settings[Setting.IS_BENCH] > 0:
+        slide, velocity = find_drive(rig, state.clock, t)
+        compliance = 0.0
+    else:
+        row = rig.rows[0, i]
+        slide = project(row, y[:n])
+        velocity = project(row, y[n : 2 * n])
+        compliance = project(row, row) / rig.settings[Setting.MASS]
+        if face[Face.STIFFNESS] != 0:
+            load -= face[Face.STIFFNESS] * project(rig.rows[1, i], y[:n])
+            load_rate -= face[Face.STIFFNESS] * project(rig.rows[1, i], y[n : 2 * n])
+
+    return Point(
+        load,
+        load_rate,
+        slide,
+        velocity,
+        memory[Memory.FORCE],
+        memory[Memory.PULL],
+        compliance,
+        memory[Memory.SPEED],
+        face[Face.LOAD],
+        face[Face.LOAD_RATE],
+    )
+
+
+@njit(**NJIT_KERNEL)
+def find_rates(rig, state, t, y, rates):
+    """Write the rates of the state y at a time t, and forces and slip rates into the memory.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion, which is updated.
+    t : float
+        Time [s].
+    y : (n,) array
+        State.
+    rates : (n,) array
+        Rates, which are written.
+    """
+    n = rig.modes.shape[1]
+    n_faces = rig.faces.shape[0]
+    mass = rig.settings[Setting.MASS]
+    v = y[n : 2 * n]
+    acceleration = rates[n : 2 * n]
+    drive = find_drive(rig, state.clock, t)[0]
+
+    # Modes under the drive (eq. 3.4), and the powers of drive and dampers.
+    power = loss = 0.0
+    for j in range(n):
+        damping = project(rig.damping[j], v)
+        push = rig.modes[Mode.PUSH, j] * drive
+        rates[j] = v[j]
+        acceleration[j] = push - rig.modes[Mode.STIFFNESS, j] * y[j] - damping
+        power += mass * push * v[j]
+        loss += mass * damping * v[j]
+
+    # Normal contact reacts on the modes by the change of the load due to heave.
+    for i in range(n_faces):
+        stiffness = rig.faces[i, Face.STIFFNESS]
+        if stiffness != 0:
+            reaction = -stiffness * project(rig.rows[1, i], y[:n])
+            if state.memory[i, Memory.CONTACT] < 0:
+                reaction = -prescribed_load(rig.faces[i], t)[0]
+            power += reaction * project(rig.rows[1, i], v)
+            for j in range(n):
+                acceleration[j] += rig.rows[1, i, j] * reaction / mass
+
+    is_held = False
+    for i in range(n_faces):
+        is_held = add_friction(rig, state, i, t, y, rates) or is_held
+    if is_held:
+        hold(rig, state, acceleration)
+
+    output = project(rig.modes[Mode.OUTPUT], y[:n])
+    phase = rig.settings[Setting.OMEGA] * t
+    rates[y.size - 4] = power
+    rates[y.size - 3] = loss
+    rates[y.size - 2] = output * np.cos(phase)
+    rates[y.size - 1] = output * np.sin(phase)
+
+
+@njit(**NJIT_KERNEL)
+def rests(memory):
+    """Return whether an interface is held at rest by rigid friction."""
+    return memory[Memory.DIRECTION] == 0 and memory[Memory.CONTACT] > 0
+
+
+@njit(**NJIT_KERNEL)
+def add_friction(rig, state, i, t, y, rates):
+    """Add the force of an interface to the accelerations and write its rates; return whether it is at rest.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion, which is updated.
+    i : int
+        Number of the interface.
+    t : float
+        Time [s].
+    y : (n,) array
+        State.
+    rates : (n,) array
+        Rates, which are written.
+    """
+    n = rig.modes.shape[1]
+    memory = state.memory[i]
+    face = rig.faces[i]
+    first = 2 * n + int(face[Face.FIRST_STATE])
+    last = first + int(face[Face.N_STATES])
+    integral = find_integrals(rig, y) + N_FACE_INTEGRALS * i
+    for k in range(first, last):
+        rates[k] = 0.0
+    if rests(memory):
+        memory[Memory.SLIP_RATE] = 0.0
+        rates[integral] = rates[integral + 1] = rates[integral + 2] = 0.0
+        return True
+
+    # The law at the state, with the acceleration that the other forces give.
+    memory[Memory.PULL] = project(rig.rows[0, i], rates[n : 2 * n])
+    point = look(rig, state, i, t, y)
+    friction = force_and_rates(
+        int(face[Face.LAW]),
+        face[Face.NUMBERS :],
+        memory,
+        point,
+        y[first:last],
+        rates[first:last],
+    )
+
+    # Its force on the modes, and the integrals of work, slip and loss.
+    memory[Memory.FORCE] = friction.force
+    memory[Memory.SLIP_RATE] = friction.slip_rate
+    rates[integral] = friction.force * point.velocity
+    rates[integral + 1] = friction.slip_rate
+    rates[integral + 2] = friction.loss
+    if point.compliance > 0:
+        for j in range(n):
+            rates[n + j] -= rig.rows[0, i, j] * friction.force / rig.settings[Setting.MASS]
+    return False
+
+
+@njit(**NJIT_KERNEL)
+def hold(rig, state, acceleration):
+    """Add the forces that keep the resting interfaces at rest.
+
+    Further passes remove the acceleration that the small compliance SHARED_GRIP leaves.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion, which is updated.
+    acceleration : (n,) array
+        Accelerations of the modes [m/s2], which are changed.
+    """
+    n_faces = rig.faces.shape[0]
+    for i in range(n_faces):
+        if rests(state.memory[i]):
+            state.memory[i, Memory.FORCE] = 0.0
+    for _ in range(N_GRIP_PASSES):
+        for i in range(n_faces):
+            state.memory[i, Memory.PULL] = project(rig.rows[0, i], acceleration)
+        for i in range(n_faces):
+            if not rests(state.memory[i]):
+                continue
+            force = 0.0
+            for k in range(n_faces):
+                if rests(state.memory[k]):
+                    force += state.grip[i, k] * state.memory[k, Memory.PULL]
+            state.memory[i, Memory.FORCE] += force
+            for j in range(acceleration.size):
+                acceleration[j] -= rig.rows[0, i, j] * force / rig.settings[Setting.MASS]
+
+
+@njit(**NJIT_KERNEL)
+def update_grip(rig, state):
+    """Invert the compliance of the resting interfaces by the Gauss-Jordan method."""
+    n = rig.faces.shape[0]
+    grip = state.grip
+    for i in range(n):
+        for k in range(n):
+            grip[i, k] = 1.0 if i == k else 0.0
+            if rests(state.memory[i]) and rests(state.memory[k]):
+                grip[i, k] = project(rig.rows[0, i], rig.rows[0, k]) / rig.settings[Setting.MASS]
+        if rests(state.memory[i]):
+            grip[i, i] *= 1 + SHARED_GRIP
+
+    for i in range(n):
+        pivot = 1 / grip[i, i]
+        grip[i, i] = 1.0
+        for k in range(n):
+            grip[i, k] *= pivot
+        for r in range(n):
+            if r != i:
+                factor = grip[r, i]
+                grip[r, i] = 0.0
+                for k in range(n):
+                    grip[r, k] -= factor * grip[i, k]

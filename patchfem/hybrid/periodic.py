@@ -1,0 +1,288 @@
+"""Periodic motions by Newton's method on the map of a period (shooting), and their Floquet multipliers.
+
+The unknowns are the modes, the states of the laws, and those reversal points of the laws that the period moves. A free
+limit cycle has its period as one more unknown, and an output that is at rest at the start as one more equation.
+"""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from .cases import Case, make_batch
+from .records import N_FACE_INTEGRALS, N_INTEGRALS, Clock, Memory, Mode, Setting, State
+from .runs import Batch, run_batch
+
+MIN_DIFFERENCE = (
+    1e-6  # smallest step of the derivatives of the map, relative to the scale of an unknown
+)
+MAX_ITERATIONS = 30
+N_FIRST_CYCLES = 8  # cycles before the first correction
+N_RELAXED = 6  # cycles without a correction after one that did not help
+MAX_CHANGE = 100.0  # largest change over a periodic motion, relative to the step tolerance
+MAX_STABLE_MULTIPLIER = (
+    1 + 1e-3
+)  # of a stable motion, because the derivatives of the map are differences
+# Distance of a multiplier from 1 that differences do not resolve; a mode with a damping ratio of 3e-7 has it.
+UNDAMPED_TOL = 2e-6
+NEUTRAL_TOL = 1e-9  # distance of a multiplier from 1, relative to the largest, that counts as none
+N_GROWTH_CYCLES = (
+    60  # cycles of each of three runs, in which a growing motion increases by similar amounts
+)
+MIN_SIZE_RATIO = (
+    1e3  # smallest ratio of a periodic motion that is never reached to the motion after these runs
+)
+MIN_GROWTH = 1e-6  # increase in these cycles, relative to the motion
+MIN_GROWTH_RATIO = 0.5  # ratio of the increases in the last and in the second of these runs
+
+
+class PeriodicMotion(NamedTuple):
+    """Periodic motion of a case.
+
+    - batch: its measures (c = 1) over a period; energies are those of this period
+    - change: largest change of the state over a period, relative to its scale; it has converged below `tolerance`
+    - error: distance of the state from that of the periodic motion, relative to its scale
+    - tolerance: largest change at which the motion counts as periodic
+    - multipliers: Floquet multipliers; without those of states that a period determines alone
+    - period: [s]
+    - n_periods: number of periods that were computed
+    - grows: whether the motion from the start grows for ever, so that none is periodic
+    """
+
+    batch: Batch
+    change: float
+    error: float
+    tolerance: float
+    multipliers: np.ndarray
+    period: float
+    n_periods: int
+    grows: bool = False
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether all multipliers are within the unit circle; that of the phase of a limit cycle is 1."""
+        return bool(np.abs(self.multipliers).max(initial=0.0) < MAX_STABLE_MULTIPLIER)
+
+
+def find_periodic_motion(
+    case: Case, *, is_free: bool = False, n_first: int = N_FIRST_CYCLES, start: State | None = None
+) -> PeriodicMotion:
+    """Find the periodic motion that follows some first cycles of a case.
+
+    Parameters
+    ----------
+    case : Case
+        Its start is that of the first cycles; its schedule is not used.
+    is_free : bool
+        Whether there is no drive, so that the period is unknown; that of the case is the first estimate.
+    n_first : int
+        Number of first cycles.
+    start : State, optional
+        State of another motion of the same rig at the start of a period, from which the first cycles begin.
+    """
+    shooting = _Shooting(case, is_free=is_free)
+    if start is not None:
+        shooting.state = _copy(start)
+    shooting.relax(n_first)
+    best = np.inf
+    tolerance = MAX_CHANGE * float(case.rig.settings[Setting.RTOL])
+    for _ in range(MAX_ITERATIONS):
+        before = shooting.state
+        batch = shooting.run()
+        change = shooting.measure_change(before)
+        if change < tolerance:
+            if shooting.has_same_regime(before):
+                break
+            continue
+        if change > best:
+            shooting.relax(N_RELAXED)
+            best = np.inf
+            continue
+        best = change
+        shooting.correct(before)
+    multipliers, error = shooting.find_multipliers(before)
+    largest = np.abs(multipliers).max(initial=0.0)
+    has_converged = change < tolerance
+    may_grow = not has_converged or largest > 1 - UNDAMPED_TOL
+    size = np.abs(before.y[0, : 2 * case.rig.modes.shape[1]]).max() if has_converged else np.inf
+    return PeriodicMotion(
+        batch,
+        change,
+        error,
+        tolerance,
+        multipliers,
+        shooting.period,
+        shooting.n_periods,
+        grows=not is_free and may_grow and _grows_for_ever(case, size),
+    )
+
+
+def _grows_for_ever(case: Case, size: float) -> bool:
+    """Return whether the motion from the start of a case increases by similar amounts in equal times.
+
+    `size` is the largest coordinate or velocity of the periodic motion that was found, which a motion that grows for ever
+    does not come near; inf if none was found.
+    """
+    shooting = _Shooting(case, is_free=False)
+    sizes = []
+    for _ in range(3):
+        shooting.relax(N_GROWTH_CYCLES)
+        sizes.append(float(np.abs(shooting.state.y[0, : 2 * case.rig.modes.shape[1]]).max()))
+    first, second = np.diff(sizes)
+    is_moving = sizes[0] > case.rig.scales[0]
+    is_far = size > MIN_SIZE_RATIO * sizes[-1]
+    is_growing = first > MIN_GROWTH * sizes[0] and second > MIN_GROWTH_RATIO * first
+    return bool(is_moving and is_far and is_growing)
+
+
+class _Shooting:
+    """State of a motion at the start of a period, and its map."""
+
+    def __init__(self, case: Case, *, is_free: bool):
+        self.is_free = is_free
+        self.case = case
+        self.state = make_batch([case])[1]
+        self.n = case.y.size - N_INTEGRALS - N_FACE_INTEGRALS * case.rig.faces.shape[0]
+        self.period = float(case.rig.settings[Setting.PERIOD])
+        self.n_periods = 0
+        # The errors of a period, of the size of the step tolerance, and of the difference are equal.
+        self.difference = max(MIN_DIFFERENCE, float(case.rig.settings[Setting.RTOL]) ** 0.5)
+
+    def run(self, states: State | None = None, periods=None) -> Batch:
+        """Advance the motion, or several of them, by a period; the clocks start at 0."""
+        own = states is None
+        states = _copy(self.state) if own else states
+        periods = [self.period] * len(states.y) if periods is None else periods
+        states.clock[:] = 0.0
+        states.clock[:, Clock.STEP] = 0.1 * self.case.rig.settings[Setting.LONGEST_STEP]
+        one = [
+            replace(self.case, ends=np.array([period]), windows=np.zeros(1), samples=np.zeros(0))
+            for period in periods
+        ]
+        batch = run_batch(one, states=states)
+        self.n_periods += len(one)
+        if own:
+            self.state = batch.states
+        return batch
+
+    def relax(self, count: int) -> None:
+        """Advance the motion by some periods."""
+        for _ in range(count):
+            self.run()
+
+    def _scales(self) -> np.ndarray:
+        """Return the magnitudes (n,) of the modes and law states at the start of a period."""
+        scale = np.maximum(np.abs(self.state.y[0, : self.n]), self.case.rig.scales[: self.n])
+        n_modes = self.case.rig.modes.shape[1]
+        omega = self.case.rig.settings[Setting.OMEGA]
+        # Displacements and velocities share their magnitudes, because either may vanish at the start of a period.
+        size = max(scale[:n_modes].max(), scale[n_modes : 2 * n_modes].max() / omega)
+        scale[:n_modes], scale[n_modes : 2 * n_modes] = size, size * omega
+        return scale
+
+    def measure_change(self, before: State) -> float:
+        """Return the change of the state since another one, relative to its scale."""
+        change = np.abs(self.state.y[0, : self.n] - before.y[0, : self.n])
+        return float((change / self._scales()).max())
+
+    def has_same_regime(self, before: State) -> bool:
+        """Return whether the laws are in the regimes of another state."""
+        columns = [Memory.DIRECTION, Memory.CONTACT, Memory.FLAG, Memory.COUNT]
+        return np.array_equal(self.state.memory[..., columns], before.memory[..., columns])
+
+    def _columns(self, before: State) -> np.ndarray:
+        """Return the indices of the unknowns in (state, memory): what a period changes."""
+        changed = self.state.y[0, : self.n] != before.y[0, : self.n]
+        changed[: 2 * self.case.rig.modes.shape[1]] = True
+        memory = np.zeros(before.memory[0].shape, bool)
+        same = before.memory[0, :, Memory.COUNT] == self.state.memory[0, :, Memory.COUNT]
+        stack = before.memory[0, :, Memory.STACK :]
+        used = np.arange(stack.shape[1]) < 2 * before.memory[0, :, Memory.COUNT, None]
+        memory[:, Memory.STACK :] = (
+            (stack != self.state.memory[0, :, Memory.STACK :]) & used & same[:, None]
+        )
+        return np.flatnonzero(np.concatenate([changed, memory.ravel()]))
+
+    def _differentiate(self, before: State) -> tuple:
+        """Return the unknowns' indices, change over a period, derivatives of the map, and their scales."""
+        columns = self._columns(before)
+        start, end = _pack(before, self.n), _pack(self.state, self.n)
+        scale = np.concatenate([self._scales(), np.abs(start[0, self.n :])])[columns]
+        count = columns.size + self.is_free
+        states = _repeat(before, count)
+        packed = _pack(states, self.n)
+        steps = self.difference * scale
+        packed[np.arange(columns.size), columns] += steps
+        _unpack(states, packed, self.n)
+        periods = [self.period] * columns.size + [
+            self.period * (1 + self.difference)
+        ] * self.is_free
+        after = _pack(self.run(states, periods).states, self.n)
+        slopes = (after - end)[:, columns].T
+        slopes[:, : columns.size] /= steps
+        if self.is_free:
+            slopes[:, -1] /= self.difference * self.period
+        return columns, (end - start)[0, columns], slopes, scale
+
+    def find_multipliers(self, before: State) -> tuple[np.ndarray, float]:
+        """Return the eigenvalues of the map of a period from a state, and the largest part of the next Newton step."""
+        columns, change, slopes, scale = self._differentiate(before)
+        square = slopes[:, : columns.size] * scale / scale[:, None]
+        if not np.isfinite(square).all():
+            return np.full(columns.size, np.nan), np.inf
+        # A state that nothing determines, such as that of an interface at rest, has no error.
+        step = np.linalg.lstsq(np.eye(columns.size) - square, change / scale, rcond=NEUTRAL_TOL)[0]
+        return np.linalg.eigvals(square), float(np.abs(step).max(initial=0.0))
+
+    def correct(self, before: State) -> None:
+        """Replace the state by a Newton step from another one, which a period takes to it."""
+        columns, change, slopes, scale = self._differentiate(before)
+        count = columns.size
+        matrix = slopes[:, :count] * scale / scale[:, None]
+
+        # Newton step for a state that a period does not change.
+        system = np.eye(count) - matrix
+        right = change / scale
+        if self.is_free:
+            n_modes = self.case.rig.modes.shape[1]
+            row = np.zeros(count)
+            row[n_modes : 2 * n_modes] = self.case.rig.modes[Mode.OUTPUT]
+            column = -slopes[:, -1:] * self.period / scale[:, None]
+            system = np.block([[system, column], [row, np.zeros((1, 1))]])
+            speed = row @ (before.y[0, columns[:count].clip(max=self.n - 1)] / scale)
+            right = np.append(right, -speed)
+
+        # Singular where a state does not matter, such as bonds that have long been forgotten.
+        step = np.linalg.lstsq(system, right, rcond=1e-13)[0]
+        if self.is_free:
+            self.period *= 1 + float(np.clip(step[-1], -0.2, 0.2))
+
+        # Regimes are those at the end of the period, where the motion has brought them.
+        start = _pack(before, self.n)
+        state = _copy(self.state)
+        packed = _pack(state, self.n)
+        packed[0, columns] = start[0, columns] + step[:count] * scale
+        _unpack(state, packed, self.n)
+        self.state = state
+
+
+def _copy(state: State) -> State:
+    """Return an independent copy of a state."""
+    return State(*(array.copy() for array in state))
+
+
+def _repeat(state: State, count: int) -> State:
+    """Return the batch of a state that is repeated."""
+    parts = (np.repeat(array, count, axis=0) for array in state[:3])
+    return State(*parts, *state[3:])
+
+
+def _pack(state: State, n: int) -> np.ndarray:
+    """Return states and memories as rows (c, k)."""
+    return np.concatenate([state.y[:, :n], state.memory.reshape(len(state.y), -1)], axis=1)
+
+
+def _unpack(state: State, packed, n: int) -> None:
+    """Write the rows of `_pack` into a state."""
+    state.y[:, :n] = packed[:, :n]
+    state.memory[:] = packed[:, n:].reshape(state.memory.shape)

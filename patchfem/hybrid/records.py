@@ -1,0 +1,350 @@
+"""Arrays of a rig, of its motion and of what is recorded, and the meaning of their columns.
+
+A batch has the same arrays with one more leading axis, the cases. Few arrays make short calls and short compile times.
+"""
+
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+
+N_FACE_INTEGRALS = 3  # work, slip and loss of every interface, near the end of a state
+N_INTEGRALS = (
+    4  # work of the drive, loss of the dampers, output times cosine and sine, at the end of a state
+)
+
+
+class Mode(IntEnum):
+    """Rows of `Rig.modes`: squared frequencies, accelerations per drive, and two participations.
+
+    `OUTPUT` is the point whose acceleration is measured, `GAUGE` the point whose displacement is measured.
+    """
+
+    STIFFNESS = 0
+    PUSH = 1
+    OUTPUT = 2
+    GAUGE = 3
+
+
+class Face(IntEnum):
+    """Columns of `Rig.faces`: law, place of its states, normal load, scales, then the numbers of the law.
+
+    The load is max(0, MEAN + SWING cos(RATE t + PHASE) - STIFFNESS heave). LOAD and LOAD_RATE are typical
+    magnitudes. A RIGID law rests without displacement below its static friction. LENGTH [m] is the stretch before slip
+    of a law whose force follows from the slide alone, else infinite.
+    """
+
+    LAW = 0
+    FIRST_STATE = 1
+    N_STATES = 2
+    RIGID = 3
+    MEAN = 4
+    SWING = 5
+    RATE = 6
+    PHASE = 7
+    STIFFNESS = 8
+    LOAD = 9
+    LOAD_RATE = 10
+    LENGTH = 11
+    NUMBERS = 12
+
+
+class Piece(IntEnum):
+    """Columns of `Rig.pieces`, with the time tau since START.
+
+    The drive is CONSTANT + SLOPE tau + AMPLITUDE sin(phase), phase' = OMEGA exp(GROWTH tau) + CHIRP tau. SQUARED is 1
+    if AMPLITUDE is that of a displacement, which phase'^2 makes an acceleration.
+    """
+
+    START = 0
+    CONSTANT = 1
+    SLOPE = 2
+    AMPLITUDE = 3
+    OMEGA = 4
+    PHASE = 5
+    CHIRP = 6
+    GROWTH = 7
+    SQUARED = 8
+
+
+class Setting(IntEnum):
+    """Entries of `Rig.settings`.
+
+    Modal mass [kg], longest step [s], largest output [m], circular frequency [rad/s] and period [s] of a cycle, whether
+    the drive is the acceleration of the base, whether it is a prescribed slide (bench), step tolerance, number of cycles
+    after which the drive repeats (0: never), largest number of steps, whether an interface is rigid.
+    """
+
+    MASS = 0
+    LONGEST_STEP = 1
+    TRAVEL = 2
+    OMEGA = 3
+    PERIOD = 4
+    BASE_MOVES = 5
+    IS_BENCH = 6
+    RTOL = 7
+    REPEAT = 8
+    MAX_STEPS = 9
+    HAS_RIGID = 10
+
+
+class Rig(NamedTuple):
+    """N modes and M interfaces: z'' + damping z' + stiffness z = push a(t) - slides^T F/mass.
+
+    - modes (4, N): see `Mode`
+    - damping (N, N): [1/s]
+    - rows (2, M, N): slide and heave of every interface per unit of the modal coordinates
+    - faces (M, k): see `Face`
+    - pieces (P, 9): successive pieces of the drive, see `Piece`
+    - tones (Q, 3): amplitude, circular frequency and phase of sines that last for the whole run
+    - scales (n,): smallest magnitudes of slides and output (for the modes), of their velocities, and of the other states,
+      to which the errors of a step are relative
+    - settings (11,): see `Setting`
+    """
+
+    modes: np.ndarray
+    damping: np.ndarray
+    rows: np.ndarray
+    faces: np.ndarray
+    pieces: np.ndarray
+    tones: np.ndarray
+    scales: np.ndarray
+    settings: np.ndarray
+
+
+class Memory(IntEnum):
+    """Columns of `State.memory`.
+
+    - DIRECTION: sign of the motion of an interface, 0 if a rigid law rests
+    - CONTACT: 1, or -1 after lift-off
+    - FORCE, SLIP_RATE: friction force [N] and irreversible velocity [m/s] at the last evaluation
+    - PULL: relative acceleration [m/s2] without the force of the interface
+    - FLAG, COUNT: regime of the law, number of its reversal points
+    - VIRGIN: 1 until an interface has slipped as a whole, then -1
+    - ORIGIN: slide at the start [m]
+    - SIZE, SPEED: largest magnitudes of slide [m] and velocity [m/s] so far
+    - STACK: first column of pairs of displacement [m] and force [N] at the reversal points
+    """
+
+    DIRECTION = 0
+    CONTACT = 1
+    FORCE = 2
+    SLIP_RATE = 3
+    PULL = 4
+    FLAG = 5
+    COUNT = 6
+    VIRGIN = 7
+    ORIGIN = 8
+    SIZE = 9
+    SPEED = 10
+    STACK = 11
+
+
+class Margin(IntEnum):
+    """Margins of a regime: direction of motion or rest, branch, contact, and a limit of the law."""
+
+    MOTION = 0
+    BRANCH = 1
+    CONTACT = 2
+    LIMIT = 3
+
+
+class Clock(IntEnum):
+    """Entries of `State.clock`.
+
+    Time [s], proposed step [s], numbers of steps, of the piece of the drive, of the next sample and of events, sum of
+    the magnitudes of the work of the drive [J], largest energy of the modes [J], status of the run (`Status`), number of
+    cycles, whether the last step ended without an event, so that its last stage is the first of the next one, and the
+    largest magnitudes of output [m] and its velocity [m/s] so far, the length of the step [s],
+    and EXCHANGED at the start of the cycle.
+    """
+
+    TIME = 0
+    STEP = 1
+    N_STEPS = 2
+    PIECE = 3
+    SAMPLE = 4
+    N_EVENTS = 5
+    EXCHANGED = 6
+    STORED = 7
+    STATUS = 8
+    N_CYCLES = 9
+    IS_SMOOTH = 10
+    OUTPUT_SIZE = 11
+    OUTPUT_SPEED = 12
+    LENGTH = 13
+    EXCHANGED_BEFORE = 14
+
+
+class Status(IntEnum):
+    """How a run ended."""
+
+    DONE = 0
+    EXCEEDS_TRAVEL = 1
+    LEAVES_GROOVES = 2
+    TOO_MANY_STEPS = 3
+    STEP_TOO_SMALL = 4
+    NO_PROGRESS = 5
+    TOO_STIFF = 6
+
+
+class State(NamedTuple):
+    """A motion, which the engine updates in place.
+
+    - y (n,): N modal coordinates, N velocities, states of the laws, then for every interface friction work [J], path of
+      slip [m] and dissipated energy [J], then work of the drive, loss of the dampers, and the integrals of the output
+      times cosine and sine of the cycle
+    - memory (M, k): see `Memory`
+    - clock (15,): see `Clock`
+    - rows (30, n): stages of a step, its dense output, workspace (see `step_kernels`)
+    - margins (5, M, 4): margins at the points of a step, and those at the last evaluation
+    - probes (6, 3 + 5 M): see `Probe`; at the points of a step, and those at the last evaluation
+    - grip (M, M): force that holds an interface per unit of relative acceleration [kg]
+    """
+
+    y: np.ndarray
+    memory: np.ndarray
+    clock: np.ndarray
+    rows: np.ndarray
+    margins: np.ndarray
+    probes: np.ndarray
+    grip: np.ndarray
+
+
+class Probe(IntEnum):
+    """Columns of `State.probes`: three of the whole, then five of every interface from FACES on."""
+
+    OUTPUT = 0
+    GAUGE = 1
+    ACCELERATION = 2
+    FACES = 3
+    # per interface: friction force, path of slip, slide, load, and |slip rate| - |velocity|/2
+    FORCE = 0
+    SLIP = 1
+    SLIDE = 2
+    LOAD = 3
+    SLIPPING = 4
+    COUNT = 5
+
+
+class Cycle(IntEnum):
+    """Columns of `Record.cycles`: end [s] and window (below 0: none) of each cycle, then what was measured.
+
+    Smallest and largest output, integrals of the output times cosine and sine, integral of the slide of the first
+    interface over time, its smallest and largest slide with the friction forces there, and 1 for a cycle that was not
+    computed, because it repeats the one before.
+    """
+
+    END = 0
+    WINDOW = 1
+    MIN = 2
+    MAX = 3
+    COS = 4
+    SIN = 5
+    SLIDE = 6
+    MIN_SLIDE = 7
+    FORCE_AT_MIN = 8
+    MAX_SLIDE = 9
+    FORCE_AT_MAX = 10
+    REPEATS = 11
+
+
+class Whole(IntEnum):
+    """Columns of `Record.whole`: extremes of gauge and acceleration, harmonics 1 and 3 of the acceleration, duration."""
+
+    MIN = 0
+    MAX = 1
+    MIN_ACCELERATION = 2
+    MAX_ACCELERATION = 3
+    COS_1 = 4
+    SIN_1 = 5
+    COS_3 = 6
+    SIN_3 = 7
+    SPAN = 8
+
+
+class Window(IntEnum):
+    """Columns of `Record.faces`.
+
+    Extremes of force, slip, slide and load; time stuck and open [s]; number of slip starts with the sums of cosine and
+    sine of twice their phases; whether the interface sticks (1) or slips (-1) at last; friction work [J]; first
+    harmonics of slide and force.
+    """
+
+    MIN_FORCE = 0
+    MAX_FORCE = 1
+    MIN_SLIP = 2
+    MAX_SLIP = 3
+    MIN_SLIDE = 4
+    MAX_SLIDE = 5
+    MIN_LOAD = 6
+    MAX_LOAD = 7
+    STUCK = 8
+    OPEN = 9
+    STARTS = 10
+    COS_START = 11
+    SIN_START = 12
+    STICKS = 13
+    WORK = 14
+    SLIDE_COS = 15
+    SLIDE_SIN = 16
+    FORCE_COS = 17
+    FORCE_SIN = 18
+
+
+class Record(NamedTuple):
+    """What a run records.
+
+    - cycles (C, 12): see `Cycle`
+    - whole (W, 9), faces (W, M, 19): measures of the windows, see `Whole` and `Window`
+    - samples (S, m), events (E, m): time, state y, forces, loads and directions of the interfaces, interface and margin
+      of an event; the first column of the samples is given. Force and load of an event are those before it, the
+      directions those after it
+    """
+
+    cycles: np.ndarray
+    whole: np.ndarray
+    faces: np.ndarray
+    samples: np.ndarray
+    events: np.ndarray
+
+
+class Point(NamedTuple):
+    """What a law may know of its interface at an instant.
+
+    - load, load_rate: normal load [N], negative as if the surfaces pulled, and its rate [N/s]
+    - slide, velocity: relative displacement [m] and velocity [m/s]
+    - held: force [N] that holds the interface at rest
+    - free: relative acceleration [m/s2] without the force of this interface
+    - compliance: relative acceleration per force [1/kg]; 0 if the slide is prescribed
+    - speed_scale, load_scale, load_rate_scale: magnitudes for the margins
+    """
+
+    load: float
+    load_rate: float
+    slide: float
+    velocity: float
+    held: float
+    free: float
+    compliance: float
+    speed_scale: float
+    load_scale: float
+    load_rate_scale: float
+
+
+class Friction(NamedTuple):
+    """Friction force [N], irreversible part of the velocity [m/s] and dissipated power [W]."""
+
+    force: float
+    slip_rate: float
+    loss: float
+
+
+class LawNumbers(NamedTuple):
+    """A law of one interface: its name in `laws.LAWS`, its numbers, first states, scales of the states, length [m]."""
+
+    law: str
+    numbers: tuple
+    states: tuple = ()
+    scales: tuple = ()
+    length: float = np.inf

@@ -1,0 +1,48 @@
+"""The functions of all laws as one compiled function each, which chooses the law by its number."""
+
+from importlib import import_module
+
+from ..compiled.jit import njit
+from ..friction.flags_kernels import NJIT_KERNEL
+from .laws import LAWS
+from .records import Friction
+
+
+@njit(**NJIT_KERNEL)
+def _no_force(law, p, memory, point, s, rates):
+    return Friction(0.0, 0.0, 0.0)
+
+
+@njit(**NJIT_KERNEL)
+def _no_margins(law, p, memory, point, s, margins):
+    pass
+
+
+@njit(**NJIT_KERNEL)
+def _no_switch(law, p, memory, point, s, which):
+    return False
+
+
+def _choose(number: int, function, other):
+    """Return a compiled function that calls that of a law by its number, or the other one."""
+
+    @njit(**NJIT_KERNEL)
+    def choose(law, p, memory, point, s, last):
+        if law == number:
+            return function(p, memory, point, s, last)
+        return other(law, p, memory, point, s, last)
+
+    return choose
+
+
+def _join(name: str, function):
+    """Return the compiled function of this name for all laws."""
+    for number, law in enumerate(LAWS):
+        module = import_module(f"{__package__}.laws.{law}")
+        function = _choose(number, njit(**NJIT_KERNEL)(getattr(module, name)), function)
+    return function
+
+
+force_and_rates = _join("force_and_rates", _no_force)
+write_law_margins = _join("write_margins", _no_margins)
+switch_law = _join("switch", _no_switch)

@@ -1,0 +1,550 @@
+"""Measures of cycles and windows, samples and events, from the dense output of the steps (compiled).
+
+A step, or its part up to an event, is evaluated at the five points of the Gauss-Lobatto rule of order 8. Integrals are
+the sums of this rule; extremes inside are located by parabolas.
+"""
+
+import numpy as np
+
+from ..compiled.jit import njit
+from ..friction.flags_kernels import NJIT_KERNEL
+from .event_kernels import MAX_ROOT_STEPS, ROOT_TOL, find_vertex
+from .motion_kernels import (
+    find_drive,
+    find_integrals,
+    find_phase,
+    find_rates,
+    look,
+    project,
+    rests,
+)
+from .records import (
+    N_FACE_INTEGRALS,
+    Clock,
+    Cycle,
+    Memory,
+    Mode,
+    Piece,
+    Probe,
+    Setting,
+    Whole,
+    Window,
+)
+from .step_kernels import POINT, RATES, read_curve
+
+N_NODES = 5
+NODES = np.array([0.0, 0.5 - np.sqrt(21) / 14, 0.5, 0.5 + np.sqrt(21) / 14, 1.0])
+WEIGHTS = np.array([9.0, 49.0, 64.0, 49.0, 9.0]) / 180
+LAST_PROBES = 5  # row of `State.probes` of the last evaluation
+N_PARABOLAS = 6  # steps of the search for an extreme
+NEAR_EXTREME = 0.2  # extremes of a step that are further from those of the window are not located
+SAME_SLIDE_TOL = 1e-12  # relative difference of slides before and after an event
+
+
+@njit(**NJIT_KERNEL)
+def write_probes(rig, state, t, y, probes):
+    """Write the scalars of a state that windows observe.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion, which is updated.
+    t : float
+        Time [s].
+    y : (n,) array
+        State.
+    probes : (p,) array
+        Scalars, which are written.
+    """
+    n = rig.modes.shape[1]
+    find_rates(rig, state, t, y, state.rows[RATES])
+    acceleration = state.rows[RATES, n : 2 * n]
+    probes[Probe.OUTPUT] = project(rig.modes[Mode.OUTPUT], y[:n])
+    probes[Probe.GAUGE] = project(rig.modes[Mode.GAUGE], y[:n])
+    probes[Probe.ACCELERATION] = project(rig.modes[Mode.OUTPUT], acceleration)
+    if rig.settings[Setting.BASE_MOVES] > 0:
+        probes[Probe.ACCELERATION] += find_drive(rig, state.clock, t)[0]
+    integrals = find_integrals(rig, y)
+    for i in range(rig.faces.shape[0]):
+        point = look(rig, state, i, t, y)
+        memory = state.memory[i]
+        first = Probe.FACES + Probe.COUNT * i
+        probes[first + Probe.FORCE] = memory[Memory.FORCE]
+        probes[first + Probe.SLIP] = y[integrals + N_FACE_INTEGRALS * i + 1]
+        probes[first + Probe.SLIDE] = point.slide
+        probes[first + Probe.LOAD] = max(point.load, 0.0)
+        slipping = abs(memory[Memory.SLIP_RATE]) - 0.5 * abs(point.velocity)
+        is_still = rests(memory) or point.velocity == 0
+        probes[first + Probe.SLIPPING] = -1.0 if is_still else slipping
+
+
+@njit(**NJIT_KERNEL)
+def find_probe(rig, state, x, column):
+    """Return a scalar at the fraction x of a step.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion, which is updated.
+    x : float
+        Fraction of the step.
+    column : int
+        Column of `State.probes`.
+    """
+    y = state.rows[POINT]
+    read_curve(state, x, y)
+    t = state.clock[Clock.TIME] + x * state.clock[Clock.LENGTH]
+    write_probes(rig, state, t, y, state.probes[LAST_PROBES])
+    return state.probes[LAST_PROBES, column]
+
+
+@njit(**NJIT_KERNEL)
+def find_output(rig, state, x):
+    """Return the output at the fraction x of a step.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion, which is updated.
+    x : float
+        Fraction of the step.
+    """
+    z = state.rows[POINT, : rig.modes.shape[1]]
+    read_curve(state, x, z)
+    return project(rig.modes[Mode.OUTPUT], z)
+
+
+@njit(**NJIT_KERNEL)
+def raise_extreme(rig, state, fraction, column, sign, known):
+    """Return the largest (sign 1) or smallest (-1) of a known value and the values of a scalar in a step.
+
+    The scalar is known at the nodes. If the result lies in this step, the last evaluation is there.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion, which is updated.
+    fraction : float
+        Fraction of the step at which its motion ends.
+    column : int
+        Column of `State.probes`.
+    sign : float
+        1 for the largest value, -1 for the smallest.
+    known : float
+        Value that is known already.
+    """
+    best = 0
+    for node in range(1, N_NODES):
+        if sign * state.probes[node, column] > sign * state.probes[best, column]:
+            best = node
+    value = sign * state.probes[best, column]
+    if value <= sign * known - NEAR_EXTREME * abs(known):
+        return known
+
+    # Successive parabolas through the best point and its neighbours.
+    x = NODES[best]
+    width = 0.5 * max(NODES[min(best + 1, N_NODES - 1)] - x, x - NODES[max(best - 1, 0)])
+    middle = min(max(x, width), 1 - width)
+
+    for _ in range(N_PARABOLAS):
+        a = -sign * find_probe(rig, state, fraction * (middle - width), column)
+        b = -sign * find_probe(rig, state, fraction * middle, column)
+        c = -sign * find_probe(rig, state, fraction * (middle + width), column)
+        vertex = find_vertex(a, b, c)[0]
+        if vertex < 0:
+            vertex = 0.0 if a < c else 2.0
+
+        at = middle + (vertex - 1) * width
+        found = sign * find_probe(rig, state, fraction * at, column)
+        gain = found - value
+        if gain > 0:
+            x = at
+            value = found
+        if abs(gain) < 1e-12 * abs(value):
+            break
+        width *= 0.3
+        middle = min(max(at, width), 1 - width)
+    if value <= sign * known:
+        return known
+    find_probe(rig, state, fraction * x, column)
+    return sign * value
+
+
+@njit(**NJIT_KERNEL)
+def observe_cycle(rig, state, fraction, cycle):
+    """Add the extremes of the output in a part of a step to those of a cycle.
+
+    Steps are short against the cycle, so that an extreme lies where the velocity changes sign.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion, which is updated.
+    fraction : float
+        Fraction of the step at which its motion ends.
+    cycle : (11,) array
+        Row of `records.Record.cycles`.
+    """
+    n = rig.modes.shape[1]
+    y = state.rows[POINT, : 2 * n]
+    f_left = project(rig.modes[Mode.OUTPUT], state.y[n : 2 * n])
+    read_curve(state, fraction, y)
+    f_right = project(rig.modes[Mode.OUTPUT], y[n : 2 * n])
+    add_output(rig, y, cycle)
+    if f_left * f_right >= 0:
+        return
+
+    # Illinois rule
+    left = 0.0
+    right = fraction
+    for _ in range(N_PARABOLAS):
+        middle = (left * f_right - right * f_left) / (f_right - f_left)
+        read_curve(state, middle, y)
+        f_middle = project(rig.modes[Mode.OUTPUT], y[n : 2 * n])
+        if f_middle * f_right < 0:
+            left = right
+            f_left = f_right
+        else:
+            f_left *= 0.5
+        right = middle
+        f_right = f_middle
+    add_output(rig, y, cycle)
+
+
+@njit(**NJIT_KERNEL)
+def add_output(rig, y, cycle):
+    """Add the output of a state to the extremes of a cycle.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    y : (n,) array
+        State.
+    cycle : (11,) array
+        Row of `records.Record.cycles`.
+    """
+    output = project(rig.modes[Mode.OUTPUT], y[: rig.modes.shape[1]])
+    cycle[Cycle.MIN] = min(cycle[Cycle.MIN], output)
+    cycle[Cycle.MAX] = max(cycle[Cycle.MAX], output)
+
+
+@njit(**NJIT_KERNEL)
+def observe_window(rig, state, record, cycle, fraction):
+    """Add the part of a step up to a fraction to the measures of the window of a cycle.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion, which is updated.
+    record : Record
+        What the run records.
+    cycle : int
+        Number of the cycle.
+    fraction : float
+        Fraction of the step at which its motion ends.
+    """
+    w = int(record.cycles[cycle, Cycle.WINDOW])
+    whole = record.whole[w]
+    t = state.clock[Clock.TIME]
+    length = fraction * state.clock[Clock.LENGTH]
+    for node in range(N_NODES):
+        find_probe(rig, state, fraction * NODES[node], 0)
+        for k in range(state.probes.shape[1]):
+            state.probes[node, k] = state.probes[LAST_PROBES, k]
+
+    raise_both(rig, state, fraction, Probe.GAUGE, whole, Whole.MIN)
+    raise_both(rig, state, fraction, Probe.ACCELERATION, whole, Whole.MIN_ACCELERATION)
+    for node in range(N_NODES):
+        weight = length * WEIGHTS[node]
+        phase = rig.settings[Setting.OMEGA] * (t + length * NODES[node])
+        value = weight * state.probes[node, Probe.ACCELERATION]
+        whole[Whole.COS_1] += value * np.cos(phase)
+        whole[Whole.SIN_1] += value * np.sin(phase)
+        whole[Whole.COS_3] += value * np.cos(3 * phase)
+        whole[Whole.SIN_3] += value * np.sin(3 * phase)
+        whole[Whole.SPAN] += weight
+
+        # First harmonics of slide and force.
+        for i in range(rig.faces.shape[0]):
+            first = Probe.FACES + Probe.COUNT * i
+            row = record.faces[w, i]
+            slide = weight * state.probes[node, first + Probe.SLIDE]
+            force = weight * state.probes[node, first + Probe.FORCE]
+            row[Window.SLIDE_COS] += slide * np.cos(phase)
+            row[Window.SLIDE_SIN] += slide * np.sin(phase)
+            row[Window.FORCE_COS] += force * np.cos(phase)
+            row[Window.FORCE_SIN] += force * np.sin(phase)
+            if i == 0:
+                record.cycles[cycle, Cycle.SLIDE] += slide
+
+    if rig.faces.shape[0]:
+        row = record.cycles[cycle]
+        observe_reversal(rig, state, fraction, row, -1.0, Cycle.MIN_SLIDE)
+        observe_reversal(rig, state, fraction, row, 1.0, Cycle.MAX_SLIDE)
+    for i in range(rig.faces.shape[0]):
+        first = Probe.FACES + Probe.COUNT * i
+        row = record.faces[w, i]
+        for k in range(4):  # force, slip, slide and load, in the order of `Probe` and `Window`
+            raise_both(rig, state, fraction, first + k, row, Window.MIN_FORCE + 2 * k)
+        add_stick(rig, state, fraction, i, row)
+        if state.memory[i, Memory.CONTACT] < 0:
+            row[Window.OPEN] += length
+
+
+@njit(**NJIT_KERNEL)
+def raise_both(rig, state, fraction, column, values, k):
+    """Update the smallest and the largest value of a scalar, at k and k + 1 of an array.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion, which is updated.
+    fraction : float
+        Fraction of the step at which its motion ends.
+    column : int
+        Column of `State.probes`.
+    values : array
+        Values, two of which are updated.
+    k : int
+        Index of the smallest value; the largest follows.
+    """
+    values[k] = raise_extreme(rig, state, fraction, column, -1.0, values[k])
+    values[k + 1] = raise_extreme(rig, state, fraction, column, 1.0, values[k + 1])
+
+
+@njit(**NJIT_KERNEL)
+def observe_reversal(rig, state, fraction, cycle, sign, column):
+    """Update the extreme slide of the first interface in a cycle, and the friction force there.
+
+    A force that jumps at the reversal counts with the mean of both sides.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion, which is updated.
+    fraction : float
+        Fraction of the step at which its motion ends.
+    cycle : (11,) array
+        Row of `records.Record.cycles`.
+    sign : float
+        1 for the largest value, -1 for the smallest.
+    column : int
+        Column of `State.probes`.
+    """
+    slide = Probe.FACES + Probe.SLIDE
+    force = Probe.FACES + Probe.FORCE
+    known = cycle[column]
+    value = raise_extreme(rig, state, fraction, slide, sign, known)
+    size = SAME_SLIDE_TOL * abs(value)
+    if abs(state.probes[0, slide] - known) <= size and abs(value - known) <= size:
+        cycle[column + 1] = 0.5 * (cycle[column + 1] + state.probes[0, force])
+    elif value != known:
+        cycle[column] = value
+        cycle[column + 1] = state.probes[LAST_PROBES, force]
+
+
+@njit(**NJIT_KERNEL)
+def add_stick(rig, state, fraction, i, row):
+    """Add the time that an interface sticks in a part of a step, and the phases at which slip starts.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion, which is updated.
+    fraction : float
+        Fraction of the step at which its motion ends.
+    i : int
+        Number of the interface.
+    row : (19,) array
+        Row of `records.Record.faces`.
+    """
+    column = Probe.FACES + Probe.COUNT * i + Probe.SLIPPING
+    h = state.clock[Clock.LENGTH]
+    sticks = state.probes[0, column] < 0
+    if row[Window.STICKS] > 0 and not sticks:
+        add_start(rig, state.clock, state.clock[Clock.TIME], row)
+    for node in range(1, N_NODES):
+        left = fraction * NODES[node - 1]
+        right = fraction * NODES[node]
+        sticks_after = state.probes[node, column] < 0
+        root = right if sticks else left
+        if sticks_after != sticks:
+            root = find_probe_root(rig, state, column, left, right)
+            if sticks:
+                add_start(rig, state.clock, state.clock[Clock.TIME] + root * h, row)
+        row[Window.STUCK] += h * ((root - left) if sticks else (right - root) * sticks_after)
+        sticks = sticks_after
+    row[Window.STICKS] = 1.0 if sticks else -1.0
+
+
+@njit(**NJIT_KERNEL)
+def find_probe_root(rig, state, column, left, right):
+    """Return the fraction of a step at which a scalar changes sign between two fractions (bisection).
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion, which is updated.
+    column : int
+        Column of `State.probes`.
+    left : float
+        Fraction of the step before the root.
+    right : float
+        Fraction of the step after the root.
+    """
+    is_negative = find_probe(rig, state, left, column) < 0
+    for _ in range(MAX_ROOT_STEPS):
+        middle = 0.5 * (left + right)
+        if (find_probe(rig, state, middle, column) < 0) == is_negative:
+            left = middle
+        else:
+            right = middle
+        if right - left < 100 * ROOT_TOL:
+            break
+    return right
+
+
+@njit(**NJIT_KERNEL)
+def add_start(rig, clock, t, row):
+    """Add the phase of the drive at which slip starts.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    clock : (14,) array
+        Row of `records.State.clock`.
+    t : float
+        Time [s].
+    row : (19,) array
+        Row of `records.Record.faces`.
+    """
+    phase = 0.0
+    if rig.tones.shape[0]:
+        phase = rig.tones[0, 1] * t + rig.tones[0, 2]
+    elif rig.pieces.shape[0]:
+        piece = rig.pieces[int(clock[Clock.PIECE])]
+        phase = find_phase(piece, t - piece[Piece.START])[0]
+    row[Window.STARTS] += 1
+    row[Window.COS_START] += np.cos(2 * phase)
+    row[Window.SIN_START] += np.sin(2 * phase)
+
+
+@njit(**NJIT_KERNEL)
+def write_row(rig, state, t, y, row):
+    """Write a sample: time, state, forces, loads and directions.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion, which is updated.
+    t : float
+        Time [s].
+    y : (n,) array
+        State.
+    row : array
+        Row that is written.
+    """
+    n_faces = rig.faces.shape[0]
+    find_rates(rig, state, t, y, state.rows[RATES])
+    row[0] = t
+    for k in range(y.size):
+        row[1 + k] = y[k]
+    for i in range(n_faces):
+        point = look(rig, state, i, t, y)
+        row[1 + y.size + i] = state.memory[i, Memory.FORCE]
+        row[1 + y.size + n_faces + i] = max(point.load, 0.0)
+    write_directions(state, row)
+
+
+@njit(**NJIT_KERNEL)
+def write_directions(state, row):
+    """Write the directions of the interfaces into a sample.
+
+    Parameters
+    ----------
+    state : State
+        Motion.
+    row : (m,) array
+        Sample, which is changed.
+    """
+    n_faces = state.memory.shape[0]
+    for i in range(n_faces):
+        row[1 + state.y.size + 2 * n_faces + i] = state.memory[i, Memory.DIRECTION]
+
+
+@njit(**NJIT_KERNEL)
+def write_samples(rig, state, record, fraction):
+    """Write the samples whose times lie in a part of a step.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion, which is updated.
+    record : Record
+        What the run records.
+    fraction : float
+        Fraction of the step at which its motion ends.
+    """
+    clock = state.clock
+    h = clock[Clock.LENGTH]
+    end = clock[Clock.TIME] + fraction * h
+    while clock[Clock.SAMPLE] < record.samples.shape[0]:
+        row = record.samples[int(clock[Clock.SAMPLE])]
+        if row[0] > end:
+            return
+        x = min(max((row[0] - clock[Clock.TIME]) / h, 0.0), fraction)
+        read_curve(state, x, state.rows[POINT])
+        write_row(rig, state, row[0], state.rows[POINT], row)
+        clock[Clock.SAMPLE] += 1
+
+
+@njit(**NJIT_KERNEL)
+def write_event(rig, state, record, face, which):
+    """Write the state at an event, before the regime changes.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion, which is updated.
+    record : Record
+        What the run records.
+    face : int
+        Number of the interface.
+    which : int
+        Margin that has vanished (`records.Margin`).
+    """
+    number = int(state.clock[Clock.N_EVENTS])
+    if number < record.events.shape[0]:
+        row = record.events[number]
+        write_row(rig, state, state.clock[Clock.TIME], state.y, row)
+        row[-2] = face
+        row[-1] = which
+    state.clock[Clock.N_EVENTS] += 1

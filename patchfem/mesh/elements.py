@@ -1,0 +1,97 @@
+"""Shape functions of plane elements of first and second order, and their rules of integration.
+
+The shape functions of an element are the combinations of its monomials that are 1 at one node and 0 at the others. Nodes
+are ordered as in meshio: corners, middles of the edges from corner to corner, centre.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class ShapeFunctions(NamedTuple):
+    """Values (g, k) of k shape functions at g points, and their derivatives (g, 2, k) along the local coordinates."""
+
+    values: np.ndarray
+    gradients: np.ndarray
+
+
+class Element(NamedTuple):
+    """Reference element with k nodes.
+
+    - ``n_corners``: 3 or 4
+    - ``nodes``: (k, 2) local coordinates of the nodes
+    - ``powers``: (k, 2) exponents of the monomials
+    - ``gauss``, ``weights``: (g, 2) points and (g,) weights of the integration of the stiffness
+    """
+
+    n_corners: int
+    nodes: np.ndarray
+    powers: np.ndarray
+    gauss: np.ndarray
+    weights: np.ndarray
+
+    @property
+    def is_quadratic(self) -> bool:
+        """Whether the element has nodes between its corners."""
+        return len(self.nodes) > self.n_corners
+
+    @property
+    def centre(self) -> np.ndarray:
+        """Local coordinates (1, 2) of the centre of the element."""
+        return self.nodes[: self.n_corners].mean(axis=0, keepdims=True)
+
+    def evaluate(self, points) -> ShapeFunctions:
+        """Return the shape functions at points (g, 2) in local coordinates."""
+        to_nodes = np.linalg.inv(self._monomials(self.nodes, 0, 0))
+        slopes = [
+            self._monomials(points, 1, 0) @ to_nodes,
+            self._monomials(points, 0, 1) @ to_nodes,
+        ]
+        return ShapeFunctions(self._monomials(points, 0, 0) @ to_nodes, np.stack(slopes, axis=1))
+
+    def _monomials(self, points, order_x: int, order_y: int) -> np.ndarray:
+        """Return the monomials (g, k) at points (g, 2), each differentiated once or not at all."""
+        out = np.ones((len(points), len(self.powers)))
+        for axis, order in enumerate((order_x, order_y)):
+            power = self.powers[:, axis]
+            factor = power if order else 1
+            out *= factor * points[:, [axis]] ** np.maximum(power - order, 0)
+        return out
+
+
+def _make_element(corners, powers, rule, has_centre: bool = False) -> Element:
+    """Return an element; with more monomials than corners it has nodes in the middles of the edges."""
+    nodes = np.array(corners, float)
+    if len(powers) > len(corners):
+        middles = (nodes + np.roll(nodes, -1, axis=0)) / 2
+        nodes = np.concatenate([nodes, middles])
+    if has_centre:
+        nodes = np.concatenate([nodes, np.zeros((1, 2))])
+    points, weights = rule
+    return Element(len(corners), nodes, np.array(powers), np.array(points), np.array(weights))
+
+
+def _square_rule(count: int) -> tuple[list, list]:
+    """Return the points and weights of the product Gauss rule with count x count points."""
+    points, weights = np.polynomial.legendre.leggauss(count)
+    pairs = [(a, b) for a in range(count) for b in range(count)]
+    return [(points[a], points[b]) for a, b in pairs], [weights[a] * weights[b] for a, b in pairs]
+
+
+_TRIANGLE = [(0, 0), (1, 0), (0, 1)]
+_SQUARE = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
+# Exact for polynomials of degree two
+_TRIANGLE_RULE = ([(1 / 6, 1 / 6), (2 / 3, 1 / 6), (1 / 6, 2 / 3)], [1 / 6, 1 / 6, 1 / 6])
+_LINEAR = [(0, 0), (1, 0), (0, 1)]
+_QUADRATIC = [*_LINEAR, (2, 0), (1, 1), (0, 2)]
+_SERENDIPITY = [*_QUADRATIC, (2, 1), (1, 2)]
+
+# Elements by their names in meshio
+ELEMENTS = {
+    "triangle": _make_element(_TRIANGLE, _LINEAR, _TRIANGLE_RULE),
+    "quad": _make_element(_SQUARE, [*_LINEAR, (1, 1)], _square_rule(2)),
+    "triangle6": _make_element(_TRIANGLE, _QUADRATIC, _TRIANGLE_RULE),
+    "quad8": _make_element(_SQUARE, _SERENDIPITY, _square_rule(3)),
+    "quad9": _make_element(_SQUARE, [*_SERENDIPITY, (2, 2)], _square_rule(3), has_centre=True),
+}

@@ -1,0 +1,332 @@
+"""A coated piece as a structured grid of columns and of rows that grow with the distance from both faces.
+
+Both pieces of a pair have the same columns over the interface, so their interface nodes match. The columns of a longer
+piece go on beyond the interface. At chamfered or rounded ends every column is lowered by the drop of the face: the
+coating by the whole drop, because a layer that is sprayed from above has the same thickness along the spray, the
+substrate by a fraction that decreases to zero at the far face. Other shapes of the surfaces are described by the gap
+g(x), never by the mesh.
+"""
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from math import ceil, log
+
+import numpy as np
+
+from ..core import PatchfemError, frozen_array
+from .ends import SHARP_END, End
+from .grading import Layout, divide_into_rows, tributary_lengths
+
+COLUMN_GROWTH = 1.1  # ratio of the lengths of successive columns beyond the interface, unless another one is given
+# Number of equal columns beyond which the rows become shorter with the columns; with fewer columns
+# the rows stay as short, which costs little
+N_REFERENCE_COLUMNS = 32
+# Growth of the rows with the distance from a face, for N_REFERENCE_COLUMNS columns; with 0.2 there
+# are a fifth more rows for the same error of the compliance
+ROW_SLOPE = 0.3
+COATING_ROWS = 4  # ratio of the thickness of a coating to the rows at its inner face
+MIN_ROWS = 6  # smallest number of rows of a piece
+
+
+@dataclass(frozen=True, eq=False)
+class TensorGrid:
+    """Graded structured grid of one piece; node j * ny + i is in column j and row i.
+
+    - ``x``: (m,) columns of nodes over the interface [m], 0 in the middle
+    - ``depth``: (ny,) rows of nodes [m], 0 at the flat face
+    - ``coating_rows``: number of rows of cells in the coating
+    - ``outer``: (k,) distances [m] of the columns beyond either end of the interface, the first 0
+    - ``end``: shape of both ends of the piece
+    """
+
+    x: np.ndarray
+    depth: np.ndarray
+    coating_rows: int
+    outer: np.ndarray = field(default_factory=lambda: np.zeros(1))
+    end: End = SHARP_END
+
+    @property
+    def length(self) -> float:
+        """Extent of the interface [m]."""
+        return float(self.x[-1] - self.x[0])
+
+    @property
+    def height(self) -> float:
+        """Depth of the far face [m]."""
+        return float(self.depth[-1])
+
+    @property
+    def first_row_height(self) -> float:
+        """Height of the first row of cells [m]."""
+        return float(self.depth[1])
+
+    @property
+    def coating_thickness(self) -> float:
+        """Thickness of the coating [m], or 0 if there is no coating."""
+        return float(self.depth[self.coating_rows])
+
+    @property
+    def piece_length(self) -> float:
+        """Length of the piece [m]."""
+        return self.length + 2 * float(self.outer[-1])
+
+    @property
+    def half_flat_length(self) -> float:
+        """Half the length [m] of the flat face between both ends."""
+        return self.piece_length / 2 - self.end.size
+
+    @property
+    def is_rectangle(self) -> bool:
+        """Whether the piece is a rectangle as long as the interface."""
+        return self.outer.size == 1 and self.end.kind == "sharp"
+
+    @cached_property
+    def columns(self) -> np.ndarray:
+        """Positions (nx,) [m] of all columns of nodes."""
+        beyond = self.x[-1] + self.outer[1:]
+        return frozen_array(np.concatenate([-beyond[::-1], self.x, beyond]))
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Numbers of columns and rows of nodes."""
+        return self.columns.size, self.depth.size
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes, known without the arrays of a grid that may be too large for the memory."""
+        return self.columns.size * self.depth.size
+
+    @property
+    def interface(self) -> np.ndarray:
+        """Nodes (m,) of the interface by increasing x."""
+        return (np.arange(self.x.size) + self.outer.size - 1) * self.depth.size
+
+    @property
+    def pressure_nodes(self) -> np.ndarray:
+        """Nodes (m,) between which the pressure is linear: those of the interface."""
+        return self.interface
+
+    @property
+    def far(self) -> np.ndarray:
+        """Fixed nodes (nx,) of the far face."""
+        return np.arange(1, self.columns.size + 1) * self.depth.size - 1
+
+    @property
+    def interface_depths(self) -> np.ndarray:
+        """Depth of the interface nodes (m,) [m], >= 0, which is added to the gap at rounded ends."""
+        return self.end.face_depth(self.x, self.piece_length)
+
+    @cached_property
+    def points(self) -> np.ndarray:
+        """Nodes (nx * ny, 2) as x and depth [m]."""
+        nx, ny = self.shape
+        out = np.stack([np.repeat(self.columns, ny), np.tile(self.depth, nx)], axis=1)
+        lowering = np.minimum(
+            1.0, (self.height - self.depth) / (self.height - self.coating_thickness)
+        )
+        drop = self.end.face_depth(self.columns, self.piece_length)
+        out[:, 1] += np.outer(drop, lowering).ravel()
+        return frozen_array(out)
+
+    @property
+    def blocks(self) -> dict[str, np.ndarray]:
+        """Cells (t, 4) by the name of their element; cells are numbered down each column."""
+        nx, ny = self.shape
+        node = np.arange(nx * ny).reshape(nx, ny)
+        corners = (node[:-1, :-1], node[1:, :-1], node[1:, 1:], node[:-1, 1:])
+        return {"quad": np.stack([corner.ravel() for corner in corners], axis=1)}
+
+    @property
+    def is_coating(self) -> np.ndarray:
+        """Whether each cell (t,) belongs to the coating."""
+        nx, ny = self.shape
+        return np.tile(np.arange(ny - 1) < self.coating_rows, nx - 1)
+
+    @property
+    def cell_positions(self) -> np.ndarray:
+        """Column and row (t, 2) of each cell, by which the grid is divided for its elimination."""
+        nx, ny = self.shape
+        return np.indices((nx - 1, ny - 1)).reshape(2, -1).T
+
+    def tributary_lengths(self) -> np.ndarray:
+        """Return the tributary length (m,) [m] of each interface node."""
+        return tributary_lengths(self.x)
+
+    def coarsen(self) -> "TensorGrid":
+        """Return the grid after its cells are merged two by two in both directions.
+
+        An odd number of columns is merged into columns of equal width. A single thin column at an
+        end would make the coarse grid finer there than elsewhere.
+        """
+        x = self.x[::2]
+        if self.x.size % 2 == 0:
+            x = np.linspace(self.x[0], self.x[-1], self.x.size // 2 + 1)
+        return self._change_levels(x, merge_levels)
+
+    def refine(self) -> "TensorGrid":
+        """Return the grid after every cell is split in two in both directions with smooth grading.
+
+        The rows of the coating stay in the coating, and the nodes of the face follow its shape.
+        """
+        return self._change_levels(split_levels(self.x), split_levels)
+
+    def _change_levels(self, x, change) -> "TensorGrid":
+        """Return the grid with given columns, after a function is applied to its rows and its outer columns."""
+        coating_depth = change(self.depth[: self.coating_rows + 1])
+        substrate_depth = change(self.depth[self.coating_rows :])
+        depth = np.concatenate([coating_depth, substrate_depth[1:]])
+        return replace(
+            self,
+            x=frozen_array(x),
+            depth=frozen_array(depth),
+            coating_rows=coating_depth.size - 1,
+            outer=frozen_array(change(self.outer)),
+        )
+
+    def extend(self, length: float, end: End, growth: float = COLUMN_GROWTH) -> "TensorGrid":
+        """Return the grid of a piece of which this one is the part over the interface.
+
+        The interface lies in the middle of the piece. The first column beyond the interface is as long
+        as the last column over it. A column of nodes lies where a chamfer or a rounding begins.
+
+        Parameters
+        ----------
+        length : float
+            Length of the piece [m].
+        end : End
+        growth : float
+            Ratio of the lengths of successive columns beyond the interface.
+
+        Returns
+        -------
+        TensorGrid
+        """
+        half_interface = float(self.x[-1])
+        cell = float(self.x[-1] - self.x[-2])
+        outer = [np.zeros(1)]
+        for stop in sorted({length / 2 - end.size, length / 2}):
+            if stop > half_interface * (1 + 1e-12):
+                columns = graded_rows(cell, stop - half_interface - outer[-1][-1], growth)
+                outer.append(outer[-1][-1] + np.cumsum(columns))
+                cell = columns[-1] * growth
+        return replace(self, outer=frozen_array(np.concatenate(outer)), end=end)
+
+
+def graded_rows(
+    start: float, total: float, growth: float = COLUMN_GROWTH, min_rows: int = 1
+) -> np.ndarray:
+    """Compute heights of rows that grow with a constant ratio and add up to a total.
+
+    Parameters
+    ----------
+    start : float
+        Height of the first row [m], or a little less.
+    total : float
+        Sum of the heights [m].
+    growth : float
+        Largest ratio of successive heights, above 1.
+    min_rows : int
+        Minimum number of rows.
+
+    Returns
+    -------
+    (ny,) ndarray [m]
+    """
+    start = min(start, total / min_rows)
+    n_rows = max(min_rows, ceil(log(1 + total * (growth - 1) / start) / log(growth) - 1e-9))
+    if n_rows * start >= total * (1 - 1e-12):
+        return np.full(n_rows, total / n_rows)
+    # The sum is convex in the ratio, so Newton steps from above decrease until round-off.
+    powers = np.arange(n_rows)
+    next_ratio = growth * (1 + 1e-6) + 1e-6
+    ratio = np.inf
+    while next_ratio < ratio:
+        ratio = next_ratio
+        rows = ratio**powers
+        derivative = start * (powers[1:] @ rows[:-1])
+        next_ratio = ratio - (start * rows.sum() - total) / derivative
+    rows = start * ratio**powers
+    return rows * (total / rows.sum())
+
+
+def graded_grid(
+    length: float, height: float, element_size: float, coating: float = 0.0
+) -> TensorGrid:
+    """Make the grid of a piece with equal columns, whose rows grow with the distance from both faces.
+
+    With more than N_REFERENCE_COLUMNS columns all rows are shorter in the same ratio as the columns, so
+    that half the element size halves every cell in both directions.
+
+    Parameters
+    ----------
+    length, height : float
+        Size of the piece [m].
+    element_size : float
+        Width of the columns [m], or a little more.
+    coating : float
+        Thickness of the coating [m].
+
+    Returns
+    -------
+    TensorGrid
+
+    Raises
+    ------
+    PatchfemError
+        If element_size exceeds the length, or the coating fills the height.
+    """
+    if element_size > length * (1 + 1e-12):
+        raise PatchfemError(
+            f"contact.element_size: {element_size:.6g} m exceeds the length {length:.6g} m"
+        )
+    if coating >= height:
+        raise PatchfemError(
+            f"contact.coating.thickness: {coating:.6g} m leaves no substrate in a piece of height "
+            f"{height:.6g} m"
+        )
+    n_columns = max(2, ceil(length / element_size - 1e-9))
+    scale = row_scale(n_columns)
+    reference_cell = length / n_columns / scale
+
+    # The stress is singular at the ends of the far face, so that the rows are short there as well.
+    bands = [(0.0, 0.0, reference_cell), (height, height, reference_cell)]
+    if coating > 0:
+        bands.append((coating, coating, min(reference_cell, coating / COATING_ROWS)))
+    max_row = height / MIN_ROWS
+    rows = Layout(
+        0.0, height, tuple(bands), (0.0, height), max_row, max_row, ROW_SLOPE
+    ).scale_cells(scale)
+
+    x = np.linspace(-length / 2, length / 2, n_columns + 1)
+    return TensorGrid(frozen_array(x), *divide_into_rows(rows, coating))
+
+
+def row_scale(n_columns: int) -> float:
+    """Return the ratio of the rows of a grid with equal columns to those with N_REFERENCE_COLUMNS columns."""
+    return min(1.0, N_REFERENCE_COLUMNS / n_columns)
+
+
+def merge_levels(levels) -> np.ndarray:
+    """Return every second grid line, including the first and the last."""
+    if levels.size % 2:
+        return levels[::2]
+    position = np.linspace(0, levels.size - 1, levels.size // 2 + 1)
+    return np.interp(position, np.arange(levels.size), levels)
+
+
+def split_levels(levels) -> np.ndarray:
+    """Insert a grid line into each cell so that geometric growth of the cells is preserved."""
+    if levels.size < 2:
+        return levels
+    cells = np.diff(levels)
+    ratio = np.ones(cells.size)
+    if cells.size > 1:
+        ratio[1:-1] = np.sqrt(cells[2:] / cells[:-2])
+        ratio[0] = cells[1] / cells[0]
+        ratio[-1] = cells[-1] / cells[-2]
+    out = np.empty(2 * levels.size - 1)
+    out[::2] = levels
+    # A ratio above four is a jump of the cell size where two gradings meet; the limit keeps the
+    # halves of a cell beside the jump within a factor of two of each other.
+    out[1::2] = levels[:-1] + cells / (1 + np.sqrt(np.clip(ratio, 0.25, 4.0)))
+    return out

@@ -1,0 +1,613 @@
+"""Runs of a rig from event to event by the engine `hybrid`.
+
+In: a Model, its Numerics and its Patch. Out: a Solution whose measures the engine has summed over its steps. The samples of
+the histories are those of the last cycles, of equal distances before them, and of the events.
+"""
+
+from dataclasses import dataclass, field, replace
+from time import perf_counter
+
+import numpy as np
+
+from ... import compiled
+from ...core import (
+    IntegratedMeasures,
+    InterfaceLoop,
+    NotConverged,
+    Outcome,
+    Response,
+    SineDrive,
+)
+from ...dynamics.event_list import DRIVE_CHANGE, RELEASE, REVERSAL, STOP, EventLog
+from ...dynamics.grooves.climbing import lift_message
+from ...dynamics.integrated import find_accelerations
+from ...formatting import format_length
+from ...hybrid import cases, periodic
+from ...hybrid import runs as engine
+from ...hybrid.laws import is_rigid
+from ...hybrid.records import Memory, State, Status
+from ...response import run_events
+from ...response.measures import MIN_SLIDE_RANGE, compute_harmonic, relative_gap
+from ...response.ringing import compute_stuck_vibration, make_ringing_measures, select_strongest
+from ...response.rows import ROWS_NEEDING_RUN
+from ...structure.drive_sizes import (
+    choose_samples_per_cycle,
+    find_drive_omega,
+    find_min_decay_rate,
+    is_periodic,
+    is_sinusoidal,
+)
+from . import strips
+from .evaluation import RunEvaluator
+from .hybrid_laws import Joints, make_joints
+from .levels import remove_incomplete_cycle, run_levels
+from .solution import Solution, first_mode_stiffness
+
+SAMPLES_PER_CYCLE = 400  # samples of each of the last cycles
+MIN_SAMPLES = 101  # samples of the last cycles of a run shorter than a cycle
+MAX_EARLY_SAMPLES = 8_000  # samples of equal distances before the last cycles
+EARLY_SAMPLES_PER_CYCLE = 40
+SAME_TIME_TOL = 1e-9  # distance of samples that are one, in cycles
+# Displacement at which a motion has left the range of a softening spring, relative to that without restoring force.
+ESCAPE_RATIO = 2.0
+MAX_CHANGE_RATIO = 1e-2  # largest ratio of the change of a steady motion to the tolerance
+N_CHANGE_WINDOWS = (
+    3  # windows at the end of a run from which the change of the motion is determined
+)
+# Smallest relative decay of a free motion over the last windows that is assumed; less damping counts as this decay.
+MIN_RELATIVE_DECAY = 1e-6
+STEADY_RTOL = 1e-10  # step tolerance of the steady motion that follows a run
+MIN_SAMPLED_CYCLES = 2.0  # cycles at the end that have as many samples as the window
+MOTION_MEASURES = (
+    "relative_displacement_amplitude",
+    "absolute_acceleration_peak",
+    "absolute_acceleration_fundamental",
+    "acceleration_distortion",
+)
+# Measures that exist only under a sine.
+SINE_MEASURES = (
+    "absolute_acceleration_fundamental",
+    "acceleration_distortion",
+    "slip_start_phase",
+    "equivalent_stiffness",
+    "equivalent_damping",
+    "secant_stiffness",
+    "harmonic_force_ratio",
+)
+# Sums over all drive levels.
+WHOLE_RUN_MEASURES = ("friction_work", "energy_dissipated")
+EARLY_ENDS = {
+    Status.EXCEEDS_TRAVEL: Outcome.EXCEEDS_TRAVEL,
+    Status.LEAVES_GROOVES: Outcome.LEAVES_GROOVES,
+}
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class LumpedRun:
+    """Run of the engine with histories.
+
+    - values: measures of the last cycles by name.
+    - response, window: histories of the run and of its last cycles.
+    - extremes (c, 2), phasors (c,): of the output in each cycle, see `hybrid.runs.Motion`.
+    - ledger: energies [J] and counters by name.
+    - outcome, message: how the run ended, if it ended early.
+    - end: arrays of the engine at the end, from which another run can go on.
+    - cycles_done: number of cycles.
+    - events: number of stored events.
+    - log: events of rigid interfaces, or None.
+    - snapshots: states of the elements of a patch in the last cycle.
+    - repeats: whether the motion repeats after each cycle.
+    """
+
+    values: dict
+    response: Response
+    window: Response
+    extremes: np.ndarray
+    phasors: np.ndarray
+    ledger: dict
+    outcome: Outcome | None
+    message: str
+    end: State
+    cycles_done: float
+    events: int
+    log: EventLog | None = None
+    snapshots: list = field(default_factory=list)
+    repeats: bool = False
+
+
+def run_from_event_to_event(
+    model, numerics, patch, frames: int = 0, say=None, progress=None
+) -> Solution:
+    """Compute the motion of a rig from event to event, for one drive level after another.
+
+    Parameters
+    ----------
+    model : Model
+    numerics : Numerics
+    patch : Patch or None
+        None under [normal] or between masses.
+    frames : int
+        Number of snapshots of the interface in the last cycle.
+    say, progress : callable, optional
+        Callbacks for a line of text and for the completed fraction.
+
+    Raises
+    ------
+    NotConverged
+        If a law or a mode is too fast for the engine.
+    """
+    begin = perf_counter()
+    joints = make_joints(model, numerics, patch)
+    reduced = perf_counter() - begin
+    compiled.load("hybrid.engine_kernels", say)
+    evaluator = LumpedEvaluator(model, numerics, patch, joints)
+    rig = model.rig
+
+    def integrate(drive, before, watch, is_last, cycles: float = rig.drive.levels.cycles):
+        """Integrate the motion under a drive from the end of another run, None for the start of the rig."""
+        state = None if before is None else before.end
+        run = evaluator.integrate(drive, cycles, state, frames if is_last else 0)
+        for name in WHOLE_RUN_MEASURES:
+            if before is not None and name in before.values:
+                run.values[name] += before.values[name]
+        return run
+
+    fields = {}
+    begin = perf_counter()
+    if rig.drive.levels.amplitudes:
+        run, fields = run_levels(evaluator, integrate, None, lambda run: run, progress)
+    else:
+        run = integrate(rig.drive.signal, None, progress, True, numerics.cycles)
+        steady = evaluator.find_steady_amplitude(run)
+        fields |= {} if steady is None else {"steady": steady}
+        run = remove_incomplete_cycle(run)
+    if progress is not None:
+        progress(1.0)
+    fields["prepare"] = {"reduce": reduced}
+    return evaluator.make_solution(run, perf_counter() - begin, **fields)
+
+
+class LumpedEvaluator(RunEvaluator):
+    """Runs of the engine `hybrid` and their evaluation."""
+
+    def __init__(self, model, numerics, patch, joints: Joints):
+        super().__init__(
+            model, numerics, patch, joints.contact, joints.stick_tolerance, SAMPLES_PER_CYCLE
+        )
+        self.joints = joints
+        self.is_rigid = bool(joints.laws) and all(is_rigid(law.law) for law, _ in joints.laws)
+        self.strips_slide_apart = model.rig.friction.strips_slide_apart and self.has_friction
+
+    def integrate(self, drive, cycles: float, state: State | None, frames: int) -> LumpedRun:
+        """Integrate the motion under a drive.
+
+        Parameters
+        ----------
+        drive
+        cycles : float
+        state : State or None
+            End of another run from which the motion goes on; None for the start of the rig.
+        frames : int
+            Number of snapshots of the elements in the last cycle.
+        """
+        travel = min(self.model.rig.springs.travel, self._find_escape())
+        times = self._choose_times(drive, cycles, frames)
+        motion = self._run(drive, cycles, np.concatenate(times[:2]), travel, state)
+        outcome = EARLY_ENDS.get(motion.status)
+        message = self._explain_end(motion, travel) if outcome is not None else ""
+        if motion.status not in (Status.DONE, *EARLY_ENDS):
+            raise NotConverged(motion.message)
+        if outcome is not None:
+            # Only a run with a known end has the measures and samples of its last cycles.
+            cycles = motion.time / drive.period
+            times = self._choose_times(drive, cycles, 0)
+            motion = self._run(drive, cycles, np.concatenate(times[:2]), np.inf, state)
+        run = self._make_run(motion, drive, cycles, times, state)
+        return replace(run, outcome=outcome, message=message)
+
+    def _find_escape(self) -> float:
+        """Return the displacement [m] beyond which a softening spring no longer pulls the output back; inf without one."""
+        cubic = self.model.rig.springs.cubic
+        if cubic is None or cubic >= 0:
+            return np.inf
+        modes = self.model.rig.modes
+        stiffness = modes.mass * modes.omega[0] ** 2 / max(modes.output[0] ** 2, 1e-300)
+        return ESCAPE_RATIO * np.sqrt(stiffness / -cubic)
+
+    def _explain_end(self, motion, travel: float) -> str:
+        """Return why a motion ended early, "" if it reached the travel of the scene."""
+        if motion.status == Status.LEAVES_GROOVES:
+            return lift_message(self.model.grooves, motion.time)
+        if travel >= self.model.rig.springs.travel:
+            return ""
+        return (
+            f"beyond a displacement of {format_length(travel, 3)} the motion grows without limit, because the force of the "
+            "softening spring no longer pulls the block back; the run ended there"
+        )
+
+    def _run(self, drive, cycles: float, times, travel: float, state: State | None):
+        """Return the `hybrid.runs.Motion` of a drive."""
+        numerics = self.numerics
+        schedule = cases.Schedule(cycles, numerics.window, np.unique(times), travel)
+        case = cases.make_rig_case(
+            self.model.rig,
+            self.joints.laws,
+            schedule,
+            signal=drive,
+            rtol=numerics.local,
+            n_steps=numerics.steps,
+        )
+        return engine.run_case(case, has_errors=False, start=state, fills_histories=numerics.whole)
+
+    def find_steady_amplitude(self, run: LumpedRun) -> tuple | None:
+        """Return amplitude [m] and error of the steady motion of elements that a run under a sine approaches.
+
+        The result is None if the motion changes no more, or if it approaches none that is stable.
+        """
+        drive = self.model.rig.drive.signal
+        laws = [law.law for law, _ in self.joints.laws]
+        if run.outcome is not None or not laws or set(laws) != {"masing"} or self.is_stuck(run):
+            return None
+        decay = find_min_decay_rate(self.model.rig.modes) * drive.period
+        tolerance = self.model.accuracy.tolerance
+        if (
+            not isinstance(drive, SineDrive)
+            or run.cycles_done % 1
+            or not may_still_change(run.extremes, self.numerics.window, tolerance, decay)
+        ):
+            return None
+        schedule = cases.Schedule(1.0, 1, np.zeros(0), np.inf)
+        case = cases.make_rig_case(self.model.rig, self.joints.laws, schedule, rtol=STEADY_RTOL)
+        return find_stable_amplitude(periodic.find_periodic_motion(case, start=run.end, n_first=0))
+
+    def _choose_times(self, drive, cycles: float, frames: int) -> tuple:
+        """Return the times [s] of samples before the last cycles, in the last cycles, and of snapshots."""
+        period = drive.period
+        end = cycles * period
+        window_start = max(0.0, end - self.numerics.window * period)
+        first = max(0.0, min(window_start, end - MIN_SAMPLED_CYCLES * period))
+        even = choose_samples_per_cycle(drive, cycles, needs_history=bool(ROWS_NEEDING_RUN))
+        count = even or max(1, min(EARLY_SAMPLES_PER_CYCLE, MAX_EARLY_SAMPLES // max(cycles, 1)))
+        if not self.numerics.whole:
+            first = window_start
+            count = 0
+        early = np.zeros(0)
+        if count:
+            early = np.arange(0.0, first - 1e-9 * period, period / count)
+        late = [
+            _divide(begin, stop, period, minimum)
+            for begin, stop, minimum in ((first, window_start, 2), (window_start, end, MIN_SAMPLES))
+            if stop > begin
+        ]
+        late = np.unique(np.concatenate(late))
+        begin = max(0.0, end - period)
+        at = begin + (end - begin) * (1 + np.arange(frames)) / max(frames, 1)
+        nearest = np.abs(late[:, None] - at).argmin(axis=0)
+        return early, late, late[nearest], window_start
+
+    def _make_run(
+        self, motion, drive, cycles: float, times: tuple, start: State | None
+    ) -> LumpedRun:
+        """Return the histories, energies and events of a motion."""
+        time = motion.rows[:, 0]
+        if hasattr(drive, "band"):
+            # Spectra need samples of equal distances.
+            is_kept = np.isin(time, np.concatenate(times[:2]))
+        else:
+            # Differences of samples at nearly the same time are round-off; the last sample is kept.
+            is_late = np.diff(time) > SAME_TIME_TOL * drive.period
+            is_kept = np.append(is_late, True)
+        motion = replace(motion, rows=motion.rows[is_kept])
+        response = motion.make_response(self.model.rig.modes, drive)
+        if self.model.grooves is not None and self.model.grooves.lifted_mass:
+            response = self._add_vertical_force(response, drive)
+        window = response.select(response.time >= times[3] * (1 - 1e-15))
+        run = LumpedRun(
+            values=dict(motion.values),
+            response=response,
+            window=window,
+            extremes=motion.extremes,
+            phasors=motion.phasors,
+            ledger=motion.find_energies() | {"steps": float(motion.n_steps)},
+            outcome=None,
+            message="",
+            end=motion.final,
+            cycles_done=cycles,
+            events=len(motion.event_rows),
+            log=self._make_log(motion, drive) if self.is_rigid else None,
+            snapshots=self._list_snapshots(motion, response, times[2], start),
+            repeats=motion.repeats,
+        )
+        if not self.strips_slide_apart:
+            return run
+        loads = strips.compute_strip_loads(self.patch)
+        offsets = self.patch.strips.offsets
+        return replace(
+            run,
+            response=strips.average_histories_over_strips(response, loads, offsets),
+            window=strips.average_histories_over_strips(window, loads, offsets),
+        )
+
+    def _add_vertical_force(self, response: Response, drive) -> Response:
+        """Return histories with the vertical force on the flanks, which carries load and lifted mass, as normal load."""
+        grooves = self.model.grooves
+        modes = self.model.rig.modes
+        accelerations = find_accelerations(
+            modes,
+            drive.values(response.time),
+            response.modal,
+            response.modal_rate,
+            np.outer(response.force, modes.slide),
+        )
+        slope = grooves.slope(response.slide)
+        bend = grooves.slope_derivative(response.slide)
+        rise = slope * (accelerations @ modes.slide) + bend * response.slide_rate**2
+        force = self.joints.laws[0][1].mean + grooves.lifted_mass * rise
+        return replace(response, extra=response.extra | {"normal_load": force})
+
+    def _make_log(self, motion, drive) -> EventLog:
+        """Return stops, releases and reversals of rigid interfaces, and the changes of the drive."""
+        directions = motion.find_directions()
+        rows = motion.event_rows
+        slides = (
+            rows[:, 1 : 1 + self.model.rig.modes.omega.size] @ self.model.rig.modes.interfaces.T
+        )
+        events = [
+            (s.start, -1, DRIVE_CHANGE, 0.0) for s in drive.segments[1:] if s.start < motion.time
+        ]
+        for k in range(directions.shape[1]):
+            before, after = directions[:-1, k], directions[1:, k]
+            changed = np.flatnonzero(before != after)
+            start = np.where(before[changed] == 0, RELEASE, REVERSAL) * after[changed]
+            kinds = np.where(after[changed] == 0, STOP, start)
+            events += zip(rows[changed, 0], np.full(changed.size, k), kinds, slides[changed, k])
+        columns = np.array(sorted(events), float).reshape(-1, 4).T
+        time, number, kind, slide = columns
+        phase = find_drive_omega(drive) * time % (2 * np.pi)
+        return EventLog(time, phase, number.astype(int), kind.astype(int), slide, time.size)
+
+    def _list_snapshots(self, motion, response: Response, times, start) -> list[dict]:
+        """Return the stretches of the elements of patches at given times, from all reversals before.
+
+        Those before the start of the motion are in the memory of its `State`, if it does not start from rest.
+        """
+        if not len(times) or self.is_rigid or not self.joints.elements:
+            return []
+        slides = response.extra.get("slides", response.slide[:, None])
+        at = np.searchsorted(response.time, times)
+        stretches = []
+        for i, (_, limit) in enumerate(self.joints.elements):
+            reversals = motion.list_reversals(i)
+            if start is not None:
+                reversals = np.concatenate([_list_remembered_reversals(start, i), reversals])
+            stretches.append(_find_stretches(reversals, (times, slides[at, i]), limit))
+        return [
+            {
+                "time": float(response.time[k]),
+                "slide": float(response.slide[k]),
+                "force": float(response.force[k]),
+                "rate": float(response.slide_rate[k]),
+                "slip": float(response.slip[k]),
+                "stretch": stretches[0][number],
+                "faces": [(float(slides[k, i]), own[number]) for i, own in enumerate(stretches)],
+            }
+            for number, k in enumerate(at)
+        ]
+
+    def compute_integrated_measures(self, run, drive, *, stuck: bool = False) -> IntegratedMeasures:
+        """Return the measures of the engine.
+
+        Strips that slide independently have a single loop of their mean displacement, which is computed from
+        samples.
+
+        Parameters
+        ----------
+        run, drive, stuck
+            See `RunEvaluator.compute_integrated_measures`.
+        """
+        values = {
+            name: None if np.isnan(value) else float(value) for name, value in run.values.items()
+        }
+        if not is_sinusoidal(drive):
+            values |= dict.fromkeys(SINE_MEASURES)
+        if self.has_friction:
+            values |= self._limit_loop_measures(run, values)
+            values["work_check"] = self._compute_work_check(run)
+        if self.strips_slide_apart:
+            names = (*MOTION_MEASURES, "slip_start_phase", "energy_balance", "work_check")
+            names += ("friction_work", "energy_dissipated", "energy_stored")
+            loop = _compute_strips_loop(run, drive)
+            return IntegratedMeasures({name: values.get(name) for name in names}, loops=(loop,))
+        values.pop("energy_stored", None)
+        return IntegratedMeasures(values)
+
+    def _limit_loop_measures(self, run, values: dict) -> dict:
+        """Return the measures of a loop that have no value, because the interface hardly moves or moves in several modes."""
+        missing = {}
+        if np.ptp(run.window.slide) <= MIN_SLIDE_RANGE:
+            names = ("equivalent_stiffness", "secant_stiffness", "harmonic_force_ratio")
+            missing = dict.fromkeys((*names, "equivalent_damping"))
+        elif not first_mode_stiffness(self.model, run.window):
+            missing = {"equivalent_damping": None}
+        return missing
+
+    def _compute_work_check(self, run) -> float:
+        """Return the relative difference of the friction work in the window from samples and from the engine."""
+        window = run.window
+        slides = window.extra.get("slides", window.slide[:, None])
+        forces = window.extra.get("forces", window.force[:, None])
+        parts = (forces[1:] + forces[:-1]) / 2 * np.diff(slides, axis=0)
+        work = window.extra["ledger"][0]
+        scale = run.ledger["power"] + run.ledger["peak_stored"]
+        return float(relative_gap(parts.sum(), work[-1] - work[0], np.abs(parts).sum(), scale))
+
+    def find_friction_loops(self, run, drive) -> tuple:
+        """Return the mean loop of strips that slide independently, else ()."""
+        return (_compute_strips_loop(run, drive),) if self.strips_slide_apart else ()
+
+    def collect_cycle_data(self, run, drive, *, stuck: bool) -> dict:
+        """Return whether the interfaces are strips of a single one.
+
+        Parameters
+        ----------
+        run, drive, stuck
+            See `RunEvaluator.collect_cycle_data`.
+        """
+        return {"is_single_interface": self.strips_slide_apart}
+
+    def is_stuck(self, run) -> bool:
+        """Return whether all interfaces or strips stick during the last cycles of a run."""
+        if not self.has_friction or self.creeps:
+            return False
+        return run_events.is_all_stuck(run.window, self.stick_tolerance)
+
+    def measure_ringing(self, run, drive) -> tuple:
+        """Compute frequency and damping of the free vibration during stick, with error estimates.
+
+        Both have a closed form if every interface is a single spring that sticks until the end of a run without
+        sinusoidal drive. In other runs they are measured in the stick intervals.
+        """
+        vibration = self._find_stuck_vibration(run, run.window, drive)
+        if not self.has_friction or self.creeps:
+            return {}, {}
+        if not vibration:
+            return run_events.measure_ringing_in_sticks(
+                run.window,
+                self.model.rig.modes,
+                drive,
+                run.log,
+                self.stick_tolerance,
+                repeats=run.repeats,
+            )
+        mode = select_strongest(vibration, "acceleration")
+        omega = 2 * np.pi * mode.frequency
+        peak = float(np.abs(run.window.acceleration).max())
+        return make_ringing_measures(mode.acceleration, omega, mode.damping, peak), {}
+
+    def _find_stuck_vibration(self, run, motion: Response, drive) -> list:
+        """Return the free vibration of the modes in a part of the motion in which no interface slips; [] if one does."""
+        springs = self.joints.springs
+        if not springs.size or motion.time.size < 2 or is_periodic(drive) or not drive.segments:
+            return []
+        slips = motion.extra.get("slips", motion.slip[:, None])
+        if np.ptp(slips, axis=0).max() > 0:
+            return []
+        return compute_stuck_vibration(self.model.rig.modes, springs, motion)
+
+    def collect_solution_fields(self, run, drive) -> dict:
+        """Return the vibration that remains after the last slip of a release."""
+        if self.model.rig.drive.kind != "free" or not self.joints.springs.size:
+            return {}
+        response = run.response
+        slips = response.extra.get("slips", response.slip[:, None])
+        moves = np.flatnonzero(np.abs(np.diff(slips, axis=0)).max(axis=1) > 0)
+        if not moves.size:
+            return {}
+        after = response.select(response.time >= response.time[moves[-1] + 1])
+        vibration = self._find_stuck_vibration(run, after, drive)
+        return {"extra": {"tail": select_strongest(vibration, "displacement")}} if vibration else {}
+
+    def estimate_run_errors(self, run, drive, values: dict) -> dict:
+        """Estimate the errors of the samples of a random motion.
+
+        Parameters
+        ----------
+        run, drive, values
+            See `RunEvaluator.estimate_run_errors`.
+        """
+        return self.estimate_sampling_errors(run, drive, values) if hasattr(drive, "band") else {}
+
+
+def find_stable_amplitude(motion: periodic.PeriodicMotion) -> tuple[float, float] | None:
+    """Return the amplitude [m] of a periodic motion and its error; None if it is not known or not stable."""
+    if motion.grows or not motion.change <= motion.tolerance or not motion.is_stable:
+        return None
+    amplitude = float(motion.batch.windows[0][MOTION_MEASURES[0]][0])
+    return amplitude, amplitude * (10 * motion.error + 1e2 * STEADY_RTOL)
+
+
+def may_still_change(extremes, window: int, tolerance: float, decay: float) -> bool:
+    """Return whether a motion may still change by more than a fraction of the tolerance.
+
+    This is the case if the run is too short. Otherwise, the change of the extremes in the last
+    N_CHANGE_WINDOWS windows is divided by the fraction by which the slowest free motion decays in
+    this time, because the extremes of a slow beat hardly change near its maximum.
+
+    Parameters
+    ----------
+    extremes : (c, 2)
+        Minimum and maximum output of each cycle [m].
+    window : int
+        Number of cycles in a window.
+    tolerance : float
+    decay : float
+        Exponent of the decay of the slowest free motion per cycle [1].
+    """
+    last = np.asarray(extremes, float)[-N_CHANGE_WINDOWS * window :]
+    if len(last) < N_CHANGE_WINDOWS * window:
+        return True
+    decayed = max(-np.expm1(-decay * len(last)), MIN_RELATIVE_DECAY)
+    limit = MAX_CHANGE_RATIO * tolerance * decayed * np.ptp(last[-window:]) / 2
+    return np.ptp(last, axis=0).max() > limit
+
+
+def _divide(begin: float, end: float, period: float, minimum: int) -> np.ndarray:
+    """Return times (k,) [s] of equal distances from begin to end, SAMPLES_PER_CYCLE in a period."""
+    count = round((end - begin) / period * SAMPLES_PER_CYCLE) + 1
+    return np.linspace(begin, end, max(minimum, count))
+
+
+def _list_remembered_reversals(state: State, interface: int) -> np.ndarray:
+    """Return the time 0 and the slides [m] (k, 2) of the origin and of the reversals that a law remembers."""
+    memory = state.memory[0, interface]
+    stack = memory[Memory.STACK :: 2][: int(memory[Memory.COUNT])]
+    slides = memory[Memory.ORIGIN] + np.append(0.0, stack)
+    return np.stack([np.zeros(slides.size), slides], axis=1)
+
+
+def _find_stretches(reversals, points, limit) -> list[np.ndarray]:
+    """Return the stretches (e,) [m] of elements at points of a motion.
+
+    Parameters
+    ----------
+    reversals : (k, 2) array
+        Times [s] and slides [m] of start and reversals.
+    points : tuple of (f,) array
+        Times [s] and slides [m].
+    limit : (e,) array
+        Yield displacements [m].
+    """
+    found = []
+    stretch = np.zeros(np.shape(limit))
+    last = reversals[0, 1]
+    k = 1
+    for time, slide in zip(*points):
+        while k < len(reversals) and reversals[k, 0] <= time:
+            stretch += reversals[k, 1] - last
+            np.maximum(np.minimum(stretch, limit, out=stretch), -limit, out=stretch)
+            last = reversals[k, 1]
+            k += 1
+        found.append(np.clip(stretch + slide - last, -limit, limit))
+    return found
+
+
+def _compute_strips_loop(run, drive) -> InterfaceLoop:
+    """Compute the friction loop of a patch from the samples of its independent strips.
+
+    Each event has a sample. The yaw does work in addition to that of the mean displacement.
+    """
+    window = run.window
+    omega = find_drive_omega(drive)
+    gaps = np.diff(window.time)
+    weight = np.concatenate([[0.0], gaps / 2]) + np.concatenate([gaps / 2, [0.0]])
+    is_stuck = ~window.extra["slide_rates"].any(axis=1)
+    power = (window.extra["forces"] * window.extra["slide_rates"]).sum(axis=1)
+    slide = window.slide - weight @ window.slide / weight.sum()
+    return InterfaceLoop(
+        displacement_harmonic=complex(compute_harmonic(window.time, weight, slide, omega)),
+        force_harmonic=complex(compute_harmonic(window.time, weight, window.force, omega)),
+        work=float(weight @ power),
+        slip_range=float(np.ptp(window.slip)),
+        stuck_time=float(weight[is_stuck].sum()),
+        max_force=float(np.abs(window.force).max()),
+    )

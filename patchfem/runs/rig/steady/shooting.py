@@ -1,0 +1,300 @@
+"""Steady motion of a rig by shooting with the map of a period of the engine `hybrid`.
+
+In: a Model, its Numerics and its Patch. Out: the Solution under a sine, and the response curve over frequency or drive
+level (`hybrid.periodic`).
+"""
+
+from dataclasses import replace
+from functools import cached_property
+from time import perf_counter
+
+import numpy as np
+
+from .... import compiled
+from ....core import NotConverged, Outcome, PatchfemError
+from ....hybrid import cases, periodic
+from ....hybrid import runs as hybrid_runs
+from ....hybrid.laws import is_rigid
+from ....hybrid.records import Clock, Status, Whole, Window
+from ....response.spectrum import harmonic_measures
+from ....structure.response import compute_receptance
+from ..event_to_event import LumpedEvaluator
+from ..hybrid_laws import make_joints
+from ..solution import Solution
+from .curves import (
+    COLUMN_MEASURES,
+    CurvePoint,
+    TracedCurve,
+    compute_response_curve,
+    describe_instability,
+    estimate_exact_errors,
+)
+
+# Cycles from rest within which a lifted mass leaves its grooves, if it leaves them at all.
+N_CYCLES_IN_GROOVES = 30
+RTOL = 1e-11  # tolerance of a step, so that the change over a period is far below the motion
+STEPS_ERROR = 100.0  # error of a periodic motion that is due to its steps, relative to RTOL
+N_CYCLES = 2.0  # computed cycles of a periodic motion, so that each stick is complete
+MIN_STOP = 1e-9  # shortest stop that is counted, in periods
+N_NEAR_CYCLES = 2  # cycles before the first correction of a motion that starts from a similar one
+FULL_SLIP_TOL = (
+    1e-9  # relative distance from its friction limit at which an interface slips as a whole
+)
+
+
+class ShootingFinder(TracedCurve):
+    """Solver for steady motions by Newton's method on the map of a period."""
+
+    def __init__(self, model, numerics, patch, frames: int = 0, say=None):
+        compiled.load("hybrid.engine_kernels", say)
+        self.model = model
+        self.modes = model.rig.modes
+        self.patch = patch
+        self.frames = frames
+        self.numerics = replace(
+            numerics, cycles=N_CYCLES, window=1, local=RTOL, steps=cases.MIN_STEPS, whole=True
+        )
+        self.joints = make_joints(model, self.numerics, patch)
+        self.evaluator = LumpedEvaluator(model, self.numerics, patch, self.joints)
+
+    def find_periodic_motion(self, drive, guess=None) -> periodic.PeriodicMotion:
+        """Find the periodic motion under sinusoidal drive, from rest or from a similar motion.
+
+        Parameters
+        ----------
+        drive : SineDrive
+        guess : hybrid.records.State, optional
+            State of a similar motion at phase 0 of the drive.
+
+        Raises
+        ------
+        NotConverged
+            If no motion is found that repeats after each cycle.
+        """
+        schedule = cases.Schedule(1.0, 1, np.zeros(0), np.inf)
+        case = cases.make_rig_case(
+            self.model.rig, self.joints.laws, schedule, signal=drive, rtol=RTOL
+        )
+        n_first = periodic.N_FIRST_CYCLES if guess is None else N_NEAR_CYCLES
+        motion = periodic.find_periodic_motion(case, start=guess, n_first=n_first)
+        if motion.grows:
+            return motion
+        status = Status(int(motion.batch.states.clock[0, Clock.STATUS]))
+        if status != Status.DONE or not motion.change <= motion.tolerance:
+            raise NotConverged(
+                f"no periodic motion was found: the motion still changes by {motion.change:.2g} of its amplitude from "
+                'one cycle to the next; use accuracy.method = "auto"'
+            )
+        return motion
+
+    def compute_steady_motion(self, drive, guess=None) -> tuple:
+        """Compute the steady motion under sinusoidal drive, and the guess for a neighbouring drive.
+
+        If the lifted mass leaves its grooves, there is no steady motion. The Solution is then that of the motion that
+        leaves them, and the guess is None.
+        """
+        begin = perf_counter()
+        run = self._leave_grooves(drive)
+        if run is not None:
+            return self._make_solution(run, drive, begin, "leaves its grooves"), None
+        motion = self.find_periodic_motion(drive, guess)
+        state = None if motion.grows else motion.batch.states
+        cycles = periodic.N_GROWTH_CYCLES if motion.grows else N_CYCLES
+        run = self.evaluator.integrate(drive, cycles, state, self.frames)
+        return self._make_periodic_solution(run, motion, drive, begin), state
+
+    def _leave_grooves(self, drive):
+        """Return the run from rest that leaves the grooves, or None if there is none."""
+        if self.model.grooves is None or not self.model.grooves.lifted_mass:
+            return None
+        run = self.evaluator.integrate(drive, N_CYCLES_IN_GROOVES, None, 0)
+        return run if run.outcome is Outcome.LEAVES_GROOVES else None
+
+    def _make_periodic_solution(self, run, motion, drive, begin: float) -> Solution:
+        """Return the Solution of a periodic motion with its stability and errors."""
+        is_stuck = self.evaluator.is_stuck(run)
+        regime = self._name_regime(motion, is_stuck=is_stuck)
+        is_stable = is_stuck or motion.grows or motion.is_stable
+        solution = self._make_solution(
+            run, drive, begin, regime if is_stable else f"{regime}, unstable"
+        )
+        reach = float(np.abs(run.extremes).max())
+        outcome = Outcome.STUCK if is_stuck else solution.outcome or Outcome.STEADY
+        if motion.grows:
+            outcome = Outcome.GROWS
+        elif reach > self.model.rig.springs.travel:
+            outcome = Outcome.EXCEEDS_TRAVEL
+        if not is_stable:
+            outcome = Outcome.NOT_CONVERGED
+            solution = replace(solution, message=describe_instability(motion.multipliers))
+
+        # The error of the fixed point adds to that of the steps.
+        coarse = replace(
+            self.evaluator.numerics,
+            local=hybrid_runs.COARSE * RTOL,
+            steps=cases.MIN_STEPS / hybrid_runs.COARSE_STEP,
+        )
+        other = LumpedEvaluator(self.model, coarse, self.patch, self.joints)
+        start = None if motion.grows else motion.batch.states
+        other_run = other.integrate(drive, run.cycles_done, start, 0)
+        coarse_values = other.evaluate_measures(other_run, drive, stuck=is_stuck)
+        shared = {name: value for name, value in solution.values.items() if name in coarse_values}
+        errors = hybrid_runs.estimate_errors(shared, coarse_values, RTOL)
+        relative = find_relative_error(motion)
+        errors = {
+            name: errors.get(name, abs(value)) + relative * abs(value)
+            for name, value in solution.values.items()
+        }
+        extra = {"multipliers": motion.multipliers, "residual": motion.change, "map": "shooting"}
+        return replace(
+            solution,
+            values=solution.values | {"drift_per_cycle": 0.0},
+            outcome=outcome,
+            errors=errors,
+            extra=solution.extra | extra,
+        )
+
+    def _name_regime(self, motion, *, is_stuck: bool) -> str:
+        """Return the name of the regime of a periodic motion, such as "2 stops" or "partial slip"."""
+        if motion.grows:
+            return "unbounded"
+        if is_stuck:
+            return "stuck"
+        laws = [law for law, _ in self.joints.laws]
+        faces = motion.batch.records.faces[0, 0, : len(laws)]
+        if laws and all(law.law == "masing" for law in laws):
+            limits = np.array([law.numbers[2] for law in laws])
+            forces = np.maximum(faces[:, Window.MAX_FORCE], -faces[:, Window.MIN_FORCE])
+            slides = (forces >= limits * (1 - FULL_SLIP_TOL)).all()
+            return "slides" if slides else "partial slip"
+        if not any(is_rigid(law.law) for law in laws):
+            return "sliding"
+        lasts = faces[:, Window.STUCK] > MIN_STOP * motion.period
+        n_stops = int((faces[:, Window.STARTS] * lasts).max())
+        return f"{n_stops} stop{'s' * (n_stops != 1)}" if n_stops else "sliding"
+
+    def _make_solution(self, run, drive, begin: float, regime: str) -> Solution:
+        """Return the Solution of a run with a regime."""
+        solution = self.evaluator.make_solution(run, perf_counter() - begin, drive)
+        errors = {name: RTOL * abs(value) for name, value in solution.values.items()}
+        extra = {"regime": regime, "multipliers": np.zeros(0)}
+        return replace(solution, steady=(None, None), errors=errors, extra=extra)
+
+    def compute_curve_point(self, drive, guess=None) -> CurvePoint:
+        """Compute one point of a response curve, starting from a neighbouring motion or from rest.
+
+        Without friction it has a closed form, except for an undamped resonance.
+        """
+        point = None if self.joints.laws else self._compute_linear_point(drive)
+        if point is not None:
+            return point
+        if self._leave_grooves(drive) is not None:
+            regime = "leaves its grooves"
+            return CurvePoint(drive, {}, {}, regime, np.nan, False, Outcome.LEAVES_GROOVES)
+        try:
+            motion = self.find_periodic_motion(drive, guess)
+        except NotConverged:
+            if guess is None:
+                raise
+            motion = self.find_periodic_motion(drive)
+        if motion.grows:
+            return CurvePoint(drive, {}, {}, "unbounded", 1.0, False, Outcome.GROWS)
+
+        windows = motion.batch.windows[0]
+        values = {name: float(windows[name][0]) for name in COLUMN_MEASURES.values()}
+        faces = motion.batch.records.faces[0, 0, : len(self.joints.laws)]
+        slips = faces[:, Window.MAX_SLIP] - faces[:, Window.MIN_SLIP]
+        is_stuck = bool((slips <= self.joints.stick_tolerance).all()) and not self.evaluator.creeps
+        regime = self._name_regime(motion, is_stuck=is_stuck)
+        is_stable = is_stuck or motion.is_stable
+        return CurvePoint(
+            drive=drive,
+            values={name: value for name, value in values.items() if np.isfinite(value)},
+            errors=self._estimate_point_errors(values, motion),
+            regime=regime if is_stable else f"{regime}, unstable",
+            multiplier=float(np.abs(motion.multipliers).max(initial=0.0)),
+            stable=is_stable,
+            outcome=Outcome.STUCK if is_stuck else Outcome.STEADY,
+            guess=motion.batch.states,
+        )
+
+    def _estimate_point_errors(self, values: dict, motion) -> dict:
+        """Return the errors of the measures of a point of a response curve."""
+        relative = find_relative_error(motion)
+        errors = estimate_exact_errors(values, relative)
+        # The ratio of two harmonics has the error of the first.
+        return errors | {"acceleration_distortion": errors["acceleration_distortion"] + relative}
+
+    def observe(self, drive, guess=None, *, needs_histories: bool = True) -> tuple | None:
+        """Return what sensors see of the periodic motion under a drive, without errors; None if it is unbounded.
+
+        Parameters
+        ----------
+        drive : SineDrive
+        guess : hybrid.records.State, optional
+            State of a similar motion at phase 0 of the drive.
+        needs_histories : bool
+            Whether the first value is needed.
+
+        Returns
+        -------
+        tuple
+            Histories of a cycle or None; peak of the absolute acceleration [m s-2]; displacement amplitude [m]; guess
+            for a similar drive; first harmonic of the acceleration (complex) [m s-2].
+        """
+        motion = self.find_periodic_motion(drive, guess)
+        if motion.grows or self._leave_grooves(drive) is not None:
+            return None
+        state = motion.batch.states
+        window = None
+        if needs_histories:
+            window = self.evaluator.integrate(drive, N_CYCLES, state, 0).window
+        values = motion.batch.windows[0]
+        whole = motion.batch.records.whole[0, 0]
+        fundamental = 2 / whole[Whole.SPAN] * complex(whole[Whole.COS_1], -whole[Whole.SIN_1])
+        peak = float(values["absolute_acceleration_peak"][0])
+        return window, peak, float(values[COLUMN_MEASURES["amplitude"]][0]), state, fundamental
+
+    def _compute_linear_point(self, drive) -> CurvePoint | None:
+        """Return the point of a response curve of a linear rig in closed form, or None at an undamped resonance."""
+        modes = self.modes
+        gauge = modes.output if modes.gauge is None else modes.gauge
+        try:
+            receptance = compute_receptance(modes, drive.omega, [gauge, modes.output], modes.base)
+        except PatchfemError:
+            return None
+        at_gauge, at_output = receptance[0, :, 0] * modes.mass
+        acceleration = drive.acceleration * float(abs(drive.moving + drive.omega**2 * at_output))
+        values = {
+            COLUMN_MEASURES["amplitude"]: drive.acceleration * float(abs(at_gauge)),
+            COLUMN_MEASURES["acceleration_peak"]: acceleration,
+            **harmonic_measures(acceleration, 0.0),
+        }
+        values = {name: value for name, value in values.items() if value is not None}
+        multiplier = float(np.exp(self._max_growth_rate * drive.period))
+        errors = estimate_exact_errors(values, 0.0)
+        return CurvePoint(drive, values, errors, "sliding", multiplier, True, Outcome.STEADY)
+
+    @cached_property
+    def _max_growth_rate(self) -> float:
+        """Largest growth rate [1/s] of the free motions without friction; negative if all of them decay."""
+        n = self.modes.omega.size
+        state = np.block(
+            [
+                [np.zeros((n, n)), np.eye(n)],
+                [-np.diag(self.modes.omega**2), -self.modes.damping_matrix],
+            ]
+        )
+        return float(np.linalg.eigvals(state).real.max())
+
+    def trace_curve(self, drive) -> tuple:
+        """Compute the response curve over frequency, which has no folds.
+
+        Each point starts from the motion at the previous one.
+        """
+        return compute_response_curve(self.modes, drive, self.compute_curve_point), ()
+
+
+def find_relative_error(motion: periodic.PeriodicMotion) -> float:
+    """Return the error of a periodic motion relative to its size, from the fixed point and from the steps of a period."""
+    return motion.error + STEPS_ERROR * RTOL

@@ -1,0 +1,146 @@
+"""Batches of `hybrid`, errors, histories, samples and early ends."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hybrid_cases import coulomb, make_modes, make_oscillator
+from hybrid_rigs import draw_spec, make_case
+
+from patchfem.core import SineDrive
+from patchfem.hybrid import cases, drives, runs
+from patchfem.hybrid.laws import masing
+from patchfem.hybrid.laws.masing import from_elements
+from patchfem.hybrid.records import Setting, Status
+from patchfem.structure.drives import RecordedDrive, SweepDrive
+
+AMPLITUDE = "relative_displacement_amplitude"
+
+
+def test_cases_of_a_batch_equal_single_runs():
+    """Each case of a batch has the values of its own run, up to the order of a sum over cycles."""
+    batch = [
+        make_oscillator(masing.from_elements([8.0], [0.1]), acceleration=a, cycles=30)
+        for a in (0.5, 1.0, 1.7)
+    ]
+    values = runs.run_batch(batch).windows[0]
+    for k, case in enumerate(batch):
+        alone = runs.run_case(case, has_errors=False).values
+        for name, value in alone.items():
+            assert value == pytest.approx(values[name][k], rel=1e-13, nan_ok=True), name
+
+
+def test_histories_are_those_of_the_dense_output():
+    """Samples lie on the solution of a run whose steps are much smaller; the acceleration obeys eq. 3.4."""
+    modes, drive = make_modes(zeta=0.003), SineDrive(1.0, 1.0)
+    time = np.linspace(0.0, 60.0, 301)
+    motions = [
+        runs.run_case(
+            make_oscillator(coulomb(), cycles=10, rtol=rtol, samples=time), has_errors=False
+        )
+        for rtol in (1e-7, 1e-12)
+    ]
+    fine, exact = (motion.make_response(modes, drive) for motion in motions)
+    at = [np.searchsorted(response.time, time) for response in (fine, exact)]
+    assert fine.slide[at[0]] == pytest.approx(exact.slide[at[1]], abs=1e-6)
+    assert np.all(np.diff(fine.time) >= 0)
+    relative = fine.acceleration - fine.base_acceleration
+    residual = relative + fine.slide + 0.006 * fine.slide_rate + fine.force + np.sin(fine.time)
+    assert np.abs(residual).max() < 1e-12
+    # Between two events the friction work is that of the constant force along the slide.
+    ledger = fine.extra["ledger"]
+    assert ledger[0] == pytest.approx(ledger[2], rel=1e-12)
+    path = np.abs(np.diff(fine.slide)).sum()
+    assert ledger[0, -1] - ledger[0, 0] == pytest.approx(0.8 * path, rel=1e-5)
+
+
+def test_errors_hold_on_random_rigs():
+    """Errors of the default tolerance against a tolerance of 1e-11: at least 95 % of all values hold."""
+    inside = []
+    for seed in range(200, 240):
+        case = make_case(draw_spec(seed))
+        motion = runs.run_case(case)
+        exact = runs.run_case(case.with_tolerance(1e-11), has_errors=False)
+        for name, value in exact.values.items():
+            error = motion.errors[name]
+            if name != "energy_balance" and np.isfinite(error):
+                inside.append(
+                    abs(motion.values[name] - value) <= error + 1e-12 * abs(value) + 1e-18
+                )
+    assert len(inside) > 500
+    assert np.mean(inside) > 0.95
+
+
+@pytest.mark.parametrize("seed", [4, 7, 16, 38, 13])
+def test_energy_is_balanced(seed):
+    """Work of the drive = energy of the modes + friction + dampers, whatever the laws."""
+    motion = runs.run_case(make_case(draw_spec(seed), rtol=1e-11), has_errors=False)
+    assert motion.values["energy_balance"] < 1e-9
+
+
+@pytest.mark.parametrize("law", [coulomb(), from_elements([0.5, 1.0], [0.3, 0.6])])
+def test_a_motion_goes_on_from_the_end_of_another(law):
+    """Two runs of 20 cycles, the second from the end of the first, equal a run of 40 cycles."""
+    options = {"acceleration": 0.9, "zeta": 0.01, "rtol": 1e-11, "load": 0.5}
+    whole = runs.run_case(make_oscillator(law, cycles=40, **options), has_errors=False)
+    half = make_oscillator(law, cycles=20, **options)
+    first = runs.run_case(half, has_errors=False)
+    second = runs.run_case(half, has_errors=False, start=first.final)
+    extremes = np.concatenate([first.extremes, second.extremes])
+    assert extremes == pytest.approx(whole.extremes, rel=1e-7)
+    work = [motion.values["friction_work"] for motion in (first, second, whole)]
+    assert work[0] + work[1] == pytest.approx(work[2], rel=1e-7)
+    assert second.values["energy_balance"] < 1e-8
+
+
+def test_cycles_that_are_not_computed_have_the_samples_of_all_cycles():
+    """A motion that repeats early has samples, works and events as if each cycle had been computed."""
+    samples = np.arange(0, 60.5, 0.25) * 2 * np.pi
+    case = make_oscillator(coulomb(), cycles=60, zeta=0.2, rtol=1e-9, load=0.6, samples=samples)
+    whole = case.rig.settings.copy()
+    whole[Setting.REPEAT] = 0
+    every = dataclasses.replace(case, rig=case.rig._replace(settings=whole))
+    short, full = (runs.run_case(one, has_errors=False) for one in (case, every))
+    assert short.repeats and not full.repeats
+    assert short.rows.shape == full.rows.shape
+    n = 1 + case.y.size
+    assert short.rows[:, :n] == pytest.approx(full.rows[:, :n], rel=1e-6, abs=1e-7)
+
+
+def test_drives_have_the_values_of_their_records():
+    """Pieces of sweeps and records give the same motion as a finely sampled record of the drive."""
+    modes = make_modes(zeta=0.05)
+    for drive in (
+        SweepDrive(0.1, 0.3, 40.0, acceleration=1.0),
+        SweepDrive(0.3, 0.1, 40.0, displacement=0.5, logarithmic=True),
+    ):
+        time = np.linspace(0.0, 60.0, 6001)
+        outputs = []
+        for signal in (
+            drives.make_signal(drive),
+            drives.make_signal(RecordedDrive(time, drive.values(time), drive.period)),
+        ):
+            interface = cases.Interface(coulomb(), cases.Load(0.3), np.ones(1))
+            rig = cases.make_rig(
+                modes, signal, [interface], (1.0, 1.0), cases.Options(moves_base=True, rtol=1e-9)
+            )
+            case = cases.Case(
+                rig,
+                cases.make_start(rig, [interface]),
+                np.array([59.0]),
+                np.zeros(1),
+                np.zeros(0),
+                1,
+            )
+            outputs.append(runs.run_case(case, has_errors=False).final.y[0, :2])
+        assert outputs[0] == pytest.approx(outputs[1], abs=1e-4)
+
+
+def test_too_stiff_a_law_is_refused_in_a_sentence():
+    """A run that would need too many steps ends with a message."""
+    from patchfem.hybrid.records import LawNumbers
+
+    law = LawNumbers("tanh", (1.0, 1e-7))
+    motion = runs.run_case(make_oscillator(law, acceleration=0.7, cycles=50, max_steps=20_000))
+    assert motion.status is Status.TOO_MANY_STEPS
+    assert "steps" in motion.message and "\n" not in motion.message

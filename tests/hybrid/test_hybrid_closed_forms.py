@@ -1,0 +1,206 @@
+"""Motions of `hybrid` with a closed form, to 1e-9 or better."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hybrid_cases import coulomb, make_bench, make_oscillator
+
+from patchfem.hybrid import cases, runs
+from patchfem.hybrid.laws import masing
+from patchfem.hybrid.records import LawNumbers, Status
+
+
+def forces(motion):
+    """Return times, slides and friction forces at the samples of a case with one interface."""
+    n = motion.case.y.size
+    return motion.rows[:, 0], motion.rows[:, 1], motion.rows[:, 1 + n]
+
+
+def test_block_in_two_stops_has_the_amplitude_of_forty_digits():
+    """Resonance with damping 0.003 and friction of 0.8 of the drive; root of the two-stop motion in 40 digits."""
+    motion = runs.run_case(make_oscillator(coulomb(), rtol=1e-12))
+    assert motion.values["relative_displacement_amplitude"] == pytest.approx(
+        0.28704671337871602595, abs=1e-11
+    )
+    assert motion.values["slip_start_phase"] == pytest.approx(0.538622, abs=1e-6)
+    assert motion.values["energy_balance"] < 1e-11
+
+
+def test_block_without_stops_after_200_cycles():
+    """Friction of half the drive; peak at the end of 200 cycles from exact propagation between reversals."""
+    motion = runs.run_case(make_oscillator(coulomb(), load=0.5, rtol=1e-12), has_errors=False)
+    assert motion.extremes[-1, 1] == pytest.approx(59.1676969670915519, rel=1e-9)
+
+
+def test_free_block_stops_after_six_half_cycles():
+    """Eq. 3.11: a release from 11.5 F/k rests at -0.5 F/k at the time 6 pi, exactly."""
+    case = make_oscillator(
+        coulomb(), load=1.0, acceleration=0.0, zeta=0.0, z=11.5, cycles=16.0, rtol=1e-12
+    )
+    motion = runs.run_case(case)
+    slides = [event.slide for event in motion.events]
+    assert slides == pytest.approx([-9.5, 7.5, -5.5, 3.5, -1.5, -0.5], abs=1e-10)
+    assert [event.time for event in motion.events] == pytest.approx(
+        np.pi * np.arange(1, 7), abs=1e-10
+    )
+    assert motion.final.y[0, 0] == pytest.approx(-0.5, abs=1e-10)
+    assert abs(motion.final.y[0, 1]) < 1e-16  # round-off of the projection on the constraint
+
+
+def test_rest_under_static_above_kinetic_friction_is_exact():
+    """A drive below static friction moves nothing; a release below it stays where it is."""
+    stuck = runs.run_case(make_oscillator(coulomb(1.0, 0.5), acceleration=0.79, cycles=100))
+    assert stuck.values["relative_displacement_amplitude"] < 1e-15
+    assert stuck.values["stick_fraction"] == 1.0
+    held = runs.run_case(make_oscillator(coulomb(1.0, 0.5), acceleration=0.0, z=0.79, cycles=50))
+    assert held.final.y[0, 0] == pytest.approx(0.79, abs=1e-15)
+    # Just above static friction, it slides under kinetic friction to the mirror image about mu_k N/k.
+    released = runs.run_case(
+        make_oscillator(coulomb(1.0, 0.5), acceleration=0.0, zeta=0.0, z=0.81, cycles=5)
+    )
+    assert released.final.y[0, 0] == pytest.approx(2 * 0.4 - 0.81, abs=1e-9)
+
+
+def test_elastic_plastic_block_decays_as_eq_3_12():
+    """Within the elastic range a released block oscillates at the stiffness of spring and contact."""
+    law = masing.from_elements([3.0], [0.5])
+    case = make_oscillator(law, load=1.5, acceleration=0.0, zeta=0.0, z=0.2, cycles=3.0, rtol=1e-12)
+    samples = np.linspace(0.0, 6 * np.pi, 50)
+    motion = runs.run_case(cases.Case(case.rig, case.y, case.ends, case.windows, samples, 1))
+    # The spring of the contact is unstretched at the start, so that the block swings about z0 k_t/(k + k_t).
+    exact = 0.15 + 0.05 * np.cos(2 * motion.rows[:, 0])
+    assert motion.rows[:, 1] == pytest.approx(exact, abs=1e-10)
+
+
+def triangle(amplitude: float, turns: int):
+    """Return corners of a slide 0, A, -A, A, ... at unit speed."""
+    slide = np.concatenate([[0.0], amplitude * (-1.0) ** np.arange(turns)])
+    return np.concatenate([[0.0], np.cumsum(np.abs(np.diff(slide)))]), slide
+
+
+@pytest.mark.parametrize(
+    ("amplitude", "chi", "beta"), [(0.3, -0.4, 0.5), (0.9, 0.3, 1.5), (1.4, -0.4, 0.5)]
+)
+def test_masing_loops_of_the_iwan_law(amplitude, chi, beta):
+    """Loop area of Segalman's law: 4 R u^(chi + 3)/((chi + 2)(chi + 3)) below phi_max, and the plastic part above."""
+    limit = 1.0
+    R = limit / (1 / (chi + 2) + beta / (chi + 1))
+    law = LawNumbers("masing", (chi, beta, limit, 1.0, 1, 0.0, 1.0, 0.0, limit))
+    motion = runs.run_case(make_bench(law, *triangle(amplitude, 3)))
+    loss = motion.values["energy_dissipated"]
+    u = min(amplitude, 1.0)
+    loop = 4 * R * u ** (chi + 3) / ((chi + 2) * (chi + 3)) + 4 * (amplitude - u) * limit
+    if amplitude > 1:
+        # Above phi_max the power law slips as a whole, and the last slider for the rest.
+        loop = 4 * (limit * amplitude - R / (chi + 3) - R * beta / (chi + 1))
+    first = runs.run_case(make_bench(law, *triangle(amplitude, 1))).values["energy_dissipated"]
+    assert loss - first == pytest.approx(loop, rel=1e-9)
+
+
+def test_masing_memory_of_nested_loops():
+    """Inner loops close; after them the outer branch goes on as if they had not happened (Madelung's rules)."""
+    law = masing.from_elements([2.0, 1.0, 0.5], [0.2, 0.5, 1.2])
+    slide = np.array([0.0, 1.0, -0.6, 0.2, -0.3, 0.1, -0.3, 0.2, -0.6, -0.9])
+    time = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(slide)))])
+    # The elements one by one, over many small increments that end at the corners.
+    stretch, history = np.zeros(3), []
+    for a, b in pairwise(slide):
+        for increment in np.full(1000, (b - a) / 1000):
+            stretch = np.clip(
+                stretch + increment, -np.array([0.2, 0.5, 1.2]), np.array([0.2, 0.5, 1.2])
+            )
+        history.append(stretch @ [2.0, 1.0, 0.5])
+    motion = runs.run_case(make_bench(law, time, slide, samples=time[1:]))
+    is_sample = (
+        np.isin(motion.rows[:, 0], time[1:]) & (motion.rows[:, -1] == 0) & (motion.rows[:, -2] == 0)
+    )
+    n = motion.case.y.size
+    by_time = {row[0]: row[1 + n] for row in motion.rows[is_sample]}
+    assert [by_time[t] for t in time[1:]] == pytest.approx(history, abs=1e-12)
+
+
+def test_bonds_heal_at_rest_and_restart():
+    """Dwell of bonds (eq. 2.10): their length after a rest, and the force F = mu N z/eps_0 of the restart."""
+    for dwell, length in ((0.05, 0.696735), (0.2, 0.932332), (1.0, 0.999977)):
+        # mu = N = eps_0 = 1, eps_k = 0.5, a_s/v_h = 10/s; no weakening, long after a steady slide at eps = 0.5.
+        numbers = (1.0, 1.0, 0.5, 1e-3, 1e9, 1e-4)
+        law = LawNumbers("bonds", numbers, (1.0, 0.5, 0.5, 0.5), (1.0, 1.0, 1.0, 1.0))
+        time = np.array([0.0, dwell])
+        motion = runs.run_case(make_bench(law, time, np.zeros(2)))
+        m, z, w, eps = motion.final.y[0, 2:6]
+        assert eps == pytest.approx(1 - 0.5 * np.exp(-10 * dwell), abs=1e-10)
+        assert eps == pytest.approx(length, abs=1e-6)
+        assert (m, z, w) == (1.0, 0.5, 0.5)
+
+
+def test_bonds_have_the_loop_of_dahl():
+    """Closed loop of bonds of constant length: areas and tip of the exact solution, F_end = tanh(A/eps)."""
+    law = LawNumbers(
+        "bonds", (1.0, 1.0, 1.0, 0.0, 1.0, 1.0), (1.0, 0.0, 0.0, 1.0), (1.0, 1e-2, 1e-4, 1.0)
+    )
+    for amplitude, area in ((0.1, 1.328022e-3), (1.0, 0.953623), (5.0, 16.000363), (10.0, 36.0)):
+        count = 2 * int(20 / amplitude) + 9
+        last = runs.run_case(make_bench(law, *triangle(amplitude, count)))
+        before = runs.run_case(make_bench(law, *triangle(amplitude, count - 2)))
+        work = last.values["friction_work"] - before.values["friction_work"]
+        exact = 4 * amplitude - 4 * np.tanh(amplitude)
+        assert exact == pytest.approx(area, rel=1e-6)
+        assert work == pytest.approx(exact, rel=1e-8)
+        # The force mu N z/eps_0 at the tip is the second state of the law.
+        assert abs(last.final.y[0, 3]) == pytest.approx(np.tanh(amplitude), rel=1e-9)
+
+
+def test_pressed_springs_equal_the_elastic_plastic_law_under_a_constant_load():
+    """The law for a load that varies, whose load does not vary."""
+    values = []
+    for law in (
+        masing.from_elements([8.0], [0.1]),
+        LawNumbers("pressed_springs", (1.0, 0.1), (0.0, 0.8), (0.8, 0.8)),
+    ):
+        motion = runs.run_case(
+            make_oscillator(law, load=0.8, cycles=40, rtol=1e-11), has_errors=False
+        )
+        values.append(
+            [
+                motion.values[name]
+                for name in (
+                    "relative_displacement_amplitude",
+                    "loop_area",
+                    "slip_amplitude",
+                    "stick_fraction",
+                )
+            ]
+        )
+    assert values[0] == pytest.approx(values[1], rel=1e-8)
+
+
+def test_coulomb_contact_that_lifts_off_follows_the_load():
+    """Sliding at constant speed under 1 + 1.5 cos t: work and open time of the positive part of the load."""
+    law = coulomb(0.5)
+    load = cases.Load(1.0, 1.5, 1.0, 0.0)
+    bench = make_bench(law, np.array([0.0, 2 * np.pi]), np.array([0.0, 2 * np.pi]))
+    interface = cases.Interface(law, load, np.ones(1))
+    from patchfem.hybrid import drives
+
+    signal = drives.make_record([0.0, 2 * np.pi], [0.0, 2 * np.pi], 2 * np.pi)
+    rig = cases.make_rig(None, signal, [interface], (1.0, 1.0), cases.Options(rtol=1e-11))
+    motion = runs.run_case(
+        cases.Case(rig, cases.make_start(rig, [interface]), bench.ends, np.zeros(1), np.zeros(0), 1)
+    )
+    edge = np.arccos(-1 / 1.5)
+    assert motion.values["friction_work"] == pytest.approx(
+        0.5 * 2 * (edge + 1.5 * np.sin(edge)), rel=1e-10
+    )
+    assert motion.values["open_fraction"] == pytest.approx(1 - edge / np.pi, rel=1e-10)
+
+
+def test_release_ends_at_the_largest_travel():
+    """A growing mode reaches the stop at the time of the closed form."""
+    case = make_oscillator(
+        coulomb(), load=0.0, acceleration=0.0, zeta=-0.05, z=1.0, cycles=50, travel=5.0
+    )
+    motion = runs.run_case(case)
+    assert motion.status is Status.EXCEEDS_TRAVEL
+    assert abs(motion.final.y[0, 0]) == pytest.approx(5.0, rel=1e-9)
+    assert "travel" in motion.message

@@ -1,0 +1,124 @@
+"""Hard cases of `hybrid`: the right motion, or an end in a sentence."""
+
+import numpy as np
+import pytest
+from hybrid_cases import coulomb, make_modes, make_oscillator
+
+from patchfem.hybrid import cases, drives, runs
+from patchfem.hybrid.laws import masing
+from patchfem.hybrid.records import LawNumbers, Status
+
+AMPLITUDE = "relative_displacement_amplitude"
+COULOMB_AMPLITUDE = (
+    0.28704671337871602595  # of the oscillator at resonance with friction of 0.8 of the drive
+)
+
+
+def make_rig_case(laws, loads, slides, omegas, *, zeta=0.005, cycles=20, **options):
+    """Return the case of several interfaces on modes under a drive of circular frequency 1."""
+    slides = np.asarray(slides, float)
+    modes = make_modes(omegas, zeta, slide=slides[0], faces=slides)
+    signal = drives.make_tones([(1.0, 1.0, 0.0)], 2 * np.pi)
+    interfaces = [
+        cases.Interface(law, cases.Load(load), slide)
+        for law, load, slide in zip(laws, loads, slides)
+    ]
+    rig = cases.make_rig(modes, signal, interfaces, (1.0, 1.0), cases.Options(True, **options))
+    schedule = cases.make_schedule(cycles, signal.period, 5)
+    return cases.Case(rig, cases.make_start(rig, interfaces), *schedule, np.zeros(0), len(laws))
+
+
+@pytest.mark.parametrize("excess", [-1e-6, -1e-12, 0.0, 1e-12, 1e-9, 1e-6])
+def test_grazing_onset(excess):
+    """A drive within 1e-6 of the static friction: rest at and below, less than 1e-10 of slip just above."""
+    motion = runs.run_case(
+        make_oscillator(coulomb(), acceleration=0.8 * (1 + excess), omega=0.5, cycles=20)
+    )
+    assert motion.status is Status.DONE
+    assert motion.values["friction_work"] <= (1e-9 if excess > 0 else 0.0)
+    assert motion.values[AMPLITUDE] < 1e-10
+
+
+def test_onset_with_lower_kinetic_friction_is_a_jump():
+    """Above static friction by 1e-9 the motion is that of any such drive."""
+    found = [
+        runs.run_case(
+            make_oscillator(
+                coulomb(1.0, 0.5), acceleration=0.8 * (1 + excess), omega=0.5, cycles=40
+            )
+        ).values[AMPLITUDE]
+        for excess in (1e-9, 1e-7)
+    ]
+    assert found[0] == pytest.approx(found[1], rel=1e-4)
+
+
+def test_interfaces_with_the_same_slide_share_their_force():
+    """Two Coulomb interfaces on one slide move as one of their sum."""
+    two = runs.run_case(
+        make_rig_case(
+            [coulomb(), coulomb()], [0.3, 0.5], np.ones((2, 1)), [1.0], zeta=0.003, cycles=200
+        )
+    )
+    assert two.values[AMPLITUDE] == pytest.approx(COULOMB_AMPLITUDE, rel=1e-6)
+    assert two.values["loop_area_2"] == pytest.approx(two.values["loop_area"] * 5 / 3, rel=1e-6)
+
+
+def test_chatter_of_many_interfaces_on_many_modes():
+    """Eight interfaces with half the friction in motion on ten modes; forces obey their limits at all events."""
+    rng = np.random.default_rng(1)
+    case = make_rig_case(
+        [coulomb(1.0, 0.5)] * 8, [0.05] * 8, rng.normal(size=(8, 10)), np.linspace(1, 20, 10)
+    )
+    motion = runs.run_case(case, has_errors=False)
+    assert motion.status is Status.DONE
+    assert motion.values["energy_balance"] < 1e-6
+    forces = motion.event_rows[:, 1 + case.y.size :][:, :8]
+    assert np.abs(forces).max() <= 0.05 * (1 + 1e-6)
+    assert len(motion.events) > 100
+
+
+def test_forty_modes():
+    """Forty modes up to 140 times the drive with four laws; energy is balanced and the run takes below 5 s."""
+    rng = np.random.default_rng(2)
+    laws = [
+        coulomb(), masing.from_elements([1.0], [0.1]), LawNumbers("bouc_wen", (1.0, 0.1, 1.5, 0.6), (0.0,), (0.01,)),
+        LawNumbers("bonds", (1.0, 0.1, 0.1, 0.0, 1.0, 1.0), (1.0, 0.0, 0.0, 0.1), (1.0, 1e-3, 1e-6, 0.1)),
+    ]  # fmt: skip
+    case = make_rig_case(
+        laws, [0.1] * 4, rng.normal(size=(4, 40)), np.geomspace(1, 140, 40), cycles=10
+    )
+    motion = runs.run_case(case, has_errors=False)
+    assert motion.status is Status.DONE
+    assert motion.values["energy_balance"] < 1e-7
+
+
+@pytest.mark.parametrize("length", [1e-3, 1e-5, 1e-9])
+def test_stiff_contacts_tend_to_coulomb_friction_or_are_refused(length):
+    """Elastic-plastic contact of the stretch `length`: near Coulomb's motion by a few lengths, or a sentence."""
+    law = masing.from_elements([0.8 / length], [length])
+    motion = runs.run_case(make_oscillator(law, cycles=60, rtol=1e-7), has_errors=False)
+    if length < 1e-8:
+        assert motion.status is Status.TOO_STIFF
+        assert "coulomb" in motion.message
+    else:
+        assert motion.values[AMPLITUDE] == pytest.approx(COULOMB_AMPLITUDE, abs=10 * length + 1e-5)
+
+
+def test_regularised_friction_tends_to_coulomb_friction():
+    """The rate law with a speed of 1e-4 of the drive's."""
+    law = LawNumbers("tanh", (1.0, 1e-4))
+    motion = runs.run_case(make_oscillator(law, cycles=60, rtol=1e-6), has_errors=False)
+    assert motion.values[AMPLITUDE] == pytest.approx(COULOMB_AMPLITUDE, rel=5e-3)
+
+
+def test_divergence_ends_at_the_stop_and_grows_without_one():
+    """A mode of negative damping beyond its friction."""
+    for travel, status in ((50.0, Status.EXCEEDS_TRAVEL), (np.inf, Status.DONE)):
+        motion = runs.run_case(
+            make_rig_case(
+                [coulomb()], [0.3], np.ones((1, 1)), [1.0], zeta=-0.02, cycles=80, travel=travel
+            )
+        )
+        assert motion.status is status
+        assert np.isfinite(motion.values[AMPLITUDE])
+    assert motion.extremes[-1, 1] > 1e2

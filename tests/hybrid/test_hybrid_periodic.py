@@ -1,0 +1,71 @@
+"""Periodic motions by shooting: against long runs, closed forms, and multipliers."""
+
+import numpy as np
+import pytest
+from hybrid_cases import coulomb, make_modes, make_oscillator
+
+from patchfem.hybrid import cases, drives, runs
+from patchfem.hybrid.laws import masing
+from patchfem.hybrid.periodic import find_periodic_motion
+from patchfem.hybrid.records import LawNumbers
+
+AMPLITUDE = "relative_displacement_amplitude"
+LAWS = {
+    "coulomb": coulomb(),
+    "kinetic": coulomb(1.0, 0.8),
+    "elastic": masing.from_elements([16.0], [0.05]),
+    "jenkins": masing.from_elements([3.0, 4.0, 5.0], [0.05, 0.1, 0.02]),
+    "iwan": LawNumbers("masing", (-0.3, 0.5, 0.8, 0.2, 1, 0.0, 0.2, 0.0, 0.8)),
+    "tanh": LawNumbers("tanh", (1.0, 0.05)),
+    "bouc-wen": LawNumbers("bouc_wen", (1.0, 0.05, 1.5, 0.6), (0.0,), (0.01,)),
+    "lugre": LawNumbers("lugre", (1.0, 0.9, 20.0, 0.1, 0.05, 0.01), (0.0,), (0.01,)),
+    "bonds": LawNumbers(
+        "bonds", (1.0, 0.1, 0.07, 0.3, 0.5, 0.01), (1.0, 0.0, 0.0, 0.1), (1.0, 0.001, 1e-5, 0.1)
+    ),
+}
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_shooting_equals_a_long_run(name):
+    """Steady motion of every law in at most 45 periods, where a run needs hundreds."""
+    case = make_oscillator(LAWS[name], acceleration=0.95, zeta=0.01, cycles=600, rtol=1e-9)
+    steady = find_periodic_motion(case)
+    assert steady.change < steady.tolerance
+    assert steady.is_stable
+    assert steady.n_periods <= 60
+    run = runs.run_case(case, has_errors=False)
+    assert steady.batch.windows[0][AMPLITUDE][0] == pytest.approx(run.values[AMPLITUDE], rel=1e-6)
+    assert steady.batch.windows[0]["loop_area"][0] == pytest.approx(
+        run.values["loop_area"], rel=1e-5
+    )
+
+
+def test_multipliers_of_a_linear_rig():
+    """Without friction they are those of the modes, exp((-zeta +- i sqrt(1 - zeta^2)) omega T)."""
+    zeta, omega = 0.02, 0.9
+    case = make_oscillator(coulomb(), load=0.0, zeta=zeta, omega=omega, cycles=10, rtol=1e-11)
+    multipliers = find_periodic_motion(case).multipliers
+    exact = np.exp((-zeta + 1j * np.sqrt(1 - zeta**2) * np.array([1, -1])) * 2 * np.pi / omega)
+    assert np.sort_complex(multipliers) == pytest.approx(np.sort_complex(exact), abs=1e-5)
+
+
+def test_unstable_limit_cycle_of_flutter_and_friction():
+    """A mode of negative damping holds by friction on a cycle of amplitude close to 2 mu N/(pi |zeta|), and unstable."""
+    zeta, limit = -0.01, 0.05
+    modes = make_modes(zeta=zeta)
+    signal = drives.make_tones([], 2 * np.pi)
+    interface = cases.Interface(LawNumbers("tanh", (limit, 0.02)), cases.Load(1.0), np.ones(1))
+    rig = cases.make_rig(modes, signal, [interface], (1.0, 1.0), cases.Options(rtol=1e-9))
+    guess = 2 * limit / (np.pi * abs(zeta))
+
+    class Start:
+        z = np.array([1.02 * guess])
+        v = np.zeros(1)
+
+    schedule = cases.make_schedule(1, signal.period, 1)
+    case = cases.Case(rig, cases.make_start(rig, [interface], Start), *schedule, np.zeros(0), 1)
+    cycle = find_periodic_motion(case, is_free=True, n_first=0)
+    assert cycle.change < cycle.tolerance
+    assert cycle.batch.windows[0][AMPLITUDE][0] == pytest.approx(guess, rel=2e-2)
+    assert not cycle.is_stable
+    assert np.abs(np.abs(cycle.multipliers) - 1).min() < 1e-4

@@ -1,0 +1,190 @@
+"""Meshes of second order: the same mesh in every format, refinement, and decks whose edges are named by surfaces."""
+
+from __future__ import annotations
+
+import meshio
+import numpy as np
+import pytest
+from any_mesh_cases import GRID, NAMES, make_pair
+from scipy.spatial import cKDTree
+
+import patchfem as pf
+from patchfem.elasticity import Piece, interface_compliance
+from patchfem.elasticity.elasticity import Layers
+from patchfem.mesh import PieceMesh, TensorGrid, read_pieces, write_mesh
+from patchfem.mesh.files import CELL_TAGS, EDGE_TAGS
+from patchfem.mesh.grid import graded_rows
+
+LAYERS = Layers((250e9, 0.24), (121e9, 0.32), "strain")
+ABAQUS = {"triangle6": "CPE6", "quad8": "CPE8R"}
+
+
+def make_quadratic_pair(kind):
+    """Return points (N, 2), cells and edges of second order with their tags, from the linear pair of grids."""
+    pair = make_pair("triangles" if kind == "triangle6" else "quads")
+    corners, tags = (
+        (pair.triangles, pair.triangle_tags)
+        if kind == "triangle6"
+        else (
+            pair.quads,
+            pair.quad_tags,
+        )
+    )
+    points = [tuple(point) for point in pair.points]
+    number = {}
+
+    def middle(a, b):
+        """Return the number of the node between two others."""
+        key = min(a, b), max(a, b)
+        if key not in number:
+            number[key] = len(points)
+            points.append(tuple((pair.points[a] + pair.points[b]) / 2))
+        return number[key]
+
+    cells = [
+        [*cell, *(middle(a, b) for a, b in zip(cell, np.roll(cell, -1)))]
+        for cell in corners.tolist()
+    ]
+    edges = [[a, b, middle(a, b)] for a, b in pair.edges.tolist()]
+    return np.array(points), np.array(cells), tags, np.array(edges), pair.edge_tags
+
+
+def write_pair(folder, kind, ending, surfaces=False):
+    """Write the pair to a file and return its path."""
+    points, cells, tags, edges, edge_tags = make_quadratic_pair(kind)
+    path = folder / f"pair{ending}"
+    if ending == ".inp":
+        lines = ["*NODE", *(f"{k + 1}, {x!r}, {y!r}" for k, (x, y) in enumerate(points.tolist()))]
+        lines.append(f"*ELEMENT, TYPE={ABAQUS[kind]}")
+        lines += [", ".join(map(str, [k + 1, *(cell + 1)])) for k, cell in enumerate(cells)]
+        for tag, name in NAMES.items():
+            if tag < 10:
+                members = np.flatnonzero(tags == tag) + 1
+                lines += [f"*ELSET, ELSET={name}", *map(str, members)]
+            elif surfaces:
+                lines.append(f"*SURFACE, TYPE=ELEMENT, NAME={name.upper()}")
+                n = 3 if kind == "triangle6" else 4
+                for edge in np.sort(edges[edge_tags == tag][:, :2], axis=1):
+                    for side in range(n):
+                        pair = np.sort(cells[:, [side, (side + 1) % n]], axis=1)
+                        lines += [
+                            f"{k + 1}, S{side + 1}" for k in np.flatnonzero((pair == edge).all(1))
+                        ]
+            else:
+                nodes = np.unique(edges[edge_tags == tag]) + 1
+                lines += [f"*NSET, NSET={name}", *map(str, nodes)]
+        path.write_text("\n".join(lines) + "\n")
+        return path
+    mesh = meshio.Mesh(
+        np.column_stack([points, 0 * points[:, 0]]), [(kind, cells), ("line3", edges)]
+    )
+    both = [np.asarray(part, np.int32) for part in (tags, edge_tags)]
+    if ending == ".vtu":
+        mesh.cell_data = {"tag": both}
+        meshio.write(path, mesh)
+        return path
+    mesh.cell_data = {"gmsh:physical": both, "gmsh:geometrical": both}
+    mesh.field_data = {name: np.array([tag, 2]) for name, tag in CELL_TAGS.items()}
+    mesh.field_data |= {name: np.array([tag, 1]) for name, tag in EDGE_TAGS.items()}
+    meshio.write(path, mesh, file_format="gmsh22", binary=True)
+    return path
+
+
+@pytest.mark.parametrize("kind", ABAQUS)
+def test_exact_same_mesh_in_every_format_gives_equal_compliance(kind, tmp_path):
+    """The same mesh of second order as .msh, .vtu and .inp, with edges as sets or as surfaces, is equal to 1e-12."""
+    paths = [write_pair(tmp_path, kind, ending) for ending in (".msh", ".vtu", ".inp")]
+    pairs = [read_pieces(path) for path in paths]
+    pairs.append(read_pieces(write_pair(tmp_path, kind, ".inp", surfaces=True)))
+    first = interface_compliance(Piece(pairs[0].upper, LAYERS))
+    for pair in pairs:
+        assert pair.lower.x.size == GRID.x.size and pair.lower.is_quadratic
+        assert pair.lower.interface.size == 2 * GRID.x.size - 1
+        assert pair.upper.coating_thickness == pytest.approx(GRID.coating_thickness, rel=1e-12)
+        for mine, other in zip(interface_compliance(Piece(pair.upper, LAYERS)), first):
+            assert np.abs(mine - other).max() <= 1e-12 * np.abs(first.nn).max()
+
+
+@pytest.mark.parametrize("kind", [*ABAQUS, "quad9"])
+def test_exact_refined_mesh_of_second_order(kind, tmp_path):
+    """A refined mesh of second order has four times the cells, the same area and its nodes in the middles of edges."""
+    piece = read_pieces(write_pair(tmp_path, kind.replace("9", "8"), ".msh")).upper
+    if kind == "quad9":
+        cells = piece.blocks["quad8"]
+        points = np.concatenate([piece.points, piece.points[cells[:, :4]].mean(axis=1)])
+        centres = len(piece.points) + np.arange(len(cells))
+        blocks = {"quad9": np.column_stack([cells, centres])}
+        piece = type(piece)(points, blocks, piece.is_coating, piece.interface, piece.far)
+    fine = piece.refine()
+    assert fine.areas() == pytest.approx(np.repeat(piece.areas() / 4, 4), rel=1e-9)
+    assert fine.x[::2] == pytest.approx(piece.x, abs=1e-15) and fine.x.size == 2 * piece.x.size - 1
+    assert fine.far.size == 2 * piece.far.size - 1
+    n = 3 if kind == "triangle6" else 4
+    nodes = fine.blocks[kind]
+    middles = (fine.points[nodes[:, :n]] + fine.points[np.roll(nodes[:, :n], -1, axis=1)]) / 2
+    assert np.abs(fine.points[nodes[:, n : 2 * n]] - middles).max() <= 1e-15
+    assert not cKDTree(fine.points).query_pairs(1e-9)
+
+
+@pytest.mark.parametrize("ending", [".msh", ".vtu"])
+def test_exact_round_trip_of_second_order(ending, tmp_path):
+    """A pair of second order is written and read back bit for bit."""
+    pair = read_pieces(write_pair(tmp_path, "quad8", ".msh"))
+    write_mesh(pair.lower, tmp_path / f"again{ending}", pair.upper)
+    again = read_pieces(tmp_path / f"again{ending}")
+    for piece, expected in ((again.lower, pair.lower), (again.upper, pair.upper)):
+        assert np.array_equal(piece.points, expected.points)
+        assert np.array_equal(piece.blocks["quad8"], expected.blocks["quad8"])
+        assert np.array_equal(piece.interface, expected.interface)
+
+
+def make_quadratic_block(kind, cell, half_region, length, height):
+    """Return a block of elements of second order with equal cells at the contact, which grow away from it."""
+    n = round(half_region / cell)
+    outer = n * cell + np.cumsum(graded_rows(1.15 * cell, length / 2 - n * cell, 1.2))
+    depth = np.append(0.0, np.cumsum(graded_rows(cell, height, 1.2)))
+    depth[-1] = height
+    grid = TensorGrid(
+        np.concatenate([-outer[::-1], np.arange(-n, n + 1) * cell, outer]), depth, coating_rows=0
+    )
+    corners = grid.blocks["quad"]
+    if kind == "triangle6":
+        corners = np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]])
+    ends = np.stack([corners, np.roll(corners, -1, axis=1)], axis=-1)
+    edges, number = np.unique(np.sort(ends.reshape(-1, 2), axis=1), axis=0, return_inverse=True)
+    middles = len(grid.points) + number.reshape(corners.shape)
+    points = np.concatenate([grid.points, grid.points[edges].mean(axis=1)])
+    blocks = {kind: np.concatenate([corners, middles], axis=1)}
+    interface = np.flatnonzero(points[:, 1] == 0)
+    interface = interface[np.argsort(points[interface, 0])]
+    far = np.flatnonzero(points[:, 1] == height)
+    return PieceMesh(points, blocks, np.zeros(len(corners), bool), interface, far)
+
+
+@pytest.mark.parametrize("kind", ABAQUS)
+def test_always_hertz_contact_on_meshes_of_second_order(kind, tmp_path):
+    """With 8 cells per half-width, half-width and peak agree with Hertz within 0.5 % and within their errors."""
+    load, radius, modulus = 32.3e3, 0.1, 120e9 / (2 * (1 - 0.3**2))
+    half_width = np.sqrt(4 * load * radius / (np.pi * modulus))
+    block = make_quadratic_block(kind, half_width / 8, 1.6 * half_width, 12.7e-3, 6.35e-3)
+    write_mesh(block, tmp_path / "pair.msh")
+    (tmp_path / "scene.toml").write_text(
+        f"""[contact]
+length = "12.7 mm"
+width = "10 mm"
+height = "6.35 mm"
+load = "{load * 0.01} N"
+mesh = "pair.msh"
+substrate = {{young = "120 GPa", poisson = 0.3, density = "4400 kg/m^3"}}
+crown = {{radius = "{radius} m"}}
+"""
+    )
+    measures = pf.run(pf.load(tmp_path / "scene.toml")).measures
+    # The pieces are 25 half-widths tall, which changes both numbers by less than 1e-3.
+    expected = {
+        "contact_half_width": half_width,
+        "pressure_peak": 2 * load / (np.pi * half_width),
+    }
+    for name, value in expected.items():
+        difference = abs(measures[name].value - value)
+        assert difference <= 5e-3 * value and difference <= measures[name].error + 1e-3 * value
