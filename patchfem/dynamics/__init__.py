@@ -46,9 +46,7 @@ PUBLIC = {
         "make_elements",
         "merge_elements",
     ),
-    "events.histories": (
-        "load_event_kernels",
-    ),
+    "events.histories": ("load_event_kernels",),
     "events.positions_kernels": ("InterfaceMeasure",),
     "events.reading": ("Reading",),
     "grooves.climbing": ("with_shear_modes",),

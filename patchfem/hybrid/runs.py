@@ -365,9 +365,9 @@ def _fill_repeated_cycles(case: Case, cycles, samples, event_rows) -> tuple:
         repeated[:, integrals] += counts[:, None] * gain
         return repeated
 
-    # Samples have the same phases in all cycles; the last computed cycle has all of them.
+    # Samples have the same phases in all cycles; the last computed cycle has all of them, except perhaps that at its end.
     missing = case.samples[: len(samples)][np.isnan(samples[:, 0])]
-    counts = np.ceil((missing - end) / period - SAME_PHASE_TOL)
+    counts = np.ceil((missing - end) / period + SAME_PHASE_TOL)
     sources = np.searchsorted(known[:, 0], missing - counts * period - SAME_PHASE_TOL * period)
     filled = np.concatenate([known, repeat(known, sources, counts)])
 

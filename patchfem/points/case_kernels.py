@@ -80,9 +80,9 @@ def solve_step(free, response, h, case, now, numbers, memory, j):
 
     Returns
     -------
-    (float, float, float, float)
-        Increment [m], velocity at the end [m/s], path-mean force [N], and its distance from the mean of the forces at both
-        ends [N].
+    (float, float, float, float, float)
+        Increment [m], velocity at the end [m/s], path-mean force [N], its time mean [N], and the distance of the path mean
+        from the mean of the forces at both ends [N].
     """
     mobility = case[Number.MOBILITY]
     beta = response[0, 2] * mobility
@@ -99,6 +99,7 @@ def solve_step(free, response, h, case, now, numbers, memory, j):
     low = -inf
     high = inf
     change = 0.0
+    time_mean = force
     mean = MeanForce(0.0, 0.0, 0.0, 0.0, 0.0)
     for _ in range(MAX_ITERATIONS):
         mean = mean_force(numbers, memory, j, load, Step(dq, h, start, end, gamma))
@@ -129,7 +130,7 @@ def solve_step(free, response, h, case, now, numbers, memory, j):
         # Velocity and displacement at the end differ from the free ones by the same mean force.
         end = free[1] - gamma / beta * (free[0] - dq - tilt * change) - velocity_tilt * change
     bend = mean.bend if not follows_path else force - now[Now.FORCE] - 0.5 * change
-    return dq, end, force, bend
+    return dq, end, force, time_mean, bend
 
 
 @njit(**NJIT_KERNEL)
@@ -202,13 +203,16 @@ def try_step(waves, h, response, is_shortest, max_bend, case, now, numbers, memo
                 if is_shortest:
                     end_at_event(q, v, h, hold, case, now, numbers, memory, j)
                 return is_shortest
+            middle = (drive * waves[1] - case[Number.STIFFNESS] * q) / mobility
             now[Now.MEAN] = 0.5 * (now[Now.FORCE] + hold)
+            now[Now.TIME_MEAN] = (now[Now.FORCE] + 4 * middle + hold) / 6
             return True
         dq = free - response[0, 2] * mobility * force
         end = free_velocity - response[1, 2] * mobility * force
+        time_mean = force
     else:
         prepare(numbers, memory, j, Step(0.0, h, v, v, 0.0))
-        dq, end, force, bend = solve_step(
+        dq, end, force, time_mean, bend = solve_step(
             (free, free_velocity), response, h, case, now, numbers, memory, j
         )
         # A law takes the net increment of a reversal inside the step as its path.
@@ -234,18 +238,22 @@ def try_step(waves, h, response, is_shortest, max_bend, case, now, numbers, memo
     now[Now.SLIDE] = q + dq
     now[Now.VELOCITY] = end
     now[Now.MEAN] = force
+    now[Now.TIME_MEAN] = time_mean
     return True
 
 
 @njit(**NJIT_KERNEL)
 def find_force(wave, case, now, numbers, memory, j):
     """Write the friction force and the irreversible slide at the end of a step."""
+    before = now[Now.FORCE]
     state = read(numbers, memory, j, case[Number.LOAD])
     now[Now.FORCE] = state.force
     now[Now.SLIP] = now[Now.SLIDE] - state.stretch
     if numbers[0, j] == Law.COULOMB and memory[0, j] == 0:
         hold = case[Number.DRIVE] * wave - case[Number.STIFFNESS] * now[Now.SLIDE]
         now[Now.FORCE] = hold / case[Number.MOBILITY]
+    if numbers[0, j] == Law.COULOMB and now[Now.EVENT] >= 0:
+        now[Now.TIME_MEAN] = before + (1 - now[Now.EVENT]) * (now[Now.FORCE] - before)
 
 
 @njit(**NJIT_KERNEL)
@@ -326,21 +334,25 @@ def observe_acceleration(waves, h, case, start, now, seen):
 
 @njit(**NJIT_KERNEL)
 def observe_harmonics(time, h, omega, start, now, seen):
-    """Add the integrals of the slide, a cubic in the step, by Gauss's rule with three points."""
+    """Add the integrals of slide and force, a cubic and a parabola in the step, by Gauss's rule with three points."""
     q = now[Now.SLIDE]
     v = now[Now.VELOCITY]
+    bend = 6 * now[Now.TIME_MEAN] - 3 * (start[2] + now[Now.FORCE])
     for k in range(3):
         s = 0.5 + 0.5 * GAUSS_POINT * (k - 1)
         weight = h * (4 / 9 if k == 1 else 5 / 18)
         rest = 1 - s
         value = start[0] + s * s * (3 - 2 * s) * (q - start[0])
         value = weight * (value + h * s * rest * (rest * start[1] - s * v))
+        force = weight * (start[2] + s * (now[Now.FORCE] - start[2]) + bend * s * rest)
         c = cos(omega * (time + s * h))
         w = sin(omega * (time + s * h))
         seen[Seen.COS_1] += value * c
         seen[Seen.SIN_1] += value * w
-        seen[Seen.COS_3] += value * c * (4 * c * c - 3)
-        seen[Seen.SIN_3] += value * w * (3 - 4 * w * w)
+        seen[Seen.FORCE_COS_1] += force * c
+        seen[Seen.FORCE_SIN_1] += force * w
+        seen[Seen.FORCE_COS_3] += force * c * (4 * c * c - 3)
+        seen[Seen.FORCE_SIN_3] += force * w * (3 - 4 * w * w)
         seen[Seen.LAST_MEAN] += value
     seen[Seen.SPAN] += h
 
@@ -463,7 +475,22 @@ def rotate_cosine(waves, k, part):
 
 
 @njit(**NJIT_KERNEL)
-def march_cycle(steps, table, waves, observes, case, now, numbers, memory, j, seen):
+def store_sample(sine, case, now, seen, samples):
+    """Store the state and the acceleration at the output at the end of a step, if there is room for it."""
+    row = int(seen[Seen.N_SAMPLES])
+    if row >= samples.shape[0]:
+        return
+    q = now[Now.SLIDE]
+    v = now[Now.VELOCITY]
+    samples[row, 0] = q
+    samples[row, 1] = v
+    samples[row, 2] = now[Now.SLIP]
+    samples[row, 3] = find_acceleration(sine, q, v, now[Now.FORCE], case)
+    seen[Seen.N_SAMPLES] += 1
+
+
+@njit(**NJIT_KERNEL)
+def march_cycle(steps, table, waves, observes, case, now, numbers, memory, j, seen, samples):
     """March a case over a cycle; `waves` are those of `march_cases`."""
     omega = case[Number.OMEGA]
     step = 2 * np.pi / omega / steps
@@ -510,13 +537,15 @@ def march_cycle(steps, table, waves, observes, case, now, numbers, memory, j, se
             observe_acceleration(drive, h, case, start, now, seen)
             observe_harmonics(time, h, omega, start, now, seen)
             observe_stick(time, h, omega, numbers[0, j] == Law.COULOMB, start, now, seen)
+            if (tick + size) % TICKS == 0:
+                store_sample(drive[2], case, now, seen, samples)
         tick += size
         if level > 0 and tick % (2 * size) == 0:
             level -= 1
 
 
 @njit(cache=True, **NJIT_KERNEL)
-def march_cases(steps, waves, parameters, numbers, memory, nows, seens, histories, table):
+def march_cases(steps, waves, parameters, numbers, memory, nows, seens, histories, samples, table):
     """March cases over their cycles.
 
     Parameters
@@ -527,8 +556,10 @@ def march_cases(steps, waves, parameters, numbers, memory, nows, seens, historie
         Sines and cosines of the drive at half steps of a cycle, and at half of the shortest steps of a step.
     parameters, numbers, memory
         See `case_rows.Cases`; the memory is changed.
-    nows : (c, 19), seens : (c, 30), histories : (c, n, 4) array
+    nows : (c, 20), seens : (c, 33), histories : (c, n, 4) array
         State, observations, and extremes and phasor of every cycle; output.
+    samples : (c, S, 4) array
+        Slide, velocity, irreversible slide and acceleration at the ends of the first S whole steps of the window; output.
     table : (LEVELS + 1, 2, 5) array
         Workspace.
     """
@@ -559,7 +590,9 @@ def march_cases(steps, waves, parameters, numbers, memory, nows, seens, historie
             if observes:
                 seen[Seen.LAST_MEAN] = 0.0
                 seen[Seen.MIDDLE] -= 2 * np.pi / omega if seen[Seen.N_CYCLES] > 0 else 0.0
-            march_cycle(steps, table, waves, observes, case, now, numbers, memory, j, seen)
+            march_cycle(
+                steps, table, waves, observes, case, now, numbers, memory, j, seen, samples[j]
+            )
             end_cycle(now, seen, histories[j, cycle])
             is_same = repeats(omega, now)
             cycle += 1

@@ -34,7 +34,7 @@ class Now(IntEnum):
     Slide, velocity, mean force of the last step, force, irreversible slide; extremes, cosine and sine integrals of the
     slide in the cycle; slide, velocity and force at the last cycle end; work of the drive, its magnitude, loss of the
     damper, friction work per mass, largest energy; fraction of the last step at which a rigid point stops, turns or is
-    released, -1 without such an event; elastic energy of the law at the end.
+    released, -1 without such an event; elastic energy of the law at the end; time mean of the force over the last step.
     """
 
     SLIDE = 0
@@ -56,6 +56,7 @@ class Now(IntEnum):
     STORED = 16
     EVENT = 17
     ELASTIC = 18
+    TIME_MEAN = 19
 
 
 class Seen(IntEnum):
@@ -63,10 +64,10 @@ class Seen(IntEnum):
 
     Extremes of acceleration, force and slip; time stuck; number of slip starts with the sums of cosine and sine of
     twice their phases; middle of the last step and its excess of slip over half of the slide; duration of the present
-    and of the longest stick; integrals of the slide times harmonics 1 and 3; friction work by mean forces, by the
+    and of the longest stick; integrals of slide and force times harmonic 1; friction work by mean forces, by the
     trapezoidal rule, and its magnitude; integral of the slide in the first and in the last cycle; sums of range and
     secant, number of secants; forces at the extremes of the cycle; slide and velocity at the start; duration; number of
-    cycles.
+    cycles; integrals of the force times harmonic 3; number of samples.
     """
 
     MAX_ACCELERATION = 0
@@ -83,8 +84,8 @@ class Seen(IntEnum):
     LONGEST_STICK = 11
     COS_1 = 12
     SIN_1 = 13
-    COS_3 = 14
-    SIN_3 = 15
+    FORCE_COS_1 = 14
+    FORCE_SIN_1 = 15
     WORK = 16
     SAMPLED = 17
     PASSED = 18
@@ -99,6 +100,9 @@ class Seen(IntEnum):
     START_VELOCITY = 27
     SPAN = 28
     N_CYCLES = 29
+    FORCE_COS_3 = 30
+    FORCE_SIN_3 = 31
+    N_SAMPLES = 32
 
 
 class Cases(NamedTuple):

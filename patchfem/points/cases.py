@@ -22,6 +22,8 @@ class CaseMarch(NamedTuple):
     - extremes (c, n, 2), phasors (c, n): of the output in every cycle [m]
     - repeats (c,): whether the motion has become periodic
     - longest_stick (c,): duration of the longest stick in the measured cycles [s]
+    - samples (c, S, 4): slide [m], velocity [m/s], irreversible slide [m] and acceleration at the output [m s-2] at the ends
+      of the steps of the window; NaN after its last step
     """
 
     values: dict[str, np.ndarray]
@@ -29,6 +31,7 @@ class CaseMarch(NamedTuple):
     phasors: np.ndarray
     repeats: np.ndarray
     longest_stick: np.ndarray
+    samples: np.ndarray
 
 
 def list_parameters(
@@ -64,7 +67,7 @@ def list_parameters(
     )
 
 
-def march_cases(cases: Cases, steps: int) -> CaseMarch:
+def march_cases(cases: Cases, steps: int, has_samples: bool = False) -> CaseMarch:
     """Run cases with a number of steps per cycle, and compute their measures.
 
     Parameters
@@ -73,6 +76,8 @@ def march_cases(cases: Cases, steps: int) -> CaseMarch:
         With the same number of cycles.
     steps : int
         Whole steps per cycle; steps with an event are halved.
+    has_samples : bool
+        Whether the motion in the window is stored.
     """
     n = len(cases.parameters)
     columns = cases.parameters.T
@@ -82,9 +87,11 @@ def march_cases(cases: Cases, steps: int) -> CaseMarch:
     now = np.zeros((n, len(Now)))
     seen = np.zeros((n, len(Seen)))
     history = np.zeros((n, int(columns[Number.CYCLES].max(initial=0)), 4))
+    n_samples = steps * int(columns[Number.WINDOW].max(initial=0)) if has_samples else 0
+    samples = np.full((n, n_samples, 4), np.nan)
     compiled.load("points.case_kernels").march_cases(
         steps, np.array([np.sin(phase), np.cos(phase)]), cases.parameters, cases.numbers,
-        cases.memory.copy(), now, seen, history, np.zeros((LEVELS + 1, 2, 5)),
+        cases.memory.copy(), now, seen, history, samples, np.zeros((LEVELS + 1, 2, 5)),
     )  # fmt: skip
 
     output = columns[Number.OUTPUT][:, None]
@@ -96,6 +103,7 @@ def march_cases(cases: Cases, steps: int) -> CaseMarch:
             phasors * output,
             seen[:, Seen.N_CYCLES] < columns[Number.WINDOW],
             seen[:, Seen.LONGEST_STICK],
+            samples,
         )
 
 
@@ -105,7 +113,7 @@ def compute_measures(cases: Cases, now, seen, history) -> dict:
     Parameters
     ----------
     cases : Cases
-    now : (c, 19), seen : (c, 30), history : (c, n, 4) array
+    now : (c, 20), seen : (c, 33), history : (c, n, 4) array
         State at the end and observations, see `case_rows`.
     """
     columns = cases.parameters.T
@@ -170,17 +178,16 @@ def _compute_harmonics(cases: Cases, now, seen, area, slide_range) -> dict:
     q_jump = now[:, Now.SLIDE] - seen[:, Seen.START_SLIDE]
     v_jump = now[:, Now.VELOCITY] - seen[:, Seen.START_VELOCITY]
 
-    def derivatives(order, cosine, sine):
-        """Return integrals of slide, velocity and acceleration times exp(-i order omega t)."""
-        slide = seen[:, cosine] - 1j * seen[:, sine]
-        velocity = q_jump + 1j * order * omega * slide
-        return slide, velocity, v_jump + 1j * order * omega * velocity
-
-    slide, velocity, first = derivatives(1, Seen.COS_1, Seen.SIN_1)
-    third = derivatives(3, Seen.COS_3, Seen.SIN_3)[2]
-    force = -1j * drive * columns[Number.DRIVE] - first
-    force = force - columns[Number.DAMPING] * velocity - columns[Number.STIFFNESS] * slide
-    force = force / columns[Number.MOBILITY]
+    # Integrals of slide, force and accelerations times exp(-i omega t) and exp(-3 i omega t); the slide of the third
+    # harmonic follows from the force by the equation of motion.
+    slide = seen[:, Seen.COS_1] - 1j * seen[:, Seen.SIN_1]
+    force = seen[:, Seen.FORCE_COS_1] - 1j * seen[:, Seen.FORCE_SIN_1]
+    first = v_jump + 1j * omega * (q_jump + 1j * omega * slide)
+    turn = 3j * omega
+    push = seen[:, Seen.FORCE_COS_3] - 1j * seen[:, Seen.FORCE_SIN_3]
+    push = -columns[Number.MOBILITY] * push - v_jump - (turn + columns[Number.DAMPING]) * q_jump
+    stiffness = columns[Number.STIFFNESS] + turn * (turn + columns[Number.DAMPING])
+    third = v_jump + turn * (q_jump + turn * push / stiffness)
     ratio = columns[Number.OUTPUT]
     fundamental = np.abs(ratio * first - 1j * drive * columns[Number.BASE]) * 2 / span
     count = np.maximum(seen[:, Seen.N_CYCLES], 1)

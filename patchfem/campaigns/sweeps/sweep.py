@@ -168,7 +168,9 @@ def _find_min_chunk_size(work: WorkerData) -> int:
     The time of a smaller chunk does not predict the time of a large one.
     """
     model = _build_case_model(work, 0)
-    if work.keep is not None or not isinstance(model, Model):  # The run of the case reports its error.
+    if work.keep is not None or not isinstance(
+        model, Model
+    ):  # The run of the case reports its error.
         return 1
     return batches.MIN_CHUNK_CASES if batches.find_group(model, len(work.cases)).key else 1
 

@@ -16,7 +16,6 @@ from ...model.similar_models import SimilarModels, select_models
 from . import lumped, one_by_one
 from .case_results import CaseResults
 
-
 # Smallest number of cases of a study of which lumped cases are computed together, and of a chunk of such a study.
 MIN_CASES = 32
 MIN_CHUNK_CASES = 256

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import Outcome, SineDrive
+from ...core import Measure, Outcome, Response, SineDrive
 from ...effects import law_has_trait, needs_bond_list
 from ...model.model import Model
 from ...model.similar_models import SimilarModels, collect_columns
@@ -28,7 +28,9 @@ from ...response.outcome import (
     classify_periodic,
     is_drifting,
     is_still_changing,
+    remaining_ringing,
     steady_estimate_error,
+    warn_of_ringing,
 )
 from ...response.reasons import (
     CHANGE_NOT_RESOLVED_REASON,
@@ -38,6 +40,7 @@ from ...response.reasons import (
 )
 from ...response.ringing import MIN_PERIODS, MIN_REFINED_FRACTION
 from ...response.rows import INTERNAL_VALUES, TABLE, error_floor, larger_term
+from ...response.run_events import measure_ringing_in_sticks
 from ...response.settling import (
     CLASSES,
     extrapolate_steady_amplitudes,
@@ -74,6 +77,7 @@ MAX_STICK_SLIP = 1e-3
 # Largest product of micro-damping and a typical speed relative to the kinetic friction, with which the power of the LuGre
 # law is not negative
 MAX_MICRO_DAMPING = 4.0
+MIN_RING_STEPS = 24  # smallest number of steps per period of a free vibration
 AMPLITUDE = "relative_displacement_amplitude"
 RIGID_SECANT = "secant_stiffness"
 
@@ -182,8 +186,9 @@ def _solve_cases(models: Sequence[Model], report: Callable | None) -> CaseResult
     refined = refine(cases, scales)
     results = make_results(models, cases, scales, refined)
     _insert_texts(models, results)
-    results.seconds[:] = (perf_counter() - begin) / len(models)
     is_alone = needs_single_run(cases, scales, refined, results)
+    is_alone |= add_ringing(models, cases, scales, refined, results, is_alone)
+    results.seconds[:] = (perf_counter() - begin) / len(models)
     one_by_one.replace_by_single_runs(results, models, is_alone, report)
     return results
 
@@ -419,21 +424,101 @@ def needs_single_run(
     cases: Cases, scales: Scales, refined: Refined, results: CaseResults
 ) -> np.ndarray:
     """Return a mask (n,) of the cases that only a single run can compute."""
-    values, parameters = refined.march.values, cases.parameters.T
+    values = refined.march.values
     is_alone = ~refined.is_met | (results.outcome == str(Outcome.GROWS))
     is_alone |= scales.may_create > 0
     is_alone |= ~(scales.limit > 0) | (scales.acceleration == 0)
     with np.errstate(invalid="ignore"):
         is_alone |= ~(values["work_check"] <= MAX_WORK_CHECK)
-
-    # While an elastic interface sticks for longer than a period, a transient rings, and a single run measures it.
-    stiffness = parameters[Number.STIFFNESS] + scales.stick_stiffness * parameters[Number.MOBILITY]
-    phase = np.sqrt(stiffness) * refined.march.longest_stick
-    is_long = phase >= 2 * np.pi * MIN_REFINED_FRACTION * MIN_PERIODS
-    may_ring = is_long & (scales.stick_stiffness > 0)
-    sticks_always = values["stick_fraction"] == 1
-    is_alone |= may_ring & ~(refined.march.repeats & sticks_always)
     return is_alone
+
+
+def add_ringing(
+    models: Sequence[Model],
+    cases: Cases,
+    scales: Scales,
+    refined: Refined,
+    results: CaseResults,
+    is_done: np.ndarray,
+) -> np.ndarray:
+    """Add the free vibration during stick, and the warning about it; return the cases (n,) in which it is not resolved.
+
+    While an elastic interface sticks for longer than a period of the free vibration, a transient rings. It is fitted as
+    in a single run to the samples of another march, whose steps resolve it, and of one with half of the steps.
+
+    Parameters
+    ----------
+    models, cases, scales, refined, results
+        As before.
+    is_done : (n,) of bool
+        Cases that are left out.
+    """
+    march, columns = refined.march, cases.parameters.T
+    stiffness = columns[Number.STIFFNESS] + scales.stick_stiffness * columns[Number.MOBILITY]
+    omega = np.sqrt(stiffness)
+    may_ring = omega * march.longest_stick >= 2 * np.pi * MIN_REFINED_FRACTION * MIN_PERIODS
+    may_ring &= (scales.stick_stiffness > 0) & ~is_done
+    may_ring &= ~(march.repeats & (march.values["stick_fraction"] == 1))
+    steps = np.maximum(refined.steps, MIN_RING_STEPS * omega / columns[Number.OMEGA])
+    steps = 2.0 ** np.ceil(np.log2(steps))
+    is_unresolved = may_ring & (steps > STEPS[-1])
+    may_ring &= ~is_unresolved
+    for count in np.unique(steps[may_ring]).astype(int).tolist():
+        part = np.flatnonzero(may_ring & (steps == count))
+        runs = [march_cases(cases.select(part), n, True) for n in (count, count // 2)]
+        for row, case in enumerate(part.tolist()):
+            rings = [_measure_ringing(models[case], run, row, scales, case) for run in runs]
+            (fine, fit_errors), (rough, _) = rings
+            if fine.keys() != rough.keys():
+                is_unresolved[case] = True
+                continue
+            errors = convergence_errors(fine, rough) if fine else {}
+            for name, value in fine.items():
+                error = float(errors[name] + fit_errors[name])
+                row_definition = TABLE[name]
+                measure = Measure(value, row_definition.unit, error, row_definition.floor)
+                results.fill(case, {name: measure})
+    _warn_of_ringing(cases, scales, refined, results)
+    return is_unresolved
+
+
+def _measure_ringing(model: Model, march: CaseMarch, row: int, scales: Scales, case: int) -> tuple:
+    """Return the ringing measures of a case and their errors, from the samples in one row of a march."""
+    rig = model.rig
+    drive = rig.drive.signal
+    samples = march.samples[row]
+    slide, speed, slip, acceleration = samples[~np.isnan(samples[:, 0])].T
+    window = int(min(10, rig.drive.cycles // 10))
+    time = np.arange(1, slide.size + 1) * (drive.period * window / len(samples))
+    still = np.zeros(slide.size)
+    ratio = rig.modes.slide[0]
+    response = Response(
+        time, slide[:, None] / ratio, speed[:, None] / ratio, slide, speed, slide, speed, acceleration,
+        still, still, slip,
+    )  # fmt: skip
+    tolerance = MAX_STICK_SLIP * float(scales.limit[case] / scales.stick_stiffness[case])
+    return measure_ringing_in_sticks(
+        response, rig.modes, drive, None, tolerance, repeats=bool(march.repeats[row])
+    )
+
+
+def _warn_of_ringing(cases: Cases, scales: Scales, refined: Refined, results: CaseResults) -> None:
+    """Warn where the amplitude of a sticking interface still decays."""
+    columns = cases.parameters.T
+    decay = scales.decay * 2 * np.pi / columns[Number.OMEGA]
+    extremes = refined.march.extremes
+    window = int(columns[Number.WINDOW, 0])
+    free = remaining_ringing(extremes, window, decay)
+    for case in np.flatnonzero(results.outcome == str(Outcome.STUCK)).tolist():
+        amplitude, error, floor = (
+            column[AMPLITUDE][case] for column in (results.values, results.errors, results.floors)
+        )
+        limits = float(scales.tolerance[case]), float(decay[case])
+        sizes = float(amplitude), float(floor + error)
+        if amplitude and (
+            texts := warn_of_ringing(free[case], sizes, limits, int(columns[Number.CYCLES, case]))
+        ):
+            results.warnings[case] = [*results.warnings.get(case, ()), *texts]
 
 
 def _insert_texts(models: Sequence[Model], results: CaseResults) -> None:
