@@ -14,7 +14,7 @@ A law is a number in `return_maps_kernels.Law` with a branch in each of five fun
 
 # Names that other folders use, by module.
 PUBLIC = {
-    "case_rows": ("Cases", "Number"),
+    "case_rows": ("SAME_CYCLE", "Cases", "Number"),
     "cases": ("CaseMarch", "list_parameters", "march_cases"),
     "contacts": ("Contact",),
     "laws": ("make_point_law",),

@@ -6,29 +6,38 @@ changes its sign, or a rigid point is released, is halved up to LEVELS times, be
 its path; events of a rigid point are then located by linear interpolation. A motion that repeats is not computed again.
 """
 
-from math import cos, inf, nan, sin
+from math import cos, inf, nan, sin, sqrt, tanh
 
 import numpy as np
 
 from ..compiled.jit import njit
 from ..friction.flags_kernels import NJIT_KERNEL
-from .case_rows import Now, Number, Seen
-from .return_maps_kernels import Law, MeanForce, Step, advance, mean_force, prepare, read
+from .case_rows import SAME_CYCLE, Now, Number, Seen
+from .return_maps_kernels import (
+    Law,
+    MeanForce,
+    Step,
+    advance,
+    mean_force,
+    prepare,
+    read,
+    slip_since_zero,
+)
 
 LEVELS = 5  # halvings of a step that contains an event
 TICKS = 1 << LEVELS  # shortest steps in a step
 TAYLOR_TERMS = 12  # of the exponential of a shortest step, whose product with any rate is below 0.1
 MAX_ITERATIONS = 60  # Newton steps and bisections for the increment of a step
 RESIDUAL = 1e-10  # residual of a step relative to its increments
-SAME_CYCLE = (
-    1e-8  # change between two cycles relative to the range of the motion, below which it repeats
-)
 GAUSS_POINT = (
     0.7745966692414834  # sqrt(3/5), distance of the outer points of Gauss's rule from the middle
 )
 # Distance of the mean force from the mean of the forces at both ends of a step, relative to the force of the drive and to
 # the squared phase of a whole step, above which the step is halved
 MAX_FORCE_BEND = 0.3
+# Change of the irreversible part of the slide from step to step, relative to the phase of a whole step, above which the
+# steps of the window stay short; near events, where steps grow with their distance, it is resolved like elsewhere
+MAX_SLIP_CHANGE = 0.25
 FULL_STICK = 1e-9  # fraction of the slide below which its irreversible or elastic part is round-off
 N_READ = 2  # measured cycles of a motion that repeats
 
@@ -273,14 +282,34 @@ def add_energies(waves, h, case, start, now):
 
 
 @njit(**NJIT_KERNEL)
+def find_turn(h, start, now):
+    """Return the part of a step and the slide at which the velocity, a parabola in the step, is 0.
+
+    Its mean is that of the slide; its signs at both ends differ.
+    """
+    first = start[1]
+    last = now[Now.VELOCITY]
+    middle = 1.5 * (now[Now.SLIDE] - start[0]) / h - 0.25 * (first + last)
+    slope = 4 * middle - 3 * first - last
+    bend = 2 * (first + last) - 4 * middle
+    # The root between the ends, without a difference of large numbers
+    size = sqrt(max(slope * slope - 4 * bend * first, 0.0))
+    sum_ = slope + (size if slope > 0 else -size)
+    part = -2 * first / sum_ if sum_ != 0 else 0.5
+    if not 0 <= part <= 1:
+        part = -0.5 * sum_ / bend if bend != 0 else 0.5
+    if not 0 <= part <= 1:
+        part = first / (first - last)
+    return part, start[0] + h * part * (first + part * (slope / 2 + part * bend / 3))
+
+
+@njit(**NJIT_KERNEL)
 def observe_extremes(h, law, start, now, seen, observes):
     """Update the extremes of the slide in the cycle, and the friction forces there."""
     q = now[Now.SLIDE]
     force = now[Now.FORCE]
     if start[1] * now[Now.VELOCITY] < 0 or (start[1] != 0 and now[Now.VELOCITY] == 0):
-        # The velocity is linear near a reversal.
-        fraction = start[1] / (start[1] - now[Now.VELOCITY])
-        q = start[0] + 0.5 * start[1] * fraction * h
+        fraction, q = find_turn(h, start, now)
         force = start[2] + fraction * (now[Now.FORCE] - start[2])
         if law == Law.TANH:
             force = 0.0
@@ -306,6 +335,17 @@ def find_acceleration(sine, q, v, force, case):
 
 
 @njit(**NJIT_KERNEL)
+def find_parabola_extreme(first, middle, last):
+    """Return the largest magnitude of the parabola through values at the start, in the middle and at the end of a step."""
+    largest = max(abs(first), abs(last))
+    bend = first - 2 * middle + last
+    tilt = last - first
+    if abs(tilt) < 2 * abs(bend):
+        largest = max(largest, abs(middle - tilt * tilt / (8 * bend)))
+    return largest
+
+
+@njit(**NJIT_KERNEL)
 def observe_acceleration(waves, h, case, start, now, seen):
     """Update the largest acceleration: that of a parabola through both ends and the middle, or beside an event."""
     q = now[Now.SLIDE]
@@ -322,13 +362,9 @@ def observe_acceleration(waves, h, case, start, now, seen):
         q_middle = 0.5 * (start[0] + q) + h / 8 * (start[1] - v)
         v_middle = 1.5 * (q - start[0]) / h - 0.25 * (start[1] + v)
         # The force in the middle has the mean of the step by Simpson's rule.
-        force = 1.5 * now[Now.MEAN] - 0.25 * (start[2] + now[Now.FORCE])
+        force = 1.5 * now[Now.TIME_MEAN] - 0.25 * (start[2] + now[Now.FORCE])
         middle = find_acceleration(waves[1], q_middle, v_middle, force, case)
-        bend = first - 2 * middle + last
-        tilt = last - first
-        peak = max(peak, abs(first))
-        if abs(tilt) < 2 * abs(bend):
-            peak = max(peak, abs(middle - tilt * tilt / (8 * bend)))
+        peak = find_parabola_extreme(first, middle, last)
     seen[Seen.MAX_ACCELERATION] = max(seen[Seen.MAX_ACCELERATION], peak)
 
 
@@ -408,12 +444,48 @@ def observe_stick(time, h, omega, is_rigid, start, now, seen):
 
 
 @njit(**NJIT_KERNEL)
-def observe_forces(start, now, seen):
+def find_extreme_slip(h, start, now, numbers, memory, j, load):
+    """Return the irreversible slide at its extreme in a step, or at the end of the step."""
+    if numbers[0, j] == Law.TANH and start[1] * now[Now.VELOCITY] < 0:
+        return find_turn(h, start, now)[1]
+    slip = now[Now.SLIP]
+    if (start[0] - start[3]) * (now[Now.SLIDE] - slip) < 0:
+        slip -= slip_since_zero(numbers, memory, j, load, now[Now.VELOCITY])
+    return slip
+
+
+@njit(**NJIT_KERNEL)
+def find_largest_force(h, start, now, numbers, j, load):
+    """Return the largest magnitude of the force in a step.
+
+    The force is smooth in the step if it follows the velocity, or holds a rigid point at rest, which is released at the
+    static limit; other laws have their largest force where a step ends.
+    """
+    law = numbers[0, j]
+    force = now[Now.FORCE]
+    if law == Law.TANH:
+        middle = 1.5 * (now[Now.SLIDE] - start[0]) / h - 0.25 * (start[1] + now[Now.VELOCITY])
+        speed = find_parabola_extreme(start[1], middle, now[Now.VELOCITY])
+        return numbers[1, j] * load * tanh(speed / numbers[2, j])
+    if law == Law.COULOMB and start[1] == 0 and now[Now.VELOCITY] != 0:
+        return numbers[1, j] * load
+    if law == Law.LUGRE or (law == Law.COULOMB and start[1] == 0):
+        # The force in the middle has the mean of the step by Simpson's rule.
+        return find_parabola_extreme(
+            start[2], 1.5 * now[Now.TIME_MEAN] - 0.25 * (start[2] + force), force
+        )
+    return abs(force)
+
+
+@njit(**NJIT_KERNEL)
+def observe_forces(h, start, now, numbers, memory, j, load, seen):
     """Add the extremes of force and slip, and the friction work."""
     dq = now[Now.SLIDE] - start[0]
-    seen[Seen.MAX_FORCE] = max(seen[Seen.MAX_FORCE], abs(now[Now.FORCE]))
-    seen[Seen.MIN_SLIP] = min(seen[Seen.MIN_SLIP], now[Now.SLIP])
-    seen[Seen.MAX_SLIP] = max(seen[Seen.MAX_SLIP], now[Now.SLIP])
+    force = find_largest_force(h, start, now, numbers, j, load)
+    slip = find_extreme_slip(h, start, now, numbers, memory, j, load)
+    seen[Seen.MAX_FORCE] = max(seen[Seen.MAX_FORCE], force)
+    seen[Seen.MIN_SLIP] = min(seen[Seen.MIN_SLIP], slip)
+    seen[Seen.MAX_SLIP] = max(seen[Seen.MAX_SLIP], slip)
     seen[Seen.WORK] += now[Now.MEAN] * dq
     seen[Seen.SAMPLED] += 0.5 * (start[2] + now[Now.FORCE]) * dq
     seen[Seen.PASSED] += abs(now[Now.MEAN] * dq)
@@ -497,6 +569,9 @@ def march_cycle(steps, table, waves, observes, case, now, numbers, memory, j, se
     max_bend = (
         MAX_FORCE_BEND * (omega * step) ** 2 * abs(case[Number.DRIVE]) / case[Number.MOBILITY]
     )
+    is_rigid = numbers[0, j] == Law.COULOMB
+    max_change = MAX_SLIP_CHANGE * omega * step
+    change = 0.0
     level = 0
     tick = 0
     start = (0.0, 0.0, 0.0, 0.0)
@@ -533,14 +608,18 @@ def march_cycle(steps, table, waves, observes, case, now, numbers, memory, j, se
         now[Now.SIN] += 0.5 * h * (start[0] * drive[0] + now[Now.SLIDE] * drive[2])
         observe_extremes(h, numbers[0, j], start, now, seen, observes)
         if observes:
-            observe_forces(start, now, seen)
+            observe_forces(h, start, now, numbers, memory, j, case[Number.LOAD], seen)
             observe_acceleration(drive, h, case, start, now, seen)
             observe_harmonics(time, h, omega, start, now, seen)
-            observe_stick(time, h, omega, numbers[0, j] == Law.COULOMB, start, now, seen)
+            excess = seen[Seen.EXCESS]
+            observe_stick(time, h, omega, is_rigid, start, now, seen)
+            change = 0.0 if is_rigid else abs(seen[Seen.EXCESS] - excess)
             if (tick + size) % TICKS == 0:
                 store_sample(drive[2], case, now, seen, samples)
         tick += size
-        if level > 0 and tick % (2 * size) == 0:
+        if change > 2 * max_change and level < LEVELS:
+            level += 1
+        elif level > 0 and tick % (2 * size) == 0 and change <= max_change:
             level -= 1
 
 

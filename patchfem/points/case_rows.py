@@ -5,6 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+# Change between two cycles relative to the range of the motion, below which it repeats
+SAME_CYCLE = 1e-8
+
 
 class Number(IntEnum):
     """Columns of `Cases.parameters`.

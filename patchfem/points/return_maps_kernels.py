@@ -533,6 +533,31 @@ def read(numbers, memory, j, load):
 
 
 @njit(**NJIT_KERNEL)
+def slip_since_zero(numbers, memory, j, load, velocity):
+    """Return the irreversible slide [m] since the stretch of a point was 0, where it is extreme; 0 without such an extreme.
+
+    Over the path the stretch s changes by ds/dq = 1 - s/l: for bonds with l = m eps/load, for the LuGre law with its
+    stretch during steady slip at the velocity [m/s]. The rest of the path slips; that of the Bouc-Wen law is |z|^n dq.
+    """
+    law = numbers[0, j]
+    if law == Law.BOUC_WEN:
+        z = memory[0, j]
+        power = numbers[3, j]
+        return numbers[2, j] * z * abs(z) ** power / (power + 1)
+    if law == Law.BONDS:
+        stretch = memory[2, j] / memory[1, j]
+        longest = memory[1, j] * memory[0, j] / load
+    elif law == Law.LUGRE:
+        stretch = memory[0, j]
+        longest = _stribeck_limit(numbers, j, velocity) / numbers[1, j]
+    else:
+        return 0.0
+    x = min(abs(stretch) / longest, 1 - LIMIT_FRACTION)
+    slip = longest * (-log1p(-x) - x)
+    return slip if stretch > 0 else -slip
+
+
+@njit(**NJIT_KERNEL)
 def press(numbers, memory, j, before, after):
     """Change the load of point j at rest: elastic forces are cut at the new limit, new bonds form."""
     law = numbers[0, j]

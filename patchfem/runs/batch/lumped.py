@@ -18,7 +18,7 @@ from ...core import Measure, Outcome, Response, SineDrive
 from ...effects import law_has_trait, needs_bond_list
 from ...model.model import Model
 from ...model.similar_models import SimilarModels, collect_columns
-from ...points.case_rows import Cases, Number
+from ...points.case_rows import SAME_CYCLE, Cases, Number
 from ...points.cases import CaseMarch, list_parameters, march_cases
 from ...points.laws import N_NUMBERS, make_point_law
 from ...response import rows
@@ -67,10 +67,6 @@ MAX_CASES_PER_CALL = 1024  # cases whose cycles are held in memory
 MIN_CYCLES = 20  # smallest number of cycles of a run
 MAX_CYCLES = 4000  # largest number of cycles of a run, limited by the memory of the extremes
 MIN_TOLERANCE = 1e-4  # smallest tolerance that STEPS meet
-# Parts of the allowed error that the differences of the marches do not show: corners of a law, extremes and instants of
-# stick converge irregularly. By measurement, tests/support/point_cases.py; the extremes are found at the ends of steps.
-UNSEEN_FRACTION = 0.1
-UNSEEN_FRACTIONS = {"absolute_acceleration_peak": 0.5, "slip_amplitude": 0.5, "normal_load": 1e-6}
 N_FINAL_WINDOWS = 5  # windows from which the steady motion is extrapolated (response.settling)
 # Largest slip amplitude of a sticking interface, relative to the stretch at the friction limit
 MAX_STICK_SLIP = 1e-3
@@ -241,15 +237,15 @@ def _may_create_energy(model: Model):
     return np.less(friction.shape, 0.5) if friction.law == "bouc-wen" else False
 
 
-def refine(cases: Cases, scales: Scales, steps: Sequence[int] = STEPS) -> Refined:
+def refine(cases: Cases, scales: Scales) -> Refined:
     """March cases, and double the steps of those that miss their tolerance.
 
     The errors follow from the marches with a half and a quarter of the steps.
     """
     left = np.arange(len(cases.parameters))
-    quarter, half = march_cases(cases, steps[0] // 4), march_cases(cases, steps[0] // 2)
+    quarter, half = march_cases(cases, STEPS[0] // 4), march_cases(cases, STEPS[0] // 2)
     refined = None
-    for count in steps:
+    for count in STEPS:
         fine = march_cases(cases.select(left), count)
         part = _select(scales, left)
         values = [march.values for march in (fine, half, quarter)]
@@ -257,7 +253,7 @@ def refine(cases: Cases, scales: Scales, steps: Sequence[int] = STEPS) -> Refine
             name: part.tolerance * np.abs(value) + find_floor(name, values[0], part)
             for name, value in values[0].items()
         }
-        errors = estimate_errors(values, allowed)
+        errors = estimate_errors(values)
         is_met = np.ones(left.size, bool)
         for name in allowed.keys() - set(INTERNAL_VALUES):
             # A measure that only one of the two finest marches has shows an event that the other missed.
@@ -272,15 +268,16 @@ def refine(cases: Cases, scales: Scales, steps: Sequence[int] = STEPS) -> Refine
     return refined
 
 
-def estimate_errors(values: Sequence[dict], allowed: dict) -> dict[str, np.ndarray]:
-    """Return the errors (n,) by name from marches with all, a half and a quarter of the steps, and the allowed errors."""
+def estimate_errors(values: Sequence[dict]) -> dict[str, np.ndarray]:
+    """Return the errors (n,) by name from marches with all, a half and a quarter of the steps.
+
+    Motions that differ by SAME_CYCLE from cycle to cycle count as periodic.
+    """
     amplitude = values[0][AMPLITUDE]
     errors = {}
     with np.errstate(all="ignore"):
         for name, error in convergence_errors(*values).items():
-            unseen = UNSEEN_FRACTIONS.get(name, UNSEEN_FRACTION)
-            parts = [error, unseen * allowed[name]]
-            errors[name] = total_error(name, values[0][name], parts, 0.0, amplitude)
+            errors[name] = total_error(name, values[0][name], [error], SAME_CYCLE, amplitude)
     return errors
 
 
