@@ -557,7 +557,8 @@ def store_sample(sine, case, now, seen, samples):
     samples[row, 0] = q
     samples[row, 1] = v
     samples[row, 2] = now[Now.SLIP]
-    samples[row, 3] = find_acceleration(sine, q, v, now[Now.FORCE], case)
+    samples[row, 3] = now[Now.FORCE]
+    samples[row, 4] = find_acceleration(sine, q, v, now[Now.FORCE], case)
     seen[Seen.N_SAMPLES] += 1
 
 
@@ -637,8 +638,9 @@ def march_cases(steps, waves, parameters, numbers, memory, nows, seens, historie
         See `case_rows.Cases`; the memory is changed.
     nows : (c, 20), seens : (c, 33), histories : (c, n, 4) array
         State, observations, and extremes and phasor of every cycle; output.
-    samples : (c, S, 4) array
-        Slide, velocity, irreversible slide and acceleration at the ends of the first S whole steps of the window; output.
+    samples : (c, S, 5) array
+        Slide, velocity, irreversible slide, force and acceleration at the ends of the first S whole steps of the window;
+        output.
     table : (LEVELS + 1, 2, 5) array
         Workspace.
     """

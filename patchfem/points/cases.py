@@ -22,8 +22,8 @@ class CaseMarch(NamedTuple):
     - extremes (c, n, 2), phasors (c, n): of the output in every cycle [m]
     - repeats (c,): whether the motion has become periodic
     - longest_stick (c,): duration of the longest stick in the measured cycles [s]
-    - samples (c, S, 4): slide [m], velocity [m/s], irreversible slide [m] and acceleration at the output [m s-2] at the ends
-      of the steps of the window; NaN after its last step
+    - samples (c, S, 5): slide [m], velocity [m/s], irreversible slide [m], force [N] and acceleration at the output [m s-2]
+      at the ends of the steps of the window; NaN after its last step
     """
 
     values: dict[str, np.ndarray]
@@ -88,7 +88,7 @@ def march_cases(cases: Cases, steps: int, has_samples: bool = False) -> CaseMarc
     seen = np.zeros((n, len(Seen)))
     history = np.zeros((n, int(columns[Number.CYCLES].max(initial=0)), 4))
     n_samples = steps * int(columns[Number.WINDOW].max(initial=0)) if has_samples else 0
-    samples = np.full((n, n_samples, 4), np.nan)
+    samples = np.full((n, n_samples, 5), np.nan)
     compiled.load("points.case_kernels").march_cases(
         steps, np.array([np.sin(phase), np.cos(phase)]), cases.parameters, cases.numbers,
         cases.memory.copy(), now, seen, history, samples, np.zeros((LEVELS + 1, 2, 5)),

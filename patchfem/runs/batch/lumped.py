@@ -28,6 +28,7 @@ from ...response.outcome import (
     classify_periodic,
     is_drifting,
     is_still_changing,
+    is_still_loading,
     remaining_ringing,
     steady_estimate_error,
     warn_of_ringing,
@@ -460,43 +461,51 @@ def add_ringing(
     steps = 2.0 ** np.ceil(np.log2(steps))
     is_unresolved = may_ring & (steps > STEPS[-1])
     may_ring &= ~is_unresolved
+    is_loading = np.zeros(len(models), bool)
     for count in np.unique(steps[may_ring]).astype(int).tolist():
         part = np.flatnonzero(may_ring & (steps == count))
-        runs = [march_cases(cases.select(part), n, True) for n in (count, count // 2)]
+        counts = (count, count // 2)
+        runs = [march_cases(cases.select(part), n, True) for n in counts]
         for row, case in enumerate(part.tolist()):
-            rings = [_measure_ringing(models[case], run, row, scales, case) for run in runs]
-            (fine, fit_errors), (rough, _) = rings
-            if fine.keys() != rough.keys():
-                is_unresolved[case] = True
-                continue
-            errors = convergence_errors(fine, rough) if fine else {}
-            for name, value in fine.items():
-                error = float(errors[name] + fit_errors[name])
-                row_definition = TABLE[name]
-                measure = Measure(value, row_definition.unit, error, row_definition.floor)
+            drive, modes = models[case].rig.drive.signal, models[case].rig.modes
+            windows = [
+                _make_window(modes, drive, run.samples[row], n) for run, n in zip(runs, counts)
+            ]
+            is_loading[case] = is_still_loading(windows[0], drive.period, scales.tolerance[case])
+            tolerance = MAX_STICK_SLIP * float(scales.limit[case] / scales.stick_stiffness[case])
+            (fine, fit_errors), (rough, _) = (
+                measure_ringing_in_sticks(
+                    window, modes, drive, None, tolerance, repeats=bool(run.repeats[row])
+                )
+                for window, run in zip(windows, runs)
+            )
+            is_unresolved[case] = fine.keys() != rough.keys()
+            errors = convergence_errors(fine, rough) if fine and rough else {}
+            for name, error in errors.items():
+                error = float(error + fit_errors[name])
+                definition = TABLE[name]
+                measure = Measure(fine[name], definition.unit, error, definition.floor)
                 results.fill(case, {name: measure})
     _warn_of_ringing(cases, scales, refined, results)
+
+    # The force of an interface that sticks may still increase.
+    is_loading &= results.outcome == str(Outcome.STUCK)
+    results.outcome[is_loading] = str(Outcome.TRANSIENT)
+    _put_reason(results, STEADY_AMPLITUDE, np.flatnonzero(is_loading), CHANGE_NOT_RESOLVED_REASON)
     return is_unresolved
 
 
-def _measure_ringing(model: Model, march: CaseMarch, row: int, scales: Scales, case: int) -> tuple:
-    """Return the ringing measures of a case and their errors, from the samples in one row of a march."""
-    rig = model.rig
-    drive = rig.drive.signal
-    samples = march.samples[row]
-    slide, speed, slip, acceleration = samples[~np.isnan(samples[:, 0])].T
-    window = int(min(10, rig.drive.cycles // 10))
-    time = np.arange(1, slide.size + 1) * (drive.period * window / len(samples))
-    still = np.zeros(slide.size)
-    ratio = rig.modes.slide[0]
-    response = Response(
+def _make_window(modes, drive, samples, steps: int) -> Response:
+    """Return the histories of the last cycles from samples of a march with a number of steps per cycle."""
+    slide, speed, slip, force, acceleration = samples[~np.isnan(samples[:, 0])].T
+    # The samples begin after the first step.
+    time = np.arange(1, slide.size + 1) * drive.period / steps
+    ratio = modes.slide[0]
+    base = np.zeros(slide.size)
+    return Response(
         time, slide[:, None] / ratio, speed[:, None] / ratio, slide, speed, slide, speed, acceleration,
-        still, still, slip,
+        base, force, slip,
     )  # fmt: skip
-    tolerance = MAX_STICK_SLIP * float(scales.limit[case] / scales.stick_stiffness[case])
-    return measure_ringing_in_sticks(
-        response, rig.modes, drive, None, tolerance, repeats=bool(march.repeats[row])
-    )
 
 
 def _warn_of_ringing(cases: Cases, scales: Scales, refined: Refined, results: CaseResults) -> None:
