@@ -313,6 +313,9 @@ def observe_extremes(h, law, start, now, seen, observes):
         force = start[2] + fraction * (now[Now.FORCE] - start[2])
         if law == Law.TANH:
             force = 0.0
+        elif law == Law.LUGRE:
+            bend = 6 * now[Now.TIME_MEAN] - 3 * (start[2] + now[Now.FORCE])
+            force += bend * fraction * (1 - fraction)
         elif now[Now.FORCE] * start[2] < 0:
             force = 0.5 * (start[2] + now[Now.FORCE])
         elif now[Now.VELOCITY] == 0:
@@ -409,10 +412,17 @@ def observe_stick(time, h, omega, is_rigid, start, now, seen):
         moves_last = 1 - event if now[Now.VELOCITY] != 0 else 0.0
         excess += moves_first + moves_last
     elif path > 0:
+        slip = abs(now[Now.SLIP] - start[3])
         if event >= 0:
+            # Slip belongs to the part before the reversal first, and fractions of the path become those of the time.
             first = 0.5 * start[1] * event * h
-            path = abs(first) + abs(dq - first)
-        excess += abs(now[Now.SLIP] - start[3]) / path
+            rest = abs(dq - first)
+            first = abs(first)
+            before = min(slip, first)
+            excess += event * before / first if first > 0 else 0.0
+            excess += (1 - event) * min(slip - before, rest) / rest if rest > 0 else 0.0
+        else:
+            excess += slip / path
     centre = time + 0.5 * h
     elapsed = centre - seen[Seen.MIDDLE]
     last = seen[Seen.EXCESS]
@@ -578,6 +588,8 @@ def march_cycle(steps, table, waves, observes, case, now, numbers, memory, j, se
     start = (0.0, 0.0, 0.0, 0.0)
     now[Now.MIN] = now[Now.MAX] = now[Now.SLIDE]
     now[Now.COS] = now[Now.SIN] = 0.0
+    # An extreme at the border of two cycles has no force of its own.
+    seen[Seen.FORCE_AT_MIN] = seen[Seen.FORCE_AT_MAX] = nan
     while tick < steps * TICKS:
         size = TICKS >> level
         h = step / (1 << level)

@@ -123,14 +123,16 @@ def test_exact_cases_without_motion_equal_single_runs(kind):
 def test_always_outcomes_agree_with_single_runs(name, law):
     """A batch gives the outcome of a single run, whether a motion grows, settles, beats, is steady or sticks.
 
-    It has the same measures, warnings and reasons; values agree within the sum of both errors.
+    It has the same measures, reasons and warnings, except those on the size of errors, which are other numbers; values
+    agree within the sum of both errors.
     """
     pairs, outcome, has_steady_estimate = OUTCOMES[name]
     model = build(replace_in_rig(*pairs).replace('law = "coulomb"', LAWS[law]))
     assert batches.find_group(model, 64).key
     batch, single = batches.solve_models([model], n_study_cases=64), one_by_one.solve([model])
     assert batch.outcome.tolist() == single.outcome.tolist()
-    assert batch.warnings == single.warnings and batch.reasons == single.reasons
+    texts = [text for text in single.warnings.get(0, ()) if "has an estimated error" not in text]
+    assert list(batch.warnings.get(0, ())) == texts and batch.reasons == single.reasons
     names = {measure for measure in batch.values if batch.has(measure, 0)}
     missing = names ^ {measure for measure in single.values if single.has(measure, 0)}
     # The extrapolation of a motion that has almost settled is a measure if its error is large enough.
