@@ -14,21 +14,6 @@ import numpy as np
 # Constants named ..._SECONDS are CPU times [s] per unit of work.
 START_SECONDS = 0.5  # CPU time [s] per run to start it and to write its files and its report page
 
-# Event-driven solution, whose motion consists of closed-form pieces between events.
-# CPU time [s] per closed-form piece of a motion with one mode and one interface
-PIECE_SECONDS = 2.5e-7
-PIECE_MODE_SECONDS = 1.5e-7  # additional CPU time [s] per piece and further mode
-PIECE_INTERFACE_SECONDS = 3e-7  # additional CPU time [s] per piece and further interface
-PIECE_ELEMENT_SECONDS = 3e-9  # additional CPU time [s] per piece and elastic-plastic element
-MAX_PIECE_SECONDS = 1e-6  # upper bound of the CPU time [s] per piece, used to select the engine
-READ_PIECE_SECONDS = 4e-6  # CPU time [s] per piece of the last cycles, whose histories are stored
-# CPU time [s] per piece, mode + 1 and interface + 1 without compilation
-PYTHON_PIECE_SECONDS = 7e-5
-# time of a sample of the motion over that of a piece, both without compilation
-PYTHON_SAMPLE_TIME_RATIO = 0.1
-# time to evaluate the histories of a piece over that of the piece, both without compilation
-PYTHON_READ_TIME_RATIO = 0.5
-
 # Time stepping.
 CYCLE_SECONDS = 3e-4  # CPU time [s] per cycle of time stepping with elements
 STEP_SECONDS = 4.3e-7  # CPU time [s] per time step with elements
@@ -52,8 +37,6 @@ HYBRID_STEP_SECONDS = 4e-6  # CPU time [s] per step from event to event
 HYBRID_MODES_SECONDS = 4e-8  # additional CPU time [s] per such step and pair of modes
 HYBRID_INTERFACES_SECONDS = 1e-6  # additional CPU time [s] per such step and pair of interfaces
 KEPT_SAMPLE_SECONDS = 8e-6  # CPU time [s] per stored sample of the last cycles of time stepping
-# CPU time [s] per stored sample of the last cycles of the event-driven solution
-KEPT_EVENT_SAMPLE_SECONDS = 2.5e-6
 
 # Points on a curve of steady-state motions. The predicted times of fourteen curves (templates, and rigs with ten modes)
 # were correct within a factor of 3.

@@ -307,7 +307,7 @@ def test_always_parallel_first_calls_load_code_once(monkeypatch):
 
     Loading it twice ended the process in half of the first sweeps of Iwan cases.
     """
-    entry = fresh_kernel_module("dynamics.events.series_kernels").find_highest_power
+    entry = fresh_kernel_module("response.ringing_kernels").fit_sinusoids
     loaded_paths = []
     barrier = Barrier(2)
 

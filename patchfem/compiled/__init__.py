@@ -63,8 +63,6 @@ TUPLE_MODULES = (
     "dynamics/ledger.py",
     "dynamics/march/element_arrays.py",
     "dynamics/march/cycle_sum_arrays.py",
-    "dynamics/events/modal_system.py",
-    "dynamics/events/elements.py",
     "hybrid/records.py",
     "points/case_rows.py",
     "points/march_rows.py",

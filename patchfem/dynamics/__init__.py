@@ -16,13 +16,12 @@ entry of this list and the entries before it:
 11. `event_list`      log of the events of a run
 12. `periodic`        linear systems and Floquet multipliers of periodic motions
 13. `interfaces`      contacts of a march: solution of a step and update of their memory
-14. `events`          exact motion from event to event: rigid and elastic-plastic elements, or no friction
-15. `march`           any law in time, under the path-mean forces of each step
-16. `harmonic`        steady motions by harmonic balance, branches and stability
-17. `limit_cycles`    limit cycles of modes with negative damping and friction
-18. `grooves`         interfaces of matched grooves, whose load climbs the flanks
+14. `march`           any law in time, under the path-mean forces of each step
+15. `harmonic`        steady motions by harmonic balance, branches and stability
+16. `limit_cycles`    limit cycles of modes with negative damping and friction
+17. `grooves`         interfaces of matched grooves, whose load climbs the flanks
 
-Read `events` first for motion from event to event, `propagator` and `interfaces` for steps of a march.
+Read `propagator` and `interfaces` first for steps of a march.
 """
 
 # Names that other folders use, by module.
@@ -40,15 +39,6 @@ PUBLIC = {
         "STOP",
         "EventLog",
     ),
-    "events.elements": (
-        "Elements",
-        "make_coulomb_elements",
-        "make_elements",
-        "merge_elements",
-    ),
-    "events.histories": ("load_event_kernels",),
-    "events.positions_kernels": ("InterfaceMeasure",),
-    "events.reading": ("Reading",),
     "grooves.climbing": ("with_shear_modes",),
     "harmonic.backbone": ("FreeBalance",),
     "harmonic.balance": (

@@ -22,27 +22,6 @@ SAMPLES_PER_CYCLE = 400
 MIN_SAMPLES = 101
 
 
-def choose_sample_times(
-    begin: float, end: float, period: float, min_samples: int = MIN_SAMPLES
-) -> np.ndarray:
-    """Return evenly spaced times at which several cycles of a run are sampled.
-
-    Parameters
-    ----------
-    begin, end, period : float
-        Start and end of the cycles, and duration of a cycle [s].
-    min_samples : int
-        Smallest number of times.
-
-    Returns
-    -------
-    ndarray
-        (k,) [s].
-    """
-    count = round((end - begin) / period * SAMPLES_PER_CYCLE) + 1
-    return np.linspace(begin, end, max(min_samples, count))
-
-
 def select_cycle_samples(rows, run, n_equidistant: int = 0) -> list:
     """Return the indices of the samples that are kept in each marched cycle.
 

@@ -28,7 +28,6 @@ MAX_ORDER = 2.0
 MAX_CHANGE_RATIO = 16.0
 # Lowest observed order of convergence at which an error is assumed to decrease with the step size.
 MIN_OBSERVED_ORDER = 0.5
-SUM_ROUND_OFF = 1e-12  # Relative round-off error of a long sum.
 # Round-off error of the mean position of a motion, relative to its amplitude.
 MEAN_ROUND_OFF = 1e-13
 # Measures that are errors of the solution, so that their own error is their value.
@@ -168,7 +167,7 @@ def merged_cell_errors(fine: dict, *coarse: dict) -> dict:
     The force of a density divided into cells is exact at the ends of each cell; its error between them is
     of second order in the cell width. Measures that depend on the start or the end of slip have an error
     of first order, because the stiffness jumps from cell to cell. The merges are those of
-    `dynamics.events.elements.CELL_MERGES`.
+    `friction.cells.CELL_MERGES`.
 
     Parameters
     ----------

@@ -1,10 +1,12 @@
 """The two problems with exact answers: stick-slip at resonance and the two masses of Fig 16."""
 
+from types import SimpleNamespace
+
 import numpy as np
 
 from patchfem.core import ModalBasis, SineDrive, frozen_array
-from patchfem.dynamics import make_coulomb_elements
-from patchfem.dynamics.events.histories import evaluate_motion
+from patchfem.hybrid import cases, drives, runs
+from patchfem.hybrid.records import LawNumbers
 
 
 def basis(omega, zeta, slide, base) -> ModalBasis:
@@ -42,8 +44,50 @@ TWO_DRIVE = SineDrive(1.0, 1.14, False)
 TWO_LIMIT = 3.0  # friction limit [N]
 
 
+def run_motion(modes, drive, laws, cycles: float, times=(), start=None, window: int = 1):
+    """Integrate modes from event to event with the smallest step tolerance.
+
+    Parameters
+    ----------
+    modes : ModalBasis
+    drive : drive
+    laws : sequence of LawNumbers
+        Law of each interface under a load of 1 N.
+    cycles : float
+    times : (k,) array_like
+        Times [s] at which the motion is stored.
+    start : InitialState, optional
+    window : int
+        Cycles at the end whose measures are recorded.
+
+    Returns
+    -------
+    hybrid.runs.Motion
+    """
+    signal = drives.make_signal(drive)
+    interfaces = [
+        cases.Interface(law, cases.Load(1.0), row) for law, row in zip(laws, modes.interfaces)
+    ]
+    sizes = cases.find_sizes(SimpleNamespace(modes=modes, start=start), signal, drive)
+    options = cases.Options(drive.moving, rtol=cases.EXACT_RTOL)
+    rig = cases.make_rig(modes, signal, interfaces, sizes, options)
+    case = cases.Case(
+        rig,
+        cases.make_start(rig, interfaces, start),
+        *cases.make_schedule(cycles, signal.period, window),
+        np.asarray(times, float),
+        len(interfaces),
+    )
+    return runs.run_case(case, has_errors=False)
+
+
+def make_coulomb(static: float, kinetic: float | None = None) -> LawNumbers:
+    """Return Coulomb's law of an interface under a load of 1 N, from its friction limits [N]."""
+    return LawNumbers("coulomb", (float(static), float(static if kinetic is None else kinetic)))
+
+
 def sample_motion(modes, drive, limit, cycles: float, times, start=None):
-    """Integrate modes by the event engine and return the response at given times.
+    """Integrate modes with Coulomb friction and return the response at given times.
 
     Parameters
     ----------
@@ -56,9 +100,9 @@ def sample_motion(modes, drive, limit, cycles: float, times, start=None):
         [s]
     start : InitialState, optional
     """
-    return evaluate_motion(
-        modes, drive, [make_coulomb_elements(limit, limit)], cycles, times, start
-    )
+    motion = run_motion(modes, drive, [make_coulomb(limit)], cycles, np.unique(times), start)
+    response = motion.make_response(modes, drive)
+    return response.select(np.searchsorted(response.time, np.asarray(times, float)))
 
 
 def exact(name: str, times):

@@ -79,7 +79,7 @@ ITEMS = (
         "a mass with friction, held to the frame by a spring and a dashpot",
         BLOCK,
         _figure("s_2_3"),
-        "tests/dynamics/events/test_coulomb_one_mode.py",
+        "tests/hybrid/test_hybrid_closed_forms.py",
         "works",
     ),
     Item(
@@ -256,7 +256,7 @@ ITEMS = (
         "any transient load, or a sweep over a range of frequencies",
         RIG,
         "studies/steady/fold.py",
-        "tests/dynamics/events/test_general_drives.py",
+        "tests/hybrid/test_hybrid_reference.py",
         "works",
     ),
     Item(
@@ -296,7 +296,7 @@ ITEMS = (
         "the simplified law, elastic up to the friction limit",
         BLOCK,
         "studies/integrators/failure.py",
-        "tests/dynamics/events/test_elastic_plastic.py",
+        "tests/hybrid/test_hybrid_closed_forms.py",
         "works",
     ),
     Item(
@@ -535,7 +535,7 @@ ITEMS = (
         "any number of interfaces",
         TWO,
         "",
-        "tests/dynamics/events/test_coulomb_systems.py",
+        "tests/hybrid/test_hybrid_hard_cases.py",
         "works",
     ),
     Item(

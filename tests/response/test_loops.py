@@ -4,6 +4,7 @@ from math import acos, pi, sin
 
 import friction_forms
 import numpy as np
+import problems
 import pytest
 from scene_texts import COULOMB, DRIVE, MODE, POINT
 
@@ -164,20 +165,14 @@ def test_exact_mean_drift_of_nonuniform_samples(count, samples):
 
 
 def sample_slide_densely(done, begin: float, samples: int = 20_000) -> np.ndarray:
-    """Return the slide (k,) [m] at the middles of equal parts of one cycle, by the event engine."""
-    from patchfem.dynamics import make_coulomb_elements
-    from patchfem.dynamics.events.histories import evaluate_motion
-
+    """Return the slide (k,) [m] at the middles of equal parts of one cycle, at step tolerance 1e-12."""
     model = done.plan.model
     rig = done.plan.model.rig
     times = (begin + (np.arange(samples) + 0.5) / samples) * PERIOD
-    return evaluate_motion(
-        rig.modes,
-        rig.drive.signal,
-        [make_coulomb_elements(*model.friction_limits(model.point.load))],
-        rig.drive.cycles,
-        times,
-    ).slide
+    law = problems.make_coulomb(*model.friction_limits(model.point.load))
+    motion = problems.run_motion(rig.modes, rig.drive.signal, [law], rig.drive.cycles, times)
+    response = motion.make_response(rig.modes, rig.drive.signal)
+    return response.slide[np.searchsorted(response.time, times)]
 
 
 @pytest.mark.parametrize("more, drive", [("", "7 g"), ("kinetic = 0.2", "5 g")])

@@ -42,8 +42,7 @@ MAX_RUN_STEPS = 1e7  # Largest number of time steps of a run after its steps wer
 # an error of 2e-4 of the motion of a slipping joint.
 MAX_MERGES = 4
 MERGE_TOLERANCE = 1e-3  # Smallest tolerance at which cells are merged MAX_MERGES times.
-# Largest phase [rad] of the fastest vibration in a time interval, as in
-# `dynamics.events.series_kernels`.
+# Largest phase [rad] of the fastest vibration in a time interval
 MAX_INTERVAL_PHASE = 2.0
 # Keys of [accuracy] that select constant time steps.
 MARCH_SETTINGS = (
@@ -164,11 +163,6 @@ def estimate_element_count_and_stiffness(model: Model) -> tuple:
         count = count + n_elements
         max_stiffness = max(max_stiffness, stiffness if stiffness < inf else 0.0)
     return count, max_stiffness
-
-
-def intervals_per_cycle(model: Model) -> float:
-    """Return the largest number of time intervals per drive cycle of an event-driven run."""
-    return sum(count_intervals_by_cause(model))
 
 
 def count_intervals_by_cause(model: Model) -> tuple:
