@@ -68,4 +68,5 @@ def test_unstable_limit_cycle_of_flutter_and_friction():
     assert cycle.change < cycle.tolerance
     assert cycle.batch.windows[0][AMPLITUDE][0] == pytest.approx(guess, rel=2e-2)
     assert not cycle.is_stable
-    assert np.abs(np.abs(cycle.multipliers) - 1).min() < 1e-4
+    # The multipliers are finite differences of motions with the step tolerance 1e-9.
+    assert np.abs(np.abs(cycle.multipliers) - 1).min() < 5e-4
