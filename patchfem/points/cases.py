@@ -127,6 +127,8 @@ def compute_measures(cases: Cases, now, seen, history) -> dict:
     work = seen[:, Seen.WORK]
     stuck = seen[:, Seen.STUCK] / span
     energies = _compute_energies(cases, now, mass)
+    gap = np.abs(seen[:, Seen.SAMPLED] - work)
+    size = seen[:, Seen.PASSED] + mass * (now[:, Now.POWER] + now[:, Now.STORED])
     values = {
         "relative_displacement_amplitude": (high - low) / 2 * np.abs(ratio),
         "absolute_acceleration_peak": seen[:, Seen.MAX_ACCELERATION],
@@ -138,8 +140,7 @@ def compute_measures(cases: Cases, now, seen, history) -> dict:
         "loop_area": work / count,
         "drift_per_cycle": (seen[:, Seen.LAST_MEAN] - seen[:, Seen.FIRST_MEAN])
         * omega / (2 * np.pi) / np.maximum(count - 1, 1),
-        "work_check": np.abs(seen[:, Seen.SAMPLED] - work)
-        / (seen[:, Seen.PASSED] + mass * (now[:, Now.POWER] + now[:, Now.STORED])),
+        "work_check": np.divide(gap, size, out=np.zeros_like(gap), where=size > 0),
     }  # fmt: skip
     return values | energies | _compute_harmonics(cases, now, seen, values["loop_area"], high - low)
 
