@@ -31,6 +31,8 @@ def test_block_without_stops_after_200_cycles():
     """Friction of half the drive; peak at the end of 200 cycles from exact propagation between reversals."""
     motion = runs.run_case(make_oscillator(coulomb(), load=0.5, rtol=1e-12), has_errors=False)
     assert motion.extremes[-1, 1] == pytest.approx(59.1676969670915519, rel=1e-9)
+    # Slip does not start where the block turns without rest.
+    assert np.isnan(motion.values["slip_start_phase"])
 
 
 def test_free_block_stops_after_six_half_cycles():

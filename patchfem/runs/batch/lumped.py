@@ -1,7 +1,7 @@
 """Batch of lumped cases, with one mode and one contact point, by time steps of `points.cases`.
 
 In: models of a group. Out: `CaseResults`. Each case has as many steps as its tolerance needs. A case that misses it, or
-that vibrates freely while its interface sticks, is computed by a single run.
+whose free vibration during stick is not resolved, is computed by a single run.
 """
 
 from __future__ import annotations
