@@ -25,7 +25,6 @@ from .engines import ENGINES
 from .fields import collect_interface_fields
 from .motion_warnings import collect_notes
 from .numerics import Numerics, choose_numerics
-from .plan import predict_march_cost
 from .postprocessing import CoupledRun
 from .runner import Runner
 from .solution import Solution, compute_peak_frequency
@@ -37,9 +36,11 @@ MIN_STEP_ERROR = 1e-12  # Smallest relative error per step; below it round-off d
 MIN_OWN_FRACTION = (
     0.1  # Fraction of the error due to the steps of `hybrid` below which smaller steps are no use.
 )
-# Largest predicted CPU time [s] of a run that is repeated with more steps although its displacement
-# meets the tolerance.
+# Largest time [s] of a run and its coarse runs that is repeated with more steps although its
+# displacement meets the tolerance.
 MAX_REFINED_SECONDS = 10.0
+# Ratio of the time of a run with twice the steps and of its coarse runs to that of the run itself.
+REFINED_TIME_RATIO = 3.5
 
 
 class RefinedRun(NamedTuple):
@@ -257,9 +258,7 @@ def _meets_tolerance(run: CoupledRun, excesses: list) -> bool:
     excesses.append(_find_step_excess(run))
     if excesses[-1] <= 1 or (len(excesses) > 2 and excesses[-1] >= excesses[-3]):
         return True
-    n_points = 1 if run.patch is None else run.patch.x.size
-    cost = predict_march_cost(run.model, run.numerics.finer(), n_points)
-    return cost.times["motion"] > MAX_REFINED_SECONDS
+    return REFINED_TIME_RATIO * run.solution.seconds > MAX_REFINED_SECONDS
 
 
 def _is_finest(model, run: RefinedRun, displacement_errors: list) -> bool:
