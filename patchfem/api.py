@@ -280,7 +280,7 @@ def build(scene: str | Path | Scene | Model, /, **sets: Any) -> Model:
 
 @_strip_file_and_line_from_errors
 def plan(scene: str | Path | Scene | Model, /, **sets: Any) -> Plan:
-    """Choose the engine of a run, and predict its size and cost, without solving anything.
+    """Choose the engine of a run, and count its unknowns, without solving anything.
 
     Parameters
     ----------
@@ -305,8 +305,8 @@ def plan(scene: str | Path | Scene | Model, /, **sets: Any) -> Plan:
     --------
     >>> import patchfem as pf
     >>> plan = pf.plan(pf.new("rig"))
-    >>> plan.kind, plan.seconds < 10
-    ('rig', True)
+    >>> plan.kind, plan.unknowns["modes"]
+    ('rig', 1)
     """
     return plan_model(build(scene, **sets))
 

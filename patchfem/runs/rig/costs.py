@@ -1,26 +1,21 @@
-"""Predicted cost of the engines of a rig, for the choice of an engine, for plans and for refusals.
+"""Steps and CPU times of the engines of a rig, for the choice of an engine and for refusals, and memory of histories.
 
-In: a Model. Out: CPU times, numbers of steps, memory (`Cost`), and reasons for time
-integration with constant steps instead of an exact solution.
+In: a Model. Out: CPU times, numbers of steps, `MemoryPart`s, and reasons for time integration with constant steps instead
+of an exact solution.
 
-The cost of an event-driven run is counted in time intervals of one power series, that of a time
-integration or of the smooth engine in steps; `cost_model` has the CPU time of each. The free
-vibration of the modes on a stuck element needs intervals only during stick. The fraction of time in
-stick is about 1 if the friction limit exceeds the force of the drive, and nearly 0 if it is half of
-it.
+The cost of an event-driven run is counted in time intervals of one power series, that of a time integration or of the
+smooth engine in steps; `cost_model` has the CPU time of each.
 """
 
-from dataclasses import replace
 from functools import lru_cache
 from math import inf, log2, pi, sqrt
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ... import compiled, cost_model
+from ... import cost_model
 from ...core import Missing
 from ...dynamics import checkpoint
-from ...dynamics.events import cost as events_cost
 from ...dynamics.events import modal_system
 from ...effects import law_has_trait
 from ...friction import record
@@ -32,10 +27,8 @@ from ...structure.drive_sizes import (
     find_drive_omega,
     find_max_acceleration,
     find_max_frequency_ratio,
-    find_min_decay_rate,
-    is_sinusoidal,
 )
-from ..cost import EVENT_CODE, SMOOTH_CODE, Cost, MemoryPart
+from ..sizes import MemoryPart
 
 if TYPE_CHECKING:
     from ...friction.protocol import Element
@@ -48,9 +41,6 @@ MAX_EXACT_SECONDS_UNRESOLVED = 60.0
 MAX_EXACT_SECONDS = 600.0  # Largest CPU time [s] of an exact solution; a longer one is refused.
 MAX_MARCH_STEPS = 6400  # Largest automatically chosen number of time steps per cycle.
 MAX_RUN_STEPS = 1e7  # Largest number of time steps of a run after its steps were doubled.
-# Exponent of the ratio of friction limit to drive force, which estimates the fraction of time in
-# stick. At a ratio of 1/2, a fraction of 0.01 was measured.
-STICKING_EXPONENT = 6
 # Largest number of times that neighbouring cells are merged in pairs: 49 of 769 cells remain, with
 # an error of 2e-4 of the motion of a slipping joint.
 MAX_MERGES = 4
@@ -65,9 +55,6 @@ MARCH_SETTINGS = (
     "merge",
     "shear_modes",
 )
-# Number of decay times of the slowest mode after which a motion is periodic up to round-off
-# (e^-30).
-N_DECAY_TIMES_TO_REPEAT = 30.0
 # Largest ratio of the steps of the smooth engine to constant time steps at which the smooth engine
 # is used.
 MAX_STEP_RATIO = 3.5
@@ -112,6 +99,12 @@ class HistoryBytes(NamedTuple):
 EVENT_HISTORY = HistoryBytes(32.0, 85.0, 6.0)
 SMOOTH_HISTORY = HistoryBytes(80.0, 140.0, 16.0)
 MARCH_HISTORY = HistoryBytes(45.0, 50.0, 18.0)
+HISTORIES = {
+    "exact": EVENT_HISTORY,
+    "piecewise": EVENT_HISTORY,
+    "smooth": SMOOTH_HISTORY,
+    "march": MARCH_HISTORY,
+}
 
 
 def required_steps_per_cycle(model: Model) -> int:
@@ -241,31 +234,6 @@ def _estimate_extra_interval_seconds(model: Model) -> float:
     ) + cost_model.PIECE_INTERFACE_SECONDS * max(0, len(modes.interfaces) - 1)
 
 
-def estimate_event_driven_seconds(model: Model) -> float:
-    """Estimate the CPU time [s] of an event-driven run.
-
-    The intervals due to vibration count only for the expected fraction of time in stick.
-    """
-    rig = model.rig
-    count, stiff = estimate_element_count_and_stiffness(model)
-    laws = rig.friction.interfaces
-    limit = sum(law.numbers.static * find_interface_load(model, law) for law in laws)
-    drive_force = rig.drive.force or rig.first_mode.mass * find_max_acceleration(rig.drive.signal)
-    vibration, events = count_intervals_by_cause(model)
-    stick_fraction = (
-        min(1.0, limit / drive_force) ** STICKING_EXPONENT if stiff and drive_force else 1.0
-    )
-    return (
-        (
-            cost_model.PIECE_SECONDS
-            + _estimate_extra_interval_seconds(model)
-            + cost_model.PIECE_ELEMENT_SECONDS * count
-        )
-        * (vibration * stick_fraction + events)
-        * rig.drive.cycles
-    )
-
-
 def estimate_march_seconds(model: Model) -> float:
     """Estimate the CPU time [s] of a time integration and of the coarse runs for its error."""
     count = estimate_element_count_and_stiffness(model)[0]
@@ -317,59 +285,14 @@ def refuse_long_event_driven_run(model: Model, numerics=None) -> None:
         )
 
 
-def predict_event_driven_cost(model: Model, numerics, n_points: int) -> Cost:
-    """Predict the cost of an event-driven run.
-
-    Parameters
-    ----------
-    model : Model
-    numerics : Numerics
-    n_points : int
-        Number of interface nodes; not used.
-    """
-    steps = int(intervals_per_cycle(model) * numerics.cycles)
-    times = {
-        "motion": estimate_event_driven_seconds(model),
-        "histories": cost_model.KEPT_EVENT_SAMPLE_SECONDS * count_stored_samples(numerics),
-    }
-    code = EVENT_CODE
-    if _estimate_python_loop_seconds(model) <= compiled.MAX_PYTHON_SECONDS:
-        # A run in interpreted Python takes 86 MB without compiled code, and 152 MB with it, because
-        # compiled code loads the LLVM library.
-        if not _is_event_loop_cached(model):
-            code = code._replace(bytes=0.0)
-        loading = replace(code.cost(), compile_seconds=0.0)
-    else:
-        loading = code.cost()
-    return Cost(times, predict_history_memory(model, numerics, EVENT_HISTORY), (), steps) + loading
-
-
-def _estimate_python_loop_seconds(model: Model) -> float:
-    """Estimate the CPU time [s] of an event-driven run in interpreted Python, without merged cells."""
-    count, stiffness = estimate_element_count_and_stiffness(model)
-    each = events_cost.estimate_cycle_time(
-        model.rig.modes, model.rig.drive.signal, stiffness, count if stiffness else 0
-    )
-    return model.rig.drive.cycles * each * 2 ** count_cell_merges(model)
-
-
-def _is_event_loop_cached(model: Model) -> bool:
-    """Return whether the compiled event loop for the number of modes of a rig is cached."""
-    from ...dynamics.events.histories import (
-        is_loop_cached,  # The engine is imported here, because a plan needs nothing else from it.
-    )
-
-    return is_loop_cached(model.rig.modes, model.rig.drive.signal)
-
-
 def count_stored_samples(numerics) -> float:
     """Return the number of samples of the last cycles that a run stores."""
     each = SAMPLES_PER_CYCLE if numerics.engine in RESAMPLING_ENGINES else numerics.steps
     return float(max(2, numerics.window) * each)
 
 
-def predict_history_memory(model: Model, numerics, history: HistoryBytes) -> tuple[MemoryPart, ...]:
-    """Predict the contributions to the memory of the histories that a run stores.
+def count_history_memory(model: Model, numerics, history: HistoryBytes) -> tuple[MemoryPart, ...]:
+    """Return the contributions of the histories that a run stores to its memory.
 
     Parameters
     ----------
@@ -390,17 +313,6 @@ def predict_history_memory(model: Model, numerics, history: HistoryBytes) -> tup
         ),
         MemoryPart(early, f"the histories of {rig.drive.cycles:.3g} cycles", length_key),
     )
-
-
-def describe_element_engine(model: Model, engine: str) -> list:
-    """Describe the engine of friction elements and its CPU time in a sentence for a plan."""
-    count = estimate_element_count_and_stiffness(model)[0]
-    exact = estimate_event_driven_seconds(model)
-    march = estimate_march_seconds(model)
-    return [
-        f"{count} element{'s' * (count > 1)} by engine {engine}; computing time: about {exact:.2g} s with the "
-        f"exact solution between yield events, about {march:.2g} s with time steps at this tolerance"
-    ]
 
 
 def explain_time_steps_over_smooth_engine(model: Model) -> str:
@@ -493,32 +405,3 @@ def estimate_stiff_time_fraction(model: Model, element: "Element") -> float:
         / element.limit
     )
     return min(1.0, float(np.exp(STIFF_TIME_EXPONENT * (1 - r))))
-
-
-def predict_smooth_cost(model: Model, numerics, n_points: int) -> Cost:
-    """Predict the cost of a run of the smooth engine and its coarse run.
-
-    Parameters
-    ----------
-    model : Model
-    numerics : Numerics
-    n_points : int
-        Number of interface nodes; not used.
-    """
-    rig = model.rig
-    cycles = model.rig.drive.cycles
-    # Cycles after the motion has become periodic are not computed.
-    if (
-        is_sinusoidal(rig.drive.signal)
-        and (decay := find_min_decay_rate(rig.modes) * rig.drive.signal.period) > 0
-    ):
-        cycles = min(cycles, 20 + N_DECAY_TIMES_TO_REPEAT / decay)
-    steps = 2 * cycles * estimate_smooth_steps(model, make_smooth_element(model))
-    times = {
-        "motion": cost_model.SMOOTH_RUN_SECONDS + cost_model.SMOOTH_STEP_SECONDS * steps,
-        "histories": cost_model.KEPT_SAMPLE_SECONDS * count_stored_samples(numerics),
-    }
-    return (
-        Cost(times, predict_history_memory(model, numerics, SMOOTH_HISTORY), (), int(steps))
-        + SMOOTH_CODE.cost()
-    )

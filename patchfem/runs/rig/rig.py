@@ -25,7 +25,6 @@ from .engines import ENGINES
 from .fields import collect_interface_fields
 from .motion_warnings import collect_notes
 from .numerics import Numerics, choose_numerics
-from .plan import predict_march_cost
 from .postprocessing import CoupledRun
 from .runner import Runner
 from .solution import Solution, compute_peak_frequency
@@ -34,9 +33,11 @@ from .solve import refuse_long_run
 # Outcomes of runs that ended early; more steps do not change them.
 EARLY_OUTCOMES = (Outcome.EXCEEDS_TRAVEL, Outcome.LEAVES_GROOVES)
 MIN_STEP_ERROR = 1e-12  # Smallest relative error per step; below it round-off dominates.
-# Largest predicted CPU time [s] of a run that is repeated with more steps although its displacement
-# meets the tolerance.
+# Largest time [s] of a run and its coarse runs that is repeated with more steps although its
+# displacement meets the tolerance.
 MAX_REFINED_SECONDS = 10.0
+# Ratio of the time of a run with twice the steps and of its coarse runs to that of the run itself.
+REFINED_TIME_RATIO = 3.5
 
 
 class RefinedRun(NamedTuple):
@@ -251,9 +252,7 @@ def _meets_tolerance(run: CoupledRun, excesses: list) -> bool:
     excesses.append(_find_step_excess(run))
     if excesses[-1] <= 1 or (len(excesses) > 2 and excesses[-1] >= excesses[-3]):
         return True
-    n_points = 1 if run.patch is None else run.patch.x.size
-    cost = predict_march_cost(run.model, run.numerics.finer(), n_points)
-    return cost.times["motion"] > MAX_REFINED_SECONDS
+    return REFINED_TIME_RATIO * run.solution.seconds > MAX_REFINED_SECONDS
 
 
 def _is_finest(model, run: RefinedRun, displacement_errors: list) -> bool:
