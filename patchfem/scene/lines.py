@@ -38,6 +38,12 @@ def split_key(key: str) -> list[str]:
     return parts
 
 
+def split_assignment(text: str) -> tuple[str, str]:
+    """Split ``table.key=values`` into the key and the values; the values are "" without an equals sign."""
+    key, _, values = text.partition("=")
+    return key.strip(), values.strip()
+
+
 def number_items_from_one(text: str) -> str:
     """Write array items of a message in the form `structure.mode[1]`."""
     changed = _ITEM_IN_MESSAGE_PATTERN.sub(lambda item: f"{item[1]}[{int(item[2]) + 1}]", text)

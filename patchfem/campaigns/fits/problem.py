@@ -15,9 +15,9 @@ from ...identify.fit_sentences import describe_fit
 from ...identify.least_squares import Fit, Problem
 from ...model.model import Model, build
 from ...runs.patch import mesh_levels
+from ...scene.assignments import BOUNDS, Range, read_assignments
 from ...scene.lines import split_key
 from ...scene.overrides import BaseScene
-from ...scene.ranges import Range, read_ranges
 from ...scene.scene import Scene, SceneError, add_sets
 
 # Largest ratio high/low of a range whose middle is the arithmetic mean; the middle of a wider range
@@ -134,7 +134,7 @@ def parse_ranges(texts: Iterable) -> list:
 
     Raises SceneError with all validation errors.
     """
-    ranges, mistakes = read_ranges(texts)
+    ranges, mistakes = read_assignments(texts, BOUNDS)
     if mistakes:
         raise SceneError(mistakes)
     return ranges

@@ -70,18 +70,6 @@ def find_key(key: str) -> KeyDefinition:
     return KeyDefinition(model, name)
 
 
-def require_key(key: str) -> KeyDefinition:
-    """Find a key as `find_key` does; raise ValueError, with the nearest known key, if no scene has it."""
-    definition = find_key(key)
-    if definition.model is not None:
-        return definition
-    table, _, last = key.rpartition(".")
-    owner = find_key(table) if table else KeyDefinition(None, "")
-    inner = find_inner_table(*owner) if owner.model is not None else None
-    advice = f"; {advise_on_name(last, attributes_by_key(inner))}" if inner is not None else ""
-    raise ValueError(f"not a key of a scene{advice}")
-
-
 def validate_value(key: str, value: Any, ignored: Iterable[str] = ()) -> dict[str, Any]:
     """Validate a value of a key.
 
