@@ -225,7 +225,7 @@ EFFECTS = {
         (
             "bond_length",
             "kinetic reading order rest_growth slip_growth rest_speed "
-            "initial_bonds breakaway spread temperature",
+            "initial_bonds spread temperature",
         ),
         "shear joints varying-load harmonic grooves",
         "bonds",
@@ -514,8 +514,7 @@ def suggest_laws(feature: str, other_features: str = "", friction=None) -> str:
 
 REMEDIES = {  # advice by name, for two effects that cannot be combined
     "order": "use order = 1",
-    "recursion": 'use reading = "stretch" with order = 1 and without breakaway',
-    "elastic range": "set breakaway = 0",
+    "recursion": 'use reading = "stretch" with order = 1',
     "kinetic": "leave out the key kinetic",
     "shapes": "put the shapes on the upper piece",
     "either": "leave one of the two out",

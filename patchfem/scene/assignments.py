@@ -13,6 +13,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import chain
 from typing import Any, NamedTuple, get_origin
 
 from ..core import PatchfemError
@@ -40,12 +41,9 @@ LENGTH_KEY = "drive.displacement"  # key of a length whose values `read_lengths`
 MAX_RANGE_VALUES = 10_000_000
 # Ratio of the ends of a range of positive numbers; at and above it the range is logarithmic by default.
 MIN_LOG_RATIO = 10
-MAX_SUGGESTED_KEYS = 4  # largest number of keys of a table that a message suggests
 # Number of significant digits of a value, so that a tenth of a range is
 # 0.1 and not 0.1000000000000001.
 SIGNIFICANT_DIGITS = 15
-# Magnitude below which a whole number without a unit is written without a decimal point.
-MAX_EXACT_INTEGER = 1e15
 _NUMBER_PATTERN = r"[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?"
 _RANGE_PATTERN = re.compile(r"(.*?)\s*\.\.\s*(.*?)\s*(?::\s*([0-9]*)\s*(log|lin)?)?")
 _QUANTITY_PATTERN = re.compile(rf"{_NUMBER_PATTERN}\s*(.*)")
@@ -217,14 +215,16 @@ def read_assignments(
     """
     given: list[Axis | Range] = []
     mistakes = []
-    pieces = [piece for text in texts for piece in ([text] if form.has_lists else text.split(","))]
-    for text in pieces:
+    texts = list(texts)
+    if texts and not form.has_lists:
+        texts = ",".join(texts).split(",")
+    for text in texts:
         key, values = split_assignment(text)
         if key and values:
             _append_values(given, mistakes, f"{form.option} {key}", (key, values), form)
         else:
             mistakes.append(f"{form.option} {text}: write {form.syntax}, such as {form.example}")
-    if not (pieces or form.has_lists):
+    if not (texts or form.has_lists):
         mistakes.append(
             f"{form.option}: at least one {form.syntax} is needed, such as {form.example}"
         )
@@ -316,7 +316,22 @@ def make_axis(key: str, texts: Iterable[str], *, distinct: bool = True) -> Axis:
 
 
 def read_values(key: str, text: str, form: Form = LISTS) -> Axis | Range:
-    """Parse the values of a key; raise ValueError with one line for each mistake."""
+    """Parse the values of a key.
+
+    Parameters
+    ----------
+    key : str
+        Dotted key of a scene.
+    text : str
+        The values as an option writes them.
+    form : Form
+        What the option accepts.
+
+    Raises
+    ------
+    ValueError
+        With one line for each mistake.
+    """
     pieces = _split_at_commas(text)
     _require_value_key(key, pieces)
     if not (form.has_lists or _holds_number(key)):
@@ -332,7 +347,7 @@ def read_values(key: str, text: str, form: Form = LISTS) -> Axis | Range:
     groups, mistakes = _collect(lambda piece: _list_texts(key, piece), pieces)
     if mistakes:
         raise ValueError("\n".join(mistakes))
-    return make_axis(key, [text for texts in groups for text in texts])
+    return make_axis(key, chain.from_iterable(groups))
 
 
 def _append_values(
@@ -495,7 +510,7 @@ def _require_value_key(key: str, texts: Sequence[str]) -> None:
     table = ".".join(pieces)
     raise ValueError(
         "is a table without a value of its own; choose a key of this table: "
-        f"{', '.join(f'{table}.{inner_key}' for inner_key in suggested[:MAX_SUGGESTED_KEYS])}"
+        f"{', '.join(f'{table}.{inner_key}' for inner_key in suggested[:4])}"
     )
 
 
@@ -564,7 +579,5 @@ def _make_value_reader(key: str) -> Callable[[str], float | str]:
 def _format_with_unit(value: float, unit: str) -> str:
     """Format a value of a swept key with its unit."""
     number = float(f"{value:.{SIGNIFICANT_DIGITS}g}")
-    if unit:
-        return f"{repr(number).removesuffix('.0')} {unit}"
-    is_whole = number.is_integer() and abs(number) < MAX_EXACT_INTEGER
-    return repr(int(number)) if is_whole else repr(number)
+    # repr writes whole numbers below 1e16 without an exponent.
+    return f"{repr(number).removesuffix('.0')} {unit}".rstrip()

@@ -38,8 +38,15 @@ def format_scene(tables: dict[str, Any]) -> str:
 def format_values(key: str, values: Any, separator: str = ",") -> str:
     """Format the values of one key as --over and, with ".." as separator, --free write them.
 
-    A text stays as it is. In a list, texts stay as they are but for quotes around a text with a comma or a bracket;
-    numbers in SI get the unit of the key.
+    Parameters
+    ----------
+    key : str
+        Dotted key of a scene, whose unit numbers get.
+    values
+        A text, which stays as it is; or a value or list of values. A text in a list gets quotes if it contains a comma
+        or a bracket.
+    separator : str
+        "," between values, ".." between the ends of a range.
     """
     if isinstance(values, str):
         return values

@@ -82,9 +82,8 @@ def describe_unknown_key(
         return UnknownKey(f"{subject}; did you mean '{suggestion}'?", suggestion)
     known = list(attributes_by_key(model))
     if is_table:
-        tables = [name for name, _ in _list_inner_tables(model)]
         known = [
-            name for name in tables if not is_table_or_value(model, attributes_by_key(model)[name])
+            name for name, _ in _list_inner_tables(model) if not _takes_value(model, name)
         ] or known
     advice = f"known here: {', '.join(known)}" if known else "this table has no keys"
     return UnknownKey(f"{subject}; {advice}", "")
@@ -104,11 +103,10 @@ def _suggest_name(
     # A file that contains both keys did not misspell one of them; a key of --set may be a
     # misspelling of a key in the file.
     is_set = f"{table_key}.{key}".lstrip(".") in sets
-    written_table = {
-        name: raw[name]
-        for name in (*attributes_by_key(model), key)
-        if name in raw and (not is_set or f"{table_key}.{name}".strip(".") in sets)
-    }
+    names = [name for name in (*attributes_by_key(model), key) if name in raw]
+    if is_set:
+        names = [name for name in names if f"{table_key}.{name}".strip(".") in sets]
+    written_table = {name: raw[name] for name in names}
     if is_table:
         return suggest_table(model, written_table, key)
     return suggest_key(model, written_table, key, is_set=is_set)
@@ -121,6 +119,11 @@ def _is_table(value: Any) -> bool:
     return isinstance(value, dict)
 
 
+def _takes_value(model: type[Table], key: str) -> bool:
+    """Return whether a key of a table also takes a single value, as a material does."""
+    return is_table_or_value(model, attributes_by_key(model)[key])
+
+
 def _list_tables_with_key(model: type[Table], key: str) -> list[str]:
     """Return the dotted names of the tables that have a key of this name, of the least depth at which one has it."""
     tables = [("", model)]
@@ -128,14 +131,12 @@ def _list_tables_with_key(model: type[Table], key: str) -> list[str]:
         owners = [name.strip(".") for name, table in tables if key in attributes_by_key(table)]
         if owners:
             return owners
-        tables = [
-            (
-                f"{name}.{inner_key}{'.NAME' if is_array_attribute(table, attributes_by_key(table)[inner_key]) else ''}",
-                inner,
-            )
-            for name, table in tables
-            for inner_key, inner in _list_inner_tables(table)
-        ]
+        outer = tables
+        tables = []
+        for name, table in outer:
+            for inner_key, inner in _list_inner_tables(table):
+                is_array = is_array_attribute(table, attributes_by_key(table)[inner_key])
+                tables.append((f"{name}.{inner_key}{'.NAME' if is_array else ''}", inner))
     return []
 
 

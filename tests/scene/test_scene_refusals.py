@@ -236,6 +236,25 @@ def test_refuses_approach_together_with_load():
     assert message.startswith("a.toml:12: contact.approach: ") and "exclude each other" in message
 
 
+@pytest.mark.parametrize(
+    "text, sets, key, instead",
+    [
+        (RIG, ["friction.breakaway=0.1"], "friction.breakaway", "law 'iwan'"),
+        (RIG, ["structure.mode.0.lateral=1"], ".lateral", "leave it out"),
+        (
+            PATCH.replace('load = "26 lbf"', "") + '[contact.approach]\ndistance = "0.2 um"\n',
+            ["contact.holder.rotational_stiffness=1e3 N m/rad"],
+            "contact.approach",
+            "give contact.load",
+        ),
+    ],
+)
+def test_refuses_removed_keys(text, sets, key, instead):
+    """A key or combination that was removed is refused with the release and what to use instead."""
+    message = get_only_mistake(text, *sets)
+    assert f"{key}: " in message and "was removed in patchfem" in message and instead in message
+
+
 COMBINATIONS = [
     ("", "a.toml: missing [contact]: "),
     (RIG[: RIG.index("[drive]")], "a.toml: missing [drive]: [structure] needs this table"),
@@ -409,9 +428,7 @@ def test_refuses_unsupported_features_by_name(text, sets, key):
 
 def test_refuses_other_mistakes_before_unsupported_features():
     """Unsupported features are reported only if the scene is valid otherwise."""
-    assert "not supported yet" not in get_only_mistake(
-        RIG, "friction.breakaway=0.1", "drive.cycles=0"
-    )
+    assert "not supported yet" not in get_only_mistake(RIG, "friction.order=2", "drive.cycles=0")
 
 
 def test_always_masses_and_interfaces_are_read():
