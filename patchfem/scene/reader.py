@@ -155,16 +155,29 @@ def apply_set(draft: SceneDraft, assignment: str) -> None:
         if depth == len(pieces) - 1:
             break
         inner = holder[piece] if isinstance(holder, list) else holder.get(piece)
+        if inner is None and _is_array_of_tables(path):
+            draft.add_set_mistake(f"{key}: the scene has no [[{path}]]")
+            return
         if inner is None:
             inner = holder[piece] = {}
-            draft.sets.add(path)
+            draft.record_set(path)
         if not isinstance(inner, dict | list):
             draft.add_set_mistake(f"{key}: {path} is a value, not a table")
             return
         holder = inner
     path = ".".join(pieces)
     holder[piece] = read_set_value(path, text)
-    draft.sets.add(path)
+    draft.record_set(path)
+
+
+def _is_array_of_tables(key: str) -> bool:
+    """Return whether a dotted key names an array of tables, such as structure.mode."""
+    place = find_key(key)
+    return (
+        place.model is not None
+        and is_array_attribute(*place)
+        and find_inner_table(*place) is not None
+    )
 
 
 def _find_item(draft: SceneDraft, items: list[Any], path: str, written_key: str) -> int | None:

@@ -184,8 +184,12 @@ def loads(
         fixed = {split_assignment(assignment)[0] for assignment in sets}
         swept = [axis for axis in _read_axes(draft, raw.pop("sweep")) if axis.key not in fixed]
     # A key that only [sweep] holds gets its first value.
-    first = [f"{axis.key}={axis.texts[0]}" for axis in swept if not draft.has_set_key(axis.key)]
-    for assignment in (*first, *sets):
+    for axis in swept:
+        if not draft.has_set_key(axis.key):
+            draft.swept_key = f"sweep.{axis.key}"
+            apply_set(draft, f"{axis.key}={axis.texts[0]}")
+    draft.swept_key = ""
+    for assignment in sets:
         apply_set(draft, assignment)
     if prepare is not None:
         prepare(draft.raw)

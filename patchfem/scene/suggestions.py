@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 from pydantic import ValidationError
 
+from ..effects import join_words
 from .keys.choices import find_selectors, split_keys
 from .keys.lookup import KeyDefinition, find_key, is_table_or_value
 from .keys.removed import describe_removed
@@ -78,15 +79,22 @@ def describe_unknown_key(
         return UnknownKey(removed, "")
     is_table = _is_table(raw[key])
     subject = "unknown table" if is_table else "unknown key"
-    if suggestion := _suggest_name(model, raw, table_key, key, sets):
-        return UnknownKey(f"{subject}; did you mean '{suggestion}'?", suggestion)
+    owners = [f"[{name}]" for name in _list_tables_with_key(Tables, key) if table_key and name]
+    wrong_table = ""
+    if owners:
+        verb = "has" if len(owners) == 1 else "have"
+        wrong_table = f"{join_words(owners, 'and')} {verb} a key of this name"
+    suggestion = _suggest_name(model, raw, table_key, key, sets)
+    if suggestion:
+        has_similar_name = key in suggestion or bool(_find_similar_names(key, [suggestion]))
+        advice = "" if has_similar_name else f" {wrong_table}".rstrip()
+        return UnknownKey(f"{subject}; did you mean '{suggestion}'?{advice}", suggestion)
     known = list(attributes_by_key(model))
     if is_table:
-        known = [
-            name for name, _ in _list_inner_tables(model) if not _takes_value(model, name)
-        ] or known
+        tables = [name for name, _ in _list_inner_tables(model)]
+        known = [name for name in tables if not _takes_value(model, name)] or known
     advice = f"known here: {', '.join(known)}" if known else "this table has no keys"
-    return UnknownKey(f"{subject}; {advice}", "")
+    return UnknownKey("; ".join(filter(None, (subject, wrong_table, advice))), "")
 
 
 def _suggest_name(

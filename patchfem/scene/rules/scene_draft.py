@@ -8,7 +8,7 @@ from functools import lru_cache
 from typing import Any
 
 from ...exceptions import PatchfemError
-from ..keys.lookup import describe_requirement, find_key
+from ..keys.lookup import describe_missing_key, find_key
 from ..keys.tables import Tables
 from ..keys.types import build_table
 from ..lines import number_items_from_one, split_key
@@ -46,6 +46,7 @@ class SceneDraft:
         Plain values of the file. Values of --set are written into them.
 
     - sets: dotted keys that --set wrote.
+    - swept_key: key of [sweep] whose first value is being written; "" for values of --set.
     - tables: the tables as far as they could be read; a value that is missing or wrong is None.
     - remarks: sentences for the user that are not mistakes.
     - read_before: id of a plain table of `raw` -> the table that it gives, which need not be read again.
@@ -53,9 +54,10 @@ class SceneDraft:
 
     def __init__(self, path: str, lines: dict[str, int], raw: dict[str, Any]) -> None:
         self.path = path
-        self.lines = lines
+        self.lines = dict(lines)
         self.raw = raw
         self.sets: set[str] = set()
+        self.swept_key = ""
         self.tables = build_table(Tables, {})
         self._values = TableView(self.tables)
         self.remarks: list[str] = []
@@ -99,7 +101,7 @@ class SceneDraft:
 
     def add_missing(self, key: str, reason: str) -> None:
         """Add a missing key as a mistake at the line of its table."""
-        needed = describe_requirement(*find_key(key))
+        needed = describe_missing_key(*find_key(key))
         clauses = dict.fromkeys(filter(None, ("missing", needed, reason)))
         self.add_mistake(key, "; ".join(clauses))
 
@@ -108,8 +110,18 @@ class SceneDraft:
         self._add(0, self.path, f"missing [{name}]: {reason}")
 
     def add_set_mistake(self, text: str) -> None:
-        """Add a mistake for a --set option that cannot be applied."""
-        self._add(SET_MISTAKE_ORDER, "--set", text)
+        """Add a mistake for a --set option, or a first value of [sweep], that cannot be applied."""
+        if self.swept_key:
+            self.add_mistake(self.swept_key, text)
+        else:
+            self._add(SET_MISTAKE_ORDER, "--set", text)
+
+    def record_set(self, key: str) -> None:
+        """Record that --set or [sweep] wrote a key, so that its mistakes are found there."""
+        if self.swept_key:
+            self.lines.setdefault(key, self.lines.get(self.swept_key, 0))
+        else:
+            self.sets.add(key)
 
     def add_remark(self, key: str, sentence: str) -> None:
         """Add a remark on a key whose value is no mistake; `sentence` follows the name of the key."""
