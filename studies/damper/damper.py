@@ -22,7 +22,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 
-from patchfem.campaigns.fits.loop import LOAD_UNITS, fit_hysteresis_loop
+from patchfem.campaigns.fits.loop import fit_hysteresis_loop
 from patchfem.campaigns.fits.loop_path import LoopOptions
 from patchfem.inputs import read_loop
 from patchfem.scene import loads
@@ -110,7 +110,7 @@ def repeat(loop) -> tuple:
 
 def main(file, names=tuple(LAWS)) -> list:
     """Return a Row for each law, fitted to a record in steady motion with a force offset."""
-    loop = read_loop(file, LOAD_UNITS)
+    loop = read_loop(file)
     period, _ = repeat(loop)
     flat = plateau(loop.displacement)
     cycle = slice(0, period + 1)

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.stats import t as student
 
 from patchfem import SceneError, build
-from patchfem.campaigns.fits.loop import LOAD_UNITS, fit_hysteresis_loop
+from patchfem.campaigns.fits.loop import fit_hysteresis_loop
 from patchfem.campaigns.fits.loop_model import BenchModel
 from patchfem.core import PatchfemError
 from patchfem.export.fits import format_fitted_scene
@@ -234,7 +234,7 @@ def test_exact_loop_of_tilted_patch_is_independent_of_earlier_trials(tmp_path):
     A free tilt moves the contact but not the mesh.
     """
     time, slide = sine_path(8, 1)
-    loop = read_loop(write_loop(tmp_path / "loop.csv", time, slide, slide * 1e6), LOAD_UNITS)
+    loop = read_loop(write_loop(tmp_path / "loop.csv", time, slide, slide * 1e6))
     text = (
         '[contact]\nlength = "12.7 mm"\nwidth = "12.7 mm"\nheight = "6.35 mm"\nload = "80 N"\nsubstrate = '
         '"Ti-8Al-1Mo-1V"\n[contact.tilt]\nangle = "10 urad"\n[contact.shear]\n'

@@ -45,7 +45,7 @@ def test_exact_table_units_are_converted(tmp_path):
 
 @pytest.mark.parametrize("text, message", [
     ("", ":1: {like}, not ''"),
-    ("frequency [Hz],input [lb]\n", ":1: input [lb]: unknown unit; use one of g, m/s^2"),
+    ("frequency [Hz],input [lb]\n", ":1: input [lb]: unknown unit; use one of m/s^2, mm/s^2, g"),
     ("frequency [Hz],speed [m/s]\n", ":1: {like}, not 'frequency [Hz],speed [m/s]' (columns with a unit: "),
     ("frequency [Hz],flag\n", ":1: {like}, not 'frequency [Hz],flag' (no column input)"),
     (HEAD + "143,5,6.0,,\n143,6\n", ":3: five cells are needed, frequency, input"),

@@ -236,25 +236,6 @@ def test_refuses_approach_together_with_load():
     assert message.startswith("a.toml:12: contact.approach: ") and "exclude each other" in message
 
 
-@pytest.mark.parametrize(
-    "text, sets, key, instead",
-    [
-        (RIG, ["friction.breakaway=0.1"], "friction.breakaway", "law 'iwan'"),
-        (RIG, ["structure.mode.0.lateral=1"], ".lateral", "leave it out"),
-        (
-            PATCH.replace('load = "26 lbf"', "") + '[contact.approach]\ndistance = "0.2 um"\n',
-            ["contact.holder.rotational_stiffness=1e3 N m/rad"],
-            "contact.approach",
-            "give contact.load",
-        ),
-    ],
-)
-def test_refuses_removed_keys(text, sets, key, instead):
-    """A key or combination that was removed is refused with the release and what to use instead."""
-    message = get_only_mistake(text, *sets)
-    assert f"{key}: " in message and "was removed in patchfem" in message and instead in message
-
-
 COMBINATIONS = [
     ("", "a.toml: missing [contact]: "),
     (RIG[: RIG.index("[drive]")], "a.toml: missing [drive]: [structure] needs this table"),
