@@ -19,6 +19,7 @@ from scipy.sparse import issparse
 from ..core import ModalBasis, PatchfemError, frozen_array
 from ..effects import MAX_COORDINATES
 from ..inputs.matlab import read_variables
+from ..inputs.symmetric import to_real
 from . import masses, matrices
 from .modes import PATCH_MOTIONS
 
@@ -169,7 +170,7 @@ def _build_basis_from_matrices(
         raise PatchfemError(f"there is no coordinate {missing[0]}: M has {n}, numbered from 1")
     faces = masses.make_slide_rows(pairs, n) if pairs else data.get("slide")
     if faces is not None:
-        faces = matrices.to_real(faces, "slide")
+        faces = to_real(faces, "slide")
         faces = faces.reshape(-1, n) if faces.size % n == 0 else faces
     output = data.get("output")
     if output is None:
@@ -293,7 +294,7 @@ def _read_numbers(data: dict, name: str, *shapes) -> np.ndarray:
         Shapes that are allowed, beginning with (n,); None stands for any length. Without a shape the
         array is flattened.
     """
-    values = matrices.to_real(data[name], name)
+    values = to_real(data[name], name)
     if values.dtype.kind not in "iufb":
         raise PatchfemError(f"{name} does not contain real numbers")
     values = values.astype(float)
