@@ -14,7 +14,7 @@ import numpy as np
 
 from ..effects import find_waveform
 from .files import list_named_files, require_files
-from .lines import find_key_lines, split_key
+from .lines import find_item, find_key_lines, split_key
 from .reader import apply_set
 from .rules.contact import MAX_SMALL_ANGLE, find_max_load
 from .rules.scene_draft import SceneDraft
@@ -167,9 +167,9 @@ def find_scene_value(scene: Scene, key: str) -> tuple[str, Any]:
     pieces = []
     for piece in split_key(key):
         if isinstance(value, tuple):
-            names = [getattr(item, "name", None) for item in value]
-            piece = str(names.index(piece)) if piece in names else piece
-            value = dict(zip(map(str, range(len(value))), value)).get(piece)
+            index = find_item([getattr(item, "name", None) for item in value], piece)
+            piece = piece if index is None else str(index)
+            value = None if index is None else value[index]
         else:
             value = getattr(value, piece, None)
         pieces.append(piece)

@@ -27,8 +27,8 @@ from .keys.types import (
     list_key_types,
     list_required_keys,
 )
-from .lines import number_items_from_one, split_assignment, split_key
-from .rules.scene_draft import SceneDraft
+from .lines import find_item, number_items_from_one, split_assignment, split_key
+from .rules.scene_draft import SceneDraft, list_item_names
 from .suggestions import describe_unknown_key
 
 # Numbers such as .3 and 5., which people write but TOML does not allow.
@@ -194,12 +194,11 @@ def _find_item(draft: SceneDraft, items: list[Any], path: str, written_key: str)
         The whole key as it was written: a number in brackets counts from 1, a number behind a dot from 0.
     """
     above, _, item_name = path.rpartition(".")
-    names = [item.get("name") if isinstance(item, dict) else None for item in items]
-    if item_name in names:
-        return names.index(item_name)
+    names = list_item_names(items)
+    index = find_item(names, item_name)
+    if index is not None:
+        return index
     is_number = item_name.isdecimal()
-    if is_number and int(item_name) < len(items):
-        return int(item_name)
     table = number_items_from_one(above)
     displayed_key = number_items_from_one(path)
     description = "such item" if is_number else f"'{item_name}'"

@@ -11,7 +11,7 @@ from ...exceptions import PatchfemError
 from ..keys.lookup import describe_missing_key, find_key
 from ..keys.tables import Tables
 from ..keys.types import build_table
-from ..lines import number_items_from_one, split_key
+from ..lines import find_item, number_items_from_one, split_key
 from .view import TableView
 
 # Sort order of mistakes in --set, which are listed after those of all lines of a file.
@@ -91,7 +91,10 @@ class SceneDraft:
         """Return whether the scene contains a key in the form of --set, with items by name or number."""
         value: Any = self.raw
         for piece in split_key(key):
-            value = find_item_or_value(value, piece)
+            if isinstance(value, list):
+                value = dict(enumerate(value)).get(find_item(list_item_names(value), piece))
+            else:
+                value = value.get(piece) if isinstance(value, dict) else None
         return value is not None
 
     def add_mistake(self, key: str, message: str) -> None:
@@ -175,16 +178,9 @@ def find_value(value: Any, key: str) -> Any:
     return value
 
 
-def find_item_or_value(holder: Any, piece: str) -> Any:
-    """Return the value at a key, name or number in a table or array read from TOML, or None if there is none."""
-    if isinstance(holder, dict):
-        return holder.get(piece)
-    if not isinstance(holder, list):
-        return None
-    for item in holder:
-        if isinstance(item, dict) and item.get("name") == piece:
-            return item
-    return holder[int(piece)] if piece.isdecimal() and int(piece) < len(holder) else None
+def list_item_names(items: list[Any]) -> list[Any]:
+    """Return the key `name` of each item of an array read from TOML, or None for an item without it."""
+    return [item.get("name") if isinstance(item, dict) else None for item in items]
 
 
 @lru_cache(4096)
