@@ -228,7 +228,6 @@ FEATURES = {
     ),
     "spread": Feature(lambda j: j.spread and law_takes_key(j.law, "spread"), "{table_key}.spread"),
     # the sum over bonds
-    "order": Feature(lambda j: abs(j.order - 1) > 0, "{table_key}.order", "order = {order:g}"),
     "list": Feature(lambda j: j.needs_list, "{table_key}.{key_preventing_recursion}"),
     "stretched list": Feature(
         lambda j: j.needs_list and j.reading != "report", "{table_key}.{key_preventing_recursion}"
@@ -266,8 +265,6 @@ FEATURES = {
     ),
     "masses": Feature(lambda j: j.scene.structure.masses, "structure.masses"),
     "reduced": Feature(lambda j: j.scene.structure.reduced, "[structure.reduced]"),
-    "file": Feature(lambda j: j.scene.structure.file, "structure.file"),
-    "bonded": Feature(lambda j: j.scene.structure.bonded, "[structure.bonded]"),
     "patches": Feature(
         lambda j: any(face.contact for face in j.scene.structure.interface),
         "[structure.interface.contact]",
