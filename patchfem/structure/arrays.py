@@ -40,9 +40,6 @@ ARRAY_NAMES = (  # names of the arrays that are read from a file
 )
 # Largest size of a number [bytes], that of a complex number of double precision
 MAX_NUMBER_BYTES = 16
-# Most negative eigenvalue of a damping matrix that is accepted as round-off of a singular matrix,
-# relative to the largest entry
-MIN_DAMPING_EIGENVALUE = -1e-9
 MAX_MASS_FRACTION = 1 + 1e-9  # largest sum of base^2: 1, plus round-off of the shapes
 
 
@@ -276,7 +273,7 @@ def _read_damping(data: dict, omega) -> tuple:
             raise PatchfemError(f"damping must be >= 0, not {damping.min():g}")
         return frozen_array(damping), None
     lowest = np.linalg.eigvalsh(damping + damping.T).min()
-    if lowest < MIN_DAMPING_EIGENVALUE * np.abs(damping).max():
+    if lowest < matrices.MIN_DAMPING_EIGENVALUE * np.abs(damping).max():
         raise PatchfemError(
             "the damping matrix adds energy; a positive semidefinite matrix D [1/s] is needed"
         )

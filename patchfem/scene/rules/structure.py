@@ -16,6 +16,7 @@ ARRAY_EXTENSIONS = (".npz", ".mat")
 UNIVERSAL_EXTENSIONS = (".uff", ".unv")
 # File extensions of matrices from finite-element programs, for [structure.reduced].
 NASTRAN_EXTENSIONS = (".op4", ".pch", ".bdf", ".dat")  # files that are no longer read
+MATRIX_KEYS = ("stiffness", "mass", "damping")  # keys of the files of [structure.reduced]
 MATRIX_EXTENSIONS = (".mtx", ".mat", ".npz")
 # Largest plausible damping ratio, at which a free oscillation decays to a few per cent within one
 # cycle; a larger value probably has a wrong unit, because 1 % is 0.01.
@@ -422,7 +423,7 @@ def check_driven_mass(draft: SceneDraft) -> None:
 def _check_matrix_files(draft: SceneDraft) -> None:
     """Report files of [structure.reduced] that cannot be read by their extension."""
     reduced = draft.tables.structure.reduced
-    for key in ("stiffness", "mass", "damping"):
+    for key in MATRIX_KEYS:
         file = getattr(reduced, key)
         if isinstance(file, str) and find_file_extension(file) not in MATRIX_EXTENSIONS:
             extension = find_file_extension(file)
