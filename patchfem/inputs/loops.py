@@ -41,7 +41,7 @@ class Loop:
         Numbers are compared as numbers. Raises PatchfemError if there is no such column, or no row with
         one of the values.
         """
-        name, equals, text = (part.strip() for part in condition.partition("="))
+        name, equals, text = map(str.strip, condition.partition("="))
         texts = [value.strip() for value in text.split(",")]
         if not equals or not all(texts):
             raise PatchfemError(

@@ -39,7 +39,7 @@ def read_slide(path) -> tuple:
     path = Path(path)
     table = TableFormat(
         {**CHANNEL_UNITS, "lateral": CHANNEL_UNITS["displacement"]},
-        ("time", "displacement"),
+        COLUMN_NAMES,
         "time [s],displacement [um]",
         "a path",
         "; slide.file is relative to the scene",

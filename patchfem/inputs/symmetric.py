@@ -26,8 +26,9 @@ def to_real(values, subject: str):
     PatchfemError
         If an imaginary part is not 0.
     """
-    values = values if sparse.issparse(values) else np.asarray(values)
-    numbers = values.data if sparse.issparse(values) else values
+    values = numbers = values if sparse.issparse(values) else np.asarray(values)
+    if sparse.issparse(values):
+        numbers = values.data
     if not np.iscomplexobj(numbers):
         return values
     largest = max(float(np.abs(numbers.real).max(initial=0.0)), 1e-300)

@@ -57,30 +57,27 @@ class Form(NamedTuple):
     """What an option accepts after ``table.key=``.
 
     - option: name of the option in messages.
-    - syntax, example: what messages say is needed.
+    - usage: what messages say is needed, with an example.
     - has_lists: whether a list of values is accepted.
     - has_ranges: whether a range without a number of values is accepted.
     """
 
     option: str
-    syntax: str
-    example: str
+    usage: str
     has_lists: bool
     has_ranges: bool
 
 
 LISTS = Form(
     "--over",
-    "table.key=v1,v2,... or table.key=low..high:n",
-    "contact.tilt.angle=1e-6 rad..1e-2 rad:9",
+    "table.key=v1,v2,... or table.key=low..high:n, such as contact.tilt.angle=1e-6 rad..1e-2 rad:9",
     has_lists=True,
     has_ranges=False,
 )
 RANDOM = LISTS._replace(has_ranges=True)
 BOUNDS = Form(
     "--free",
-    "table.key=low..high",
-    "friction.bond_length=0.2 um..20 um",
+    "table.key=low..high, such as friction.bond_length=0.2 um..20 um",
     has_lists=False,
     has_ranges=True,
 )
@@ -223,11 +220,9 @@ def read_assignments(
         if key and values:
             _append_values(given, mistakes, f"{form.option} {key}", (key, values), form)
         else:
-            mistakes.append(f"{form.option} {text}: write {form.syntax}, such as {form.example}")
+            mistakes.append(f"{form.option} {text}: write {form.usage}")
     if not (texts or form.has_lists):
-        mistakes.append(
-            f"{form.option}: at least one {form.syntax} is needed, such as {form.example}"
-        )
+        mistakes.append(f"{form.option}: at least one range is needed, {form.usage}")
     counts = Counter(item.key for item in given)
     mistakes += [f"{form.option} {key}: is given twice" for key in counts if counts[key] > 1]
     return given, mistakes
@@ -343,7 +338,7 @@ def read_values(key: str, text: str, form: Form = LISTS) -> Axis | Range:
         if interval is not None:
             return _make_range(key, interval, form)
     if not form.has_lists:
-        raise ValueError(f"{text}: a range low..high is needed, such as {form.example}")
+        raise ValueError(f"{text}: a range is needed, {form.usage}")
     groups, mistakes = _collect(lambda piece: _list_texts(key, piece), pieces)
     if mistakes:
         raise ValueError("\n".join(mistakes))

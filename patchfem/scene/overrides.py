@@ -154,9 +154,9 @@ def _replace_number(holder: Any, pieces: list[str], value: Any) -> Any:
     """Return a copy of a table, or of an array of tables, with the number at a dotted key replaced."""
     name, *inner = pieces
     if isinstance(holder, tuple):
-        index = int(name)
-        item = _replace_number(holder[index], inner, value)
-        return (*holder[:index], item, *holder[index + 1 :])
+        items = list(holder)
+        items[int(name)] = _replace_number(holder[int(name)], inner, value)
+        return tuple(items)
     new = _replace_number(getattr(holder, name), inner, value) if inner else value
     return holder.model_copy(update={name: new})
 

@@ -89,10 +89,11 @@ def describe_unknown_key(
         has_similar_name = key in suggestion or bool(_find_similar_names(key, [suggestion]))
         advice = "" if has_similar_name else f" {wrong_table}".rstrip()
         return UnknownKey(f"{subject}; did you mean '{suggestion}'?{advice}", suggestion)
-    known = list(attributes_by_key(model))
+    names = attributes_by_key(model)
+    known = list(names)
     if is_table:
         tables = [name for name, _ in _list_inner_tables(model)]
-        known = [name for name in tables if not _takes_value(model, name)] or known
+        known = [name for name in tables if not is_table_or_value(model, names[name])] or known
     advice = f"known here: {', '.join(known)}" if known else "this table has no keys"
     return UnknownKey("; ".join(filter(None, (subject, wrong_table, advice))), "")
 
@@ -125,11 +126,6 @@ def _is_table(value: Any) -> bool:
     if isinstance(value, list) and value:
         return isinstance(value[0], dict)
     return isinstance(value, dict)
-
-
-def _takes_value(model: type[Table], key: str) -> bool:
-    """Return whether a key of a table also takes a single value, as a material does."""
-    return is_table_or_value(model, attributes_by_key(model)[key])
 
 
 def _list_tables_with_key(model: type[Table], key: str) -> list[str]:

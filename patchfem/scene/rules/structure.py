@@ -21,9 +21,6 @@ MATRIX_EXTENSIONS = (".mtx", ".mat", ".npz")
 # Largest plausible damping ratio, at which a free oscillation decays to a few per cent within one
 # cycle; a larger value probably has a wrong unit, because 1 % is 0.01.
 MAX_USUAL_DAMPING = 0.5
-# Largest excess over 1 of the sum of squared base participations that
-# round-off of the mode shapes can cause.
-BASE_PARTICIPATION_TOL = 1e-9
 LOCATION_KEYS = ("slide_at", "output_at", "base_at", "force_at", "normal_at", "pitch_at")
 # Keys that describe a rig; a scene has one of them.
 DESCRIPTION_KEYS = ("mode", "masses", "file", "reduced")
@@ -298,7 +295,7 @@ def _check_base(draft: SceneDraft, modes: tuple) -> None:
         default = 0.0 if index else mode.slide
         base = mode.base if draft.has(f"structure.mode.{index}.base") else default
         squares.append((base or 0.0) ** 2)
-    if sum(squares) > 1 + BASE_PARTICIPATION_TOL:
+    if sum(squares) > 1 + 1e-9:  # round-off of the mode shapes can cause this excess
         table_key = f"structure.mode.{squares.index(max(squares))}"
         key = "base" if draft.has(f"{table_key}.base") else "slide"
         draft.add_mistake(
