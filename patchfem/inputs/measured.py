@@ -8,11 +8,10 @@ from ..exceptions import PatchfemError
 from ..scene.keys.quantities import UNIT_FACTORS
 from .cells import TableFormat, parse_header, parse_number, read_lines, split_cells
 
-_ACCELERATION_UNITS = UNIT_FACTORS["acceleration"] | {"m s-2": 1.0}
 COLUMN_UNITS = {
     "frequency": UNIT_FACTORS["frequency"],
-    "input": _ACCELERATION_UNITS,
-    "acceleration": _ACCELERATION_UNITS,
+    "input": UNIT_FACTORS["acceleration"],
+    "acceleration": UNIT_FACTORS["acceleration"],
     "displacement": UNIT_FACTORS["length"],
 }
 TABLE_FORMAT = TableFormat(

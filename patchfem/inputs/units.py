@@ -7,6 +7,7 @@ without a unit.
 import re
 
 from ..exceptions import PatchfemError
+from ..scene.keys import quantities
 from ..scene.keys.quantities import UNIT_FACTORS
 
 RATIO_UNITS = {"": 1.0, "1": 1.0, "%": 0.01}
@@ -28,26 +29,22 @@ _UNIT_SYNONYMS = {
     "seconds": "s",
     "newton": "N",
     "newtons": "N",
-    "µm": "um",
-    "μm": "um",
-    "µs": "us",
-    "μs": "us",
 }
 # Spellings of "per second squared" and of "per second" after a unit.
 _RATE_UNIT_PATTERNS = {
-    "/s^2": re.compile(r"(\w+) ?(?:/ ?s(?:ec)?(?:\^|\*\*)?2|/ ?s²| s-2| s\^-2)"),
+    "/s^2": re.compile(r"(\w+) ?(?:/ ?s(?:ec)?(?:\^|\*\*)?2| s-2| s\^-2)"),
     "/s": re.compile(r"(\w+) ?(?:/ ?s(?:ec)?| s-1| s\^-1)"),
 }
 
 
 def normalize_unit(text: str) -> str:
     """Spell a unit as the tables do: "m/s2" and "m s-2" become "m/s^2", "µm" becomes "um"."""
-    text = " ".join(text.split())
-    text = _UNIT_SYNONYMS.get(text.lower(), _UNIT_SYNONYMS.get(text, text))
+    text = quantities.normalize_unit(text)
+    text = _UNIT_SYNONYMS.get(text.lower(), text)
     for ending, pattern in _RATE_UNIT_PATTERNS.items():
         match = pattern.fullmatch(text)
         if match:
-            return _UNIT_SYNONYMS.get(match[1], match[1]) + ending
+            return match[1] + ending
     return text
 
 
