@@ -31,10 +31,8 @@ ACCURACY_TABLE = "cycles = 30\n[accuracy]\n"
     "name, old, new",
     [
         ("smooth", CONSTANT_BONDS, GROWING_BONDS),
-        ("smooth", CONSTANT_BONDS, CONSTANT_BONDS + "\nbreakaway = 0.3"),
         ("smooth", LAW_NAME, 'law = "lugre"\nstiffness = "1e7 N/m"\nstribeck_speed = "1 cm/s"'),
         ("march", CONSTANT_BONDS, SHORT_BONDS),
-        ("march", CONSTANT_BONDS, GROWING_BONDS + "\nbreakaway = 0.3"),
         ("march", CONSTANT_BONDS, CONSTANT_BONDS + "\norder = 0.5"),
         ("march", "cycles = 30", ACCURACY_TABLE + "steps_per_cycle = 400"),
         ("march", 'waveform = "sine"', 'waveform = "levels"\nlevels = ["3 g", "5 g"]'),

@@ -300,6 +300,6 @@ def _find_harmonic_law_obstacle(motion: MotionFeatures) -> str:
         )
     if not law_has_trait(law.law, "bonds"):
         return ""
-    keys = [f"friction.{key}" for key in ("rest_growth", "breakaway") if getattr(law, key)]
-    beside = next(filter(None, (*keys, motion.compliance, motion.lower_shape)), "")
+    growth = "friction.rest_growth" if law.rest_growth else ""
+    beside = next(filter(None, (growth, motion.compliance, motion.lower_shape)), "")
     return beside and describe_unsupported(f"'harmonic' with law '{law.law}' and {beside}", "march")

@@ -49,7 +49,7 @@ def test_exact_march_agrees_with_harmonic_balance(law):
 
 
 @pytest.mark.share(0)
-@pytest.mark.parametrize("extra_keys", ["", "breakaway = 0.2\n", "initial_bonds = 0.0\n"])
+@pytest.mark.parametrize("extra_keys", ["", "initial_bonds = 0.0\n"])
 def test_exact_released_bonds_agree_in_both_engines(extra_keys):
     """Displacement and slip after a release agree between the march and the smooth engine within 5 nm.
 

@@ -33,7 +33,7 @@ SIZES = {  # Constant -> description of the quantity that it bounds.
     "scene.rules.contact.MAX_ELEMENTS": "number of elements along an interface that has element_size",
     "scene.keys.tables.MAX_MASS_NUMBER": "number of masses in structure.masses",
     "effects.MAX_COORDINATES": "number of masses or modes of a rig",
-    "scene.axes.MAX_RANGE_VALUES": "number of values in one range of a sweep",
+    "scene.assignments.MAX_RANGE_VALUES": "number of values in one range of a sweep",
     "campaigns.sweeps.parse_request.MAX_CASES": "number of cases of a sweep",
     "inputs.cells.MAX_BYTES": "bytes of a text file with a table",
     "inputs.records.MAX_BYTES": "bytes of a laboratory file",
