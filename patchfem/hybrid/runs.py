@@ -222,7 +222,9 @@ class Motion:
         )  # fmt: skip
 
 
-def run_batch(cases, n_events: int = 0, states: State | None = None) -> Batch:
+def run_batch(
+    cases, n_events: int = 0, states: State | None = None, *, has_windows: bool = True
+) -> Batch:
     """Run cases whose arrays have the same shapes in one compiled loop.
 
     Parameters
@@ -232,11 +234,15 @@ def run_batch(cases, n_events: int = 0, states: State | None = None) -> Batch:
         Number of events that a case can store.
     states : State, optional
         States at the start in place of those of the cases; they are changed.
+    has_windows : bool
+        Whether the measures of the windows are computed.
     """
     rigs, own_states, records = make_batch(cases, n_events)
     states = own_states if states is None else states
     start = states.y.copy()
     compiled.load("hybrid.engine_kernels").run_cases(rigs, states, records)
+    if not has_windows:
+        return Batch(rigs, states, records, start, [])
     model = {"n_friction": cases[0].n_friction, "stiffness": cases[0].first_stiffness}
     with np.errstate(invalid="ignore", divide="ignore"):
         windows = [
