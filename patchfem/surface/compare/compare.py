@@ -45,6 +45,7 @@ MIN_BOW = (
 MIN_DEPOSITS = 0.05  # smallest grown area that is reported, relative to the lost area
 MIN_OTHER_LENGTH = 5e-4  # smallest error of length that is reported
 MAX_STEP_RATIO = 1.01  # ratio of two sampling intervals that counts as equal
+PLACEMENT_NAMES = ("shift", "tilt", "scale", "offset", "gain")
 MIN_TOPS_FRACTION = 0.6  # fraction of worn heights in a track below which it consists of worn tops
 
 
@@ -187,8 +188,8 @@ def _note_steps(before: Profile, after: Profile) -> tuple[Finding, ...]:
 
 
 def _name_unknowns(reason: str) -> dict[str, Quantity]:
-    names = ("shift", "tilt", "scale", "worn_depth_mean", "worn_depth_max", "worn_area")
-    names += ("grown_area", "worn_depth_within")
+    names = (*PLACEMENT_NAMES, "worn_depth_mean", "worn_depth_max", "worn_depth_max_at")
+    names += ("worn_area", "grown_area", "worn_depth_within")
     names += tuple(f"worn_{end}_{side}" for end in ("from", "to") for side in ("before", "after"))
     return {name: name_unknown(name, reason) for name in names}
 
@@ -203,6 +204,8 @@ def _compose_placed(traces: list[Profile], aligned: Aligned) -> Comparison:
         "shift": (fit.state[0], errors[0]),
         "scale": (1 + fit.state[1], errors[1]),
         "tilt": (fit.state[3] / model.half, errors[3] / model.half),
+        "offset": (fit.state[2], errors[2]),
+        "gain": (aligned.gain, aligned.gain_error),
     }
     placement = {}
     for name, (value, error) in placed.items():
@@ -238,7 +241,7 @@ def _compose_placed(traces: list[Profile], aligned: Aligned) -> Comparison:
     if section.drift_height > datum.noise:
         findings.append(Finding("drift", {"height": section.drift_height}))
     result = _compose(traces, section, Evidence(place, datum, curves), findings)
-    hidden = name_quantity("hidden_wear", 0.0, 0.0, None)
+    hidden = name_unknown("hidden_wear", "no_limit")._replace(low=0.0)
     return replace(result, values=result.values | {"hidden_wear": hidden})
 
 
@@ -255,7 +258,7 @@ def _compose_unplaced(
         if aligned.reason == "mirror_finish":
             numbers = find_mirror_finish([trace.z for trace in traces])
         return Comparison(*traces, Finding(aligned.reason, numbers), values)
-    placement = {name: name_unknown(name, "elsewhere") for name in ("shift", "scale", "tilt")}
+    placement = {name: name_unknown(name, "elsewhere") for name in PLACEMENT_NAMES}
     noise = float(section.noise[0])
     datum = Datum(float(section.unworn.mean()), noise, 0.0, section.correlation)
     curves = _draw_curves(section, traces[1].z + section.depth)
@@ -287,11 +290,13 @@ def _compose(
     """Measure a section, and find the verdict."""
     placement = evidence.placement
     length = float(section.widths.sum())
+    placed = placement.values | {
+        "common_length": name_quantity("common_length", length, None, None)
+    }
     spans = find_spans(section)
     # New roughness that stands above the first surface is no loss.
     is_loss = section.depth > -UNWORN_LIMIT * section.noise
     area, error = section.integrate(cover_spans(section, spans) & is_loss & ~section.grown)
-    error = float(np.hypot(error, section.model_error * area))
     hidden = measure_hidden_area(section)
     bounds = (area, max(area - SIDE * error, 0.0), area + SIDE * error + hidden)
     lost = section.integrate(section.worn)
@@ -305,12 +310,14 @@ def _compose(
     bow = 2 / 3 * max(evidence.datum.bend, 0.0) * length
     waves_height = robust_deviation(remove_long_waves(section.after))
     is_bow_large = bow > area and evidence.datum.bend > MIN_BOW * waves_height
-    values = _name_unknowns("no_wear") | placement.values
+    values = _name_unknowns("no_wear") | placed
     low = max(grown - SIDE * grown_error, 0.0)
     values["grown_area"] = name_quantity("grown_area", grown, low, grown + SIDE * grown_error)
     tracks = ()
     if code.startswith("worn"):
-        tracks = tuple(measure_track(section, span) for span in spans)
+        # The area of a single track is that of the common part.
+        whole = bounds if len(spans) == 1 else None
+        tracks = tuple(measure_track(section, span, whole) for span in spans)
         if _may_be_growth(section, spans, tracks):
             code = "growth_at_ends"
             numbers |= {
@@ -318,7 +325,7 @@ def _compose(
                 "growth_height": tracks[0].values["depth_mean"].value,
             }
             tracks = ()
-            values = _name_unknowns("growth_at_ends") | placement.values
+            values = _name_unknowns("growth_at_ends") | placed
         elif is_bow_large and (not tracks or any(tracks[0].cut)):
             code = "scar_or_bow"
     elif code == "no_wear" and is_bow_large:
@@ -332,12 +339,12 @@ def _compose(
     if code == "scar_or_bow":
         numbers["scar_depth"] = (bow + area) / length
         tracks = ()
-        values = _name_unknowns("scar_or_bow") | placement.values
+        values = _name_unknowns("scar_or_bow") | placed
     if code.startswith("worn"):
         values["worn_area"] = name_quantity("worn_area", *bounds)
         means = (bound / length for bound in bounds)
         values["worn_depth_mean"] = name_quantity("worn_depth_mean", *means)
-        values["worn_depth_max"] = measure_largest(section, "worn_depth_max")
+        values["worn_depth_max"], values["worn_depth_max_at"] = measure_largest(section)
         values |= _name_ends(tracks, placement, traces[1])
         findings += _describe_tracks(section, spans, tracks)
         if grown > MIN_DEPOSITS * area:

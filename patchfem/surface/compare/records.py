@@ -18,8 +18,21 @@ DEFINITIONS = {
     "shift": ("m", "x of a feature in the second trace minus its x in the first"),
     "tilt": ("rad", "slope of the second trace relative to the first"),
     "scale": ("1", "length of the second trace divided by that of the first"),
+    "offset": (
+        "m",
+        "height of the second surface above the first where neither is worn, in the middle",
+    ),
+    "gain": (
+        "1",
+        "factor by which the heights of the second surface were divided; 1 if no other gain of the instrument shows",
+    ),
+    "common_length": ("m", "length that both traces show"),
+    "common_area": ("m2", "area that both scans show"),
     "worn_depth_mean": ("m", "lost area or volume divided by the size of the common part"),
     "worn_depth_max": ("m", "largest depth"),
+    "worn_depth_max_at": ("m", "x in the second trace of the largest depth"),
+    "worn_depth_max_x": ("m", "x in the first scan of the largest depth"),
+    "worn_depth_max_y": ("m", "y in the first scan of the largest depth"),
     "worn_area": ("m2", "area lost in the common part, per unit of width"),
     "grown_area": ("m2", "area above the first trace in the common part"),
     "worn_depth_within": ("m", "mean depth of the longest track: lost area divided by its width"),
@@ -41,7 +54,10 @@ DEFINITIONS = {
     "width": ("m", "width of the track"),
     "depth_mean": ("m", "lost area divided by width"),
     "depth_floor": ("m", "mean depth of the deepest fifth of the width"),
-    "step": ("m", "mean depth over the middle third of the width (ISO 5436-1, type A1)"),
+    "step": (
+        "m",
+        "mean depth over the middle third of a track with a flat bottom (ISO 5436-1, type A1)",
+    ),
     "area_gross": ("m2", "area lost in the track"),
     "pile_up": ("m2", "area above the first trace within one width of the track on both sides"),
     "pile_up_left": ("m2", "area above the first trace within one width before the track"),
@@ -52,7 +68,7 @@ DEFINITIONS = {
     "direction": ("rad", "direction of the track from the x axis, anticlockwise"),
     "Ra": ("m", "mean of the absolute heights of the roughness profile"),
     "Rq": ("m", "root mean square of the heights of the roughness profile"),
-    "slope": ("1", "root mean square slope of the roughness profile"),
+    "slope": ("m m-1", "root mean square slope of the roughness profile"),
 }
 
 
@@ -161,8 +177,8 @@ class Evidence:
 
     - placement, datum: how the second surface was laid on the first.
     - curves: of traces, or maps of scans.
-    - roughness: {"inside", "outside": {"before", "after": {"Ra", "Rq", "slope": Quantity}}} of the
-      track; {} without a track. `cutoff` [m] is that of these values.
+    - roughness: {"inside", "outside": {"before", "after", "ratio": {"Ra", "Rq", "slope": Quantity}}}
+      of the track, with the ratio after/before; {} without a track. `cutoff` [m] is that of these values.
     - removed: heights left out before and after as spikes, dropouts or dust.
     """
 

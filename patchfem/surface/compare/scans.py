@@ -60,7 +60,7 @@ MIN_SECTIONS = 8  # smallest number of sections across a track
 MODEL_ERROR = 0.01  # relative standard deviation of a volume: gain of two calibrated instruments
 VARIANTS = (("", False), ("x", False), ("", True), ("x", True))  # mirrored along, heights inverted
 NAMES = ("worn_volume", "grown_volume", "worn_share", "worn_depth_mean", "worn_depth_max")
-PLACEMENT_NAMES = ("shift_x", "shift_y", "rotation")
+PLACEMENT_NAMES = ("shift_x", "shift_y", "rotation", "offset")
 
 
 def compare_scans(
@@ -87,7 +87,7 @@ def compare_scans(
         findings = (Finding("identical_files", {}),)
         return Comparison(before, after, verdict, values, (), findings, direction=direction)
 
-    model, fit, variant, gain = _align_calibrated(*cleaned)
+    model, fit, variant, gains = _align_calibrated(*cleaned)
     ratios = _compare_lines(*cleaned, direction, fit)
     if fit is None:
         finish = find_mirror_finish([fill_nearest(scan.z) for scan in cleaned])
@@ -97,8 +97,10 @@ def compare_scans(
         return Comparison(before, after, verdict, values | ratios, (), (), evidence, direction)
     result = _measure(cleaned, model, fit, variant)
     evidence = replace(result.evidence, removed=tuple(counts))
+    gain, error = gains
     if gain != 1.0:
         result = replace(result, findings=(*result.findings, Finding("other_gain", {"gain": gain})))
+    ratios["gain"] = name_quantity("gain", gain, gain - SIDE * error, gain + SIDE * error)
     return replace(
         result,
         before=before,
@@ -199,14 +201,15 @@ def _measure(
     values: dict[str, Quantity] = {name: name_unknown(name, "no_wear") for name in NAMES}
     low = max(grown - SIDE * grown_error, 0.0)
     values["grown_volume"] = name_quantity("grown_volume", grown, low, grown + SIDE * grown_error)
-    values["hidden_wear"] = name_quantity("hidden_wear", 0.0, 0.0, None)
+    values["hidden_wear"] = name_unknown("hidden_wear", "no_limit")._replace(low=0.0)
+    values["common_area"] = name_quantity("common_area", region, None, None)
     tracks: tuple[Track, ...] = ()
     findings = [Finding("hidden_even_wear", {"limit": None})]
     findings += [Finding("mirrored", {})] * bool(variant[0]) + [Finding("turned", {})] * variant[1]
     if code.startswith("worn"):
         values["worn_volume"] = name_quantity("worn_volume", *bounds)
         values["worn_depth_mean"] = name_quantity("worn_depth_mean", *(b / region for b in bounds))
-        values["worn_depth_max"] = _measure_largest(maps)
+        values |= _measure_largest(maps)
         share = float(maps.worn.sum()) * cell / region
         edge = float(ndimage.binary_dilation(maps.worn).sum()) * cell / region - share
         values["worn_share"] = name_quantity(
@@ -241,9 +244,10 @@ def _measure(
 
 def _align_calibrated(
     before: Areal, after: Areal
-) -> tuple[ScanModel | None, Fit | None, tuple[str, bool], float]:
-    """Align two scans; returns the gain of the instrument too, by which the heights of the second one are divided."""
+) -> tuple[ScanModel | None, Fit | None, tuple[str, bool], tuple[float, float]]:
+    """Align two scans; returns the gain by which the heights of the second one are divided, and its error, too."""
     total = 1.0
+    error = MODEL_ERROR
     for _ in range(MAX_GAINS):
         model, fit, variant = _align(before, replace(after, z=after.z / total))
         if fit is None:
@@ -252,7 +256,7 @@ def _align_calibrated(
         if not is_other_gain(gain, error):
             break
         total *= gain
-    return model, fit, variant, total
+    return model, fit, variant, (total, min(error, MODEL_ERROR))
 
 
 def _measure_gain(model: ScanModel, fit: Fit) -> tuple[float, float]:
@@ -322,8 +326,8 @@ def _estimate_error(model: ScanModel, maps: ScanMaps, part) -> float:
     return float(np.sqrt(variance * (plane + part.sum() * tile_size) + noise**2))
 
 
-def _measure_largest(maps: ScanMaps) -> Quantity:
-    """Return the largest median of 3 x 3 depths, without the bias of a maximum."""
+def _measure_largest(maps: ScanMaps) -> dict[str, Quantity]:
+    """Return the largest median of 3 x 3 depths, without the bias of a maximum, and its place."""
     smooth = np.where(maps.worn, ndimage.median_filter(maps.depth, 3), -np.inf)
     at = np.unravel_index(np.argmax(smooth), smooth.shape)
     noise = maps.noise[at] if np.isfinite(maps.noise[at]) else float(np.nanmedian(maps.noise))
@@ -333,7 +337,13 @@ def _measure_largest(maps: ScanMaps) -> Quantity:
     value = float(smooth[at]) - bias
     window = maps.depth[max(at[0] - 1, 0) : at[0] + 2, max(at[1] - 1, 0) : at[1] + 2]
     high = max(float(window.max()), value) + SIDE * sigma
-    return name_quantity("worn_depth_max", value, max(value - bias - SIDE * sigma, 0.0), high)
+    return {
+        "worn_depth_max": name_quantity(
+            "worn_depth_max", value, max(value - bias - SIDE * sigma, 0.0), high
+        ),
+        "worn_depth_max_x": name_quantity("worn_depth_max_x", maps.x[at[1]], None, None),
+        "worn_depth_max_y": name_quantity("worn_depth_max_y", maps.y[at[0]], None, None),
+    }
 
 
 def _measure_track(before: Areal, model: ScanModel, maps: ScanMaps) -> Track | None:

@@ -80,13 +80,14 @@ class Section:
         return np.where(bend > MIN_WALL * self.noise, WALL_ERROR * self.widths * bend, 0.0)
 
     def integrate(self, inside, sign: float = 1.0) -> tuple[float, float]:
-        """Integrate the depth over samples (n,) bool; return the area [m2] and its standard deviation."""
+        """Integrate the depth over samples (n,) bool; return the area [m2] and its standard deviation, gain included."""
         weights = np.where(inside, self.widths, 0.0)
         gaps = self.gap_errors[inside[1:] & inside[:-1]]
         walls = self.wall_errors[inside]
         variance = np.var(self.draws @ weights) + gaps @ gaps + walls @ walls
         error = SCATTER_FACTOR * np.sqrt(variance + self.drift * weights.sum())
-        return sign * float(weights @ self.depth), float(error)
+        area = float(weights @ self.depth)
+        return sign * area, float(np.hypot(error, self.model_error * area))
 
 
 def make_section(x, second, fit: Fit, gain_error: float = 0.0) -> Section:
@@ -171,11 +172,12 @@ def measure_hidden_area(section: Section) -> float:
     return excess * UNWORN_LIMIT * float(np.median(section.noise)) * float(section.widths.sum())
 
 
-def measure_largest(section: Section, name: str) -> Quantity:
-    """Measure the largest depth of short parabolas, without the bias of the maximum of noisy depths.
+def measure_largest(section: Section) -> tuple[Quantity, Quantity]:
+    """Measure the largest depth of short parabolas, without the bias of the maximum of noisy depths, and its place.
 
     The largest of n values with normal errors is too large by about sigma sqrt(2 log n). The upper end
-    of the interval contains every single depth there, because a crest may be worn as deep.
+    of the interval contains every single depth there, because a crest may be worn as deep. The interval
+    of the place contains all places that are as deep but for the noise.
     """
     depth = section.depth
     size = min(PARABOLA_SAMPLES, depth.size)
@@ -183,10 +185,13 @@ def measure_largest(section: Section, name: str) -> Quantity:
     is_sure = section.noise < MAX_NOISE_RATIO * np.median(section.noise)
     top = int(np.argmax(np.where(is_sure, smooth, -np.inf)))
     sigma = float(np.hypot(section.draws[:, top].std(), PARABOLA_ERROR * section.noise[top]))
-    near = max((smooth > smooth[top] - 2 * sigma).sum() / section.correlation, 1.0)
+    is_near = smooth > smooth[top] - 2 * sigma
+    near = max(is_near.sum() / section.correlation, 1.0)
     bias = float(np.sqrt(2 * np.log(near)) / 2 * sigma)
     value = smooth[top] - bias
     sigma = float(np.hypot(SCATTER_FACTOR * sigma, section.model_error * abs(value)))
     raw = depth[max(top - 2, 0) : top + 3].max()
     low = value - bias - SIDE * sigma
-    return name_quantity(name, value, max(low, 0.0), max(raw, value) + SIDE * sigma)
+    largest = name_quantity("worn_depth_max", value, max(low, 0.0), max(raw, value) + SIDE * sigma)
+    places = section.x[top], *section.x[is_near][[0, -1]]
+    return largest, name_quantity("worn_depth_max_at", *places)
