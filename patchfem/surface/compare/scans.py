@@ -29,7 +29,7 @@ from .scan_model import (
     find_changed_points,
     find_scan_place,
 )
-from .section import make_section
+from .section import find_largest, make_section
 from .statistics import (
     MAX_GAINS,
     UNWORN_LIMIT,
@@ -56,6 +56,9 @@ MIN_TILE_FRACTION = 0.3  # fraction of unworn points in a tile whose mean shows 
 MIN_TILES = 6  # smallest number of such tiles
 MIN_ELONGATION = 2.0  # length of a worn place relative to its width, from which on it is a track
 MIN_GROWN_BORDER = 0.5  # fraction of a line near a border that grew, from which on the border grew
+MEDIAN_ERROR = (
+    0.5  # error of a median of nine heights relative to that of one, with their correlation
+)
 MIN_SECTIONS = 8  # smallest number of sections across a track
 MODEL_ERROR = 0.01  # relative standard deviation of a volume: gain of two calibrated instruments
 VARIANTS = (("", False), ("x", False), ("", True), ("x", True))  # mirrored along, heights inverted
@@ -327,22 +330,16 @@ def _estimate_error(model: ScanModel, maps: ScanMaps, part) -> float:
 
 
 def _measure_largest(maps: ScanMaps) -> dict[str, Quantity]:
-    """Return the largest median of 3 x 3 depths, without the bias of a maximum, and its place."""
+    """Return the largest depth by medians of 3 x 3 depths, and its place."""
     smooth = np.where(maps.worn, ndimage.median_filter(maps.depth, 3), -np.inf)
-    at = np.unravel_index(np.argmax(smooth), smooth.shape)
-    noise = maps.noise[at] if np.isfinite(maps.noise[at]) else float(np.nanmedian(maps.noise))
-    sigma = 0.5 * noise  # of a median of nine heights, with their correlation
-    near = max(int((smooth > smooth[at] - 2 * sigma).sum()), 1)
-    bias = float(np.sqrt(2 * np.log(near)) / 2 * sigma)
-    value = float(smooth[at]) - bias
-    window = maps.depth[max(at[0] - 1, 0) : at[0] + 2, max(at[1] - 1, 0) : at[1] + 2]
-    high = max(float(window.max()), value) + SIDE * sigma
+    noise = np.where(np.isfinite(maps.noise), maps.noise, np.nanmedian(maps.noise))
+    depth = np.where(maps.worn, maps.depth, -np.inf)
+    largest, _ = find_largest(depth, smooth, MEDIAN_ERROR * noise, (1.0, MODEL_ERROR))
+    row, column = np.unravel_index(np.argmax(smooth), smooth.shape)
     return {
-        "worn_depth_max": name_quantity(
-            "worn_depth_max", value, max(value - bias - SIDE * sigma, 0.0), high
-        ),
-        "worn_depth_max_x": name_quantity("worn_depth_max_x", maps.x[at[1]], None, None),
-        "worn_depth_max_y": name_quantity("worn_depth_max_y", maps.y[at[0]], None, None),
+        "worn_depth_max": largest,
+        "worn_depth_max_x": name_quantity("worn_depth_max_x", maps.x[column], None, None),
+        "worn_depth_max_y": name_quantity("worn_depth_max_y", maps.y[row], None, None),
     }
 
 

@@ -22,7 +22,7 @@ def whiten(z) -> np.ndarray:
     """Return heights (n,) or (m, n) whose waves are equally high, so that a periodic lay does not hide the others."""
     spectrum = np.fft.rfftn(z)
     size = np.abs(spectrum)
-    return np.fft.irfftn(spectrum / (size + np.median(size) + TINY), z.shape)
+    return np.fft.irfftn(spectrum / (size + np.median(size) + TINY), z.shape, range(z.ndim))
 
 
 def correlate(first, second, min_overlap: float) -> np.ndarray:
@@ -32,10 +32,13 @@ def correlate(first, second, min_overlap: float) -> np.ndarray:
     overlap below `min_overlap` of the smaller array.
     """
     size = [a + b for a, b in zip(first.shape, second.shape)]
+    axes = range(first.ndim)
     powers = [(z, z**2, np.ones(z.shape)) for z in (first, second)]
-    transforms, others = ([np.fft.rfftn(values, size) for values in group] for group in powers)
+    transforms, others = (
+        [np.fft.rfftn(values, size, axes) for values in group] for group in powers
+    )
     product, count, power1, power2 = (
-        np.fft.irfftn(transforms[i] * others[k].conj(), size)
+        np.fft.irfftn(transforms[i] * others[k].conj(), size, axes)
         for i, k in ((0, 0), (2, 2), (1, 2), (2, 1))
     )
     norm = np.sqrt(np.maximum(power1 * power2, 1e-12 * power1.max() * power2.max()))
