@@ -28,7 +28,10 @@ STATES = ("not used", "unworn", "worn", "grown")  # meanings of the codes of the
 # Numbers of compare.json that the page and the screen show under another name: those of the longest track in both traces.
 SHOWN_ELSEWHERE = (
     "worn_depth_within",
-    *(f"worn_{end}_{side}" for end in ("from", "to") for side in SIDES),
+    "worn_from_before",
+    "worn_from_after",
+    "worn_to_before",
+    "worn_to_after",
     "track_pile_up",
 )
 MIN_BAND_FRACTION = 0.01  # width of a band relative to the axis, below which the line hides it
@@ -161,6 +164,9 @@ def build(
         Further content of compare.json.
     """
     values = values | {name_in_track(name): value for name, value in track.items()}
+    shown = [
+        name for name in values if name not in SHOWN_ELSEWHERE and not _is_repeated(name, values)
+    ]
     content = {
         "patchfem": __version__,
         "verdict": words.verdict[0],
@@ -174,11 +180,7 @@ def build(
         kind="compare",
         title=" and ".join(Path(source).name for source in sources),
         verdict=words.verdict,
-        quantities={
-            name: sentences.to_answer(value)
-            for name, value in values.items()
-            if name not in SHOWN_ELSEWHERE and not _is_repeated(name, values)
-        },
+        quantities={name: sentences.to_answer(values[name]) for name in shown},
         data=data,
         remarks=Remarks(words.warnings, words.notes),
         details=content | details,

@@ -199,12 +199,10 @@ def _describe_loss(comparison: Comparison) -> str:
     """Return the sentence on the lost volume, the track and the deepest place."""
     values = comparison.values
     parts = [f"{format_value('worn_depth_max', values['worn_depth_max'])} at the deepest place"]
-    places = [
-        f"{name[-1] if comparison.is_areal else 'x'} = {format_rounded(values[name].value, 'm')}"
-        for name in ("worn_depth_max_at", "worn_depth_max_x", "worn_depth_max_y")
-        if is_known(values.get(name))
-    ]
-    parts[0] += "".join(f", {place}" for place in places)
+    for name in ("worn_depth_max_at", "worn_depth_max_x", "worn_depth_max_y"):
+        if is_known(values.get(name)):
+            axis = "y" if name.endswith("y") else "x"
+            parts[0] += f", {axis} = {format_rounded(values[name].value, 'm')}"
     if comparison.track is not None:
         parts.insert(0, _describe_track(comparison.track))
     if is_known(values.get("worn_volume")):

@@ -45,6 +45,7 @@ MIN_BOW = (
 MIN_DEPOSITS = 0.05  # smallest grown area that is reported, relative to the lost area
 MIN_OTHER_LENGTH = 5e-4  # smallest error of length that is reported
 MAX_STEP_RATIO = 1.01  # ratio of two sampling intervals that counts as equal
+# Quantities of the place of the second trace.
 PLACEMENT_NAMES = ("shift", "tilt", "scale", "offset", "gain")
 MIN_TOPS_FRACTION = 0.6  # fraction of worn heights in a track below which it consists of worn tops
 

@@ -11,11 +11,13 @@ N_DATUMS = 300  # number of datums that are improved by concentration steps
 MAX_DATUMS = 3000  # number of datums through modes of blocks that are compared
 MAX_DATUM_SAMPLES = 2000  # number of heights from which the datum is found
 MIN_BLOCK_HEIGHTS = 4  # smallest number of known heights in a block
-MIN_DETERMINANT = 1e-3  # of the places of blocks that determine a datum well
+MIN_DETERMINANT = 1e-3  # smallest determinant of the places of blocks that show a datum
 MAX_SCALE = 4.0  # scale of a datum relative to the smallest one, up to which it is compared
 MIN_END_FRACTION = 0.7  # fraction of the heights at an end that agree, if the end is unworn
-AGREEING = 5.0  # distance from a datum, in its smallest scale, within which heights agree
-GROWN = 10.0  # distance above which they have grown
+MAX_AGREEING_DISTANCE = (
+    5.0  # distance from a datum, in its smallest scale, within which heights agree
+)
+MIN_GROWN_DISTANCE = 10.0  # distance, in the same scale, above which they have grown
 
 
 def whiten(z) -> np.ndarray:
@@ -28,8 +30,14 @@ def whiten(z) -> np.ndarray:
 def correlate(first, second, min_overlap: float) -> np.ndarray:
     """Return the significance of the correlation of two arrays at each lag, negative lags at the end.
 
-    It is Fisher's z times the root of the number of common heights, relative to its scatter over all lags; -inf for an
-    overlap below `min_overlap` of the smaller array.
+    It is Fisher's z times the root of the number of common heights, relative to its scatter over all lags.
+
+    Parameters
+    ----------
+    first, second : (n,) or (m, n) array
+        Short waves of both surfaces.
+    min_overlap : float
+        Smallest overlap relative to the smaller array; the significance is -inf below it.
     """
     size = [a + b for a, b in zip(first.shape, second.shape)]
     axes = range(first.ndim)
@@ -91,11 +99,11 @@ def find_datum(base, depth, blocks: list, ends: list) -> np.ndarray:
     scales = _scale_datums(datums, few_base, few)
     known = np.flatnonzero(scales <= MAX_SCALE * scales.min())
     relative = (few + datums[known] @ few_base.T) / max(scales.min(), 1e-15)
-    agrees = np.abs(relative) < AGREEING
+    agrees = np.abs(relative) < MAX_AGREEING_DISTANCE
     has_end = np.zeros(known.size, bool)
     for end in ends:
         has_end |= agrees[:, np.isin(thin, end)].mean(axis=1) > MIN_END_FRACTION
-    grown = np.round((relative < -GROWN).mean(axis=1), 1)
+    grown = np.round((relative < -MIN_GROWN_DISTANCE).mean(axis=1), 1)
     return datums[known[np.lexsort((-agrees.mean(axis=1), grown, ~has_end))[0]]]
 
 

@@ -23,6 +23,7 @@ RATIO_ERROR = 0.004  # standard deviation of a ratio due to tip, interpolation a
 MAX_NOISE_FRACTION = 0.5  # noise relative to the size of the surface above which a ratio is unknown
 MIN_CUTOFFS = 2.0  # smallest length of a piece in cut-offs, half of one is trimmed at each end
 MIN_WAVES = 3.0  # smallest length of a trace relative to the longest wave of the band
+# Sizes of the roughness in a track.
 ROUGHNESS_NAMES = ("Ra", "Rq", "slope")
 MIN_STEPS = 4.0  # smallest length of the shortest wave of the band in steps
 
