@@ -26,6 +26,7 @@ from .records import (
     Placement,
     TraceCurves,
     Track,
+    name_estimate,
     name_quantity,
     name_unknown,
 )
@@ -208,9 +209,7 @@ def _compose_placed(traces: list[Profile], aligned: Aligned) -> Comparison:
         "offset": (fit.state[2], errors[2]),
         "gain": (aligned.gain, aligned.gain_error),
     }
-    placement = {}
-    for name, (value, error) in placed.items():
-        placement[name] = name_quantity(name, value, value - SIDE * error, value + SIDE * error)
+    placement = {name: name_estimate(name, *estimate) for name, estimate in placed.items()}
     bend = float(fit.state[4])
     datum = Datum(
         unworn=float(fit.unworn.mean()),
@@ -312,8 +311,7 @@ def _compose(
     waves_height = robust_deviation(remove_long_waves(section.after))
     is_bow_large = bow > area and evidence.datum.bend > MIN_BOW * waves_height
     values = _name_unknowns("no_wear") | placed
-    low = max(grown - SIDE * grown_error, 0.0)
-    values["grown_area"] = name_quantity("grown_area", grown, low, grown + SIDE * grown_error)
+    values["grown_area"] = name_estimate("grown_area", grown, grown_error, 0.0)
     tracks = ()
     if code.startswith("worn"):
         # The area of a single track is that of the common part.

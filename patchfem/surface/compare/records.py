@@ -11,7 +11,7 @@ import numpy as np
 
 from ..areal import Areal
 from ..profile import Profile
-from ..quantity import Quantity
+from ..quantity import SIDE, Quantity
 
 # Unit and definition of each quantity of a comparison.
 DEFINITIONS = {
@@ -227,6 +227,20 @@ def name_quantity(name: str, value: float, low: float | None, high: float | None
     """Return the quantity of this name with its interval."""
     bounds = [None if number is None else float(number) for number in (value, low, high)]
     return Quantity(*bounds, *DEFINITIONS[name], name=name)
+
+
+def name_estimate(name: str, value: float, error: float, least: float = -np.inf) -> Quantity:
+    """Return the quantity of this name with its 95 % interval, which ends at the least possible value.
+
+    Parameters
+    ----------
+    name : str
+    value, error : float
+        Value and its standard deviation.
+    least : float, optional
+        0 for a quantity that cannot be negative.
+    """
+    return name_quantity(name, value, max(value - SIDE * error, least), value + SIDE * error)
 
 
 def name_unknown(name: str, reason: str) -> Quantity:

@@ -19,6 +19,7 @@ from .records import (
     Placement,
     ScanMaps,
     Track,
+    name_estimate,
     name_quantity,
     name_unknown,
 )
@@ -103,7 +104,7 @@ def compare_scans(
     gain, error = gains
     if gain != 1.0:
         result = replace(result, findings=(*result.findings, Finding("other_gain", {"gain": gain})))
-    ratios["gain"] = name_quantity("gain", gain, gain - SIDE * error, gain + SIDE * error)
+    ratios["gain"] = name_estimate("gain", gain, error)
     return replace(
         result,
         before=before,
@@ -202,8 +203,7 @@ def _measure(
         code = "growth_at_ends"
     region = float(inside.sum()) * cell
     values: dict[str, Quantity] = {name: name_unknown(name, "no_wear") for name in NAMES}
-    low = max(grown - SIDE * grown_error, 0.0)
-    values["grown_volume"] = name_quantity("grown_volume", grown, low, grown + SIDE * grown_error)
+    values["grown_volume"] = name_estimate("grown_volume", grown, grown_error, 0.0)
     values["hidden_wear"] = name_unknown("hidden_wear", "no_limit")._replace(low=0.0)
     values["common_area"] = name_quantity("common_area", region, None, None)
     tracks: tuple[Track, ...] = ()
@@ -230,8 +230,8 @@ def _measure(
     covariance = np.linalg.pinv((weighted / scale).T @ (weighted / scale), rcond=1e-10)
     errors = np.sqrt(np.diag(covariance)) / scale
     placed = {
-        name: name_quantity(name, value, value - SIDE * deviation, value + SIDE * deviation)
-        for name, value, deviation in zip(PLACEMENT_NAMES, fit.state, errors)
+        name: name_estimate(name, value, error)
+        for name, value, error in zip(PLACEMENT_NAMES, fit.state, errors)
     }
     noise = float(np.median(fit.noise))
     limit = noise * find_changed_points(maps.depth / maps.noise, model.known).limit

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..profile import find_runs
 from ..quantity import SIDE, Quantity
-from .records import Track, name_quantity, name_unknown
+from .records import Track, name_estimate, name_quantity, name_unknown
 from .section import Section
 from .statistics import UNWORN_LIMIT
 
@@ -241,7 +241,7 @@ def measure_track(
         for place in (start, end):
             near = section.integrate((x >= place.low) & (x <= place.high))[0]
             error = float(np.hypot(error, near / (2 * SIDE)))
-        gross = _bound("area_gross", area, error)
+        gross = name_estimate("area_gross", area, error, 0.0)
     else:
         area = lost[0]
         error = (lost[2] - area) / SIDE
@@ -252,7 +252,7 @@ def measure_track(
         "from": name_quantity("from", *start),
         "to": name_quantity("to", *end),
         "width": widths,
-        "depth_mean": _bound("depth_mean", mean, mean_error),
+        "depth_mean": name_estimate("depth_mean", mean, mean_error, 0.0),
         "depth_floor": _measure_floor(section, start.value, width),
         "step": _measure_step(section, start.value, width),
         "area_gross": gross,
@@ -262,15 +262,10 @@ def measure_track(
     piled = left.value + right.value
     piled_error = float(np.hypot(left.high - left.value, right.high - right.value)) / SIDE
     values |= {
-        "pile_up": _bound("pile_up", piled, piled_error),
+        "pile_up": name_estimate("pile_up", piled, piled_error, 0.0),
         "pile_up_left": left,
         "pile_up_right": right,
-        "area_net": name_quantity(
-            "area_net",
-            area - piled,
-            area - piled - SIDE * np.hypot(error, piled_error),
-            area - piled + SIDE * np.hypot(error, piled_error),
-        ),
+        "area_net": name_estimate("area_net", area - piled, float(np.hypot(error, piled_error))),
     }
 
     # Where the section cuts the track off, its end and what lies beyond are unknown.
@@ -285,11 +280,6 @@ def measure_track(
     return Track(values, cut)
 
 
-def _bound(name: str, value: float, error: float) -> Quantity:
-    """Return a quantity that cannot be negative with the interval of a standard deviation."""
-    return name_quantity(name, value, max(value - SIDE * error, 0.0), value + SIDE * error)
-
-
 def _average(section: Section, name: str, first: float, last: float) -> Quantity:
     """Return the mean depth between two places."""
     inside = (section.x >= first) & (section.x <= last)
@@ -297,7 +287,7 @@ def _average(section: Section, name: str, first: float, last: float) -> Quantity
         inside[int(np.argmin(np.abs(section.x - (first + last) / 2)))] = True
     area, error = section.integrate(inside)
     length = float(section.widths[inside].sum())
-    return _bound(name, area / length, error / length)
+    return name_estimate(name, area / length, error / length, 0.0)
 
 
 def _measure_step(section: Section, start: float, width: float) -> Quantity:
@@ -347,6 +337,5 @@ def _measure_pile_up(section: Section, name: str, end: End, width: float) -> Qua
     # A ridge may begin anywhere in the interval of the end.
     is_end = (section.x >= end.low) & (section.x <= end.high) & (section.depth < 0)
     area, error = section.integrate(inside | is_end, -1.0)
-    return _bound(
-        name, area, float(np.hypot(error, section.integrate(is_end, -1.0)[0] / (2 * SIDE)))
-    )
+    beginning = section.integrate(is_end, -1.0)[0]
+    return name_estimate(name, area, float(np.hypot(error, beginning / (2 * SIDE))), 0.0)

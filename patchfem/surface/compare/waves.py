@@ -53,7 +53,6 @@ def compare_waves(lines: list[np.ndarray], step: float, noise: float) -> dict[st
     count = int(np.clip(length / (BLOCK_WAVES * BAND[1]), MIN_BLOCKS, MAX_BLOCKS))
     if min(len(line) for line in lines) >= MAX_BLOCKS:
         count = MAX_BLOCKS  # groups of lines
-    student = float(special.stdtrit(count - 1, 0.975))
     values = {}
     for name, sizes, error in (
         ("amplitude_ratio", passed, band_noise),
@@ -64,13 +63,26 @@ def compare_waves(lines: list[np.ndarray], step: float, noise: float) -> dict[st
         if not totals.min() > 0 or error**2 > MAX_NOISE_FRACTION * totals.min():
             values[name] = name_unknown(name, "noise")
             continue
-        ratio = float(np.sqrt(totals[1] / totals[0]))
-        # Linearised ratio of two means: the scatter of its numerator and denominator together.
-        influence = blocks[1] / totals[1] - blocks[0] / totals[0]
-        scatter = influence.std(ddof=1) / np.sqrt(count) / 2
-        width = student * float(np.hypot(scatter, RATIO_ERROR))
-        values[name] = name_quantity(name, ratio, ratio * np.exp(-width), ratio * np.exp(width))
+        values[name] = name_quantity(name, *_divide_means(*blocks, 0.5))
     return values
+
+
+def _divide_means(before, after, power: float) -> tuple[float, float | None, float | None]:
+    """Return the ratio of the means of blocks (k,), after divided by before, to a power, with its interval.
+
+    Both surfaces have the same blocks, so the scatter of the ratio does not contain that of the surface.
+    """
+    first = before.mean()
+    second = after.mean()
+    ratio = float((second / first) ** power)
+    if len(before) < 2:
+        return ratio, None, None
+    # Linearised ratio of two means: the scatter of its numerator and denominator together.
+    influence = after / second - before / first
+    scatter = power * influence.std(ddof=1) / np.sqrt(len(before))
+    student = float(special.stdtrit(len(before) - 1, 0.975))
+    width = student * float(np.hypot(scatter, RATIO_ERROR))
+    return ratio, ratio * np.exp(-width), ratio * np.exp(width)
 
 
 def _pass_band(z, step: float) -> np.ndarray:
@@ -156,22 +168,9 @@ def _pool(table) -> dict[str, Quantity]:
 
 
 def _divide(before, after) -> dict[str, Quantity]:
-    """Return the ratios of the sizes of sections (k, 3), after divided by before, with their intervals.
-
-    Both traces have the same sections, so the scatter of their ratio does not contain that of the surface.
-    """
-    means = np.array([before.mean(axis=0), after.mean(axis=0)])
+    """Return the ratios of the sizes of sections (k, 3), after divided by before, with their intervals."""
     out = {}
     for k, name in enumerate(ROUGHNESS_NAMES):
-        power = 1.0 if name == "Ra" else 0.5
-        ratio = float((means[1, k] / means[0, k]) ** power)
-        width = None
-        if len(before) > 1:
-            influence = after[:, k] / means[1, k] - before[:, k] / means[0, k]
-            scatter = power * influence.std(ddof=1) / np.sqrt(len(before))
-            student = float(special.stdtrit(len(before) - 1, 0.975))
-            width = student * float(np.hypot(scatter, RATIO_ERROR))
-        ends = (None, None) if width is None else (ratio * np.exp(-width), ratio * np.exp(width))
-        text = f"{DEFINITIONS[name][1]}, after wear divided by before"
-        out[name] = Quantity(ratio, *ends, "1", text)
+        ratio = _divide_means(before[:, k], after[:, k], 1.0 if name == "Ra" else 0.5)
+        out[name] = Quantity(*ratio, "1", f"{DEFINITIONS[name][1]}, after wear divided by before")
     return out
