@@ -67,55 +67,33 @@ NAMES = ("worn_volume", "grown_volume", "worn_share", "worn_depth_mean", "worn_d
 PLACEMENT_NAMES = ("shift_x", "shift_y", "rotation", "offset")
 
 
-def compare_scans(
-    before: Areal, after: Areal, direction: str = "", *, keep_spikes: bool = False
-) -> Comparison:
-    """Compare two scans of the same region.
+def measure_scans(before: Areal, after: Areal, direction: str = "") -> Comparison:
+    """Compare two clean scans.
 
     Parameters
     ----------
     before, after : Areal
         Scans before and after wear.
-    direction : str
-        "x" or "y", along which the waves are compared; "" is x.
-    keep_spikes : bool
-        Whether single heights far off their neighbours count.
+    direction : str, optional
+        "x" or "y", along which the waves are compared; x by default.
     """
-    cleaned = [_clean(scan, keep_spikes=keep_spikes) for scan in (before, after)]
-    counts = [
-        int((~a.missing).sum() - (~b.missing).sum()) for a, b in zip((before, after), cleaned)
-    ]
-    if before.z.shape == after.z.shape and np.array_equal(before.z, after.z, equal_nan=True):
-        verdict = Finding("identical", {})
-        values = {name: name_unknown(name, "identical") for name in (*NAMES, "hidden_wear")}
-        findings = (Finding("identical_files", {}),)
-        return Comparison(before, after, verdict, values, (), findings, direction=direction)
-
-    model, fit, variant, gains = _align_calibrated(*cleaned)
-    ratios = _compare_lines(*cleaned, direction, fit)
+    model, fit, variant, gains = _align_calibrated(before, after)
+    ratios = _compare_lines(before, after, direction, fit)
     if fit is None:
-        finish = find_mirror_finish([fill_nearest(scan.z) for scan in cleaned])
+        finish = find_mirror_finish([fill_nearest(scan.z) for scan in (before, after)])
         verdict = Finding("mirror_finish" if finish else "elsewhere", finish)
         values = {name: name_unknown(name, verdict.code) for name in (*NAMES, "hidden_wear")}
-        evidence = Evidence(removed=tuple(counts))
-        return Comparison(before, after, verdict, values | ratios, (), (), evidence, direction)
-    result = _measure(cleaned, model, fit, variant)
-    evidence = replace(result.evidence, removed=tuple(counts))
-    gain, error = gains
-    if gain != 1.0:
-        result = replace(result, findings=(*result.findings, Finding("other_gain", {"gain": gain})))
-    ratios["gain"] = name_estimate("gain", gain, error)
-    return replace(
-        result,
-        before=before,
-        after=after,
-        values=result.values | ratios,
-        evidence=evidence,
-        direction=direction,
-    )
+        return Comparison(before, after, verdict, values | ratios)
+    result = _measure([before, after], model, fit, variant)
+    ratios["gain"] = name_estimate("gain", *gains)
+    findings = result.findings
+    if gains[0] != 1.0:
+        findings += (Finding("other_gain", {"gain": gains[0]}),)
+    return replace(result, values=result.values | ratios, findings=findings)
 
 
-def _clean(scan: Areal, *, keep_spikes: bool) -> Areal:
+def clean_scan(scan: Areal, *, keep_spikes: bool) -> Areal:
+    """Return a scan without spikes."""
     if min(scan.z.shape) < MIN_SIDE:
         rows, columns = scan.z.shape
         raise PatchfemError(
