@@ -211,6 +211,7 @@ def _measure(
         name: name_estimate(name, value, error)
         for name, value, error in zip(PLACEMENT_NAMES, fit.state, errors)
     }
+    values |= placed
     noise = float(np.median(fit.noise))
     limit = noise * find_changed_points(maps.depth / maps.noise, model.known).limit
     datum = Datum(float(fit.unworn.mean()), noise, 0.0, 1.0, limit)
