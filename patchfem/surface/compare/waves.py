@@ -63,12 +63,13 @@ def compare_waves(lines: list[np.ndarray], step: float, noise: float) -> dict[st
         if not totals.min() > 0 or error**2 > MAX_NOISE_FRACTION * totals.min():
             values[name] = name_unknown(name, "noise")
             continue
-        values[name] = name_quantity(name, *_divide_means(*blocks, 0.5))
+        ratio = _divide_means(*blocks, 0.5, DEFINITIONS[name][1])
+        values[name] = ratio._replace(name=name)
     return values
 
 
-def _divide_means(before, after, power: float) -> tuple[float, float | None, float | None]:
-    """Return the ratio of the means of blocks (k,), after divided by before, to a power, with its interval.
+def _divide_means(before, after, power: float, text: str) -> Quantity:
+    """Return the ratio of the means of blocks (k,), after divided by before, to a power; text: its definition.
 
     Both surfaces have the same blocks, so the scatter of the ratio does not contain that of the surface.
     """
@@ -76,13 +77,14 @@ def _divide_means(before, after, power: float) -> tuple[float, float | None, flo
     second = after.mean()
     ratio = float((second / first) ** power)
     if len(before) < 2:
-        return ratio, None, None
+        return Quantity(ratio, None, None, "1", text)
     # Linearised ratio of two means: the scatter of its numerator and denominator together.
     influence = after / second - before / first
     scatter = power * influence.std(ddof=1) / np.sqrt(len(before))
     student = float(special.stdtrit(len(before) - 1, 0.975))
     width = student * float(np.hypot(scatter, RATIO_ERROR))
-    return ratio, ratio * np.exp(-width), ratio * np.exp(width)
+    ends = ratio * np.exp(np.array([-width, width]))
+    return Quantity(ratio, *ends.tolist(), "1", text)
 
 
 def _pass_band(z, step: float) -> np.ndarray:
@@ -171,6 +173,7 @@ def _divide(before, after) -> dict[str, Quantity]:
     """Return the ratios of the sizes of sections (k, 3), after divided by before, with their intervals."""
     out = {}
     for k, name in enumerate(ROUGHNESS_NAMES):
-        ratio = _divide_means(before[:, k], after[:, k], 1.0 if name == "Ra" else 0.5)
-        out[name] = Quantity(*ratio, "1", f"{DEFINITIONS[name][1]}, after wear divided by before")
+        text = f"{DEFINITIONS[name][1]}, after wear divided by before"
+        power = 1.0 if name == "Ra" else 0.5
+        out[name] = _divide_means(before[:, k], after[:, k], power, text)
     return out
