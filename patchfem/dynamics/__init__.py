@@ -35,7 +35,6 @@ PUBLIC = {
         "store_checkpoints",
     ),
     "curve_points": ("sample_adaptively",),
-    "events.cost": ("estimate_cycle_time",),
     "events.elements": (
         "CELL_MERGES",
         "Elements",
@@ -48,7 +47,6 @@ PUBLIC = {
     "events.event_list": ("DRIVE_CHANGE",),
     "events.histories": (
         "announce_runs",
-        "is_loop_cached",
         "load_event_kernels",
         "simulate_batch",
     ),

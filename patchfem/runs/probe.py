@@ -47,11 +47,11 @@ def run_probe(plan: Plan) -> Probe:
     sentences = [
         ", ".join([f"a run without error estimates took {seconds['total']:.2g} s", *stages])
     ]
-    sentences += _describe_factors(plan, bool(motion), bool(contact))
+    sentences += _describe_factors(plan, has_motion=bool(motion), has_contact=bool(contact))
     return Probe(seconds, faces.static_measures_without_errors(plan.model), tuple(sentences))
 
 
-def _describe_factors(plan: Plan, has_motion: bool, has_contact: bool) -> list[str]:
+def _describe_factors(plan: Plan, *, has_motion: bool, has_contact: bool) -> list[str]:
     """Describe what each setting multiplies."""
     factors = []
     if has_motion:
