@@ -48,9 +48,8 @@ BOND_NODE_SECONDS = 6e-8
 # additional CPU time [s] per time step and node of elements in partial slip
 SLIP_NODE_SECONDS = 3e-9
 
-# CPU time [s] per run of the high-order integrator, in addition to its time steps
-SMOOTH_RUN_SECONDS = 0.02
-SMOOTH_STEP_SECONDS = 2e-6  # CPU time [s] per time step of the high-order integrator
+HYBRID_STEP_SECONDS = 4e-6  # CPU time [s] per step from event to event
+HYBRID_MODES_SECONDS = 4e-8  # additional CPU time [s] per such step and pair of modes
 KEPT_SAMPLE_SECONDS = 8e-6  # CPU time [s] per stored sample of the last cycles of time stepping
 # CPU time [s] per stored sample of the last cycles of the event-driven solution
 KEPT_EVENT_SAMPLE_SECONDS = 2.5e-6

@@ -105,6 +105,6 @@ NO_CODE = EngineCode(0.0, 0.0)
 SHORT_CODE = EngineCode(58e6, 0.15, 2.0)
 MARCH_CODE = EngineCode(58e6, 0.15, 3.5)
 SHEAR_MARCH_CODE = EngineCode(58e6, 0.15, 7.0)  # For time steps with shear modes.
-SMOOTH_CODE = EngineCode(74e6, 0.15, 9.0)
+HYBRID_CODE = EngineCode(82e6, 0.15, 12.0)
 EVENT_CODE = EngineCode(82e6, 0.15, 12.0)  # For the event-driven engines.
 BALANCE_CODE = EngineCode(1e8, 0.3, 3.0)

@@ -39,7 +39,7 @@ MIN_PATCH_ERROR = 1e-6
 # of the time steps.
 MIN_SLIP_PATCH_ERROR = 3e-5
 SAFE_TOLERANCE = 1e-3  # Tolerance that is proposed, because the meshes of all patches meet it.
-STEPLESS_ENGINES = ("exact", "piecewise", "smooth")  # Engines that choose their own steps.
+STEPLESS_ENGINES = ("exact", "piecewise", "hybrid")  # Engines that choose their own steps.
 MAX_CYCLES = 1e5  # Largest number of drive cycles that is proposed.
 
 
@@ -163,7 +163,7 @@ def _find_rig_steps_cause(model: Model) -> Cause | None:
     engine = engines.choose_engine(model)
     if (
         not engine.coarser_in_time(model, numerics.choose_numerics(model))
-        or engine is engines.SMOOTH
+        or engine is engines.HYBRID
     ):
         return None
     steps = numerics.choose_numerics(model).steps

@@ -35,7 +35,7 @@ from .costs import (
     find_interface_load,
     predict_event_driven_cost,
     predict_history_memory,
-    predict_smooth_cost,
+    predict_hybrid_cost,
     steps_per_cycle,
 )
 from .engines import ENGINES, PIECES, choose_steady_method
@@ -520,7 +520,7 @@ def _estimate_smooth_law_seconds(rig) -> float:
 COSTS = {
     "exact": predict_event_driven_cost,
     "piecewise": predict_event_driven_cost,
-    "smooth": predict_smooth_cost,
+    "hybrid": predict_hybrid_cost,
     "march": predict_march_cost,
     "harmonic": predict_steady_cost,
 }
