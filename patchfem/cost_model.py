@@ -21,6 +21,10 @@ CYCLE_SECONDS = 3e-4  # CPU time [s] per cycle of time stepping with elements
 STEP_SECONDS = 4.3e-7  # CPU time [s] per time step with elements
 STEP_ELEMENT_SECONDS = 9e-10  # additional CPU time [s] per time step and element
 
+# Steps from event to event.
+HYBRID_STEP_SECONDS = 4e-6  # CPU time [s] per step from event to event
+HYBRID_MODES_SECONDS = 4e-8  # additional CPU time [s] per such step and pair of modes
+
 # Lists of bonds, which are evaluated in one or more passes per time step.
 # CPU time [s] per strip and pass, by the form of the list (`friction.bonds.list_forms_kernels`)
 STRIP_SECONDS = (3e-10, 3e-9, 2e-9, 3e-9)

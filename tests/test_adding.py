@@ -79,7 +79,7 @@ def assert_loop_matches_closed_form(found: dict) -> None:
 
 def test_exact_law_of_page_agrees_with_closed_form(example_folder):
     """The loop area and the peak force of the added law agree with their closed form within 2e-4."""
-    assert_loop_matches_closed_form(read_measures(example_folder / "smooth"))
+    assert_loop_matches_closed_form(read_measures(example_folder / "rig_dahl"))
 
 
 @pytest.mark.slow
@@ -89,13 +89,13 @@ def test_always_law_of_page_agrees_in_three_engines(example_folder):
         example_folder,
         [line for line in adding.find_commands(PAGE) if any(word in line for word in LATER)],
     )
-    smooth = read_measures(example_folder / "smooth")
+    hybrid = read_measures(example_folder / "rig_dahl")
     for engine in ("march", "harmonic"):
         found = read_measures(example_folder / engine)
         assert_loop_matches_closed_form(found)
         for name in ("relative_displacement_amplitude", "loop_area", "friction_force_peak"):
             one = found[name]
-            other = smooth[name]
+            other = hybrid[name]
             assert abs(one["value"] - other["value"]) <= one["error"] + other["error"], (
                 engine,
                 name,
@@ -163,8 +163,8 @@ def test_always_added_measures_agree_with_histories(example_folder):
     slide = run.relative_displacement.values
     assert found["slide_range"]["value"] == pytest.approx(np.ptp(slide), rel=1e-9)
     assert 0 <= found["slide_range"]["error"] < 1e-3 * found["slide_range"]["value"]
-    smooth = read_measures(example_folder / "smooth")["slide_range"]
-    assert 0 < smooth["error"] < 1e-3 * smooth["value"]
+    hybrid = read_measures(example_folder / "rig_dahl")["slide_range"]
+    assert 0 < hybrid["error"] < 1e-3 * hybrid["value"]
     rms = found["friction_force_rms"]  # the start transient changes it by less than 1 %
     late = run.isel(time=run.time.values >= 195 / 143)
     steady = np.sqrt(

@@ -64,7 +64,6 @@ TUPLE_MODULES = (
     "dynamics/march/element_arrays.py",
     "dynamics/march/cycle_sum_arrays.py",
     "dynamics/march/lane_rows.py",
-    "dynamics/smooth/arrays.py",
     "dynamics/events/modal_system.py",
     "dynamics/events/elements.py",
     "hybrid/records.py",

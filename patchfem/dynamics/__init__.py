@@ -6,23 +6,21 @@ entry of this list and the entries before it:
 1. `ledger`           positions in the energy sums and samples of a march
 2. `modal_kernels`    motion of the modes over a step of a march, and its energies
 3. `dense_kernels`    small dense linear systems
-4. `tableau_kernels`  coefficients of the Runge-Kutta step of order 8
-5. `doubling`         step of stiff modes by repeated doubling of a short step
-6. `propagator`       exact modal steps under any drive
-7. `checkpoint`       checkpoints of a long march on disk
-8. `periodicity`      schedule and error bound of the check for a periodic motion
-9. `integrated`       time histories of a run from its modal coordinates
-10. `cycles`           extremes, phasors and selected samples of the cycles of a march
-11. `curve_points`    adaptive points of a curve, denser where its curvature is larger
-12. `periodic`        periodic motions by Newton's method on the map of a period (shooting)
-13. `interfaces`      contacts of a march: solution of a step and update of their memory
-14. `events`          exact motion from event to event: rigid and elastic-plastic elements, or no friction
-15. `lanes`           many cases of one mode under sinusoidal drive, side by side
-16. `march`           any law in time, under the path-mean forces of each step
-17. `smooth`          smooth laws by a Runge-Kutta method of order 8 from reversal to reversal
-18. `harmonic`        steady motions by harmonic balance, branches and stability
-19. `limit_cycles`    limit cycles of modes with negative damping and friction
-20. `grooves`         interfaces of matched grooves, whose load climbs the flanks
+4. `doubling`         step of stiff modes by repeated doubling of a short step
+5. `propagator`       exact modal steps under any drive
+6. `checkpoint`       checkpoints of a long march on disk
+7. `periodicity`      schedule and error bound of the check for a periodic motion
+8. `integrated`       time histories of a run from its modal coordinates
+9. `cycles`           extremes, phasors and selected samples of the cycles of a march
+10. `curve_points`    adaptive points of a curve, denser where its curvature is larger
+11. `periodic`        periodic motions by Newton's method on the map of a period (shooting)
+12. `interfaces`      contacts of a march: solution of a step and update of their memory
+13. `events`          exact motion from event to event: rigid and elastic-plastic elements, or no friction
+14. `lanes`           many cases of one mode under sinusoidal drive, side by side
+15. `march`           any law in time, under the path-mean forces of each step
+16. `harmonic`        steady motions by harmonic balance, branches and stability
+17. `limit_cycles`    limit cycles of modes with negative damping and friction
+18. `grooves`         interfaces of matched grooves, whose load climbs the flanks
 
 Read `events` first for motion from event to event, `propagator` and `interfaces` for steps of a march.
 """
@@ -181,5 +179,4 @@ PUBLIC = {
         "make_tanh_law",
     ),
     "periodic": ("is_stable",),
-    "smooth.run": ("load_loop",),
 }

@@ -12,7 +12,6 @@ PUBLIC = {
         "RECURSION",
         "RequestedEngine",
         "choose_engine",
-        "unsupported_reason",
     ),
     "bonds.list_forms_kernels": (
         "FORM_MOMENTS",
@@ -88,12 +87,7 @@ PUBLIC = {
         "points_element",
         "unpack_bonds",
     ),
-    "laws.stretch_kernels": (
-        "end_motion",
-        "relax_stretch",
-        "start_motion",
-        "state_rates",
-    ),
+    "laws.stretch_kernels": ("relax_stretch",),
     "laws.tanh": ("TanhLaw",),
     "laws.tanh_kernels": ("HAS_SPEED_LAYER",),
     "path_work": ("sampled_work",),

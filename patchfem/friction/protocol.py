@@ -92,7 +92,6 @@ class Element(NamedTuple):
     - form: layout of the memory, for engines that read it: "parallel" for parallel elements, "points" for points with
       bonds, "places" for points with bonds under the pressure of the lower piece, "speed" for no memory, "flow" for a
       single number, or ""
-    - state_scales: typical magnitudes of the states of the rate equations, None if the law has no rate equations
     """
 
     kernels: str
@@ -102,4 +101,3 @@ class Element(NamedTuple):
     length: float = 0.0
     is_bounded: bool = True
     form: str = ""
-    state_scales: tuple | None = None

@@ -174,7 +174,8 @@ class Motion:
         """Return the stored samples as histories.
 
         Forces, slides, slips and loads of several interfaces are columns of `forces`, `slides`, `slide_rates`,
-        `slips`; "ledger" has friction work, stored, dissipated and created energy [J].
+        `slips`; "ledger" has friction work, stored, dissipated and created energy [J]. A slip starts from the slide at the
+        start of the motion.
         """
         rows = self.rows
         rig = self.case.rig
@@ -197,7 +198,8 @@ class Motion:
         slides, slide_rates = z @ rig.rows[0, :m].T, rate @ rig.rows[0, :m].T
         rests = (self._columns(rows, 2) == 0) & (rig.faces[:m, Face.RIGID] > 0)
         slide_rates[rests] = 0.0
-        work, slips, loss = integrals[:, :m, 0], integrals[:, :m, 1], integrals[:, :m, 2]
+        work, loss = integrals[:, :m, 0], integrals[:, :m, 2]
+        slips = integrals[:, :m, 1] + self.case.y[:n] @ rig.rows[0, :m].T
         extra = {
             "ledger": np.stack(
                 [work.sum(1), (work - loss).sum(1), loss.sum(1), np.zeros(time.size)]
@@ -371,9 +373,10 @@ def _fill_repeated_cycles(case: Case, cycles, samples, event_rows) -> tuple:
         repeated[:, integrals] += counts[:, None] * gain
         return repeated
 
-    # Samples have the same phases in all cycles; the last computed cycle has all of them.
+    # Samples have the same phases in all cycles; the last computed cycle has all of them from its start on, but perhaps
+    # not the one at its end.
     missing = case.samples[: len(samples)][np.isnan(samples[:, 0])]
-    counts = np.ceil((missing - end) / period - SAME_PHASE_TOL)
+    counts = np.floor((missing - end) / period + SAME_PHASE_TOL) + 1
     sources = np.searchsorted(known[:, 0], missing - counts * period - SAME_PHASE_TOL * period)
     filled = np.concatenate([known, repeat(known, sources, counts)])
 

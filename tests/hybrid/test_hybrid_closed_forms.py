@@ -124,7 +124,7 @@ def test_bonds_heal_at_rest_and_restart():
     """Dwell of bonds (eq. 2.10): their length after a rest, and the force F = mu N z/eps_0 of the restart."""
     for dwell, length in ((0.05, 0.696735), (0.2, 0.932332), (1.0, 0.999977)):
         # mu = N = eps_0 = 1, eps_k = 0.5, a_s/v_h = 10/s; no weakening, long after a steady slide at eps = 0.5.
-        numbers = (1.0, 1.0, 0.5, 1e-3, 1e9, 1e-4)
+        numbers = (1.0, 1.0, 0.5, 1e-3, 1e9, 1e-4, 0.0)
         law = LawNumbers("bonds", numbers, (1.0, 0.5, 0.5, 0.5), (1.0, 1.0, 1.0, 1.0))
         time = np.array([0.0, dwell])
         motion = runs.run_case(make_bench(law, time, np.zeros(2)))
@@ -137,7 +137,7 @@ def test_bonds_heal_at_rest_and_restart():
 def test_bonds_have_the_loop_of_dahl():
     """Closed loop of bonds of constant length: areas and tip of the exact solution, F_end = tanh(A/eps)."""
     law = LawNumbers(
-        "bonds", (1.0, 1.0, 1.0, 0.0, 1.0, 1.0), (1.0, 0.0, 0.0, 1.0), (1.0, 1e-2, 1e-4, 1.0)
+        "bonds", (1.0, 1.0, 1.0, 0.0, 1.0, 1.0, 0.0), (1.0, 0.0, 0.0, 1.0), (1.0, 1e-2, 1e-4, 1.0)
     )
     for amplitude, area in ((0.1, 1.328022e-3), (1.0, 0.953623), (5.0, 16.000363), (10.0, 36.0)):
         count = 2 * int(20 / amplitude) + 9
@@ -149,6 +149,28 @@ def test_bonds_have_the_loop_of_dahl():
         assert work == pytest.approx(exact, rel=1e-8)
         # The force mu N z/eps_0 at the tip is the second state of the law.
         assert abs(last.final.y[0, 3]) == pytest.approx(np.tanh(amplitude), rel=1e-9)
+
+
+def test_bonds_with_breakaway_break_only_after_their_play():
+    """Bonds with b = 0.4, mu = N = eps_0 = 1: F = q up to b, then 1 + (b - 1) exp(b - q); after a reversal F falls by 2 b
+    before bonds break again, then F = -1 + (F_1 + 1) exp(-x) with F_1 at the end of the play and the path x from there."""
+    play = 0.4
+    numbers = (1.0, 1.0, 1.0, 0.0, 1.0, 1.0, play)
+    law = LawNumbers("bonds", numbers, (1.0, 0.0, 0.0, 1.0, 0.0), (1.0, 1e-2, 1e-4, 1.0, 1.0))
+    top = 1.7
+    time = np.array([0.0, top, 2 * top])
+    samples = np.array([0.3, 1.2, top + 0.5, top + 1.5])
+    motion = runs.run_case(make_bench(law, time, np.array([0.0, top, 0.0]), samples=samples))
+    found = dict(zip(*forces(motion)[::2]))
+    peak = 1 + (play - 1) * np.exp(play - top)
+    low = peak - 2 * play
+    expected = (
+        0.3,
+        1 + (play - 1) * np.exp(play - 1.2),
+        peak - 0.5,
+        -1 + (low + 1) * np.exp(-(1.5 - 2 * play)),
+    )
+    assert [found[t] for t in samples] == pytest.approx(expected, abs=1e-8)
 
 
 def test_pressed_springs_equal_the_elastic_plastic_law_under_a_constant_load():

@@ -2,29 +2,40 @@
 
 The law is Coulomb's law, or a velocity-dependent force.
 
-`dynamics.smooth` integrates the motion, which is sampled at the steps of a march.
+The engine `hybrid` integrates the motion from event to event, which is sampled at the steps of a march.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...core import InitialState, Outcome
 from ...friction.grooves import Grooves
 from ...friction.path_work import sampled_work
-from ...friction.protocol import Element
+from ...hybrid import cases
+from ...hybrid import runs as engine
+from ...hybrid.drives import make_signal
+from ...hybrid.laws import grooves as rigid_law
+from ...hybrid.laws import smooth_grooves as speed_law
+from ...hybrid.records import (
+    N_FACE_INTEGRALS,
+    N_INTEGRALS,
+    Clock,
+    Memory,
+    Piece,
+    Setting,
+    State,
+    Status,
+)
 from ..ledger import Ledger
 from ..march.models import coulomb_model
 from ..march.run import MarchStatus
-from ..smooth import run as smooth
-from ..smooth.arrays import Counter, Scalar, Work
 from .climbing import FlankModel, GroovesRun, check_lifted_mass
 
 # Relative tolerance of an integration step, equal to that of a march with grooves.
 STEP_TOLERANCE = 1e-11
 # Largest displacement that the step-size control treats as rest, relative to wavelength/(2 pi).
 REST_RATIO = 1e-6
-LAW_MODULE = "dynamics.grooves.flank_kernels"
 # Ledger positions of the sums that `SampledRun._read_sums` returns.
 LEDGER_SUMS = [
     Ledger.DRIVE_WORK,
@@ -34,11 +45,6 @@ LEDGER_SUMS = [
     Ledger.N_ITERATIONS,
     Ledger.FRICTION_WORK,
 ]
-# Status of the march for each outcome of the integrated motion.
-STATUS_OF_OUTCOME = {
-    Outcome.LEAVES_GROOVES: MarchStatus.LEAVES_GROOVES,
-    Outcome.NOT_CONVERGED: MarchStatus.NOT_FINITE,
-}
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -47,14 +53,14 @@ class GroovesModel(FlankModel):
 
     - grooves, load: geometry and normal load [N]
     - static, kinetic: coefficients of friction [1]
-    - speed: v_0 [m/s] of eq. 2.4, static tanh(v/v_0) along the flank; None for Coulomb's law
+    - reference_speed: v_0 [m/s] of eq. 2.4, static tanh(v/v_0) along the flank; None for Coulomb's law
     """
 
     grooves: Grooves
     load: float
     static: float
     kinetic: float
-    speed: float | None = None
+    reference_speed: float | None = None
 
     @property
     def length(self) -> float:
@@ -64,7 +70,7 @@ class GroovesModel(FlankModel):
     @property
     def set_valued(self) -> bool:
         """Return whether the law sticks rigidly (set-valued Coulomb friction)."""
-        return self.speed is None
+        return self.reference_speed is None
 
     @property
     def runner(self):
@@ -111,114 +117,143 @@ class SampledRun(GroovesRun):
     def __init__(self, modes, drive, model, steps_per_cycle, travel, loops, start=None):
         super().__init__(modes, drive, model, steps_per_cycle, travel, loops, start)
         self.width += 1
-        self._start_smooth_motion()
+        self._start_motion()
         self.ledger[Ledger.DRIVE_WORK] += self.find_interface_energy()
 
-    def _start_smooth_motion(self) -> None:
-        """Start the Runge-Kutta integration from the present modal state, at the start of the drive signal."""
-        g = self.model.grooves
-        model = self.model
-        numbers = [
-            1.0,
-            model.load,
-            g.wave_number,
-            g.amplitude,
-            g.phase,
-            g.lifted_mass,
-            model.static,
-            model.kinetic,
-            model.speed or 0.0,
-        ]
-        element = Element(
-            LAW_MODULE, np.array(numbers), np.zeros(1), model.limit, state_scales=(np.inf,) * 3
-        )
-        self.smooth_motion = smooth.Motion(
-            self.modes, self.drive, element, 1.0, STEP_TOLERANCE, start=InitialState(*self.state)
-        )
-        self.smooth_motion.request_last_phasors(1)
-        n = self.modes.omega.size
-        size_floors = self.smooth_motion.arrays.work[Work.SIZES]
-        size_floors[:n] = REST_RATIO / g.wave_number
-        size_floors[n : 2 * n] = (
-            REST_RATIO / g.wave_number * self.smooth_motion.arrays.scalars[Scalar.FASTEST_RATE]
-        )
+    def _start_motion(self) -> None:
+        """Start the integration from the present modal state, at the present time."""
+        self._make_case()
+        start = cases.make_start(self.case.rig, (), InitialState(*self.state))
+        self.motion = cases.make_batch([replace(self.case, y=start)])[1]
+        self._enter_piece()
         self.counted_sums = self._read_sums()
 
+    def _make_case(self) -> None:
+        """Make the arrays of the engine for the present drive."""
+        model = self.model
+        make_law = (rigid_law if model.set_valued else speed_law).make_grooves
+        interface = cases.Interface(
+            make_law(model, model.grooves), cases.Load(model.load), self.modes.slide
+        )
+        signal = make_signal(self.drive)
+        sizes = cases.find_sizes(self.modes, signal, self.drive, InitialState(*self.state))
+        rest = REST_RATIO / model.grooves.wave_number
+        sizes = max(sizes[0], rest), max(sizes[1], 2 * np.pi / signal.period * rest)
+        options = cases.Options(self.drive.moving, rtol=STEP_TOLERANCE, max_steps=np.inf)
+        rig = cases.make_rig(self.modes, signal, [interface], sizes, options)
+        rig.settings[Setting.REPEAT] = 0  # a march finds by itself whether a motion repeats
+        self.case = cases.Case(rig, np.zeros(rig.scales.size), *np.zeros((3, 1)), 1)
+
+    def _enter_piece(self) -> None:
+        """Set the time of the motion and the piece of the drive there."""
+        clock = self.motion.clock[0]
+        clock[Clock.TIME] = self.done * float(self.prop.dt)
+        starts = self.case.rig.pieces[:, Piece.START]
+        clock[Clock.PIECE] = max(np.searchsorted(starts, clock[Clock.TIME], side="right") - 1, 0)
+
     def _read_sums(self) -> np.ndarray:
-        """Return the energy sums and the step count of the Runge-Kutta integration, (6,).
+        """Return the energy sums and the step count of the engine, (6,).
 
         They are drive work, viscous loss, sum of absolute drive works, friction loss [J], number of steps, and friction
         work [J].
         """
-        y = self.smooth_motion.arrays.state
-        counters = self.smooth_motion.record.counters
-        n = 2 * self.modes.omega.size
-        return np.array(
-            [y[-3], y[-2], counters[Counter.DRIVE_POWER], y[n], counters[Counter.ACCEPTED], y[-1]]
-        )
+        y = self.motion.y[0]
+        clock = self.motion.clock[0]
+        work, _, loss = y[-N_INTEGRALS - N_FACE_INTEGRALS : -N_INTEGRALS]
+        drive_work, viscous_loss = y[-N_INTEGRALS : -N_INTEGRALS + 2]
+        exchanged, steps = clock[[Clock.EXCHANGED, Clock.N_STEPS]]
+        return np.array([drive_work, viscous_loss, exchanged, loss, steps, work])
 
     def fork(self, drive):
         """Return an independent copy of the march that continues with another drive signal."""
         copied_run = super().fork(drive)
-        copied_run.smooth_motion = self.smooth_motion.fork(drive)
+        copied_run.motion = copy_motion(self.motion)
+        if drive is not self.drive:
+            copied_run._make_case()
+            copied_run._enter_piece()
         return copied_run
 
     def _slide_contact(self, path) -> None:
         """Do nothing, because the contact has no memory."""
 
+    def _sample_motion(self, times) -> tuple[np.ndarray, Status]:
+        """Continue the motion from the first to the last of several times [s].
+
+        Returns
+        -------
+        samples : (k, m) ndarray
+            Rows of `hybrid.records.Record.samples`; those of a motion that ends early are fewer, and the last is at its end.
+        status : Status
+        """
+        clock = self.motion.clock[0]
+        clock[Clock.SAMPLE] = 0
+        case = replace(self.case, ends=times[-1:], windows=np.full(1, -1.0), samples=times)
+        batch = engine.run_batch([case], states=self.motion)
+        count = int(clock[Clock.SAMPLE])
+        samples = batch.records.samples[0][: count + 1]
+        if count < len(times):
+            memory = self.motion.memory[0, 0]
+            face = memory[Memory.FORCE], self.model.load, memory[Memory.DIRECTION]
+            samples[count, :-2] = clock[Clock.TIME], *self.motion.y[0], *face
+        return samples, Status(int(clock[Clock.STATUS]))
+
     def _march_steps(self, count: int, rows) -> tuple:
-        """Fill the sample rows of a march from the Runge-Kutta integration.
+        """Fill the sample rows of a march from the integration by the engine `hybrid`.
 
         The rows have the friction loss of each step as an additional column.
         """
         n = self.modes.omega.size
-        dt = float(self.prop.dt)
-        times = (self.done + np.arange(count + 1)) * dt
-        motion = self.smooth_motion
-        if motion.time != times[0] or not np.array_equal(
-            motion.arrays.state[: 2 * n], self.state.ravel()
-        ):
-            self._start_smooth_motion()
-            motion = self.smooth_motion
-        start_motion = motion.fork(self.drive)
-        samples = motion.run_to(times[-1], times)
-        # A motion that ends early is sampled at its end.
-        if motion.outcome is not None and len(samples) <= count:
-            samples = np.concatenate([samples, motion.read_state()[0][None]])
-        output = samples[:, 1 : 1 + n] @ self.modes.output
-        exceeding = np.flatnonzero(np.abs(output) > self.travel)
+        times = (self.done + np.arange(count + 1)) * float(self.prop.dt)
+        clock = self.motion.clock[0]
+        is_same = np.array_equal(self.motion.y[0, : 2 * n], self.state.ravel())
+        if not is_same or clock[Clock.TIME] != times[0]:
+            self._start_motion()
+        before = copy_motion(self.motion)
+        samples, outcome = self._sample_motion(times)
+        status = MarchStatus.FINISHED
+        if outcome is Status.LEAVES_GROOVES:
+            status = MarchStatus.LEAVES_GROOVES
+        elif outcome is not Status.DONE:
+            status = MarchStatus.NOT_FINITE
+
+        # The motion is integrated again up to the last sample within the travel, so that sums and state belong to it.
+        exceeding = np.flatnonzero(np.abs(samples[:, 1 : 1 + n] @ self.modes.output) > self.travel)
         last = len(samples) - 1
-        status = STATUS_OF_OUTCOME.get(motion.outcome, MarchStatus.FINISHED)
         if exceeding.size:
             last = int(exceeding[0])
             status = MarchStatus.EXCEEDS_TRAVEL
-        # The motion is integrated again up to the last sample, so that sums
-        # and state belong to that sample.
         if 0 < last < len(samples) - 1:
-            motion = self.smooth_motion = start_motion
-            motion.run_to(times[last], times[: last + 1])
-        samples = samples[: last + 1]
-        work = np.diff(samples[:, -1])
-        slip_path = np.diff(samples[:, 2 * n + 1])
-        filled_rows = rows[: last + 1]
-        filled_rows[:, : 2 * n + 2] = samples[:, 1 : 2 * n + 3]
-        filled_rows[:, 2 * n + 2] = samples[:, 2 * n + 3]
-        filled_rows[:, 2 * n + 3] = samples[:, 2 * n + 4]
-        filled_rows[:, 2 * n + 4] = samples[:, 2 * n + 3]
-        filled_rows[:, 2 * n + 5] = samples[:, 2 * n + 5]
-        filled_rows[:-1, 2 * n + 4] = np.divide(
-            work, slip_path, out=samples[:-1, 2 * n + 3].copy(), where=slip_path != 0
-        )
-        filled_rows[:-1, 2 * n + 6] = work
-        filled_rows[:-1, 2 * n + 7] = work - np.diff(samples[:, 2 * n + 5])
-        self.state[:] = motion.arrays.state[: 2 * n].reshape(2, n)
+            self.motion = before
+            samples = self._sample_motion(times[: last + 1])[0]
+        self._fill_rows(rows[: last + 1], samples[: last + 1])
+
+        self.state[:] = self.motion.y[0, : 2 * n].reshape(2, n)
         sums = self._read_sums()
         self.ledger[LEDGER_SUMS] += sums - self.counted_sums
         self.ledger[Ledger.MAX_STORED] = max(
-            self.ledger[Ledger.MAX_STORED], motion.record.counters[Counter.MAX_STORED]
+            self.ledger[Ledger.MAX_STORED], self.motion.clock[0, Clock.STORED]
         )
         self.counted_sums = sums
         return last, status
+
+    def _fill_rows(self, rows, samples) -> None:
+        """Write the columns of the march from samples of the engine."""
+        n = self.modes.omega.size
+        y = samples[:, 1:-5]
+        force = samples[:, -5]
+        rests = (samples[:, -3] == 0) & self.model.set_valued
+        slide = y[:, :n] @ self.modes.slide
+        rate = np.where(rests, 0.0, y[:, n : 2 * n] @ self.modes.slide)
+        energy = self._find_interface_energies(slide, rate)
+        work = np.diff(y[:, -N_INTEGRALS - N_FACE_INTEGRALS])
+
+        rows[:, : 2 * n] = y[:, : 2 * n]
+        rows[:, 2 * n : 2 * n + 6] = np.stack([slide, rate, force, slide, force, energy], axis=1)
+        # The mean force over the path of a step; at rest the path is round-off.
+        path = np.where(rests[:-1] & rests[1:], 0.0, np.diff(slide))
+        np.divide(work, path, out=rows[:-1, 2 * n + 4], where=path != 0)
+        rows[:-1, 2 * n + 6] = work
+        rows[:-1, 2 * n + 7] = work - np.diff(energy)
 
     def _sampled_works(self, rows) -> np.ndarray:
         n = 2 * self.modes.omega.size
@@ -249,8 +284,16 @@ class SampledRun(GroovesRun):
 
     def find_interface_energy(self) -> float:
         """Return the energy [J] due to the height of the load and the motion of the lifted mass."""
+        return float(self._find_interface_energies(*(self.state @ self.modes.slide)))
+
+    def _find_interface_energies(self, slide, rate):
+        """Return these energies [J] at relative displacements [m] and velocities [m/s]."""
         g = self.model.grooves
-        z, v = self.state
-        q = float(self.modes.slide @ z)
-        rate = float(self.modes.slide @ v)
-        return float(self.model.load * g.height(q) + 0.5 * g.lifted_mass * (g.slope(q) * rate) ** 2)
+        return (
+            self.model.load * g.height(slide) + 0.5 * g.lifted_mass * (g.slope(slide) * rate) ** 2
+        )
+
+
+def copy_motion(motion: State) -> State:
+    """Return an independent copy of the arrays of a motion."""
+    return State(*(array.copy() for array in motion))

@@ -60,7 +60,6 @@ class BoucWen:
             self.static * load,
             self.length,
             form="flow",
-            state_scales=(1.0,),
         )
 
     def _half_loop(self, w) -> _HalfLoop:

@@ -46,7 +46,6 @@ class LuGre:
             self.static / self.stiffness,
             is_bounded=False,
             form="flow",
-            state_scales=(self.static / self.stiffness,),
         )
 
     def limit(self, speed):

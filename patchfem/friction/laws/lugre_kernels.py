@@ -27,9 +27,6 @@ from .exponential_kernels import exp_minus
 
 # Units of `numbers`, for batches that scale time and force
 NUMBER_UNITS = "N/m N N m/s N_s/m N_s/m"
-# Ratio of the velocity to v_s from which the limit is the kinetic force; exp(-36) is below
-# round-off
-MAX_STRIBECK_RATIO = 6.0
 # Smallest friction limit relative to the static force; z relaxes over limit/stiffness, which must
 # not be 0
 MIN_LIMIT_RATIO = 1e-9
@@ -173,43 +170,3 @@ def relax_stretch(numbers, stretch, increment, dt):
     return RelaxedStretch(
         relaxed.end, relaxed.end_by_stretch, relaxed.end_by_increment, relaxed.end_by_time
     )
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def start_motion(numbers, memory, direction, states):
-    """Initialize the bristle stretch, and return the path at which its rate has a kink.
-
-    The limit increases below MAX_STRIBECK_RATIO v_s; a step that starts above would not resolve this increase.
-
-    Returns
-    -------
-    path, velocity : float
-        Path [m] to the next kink, inf for none, and velocity [m/s] of a kink, 0 for none.
-    """
-    states[0] = memory[0]
-    return inf, MAX_STRIBECK_RATIO * numbers[4] if numbers[3] > numbers[2] else 0.0
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def state_rates(numbers, memory, motion, increment, velocity, states, rates):
-    """Write dz/dt [m/s] and return the force [N].
-
-    Returns
-    -------
-    float
-    """
-    rates_at_state = rate_equation(numbers, states[0], velocity, motion[0])
-    rates[0] = rates_at_state.stretch_rate * velocity
-    return rates_at_state.force
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def end_motion(numbers, memory, motion, increment, velocity, states):
-    """Store the final stretch; return nan, so that the engine computes the loss from the work.
-
-    Returns
-    -------
-    float
-    """
-    memory[0] = states[0]
-    return nan

@@ -52,7 +52,6 @@ def points_element(law: Bonds, area, sigma, pattern=None) -> Element:
             length=law.length,
             is_bounded=False,
             form="points",
-            state_scales=_state_scales(law),
         )
     x, sigma_on_lower = (np.asarray(part, float) for part in pattern)
     head = [0.0, area.size, law.length]
@@ -67,18 +66,6 @@ def points_element(law: Bonds, area, sigma, pattern=None) -> Element:
         is_bounded=False,
         form="places",
     )
-
-
-def _state_scales(law: Bonds) -> tuple | None:
-    """Return typical magnitudes of the state variables of bonds.
-
-    They are () for a constant length, and None if rates cannot integrate the law.
-    """
-    if not law.has_growth:
-        return ()
-    if law.breakaway:
-        return None
-    return law.length, 1.0, law.length, law.length**2
 
 
 def unpack_bonds(element: Element, memory) -> np.ndarray:

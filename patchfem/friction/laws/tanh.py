@@ -30,7 +30,6 @@ class TanhLaw(LastTraction):
             np.zeros(0),
             self.static * load,
             form="speed",
-            state_scales=(),
         )
 
     def limit_fraction(self, dq, dt):

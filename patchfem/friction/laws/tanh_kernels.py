@@ -102,37 +102,3 @@ def read_memory(numbers, memory, rel_disp, velocity):
     Reading
     """
     return Reading(numbers[1] * tanh(velocity * numbers[2]), 0.0, rel_disp)
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def start_motion(numbers, memory, direction, states):
-    """Return an infinite path, because the rates have no kink; the law has no state to set.
-
-    Returns
-    -------
-    path, velocity : float
-        Path [m] to the next kink, inf for none, and velocity [m/s] of a kink, 0 for none.
-    """
-    return inf, 0.0
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def state_rates(numbers, memory, motion, increment, velocity, states, rates):
-    """Return the force [N] at a velocity; there are no states.
-
-    Returns
-    -------
-    float
-    """
-    return numbers[1] * tanh(velocity * numbers[2])
-
-
-@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
-def end_motion(numbers, memory, motion, increment, velocity, states):
-    """Return nan, so that the engine computes the dissipated energy from the work; there is no memory.
-
-    Returns
-    -------
-    float
-    """
-    return nan

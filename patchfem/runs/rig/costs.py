@@ -4,12 +4,12 @@ In: a Model. Out: CPU times, numbers of steps, `MemoryPart`s, and reasons for ti
 of an exact solution.
 
 The cost of an event-driven run is counted in time intervals of one power series, that of a time integration or of the
-smooth engine in steps; `cost_model` has the CPU time of each.
+engine `hybrid` in steps; `cost_model` has the CPU time of each.
 """
 
 from functools import lru_cache
 from math import inf, log2, pi, sqrt
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,21 +17,16 @@ from ... import cost_model
 from ...core import Missing
 from ...dynamics import checkpoint
 from ...dynamics.events import modal_system
-from ...effects import law_has_trait
+from ...effects import law_has_trait, law_supports, needs_bond_list
 from ...friction import record
-from ...friction.bonds import engines
-from ...friction.laws import stretch
+from ...hybrid import laws as hybrid_laws
 from ...model import patch as patch_model
 from ...model.model import Model
 from ...structure.drive_sizes import (
-    find_drive_omega,
     find_max_acceleration,
     find_max_frequency_ratio,
 )
 from ..sizes import MemoryPart
-
-if TYPE_CHECKING:
-    from ...friction.protocol import Element
 
 # Largest CPU time [s] of an exact solution if time integration, which has discretization errors,
 # takes less.
@@ -48,27 +43,27 @@ MERGE_TOLERANCE = 1e-3  # Smallest tolerance at which cells are merged MAX_MERGE
 # Largest phase [rad] of the fastest vibration in a time interval, as in
 # `dynamics.events.series_kernels`.
 MAX_INTERVAL_PHASE = 2.0
-# Keys of [accuracy] that select constant time steps instead of the smooth engine.
+# Keys of [accuracy] that select constant time steps instead of the engine `hybrid`.
 MARCH_SETTINGS = (
     "steps_per_cycle",
     "tail",
     "merge",
     "shear_modes",
 )
-# Largest ratio of the steps of the smooth engine to constant time steps at which the smooth engine
-# is used.
-MAX_STEP_RATIO = 3.5
+HYBRID_RUNS = 1.7  # Steps of a run and its comparison run, relative to those of the run.
+MIN_STEPS = 12  # Smallest number of steps of `hybrid` per shortest period of the drive.
+STEPS_PER_PHASE = 0.8  # Steps of `hybrid` per radian of the fastest vibration.
+STEPS_PER_EVENT = 3.0
+MAX_STEP_RELAXATION_TIMES = 4.0  # Largest stable step of `hybrid` in relaxation times of a law.
 # A speed-dependent law is stiff for the fraction exp(STIFF_TIME_EXPONENT (1 - r)) of the time,
 # where r is the ratio of drive force to friction limit. Fractions of 0.5 at r = 1.07 and 0.1 at r =
 # 1.26 were measured.
 STIFF_TIME_EXPONENT = 9.0
-# Largest stable step in relaxation lengths of a state variable of the friction law.
-MAX_STEP_RELAXATION_LENGTHS = 3.0
 # Engines whose number of stored samples per cycle does not depend on their steps.
 RESAMPLING_ENGINES = (
     "exact",
     "piecewise",
-    "smooth",
+    "hybrid",
 )
 SAMPLES_PER_CYCLE = 400  # Number of samples of a stored cycle, as in `dynamics.cycles`.
 # Expected number of reversals per cycle, which are also stored for the cycles before the window.
@@ -97,12 +92,12 @@ class HistoryBytes(NamedTuple):
 
 
 EVENT_HISTORY = HistoryBytes(32.0, 85.0, 6.0)
-SMOOTH_HISTORY = HistoryBytes(80.0, 140.0, 16.0)
+HYBRID_HISTORY = HistoryBytes(80.0, 140.0, 16.0)
 MARCH_HISTORY = HistoryBytes(45.0, 50.0, 18.0)
 HISTORIES = {
     "exact": EVENT_HISTORY,
     "piecewise": EVENT_HISTORY,
-    "smooth": SMOOTH_HISTORY,
+    "hybrid": HYBRID_HISTORY,
     "march": MARCH_HISTORY,
 }
 
@@ -234,9 +229,17 @@ def _estimate_extra_interval_seconds(model: Model) -> float:
     ) + cost_model.PIECE_INTERFACE_SECONDS * max(0, len(modes.interfaces) - 1)
 
 
-def estimate_march_seconds(model: Model) -> float:
-    """Estimate the CPU time [s] of a time integration and of the coarse runs for its error."""
-    count = estimate_element_count_and_stiffness(model)[0]
+def estimate_march_seconds(model: Model, count: int | None = None) -> float:
+    """Estimate the CPU time [s] of a time integration and of the coarse runs for its error.
+
+    Parameters
+    ----------
+    model : Model
+    count : int, optional
+        Number of friction elements; default: that of elastic-plastic elements or rigid interfaces.
+    """
+    if count is None:
+        count = estimate_element_count_and_stiffness(model)[0]
     n_interfaces = len(model.rig.friction.interfaces)
     step = cost_model.STEP_SECONDS + cost_model.STEP_ELEMENT_SECONDS * count
     return (
@@ -315,93 +318,102 @@ def count_history_memory(model: Model, numerics, history: HistoryBytes) -> tuple
     )
 
 
-def explain_time_steps_over_smooth_engine(model: Model) -> str:
-    """Return why time integration is chosen over the smooth engine, or "" if it is not."""
-    rig = model.rig
+def explain_time_steps_over_hybrid(model: Model) -> str:
+    """Return why time integration is chosen over the engine `hybrid`, or "" if it is not.
+
+    The reason is a setting of the time integration in the scene, a law without a finite number of states, or that the
+    steps of `hybrid` cost more CPU time than those of the time integration and than its smaller errors are worth.
+    """
     accuracy = model.accuracy
+    friction = model.friction
     for key in MARCH_SETTINGS:
         if getattr(accuracy, key) is not None:
-            return f"with accuracy.{key}"
+            return f"accuracy.{key} is set"
     if accuracy.quadrature not in ("auto", "recursion"):
-        return "with accuracy.quadrature"
-    if len(rig.modes.interfaces) > 1:
-        return "with other forces"
-    if model.side == "lower" and law_has_trait(model.friction.law, "bonds"):
-        return "under a pressure that stays"
-    element = make_smooth_element(model)
-    if element is None or element.state_scales is None:
-        return f"for law '{model.friction.law}'"
-    if estimate_smooth_steps(model, element) > MAX_STEP_RATIO * max(steps_per_cycle(model), 400):
-        return "in so many steps"
-    return ""
+        return "accuracy.quadrature is set"
+    has_pieces = law_supports(friction, "exact") or law_supports(friction, "pieces")
+    if has_pieces or friction.law not in hybrid_laws.LAW_OF_NAME:
+        return f"law '{friction.law}' has no rates"
+    if law_has_trait(friction.law, "bonds"):
+        if needs_bond_list(friction):
+            return "the bonds have no finite number of states"
+        if model.side == "lower":
+            return "the pressure stays on the lower piece"
+    is_resolved = required_steps_per_cycle(model) <= MAX_MARCH_STEPS
+    seconds = MAX_EXACT_SECONDS_OVER_MARCH if is_resolved else MAX_EXACT_SECONDS_UNRESOLVED
+    if estimate_hybrid_seconds(model) <= max(seconds, estimate_march_seconds(model, 1)):
+        return ""
+    return "time steps are faster than steps from event to event"
 
 
-def make_smooth_element(model: Model) -> "Element | None":
-    """Return the friction law as an Element for the smooth engine; None if not supported.
+def estimate_hybrid_steps(model: Model) -> float:
+    """Estimate the number of steps per cycle of the engine `hybrid`.
 
-    It is None if the bonds are summed in a list, or if the law averages the pressure over all
-    points.
-    """
-    f = model.friction
-    load = model.nominal_load
-    if law_has_trait(f.law, "averaged"):
-        return None
-    if not law_has_trait(f.law, "bonds"):
-        return record.make_law(f, load).element(load)
-    if engines.unsupported_reason("recursion", f.reading, 1.0 if f.order is None else f.order):
-        return None
-    return stretch.points_element(model.bonds, [1.0], [load])
-
-
-def estimate_smooth_steps(model: Model, element: "Element") -> float:
-    """Estimate the number of steps per cycle of the smooth engine.
-
-    It is the sum of steps for the phase of the fastest motion, for each reversal, and for the
-    stability of state variables with a short relaxation length.
+    It is the sum of steps for the phase of the fastest motion or the rows of the drive, for the decay of modes and law,
+    which the explicit method follows, and for the reversals.
     """
     rig = model.rig
-    modes = model.rig.modes
-    omega = find_drive_omega(rig.drive.signal)
+    modes = rig.modes
     period = rig.drive.signal.period
-    damping = modes.damping_matrix
-    max_rate = max(
-        float(modes.omega.max()),
-        float(np.abs(damping).sum(axis=1).max()),
-        omega * find_max_frequency_ratio(rig.drive.signal),
-    )
+    friction = model.friction
+    limit = friction.static * model.nominal_load
     inverse_mass = float((modes.slide**2).sum()) / modes.mass
-    stiff_rate = 0.0
-    if not element.length:
-        slope = element.limit / model.friction.reference_speed
-        stiff_rate = slope * inverse_mass * estimate_stiff_time_fraction(model, element)
-    path = 4 * model.speed_scale / omega
-    states = path / element.length if element.state_scales and element.length else 0.0
-    growth_length = (
-        model.friction.slip_growth if law_has_trait(model.friction.law, "bonds") else None
-    )
-    if growth_length:
-        states = max(states, path / growth_length)
+    damping = float(np.abs(modes.damping_matrix).sum(axis=1).max())
+    shortest = find_max_frequency_ratio(rig.drive.signal)
+    n_rows = 0 if rig.drive.signal.segments else len(rig.drive.signal.breaks) / rig.drive.cycles
+
+    rate = 0.0
+    stiffness = friction.stiffness or 0.0
+    if friction.reference_speed:
+        slope = limit / friction.reference_speed * inverse_mass
+        rate = slope * _estimate_stiff_time_fraction(model, limit)
+    elif limit and (friction.bond_length or stiffness):
+        length = friction.bond_length or limit / stiffness
+        stiffness = limit / length
+        rate = 4 * rig.displacement_scale / (period * min(length, friction.slip_growth or inf))
+    rate = max(rate, ((friction.micro_damping or 0.0) + (friction.viscous or 0.0)) * inverse_mass)
+    omega = sqrt(float(modes.omega.max()) ** 2 + stiffness * inverse_mass)
     return (
-        24 + 1.2 * max_rate * period + (states + stiff_rate * period) / MAX_STEP_RELAXATION_LENGTHS
+        max(n_rows or MIN_STEPS * shortest, STEPS_PER_PHASE * omega * period)
+        + (rate + damping) * period / MAX_STEP_RELAXATION_TIMES
+        + 2 * STEPS_PER_EVENT * shortest
     )
 
 
-def estimate_stiff_time_fraction(model: Model, element: "Element") -> float:
+def estimate_hybrid_seconds(model: Model) -> float:
+    """Estimate the CPU time [s] of a run of the engine `hybrid` and its comparison run."""
+    each = (
+        cost_model.HYBRID_STEP_SECONDS
+        + cost_model.HYBRID_MODES_SECONDS * model.rig.modes.omega.size**2
+    )
+    return HYBRID_RUNS * each * estimate_hybrid_steps(model) * model.rig.drive.cycles
+
+
+def refuse_long_hybrid_run(model: Model) -> None:
+    """Raise Missing if a run of the engine `hybrid` would take more than the allowed CPU time."""
+    seconds = estimate_hybrid_seconds(model)
+    if seconds > MAX_EXACT_SECONDS:
+        raise Missing(
+            f"the motion from event to event (about {estimate_hybrid_steps(model):.2g} steps per cycle, set by the fastest "
+            f"free vibration and the friction law) would need a computing time of about {seconds:.0f} s, more than the "
+            f'limit of {MAX_EXACT_SECONDS:.0f} s; lower drive.cycles, or use accuracy.method = "march"',
+            "",
+        )
+
+
+def _estimate_stiff_time_fraction(model: Model, limit: float) -> float:
     """Estimate the fraction of time in which a speed-dependent law makes the equations stiff.
 
-    It is 1 if there are several modes or if the drive force is below the friction limit, and
-    smaller otherwise.
+    It is 1 if there are several modes or if the drive force is below the friction limit, and smaller otherwise.
+
+    Parameters
+    ----------
+    model : Model
+    limit : float
+        Largest friction force [N].
     """
-    rig = model.rig
     modes = model.rig.modes
-    if modes.omega.size > 1 or not modes.slide[0]:
+    if modes.omega.size > 1 or not modes.slide[0] or not limit:
         return 1.0
-    if not element.limit:
-        return 0.0
-    r = (
-        modes.mass
-        * find_max_acceleration(rig.drive.signal)
-        * abs(modes.base[0] / modes.slide[0])
-        / element.limit
-    )
-    return min(1.0, float(np.exp(STIFF_TIME_EXPONENT * (1 - r))))
+    push = find_max_acceleration(model.rig.drive.signal) * abs(modes.base[0] / modes.slide[0])
+    return min(1.0, float(np.exp(STIFF_TIME_EXPONENT * (1 - modes.mass * push / limit))))

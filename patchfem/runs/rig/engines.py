@@ -14,6 +14,7 @@ import numpy as np
 
 from ...dynamics.events.elements import CELL_MERGES
 from ...effects import NO_WAVEFORM, law_has_trait
+from ...hybrid import runs as hybrid_runs
 from ...model.model import Model
 from ...response.coarser import CoarserRuns, second_order_errors
 from ...response.errors import (
@@ -30,7 +31,7 @@ from ..patch import faces
 from .costs import (
     explain_time_steps_over_element_events,
     explain_time_steps_over_events,
-    explain_time_steps_over_smooth_engine,
+    explain_time_steps_over_hybrid,
     intervals_per_cycle,
 )
 
@@ -348,8 +349,7 @@ def _estimate_bond_sum_errors(model: Model, patch, fraction: float, values: dict
 def _list_engine_errors(model: Model, numerics, patch, coarse, solution) -> list:
     """Return the error estimates that the engine provides, in the form of comparison runs.
 
-    For harmonic balance these are the residual and the change with twice the harmonics, for the
-    smooth engine the errors of the samples.
+    For harmonic balance these are the residual and the change with twice the harmonics.
     """
     return [CoarserRuns((), lambda fine: {name: solution.errors.get(name, 0.0) for name in fine})]
 
@@ -362,19 +362,20 @@ def _list_steady_space_runs(model: Model, numerics, patch, coarse, solution) -> 
     return coarser_runs
 
 
-# Tolerance factor for the time steps of the coarse run of the smooth engine.
-STEP_TOLERANCE_FACTOR = 30.0
-estimate_smooth_errors = partial(convergence_errors, ratio=STEP_TOLERANCE_FACTOR)
+def _list_hybrid_time_runs(model: Model, numerics) -> list:
+    """List the comparison run of the engine `hybrid` with larger steps."""
+    coarse = replace(
+        numerics,
+        local=hybrid_runs.COARSE * numerics.local,
+        steps=numerics.steps / hybrid_runs.COARSE_STEP,
+    )
 
+    def find_errors(values: dict, coarse_values: dict) -> dict:
+        """Return the errors of the measures that both runs have."""
+        shared = {name: value for name, value in values.items() if name in coarse_values}
+        return hybrid_runs.estimate_errors(shared, coarse_values, numerics.local)
 
-def _list_smooth_time_runs(model: Model, numerics) -> list:
-    """List the comparison run of the smooth engine with a larger step tolerance.
-
-    A step may have STEP_TOLERANCE_FACTOR times the error, and the error of a run is proportional to
-    that of its steps.
-    """
-    wider = replace(numerics, local=numerics.local * STEP_TOLERANCE_FACTOR)
-    return [CoarserRuns((wider,), estimate_smooth_errors)]
+    return [CoarserRuns((coarse,), find_errors)]
 
 
 EXACT = Engine(
@@ -391,15 +392,13 @@ PIECES = Engine(
     _list_element_space_runs,
     why_not_cheapest=explain_time_steps_over_element_events,
 )
-SMOOTH = Engine(
-    "smooth",
+HYBRID = Engine(
+    "hybrid",
     "",
-    _list_smooth_time_runs,
-    _list_engine_errors,
-    why_not_cheapest=explain_time_steps_over_smooth_engine,
-    min_relative_error=3e-8,
+    _list_hybrid_time_runs,
+    _no_comparison_runs,
+    why_not_cheapest=explain_time_steps_over_hybrid,
     max_balance_error=None,
-    summary_numbers=("iterations",),
 )
 MARCH = Engine(
     "march",
@@ -417,12 +416,12 @@ HARMONIC = Engine(
     max_balance_error=None,
     finds_periodic_motion=True,
 )
-ENGINES = {engine.name: engine for engine in (EXACT, PIECES, SMOOTH, MARCH, HARMONIC)}
+ENGINES = {engine.name: engine for engine in (EXACT, PIECES, HYBRID, MARCH, HARMONIC)}
 # Engines in the order of preference for method = "auto".
 AUTOMATIC_ENGINES = (
     EXACT,
     PIECES,
-    SMOOTH,
+    HYBRID,
     MARCH,
 )
 

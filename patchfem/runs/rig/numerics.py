@@ -9,10 +9,11 @@ from math import ceil, sqrt
 import numpy as np
 
 from ...effects import law_has_trait
+from ...hybrid import cases
 from ...model.model import Model
 from ...structure.drive_sizes import count_repeat_cycles, find_min_decay_rate, is_sinusoidal
 from .costs import MARCH_SETTINGS, count_cell_merges, steps_per_cycle
-from .engines import MARCH, PIECES, SMOOTH, choose_engine
+from .engines import HYBRID, MARCH, PIECES, choose_engine
 
 # Largest fraction of a cycle by which round-off changes an integer number of cycles, so that a
 # record of 30 periods has 30 cycles.
@@ -28,14 +29,14 @@ class Numerics:
     """Numerical settings of a run of a rig.
 
     - engine: name of the engine.
-    - steps: time steps per cycle.
+    - steps: time steps per cycle; of the engine `hybrid` the smallest number per shortest period of the drive.
     - cycles, window: number of cycles of the run, and of the window at its end.
     - shear_modes: number of shear modes; None: set by the tolerance.
     - per_point: whether every node has its own bonds.
     - pinned: names of settings that the scene fixes.
     - choice: method of bond summation; None: set by the tolerance and the steps.
     - whole: whether the run stores the histories before the window; coarse runs may omit them.
-    - local: largest relative error per step of the smooth engine.
+    - local: largest relative error per step of the engine `hybrid`.
     - pairs: how many times neighbouring slider cells are merged in pairs.
     - joined: (number of cells that are merged into one, index of the first merged cell), or ().
     - other_rig: index of the rig with other modes of a reduced structure, or None.
@@ -64,8 +65,8 @@ class Numerics:
     def finer(self):
         """Return finer settings for the next run.
 
-        If cells are merged, there are four times as many cells. Otherwise, the smooth engine has a
-        hundredth of the step error, and other engines have twice as many steps.
+        If cells are merged, there are four times as many cells. Otherwise, the engine `hybrid`
+        has a hundredth of the step error, and other engines have twice as many steps.
         """
         if self.pairs:
             return replace(self, pairs=max(0, self.pairs - 2))
@@ -119,8 +120,9 @@ def choose_numerics(model: Model) -> Numerics:
         model.side == "lower",
         frozenset(pinned),
     )
-    if engine is SMOOTH:
-        return replace(numerics, local=choose_step_tolerance(accuracy.tolerance))
+    if engine is HYBRID:
+        local = choose_step_tolerance(accuracy.tolerance)
+        return replace(numerics, local=local, steps=cases.MIN_STEPS)
     if engine is PIECES:
         return replace(numerics, pairs=count_cell_merges(model))
     if engine is MARCH and accuracy.steps_per_cycle is None:
@@ -132,11 +134,8 @@ def choose_numerics(model: Model) -> Numerics:
 
 
 def choose_step_tolerance(tolerance: float) -> float:
-    """Return the largest relative error per step of the smooth engine.
-
-    It is at most 1e-9, because the energy balance requires this accuracy.
-    """
-    return float(np.clip(1e-3 * tolerance, 1e-12, 1e-9))
+    """Return the largest relative error per step of the engine `hybrid`."""
+    return float(np.clip(1e-5 * tolerance, 1e-12, 1e-8))
 
 
 def round_steps_to_run_end(steps: int, cycles: float) -> int:

@@ -267,7 +267,7 @@ def _is_finest(model, run: RefinedRun, displacement_errors: list) -> bool:
     """
     numerics = run.numerics
     if numerics.local:
-        return numerics.local < MIN_STEP_ERROR
+        return 0.01 * numerics.local < MIN_STEP_ERROR
     steps = numerics.steps * 2
     book = run.solution.book
     return (

@@ -4,7 +4,7 @@ In: a Model, its Numerics and its Patch. Out: a Solution. `engines` lists what e
 compute.
 """
 
-from . import bond_lists, costs, event_driven, march, smooth
+from . import bond_lists, costs, event_driven, event_to_event, march
 from .solution import Solution, replace_output_by_gauge
 from .steady import steady
 
@@ -29,8 +29,8 @@ def solve_rig(model, numerics, patch, frames: int = 0, say=None, progress=None) 
     """
     if numerics.engine in ("exact", "piecewise"):
         run = event_driven.run_event_driven
-    elif numerics.engine == "smooth":
-        run = smooth.integrate_smooth_motion
+    elif numerics.engine == "hybrid":
+        run = event_to_event.integrate_from_event_to_event
     elif numerics.engine == "march":
         run = march.march_in_time
     else:
@@ -45,5 +45,7 @@ def refuse_long_run(model, numerics) -> None:
     """Raise Missing if a run would take too much CPU time."""
     if numerics.engine in ("exact", "piecewise"):
         costs.refuse_long_event_driven_run(model)
+    elif numerics.engine == "hybrid":
+        costs.refuse_long_hybrid_run(model)
     elif numerics.engine == "march":
         bond_lists.refuse_long_bond_list(model, numerics)

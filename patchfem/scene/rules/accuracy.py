@@ -28,7 +28,7 @@ class SettingScope(NamedTuple):
 
 # Scope in which each numerical setting (a key of [accuracy]) has an effect.
 SETTING_SCOPES: dict[str, SettingScope] = {
-    "steps_per_cycle": SettingScope("bench rig linear", "auto bench march smooth harmonic"),
+    "steps_per_cycle": SettingScope("bench rig linear", "auto bench march harmonic"),
     "tail": SettingScope("bench rig", "auto bench march", "bonds"),
     "merge": SettingScope("bench rig", "auto bench march", "bonds"),
     "harmonics": SettingScope("rig", "harmonic"),

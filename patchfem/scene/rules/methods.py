@@ -96,7 +96,7 @@ FEATURE_FINDERS = {
 ENGINE_SUPPORT = {
     "exact": EngineSupport("exact", "no-law yaw faces levels"),
     "piecewise": EngineSupport("pieces", "parts faces levels"),
-    "smooth": EngineSupport("", ""),
+    "hybrid": EngineSupport("", ""),
     "march": EngineSupport("", " ".join(FEATURE_FINDERS)),
     "harmonic": EngineSupport("", "no-law parts grooves spring faces levels"),
 }

@@ -45,7 +45,8 @@ SIZES = {  # Constant -> description of the quantity that it bounds.
     "runs.rig.costs.MAX_MARCH_STEPS": "steps per cycle of a time integration, if the tolerance determines the steps",
     "dynamics.march.capacity.MAX_ENTRIES": "number of entries in a list of bonds",
     "friction.bonds.parameters.MAX_LIST_SECONDS": "estimated computing time of a run with a list of bonds [s]",
-    "runs.rig.costs.MAX_EXACT_SECONDS": "estimated time to compute a whole motion by the event-to-event method [s]",
+    "runs.rig.costs.MAX_EXACT_SECONDS": "estimated time to compute a whole motion from event to event, with "
+    "method `exact` or by engine `hybrid` [s]",
     "structure.drive_sizes.MAX_STORED_SAMPLES": "number of samples at equal spacing that are stored of a whole release, at "
     "least 20 per cycle; of a longer release turning points and the last cycles",
     "dynamics.checkpoint.MAX_EARLY_SAMPLES": "number of samples stored before the last cycles; longer records are "
