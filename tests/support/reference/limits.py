@@ -140,7 +140,7 @@ def text() -> str:
         _format_bounds(),
         "## Sizes",
         _format_sizes(),
-        "A run is refused if the memory that `patchfem plan` estimates for this run exceeds the memory limit of "
+        "A run is refused if the memory that its unknowns and histories need exceeds the memory limit of "
         "the process. The message names the key whose value requires so much memory.",
         "## What the models leave out",
         LEFT_OUT.strip(),
