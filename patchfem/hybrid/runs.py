@@ -32,7 +32,9 @@ COARSE = 30.0  # ratio of the step tolerances of the comparison run and of the r
 COARSE_STEP = 2.0  # ratio of their longest steps
 ERROR_FACTOR = 3.0  # safety; on 150 random rigs 97 % of the errors of each measure hold, with 1 instead of 3 94 %
 ERROR_FLOOR = 10.0  # smallest error of a value, relative to the step tolerance
-N_EVENTS = 200_000  # events that a single run stores
+N_EVENTS = 200_000  # events that a single run stores at most
+MIN_EVENTS = 1000  # events for which it has room in any case, with EVENTS_PER_PART for each cycle and piece of the drive
+EVENTS_PER_PART = 100
 MAX_REPEATED = 1000  # cycles whose events are repeated where the motion repeats
 SAME_PHASE_TOL = 1e-6  # in cycles
 EVENT_NAMES = {
@@ -82,7 +84,7 @@ class Motion:
     - extremes (c, 2), phasors (c,): smallest and largest output [m] and phasor of the output [m] of each cycle
     - rows (k, m): stored samples and events in the order of time, see `records.Record`; an event follows a sample at
       its time
-    - event_rows (e, m): the first N_EVENTS events
+    - event_rows (e, m): the first events, see N_EVENTS
     - time: end of the motion [s]
     - repeats: whether the motion repeats after each cycle before the last ones
     - final: arrays of the engine at the end
@@ -307,7 +309,9 @@ def run_case(
     fills_histories : bool
         Whether samples and events of cycles are added that repeat an earlier one and are not computed.
     """
-    batch = run_batch([case], N_EVENTS, None if start is None else _restart(case, start))
+    n_parts = case.ends.size + len(case.rig.pieces)
+    n_events = min(N_EVENTS, MIN_EVENTS + EVENTS_PER_PART * n_parts)
+    batch = run_batch([case], n_events, None if start is None else _restart(case, start))
     _, states, records = batch[:3]
     clock = states.clock[0]
     status = Status(int(clock[Clock.STATUS]))
@@ -318,7 +322,7 @@ def run_case(
 
     cycles = records.cycles[0, :n_cycles]
     samples = records.samples[0][: int(clock[Clock.SAMPLE])]
-    event_rows = records.events[0][: min(int(clock[Clock.N_EVENTS]), N_EVENTS)]
+    event_rows = records.events[0][: int(clock[Clock.N_EVENTS])]
     repeats = bool(cycles[:, Cycle.REPEATS].any())
     if repeats and fills_histories and len(samples):
         samples, event_rows = _fill_repeated_cycles(case, cycles, samples, event_rows)

@@ -192,3 +192,24 @@ def test_exact_slip_starts_do_not_depend_on_round_off():
         result = pf.run(REVERSING_HYSTERESIS, **{"accuracy.tolerance": tolerance})
         phases.append(result.measures["slip_start_phase"])
     assert phases[0].value == pytest.approx(phases[1].value, abs=phases[0].error + phases[1].error)
+
+
+def test_exact_run_that_ends_in_first_cycle_has_rising_times():
+    """A run that reaches the travel in its first cycle, with an event of the growing bonds at t = 0, has samples at
+    different times and the travel as its largest output."""
+    text = SCENE.replace(CONSTANT_BONDS, GROWING_BONDS)
+    result = pf.run(text.replace("[structure]\n", '[structure]\ntravel = "20 um"\n'))
+    assert (result.extra["engine"], result.outcome) == ("hybrid", "exceeds_travel")
+    for histories in (result.window, result.response):
+        assert (np.diff(histories.time) > 0).all()
+    assert np.abs(result.window.output).max() == pytest.approx(20e-6, rel=1e-9)
+
+
+def test_exact_part_of_a_cycle_does_not_change_a_steady_motion():
+    """Half a cycle more changes neither the amplitude nor the loop of a motion that repeats, and no measure is of the part
+    of a cycle alone."""
+    text = SCENE.replace("cycles = 30", "cycles = 300").replace("damping = 0.003", "damping = 0.05")
+    whole, longer = (pf.run(text, **{"drive.cycles": cycles}) for cycles in (300, 300.5))
+    for name in ("relative_displacement_amplitude", "loop_area", "friction_force_peak"):
+        one, other = whole.measures[name], longer.measures[name]
+        assert abs(one.value - other.value) <= one.error + other.error, name

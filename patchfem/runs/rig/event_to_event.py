@@ -15,8 +15,8 @@ from ...core import IntegratedMeasures, NotConverged, Outcome, Response
 from ...hybrid import cases, laws
 from ...hybrid import runs as engine
 from ...hybrid.records import Status
-from ...response.measures import MIN_SLIDE_RANGE
-from ...response.rows import ROWS_NEEDING_RUN
+from ...response.measures import MIN_SLIDE_RANGE, slip_round_off
+from ...response.rows import ROWS_NEEDING_RUN, find_definition
 from ...structure.drive_sizes import choose_samples_per_cycle, is_sinusoidal
 from .evaluation import RunEvaluator, compute_sampled_work, compute_work_check, thin_samples
 from .interface import make_contact
@@ -28,7 +28,11 @@ MAX_EARLY_SAMPLES = 8_000  # samples of equal distances before the last cycles
 EARLY_SAMPLES_PER_CYCLE = 40
 MIN_SAMPLED_CYCLES = 2.0  # cycles at the end that have as many samples as the window
 SAME_TIME_TOL = 1e-9  # distance of samples that are one, in cycles
+WHOLE_CYCLES_TOL = 1e-12  # relative round-off of a number of cycles
+# Smallest ratio of slip to its round-off at which an interface moves.
+MIN_SLIP_OVER_ROUND_OFF = 1e3
 STUCK_SLIP = 1e-3  # largest slip per cycle of an interface that counts as stuck, relative to its elastic length
+STICK_MEASURES = ("stick_fraction", "slip_start_phase")
 # Measures that exist only under a sine.
 SINE_MEASURES = (
     "absolute_acceleration_fundamental",
@@ -170,16 +174,14 @@ class HybridEvaluator(RunEvaluator):
         drive = self.model.rig.drive.signal
         times = self._choose_times(cycles)
         time = motion.rows[:, 0]
-        if hasattr(drive, "band"):
-            # Spectra need samples of equal distances.
-            is_kept = np.isin(time, np.concatenate(times))
-        else:
-            # Differences of samples at nearly the same time are round-off. An event gives way to the next row, and to a
-            # sample before it.
-            is_sample = np.isin(time, np.concatenate(times))
-            is_near = np.diff(time) <= SAME_TIME_TOL * drive.period
-            is_kept = is_sample | np.append(~is_near, True)
-            is_kept[1:] &= is_sample[1:] | ~(is_near & is_sample[:-1])
+        is_sample = np.isin(time, np.concatenate(times)) & (np.diff(time, prepend=-1.0) > 0)
+        is_kept = is_sample
+        if not hasattr(drive, "band"):  # Spectra need samples of equal distances.
+            # Differences of rows at nearly the same time are round-off: the sample is kept, else the last event.
+            group = np.cumsum(np.diff(time, prepend=time[0]) > SAME_TIME_TOL * drive.period)
+            has_sample = np.bincount(group, is_sample) > 0
+            is_last = np.append(np.diff(group) > 0, True)
+            is_kept = is_sample | (is_last & ~has_sample[group])
         response = replace(motion, rows=motion.rows[is_kept]).make_response(
             self.model.rig.modes, drive
         )
@@ -188,13 +190,14 @@ class HybridEvaluator(RunEvaluator):
         ledger = motion.find_energies() | compute_sampled_work(with_events)
         works = with_events.extra["ledger"][0]
         ledger |= {"booked": float(works[-1] - works[0]), "steps": float(motion.n_steps)}
+        n_whole = max(1, int(cycles * (1 + WHOLE_CYCLES_TOL)))  # The first cycle may be a part.
         return HybridRun(
             values=dict(motion.values),
             response=response,
             window=with_events.select(np.isin(with_events.time, times.window)),
             with_events=with_events,
-            extremes=motion.extremes,
-            phasors=motion.phasors,
+            extremes=motion.extremes[-n_whole:],
+            phasors=motion.phasors[-n_whole:],
             ledger=ledger,
             outcome=outcome,
         )
@@ -212,6 +215,11 @@ class HybridEvaluator(RunEvaluator):
         values.pop("energy_stored")
         if not is_sinusoidal(drive):
             values |= dict.fromkeys(SINE_MEASURES)
+
+        # The samples show whether an interface that hardly slips sticks.
+        if not _has_clear_slip(run):
+            for name in STICK_MEASURES:
+                values.pop(name)
 
         # A loop has no stiffness if the interface hardly moves, and no damping if it moves in several modes.
         if np.ptp(run.window.slide) <= MIN_SLIDE_RANGE:
@@ -247,7 +255,17 @@ class HybridEvaluator(RunEvaluator):
         run, drive, values
             See `RunEvaluator.estimate_run_errors`.
         """
-        return self.compare_with_half_the_samples(run, drive, values)
+        errors = self.compare_with_half_the_samples(run, drive, values)
+        if not _has_clear_slip(run):
+            errors |= {
+                name: find_definition(name).sample_error / self.steps for name in STICK_MEASURES
+            }
+        return errors
+
+
+def _has_clear_slip(run: HybridRun) -> bool:
+    """Return whether the slip of a run clearly exceeds its round-off."""
+    return np.ptp(run.window.slip) > MIN_SLIP_OVER_ROUND_OFF * slip_round_off(run.window)
 
 
 def _divide(begin: float, end: float, period: float, minimum: int) -> np.ndarray:
