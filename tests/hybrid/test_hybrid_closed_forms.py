@@ -151,28 +151,6 @@ def test_bonds_have_the_loop_of_dahl():
         assert abs(last.final.y[0, 3]) == pytest.approx(np.tanh(amplitude), rel=1e-9)
 
 
-def test_bonds_with_breakaway_break_only_after_their_play():
-    """Bonds with b = 0.4, mu = N = eps_0 = 1: F = q up to b, then 1 + (b - 1) exp(b - q); after a reversal F falls by 2 b
-    before bonds break again, then F = -1 + (F_1 + 1) exp(-x) with F_1 at the end of the play and the path x from there."""
-    play = 0.4
-    numbers = (1.0, 1.0, 1.0, 0.0, 1.0, 1.0, play)
-    law = LawNumbers("bonds", numbers, (1.0, 0.0, 0.0, 1.0, 0.0), (1.0, 1e-2, 1e-4, 1.0, 1.0))
-    top = 1.7
-    time = np.array([0.0, top, 2 * top])
-    samples = np.array([0.3, 1.2, top + 0.5, top + 1.5])
-    motion = runs.run_case(make_bench(law, time, np.array([0.0, top, 0.0]), samples=samples))
-    found = dict(zip(*forces(motion)[::2]))
-    peak = 1 + (play - 1) * np.exp(play - top)
-    low = peak - 2 * play
-    expected = (
-        0.3,
-        1 + (play - 1) * np.exp(play - 1.2),
-        peak - 0.5,
-        -1 + (low + 1) * np.exp(-(1.5 - 2 * play)),
-    )
-    assert [found[t] for t in samples] == pytest.approx(expected, abs=1e-8)
-
-
 def test_pressed_springs_equal_the_elastic_plastic_law_under_a_constant_load():
     """The law for a load that varies, whose load does not vary."""
     values = []

@@ -5,11 +5,9 @@ load obey, along the path |v| dt,
 
     m' = (1 - m)|v|/eps,   z' = m v - z|v|/eps,   w' = 2 z v - w|v|/eps,   F = mu N z/eps_0,
 
-and eps' = a_s/max(|v|, v_h) (eps_0 - eps) + |v|/l_k (eps_k - eps). Stored energy: mu N w/(2 eps_0). With a breakaway b, no
-bond breaks along the path b eps_0 from the start and 2 b eps_0 from a reversal: m' = 0, z' = m v, w' = 2 z v. States: m, z,
-w, eps, and with breakaway the play in this path, from -1 to 1. Numbers: mu, eps_0, eps_k [m], a_s [m/s2] (0: eps is
-constant), l_k [m], v_h [m/s], b eps_0 [m] (0: no breakaway). `memory[FLAG]` is 1 above the speed v_h, or while bonds break
-under a law with breakaway.
+and eps' = a_s/max(|v|, v_h) (eps_0 - eps) + |v|/l_k (eps_k - eps). Stored energy: mu N w/(2 eps_0). States: m, z, w, eps.
+Numbers: mu, eps_0, eps_k [m], a_s [m/s2] (0: eps is constant), l_k [m], v_h [m/s]. `memory[FLAG]` is 1 above the
+speed v_h.
 """
 
 from ...exceptions import PatchfemError
@@ -44,9 +42,6 @@ def force_and_rates(p, memory, point, s, rates):
         healing_speed = speed if memory[Memory.FLAG] > 0 else p[5]
         rates[3] = p[3] / healing_speed * (p[1] - s[3]) + speed / p[4] * (p[2] - s[3])
     breaking = speed / s[3]
-    if p[6] > 0 and memory[Memory.FLAG] < 0:
-        breaking = 0.0
-        rates[4] = v / p[6]
     rates[0] = (1 - s[0]) * breaking
     rates[1] = s[0] * v - s[1] * breaking
     rates[2] = 2 * s[1] * v - s[2] * breaking
@@ -76,12 +71,10 @@ def write_margins(p, memory, point, s, margins):
     margins[Margin.MOTION] = speed / point.speed_scale
     if p[3] > 0:
         margins[Margin.BRANCH] = memory[Memory.FLAG] * (speed - p[5]) / p[5]
-    if p[6] > 0 and memory[Memory.FLAG] < 0:
-        margins[Margin.BRANCH] = 1 - memory[Memory.DIRECTION] * s[4]
 
 
 def switch(p, memory, point, s, which):
-    """Change the direction of motion or the side of the speed v_h; bonds break at the end of the play.
+    """Change the direction of motion or the side of the speed v_h.
 
     Parameters
     ----------
@@ -98,11 +91,6 @@ def switch(p, memory, point, s, which):
     """
     column = Memory.DIRECTION if which == Margin.MOTION else Memory.FLAG
     memory[column] = -memory[column]
-    if p[6] > 0:
-        if which == Margin.MOTION:
-            memory[Memory.FLAG] = -1.0
-        else:
-            s[4] = memory[Memory.DIRECTION]
     return False
 
 
@@ -118,24 +106,18 @@ def from_keys(friction, load, speed):
     speed : float
         Expected peak speed [m/s].
     """
-    has_growth = friction.rest_growth is not None
-    if friction.reading != "stretch" or friction.order != 1 or (friction.breakaway and has_growth):
+    if friction.reading != "stretch" or friction.order != 1:
         raise PatchfemError(
-            "bonds with reading = 'report', an order other than 1 or a breakaway beside rest_growth have no finite set of "
-            "rates, so their motion is not computed from event to event",
+            "bonds with reading = 'report' or an order other than 1 have no finite set of rates, so their motion is not "
+            "computed from event to event",
             "friction.reading",
         )
     length = friction.bond_length
     ratio = friction.kinetic / friction.static if friction.static > 0 else 1.0
     growth = (0.0, 1.0, 1.0)
-    if has_growth:
+    if friction.rest_growth is not None:
         rest_speed = friction.rest_speed or max(REST_SPEED_FRACTION * speed, MIN_REST_SPEED)
         growth = (friction.rest_growth, friction.slip_growth, rest_speed)
-    play = (friction.breakaway or 0.0) * length
-    numbers = (friction.static, length, ratio * length, *growth, play)
-    states = (friction.initial_bonds, 0.0, 0.0, length)
+    numbers = (friction.static, length, ratio * length, *growth)
     scales = (DENSITY_SCALE, 1e-2 * length, 1e-4 * length**2, length)
-    if play:
-        states += (0.0,)
-        scales += (1.0,)
-    return LawNumbers("bonds", numbers, states, scales)
+    return LawNumbers("bonds", numbers, (friction.initial_bonds, 0.0, 0.0, length), scales)
