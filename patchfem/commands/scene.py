@@ -16,7 +16,6 @@ from ..response import rows
 from ..runs import plan as plans
 from ..runs.patch import plan as patch_plan
 from ..runs.patch import result
-from ..runs.probe import run_probe
 from ..scene.files import list_named_files
 from .shared import Json, Sets, UsageError, flag_option, load_model, load_scene, note, print_message
 from .sweep import CaseOptions
@@ -104,6 +103,8 @@ def plan(
     run_plan = plans.plan(loaded_scene)
     plan_data = run_plan.as_json()
     if probe:
+        from ..runs.probe import run_probe
+
         measured = run_probe(run_plan)
         plan_data |= {"seconds": measured.seconds["total"], "probe": measured.as_json()}
         if measured.static:
@@ -144,7 +145,9 @@ def _print_plan(plan_data: dict, is_solved: bool, verbose: bool) -> None:
     verbose: whether to list the effects that the scene does not have.
     """
     print(f"kind     {plan_data['kind']}, engine {plan_data['engine']}")
-    sizes = [f"{count} {_format_size_name(name)}" for name, count in plan_data["unknowns"].items()]
+    sizes = []
+    for name, count in plan_data["unknowns"].items():
+        sizes.append(f"{count} {_format_size_name(name.removesuffix('s') if count == 1 else name)}")
     if sizes:
         print("sizes    " + ", ".join(sizes))
     for sentence in plan_data.get("probe", {}).get("sentences", ()):

@@ -162,7 +162,17 @@ class _Shooting:
         self.difference = max(MIN_DIFFERENCE, float(case.rig.settings[Setting.RTOL]) ** 0.5)
 
     def run(self, states: State | None = None, periods=None, *, has_windows: bool = False) -> Batch:
-        """Advance the motion, or several of them, by a period; the clocks start at 0."""
+        """Advance the motion, or several of them, by a period; the clocks start at 0.
+
+        Parameters
+        ----------
+        states : State, optional
+            States of several motions; default: that of this motion, which goes on.
+        periods : sequence of float, optional
+            Period [s] of each motion.
+        has_windows : bool
+            Whether the measures of the period are computed.
+        """
         own = states is None
         states = _copy(self.state) if own else states
         periods = [self.period] * len(states.y) if periods is None else periods

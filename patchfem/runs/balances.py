@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from ..core import Outcome
-from ..response.outcome import remove_errors
+from ..response import outcome
 from .results.result import Result
 
 # Largest relative residual of the load; the contact solver reaches 1e-9 or less.
@@ -31,7 +31,7 @@ def mark_unbalanced(result: Result) -> Result:
     return replace(
         result,
         outcome=Outcome.NOT_CONVERGED,
-        measures=remove_errors(result.measures),
+        measures=outcome.remove_errors(result.measures),
         warnings=[*warnings, *result.warnings],
     )
 

@@ -230,7 +230,8 @@ def _count_sizes(model: Model) -> RunSizes:
     The memory contributions are sorted from the largest to the smallest.
     """
     sizes = RunSizes(parts=(MemoryPart(PACKAGE_BYTES, "packages"),))
-    sizes += patch_plan.count_patch_sizes(model)
+    if model.patch is not None or model.has_interface_patches:
+        sizes += patch_plan.count_patch_sizes(model)
     points = sizes.unknowns.get("interface_points", 1)
     if model.rig is not None:
         sizes += of_rig.count_rig_sizes(model, points)

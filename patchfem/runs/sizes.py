@@ -24,7 +24,7 @@ class MemoryPart(NamedTuple):
     key: str = ""
 
 
-COMPILED_CODE = MemoryPart(9e7, COMPILED_CODE_LABEL)  # for any engine with compiled code
+COMPILED_CODE = MemoryPart(6e7, COMPILED_CODE_LABEL)  # for any engine with compiled code
 
 
 @dataclass(frozen=True, slots=True)

@@ -132,7 +132,7 @@ def test_always_wear_beyond_friction_table_gives_warning():
         ),
         (
             ['wear.friction.depth=["0 um","1 um","3 um"]'],
-            "2 factors for 3 depths; give one factor for each",
+            "2 values for 3 values of `depth`; give one value for each",
         ),
         (
             ["wear.friction.coefficient_factor=[1.1,2]"],

@@ -5,7 +5,7 @@ from math import ceil
 
 import numpy as np
 
-from ...compiled import get_kernel_module, load, set_compile_callback
+from ...compiled import load, set_compile_callback
 from ...core import (
     InitialState,
     ModalBasis,
@@ -22,7 +22,6 @@ from ..event_list import DRIVE_CHANGE, MAX_EVENTS, RELEASE, REVERSAL, STOP, Even
 from .cost import estimate_cycle_time, estimate_sample_time
 from .elements import (
     element_stretches,
-    make_coulomb_elements,
     make_element_table,
     make_unstretched_memory,
 )
@@ -167,28 +166,6 @@ def announce_runs(
         runs * cycles_read * SAMPLES_PER_CYCLE * estimate_sample_time(modes)
     )
     read.read_rows.add_python_cost(PYTHON_READ_TIME_RATIO * runs * cycles_read * seconds_per_cycle)
-
-
-def is_loop_cached(modes: ModalBasis, drive) -> bool:
-    """Return whether the cache contains machine code of the event loop for the given modes.
-
-    The loop for one mode, whose squared frequency is a tuple, and that for several are compiled
-    separately.
-    """
-    modal_system = make_modal_system(modes)
-    table = make_element_table([make_coulomb_elements(1.0)] * len(modal_system.interfaces))
-    arrays = RunArrays(
-        modal_system,
-        table,
-        np.zeros((2, modes.omega.size)),
-        make_unstretched_memory(table, np.zeros(len(modal_system.interfaces))),
-        make_previous_cycle(modal_system, table),
-        make_initial_time_state(drive, len(modal_system.interfaces)),
-        make_run_sums(1, np.zeros(1)),
-        make_workspace(modal_system),
-    )
-    march = get_kernel_module(f"{PACKAGE}.march_kernels").march
-    return march.is_stored((0.0, 0.0), arrays, np.zeros((1, 1)))
 
 
 def start_event_run(

@@ -6,7 +6,7 @@ in m and angles for times, so that f is a force per unit mass [m].
 
 A step ends and starts anew where the slide reverses, and where the law has a kink at zero stretch. A law whose force
 changes in a thin layer of speeds (`HAS_SPEED_LAYER`) is followed through the layer in parts. A reference is the engine
-`dynamics.smooth`.
+`hybrid`.
 """
 
 from math import cos, nan, sin

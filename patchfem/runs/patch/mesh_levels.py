@@ -206,6 +206,7 @@ def solve_on_refined_meshes(patch_model, tolerance: float, estimate: bool = True
         if (
             not is_within
             and seconds > MAX_CONDENSING_SECONDS[False]
+            and points is None
             and not has_failed_on_points
             and profile_points.can_use_points(patch_model)
         ):
@@ -214,7 +215,8 @@ def solve_on_refined_meshes(patch_model, tolerance: float, estimate: bool = True
             # points that do not converge do not do so on the next mesh either
             has_failed_on_points = points is None
             patches = with_static_measures(patches, tolerance, points)
-        is_done = is_within or patches[0].points is not None
+        # The points do not determine a peak that may be at a free corner, but a finer mesh does.
+        is_done = is_within or (points is not None and "pressure_peak" in points.measures)
         if is_done and _resolves_slip_work(patch_model, patches, tolerance):
             return patches
         if seconds > max_condensing_seconds(patch_model, tolerance):
