@@ -368,7 +368,9 @@ def make_batch(cases, n_events: int = 0) -> tuple[Rig, State, Record]:
         Number of events that a case can store.
     """
     rig = cases[0].rig
-    n_cases, n_faces, n = len(cases), rig.faces.shape[0], cases[0].y.size
+    n_cases = len(cases)
+    n_faces = rig.faces.shape[0]
+    n = cases[0].y.size
     clock = np.zeros((n_cases, len(Clock)))
     clock[:, Clock.STEP] = [0.1 * case.rig.settings[Setting.LONGEST_STEP] for case in cases]
 

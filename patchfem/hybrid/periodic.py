@@ -20,9 +20,8 @@ MAX_ITERATIONS = 30
 N_FIRST_CYCLES = 8  # cycles before the first correction
 N_RELAXED = 6  # cycles without a correction after one that did not help
 MAX_CHANGE = 100.0  # largest change over a periodic motion, relative to the step tolerance
-MAX_STABLE_MULTIPLIER = (
-    1 + 1e-3
-)  # of a stable motion, because the derivatives of the map are differences
+# Largest Floquet multiplier of a stable motion; above 1, because the derivatives of the map are differences.
+MAX_STABLE_MULTIPLIER = 1 + 1e-3
 # Distance of a multiplier from 1 that differences do not resolve; a mode with a damping ratio of 3e-7 has it.
 UNDAMPED_TOL = 2e-6
 NEUTRAL_TOL = 1e-9  # distance of a multiplier from 1, relative to the largest, that counts as none
@@ -32,8 +31,8 @@ N_GROWTH_CYCLES = (
 MIN_SIZE_RATIO = (
     1e3  # smallest ratio of a periodic motion that is never reached to the motion after these runs
 )
-# Largest ratio of the changes over a period after and before a correction at which its derivatives are used again: it is
-# about the relative change of the derivatives.
+# Largest ratio of the changes over a period after and before a correction at which the derivatives of this correction
+# are used again. The ratio is about the relative change of the derivatives.
 MAX_REMAINDER = 1e-3
 MIN_GROWTH = 1e-6  # increase in these cycles, relative to the motion
 MIN_GROWTH_RATIO = 0.5  # ratio of the increases in the last and in the second of these runs
@@ -200,7 +199,8 @@ class _Shooting:
         omega = self.case.rig.settings[Setting.OMEGA]
         # Displacements and velocities share their magnitudes, because either may vanish at the start of a period.
         size = max(scale[:n_modes].max(), scale[n_modes : 2 * n_modes].max() / omega)
-        scale[:n_modes], scale[n_modes : 2 * n_modes] = size, size * omega
+        scale[:n_modes] = size
+        scale[n_modes : 2 * n_modes] = size * omega
         return scale
 
     def measure_change(self, before: State) -> float:
@@ -232,7 +232,8 @@ class _Shooting:
         The derivatives of the last correction are used again as long as `slopes` has them.
         """
         columns = self._columns(before)
-        start, end = _pack(before, self.n), _pack(self.state, self.n)
+        start = _pack(before, self.n)
+        end = _pack(self.state, self.n)
         scale = np.concatenate([self._scales(), np.abs(start[0, self.n :])])[columns]
         if self.slopes is None or not np.array_equal(self.slopes[0], columns):
             self.slopes = columns, self._compute_slopes(before, columns, scale, end)

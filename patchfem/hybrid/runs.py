@@ -36,7 +36,7 @@ N_EVENTS = 200_000  # events that a single run stores at most
 MIN_EVENTS = 1000  # events for which it has room in any case, with EVENTS_PER_PART for each cycle and piece of the drive
 EVENTS_PER_PART = 100
 MAX_REPEATED = 1000  # cycles whose events are repeated where the motion repeats
-SAME_PHASE_TOL = 1e-6  # in cycles
+SAME_PHASE_TOL = 1e-6  # difference of two phases that count as equal [cycles]
 EVENT_NAMES = {
     Margin.MOTION: "stop or reversal",
     Margin.BRANCH: "change of branch",
@@ -181,8 +181,12 @@ class Motion:
         """
         rows = self.rows
         rig = self.case.rig
-        n, n_faces, m = rig.modes.shape[1], rig.faces.shape[0], self.case.n_friction
-        time, z, rate = rows[:, 0], rows[:, 1 : 1 + n], rows[:, 1 + n : 1 + 2 * n]
+        n = rig.modes.shape[1]
+        n_faces = rig.faces.shape[0]
+        m = self.case.n_friction
+        time = rows[:, 0]
+        z = rows[:, 1 : 1 + n]
+        rate = rows[:, 1 + n : 1 + 2 * n]
         first = 1 + self.case.y.size - N_INTEGRALS - N_FACE_INTEGRALS * n_faces
         integrals = rows[:, first : first + N_FACE_INTEGRALS * n_faces].reshape(
             len(rows), n_faces, N_FACE_INTEGRALS
@@ -197,10 +201,12 @@ class Motion:
         )
         acceleration -= forces @ rig.rows[0] / modes.mass
 
-        slides, slide_rates = z @ rig.rows[0, :m].T, rate @ rig.rows[0, :m].T
+        slides = z @ rig.rows[0, :m].T
+        slide_rates = rate @ rig.rows[0, :m].T
         rests = (self._columns(rows, 2) == 0) & (rig.faces[:m, Face.RIGID] > 0)
         slide_rates[rests] = 0.0
-        work, loss = integrals[:, :m, 0], integrals[:, :m, 2]
+        work = integrals[:, :m, 0]
+        loss = integrals[:, :m, 2]
         slips = integrals[:, :m, 1] + self.case.y[:n] @ rig.rows[0, :m].T
         extra = {
             "ledger": np.stack(

@@ -106,7 +106,7 @@ def run(
 def _run_plan(
     run_plan: Plan, say, progress, state_file: StateFile | None, *, estimate: bool, fresh: bool
 ) -> Result:
-    """Run a plan whose memory is accepted.
+    """Run a plan that needs no more memory than is free.
 
     The order is: patch of [contact] on its meshes, patches of the interfaces, wear, then the motion or
     the static result, and finally static measures, balances and warnings. A patch without contact

@@ -151,7 +151,7 @@ class PlainNumbers:
 
 
 def _replace_number(holder: Any, pieces: list[str], value: Any) -> Any:
-    """Return a copy of a table, or of an array of tables, with the number at a dotted key replaced."""
+    """Return a copy of a table, or of an array of tables, with another number at the pieces of a dotted key."""
     name, *inner = pieces
     if isinstance(holder, tuple):
         items = list(holder)

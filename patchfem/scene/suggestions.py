@@ -109,8 +109,8 @@ def _suggest_name(
         present = [name for name in owners if name.partition(".")[0] in raw]
         if owners:
             return "' or '".join(f"{name}.{key}" for name in present[:1] or owners)
-    # A file that contains both keys did not misspell one of them; a key of --set may be a
-    # misspelling of a key in the file.
+    # If the file contains both keys, neither is a misspelling of the other. The unknown key of --set may be meant
+    # for a key that the file contains.
     is_set = f"{table_key}.{key}".lstrip(".") in sets
     names = [name for name in (*attributes_by_key(model), key) if name in raw]
     if is_set:

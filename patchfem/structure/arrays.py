@@ -71,7 +71,7 @@ def read_arrays(path: Path) -> dict:
 
 
 def _read_member(file: np.lib.npyio.NpzFile, name: str) -> np.ndarray:
-    """Read one array of a .npz file after its header is checked, because NumPy reserves memory for what it announces."""
+    """Read one array of a .npz file; its header is checked first, because NumPy reserves the memory that it states."""
     readers = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
     with file.zip.open(f"{name}.npy") as member:
         shape, _, dtype = readers[npy.read_magic(member)](member)

@@ -198,7 +198,8 @@ def from_elements(stiffness, yield_displacement):
     for k, x in zip(stiffness, yield_displacement):
         pairs[float(x)] = pairs.get(float(x), 0.0) + float(k)
     points = sorted(pairs)
-    edges, forces = [0.0], [0.0]
+    edges = [0.0]
+    forces = [0.0]
     slope = sum(pairs.values())
     for x in points:
         forces.append(forces[-1] + slope * (x - edges[-1]))
@@ -222,7 +223,8 @@ def from_keys(friction, load, speed):
     """
     limit = friction.static * load
     if friction.law == "iwan":
-        chi, beta = friction.chi, friction.beta
+        chi = friction.chi
+        beta = friction.beta
         length = limit * (1 + beta) / (friction.stiffness * (beta + (chi + 1) / (chi + 2)))
         numbers = (chi, beta, limit, length, 1, 0.0, length, 0.0, limit)
         return LawNumbers("masing", numbers, length=limit / friction.stiffness)

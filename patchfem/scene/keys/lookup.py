@@ -145,7 +145,7 @@ def describe_requirement(model: type[Table] | None, name: str) -> str:
 
 
 def describe_missing_key(model: type[Table] | None, name: str) -> str:
-    """Describe what a missing key requires; a number without unit or a text is described by the meaning of the key."""
+    """Describe the value that a missing key needs; the meaning of the key follows where its type says too little."""
     needed = describe_requirement(model, name)
     if model is None or not needed.startswith(_UNSPECIFIC_REQUIREMENTS):
         return needed

@@ -78,7 +78,7 @@ def _decode(content: Content) -> str:
 def _read_columns(
     path, header: Header, lines: Iterator[tuple[int, str]], *, has_units: bool
 ) -> Table:
-    """Read columns x, (y) and z."""
+    """Read the columns x and z of a trace, or x, y and z of points of a surface."""
     place = f"{path}:{header.number}"
     if (header.count or len(header.columns)) < 2:
         raise PatchfemError(f"{place}: only one column, but x and z are needed; {HEADER_EXAMPLE}")
@@ -159,7 +159,7 @@ def _read_matrix(path, header: Header, lines: Iterator[tuple[int, str]]) -> Tabl
 
 
 def _is_even(values) -> bool:
-    """Return whether numbers (n,) increase by equal steps."""
+    """Return whether numbers (n,) increase by equal steps, within MAX_UNEVEN of the first step."""
     steps = np.diff(values)
     return bool(steps[0] > 0 and np.ptp(steps) < MAX_UNEVEN * steps[0])
 
