@@ -5,7 +5,7 @@ Read the package in this order. A module imports only from its own entry of the 
 1. `lazy_imports` modules that are loaded on first use
 2. `exceptions`   errors with messages for the user and exit codes
 3. `formatting`   numbers as text: readable units, digits that match the error
-4. `cost_model`   CPU times of the stages of a run, and the speed of this machine
+4. `cost_model`   CPU times per unit of work
 5. `core`         exchanged records: interface, compliance, contact state, modal basis, response, measure, outcome
 6. `effects`      physical effects and methods that a scene can request
 7. `disk`         atomic writes, locks and the user's cache
@@ -79,7 +79,7 @@ if TYPE_CHECKING:
         view,
     )
 
-__version__ = "1.3.0"
+__version__ = "1.4.0"
 __all__ = [
     "FitOptions",
     "Measure",

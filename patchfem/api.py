@@ -61,7 +61,7 @@ from .runs.plan import Plan
 from .runs.plan import plan as plan_model
 from .runs.results import result as run_result
 from .runs.run import run as run_plan
-from .scene import axes, starting
+from .scene import assignments, starting
 from .scene.backbone_scene import BackboneTables
 from .scene.files import require_files
 from .scene.keys import removed
@@ -195,10 +195,10 @@ def load(scene: str | Path | Scene | Mapping[str, Any], /, **sets: Any) -> Scene
     """
     if not isinstance(scene, Scene):
         return _load_and_prepare(scene, None, sets)
-    assignments = format_assignments(sets)
-    if not assignments:
+    new_sets = format_assignments(sets)
+    if not new_sets:
         return scene
-    return require_units(get_base_scene(scene).override(assignments), sets)
+    return require_units(get_base_scene(scene).override(new_sets), sets)
 
 
 def _load_and_prepare(scene, prepare: Callable | None, sets: dict) -> Scene:
@@ -206,19 +206,19 @@ def _load_and_prepare(scene, prepare: Callable | None, sets: dict) -> Scene:
 
     `scene` and `sets` are as for `load`; `prepare` may be None.
     """
-    assignments = format_assignments(sets)
+    new_sets = format_assignments(sets)
     if isinstance(scene, Mapping):
         text = format_scene(dict(scene))
-        loaded = require_files(loads(text, DICT_NAME, assignments, prepare=prepare))
+        loaded = require_files(loads(text, DICT_NAME, new_sets, prepare=prepare))
         return require_units(loaded, {**scene, **sets})
     if isinstance(scene, Scene):
-        all_sets = (*scene.sets, *assignments)
+        all_sets = (*scene.sets, *new_sets)
         return require_units(loads(scene.text, scene.path, all_sets, prepare=prepare), sets)
     if _is_scene_text(scene):
-        loaded = require_files(loads(scene, INLINE_SCENE_NAME, assignments, prepare=prepare))
+        loaded = require_files(loads(scene, INLINE_SCENE_NAME, new_sets, prepare=prepare))
         return require_units(loaded, sets)
     path = _require_path(scene, "a scene")
-    return require_units(load_file(path, assignments, prepare=prepare), sets)
+    return require_units(load_file(path, new_sets, prepare=prepare), sets)
 
 
 def _is_scene_text(scene: Any) -> bool:
@@ -280,7 +280,7 @@ def build(scene: str | Path | Scene | Model, /, **sets: Any) -> Model:
 
 @_strip_file_and_line_from_errors
 def plan(scene: str | Path | Scene | Model, /, **sets: Any) -> Plan:
-    """Choose the engine of a run, and predict its size and cost, without solving anything.
+    """Choose the engine of a run, and count its unknowns, without solving anything.
 
     Parameters
     ----------
@@ -305,8 +305,8 @@ def plan(scene: str | Path | Scene | Model, /, **sets: Any) -> Plan:
     --------
     >>> import patchfem as pf
     >>> plan = pf.plan(pf.new("rig"))
-    >>> plan.kind, plan.seconds < 10
-    ('rig', True)
+    >>> plan.kind, plan.unknowns["modes"]
+    ('rig', 1)
     """
     return plan_model(build(scene, **sets))
 
@@ -555,7 +555,9 @@ def backbone(
     model, notes = given_modes.prepare_model(build_with, modes)
     lengths = None
     if amplitudes is not None:
-        lengths = axes.read_lengths(_format_lengths(amplitudes), "amplitudes")
+        lengths = assignments.read_lengths(
+            format_values(assignments.LENGTH_KEY, amplitudes), "amplitudes"
+        )
     name = _require_string(mode, "backbone: mode")
     curves = backbone_curves.compute_backbone(model, name, lengths, methods)
     return netcdf.to_dataset(backbones.make_answer(curves.add_notes(notes), model.source))
@@ -633,7 +635,7 @@ def sweep(
     if empty := [key for key, values in values_by_key.items() if _is_empty(values)]:
         raise SceneError([f"{key}: the sweep has no value for this key" for key in empty])
     sweep_scene = _read_sweep_scene(scene, of)
-    ranges = [f"{key}={_format_swept_values(key, values)}" for key, values in values_by_key.items()]
+    ranges = [f"{key}={format_values(key, values)}" for key, values in values_by_key.items()]
     request = parse_request.Request(ranges, None, draw, sobol, seed, of)
     cases = parse_request.read_cases(sweep_scene, request)
     pool = executors.make_executor(executor, jobs)
@@ -648,11 +650,6 @@ def sweep(
 def _is_empty(values: Any) -> bool:
     """Return whether the values of a swept key are an empty list or string."""
     return hasattr(values, "__len__") and not len(values)
-
-
-def _format_swept_values(key: str, values: Any) -> str:
-    """Return the values of a swept key as a string for the option `patchfem sweep --over`."""
-    return values if isinstance(values, str) else ",".join(format_values(key, values))
 
 
 class SweepPlots:
@@ -833,7 +830,7 @@ def fit(
         raise PatchfemError(
             f"fit: `free` must be a dict of keys and their ranges (low, high), not {free!r:.60}"
         )
-    ranges = [f"{key}={_format_bounds(key, ends)}" for key, ends in (free or {}).items()]
+    ranges = [_format_bounds(key, ends) for key, ends in (free or {}).items()]
     options = _check_fit_options(FitOptions() if options is None else options, changes)
     data = keywords.get("to", data)
     data_path = "" if isinstance(data, str) and not data else str(_require_path(data, "fit: to"))
@@ -862,23 +859,16 @@ def _check_fit_options(options: Any, changes: dict) -> FitOptions:
 
 
 def _format_bounds(key: str, ends: Any) -> str:
-    """Return the lower and the upper bound of a free parameter as a string "low..high".
+    """Return a free parameter and its bounds as for --free; `ends` is a pair of values, or a text.
 
-    `ends` is a pair of values, or a string that is returned unchanged. Raises PatchfemError for anything else.
+    Raises PatchfemError for anything else.
     """
-    pair = [ends] if isinstance(ends, str) else format_values(key, ends)
-    if not isinstance(ends, str) and len(pair) != 2:
+    is_pair = hasattr(ends, "__len__") and len(ends) == 2
+    if not (is_pair or isinstance(ends, str)):
         raise PatchfemError(
             f"fit: free: {key}: (low, high) or a text such as '0.1..0.6' is needed, not {ends!r:.60}"
         )
-    return "..".join(pair)
-
-
-def _format_lengths(lengths: float | str | Iterable) -> str:
-    """Return lengths [m] as a string for an option of the command line."""
-    if isinstance(lengths, str):
-        return lengths
-    return ",".join(format_values(axes.LENGTH_KEY, lengths))
+    return f"{key}={format_values(key, ends, '..')}"
 
 
 @_reject_removed_options

@@ -225,7 +225,7 @@ EFFECTS = {
         (
             "bond_length",
             "kinetic reading order rest_growth slip_growth rest_speed "
-            "initial_bonds breakaway spread temperature",
+            "initial_bonds spread temperature",
         ),
         "shear joints varying-load harmonic grooves",
         "bonds",
@@ -428,8 +428,6 @@ WAVEFORMS = {
 }
 NO_WAVEFORM = Waveform()  # waveform of a release and of an unknown name
 SINE_WAVEFORM = WAVEFORMS["sine"]  # default waveform of a scene
-# features of the law `nonlocal` with a reading or an order that requires the sum over all bonds
-BOND_LIST_SUPPORT = "two-directions"
 
 
 def find_waveform(drive) -> Waveform:
@@ -465,9 +463,8 @@ def needs_bond_list(friction) -> bool:
 
 
 def law_supports(friction, feature: str) -> bool:
-    """Return whether the law of a [friction] table supports an engine or a feature."""
-    words = BOND_LIST_SUPPORT if needs_bond_list(friction) else LAWS[friction.law].supports
-    return feature in words.split()
+    """Return whether the law of a [friction] table supports an engine or a feature; a sum over all bonds supports none."""
+    return not needs_bond_list(friction) and feature in LAWS[friction.law].supports.split()
 
 
 def describe_law(friction) -> str:
@@ -514,9 +511,7 @@ def suggest_laws(feature: str, other_features: str = "", friction=None) -> str:
 
 
 REMEDIES = {  # advice by name, for two effects that cannot be combined
-    "order": "use order = 1",
-    "recursion": 'use reading = "stretch" with order = 1 and without breakaway',
-    "elastic range": "set breakaway = 0",
+    "recursion": 'use reading = "stretch" with order = 1',
     "kinetic": "leave out the key kinetic",
     "shapes": "put the shapes on the upper piece",
     "either": "leave one of the two out",

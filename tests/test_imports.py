@@ -108,7 +108,7 @@ MODULES_OF_SCENES = {  # run from Python -> text of the scene, modules that are 
             ("harmonic", '[accuracy]\nmethod = "harmonic"\n', "hybrid.periodic"),
         )
     },
-    "bench": (BENCH, "runs.bench.bench", "campaigns export.sweeps scene.axes runs.batch"),
+    "bench": (BENCH, "runs.bench.bench", "campaigns export.sweeps scene.assignments runs.batch"),
 }
 
 
@@ -160,7 +160,7 @@ COMMANDS = {  # command -> scene, arguments, modules of patchfem and packages th
     "check of a bench": (
         BENCH,
         ("check", "SCENE"),
-        "campaigns export.sweeps scene.axes runs.batch",
+        "campaigns export.sweeps scene.assignments runs.batch",
         "email socket",
     ),
     "check of measured rows": ("", ("check", str(RIG)), "", HEAVY),

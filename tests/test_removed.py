@@ -104,6 +104,7 @@ TRIED = {  # removed feature -> (function that uses it, replacement that the mes
             ("accuracy.stick_speed", "1 mm/s", "use method 'march' without it"),
             ("wear.scheme", "explicit", "contact and wear are always solved together"),
             ("structure.mode.lateral", 0.2, "the patch slides along x alone"),
+            ("friction.breakaway", 0.2, "law 'iwan' or 'elastic-plastic' does not creep"),
         )
     },
     "quadrature exponential": (
@@ -165,6 +166,17 @@ TRIED = {  # removed feature -> (function that uses it, replacement that the mes
     "structure.interface.lateral": (
         lambda folder: pf.load(f"{MASSES}lateral = [2, 1]\n{DRIVE}"),
         "an interface slides along x alone",
+    ),
+    "structure.interface.breakaway": (
+        lambda folder: pf.load(f"{MASSES}breakaway = 0.2\n{DRIVE}"),
+        "law 'iwan' or 'elastic-plastic' does not creep",
+    ),
+    "approach of a piece that can rotate": (
+        lambda folder: pf.load(
+            COATED.replace('load = "26 lbf"', 'approach.distance = "1 um"'),
+            **{"contact.load_line.offset": "1 mm"},
+        ),
+        "give contact.load, or leave out [contact.load_line]",
     ),
     "slide in two directions": (read_two_directions, "leave out the column"),
     ".unv mesh": (partial(read_file, read_pieces, "pair.unv"), "use .med or .msh"),

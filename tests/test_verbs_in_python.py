@@ -174,7 +174,7 @@ def test_refuses_invalid_amplitudes(amplitudes, said):
     [
         ({"friction.static": 0.3}, r"\(low, high\) .* not 0\.3"),
         ({"friction.static": (0.1, 0.2, 0.5)}, r"\(low, high\)"),
-        ({"friction.static": None}, "cannot be a value of a scene"),
+        ({"friction.static": None}, r"\(low, high\) .* not None"),
         (["friction.static=0.1..0.5"], "must be a dict"),
         ({}, "at least one"),
         ({"friction.static": "0.5..0.1"}, "must lie below"),

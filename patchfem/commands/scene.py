@@ -6,7 +6,6 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from .. import cost_model
 from ..campaigns.sweeps import parse_request
 from ..campaigns.sweeps import plan as sweep_plan
 from ..effects import law_has_trait, list_displayed_absent_effects
@@ -15,8 +14,8 @@ from ..mesh import files as mesh_files
 from ..model import files as model_files
 from ..response import rows
 from ..runs import plan as plans
-from ..runs.patch import faces, result
 from ..runs.patch import plan as patch_plan
+from ..runs.patch import result
 from ..scene.files import list_named_files
 from .shared import Json, Sets, UsageError, flag_option, load_model, load_scene, note, print_message
 from .sweep import CaseOptions
@@ -80,13 +79,13 @@ def plan(
     what: CaseOptions | None = None,
     json_: Json = False,
     probe: flag_option(
-        "measure the speed of this machine, and compute the stiffness of the static patch"
+        "run the scene once without error estimates: measured seconds, and the stiffness of the solved patch"
     ) = False,
     verbose: flag_option(
         "list also the effects that the scene does not name", "-v", "--verbose"
     ) = False,
 ):
-    """Print what a run of SCENE would compute: sizes, cost, the stiffnesses in series and dimensionless groups. With
+    """Print what a run of SCENE would compute: sizes, the stiffnesses in series and dimensionless groups. With
     --over, or if SCENE has a table [sweep], plan the whole sweep.
 
     Example: patchfem plan rig.toml --over "contact.tilt.angle=1e-6 rad..1e-2 rad:9"
@@ -104,13 +103,14 @@ def plan(
     run_plan = plans.plan(loaded_scene)
     plan_data = run_plan.as_json()
     if probe:
-        plan_data["seconds"] = round(
-            plan_data["seconds"] * cost_model.measure_machine_time_ratio(), 2
-        )
-    if probe and (static_measures := faces.static_measures_without_errors(run_plan.model)):
-        chain = plan_data["stiffness_chain"]
-        chain |= patch_plan.find_solved_links(chain, static_measures)
-        plan_data["probe"], plan_data["modes"] = static_measures, run_plan.modes(chain)
+        from ..runs.probe import run_probe
+
+        measured = run_probe(run_plan)
+        plan_data |= {"seconds": measured.seconds["total"], "probe": measured.as_json()}
+        if measured.static:
+            chain = plan_data["stiffness_chain"]
+            chain |= patch_plan.find_solved_links(chain, measured.static)
+            plan_data["modes"] = run_plan.modes(chain)
     if json_:
         print(json.dumps(plan_data))
         return
@@ -139,22 +139,19 @@ def _plan_sweep(scene: Path, sets, what: CaseOptions, json_: bool, verbose: bool
 
 
 def _print_plan(plan_data: dict, is_solved: bool, verbose: bool) -> None:
-    """Print a plan: effects, cost, sentences, stiffnesses and groups; the plan of a sweep has no cost.
+    """Print a plan: effects, measured time, sentences, stiffnesses and groups.
 
     is_solved: whether the stiffness of the pieces is that of a solved patch.
     verbose: whether to list the effects that the scene does not have.
     """
     print(f"kind     {plan_data['kind']}, engine {plan_data['engine']}")
-    sizes = [f"{count} {_format_size_name(name)}" for name, count in plan_data["unknowns"].items()]
-    if plan_data["seconds"] is not None:
-        compiles = plans.describe_compile_time(plan_data["compile_seconds"])
-        print(
-            f"cost     about {plan_data['seconds']:.1f} s of computing time{compiles}, "
-            f"{plan_data['bytes'] / 1e6:.0f} MB of memory"
-        )
-        sizes.append(f"{plan_data['steps']} steps in all")
+    sizes = []
+    for name, count in plan_data["unknowns"].items():
+        sizes.append(f"{count} {_format_size_name(name.removesuffix('s') if count == 1 else name)}")
     if sizes:
         print("sizes    " + ", ".join(sizes))
+    for sentence in plan_data.get("probe", {}).get("sentences", ()):
+        print(f"probe    {sentence}")
     for effect in plan_data["effects"]:
         print(f"  runs   {effect['effect']:<28} {effect['equations']}")
     for sentence in plan_data["verdict"]:

@@ -13,7 +13,7 @@ from ..campaigns.backbone import given_modes
 from ..campaigns.fits import request as fit_requests
 from ..export import backbones, costs, fits
 from ..model import model
-from ..scene import axes
+from ..scene import assignments
 from ..scene.scene import remember_written
 from .shared import (
     NOT_CONVERGED,
@@ -123,7 +123,7 @@ def backbone(
 
     free_model, notes = given_modes.prepare_model(build_model, modes)
     methods = backbone_curves.choose_methods(method)
-    lengths = axes.read_lengths(amplitudes, "--amplitudes") if amplitudes else None
+    lengths = assignments.read_lengths(amplitudes, "--amplitudes") if amplitudes else None
     target = choose_folder(out, f"{free_model.source.path.stem}-backbone")
     output = Output(target, json_, quiet, not no_page, plot, verbose)
 

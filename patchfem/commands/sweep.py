@@ -13,7 +13,7 @@ from cyclopts import Parameter
 from .. import core
 from ..campaigns.sweeps import executors, parse_request
 from ..export.sweeps import run
-from ..scene import axes
+from ..scene import assignments
 from .shared import (
     NOT_CONVERGED,
     CommandExit,
@@ -184,7 +184,7 @@ def sweep(
 def _print_notes(sweep_scene, cases, what: CaseOptions | None) -> None:
     """Print notes on the ranges of the keys, on invalid cases and on a bolted joint."""
     texts = [
-        *axes.describe_ranges(what.over if what else ()),
+        *assignments.describe_ranges(what.over if what else ()),
         parse_request.warn_of_invalid_cases(sweep_scene, cases),
         sweep_scene.note_bolted_joint(),
     ]

@@ -297,12 +297,6 @@ class KernelFunction:
         known = self.python_seconds if self.python_seconds < inf else 0.0
         self.python_seconds = known + seconds
 
-    def is_stored(self, *arguments) -> bool:
-        """Return whether machine code for arguments of these types is stored."""
-        type_codes = [self.converter.convert(argument)[0] for argument in arguments]
-        file_name = self._make_file_name(type_codes)
-        return any((folder / "code" / file_name).is_file() for folder in _list_code_folders())
-
     def bind_arguments(self, *arguments) -> tuple:
         """Convert the last arguments of many calls once, for `call_with_bound_args`.
 

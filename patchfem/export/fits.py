@@ -20,7 +20,7 @@ from ..disk.atomic_write import write_text
 from ..formatting import format_number
 from ..identify.least_squares import Fit
 from ..model.model import build, write_resolved
-from ..scene.ranges import Range
+from ..scene.assignments import Range
 from ..scene.scene import Scene, add_sets, move_scene
 from . import page, store
 from .answer import Answer, Quantity, Remarks, Variable, encode, make_columns

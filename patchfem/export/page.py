@@ -30,6 +30,7 @@ FILE_TEXTS = {
     "scene.resolved.toml": "the scene in SI units, with all default values",
     "scene.fitted.toml": "the scene with the fitted values, ready to run",
 }
+SURFACE_FILE_TEXTS = {"result.nc": "curves and maps (xarray, MATLAB, ncdump)"}
 WIDE_STYLES = ("relative", "menu", "maps", "film")  # styles of charts that take the whole width
 TALL_STYLES = ("relative", "menu", "maps", "shares", "film", "bars")
 COMPRESSION = 6  # level of the compression of the figures in a page
@@ -105,7 +106,7 @@ def make_page(folders: list[Path]) -> str:
         "tables": make_tables(first)
         if len(answers) == 1
         else several.list_scene_differences(answers),
-        "files": _list_files(folders[0]) if len(folders) == 1 else [],
+        "files": _list_files(folders[0], first.kind) if len(folders) == 1 else [],
         "figures": figures,
         "data": pack_figures([_strip(figure) for figure in figures]),
         "library": read_library() if figures else "",
@@ -179,6 +180,7 @@ def _describe(answers: dict[str, Answer]) -> dict:
         "notes": first.remarks.notes,
         "tiles": make_tiles(first),
         "command": origin.get("command", ""),
+        "sources": "files" if first.kind in quantities.SURFACE_KINDS else "scene",
         "effects": first.details.get("effects", []),
         "texts": [part for part in texts if part[1]],
     }
@@ -347,14 +349,15 @@ def make_stress_panel(path: Path) -> panels.Panel | None:
     return panels.make_film(frames, "von Mises stress in both pieces", "Pa")
 
 
-def _list_files(folder: Path) -> list[tuple[str, str]]:
-    """Return name and description of the files beside the page."""
+def _list_files(folder: Path, kind: str) -> list[tuple[str, str]]:
+    """Return name and description of the files beside the page of a kind of answer."""
+    texts = FILE_TEXTS | (SURFACE_FILE_TEXTS if kind in quantities.SURFACE_KINDS else {})
     names = sorted(path.name for path in folder.iterdir() if not path.name.startswith("."))
     csv_text = "columns of this curve (spreadsheet)"
     known = [
-        (name, FILE_TEXTS.get(name, csv_text))
+        (name, texts.get(name, csv_text))
         for name in names
-        if name in FILE_TEXTS or name.endswith(".csv")
+        if name in texts or name.endswith(".csv")
     ]
     details = [
         (name, "all numbers of this answer, in SI units")

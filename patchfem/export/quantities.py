@@ -21,7 +21,11 @@ MEASURED_DIGITS = 4  # of quantities of measured surfaces without an error; trac
 # words at the end of a name that mark a fraction (in percent) or a phase (in degrees)
 PERCENT_WORDS = ("fraction", "share")
 # display units of areas of sections and of wear coefficients
-LADDERS = UNIT_LADDERS | {"m2": (("um^2", 1e12),), "m2 N-1": (("m^2/N", 1.0),)}
+LADDERS = UNIT_LADDERS | {
+    "m2": (("um^2", 1e12),),
+    "m2 N-1": (("m^2/N", 1.0),),
+    "m m-1": (("um/mm", 1e3),),  # slopes of roughness profiles
+}
 DEGREES = ("deg", 57.29577951308232)
 
 KEY = (

@@ -10,18 +10,17 @@ TRACK_NAMES = {"depth_mean": "track_depth"}
 
 # quantities that have the same meaning between two scans, two traces and two runs
 _MEANINGS = {
-    "worn_volume": ("m3", "volume lost in the common part of two scans, or on the patch of a run"),
+    "worn_volume": ("m3", "volume lost in the part that both surfaces show"),
     "worn_depth_mean": (
         "m",
-        "mean depth of the lost material: lost area divided by the common length, or lost volume divided by the common area "
-        "or by the area of the patch",
+        "mean depth of the lost material over the part that both surfaces show",
     ),
     "worn_depth_max": ("m", "largest depth of the lost material"),
     "worn_area": ("m2", "lost area of the section, which is the lost volume per width"),
-    "worn_share": ("1", "fraction of the common area, or of the area of the patch, that is worn"),
+    "worn_share": ("1", "fraction of the part that both surfaces show that is worn"),
     "hidden_wear": (
         "m",
-        "largest mean of an even or wedge-shaped wear, which measured surfaces show as a shift of the datum",
+        "mean of an even or wedge-shaped wear, which measured surfaces show as an offset or tilt of the datum",
     ),
     "track_hidden_wear": (
         "m",

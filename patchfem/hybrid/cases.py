@@ -293,7 +293,9 @@ def make_rig_case(
 
     max_steps = MAX_STEPS + MAX_CYCLE_STEPS * schedule.cycles
     options = Options(drive.moving, schedule.travel, rtol, max_steps, n_steps)
-    arrays = make_rig(modes, signal, interfaces, find_sizes(rig, signal, drive), options)
+    arrays = make_rig(
+        modes, signal, interfaces, find_sizes(modes, signal, drive, rig.start), options
+    )
     ends = make_schedule(schedule.cycles, signal.period, schedule.window)
     return Case(
         arrays, make_start(arrays, interfaces, rig.start), *ends, np.asarray(schedule.samples, float),
@@ -301,19 +303,27 @@ def make_rig_case(
     )  # fmt: skip
 
 
-def find_sizes(rig, signal: Signal, drive) -> tuple[float, float]:
+def find_sizes(modes: ModalBasis, signal: Signal, drive, start=None) -> tuple[float, float]:
     """Return the displacement [m] and speed [m/s] that drive and start alone give to slides and output.
 
     A mode above the frequency of the drive follows it by its stiffness, one below by its inertia.
+
+    Parameters
+    ----------
+    modes : ModalBasis
+    signal : Signal
+    drive
+        Drive of the signal.
+    start : InitialState, optional
+        Modal coordinates [m] and velocities [m/s]; at rest by default.
     """
-    modes = rig.modes
     rows = np.vstack([modes.interfaces, modes.output])
     omega = 2 * np.pi / signal.period
     response = np.abs(modes.base) / np.maximum(omega, modes.omega) ** 2
     size = find_max_acceleration(drive) * (np.abs(rows) @ response).max(initial=0.0)
     speed = omega * size
-    if rig.start is not None:
-        speeds = np.append(rows @ np.asarray(rig.start.v), omega * (rows @ np.asarray(rig.start.z)))
+    if start is not None:
+        speeds = np.append(rows @ np.asarray(start.v), omega * (rows @ np.asarray(start.z)))
         speed = max(speed, np.abs(speeds).max())
     return speed / omega, speed
 
@@ -358,7 +368,9 @@ def make_batch(cases, n_events: int = 0) -> tuple[Rig, State, Record]:
         Number of events that a case can store.
     """
     rig = cases[0].rig
-    n_cases, n_faces, n = len(cases), rig.faces.shape[0], cases[0].y.size
+    n_cases = len(cases)
+    n_faces = rig.faces.shape[0]
+    n = cases[0].y.size
     clock = np.zeros((n_cases, len(Clock)))
     clock[:, Clock.STEP] = [0.1 * case.rig.settings[Setting.LONGEST_STEP] for case in cases]
 

@@ -85,7 +85,8 @@ def make_record(time, value, period: float) -> Signal:
 
 def make_sweep(drive) -> Signal:
     """Return the Signal of a `structure.drives.SweepDrive`."""
-    low, high = 2 * np.pi * drive.low, 2 * np.pi * drive.high
+    low = 2 * np.pi * drive.low
+    high = 2 * np.pi * drive.high
     growth = chirp = 0.0
     if drive.logarithmic:
         growth = np.log(high / low) / drive.duration

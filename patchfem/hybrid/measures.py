@@ -96,7 +96,10 @@ def compute_measures(
 
 
 def _mean_phase(row) -> np.ndarray:
-    """Return the mean phase (c,) [rad], modulo pi, at which slip starts; NaN without a common phase."""
+    """Return the mean phase (c,) [rad], modulo pi, at which slip starts in each case; NaN without a common phase.
+
+    `row` (c, m) has the sums over the last cycles (`records.Window`) of one interface.
+    """
     count = row[:, Window.STARTS]
     cosine = row[:, Window.COS_START]
     sine = row[:, Window.SIN_START]
@@ -106,7 +109,8 @@ def _mean_phase(row) -> np.ndarray:
 
 def _compute_energies(rigs, states, first, n_friction: int) -> dict:
     """Return the energies [J] of the whole run and the relative error of their balance."""
-    n_faces, n = rigs.faces.shape[1], rigs.modes.shape[2]
+    n_faces = rigs.faces.shape[1]
+    n = rigs.modes.shape[2]
     y = states.y
     integrals = y.shape[1] - N_INTEGRALS - N_FACE_INTEGRALS * n_faces
     faces = y[:, integrals : y.shape[1] - N_INTEGRALS].reshape(len(y), n_faces, N_FACE_INTEGRALS)

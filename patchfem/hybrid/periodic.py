@@ -20,9 +20,8 @@ MAX_ITERATIONS = 30
 N_FIRST_CYCLES = 8  # cycles before the first correction
 N_RELAXED = 6  # cycles without a correction after one that did not help
 MAX_CHANGE = 100.0  # largest change over a periodic motion, relative to the step tolerance
-MAX_STABLE_MULTIPLIER = (
-    1 + 1e-3
-)  # of a stable motion, because the derivatives of the map are differences
+# Largest Floquet multiplier of a stable motion; above 1, because the derivatives of the map are differences.
+MAX_STABLE_MULTIPLIER = 1 + 1e-3
 # Distance of a multiplier from 1 that differences do not resolve; a mode with a damping ratio of 3e-7 has it.
 UNDAMPED_TOL = 2e-6
 NEUTRAL_TOL = 1e-9  # distance of a multiplier from 1, relative to the largest, that counts as none
@@ -32,6 +31,9 @@ N_GROWTH_CYCLES = (
 MIN_SIZE_RATIO = (
     1e3  # smallest ratio of a periodic motion that is never reached to the motion after these runs
 )
+# Largest ratio of the changes over a period after and before a correction at which the derivatives of this correction
+# are used again. The ratio is about the relative change of the derivatives.
+MAX_REMAINDER = 1e-3
 MIN_GROWTH = 1e-6  # increase in these cycles, relative to the motion
 MIN_GROWTH_RATIO = 0.5  # ratio of the increases in the last and in the second of these runs
 
@@ -83,24 +85,33 @@ def find_periodic_motion(
     shooting = _Shooting(case, is_free=is_free)
     if start is not None:
         shooting.state = _copy(start)
-    shooting.relax(n_first)
+    shooting.relax(n_first - 1)
     best = np.inf
     tolerance = MAX_CHANGE * float(case.rig.settings[Setting.RTOL])
     for _ in range(MAX_ITERATIONS):
         before = shooting.state
-        batch = shooting.run()
+        shooting.run()
         change = shooting.measure_change(before)
         if change < tolerance:
             if shooting.has_same_regime(before):
                 break
+            shooting.slopes = None
             continue
         if change > best:
             shooting.relax(N_RELAXED)
+            shooting.slopes = None
             best = np.inf
             continue
+        # The derivatives of a correction that was nearly exact serve for the next one.
+        if best < np.inf and change > MAX_REMAINDER * best:
+            shooting.slopes = None
         best = change
         shooting.correct(before)
+    if best < np.inf and change > MAX_REMAINDER * best:
+        shooting.slopes = None
     multipliers, error = shooting.find_multipliers(before)
+    shooting.state = before
+    batch = shooting.run(has_windows=True)
     largest = np.abs(multipliers).max(initial=0.0)
     has_converged = change < tolerance
     may_grow = not has_converged or largest > 1 - UNDAMPED_TOL
@@ -145,11 +156,22 @@ class _Shooting:
         self.n = case.y.size - N_INTEGRALS - N_FACE_INTEGRALS * case.rig.faces.shape[0]
         self.period = float(case.rig.settings[Setting.PERIOD])
         self.n_periods = 0
+        self.slopes: tuple | None = None
         # The errors of a period, of the size of the step tolerance, and of the difference are equal.
         self.difference = max(MIN_DIFFERENCE, float(case.rig.settings[Setting.RTOL]) ** 0.5)
 
-    def run(self, states: State | None = None, periods=None) -> Batch:
-        """Advance the motion, or several of them, by a period; the clocks start at 0."""
+    def run(self, states: State | None = None, periods=None, *, has_windows: bool = False) -> Batch:
+        """Advance the motion, or several of them, by a period; the clocks start at 0.
+
+        Parameters
+        ----------
+        states : State, optional
+            States of several motions; default: that of this motion, which goes on.
+        periods : sequence of float, optional
+            Period [s] of each motion.
+        has_windows : bool
+            Whether the measures of the period are computed.
+        """
         own = states is None
         states = _copy(self.state) if own else states
         periods = [self.period] * len(states.y) if periods is None else periods
@@ -159,7 +181,7 @@ class _Shooting:
             replace(self.case, ends=np.array([period]), windows=np.zeros(1), samples=np.zeros(0))
             for period in periods
         ]
-        batch = run_batch(one, states=states)
+        batch = run_batch(one, states=states, has_windows=has_windows)
         self.n_periods += len(one)
         if own:
             self.state = batch.states
@@ -177,7 +199,8 @@ class _Shooting:
         omega = self.case.rig.settings[Setting.OMEGA]
         # Displacements and velocities share their magnitudes, because either may vanish at the start of a period.
         size = max(scale[:n_modes].max(), scale[n_modes : 2 * n_modes].max() / omega)
-        scale[:n_modes], scale[n_modes : 2 * n_modes] = size, size * omega
+        scale[:n_modes] = size
+        scale[n_modes : 2 * n_modes] = size * omega
         return scale
 
     def measure_change(self, before: State) -> float:
@@ -204,12 +227,24 @@ class _Shooting:
         return np.flatnonzero(np.concatenate([changed, memory.ravel()]))
 
     def _differentiate(self, before: State) -> tuple:
-        """Return the unknowns' indices, change over a period, derivatives of the map, and their scales."""
+        """Return the unknowns' indices, change over a period, derivatives of the map, and their scales.
+
+        The derivatives of the last correction are used again as long as `slopes` has them.
+        """
         columns = self._columns(before)
-        start, end = _pack(before, self.n), _pack(self.state, self.n)
+        start = _pack(before, self.n)
+        end = _pack(self.state, self.n)
         scale = np.concatenate([self._scales(), np.abs(start[0, self.n :])])[columns]
-        count = columns.size + self.is_free
-        states = _repeat(before, count)
+        if self.slopes is None or not np.array_equal(self.slopes[0], columns):
+            self.slopes = columns, self._compute_slopes(before, columns, scale, end)
+        return columns, (end - start)[0, columns], self.slopes[1], scale
+
+    def _compute_slopes(self, before: State, columns, scale, end) -> np.ndarray:
+        """Return the derivatives (k, k) of the map of a period with respect to the unknowns, by differences.
+
+        A free motion has a column more, the derivative with respect to the period. `end` is the end of the period.
+        """
+        states = _repeat(before, columns.size + self.is_free)
         packed = _pack(states, self.n)
         steps = self.difference * scale
         packed[np.arange(columns.size), columns] += steps
@@ -222,7 +257,7 @@ class _Shooting:
         slopes[:, : columns.size] /= steps
         if self.is_free:
             slopes[:, -1] /= self.difference * self.period
-        return columns, (end - start)[0, columns], slopes, scale
+        return slopes
 
     def find_multipliers(self, before: State) -> tuple[np.ndarray, float]:
         """Return the eigenvalues of the map of a period from a state, and the largest part of the next Newton step."""

@@ -32,9 +32,11 @@ COARSE = 30.0  # ratio of the step tolerances of the comparison run and of the r
 COARSE_STEP = 2.0  # ratio of their longest steps
 ERROR_FACTOR = 3.0  # safety; on 150 random rigs 97 % of the errors of each measure hold, with 1 instead of 3 94 %
 ERROR_FLOOR = 10.0  # smallest error of a value, relative to the step tolerance
-N_EVENTS = 200_000  # events that a single run stores
+N_EVENTS = 200_000  # events that a single run stores at most
+MIN_EVENTS = 1000  # events for which it has room in any case, with EVENTS_PER_PART for each cycle and piece of the drive
+EVENTS_PER_PART = 100
 MAX_REPEATED = 1000  # cycles whose events are repeated where the motion repeats
-SAME_PHASE_TOL = 1e-6  # in cycles
+SAME_PHASE_TOL = 1e-6  # difference of two phases that count as equal [cycles]
 EVENT_NAMES = {
     Margin.MOTION: "stop or reversal",
     Margin.BRANCH: "change of branch",
@@ -82,7 +84,7 @@ class Motion:
     - extremes (c, 2), phasors (c,): smallest and largest output [m] and phasor of the output [m] of each cycle
     - rows (k, m): stored samples and events in the order of time, see `records.Record`; an event follows a sample at
       its time
-    - event_rows (e, m): the first N_EVENTS events
+    - event_rows (e, m): the first events, see N_EVENTS
     - time: end of the motion [s]
     - repeats: whether the motion repeats after each cycle before the last ones
     - final: arrays of the engine at the end
@@ -174,12 +176,17 @@ class Motion:
         """Return the stored samples as histories.
 
         Forces, slides, slips and loads of several interfaces are columns of `forces`, `slides`, `slide_rates`,
-        `slips`; "ledger" has friction work, stored, dissipated and created energy [J].
+        `slips`; "ledger" has friction work, stored, dissipated and created energy [J]. A slip starts from the slide at the
+        start of the motion.
         """
         rows = self.rows
         rig = self.case.rig
-        n, n_faces, m = rig.modes.shape[1], rig.faces.shape[0], self.case.n_friction
-        time, z, rate = rows[:, 0], rows[:, 1 : 1 + n], rows[:, 1 + n : 1 + 2 * n]
+        n = rig.modes.shape[1]
+        n_faces = rig.faces.shape[0]
+        m = self.case.n_friction
+        time = rows[:, 0]
+        z = rows[:, 1 : 1 + n]
+        rate = rows[:, 1 + n : 1 + 2 * n]
         first = 1 + self.case.y.size - N_INTEGRALS - N_FACE_INTEGRALS * n_faces
         integrals = rows[:, first : first + N_FACE_INTEGRALS * n_faces].reshape(
             len(rows), n_faces, N_FACE_INTEGRALS
@@ -194,10 +201,13 @@ class Motion:
         )
         acceleration -= forces @ rig.rows[0] / modes.mass
 
-        slides, slide_rates = z @ rig.rows[0, :m].T, rate @ rig.rows[0, :m].T
+        slides = z @ rig.rows[0, :m].T
+        slide_rates = rate @ rig.rows[0, :m].T
         rests = (self._columns(rows, 2) == 0) & (rig.faces[:m, Face.RIGID] > 0)
         slide_rates[rests] = 0.0
-        work, slips, loss = integrals[:, :m, 0], integrals[:, :m, 1], integrals[:, :m, 2]
+        work = integrals[:, :m, 0]
+        loss = integrals[:, :m, 2]
+        slips = integrals[:, :m, 1] + self.case.y[:n] @ rig.rows[0, :m].T
         extra = {
             "ledger": np.stack(
                 [work.sum(1), (work - loss).sum(1), loss.sum(1), np.zeros(time.size)]
@@ -222,7 +232,9 @@ class Motion:
         )  # fmt: skip
 
 
-def run_batch(cases, n_events: int = 0, states: State | None = None) -> Batch:
+def run_batch(
+    cases, n_events: int = 0, states: State | None = None, *, has_windows: bool = True
+) -> Batch:
     """Run cases whose arrays have the same shapes in one compiled loop.
 
     Parameters
@@ -232,11 +244,15 @@ def run_batch(cases, n_events: int = 0, states: State | None = None) -> Batch:
         Number of events that a case can store.
     states : State, optional
         States at the start in place of those of the cases; they are changed.
+    has_windows : bool
+        Whether the measures of the windows are computed.
     """
     rigs, own_states, records = make_batch(cases, n_events)
     states = own_states if states is None else states
     start = states.y.copy()
     compiled.load("hybrid.engine_kernels").run_cases(rigs, states, records)
+    if not has_windows:
+        return Batch(rigs, states, records, start, [])
     model = {"n_friction": cases[0].n_friction, "stiffness": cases[0].first_stiffness}
     with np.errstate(invalid="ignore", divide="ignore"):
         windows = [
@@ -299,7 +315,9 @@ def run_case(
     fills_histories : bool
         Whether samples and events of cycles are added that repeat an earlier one and are not computed.
     """
-    batch = run_batch([case], N_EVENTS, None if start is None else _restart(case, start))
+    n_parts = case.ends.size + len(case.rig.pieces)
+    n_events = min(N_EVENTS, MIN_EVENTS + EVENTS_PER_PART * n_parts)
+    batch = run_batch([case], n_events, None if start is None else _restart(case, start))
     _, states, records = batch[:3]
     clock = states.clock[0]
     status = Status(int(clock[Clock.STATUS]))
@@ -310,7 +328,7 @@ def run_case(
 
     cycles = records.cycles[0, :n_cycles]
     samples = records.samples[0][: int(clock[Clock.SAMPLE])]
-    event_rows = records.events[0][: min(int(clock[Clock.N_EVENTS]), N_EVENTS)]
+    event_rows = records.events[0][: int(clock[Clock.N_EVENTS])]
     repeats = bool(cycles[:, Cycle.REPEATS].any())
     if repeats and fills_histories and len(samples):
         samples, event_rows = _fill_repeated_cycles(case, cycles, samples, event_rows)
@@ -365,9 +383,10 @@ def _fill_repeated_cycles(case: Case, cycles, samples, event_rows) -> tuple:
         repeated[:, integrals] += counts[:, None] * gain
         return repeated
 
-    # Samples have the same phases in all cycles; the last computed cycle has all of them, except perhaps that at its end.
+    # Samples have the same phases in all cycles; the last computed cycle has all of them from its start on, but perhaps
+    # not the one at its end.
     missing = case.samples[: len(samples)][np.isnan(samples[:, 0])]
-    counts = np.ceil((missing - end) / period + SAME_PHASE_TOL)
+    counts = np.floor((missing - end) / period + SAME_PHASE_TOL) + 1
     sources = np.searchsorted(known[:, 0], missing - counts * period - SAME_PHASE_TOL * period)
     filled = np.concatenate([known, repeat(known, sources, counts)])
 

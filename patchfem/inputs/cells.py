@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..exceptions import Missing, PatchfemError
+from .units import normalize_unit
 
 MAX_BYTES = 64 * 2**20  # largest size of a text file in bytes
 MAX_VALUE = 1e50  # largest value in SI; the keys of a scene have the same limit
@@ -105,7 +106,7 @@ def parse_header(path, line: str, table: TableFormat) -> tuple[list, dict]:
             continue
         if unit is None and "" not in units:
             raise PatchfemError(f"{path}:1: {expected} ({name} without a unit)")
-        factors[name] = units.get(unit or "")
+        factors[name] = units.get(normalize_unit(unit or ""))
         if factors[name] is None:
             known = ", ".join(filter(None, units))
             raise PatchfemError(f"{path}:1: {name} [{unit}]: unknown unit; use one of {known}")

@@ -41,7 +41,7 @@ class Loop:
         Numbers are compared as numbers. Raises PatchfemError if there is no such column, or no row with
         one of the values.
         """
-        name, equals, text = (part.strip() for part in condition.partition("="))
+        name, equals, text = map(str.strip, condition.partition("="))
         texts = [value.strip() for value in text.split(",")]
         if not equals or not all(texts):
             raise PatchfemError(
@@ -66,7 +66,7 @@ class Loop:
         return np.array([value in selected for value in values])
 
 
-def read_loop(path, units: Mapping = SLIDE_UNITS) -> Loop:
+def read_loop(path) -> Loop:
     """Read a friction loop; its displacement is measured from the first row.
 
     Parameters
@@ -75,8 +75,6 @@ def read_loop(path, units: Mapping = SLIDE_UNITS) -> Loop:
         CSV file with a header like ``time [s],displacement [um],force [N]``. The time may be absent, a
         column friction_ratio may replace the force, and the columns of `patchfem export` may replace
         displacement and force (`EXPORTED_NAMES`).
-    units : Mapping
-        Quantity -> unit -> factor to SI.
 
     Returns
     -------
@@ -90,7 +88,7 @@ def read_loop(path, units: Mapping = SLIDE_UNITS) -> Loop:
         If the table is not a loop; the message names the line.
     """
     path = Path(path)
-    known = {**FORCE_UNITS, **units}
+    known = {**FORCE_UNITS, **SLIDE_UNITS}
     for quantity, names in EXPORTED_NAMES.items():
         known |= dict.fromkeys(names, known[quantity])
     required = " ".join(("displacement", *EXPORTED_NAMES["displacement"]))

@@ -16,6 +16,7 @@ from scipy import sparse
 from ..core import PatchfemError
 from . import matlab
 from .damage import refuse_damage
+from .symmetric import SKEW_REFUSAL, symmetrize
 
 # Names of each matrix in a file with several matrices.
 MATRIX_NAMES = {
@@ -23,8 +24,6 @@ MATRIX_NAMES = {
     "mass": ("m", "maax", "maa", "mgg", "mass"),
     "damping": ("c", "d", "baax", "baa", "bgg", "damping"),
 }
-MAX_SKEW = 1e-8  # largest skew part |A - A^T| / |A| of a matrix that counts as symmetric
-SKEW_REFUSAL = "gyroscopic and follower terms are not supported"
 MAX_NUMBERS = 5 * 10**7  # largest number of values in a matrix
 MAX_ROWS = 2 * 10**6  # largest number of rows in a matrix
 MAX_LISTED_ARRAYS = 12  # largest number of arrays that an error message lists
@@ -64,7 +63,8 @@ def read_matrix(path, matrix_name: str) -> Matrix:
     path = Path(path)
     with refuse_damage(f"{path} cannot be read"):
         matrix = READERS_BY_EXTENSION[path.suffix.lower()](path, matrix_name)
-    return matrix._replace(values=_symmetrize(path, matrix.values, matrix_name))
+    values = symmetrize(sparse.csr_array(matrix.values), f"{path}: the {matrix_name}")
+    return matrix._replace(values=values.tocsr())
 
 
 class MatrixRounding(NamedTuple):
@@ -172,33 +172,6 @@ def _insert_empty_rows(values, rows: np.ndarray, n: int) -> sparse.csr_array:
     matrix = values.tocoo()
     i, j = matrix.coords
     return sparse.coo_array((matrix.data, (rows[i], rows[j])), (n, n)).tocsr()
-
-
-def _symmetrize(path, values, matrix_name: str) -> sparse.csr_array:
-    """Check that a matrix is square, real, finite and nearly symmetric; make it symmetric."""
-    values = sparse.csr_array(values)
-    if values.ndim != 2 or values.shape[0] != values.shape[1] or not values.shape[0]:
-        raise PatchfemError(
-            f"{path}: the {matrix_name} must be square, not of shape {values.shape}"
-        )
-    if np.iscomplexobj(values.data):
-        if np.any(values.data.imag):
-            raise PatchfemError(
-                f"{path}: the {matrix_name} is complex; motion in time needs real matrices: give hysteretic "
-                "damping as a damping ratio, which is half the loss factor"
-            )
-        values = values.real
-    if not np.isfinite(values.data).all():
-        raise PatchfemError(f"{path}: the {matrix_name} contains values that are not finite")
-    values = values.astype(float)
-    skew = abs(values - values.T).max()
-    largest = abs(values).max()
-    if skew > MAX_SKEW * largest:
-        raise PatchfemError(
-            f"{path}: the {matrix_name} is not symmetric: entries differ from the transpose by {skew:.3g}, "
-            f"which is {skew / largest:.2g} of the largest entry; {SKEW_REFUSAL}"
-        )
-    return ((values + values.T) / 2).tocsr()
 
 
 def _find_matrix_name(path, names, matrix_name: str) -> str:

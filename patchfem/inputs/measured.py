@@ -5,13 +5,14 @@ from functools import lru_cache
 from pathlib import Path
 
 from ..exceptions import PatchfemError
+from ..scene.keys.quantities import UNIT_FACTORS
 from .cells import TableFormat, parse_header, parse_number, read_lines, split_cells
 
 COLUMN_UNITS = {
-    "frequency": {"Hz": 1.0, "kHz": 1e3},
-    "input": {"g": 9.80665, "m/s^2": 1.0, "m s-2": 1.0},
-    "acceleration": {"g": 9.80665, "m/s^2": 1.0, "m s-2": 1.0},
-    "displacement": {"mil": 25.4e-6, "in": 0.0254, "m": 1.0, "mm": 1e-3, "um": 1e-6},
+    "frequency": UNIT_FACTORS["frequency"],
+    "input": UNIT_FACTORS["acceleration"],
+    "acceleration": UNIT_FACTORS["acceleration"],
+    "displacement": UNIT_FACTORS["length"],
 }
 TABLE_FORMAT = TableFormat(
     COLUMN_UNITS,

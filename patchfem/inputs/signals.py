@@ -5,18 +5,19 @@ from pathlib import Path
 import numpy as np
 
 from ..core import PatchfemError
+from ..scene.keys.quantities import UNIT_FACTORS
 from .cells import TableFormat
 from .columns import read_columns
 from .records import select_channels
 from .slides import require_increasing_time
-from .units import RECORD_UNITS, SI_UNITS, SLIDE_UNITS
+from .units import CHANNEL_UNITS, SI_UNITS
 from .universal import OrdinateType, make_channels, read_datasets
 
 FILE_REMEDY = "; drive.file is relative to the scene"
 SPECTRUM_FORMAT = TableFormat(
     {
-        "frequency": {"Hz": 1.0, "kHz": 1e3},
-        "level": {"g^2/Hz": 9.80665**2, "m^2/s^3": 1.0, "(m/s^2)^2/Hz": 1.0},
+        "frequency": UNIT_FACTORS["frequency"],
+        "level": UNIT_FACTORS["acceleration spectrum"],
     },
     ("frequency", "level"),
     "frequency [Hz],level [g^2/Hz]",
@@ -54,7 +55,7 @@ def read_signal(path, quantity: str) -> tuple:
         time, value = _read_universal(path, quantity)
     else:
         table = TableFormat(
-            {**RECORD_UNITS, **SLIDE_UNITS},
+            CHANNEL_UNITS,
             ("time", quantity),
             f"time [s],{quantity} [{SI_UNITS[quantity]}]",
             "a drive",

@@ -3,7 +3,6 @@
 The slide is linear between the rows. Other columns are ignored.
 """
 
-from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -11,12 +10,12 @@ import numpy as np
 from ..core import PatchfemError
 from .cells import TableFormat
 from .columns import read_columns
-from .units import RECORD_UNITS, SLIDE_UNITS
+from .units import CHANNEL_UNITS
 
 COLUMN_NAMES = ("time", "displacement")
 
 
-def read_slide(path, units: Mapping = SLIDE_UNITS) -> tuple:
+def read_slide(path) -> tuple:
     """Read a prescribed displacement from a table, a measured loop or a `patchfem import` file.
 
     Parameters
@@ -24,8 +23,6 @@ def read_slide(path, units: Mapping = SLIDE_UNITS) -> tuple:
     path : path-like
         CSV file with a header like ``time [s],displacement [um]``, and at least two rows. The first
         row is 0 in every column: there the pieces were pressed together.
-    units : Mapping
-        Quantity -> unit -> factor to SI.
 
     Returns
     -------
@@ -41,8 +38,8 @@ def read_slide(path, units: Mapping = SLIDE_UNITS) -> tuple:
     """
     path = Path(path)
     table = TableFormat(
-        {**RECORD_UNITS, **units, "lateral": units["displacement"]},
-        ("time", "displacement"),
+        {**CHANNEL_UNITS, "lateral": CHANNEL_UNITS["displacement"]},
+        COLUMN_NAMES,
         "time [s],displacement [um]",
         "a path",
         "; slide.file is relative to the scene",

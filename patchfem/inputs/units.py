@@ -1,4 +1,4 @@
-"""Units of the quantities in files of measurements, and their factors to SI.
+"""Units of the quantities in files of measurements, and their factors to SI: those of a scene.
 
 Every table maps a quantity to its units, and each unit to its factor; the unit "" stands for a column
 without a unit.
@@ -7,54 +7,44 @@ without a unit.
 import re
 
 from ..exceptions import PatchfemError
+from ..scene.keys import quantities
+from ..scene.keys.quantities import UNIT_FACTORS
 
-_TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
-_LENGTH_UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "in": 0.0254, "mil": 25.4e-6}
-_ACCELERATION_UNITS = {"m/s^2": 1.0, "g": 9.80665, "mm/s^2": 1e-3, "in/s^2": 0.0254}
 RATIO_UNITS = {"": 1.0, "1": 1.0, "%": 0.01}
-SLIDE_UNITS = {"time": _TIME_UNITS, "displacement": _LENGTH_UNITS}
-FORCE_UNITS = {
-    "force": {"N": 1.0, "kN": 1e3, "lbf": 4.4482216152605, "kgf": 9.80665},
-    "friction_ratio": RATIO_UNITS,
-}
+SLIDE_UNITS = {"time": UNIT_FACTORS["time"], "displacement": UNIT_FACTORS["length"]}
+FORCE_UNITS = {"force": UNIT_FACTORS["force"], "friction_ratio": RATIO_UNITS}
 # Quantities that a record may contain besides time; a reader ignores those that it does not need.
 RECORD_UNITS = {
-    "displacement": _LENGTH_UNITS,
-    "velocity": {"m/s": 1.0, "mm/s": 1e-3, "um/s": 1e-6, "in/s": 0.0254},
-    "acceleration": _ACCELERATION_UNITS,
-    "base_acceleration": _ACCELERATION_UNITS,
+    "displacement": UNIT_FACTORS["length"],
+    "velocity": UNIT_FACTORS["velocity"],
+    "acceleration": UNIT_FACTORS["acceleration"],
+    "base_acceleration": UNIT_FACTORS["acceleration"],
     **FORCE_UNITS,
 }
-CHANNEL_UNITS = {"time": _TIME_UNITS | {"min": 60.0}, **RECORD_UNITS}
-SI_UNITS = {
-    name: next(unit for unit, factor in units.items() if factor == 1.0 and unit)
-    for name, units in CHANNEL_UNITS.items()
-}
+CHANNEL_UNITS = {"time": UNIT_FACTORS["time"], **RECORD_UNITS}
+# The SI unit is the first one of each table that is not "".
+SI_UNITS = {name: next(filter(None, units)) for name, units in CHANNEL_UNITS.items()}
 _UNIT_SYNONYMS = {
     "sec": "s",
     "seconds": "s",
     "newton": "N",
     "newtons": "N",
-    "µm": "um",
-    "μm": "um",
-    "µs": "us",
-    "μs": "us",
 }
 # Spellings of "per second squared" and of "per second" after a unit.
 _RATE_UNIT_PATTERNS = {
-    "/s^2": re.compile(r"(\w+) ?(?:/ ?s(?:ec)?(?:\^|\*\*)?2|/ ?s²| s-2| s\^-2)"),
+    "/s^2": re.compile(r"(\w+) ?(?:/ ?s(?:ec)?(?:\^|\*\*)?2| s-2| s\^-2)"),
     "/s": re.compile(r"(\w+) ?(?:/ ?s(?:ec)?| s-1| s\^-1)"),
 }
 
 
 def normalize_unit(text: str) -> str:
     """Spell a unit as the tables do: "m/s2" and "m s-2" become "m/s^2", "µm" becomes "um"."""
-    text = " ".join(text.split())
-    text = _UNIT_SYNONYMS.get(text.lower(), _UNIT_SYNONYMS.get(text, text))
+    text = quantities.normalize_unit(text)
+    text = _UNIT_SYNONYMS.get(text.lower(), text)
     for ending, pattern in _RATE_UNIT_PATTERNS.items():
         match = pattern.fullmatch(text)
         if match:
-            return _UNIT_SYNONYMS.get(match[1], match[1]) + ending
+            return match[1] + ending
     return text
 
 

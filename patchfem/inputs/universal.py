@@ -135,7 +135,7 @@ def _make_channel(path, number: int, dataset: dict, factors: dict | None, notes:
         raise PatchfemError(
             f"{location}: {values.size} values, but {dataset['num_pts']} are announced; the file is damaged"
         )
-    quantity = _find_quantity(int(dataset["ordinate_spec_data_type"]))
+    quantity = find_quantity(int(dataset["ordinate_spec_data_type"]))
     unit = normalize_unit(_clean_text(dataset["ordinate_axis_units_lab"]))
     factor = None
     if quantity and unit not in CHANNEL_UNITS[quantity]:
@@ -157,7 +157,7 @@ def _make_channel(path, number: int, dataset: dict, factors: dict | None, notes:
     return Channel(name, place, quantity, unit, values, time, factor)
 
 
-def _find_quantity(ordinate_type: int) -> str:
+def find_quantity(ordinate_type: int) -> str:
     """Return the quantity of a data type, or "" for an unknown type."""
     if ordinate_type not in list(OrdinateType):
         return ""

@@ -16,10 +16,10 @@ from .pieces import PieceMesh, find_edges, freeze_piece, signed_areas
 # Largest slope of a rounded edge within the interface; the normal and the vertical gap then differ
 # by half a percent
 MAX_SLOPE = 0.1
-# Tags of the cells of both pieces
-CELL_TAGS = ("upper_substrate", "upper_coating", "lower_substrate", "lower_coating")
-# Tags of the edges on the interfaces and the far faces of both pieces
-EDGE_TAGS = ("upper_interface", "lower_interface", "upper_far", "lower_far")
+# Names of the tags of the cells of both pieces, with their numbers in mesh files
+CELL_TAGS = {"upper_substrate": 1, "upper_coating": 2, "lower_substrate": 3, "lower_coating": 4}
+# Names of the tags of the edges on the interfaces and the far faces of both pieces, with these numbers
+EDGE_TAGS = {"upper_interface": 11, "lower_interface": 12, "upper_far": 13, "lower_far": 14}
 
 
 class TaggedBlock(NamedTuple):

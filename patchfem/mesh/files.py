@@ -14,15 +14,11 @@ import numpy as np
 
 from ..core import PatchfemError
 from ..disk.atomic_write import write_atomically
-from .checks import PairMesh, TaggedBlock, TaggedMesh, build_pair
+from .checks import CELL_TAGS, EDGE_TAGS, PairMesh, TaggedBlock, TaggedMesh, build_pair
 from .decks import read_deck
 from .elements import ELEMENTS
 from .pieces import find_edges
 
-# Tag numbers of the cells of a pair
-CELL_TAGS = {"upper_substrate": 1, "upper_coating": 2, "lower_substrate": 3, "lower_coating": 4}
-# Tag numbers of the edges of a pair
-EDGE_TAGS = {"upper_interface": 11, "lower_interface": 12, "upper_far": 13, "lower_far": 14}
 # Largest size of a mesh file [bytes]; meshes of two plane pieces are smaller
 MAX_FILE_BYTES = 256 * 2**20
 # Smallest size [bytes] of an entry in these sections of a .msh file

@@ -88,7 +88,7 @@ class TensorGrid:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Numbers of columns and rows of nodes."""
+        """Number of columns and number of rows of nodes."""
         return self.columns.size, self.depth.size
 
     @property

@@ -13,6 +13,7 @@ from ..exceptions import PatchfemError
 from ..inputs import measured
 from ..mesh import files
 from ..scene.files import file_exists, list_named_files
+from ..scene.rules.structure import MATRIX_KEYS
 from . import (
     drive,
     earlier_wear,
@@ -192,10 +193,7 @@ FILE_CHECKS = {
     "slide.file": _check_slide,
     "drive.file": _check_drive,
     "structure.file": _check_structure,
-    **{
-        f"structure.reduced.{key}": _make_matrix_check(key)
-        for key in ("stiffness", "mass", "damping")
-    },
+    **{f"structure.reduced.{key}": _make_matrix_check(key) for key in MATRIX_KEYS},
     "measured.file": _check_measured,
     "wear.start": _check_wear_start,
 }

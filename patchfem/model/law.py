@@ -157,7 +157,6 @@ def make_bond_parameters(law: Friction, peak_speed: float, min_rest_speed: float
         law.slip_growth,
         rest_speed,
         law.initial_bonds,
-        law.breakaway,
     )
 
 

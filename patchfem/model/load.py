@@ -8,6 +8,7 @@ import numpy as np
 
 from ..core import Missing
 from ..friction import grooves
+from ..scene.rules.methods import find_climbed_grooves
 from .slide import SlidePath
 
 MAX_SLIDE_SAMPLES = 5_000_000  # largest number of samples in a slide; more take too much memory
@@ -103,14 +104,11 @@ class PointLoad:
 
 def build_grooves(scene) -> grooves.Grooves | None:
     """Build the grooves of [contact] or [normal], or return None if there are none or they are flat."""
-    for name in ("contact", "normal"):
-        table = getattr(scene, name)
-        if table is not None and table.grooves is not None and table.grooves.amplitude:
-            keys = table.grooves
-            return grooves.Grooves(
-                keys.wavelength, keys.amplitude, keys.phase, keys.lifted_mass, f"{name}.grooves"
-            )
-    return None
+    key = find_climbed_grooves(scene).strip("[]")
+    if not key:
+        return None
+    keys = getattr(scene, key.partition(".")[0]).grooves
+    return grooves.Grooves(keys.wavelength, keys.amplitude, keys.phase, keys.lifted_mass, key)
 
 
 def build_point_load(scene) -> PointLoad | None:

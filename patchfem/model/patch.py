@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from math import asinh, sinh, sqrt
 from pathlib import Path
 from typing import NamedTuple
 
@@ -281,20 +280,14 @@ class PatchModel:
 
     @property
     def nominal_load(self) -> float:
-        """Total load [N] of all equal pairs; an upper estimate if the approach is prescribed.
-
-        The estimate takes the layers as flat bars in series, tilted by the moment of the load.
-        """
+        """Total load [N] of all equal pairs; an upper estimate, of flat bars in series, if the approach is prescribed."""
         loading = self.loading
         if loading.load is not None:
             return loading.load
         compliance = self.pieces.series_compliance(
             lambda material: (1 - material.poisson**2) / material.young
         )
-        load = loading.approach / compliance
-        if loading.can_rotate and not loading.rotational_stiffness:
-            return _compute_tilted_bar_load(load, loading.line_moment or 0.0, self.pieces.length)
-        return load
+        return loading.approach / compliance
 
     def with_element_size(self, size: float | None) -> "PatchModel":
         """Return a copy of the patch with an element size [m]; None: the mesh is refined to the tolerance."""
@@ -452,19 +445,3 @@ def find_shortest_wavelength(contact: Contact, length: float) -> float | None:
     if cutoff is not None or contact.profile is None:
         return cutoff
     return profile.ELEMENTS_PER_WAVE * length / DEFAULT_CELLS
-
-
-def _compute_tilted_bar_load(load: float, moment: float, length: float) -> float:
-    """Return the load [N] of parallel bars that a moment [N m] tilts about their middle.
-
-    Without rotation the bars carry `load` [N]; the middle keeps its depth. All bars carry up to a
-    moment of load * length/6. Beyond it the bars over a length u L carry: the pressure is a
-    triangle, N = M/(L/2 - u L/3), and with v = u - 1/2 and m = M/(load L) the depth and the moment
-    give 2 v^3 + (12 m - 3/2) v = 1/2, which has one real root.
-    """
-    m = abs(moment) / (load * length)
-    if m <= 1 / 6:
-        return load
-    p = 6 * m - 0.75
-    v = 2 * sqrt(p / 3) * sinh(asinh(0.375 / p * sqrt(3 / p)) / 3)
-    return load * m / (1 / 3 - v / 3)

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..core import InitialState, ModalBasis
 from ..effects import Waveform, find_waveform
+from ..scene.rules.methods import find_load_change_key
 from ..structure.drive_sizes import (
     count_cycles_per_level,
     estimate_peak_speed,
@@ -27,7 +28,6 @@ from .structure import (
     find_bolted_scene,
     find_first_elastic_mode,
     has_pressed_joint,
-    has_varying_load,
     needs_strip_displacements,
     read_file_notes,
 )
@@ -291,7 +291,7 @@ def _build(scene, own_modes: ModalBasis, interfaces: tuple, joint: float | None 
     friction = RigFriction(
         interfaces=interfaces,
         names=tuple(make_interface_names(scene.structure)),
-        load_varies=has_varying_load(scene),
+        load_varies=bool(interfaces and find_load_change_key(scene)),
         strips_slide_apart=needs_strip_displacements(scene),
     )
     return Rig(

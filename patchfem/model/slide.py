@@ -9,7 +9,6 @@ import numpy as np
 
 from ..core import Missing, PatchfemError
 from ..inputs import slides
-from ..scene.keys.quantities import UNIT_FACTORS
 from .file_cache import cache_by_file
 
 # Smallest number of steps per straight leg; the coarsest run of the
@@ -217,11 +216,7 @@ def _list_dwell_corners(keys) -> tuple:
 @cache_by_file
 def read_path_file(path: Path) -> tuple:
     """Read the columns of a path file (`inputs.slides.read_slide`)."""
-    units = {
-        "time": UNIT_FACTORS["time"],
-        "displacement": UNIT_FACTORS["length"],
-    }
-    return slides.read_slide(path, units)
+    return slides.read_slide(path)
 
 
 def _sample_legs(time, rel_disp, steps: int) -> SlideSamples:

@@ -13,6 +13,7 @@ from ..core import InitialState, ModalBasis, PatchfemError, frozen_array
 from ..effects import find_waveform, import_effect, law_has_trait
 from ..friction import record
 from ..scene.keys.memoize import memoize
+from ..scene.rules.methods import find_yaw_key
 from ..structure import masses, starts
 from ..structure import modes as listed_modes
 from . import structure_files, structure_reduced
@@ -304,9 +305,8 @@ def find_first_elastic_mode(scene, own_modes: ModalBasis) -> tuple:
 
 def needs_strip_displacements(scene) -> bool:
     """Return whether a mode yaws a patch with strips, so that the strips have different displacements."""
-    if scene.contact is None or scene.contact.strips is None or scene.friction is None:
-        return False
-    return any(mode.yaw for mode in scene.structure.mode)
+    has_strips = scene.contact is not None and scene.contact.strips is not None
+    return has_strips and scene.friction is not None and bool(find_yaw_key(scene))
 
 
 def compute_strip_slides(modes: ModalBasis, offsets) -> np.ndarray:
@@ -327,12 +327,3 @@ def compute_strip_slides(modes: ModalBasis, offsets) -> np.ndarray:
     """
     yaw = np.zeros(modes.slide.size) if modes.yaw is None else modes.yaw
     return modes.slide - np.outer(offsets, yaw)
-
-
-def has_varying_load(scene) -> bool:
-    """Return whether the normal load of a rig changes in time or with the motion."""
-    if scene.friction is None and not scene.structure.interface:
-        return False
-    if scene.normal is not None and scene.normal.amplitude:
-        return True
-    return any(mode.normal or mode.pitch for mode in scene.structure.mode)

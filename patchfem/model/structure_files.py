@@ -4,11 +4,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..core import ModalBasis, PatchfemError
+from ..scene.rules.structure import LOCATION_KEYS, UNIVERSAL_EXTENSIONS
 from ..structure import arrays, places, universal
 from .file_cache import cache_by_file
-
-LOCATION_KEYS = ("slide_at", "output_at", "base_at", "force_at", "normal_at", "pitch_at")
-UNIVERSAL_EXTENSIONS = (".uff", ".unv")  # file extensions of universal files
 
 
 class FileModes(NamedTuple):

@@ -10,12 +10,12 @@ import numpy as np
 from ..core import ModalBasis, PatchfemError
 from ..formatting import format_number
 from ..inputs import matrices
+from ..scene.rules.structure import MATRIX_KEYS
 from ..structure import reduced
 from ..structure.places import DIRECTION_NAMES
 
 # Smallest relative uncertainty of a frequency that is reported.
 MIN_REPORTED_UNCERTAINTY = 1e-5
-MATRIX_KEYS = ("stiffness", "mass", "damping")  # keys of the files of [structure.reduced]
 NODE_PATTERN = re.compile(r"(\d+)(?::(r?[xyz]))?")  # pattern of "1201:x" or "1201"
 RANGE_PATTERN = re.compile(r"(\d+)\.\.(\d+)(?::(\d+))?")  # pattern of "a..b" or "a..b:n"
 

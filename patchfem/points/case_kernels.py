@@ -26,7 +26,8 @@ from .return_maps_kernels import (
 
 LEVELS = 5  # halvings of a step that contains an event
 TICKS = 1 << LEVELS  # shortest steps in a step
-TAYLOR_TERMS = 12  # of the exponential of a shortest step, whose product with any rate is below 0.1
+# Number of terms of the exponential of a shortest step; the product of this step with any rate is below 0.1.
+TAYLOR_TERMS = 12
 MAX_ITERATIONS = 60  # Newton steps and bisections for the increment of a step
 RESIDUAL = 1e-10  # residual of a step relative to its increments
 GAUSS_POINT = (

@@ -50,7 +50,8 @@ def list_parameters(
         Number of cycles, and of the last of them that are measured.
     start : core.InitialState, optional
     """
-    slide, output = modes.slide[0], modes.output[0]
+    slide = modes.slide[0]
+    output = modes.output[0]
     return (
         modes.damping_matrix[0, 0],
         modes.omega[0] ** 2,
@@ -117,7 +118,8 @@ def compute_measures(cases: Cases, now, seen, history) -> dict:
         State at the end and observations, see `case_rows`.
     """
     columns = cases.parameters.T
-    omega, ratio = columns[Number.OMEGA], columns[Number.OUTPUT]
+    omega = columns[Number.OMEGA]
+    ratio = columns[Number.OUTPUT]
     mass = 1 / columns[Number.MOBILITY]
     count = seen[:, Seen.N_CYCLES]
     span = seen[:, Seen.SPAN]
@@ -166,7 +168,8 @@ def _compute_energies(cases: Cases, now, mass) -> dict:
 def _mean_phase(seen) -> np.ndarray:
     """Return the mean phase (c,) [rad], modulo pi, at which slip starts; NaN without a common phase."""
     count = seen[:, Seen.STARTS]
-    cosine, sine = seen[:, Seen.START_COS], seen[:, Seen.START_SIN]
+    cosine = seen[:, Seen.START_COS]
+    sine = seen[:, Seen.START_SIN]
     is_common = (count > 0) & (np.hypot(cosine, sine) >= MIN_ALIGNMENT * count)
     return np.where(is_common, np.arctan2(sine, cosine) / 2 % np.pi, np.nan)
 
@@ -174,7 +177,8 @@ def _mean_phase(seen) -> np.ndarray:
 def _compute_harmonics(cases: Cases, now, seen, area, slide_range) -> dict:
     """Return the measures that follow from harmonics; integrals by parts give those of velocity and acceleration."""
     columns = cases.parameters.T
-    omega, span = columns[Number.OMEGA], seen[:, Seen.SPAN]
+    omega = columns[Number.OMEGA]
+    span = seen[:, Seen.SPAN]
     drive = 0.5 * span
     q_jump = now[:, Now.SLIDE] - seen[:, Seen.START_SLIDE]
     v_jump = now[:, Now.VELOCITY] - seen[:, Seen.START_VELOCITY]

@@ -28,7 +28,10 @@ class PointLaw(NamedTuple):
 
 
 def _pack(law: Law, numbers, memory=(), load=1.0, n_memory: int = N_MEMORY) -> PointLaw:
-    """Return a PointLaw from the first rows of numbers and memory; floats or (c,)."""
+    """Return a PointLaw whose other numbers and memory are 0.
+
+    The entries of numbers and memory are floats, or arrays (c,) with a value for each of c points.
+    """
     shape = np.broadcast_shapes(np.shape(load), *map(np.shape, (*numbers, *memory)))
     rows = np.zeros((N_NUMBERS, *shape))
     state = np.zeros((n_memory, *shape))
@@ -99,7 +102,8 @@ def make_point_law(friction, load, bonds: Bonds | None = None) -> PointLaw:
     if name == "nonlocal":
         return make_bonds(bonds or Bonds(friction.static, friction.bond_length), load)
     if name == "iwan":
-        chi, beta = friction.chi, friction.beta
+        chi = friction.chi
+        beta = friction.beta
         length = max_yield_displacement(limit, friction.stiffness, chi, beta)
         memory = (*(0.0,) * Masing.VIRGIN, 1.0)
         size = Masing.STACK + 2 * REVERSALS

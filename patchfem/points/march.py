@@ -179,7 +179,8 @@ def _make_points(contact: Contact, n_nodes: int) -> Points:
         shapes[row : row + one.stiffness.size, column : column + count] = one.shapes.reshape(
             -1, count
         )
-        row, column = row + one.stiffness.size, column + count
+        row = row + one.stiffness.size
+        column = column + count
     size = max([N_MEMORY, *(law.memory.size for law in laws)])
     memory = np.zeros((size, len(laws)))
     numbers = np.zeros((N_NUMBERS, len(laws)))
@@ -233,7 +234,9 @@ def sample_drive(drive, step: float, first: int, count: int) -> np.ndarray:
     """Return value, slope and second derivative (count, 3) of parabolas through the drive in each step."""
     times = step * (first + np.arange(2 * count + 1) / 2)
     values = drive.values(times)
-    start, middle, end = values[:-2:2], values[1::2], values[2::2]
+    start = values[:-2:2]
+    middle = values[1::2]
+    end = values[2::2]
     slope = (4 * middle - 3 * start - end) / step
     return np.stack([start, slope, 4 * (start - 2 * middle + end) / step**2], axis=1)
 
@@ -368,7 +371,11 @@ def _march_frames(
 def _make_motion(modes, drive, contact, system, chunks, snapshots, run) -> Motion:
     """Return the record of a finished march."""
     status, done, n_window, steps, step = run
-    extremes, phasors, kept, numbers, works = [], [], [], [], []
+    extremes = []
+    phasors = []
+    kept = []
+    numbers = []
+    works = []
     friction = 0.0
     first_window = done - n_window
     size = 2 * modes.omega.size
@@ -390,7 +397,8 @@ def _make_motion(modes, drive, contact, system, chunks, snapshots, run) -> Motio
     kept.append(chunks[-1][1][-1:])
     works.append([friction])
     numbers.append([chunks[-1][0] + len(chunks[-1][1]) - 1])
-    rows, number = np.concatenate(kept), np.concatenate(numbers)
+    rows = np.concatenate(kept)
+    number = np.concatenate(numbers)
     in_window = number >= first_window
     response = make_response(modes, drive, contact, rows, number * step, np.concatenate(works))
     window = response.select(in_window)
@@ -438,7 +446,8 @@ def _make_ledger(modes: ModalBasis, system: System, last) -> dict:
     """Return energies [J] and counters by name."""
     n = modes.omega.size
     totals = system.totals
-    z, v = last[:n], last[n : 2 * n]
+    z = last[:n]
+    v = last[n : 2 * n]
     interface = last[2 * n + Sample.ENERGY] + last[2 * n + Sample.CONTACT_ENERGY]
     friction = float(totals[Total.FRICTION])
     stored = 0.5 * modes.mass * float(v @ v + (modes.omega * z) @ (modes.omega * z)) + float(
@@ -456,13 +465,17 @@ def _make_ledger(modes: ModalBasis, system: System, last) -> dict:
 def find_extremes(samples, modes: ModalBasis, step: float) -> tuple[float, float]:
     """Return the smallest and largest output of samples, those of the cubics between them included."""
     n = modes.omega.size
-    q, v = samples[:, :n] @ modes.output, samples[:, n : 2 * n] @ modes.output
+    q = samples[:, :n] @ modes.output
+    v = samples[:, n : 2 * n] @ modes.output
     turn = np.flatnonzero(v[:-1] * v[1:] < 0)
     if not turn.size:
         return float(q.min()), float(q.max())
     # The velocity is the parabola with the mean of the increment.
-    first, last, mean = v[turn], v[turn + 1], (q[turn + 1] - q[turn]) / step
-    square, linear = 3 * (first + last) - 6 * mean, 6 * mean - 4 * first - 2 * last
+    first = v[turn]
+    last = v[turn + 1]
+    mean = (q[turn + 1] - q[turn]) / step
+    square = 3 * (first + last) - 6 * mean
+    linear = 6 * mean - 4 * first - 2 * last
     root = np.sqrt(np.maximum(linear**2 - 4 * square * first, 0.0))
     x = 2 * first / (-linear + np.copysign(root, first - last))
     x = np.clip(x, 0.0, 1.0)
@@ -477,7 +490,8 @@ def make_response(modes: ModalBasis, drive, contact: Contact, rows, time, work) 
     are columns in `extra`, which also has the load, moment, energy, heave and pitch of a contact that moves.
     """
     n = modes.omega.size
-    z, rate = rows[:, :n], rows[:, n : 2 * n]
+    z = rows[:, :n]
+    rate = rows[:, n : 2 * n]
     first = 2 * n + Sample.PORTS
     n_ports = len(contact.point_sets)
     columns = rows[:, first : first + N_PORT_COLUMNS * n_ports].reshape(
@@ -502,7 +516,8 @@ def make_response(modes: ModalBasis, drive, contact: Contact, rows, time, work) 
     energy = rows[:, 2 * n + Sample.ENERGY]
     extra["ledger"] = np.stack([work, energy, work - energy, np.zeros_like(work)])
     is_interface = [not one.is_spring for one in contact.point_sets]
-    slides, rates = z @ port_rows.T, rate @ port_rows.T
+    slides = z @ port_rows.T
+    rates = rate @ port_rows.T
     if len(port_rows) > 1:
         parts = {"slides": slides, "slide_rates": rates, "forces": forces, "slips": columns[..., 1]}
         extra |= {name: part[:, is_interface] for name, part in parts.items()}

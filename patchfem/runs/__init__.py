@@ -1,11 +1,11 @@
 """Plan and run of a scene: the entry points that use all other folders.
 
-In: a `Scene`. Out: `Result` with measures, histories, fields and error estimates. `plan` predicts
+In: a `Scene`. Out: `Result` with measures, histories, fields and error estimates. `plan` says
 what would run, `run` runs it. A module imports only its own entry of this list and entries above
 it:
 
 1.  `results`  what every run returns, with its notes
-2.  `cost`  CPU time, memory and sentences of a plan, as each step of a run predicts them
+2.  `sizes`  unknowns and memory of a run
 3.  `patch`  a static patch: its grids, its pressure, its measures with error estimates
 4.  `bench`  a patch or a point under a prescribed displacement
 5.  `joint`  removal of a joint from modes that were measured with it
@@ -14,10 +14,10 @@ it:
 8.  `accuracy_warnings`  measures that miss the tolerance, and the setting to change
 9.  `accuracy_curve`  accuracy of a motion against its computing time
 10. `memory`  the memory that a run may use
-11. `tolerance_forecast`  whether a tolerance will be missed, before anything runs
-12. `plan`  what would run: engine, sizes, cost
-13. `self_checks`  comparison of results with a second computation
-14. `run`  from a plan to its result
+11. `plan`  what would run: engine, sizes, stiffnesses
+12. `balances`  equilibrium of a patch and energy of a bench
+13. `run`  from a plan to its result
+14. `probe`  one run without error estimates, with its measured time
 15. `pieces`  displacement and stress inside both pieces, and where they yield
 16. `batch`  many models in one batch
 """
@@ -49,7 +49,6 @@ PUBLIC = {
     "patch.faces": (
         "NO_ERROR_ESTIMATE",
         "has_error_meshes",
-        "static_measures_without_errors",
     ),
     "patch.jenkins_elements": ("elements",),
     "patch.mesh_levels": (
@@ -57,6 +56,7 @@ PUBLIC = {
         "solve_on_split_mesh",
     ),
     "patch.press": ("nodal_areas",),
+    "probe": ("run_probe",),
     "patch.result": ("make_piece_meshes_of_run",),
     "patch.values": (
         "contact_ends",
@@ -71,7 +71,6 @@ PUBLIC = {
     "plan": (
         "GROUPS",
         "Plan",
-        "describe_compile_time",
     ),
     "results.patch_rows": (
         "TABLE",

@@ -10,7 +10,7 @@ from pathlib import Path
 from time import monotonic
 
 from ..core import Missing
-from .cost import COMPILED_CODE_LABEL
+from .sizes import COMPILED_CODE_LABEL
 
 MAPPED_BYTES = 60e6  # Address space [bytes] that the packages map in addition to the memory in use.
 COMPILER_BYTES = 150e6  # Address space [bytes] of the compiler library.

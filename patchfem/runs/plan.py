@@ -1,4 +1,4 @@
-"""Plan of a scene before it is run: engine, sizes, cost, stiffnesses and dimensionless groups.
+"""Plan of a scene before it is run: engine, sizes, stiffnesses and dimensionless groups.
 
 In: a Scene or a Model. Out: a `Plan`. Nothing is solved, except for the contact search by which an
 automatic mesh is graded, and for the patch of a joint that was bolted when the modes were measured.
@@ -7,8 +7,7 @@ automatic mesh is graded, and for the patch of a joint that was bolted when the 
 from dataclasses import dataclass, replace
 from math import inf
 
-from .. import compiled, cost_model
-from ..core import Missing, PatchfemError
+from ..core import PatchfemError
 from ..effects import EFFECTS, law_has_trait
 from ..formatting import format_length
 from ..friction import record
@@ -20,24 +19,20 @@ from ..response import rows
 from ..structure import drive_sizes
 from . import joint, memory
 from .bench import engine as of_bench
-from .cost import Cost, MemoryPart
 from .patch import plan as patch_plan
 from .rig import engines
 from .rig import plan as of_rig
-from .tolerance_forecast import EMPTY_FORECAST, Forecast, forecast_tolerance
-from .wear import plan as of_wear
+from .sizes import MemoryPart, RunSizes
 
 PACKAGE_BYTES = 80e6  # Memory of the packages that every run imports [bytes].
-MAX_CPU_SECONDS = 1e6  # Largest predicted CPU time [s] of a run that is started; twelve days.
 SKIPPING_ENGINES = (
     "march",
     "hybrid",
 )  # Engines that skip cycles once the motion is periodic.
 # Smallest number of cycles at which a plan mentions that cycles may be skipped.
 MIN_SKIPPED_CYCLES = 100
-UPPER_LIMIT_NOTE = (
-    "the computing time is an upper limit: as soon as the motion repeats itself, the remaining cycles are not "
-    "computed one by one"
+SKIPPING_NOTE = (
+    "as soon as the motion repeats itself, the remaining cycles are not computed one by one"
 )
 GROUPS = {  # Definition and SI unit of each group.
     "D": (
@@ -69,55 +64,35 @@ GROUPS = {  # Definition and SI unit of each group.
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Plan:
-    """Model with the engine that will run it, the numbers of unknowns and the predicted cost.
+    """Model with the engine that will run it and the numbers of its unknowns.
 
     - model, kind: model, and the kind of its run.
     - effects: names of the effects in the scene.
     - not_in_scene: effects that the scene does not contain.
-    - cost: predicted cost of the run; its memory contributions from the largest to the smallest.
+    - sizes: unknowns and contributions to the memory, from the largest to the smallest.
     - chain: stiffness [N/m], or "rigid", of each element in series between modes and interface.
     - groups: dimensionless groups by name.
     - verdict: sentences on the run.
-    - compile_seconds: CPU seconds of compiling in addition to `seconds`, if no earlier run has
-      compiled this code.
-    - tolerance: forecast whether the run misses the tolerance.
     """
 
     model: Model
     kind: str
     effects: tuple
     not_in_scene: tuple
-    cost: Cost
+    sizes: RunSizes
     chain: dict
     groups: dict
     verdict: tuple
-    compile_seconds: float = 0.0
-    tolerance: Forecast = EMPTY_FORECAST
 
     @property
     def engine(self) -> str:
         """Name of the engine; "static" for a patch without motion."""
-        return self.cost.engine or "static"
+        return self.sizes.engine or "static"
 
     @property
     def unknowns(self) -> dict:
         """Numbers of unknowns of mesh and motion by name."""
-        return self.cost.sizes
-
-    @property
-    def steps(self) -> int:
-        """Number of time steps, including those of the coarse runs."""
-        return self.cost.steps
-
-    @property
-    def seconds(self) -> float:
-        """Predicted CPU seconds of the run on one core."""
-        return round(self.cost.seconds, 2)
-
-    @property
-    def bytes(self) -> int:
-        """Predicted peak memory of the run [bytes]."""
-        return self.cost.bytes
+        return self.sizes.unknowns
 
     def __repr__(self) -> str:
         sizes = []
@@ -125,9 +100,7 @@ class Plan:
             sizes.append(f"{count} {name.removesuffix('_about').replace('_', ' ')}")
         sizes = ", ".join(sizes)
         lines = [
-            f"Plan of {self.model.source.path.name}: {self.kind}, engine {self.engine}, {sizes or 'one point'}, "
-            f"{self.steps} steps, about {self.seconds:.1f} s{describe_compile_time(self.compile_seconds)} and "
-            f"{self.bytes / 1e6:.0f} MB"
+            f"Plan of {self.model.source.path.name}: {self.kind}, engine {self.engine}, {sizes or 'one point'}"
         ]
         return "\n".join([*lines, *(f"  {text}" for text in self.verdict)])
 
@@ -143,22 +116,15 @@ class Plan:
             "not_in_scene": list(self.not_in_scene),
             "engine": self.engine,
             "unknowns": self.unknowns,
-            "steps": self.steps,
-            "seconds": self.seconds,
-            "bytes": self.bytes,
+            "steps": None,
+            "seconds": None,
+            "bytes": None,
             "stiffness_chain": self.chain,
             "groups": self.groups,
             "verdict": list(self.verdict),
             "modes": self.modes(self.chain),
-            "memory": {part.what: int(part.bytes) for part in self.cost.parts},
-            "compile_seconds": self.compile_seconds,
-            "tolerance": self.tolerance.as_json(),
+            "compile_seconds": None,
         }
-
-
-def describe_compile_time(seconds: float) -> str:
-    """Return a phrase on the compile time; "" if nothing is compiled."""
-    return f" (and {seconds:.0f} s once for compiling)" if seconds else ""
 
 
 def plan(source) -> Plan:
@@ -179,7 +145,7 @@ def plan(source) -> Plan:
 
 
 def _make_plan(model: Model) -> Plan:
-    """Collect what `plan` states of a Model: its effects, stiffnesses, groups of numbers, cost and verdict."""
+    """Collect what `plan` states of a Model: its effects, stiffnesses, groups of numbers, sizes and verdict."""
     if model.measured is not None:
         try:
             # An invalid table of measured responses is reported before anything runs.
@@ -223,8 +189,8 @@ def _make_plan(model: Model) -> Plan:
             patch_sentences += patch_plan.describe_interface_patch(
                 rig.friction.names[number], interface
             )
-    cost = _predict_cost(model)
-    law_sentences += cost.words
+    sizes = _count_sizes(model)
+    law_sentences += sizes.sentences
     if model.kind == "bench":
         groups = of_bench.compute_dimensionless_groups(model) | groups
     if model.friction is not None:
@@ -234,103 +200,64 @@ def _make_plan(model: Model) -> Plan:
     if rig is not None:
         motion_sentences += of_rig.describe_stick(rig, groups, chain)
     if (
-        cost.engine in SKIPPING_ENGINES
+        sizes.engine in SKIPPING_ENGINES
         and drive_sizes.is_sinusoidal(rig.drive.signal)
         and rig.drive.cycles >= MIN_SKIPPED_CYCLES
     ):
-        law_sentences.append(UPPER_LIMIT_NOTE)
-    # The forecast solves a contact, which a run with too little memory could not afford.
-    forecast = Forecast(model.accuracy.tolerance, ())
-    refusal = memory.reason_for_refusal(cost.parts)
-    memory_sentence = memory.describe_largest_part(cost.parts)
+        law_sentences.append(SKIPPING_NOTE)
+    refusal = memory.reason_for_refusal(sizes.parts)
+    memory_sentence = memory.describe_largest_part(sizes.parts)
     if refusal:
         memory_sentence = f"`run` will refuse this scene: {refusal}"
-    else:
-        forecast = forecast_tolerance(model)
-    motion_sentences = [*([forecast.sentence()] if forecast.causes else []), *motion_sentences]
-    is_compiled = cost.compile_seconds == 0 or compiled.has_run(
-        compiled_code_key(model, cost.engine, cost.sizes)
+    sentences = _arrange_sentences(
+        model, groups, memory_sentence, (motion_sentences, patch_sentences, law_sentences)
     )
     return Plan(
         model,
         model.kind,
         model.source.effects,
         model.absent,
-        cost,
+        sizes,
         chain,
         groups,
-        tuple(
-            _arrange_sentences(
-                model, groups, memory_sentence, (motion_sentences, patch_sentences, law_sentences)
-            )
-        ),
-        0.0 if is_compiled else cost.compile_seconds,
-        forecast,
+        tuple(sentences),
     )
 
 
-def _predict_cost(model: Model) -> Cost:
-    """Predict the cost of a run, including all coarse runs.
+def _count_sizes(model: Model) -> RunSizes:
+    """Count the unknowns and the memory of a run.
 
     The memory contributions are sorted from the largest to the smallest.
     """
-    pressing = Cost()
+    sizes = RunSizes(parts=(MemoryPart(PACKAGE_BYTES, "packages"),))
     if model.patch is not None or model.has_interface_patches:
-        pressing = patch_plan.predict_cost(model)
-    points = pressing.sizes.get("interface_points", 1)
-    motion = Cost()
+        sizes += patch_plan.count_patch_sizes(model)
+    points = sizes.unknowns.get("interface_points", 1)
     if model.rig is not None:
-        motion = of_rig.predict_cost(model, points)
+        sizes += of_rig.count_rig_sizes(model, points)
     elif model.kind == "bench":
-        motion = of_bench.predict_cost(model, points)
-    total = (
-        Cost({"start": cost_model.START_SECONDS}, (MemoryPart(PACKAGE_BYTES, "packages"),))
-        + pressing
-        + motion
-    )
+        sizes += of_bench.count_bench_sizes(model, points)
     if model.wear is not None and model.patch is not None:
-        total += of_wear.predict_cost(
-            model, points, motion.times["motion"] + motion.times.get("histories", 0.0)
-        )
-    return replace(
-        total, parts=tuple(sorted((part for part in total.parts if part.bytes > 0), reverse=True))
+        sizes += RunSizes(sentences=(_describe_wear(model),))
+    parts = sorted((part for part in sizes.parts if part.bytes > 0), reverse=True)
+    return replace(sizes, parts=tuple(parts))
+
+
+def _describe_wear(model: Model) -> str:
+    """Describe the jumps over the cycles of wear and the motion between them in a sentence."""
+    changes_motion = (
+        bool(model.partial_slip)
+        or model.side == "lower"
+        or model.grooves is not None
+        or model.wear.friction is not None
     )
-
-
-def compiled_code_key(model: Model, engine: str, unknowns: dict) -> str:
-    """Return a text that identifies the compiled code that a run needs.
-
-    Runs with equal texts use the same code.
-
-    Parameters
-    ----------
-    model : Model
-    engine : str
-        Name of the engine.
-    unknowns : dict
-        Numbers of unknowns by name.
-    """
-    rig = model.rig
-    friction = model.friction
-    laws = [] if friction is None else [friction]
-    if rig is not None:
-        laws = [interface.numbers for interface in rig.friction.interfaces]
-    words = [
-        engine,
-        *sorted({f"{law.law} {law.reading} {law.order not in (None, 0, 1)}" for law in laws}),
-    ]
-    if rig is not None:
-        words += [
-            f"{min(2, len(rig.structure.frequencies))} {min(2, len(rig.friction.interfaces))}",
-            "sines" * bool(rig.drive.signal.segments),
-        ]
-    flags = {
-        "soft": bool(model.partial_slip),
-        "grooves": model.grooves is not None,
-        "varies": model.load_varies,
-        "list": "bond_list_about" in unknowns,
-    }
-    return ", ".join([*words, *(name for name, holds in flags.items() if holds)])
+    jumps = (
+        f"{model.wear.jumps} jumps" if model.wear.jumps else "jumps whose number the run chooses"
+    )
+    repetition = "the motion is computed only once, because wear does not change it"
+    if changes_motion:
+        repetition = "the motion is computed again after each jump"
+    return f"wear: {model.wear.cycles:.6g} cycles in {jumps}; {repetition}"
 
 
 def _arrange_sentences(
@@ -361,24 +288,6 @@ def _arrange_sentences(
             "all nodes; the numerical error is estimated from a second run with half as many modes"
         )
     return sentences
-
-
-def refuse_large_run(run_plan: Plan) -> None:
-    """Raise Missing if a run needs too much memory or CPU time."""
-    memory.refuse_insufficient_memory(run_plan.cost.parts)
-    if run_plan.seconds > MAX_CPU_SECONDS:
-        key = ""
-        if run_plan.model.accuracy.steps_per_cycle is not None:
-            key = "accuracy.steps_per_cycle or "
-        if run_plan.kind == "bench":
-            key += "slide.cycles"
-        elif run_plan.model.rig is not None:
-            key += "drive.cycles"
-        raise Missing(
-            f"the run would need a computing time of about {run_plan.seconds:.2g} s ({run_plan.steps:.2g} time "
-            f"steps), more than the limit of {MAX_CPU_SECONDS:.0e} s; lower {key or 'the number of elements'}",
-            "",
-        )
 
 
 def _interface_stiffnesses(model: Model) -> dict:

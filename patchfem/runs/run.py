@@ -12,21 +12,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .. import compiled
 from ..core import Measure, NotConverged, Outcome
 from ..dynamics import checkpoint
 from ..model.model import Model
 from ..model.source import locate_errors
-from . import joint
+from . import joint, memory
 from .accuracy_warnings import AccuracyContext, tolerance_warnings
+from .balances import mark_unbalanced
 from .bench import result as bench_result
 from .patch import faces, store, strength
 from .patch import result as patch_result
-from .plan import Plan, compiled_code_key, plan, refuse_large_run
+from .plan import Plan, plan
 from .results.patch_rows import find_unknown_measures
 from .results.result import Result, RunInputs, describe_measure, shorten_file_names
 from .rig import engines, rig
-from .self_checks.checks import mark_failed_checks
 from .wear import evolve, measures
 
 __all__ = ["Plan", "Result", "StateFile", "plan", "run"]
@@ -100,17 +99,17 @@ def run(
     """
     runnable = runnable if isinstance(runnable, Plan) else plan(runnable)
     with locate_errors(runnable.model.source):
-        refuse_large_run(runnable)
+        memory.refuse_insufficient_memory(runnable.sizes.parts)
         return _run_plan(runnable, say, progress, state_file, estimate=estimate, fresh=fresh)
 
 
 def _run_plan(
     run_plan: Plan, say, progress, state_file: StateFile | None, *, estimate: bool, fresh: bool
 ) -> Result:
-    """Run a plan whose memory and CPU time are accepted.
+    """Run a plan that needs no more memory than is free.
 
     The order is: patch of [contact] on its meshes, patches of the interfaces, wear, then the motion or
-    the static result, and finally static measures, self-checks and warnings. A patch without contact
+    the static result, and finally static measures, balances and warnings. A patch without contact
     and a rig without load have a result at once.
     """
     start = perf_counter()
@@ -177,9 +176,7 @@ def _run_plan(
             result = measures.add_wear_measures(
                 replace(result, plan=run_plan), worn_patch, estimate
             )
-    if run_plan.compile_seconds and estimate:
-        compiled.record_run(compiled_code_key(model, run_plan.engine, run_plan.unknowns))
-    return _complete_result(mark_failed_checks(result), notes, start, meshes)
+    return _complete_result(mark_unbalanced(result), notes, start, meshes)
 
 
 def _solve_contact_patch(model: Model, *, estimate: bool) -> PatchMeshes:

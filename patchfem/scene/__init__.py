@@ -7,13 +7,16 @@ Read `scene` first, then `keys/tables`. README.md in this folder explains every 
 
 # Names that other folders use, by module.
 PUBLIC = {
-    "axes": (
+    "assignments": (
         "Axis",
+        "BOUNDS",
         "LENGTH_KEY",
-        "SampledRange",
+        "LISTS",
+        "RANDOM",
+        "Range",
         "describe_ranges",
         "make_axis",
-        "read_axes",
+        "read_assignments",
         "read_lengths",
     ),
     "backbone_scene": (
@@ -59,15 +62,12 @@ PUBLIC = {
     "lines": (
         "locate_key",
         "number_items_from_one",
+        "split_assignment",
         "split_key",
     ),
     "overrides": (
         "BaseScene",
         "PlainNumbers",
-    ),
-    "ranges": (
-        "Range",
-        "read_ranges",
     ),
     "rules.accuracy": (
         "has_effect",

@@ -8,6 +8,7 @@ from typing import Any
 
 from .lines import find_key_lines
 from .rules.scene_draft import SceneDraft
+from .rules.structure import MATRIX_KEYS
 from .rules.view import wrap_value
 
 
@@ -29,7 +30,7 @@ def list_named_files(tables: Any) -> list[tuple[str, str]]:
         # Damping may also be a ratio, which is not the name of a file.
         *(
             (f"structure.reduced.{key}", structure.reduced[key])
-            for key in _MATRIX_KEYS
+            for key in MATRIX_KEYS
             if structure.reduced
         ),
         ("measured.file", scene["measured"].file),
@@ -39,7 +40,6 @@ def list_named_files(tables: Any) -> list[tuple[str, str]]:
 
 
 _TABLES_WITH_FILES = ("contact", "slide", "structure", "drive", "measured", "wear")
-_MATRIX_KEYS = ("stiffness", "mass", "damping")
 
 
 def _list_patch_files(table_key: str, contact: Any) -> list[tuple[str, Any]]:

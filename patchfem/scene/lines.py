@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 # Largest number of parts in a dotted key; no key of a scene has more than five, and the run
 # time is quadratic in their number.
@@ -36,6 +38,19 @@ def split_key(key: str) -> list[str]:
         item = _ITEM_PATTERN.fullmatch(piece.strip())
         parts += [item[1], str(int(item[2]) - 1)] if item else [piece.strip()]
     return parts
+
+
+def split_assignment(text: str) -> tuple[str, str]:
+    """Split ``table.key=values`` into the key and the values; the values are "" without an equals sign."""
+    key, _, values = text.partition("=")
+    return key.strip(), values.strip()
+
+
+def find_item(names: Sequence[Any], piece: str) -> int | None:
+    """Return the index of the item with a name, or with a number counted from 0; None if there is none."""
+    if piece in names:
+        return names.index(piece)
+    return int(piece) if piece.isdecimal() and int(piece) < len(names) else None
 
 
 def number_items_from_one(text: str) -> str:

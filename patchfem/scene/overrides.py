@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Iterable, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
 from math import inf
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from ..effects import find_waveform
 from .files import list_named_files, require_files
-from .lines import find_key_lines, split_key
+from .lines import find_item, find_key_lines, split_key
 from .reader import apply_set
 from .rules.contact import MAX_SMALL_ANGLE, find_max_load
 from .rules.scene_draft import SceneDraft
@@ -107,28 +108,10 @@ class BaseScene:
         is_reduced = scene.structure is not None and scene.structure.reduced is not None
         if has_own_kinetic or is_reduced or not (_is_plain_point(scene) or _is_plain_patch(scene)):
             return None
-        plain_keys = [_find_plain_key(scene, key) for key in keys]
-        return None if None in plain_keys else PlainNumbers(scene, tuple(plain_keys))
-
-
-class NumberLocation(NamedTuple):
-    """Location of a number in the tables of a scene.
-
-    - table: table of the scene.
-    - part: index of a mode, name of a shape, None for the table itself.
-    - name: attribute.
-    """
-
-    table: str
-    part: int | str | None
-    name: str
-
-
-class PlainKey(NamedTuple):
-    """Location of a numeric value, and the limit below which the value affects no check of the scene."""
-
-    location: NumberLocation
-    limit: float
+        limits = dict(_find_plain_key(scene, key) for key in keys)
+        # Two keys may name the same number, one of them by the name of its mode.
+        is_plain = None not in limits and len(limits) == len(keys)
+        return PlainNumbers(scene, limits) if is_plain else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,60 +119,61 @@ class PlainNumbers:
     """Generator of scenes that differ only in numeric values that affect no check.
 
     - scene: one of these scenes.
-    - keys: the numbers that differ.
+    - limits: key of each number that differs, with modes by number -> limit below which the value affects no check.
     """
 
     scene: Scene
-    keys: tuple[PlainKey, ...]
+    limits: dict[str, float]
 
     def are_plain(self, values: np.ndarray) -> bool:
         """Return whether given values of the keys affect no check."""
-        return bool(np.all((values > 0) & (values < [key.limit for key in self.keys])))
+        return bool(np.all((values > 0) & (values < list(self.limits.values()))))
 
-    def values_by_location(self, values: Sequence) -> dict[NumberLocation, Any]:
-        """Map the location of each key to its value."""
-        numbers = {key.location: value for key, value in zip(self.keys, values)}
-        static = NumberLocation("friction", None, "static")
-        if static in numbers and self.scene.friction.kinetic is not None:
-            numbers[static._replace(name="kinetic")] = numbers[static]
-        return numbers
-
-    def make_table(self, name: str, numbers: dict[NumberLocation, Any]) -> Any:
-        """Return a copy of a table of the scene with some numbers replaced."""
-        table = getattr(self.scene, name)
-        updates: dict[int | str | None, dict[str, Any]] = {}
-        for location, value in numbers.items():
-            if location.table == name:
-                updates.setdefault(location.part, {})[location.name] = value
-        changed = updates.pop(None, {})
-        if name == "structure" and updates:
-            modes = enumerate(table.mode)
-            changed["mode"] = tuple(_update_table(mode, updates.get(k, {})) for k, mode in modes)
-        else:
-            for part, new in updates.items():
-                changed[part] = _update_table(getattr(table, part), new)
-        return _update_table(table, changed)
-
-    def replace_assignments(self, sets: Sequence[str]) -> tuple:
-        """Return the assignments of the scene with some of them replaced."""
-        return (*self.scene.sets[: len(self.scene.sets) - len(self.keys)], *sets)
-
-    def make_scene(self, values: Sequence[float], sets: Sequence[str]) -> Scene:
+    def make_scene(self, values: Sequence, sets: Sequence[str]) -> Scene:
         """Create a scene with given values; it is neither parsed nor checked.
 
         `values` [SI] are those of the keys; `are_plain` must hold for them.
         """
-        numbers = self.values_by_location(values)
-        tables = {name: self.make_table(name, numbers) for name in self.changed_tables()}
-        return replace(self.scene, sets=self.replace_assignments(sets), **tables)
+        numbers = dict(zip(self.limits, values))
+        if "friction.static" in numbers and self.scene.friction.kinetic is not None:
+            numbers["friction.kinetic"] = numbers["friction.static"]
+        tables: dict[str, Any] = {}
+        for key, value in numbers.items():
+            name, *pieces = key.split(".")
+            table = tables.get(name) or getattr(self.scene, name)
+            tables[name] = _replace_number(table, pieces, value)
+        kept = self.scene.sets[: len(self.scene.sets) - len(self.limits)]
+        return replace(self.scene, sets=(*kept, *sets), **tables)
 
     def changed_tables(self) -> set[str]:
         """Return the names of the tables in which a number differs."""
-        return {key.location.table for key in self.keys}
+        return {key.partition(".")[0] for key in self.limits}
 
 
-def _update_table(table: Any, values: dict[str, Any]) -> Any:
-    return table.model_copy(update=values) if values else table
+def _replace_number(holder: Any, pieces: list[str], value: Any) -> Any:
+    """Return a copy of a table, or of an array of tables, with another number at the pieces of a dotted key."""
+    name, *inner = pieces
+    if isinstance(holder, tuple):
+        items = list(holder)
+        items[int(name)] = _replace_number(holder[int(name)], inner, value)
+        return tuple(items)
+    new = _replace_number(getattr(holder, name), inner, value) if inner else value
+    return holder.model_copy(update={name: new})
+
+
+def find_scene_value(scene: Scene, key: str) -> tuple[str, Any]:
+    """Find the value of a dotted key; return the key with items by number, and the value or None."""
+    value: Any = scene
+    pieces = []
+    for piece in split_key(key):
+        if isinstance(value, tuple):
+            index = find_item([getattr(item, "name", None) for item in value], piece)
+            piece = piece if index is None else str(index)
+            value = None if index is None else value[index]
+        else:
+            value = getattr(value, piece, None)
+        pieces.append(piece)
+    return ".".join(pieces), value
 
 
 def _is_plain_point(scene: Scene) -> bool:
@@ -228,31 +212,10 @@ def _is_plain_motion(scene: Scene) -> bool:
     return bool(has_modes and has_sine and law.law and not law.temperature and not law.spread)
 
 
-def _find_plain_key(scene: Scene, key: str) -> PlainKey | None:
-    """Find a key of PLAIN_KEYS in a scene, or return None for another key or a value out of range."""
-    pieces = split_key(key)
-    table = getattr(scene, pieces[0], None)
-    part: int | str | None = None
-    holder = table
-    if pieces[:2] == ["structure", "mode"] and len(pieces) == 4:
-        names = [mode.name for mode in scene.structure.mode]
-        item = pieces.pop(2)
-        if item in names:
-            part = names.index(item)
-        elif item.isdecimal() and int(item) < len(names):
-            part = int(item)
-        else:
-            return None
-        holder = table.mode[part]
-    elif len(pieces) == 3:
-        part = pieces[1]
-        holder = getattr(table, part, None)
-    limit = PLAIN_KEYS.get(".".join(pieces))
-    if limit is None or (pieces[:2] == ["structure", "mode"] and not isinstance(part, int)):
-        return None
+def _find_plain_key(scene: Scene, key: str) -> tuple[str | None, float]:
+    """Find a key of PLAIN_KEYS in a scene, and its limit; return None as key for others and for values out of range."""
+    place, value = find_scene_value(scene, key)
+    limit = PLAIN_KEYS.get(re.sub(r"\.\d+", "", place), 0.0)
     if key == "contact.load":
         limit = find_max_load(TableView(scene.contact))
-    value = getattr(holder, pieces[-1], None)
-    if value is None or not 0 < value < limit:
-        return None
-    return PlainKey(NumberLocation(pieces[0], part, pieces[-1]), limit)
+    return (place if value is not None and 0 < value < limit else None), limit

@@ -8,7 +8,6 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from . import suggestions
 from .keys.lookup import (
     LIMITS_BY_ERROR_TYPE,
     KeyDefinition,
@@ -17,7 +16,6 @@ from .keys.lookup import (
     format_for_message,
     is_table_or_value,
 )
-from .keys.removed import describe_removed
 from .keys.tables import Tables
 from .keys.types import (
     Table,
@@ -29,8 +27,9 @@ from .keys.types import (
     list_key_types,
     list_required_keys,
 )
-from .lines import number_items_from_one, split_key
-from .rules.scene_draft import SceneDraft
+from .lines import find_item, number_items_from_one, split_assignment, split_key
+from .rules.scene_draft import SceneDraft, list_item_names
+from .suggestions import describe_unknown_key
 
 # Numbers such as .3 and 5., which people write but TOML does not allow.
 _BARE_POINT_PATTERN = re.compile(r"[-+]?(\.[0-9]+|[0-9]+\.)([eE][-+]?[0-9]+)?")
@@ -122,66 +121,10 @@ def _report_unknown(
 ) -> None:
     """Report an unknown key with the most similar known key."""
     path = f"{table_key}.{key}" if table_key else key
-    # The number of an item, as in structure.mode.0, is no part of the name of its keys.
-    name = ".".join(piece for piece in path.split(".") if not piece.isdecimal())
-    if removed := describe_removed(name):
-        draft.add_mistake(path, removed)
-        return
-    is_table = _is_table(raw[key])
-    known = list(attributes_by_key(model))
-    if is_table:
-        known = _list_inner_tables(model) or known
-    advice = f"known here: {', '.join(known)}" if known else "this table has no keys"
-    if suggestion := _suggest_name(draft, model, raw, key, table_key):
-        advice = f"did you mean '{suggestion}'?"
+    sentence, suggestion = describe_unknown_key(model, raw, table_key, key, draft.sets)
+    if suggestion:
         draft.suggested_keys.add(f"{table_key}.{suggestion}")
-    draft.add_mistake(path, f"unknown {'table' if is_table else 'key'}; {advice}")
-
-
-def _list_inner_tables(model: type[Table]) -> list[str]:
-    """Return the keys of a table that hold an inner table and do not accept a single value."""
-    names = attributes_by_key(model).items()
-    tables = [key for key, name in names if find_inner_table(model, name) is not None]
-    return [key for key in tables if not is_table_or_value(model, attributes_by_key(model)[key])]
-
-
-def _suggest_name(
-    draft: SceneDraft, model: type[Table], raw: dict[str, Any], key: str, table_key: str
-) -> str:
-    """Return the key or table that was probably meant by an unknown one, or "" if none is similar."""
-    is_table = _is_table(raw[key])
-    if not table_key and not is_table:
-        # --set may name a key without its table; the key then belongs to a
-        # table that has a key of this name.
-        owners = _list_tables_with_key(model, key)
-        present = [name for name in owners if name in raw]
-        if owners:
-            return "' or '".join(f"{name}.{key}" for name in present[:1] or owners)
-    # A file that contains both keys did not misspell one of them; a key of --set may be a
-    # misspelling of a key in the file.
-    is_set = (f"{table_key}.{key}" if table_key else key) in draft.sets
-    written_table = {
-        name: raw[name]
-        for name in (*attributes_by_key(model), key)
-        if name in raw and (not is_set or f"{table_key}.{name}".strip(".") in draft.sets)
-    }
-    if is_table:
-        return suggestions.suggest_table(model, written_table, key)
-    return suggestions.suggest_key(model, written_table, key, is_set=is_set)
-
-
-def _list_tables_with_key(model: type[Table], key: str) -> list[str]:
-    """Return the inner tables of a table that have a key of this name."""
-    names = attributes_by_key(model).items()
-    inner = {table: find_inner_table(model, name) for table, name in names}
-    return [name for name, table in inner.items() if table and key in attributes_by_key(table)]
-
-
-def _is_table(value: Any) -> bool:
-    """Return whether a value read from TOML is a table or an array of tables."""
-    if isinstance(value, list) and value:
-        return isinstance(value[0], dict)
-    return isinstance(value, dict)
+    draft.add_mistake(path, sentence)
 
 
 def apply_set(draft: SceneDraft, assignment: str) -> None:
@@ -194,9 +137,9 @@ def apply_set(draft: SceneDraft, assignment: str) -> None:
             f"{displayed_text}: contains bytes that are not UTF-8 text; save the file as UTF-8"
         )
         return
-    key, equals, text = assignment.partition("=")
+    key, text = split_assignment(assignment)
     pieces = split_key(key)
-    if not equals or not all(pieces):
+    if "=" not in assignment or not all(pieces):
         draft.add_set_mistake(
             f"{assignment}: table.key=value is needed, such as contact.load=26 lbf"
         )
@@ -212,16 +155,29 @@ def apply_set(draft: SceneDraft, assignment: str) -> None:
         if depth == len(pieces) - 1:
             break
         inner = holder[piece] if isinstance(holder, list) else holder.get(piece)
+        if inner is None and _is_array_of_tables(path):
+            draft.add_set_mistake(f"{key}: the scene has no [[{path}]]")
+            return
         if inner is None:
             inner = holder[piece] = {}
-            draft.sets.add(path)
+            draft.record_set(path)
         if not isinstance(inner, dict | list):
-            draft.add_set_mistake(f"{key.strip()}: {path} is a value, not a table")
+            draft.add_set_mistake(f"{key}: {path} is a value, not a table")
             return
         holder = inner
     path = ".".join(pieces)
-    holder[piece] = read_set_value(path, text.strip())
-    draft.sets.add(path)
+    holder[piece] = read_set_value(path, text)
+    draft.record_set(path)
+
+
+def _is_array_of_tables(key: str) -> bool:
+    """Return whether a dotted key names an array of tables, such as structure.mode."""
+    place = find_key(key)
+    return (
+        place.model is not None
+        and is_array_attribute(*place)
+        and find_inner_table(*place) is not None
+    )
 
 
 def _find_item(draft: SceneDraft, items: list[Any], path: str, written_key: str) -> int | None:
@@ -238,12 +194,11 @@ def _find_item(draft: SceneDraft, items: list[Any], path: str, written_key: str)
         The whole key as it was written: a number in brackets counts from 1, a number behind a dot from 0.
     """
     above, _, item_name = path.rpartition(".")
-    names = [item.get("name") if isinstance(item, dict) else None for item in items]
-    if item_name in names:
-        return names.index(item_name)
+    names = list_item_names(items)
+    index = find_item(names, item_name)
+    if index is not None:
+        return index
     is_number = item_name.isdecimal()
-    if is_number and int(item_name) < len(items):
-        return int(item_name)
     table = number_items_from_one(above)
     displayed_key = number_items_from_one(path)
     description = "such item" if is_number else f"'{item_name}'"

@@ -12,11 +12,11 @@ from pathlib import Path
 from textwrap import shorten
 from typing import Any
 
-from . import axes
+from . import assignments
 from .defaults import complete_tables
 from .files import list_absent_files, make_relative_file_sets, require_files
 from .keys import tables
-from .lines import locate_key
+from .lines import locate_key, split_assignment
 from .reader import apply_set, read_tables
 from .rules.check import check_scene
 from .rules.scene_draft import SceneDraft, SceneError
@@ -181,11 +181,15 @@ def loads(
     draft = SceneDraft(str(path), lines, raw)
     swept = []
     if "sweep" in raw:
-        fixed = {assignment.partition("=")[0].strip() for assignment in sets}
+        fixed = {split_assignment(assignment)[0] for assignment in sets}
         swept = [axis for axis in _read_axes(draft, raw.pop("sweep")) if axis.key not in fixed]
     # A key that only [sweep] holds gets its first value.
-    first = [f"{axis.key}={axis.texts[0]}" for axis in swept if not draft.has_set_key(axis.key)]
-    for assignment in (*first, *sets):
+    for axis in swept:
+        if not draft.has_set_key(axis.key):
+            draft.swept_key = f"sweep.{axis.key}"
+            apply_set(draft, f"{axis.key}={axis.texts[0]}")
+    draft.swept_key = ""
+    for assignment in sets:
         apply_set(draft, assignment)
     if prepare is not None:
         prepare(draft.raw)
@@ -290,7 +294,7 @@ def read_sweep_axes(text: str, path: str | Path) -> tuple[list, list[str]]:
 
 def _read_axes(draft: SceneDraft, table: Any) -> list:
     """Return the axes of a table [sweep]; mistakes are added to the draft."""
-    swept, mistakes = axes.read_table(table)
+    swept, mistakes = assignments.read_table(table)
     for key, message in mistakes:
         draft.add_mistake(key, message)
     return swept

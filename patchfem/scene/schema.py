@@ -3,6 +3,7 @@
 A schema cannot express which keys go together and which files exist; `patchfem check` reports these mistakes.
 """
 
+import json
 import re
 
 from .keys.choices import find_selectors, format_keys, split_keys
@@ -11,12 +12,12 @@ from .keys.materials import MATERIALS, SEPARATORS, is_case_sensitive, list_spell
 from .keys.quantities import NUMBER_PATTERN, PERCENTAGE_PATTERN, UNIT_FACTORS, find_si_unit
 from .keys.tables import Tables
 from .keys.types import (
+    TABLE_WORD,
     Table,
     attributes_by_key,
     find_inner_table,
     find_meaning,
     find_quantity_kind,
-    nested_validators,
 )
 
 SCHEMA_DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -28,24 +29,15 @@ UNIT_SPELLINGS = {"u": "[uµμ]", "^2": "(?:\\^2|²)", "^3": "(?:\\^3|³)", " ":
 
 def make_schema() -> dict:
     """Return the JSON schema (draft 2020-12) of a scene: meaning, limits, default, unit of keys."""
-    with nested_validators():
-        _rebuild_validator(Tables)
-    raw = Tables.model_json_schema(by_alias=True)
-    definitions = raw.pop("$defs")
-    for model in _list_inner_models(Tables):
-        definitions[model.__name__] = _describe_table(model, definitions[model.__name__])
+    tables = sorted(_list_inner_models(Tables), key=lambda model: model.__name__)
+    definitions = {model.__name__: _describe_table(model) for model in tables}
     definitions[Material.__name__] = _describe_material(definitions[Material.__name__])
-    scene = _describe_table(Tables, raw)
+    scene = _describe_table(Tables)
     scene["properties"]["sweep"] = _describe_sweep()
-    return {"$schema": SCHEMA_DIALECT, "title": "patchfem scene", **scene, "$defs": definitions}
-
-
-def _rebuild_validator(model: type[Table]) -> None:
-    """Rebuild the pydantic validator of a table, after those of its inner tables."""
-    for name in attributes_by_key(model).values():
-        if inner := find_inner_table(model, name):
-            _rebuild_validator(inner)
-    model.model_rebuild(force=True)
+    schema = {"$schema": SCHEMA_DIALECT, "title": "patchfem scene", **scene, "$defs": definitions}
+    # Pydantic describes each table by itself, in which an inner table is only named.
+    text = json.dumps(schema).replace(f'"{TABLE_WORD}": "', '"$ref": "#/$defs/')
+    return json.loads(text)
 
 
 def _list_inner_models(model: type[Table]) -> set[type[Table]]:
@@ -54,9 +46,10 @@ def _list_inner_models(model: type[Table]) -> set[type[Table]]:
     return inner.union(*map(_list_inner_models, inner))
 
 
-def _describe_table(model: type[Table], raw: dict) -> dict:
+def _describe_table(model: type[Table]) -> dict:
     """Return the schema of a table: the meaning and default of each key; null is not allowed."""
-    properties = raw["properties"]
+    raw = model.model_json_schema(by_alias=True)
+    properties = raw.get("properties", {})
     keys = attributes_by_key(model)
     schema = {
         "type": "object",

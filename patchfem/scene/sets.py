@@ -35,14 +35,24 @@ def format_scene(tables: dict[str, Any]) -> str:
     return "".join(f"{name} = {_format_toml(str(name), table)}\n" for name, table in tables.items())
 
 
-def format_values(key: str, values: Any) -> list[str]:
-    """Format the values of one key as the command-line option --over does.
+def format_values(key: str, values: Any, separator: str = ",") -> str:
+    """Format the values of one key as --over and, with ".." as separator, --free write them.
 
-    Texts stay as they are, but for quotes around a text with a comma or a bracket; numbers in SI get the unit of the key.
+    Parameters
+    ----------
+    key : str
+        Dotted key of a scene, whose unit numbers get.
+    values
+        A text, which stays as it is; or a value or list of values. A text in a list gets quotes if it contains a comma
+        or a bracket.
+    separator : str
+        "," between values, ".." between the ends of a range.
     """
+    if isinstance(values, str):
+        return values
     plain = _to_plain_value(values)
     items = plain if isinstance(plain, Iterable) else [plain]
-    return [_format_value(key, item) for item in items]
+    return separator.join(_format_value(key, item) for item in items)
 
 
 def require_units(scene: Any, values: dict[str, Any]) -> Any:

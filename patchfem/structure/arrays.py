@@ -11,7 +11,6 @@ Other arrays of the file are ignored.
 
 from math import prod
 from pathlib import Path
-from zipfile import ZipFile
 
 import numpy as np
 from numpy.lib import format as npy
@@ -20,6 +19,7 @@ from scipy.sparse import issparse
 from ..core import ModalBasis, PatchfemError, frozen_array
 from ..effects import MAX_COORDINATES
 from ..inputs.matlab import read_variables
+from ..inputs.symmetric import to_real
 from . import masses, matrices
 from .modes import PATCH_MOTIONS
 
@@ -38,17 +38,8 @@ ARRAY_NAMES = (  # names of the arrays that are read from a file
     *PATCH_MOTIONS,
     "names",
 )
-MAX_NAME_BYTES = 1024  # largest length of a name [bytes]; longer data are not a name
 # Largest size of a number [bytes], that of a complex number of double precision
 MAX_NUMBER_BYTES = 16
-# Largest size of the list of members of a zip file [bytes]; a file with a longer list is damaged
-MAX_DIRECTORY_BYTES = 2**20
-ZIP_END_SIGNATURE = b"PK\x05\x06"  # signature of the end of the list of members of a zip file
-# Largest number of bytes after the list of members: a record and a comment
-MAX_ZIP_END_BYTES = 2**16 + 22
-# Most negative eigenvalue of a damping matrix that is accepted as round-off of a singular matrix,
-# relative to the largest entry
-MIN_DAMPING_EIGENVALUE = -1e-9
 MAX_MASS_FRACTION = 1 + 1e-9  # largest sum of base^2: 1, plus round-off of the shapes
 
 
@@ -62,11 +53,8 @@ def read_arrays(path: Path) -> dict:
     """
     try:
         if str(path).lower().endswith(".npz"):
-            _refuse_long_directory(path)
-            with ZipFile(path) as file:
-                members = file.namelist()
-                names = [name for name in ARRAY_NAMES if f"{name}.npy" in members]
-                return {name: _read_member(file, name) for name in names}
+            with np.load(path, allow_pickle=False) as file:
+                return {name: _read_member(file, name) for name in ARRAY_NAMES if name in file}
         variables = read_variables(path)
         names = [name for name in ARRAY_NAMES if name in variables]
         for name in names:
@@ -82,39 +70,18 @@ def read_arrays(path: Path) -> dict:
         ) from None
 
 
-def _read_member(file: ZipFile, name: str) -> np.ndarray:
-    """Read one array of a .npz file after its header is checked."""
+def _read_member(file: np.lib.npyio.NpzFile, name: str) -> np.ndarray:
+    """Read one array of a .npz file; its header is checked first, because NumPy reserves the memory that it states."""
     readers = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
-    with file.open(f"{name}.npy") as member:
+    with file.zip.open(f"{name}.npy") as member:
         shape, _, dtype = readers[npy.read_magic(member)](member)
-    _refuse_large(name, shape)
-    if dtype.itemsize > (MAX_NAME_BYTES if name == "names" else MAX_NUMBER_BYTES):
-        raise PatchfemError(
-            f"{name} contains values of {dtype.itemsize} bytes each, which is too long"
-        )
-    if name == "names" and prod(shape) > MAX_COORDINATES:
-        raise PatchfemError(f"{name} contains {prod(shape)} names; {MAX_COORDINATES} is the limit")
-    with file.open(f"{name}.npy") as member:
-        return npy.read_array(member, allow_pickle=False)
+    _refuse_large(name, shape, dtype.itemsize)
+    return file[name]
 
 
-def _refuse_long_directory(path: Path) -> None:
-    """Raise PatchfemError if the list of members of a zip file is too long to be read."""
-    with open(path, "rb") as file:
-        size = file.seek(0, 2)
-        file.seek(max(0, size - MAX_ZIP_END_BYTES))
-        last_bytes = file.read()
-    end = last_bytes.rfind(ZIP_END_SIGNATURE)
-    size = int.from_bytes(last_bytes[end + 12 : end + 16], "little") if end >= 0 else 0
-    if size > MAX_DIRECTORY_BYTES:
-        raise PatchfemError(
-            f"the list of members takes {size} bytes; {MAX_DIRECTORY_BYTES} is the limit"
-        )
-
-
-def _refuse_large(name: str, shape: tuple) -> None:
+def _refuse_large(name: str, shape: tuple, itemsize: int = MAX_NUMBER_BYTES) -> None:
     """Raise PatchfemError if an array is larger than the matrices of the largest rig that is allowed."""
-    if prod(shape) > MAX_COORDINATES**2:
+    if prod(shape) * itemsize > MAX_COORDINATES**2 * MAX_NUMBER_BYTES:
         raise PatchfemError(
             f"{name} of shape {'x'.join(map(str, shape))} is larger than {MAX_COORDINATES} coordinates "
             "squared; give a reduced model, or only the modes in the frequency range of the drive"
@@ -200,7 +167,7 @@ def _build_basis_from_matrices(
         raise PatchfemError(f"there is no coordinate {missing[0]}: M has {n}, numbered from 1")
     faces = masses.make_slide_rows(pairs, n) if pairs else data.get("slide")
     if faces is not None:
-        faces = matrices.to_real(faces, "slide")
+        faces = to_real(faces, "slide")
         faces = faces.reshape(-1, n) if faces.size % n == 0 else faces
     output = data.get("output")
     if output is None:
@@ -306,7 +273,7 @@ def _read_damping(data: dict, omega) -> tuple:
             raise PatchfemError(f"damping must be >= 0, not {damping.min():g}")
         return frozen_array(damping), None
     lowest = np.linalg.eigvalsh(damping + damping.T).min()
-    if lowest < MIN_DAMPING_EIGENVALUE * np.abs(damping).max():
+    if lowest < matrices.MIN_DAMPING_EIGENVALUE * np.abs(damping).max():
         raise PatchfemError(
             "the damping matrix adds energy; a positive semidefinite matrix D [1/s] is needed"
         )
@@ -324,7 +291,7 @@ def _read_numbers(data: dict, name: str, *shapes) -> np.ndarray:
         Shapes that are allowed, beginning with (n,); None stands for any length. Without a shape the
         array is flattened.
     """
-    values = matrices.to_real(data[name], name)
+    values = to_real(data[name], name)
     if values.dtype.kind not in "iufb":
         raise PatchfemError(f"{name} does not contain real numbers")
     values = values.astype(float)

@@ -12,14 +12,13 @@ import numpy as np
 from scipy.linalg import LinAlgError, cholesky, eigh, solve_triangular, svd
 
 from ..core import ModalBasis, PatchfemError, frozen_array
+from ..inputs.symmetric import symmetrize, to_real
 
 # Round-off of an eigenvalue of an n x n matrix, divided by n and relative to the largest eigenvalue
 EIGENVALUE_TOL = 16 * np.finfo(float).eps
 # Largest entry of a projected damping matrix that is set to zero as round-off, relative to its
 # scale
 ENTRY_TOL = 1e-12
-# Largest difference of a matrix and its transpose, relative to the largest entry
-MAX_ASYMMETRY = 1e-8
 # Most negative eigenvalue of a damping matrix that is accepted as round-off of a singular matrix,
 # relative to the largest eigenvalue
 MIN_DAMPING_EIGENVALUE = -1e-9
@@ -81,11 +80,11 @@ def build_basis(
         If a matrix is not square, finite and symmetric, if M is not positive definite, or if K or C is
         not positive semidefinite.
     """
-    M = _symmetrize(M, "M")
+    M = _check_matrix(M, "M")
     n = len(M)
     root = _factor_mass(M)
     if spring_rows is None:
-        omega, normalized = _compute_modes(root, _symmetrize(K, "K", M.shape))
+        omega, normalized = _compute_modes(root, _check_matrix(K, "K", M.shape))
     else:
         rows_per_root = _divide_by_root(root, np.asarray(spring_rows, float).T).T
         omega, normalized = decouple_modes(_require_finite(rows_per_root))
@@ -94,7 +93,7 @@ def build_basis(
     if damper_rows is not None:
         D = _project_damper_rows(phi, np.asarray(damper_rows, float))
     elif C is not None:
-        D = _project_damping_matrix(phi, _symmetrize(C, "C", M.shape))
+        D = _project_damping_matrix(phi, _check_matrix(C, "C", M.shape))
     phi, D = _decouple_equal_frequencies(phi, omega, D)
 
     faces = np.zeros((0, n)) if faces is None else np.atleast_2d(_check_row(faces, n, "slide"))
@@ -244,62 +243,17 @@ def _divide_by_root(root, right, *, transpose: bool = False) -> np.ndarray:
         return right / root[:, None]
 
 
-def to_real(values, name: str) -> np.ndarray:
-    """Return the real parts of an array that is stored as complex numbers.
-
-    Hysteretic damping K (1 + i eta) is refused, because it describes a single frequency. C = eta K/omega
-    has the same loss at omega, and a mode there has the damping ratio eta/2.
-
-    Raises
-    ------
-    PatchfemError
-        If an imaginary part is not 0.
-    """
-    values = np.asarray(values)
-    if not np.iscomplexobj(values):
-        return values
-    largest = max(float(np.abs(values.real).max(initial=0.0)), 1e-300)
-    ratio = float(np.abs(values.imag).max(initial=0.0)) / largest
-    if ratio == 0.0:
-        return values.real
-    remedy = ""
-    if name == "K":
-        remedy = (
-            f"; for a loss factor eta (here about {ratio:.3g}) give K without the loss factor, and the damping "
-            "matrix C = eta K/omega [N s/m] at the frequency of the drive"
-        )
-    raise PatchfemError(
-        f"structure: {name} is complex (imaginary parts are up to {ratio:.2g} times the real parts); "
-        f"motion in time needs real matrices{remedy}"
-    )
-
-
-def _symmetrize(matrix, name: str, shape=None) -> np.ndarray:
-    """Check that a matrix is square, finite and symmetric, and make it exactly symmetric."""
+def _check_matrix(matrix, name: str, shape=None) -> np.ndarray:
+    """Return a matrix in full that is symmetric and has the shape of the mass matrix."""
     if hasattr(matrix, "toarray"):
         matrix = matrix.toarray()
-    try:
-        matrix = np.asarray(to_real(matrix, name), float)
-    except (TypeError, ValueError):
-        raise PatchfemError(f"structure: {name} is not a matrix of real numbers") from None
-    if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not matrix.size:
-        raise PatchfemError(f"structure: {name} must be square, not of shape {matrix.shape}")
+    matrix = symmetrize(matrix, f"structure: {name}")
     if shape is not None and matrix.shape != shape:
         raise PatchfemError(
             f"structure: {name} is {matrix.shape[0]} x {matrix.shape[0]} but M is "
             f"{shape[0]} x {shape[0]}"
         )
-    if not np.isfinite(matrix).all():
-        raise PatchfemError(f"structure: {name} contains values that are not finite")
-    asymmetry = np.abs(matrix - matrix.T).max()
-    largest = np.abs(matrix).max()
-    if asymmetry > MAX_ASYMMETRY * largest:
-        raise PatchfemError(
-            f"structure: {name} is not symmetric: entries differ from the transpose by {asymmetry:.3g}, "
-            f"which is {asymmetry / largest:.2g} of the largest entry; gyroscopic and follower terms are not "
-            "supported"
-        )
-    return (matrix + matrix.T) / 2
+    return matrix
 
 
 def _project_damping_matrix(phi, C) -> np.ndarray:
@@ -342,7 +296,7 @@ def _decouple_equal_frequencies(phi, omega, D) -> tuple:
 def _check_row(row, n: int, name: str) -> np.ndarray:
     """Check that a row has n finite real numbers; `slide` may have several rows."""
     try:
-        row = np.asarray(to_real(row, name), float)
+        row = np.asarray(to_real(row, f"structure: {name}"), float)
     except (TypeError, ValueError):
         raise PatchfemError(f"structure: {name} does not contain real numbers") from None
     if row.ndim == 2 and 1 in row.shape and name != "slide":

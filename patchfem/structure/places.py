@@ -6,9 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..core import ModalBasis, PatchfemError, frozen_array
+from ..inputs.universal import DIRECTION_NAMES
 
-# Names of the directions of a node: three displacements and three rotations
-DIRECTION_NAMES = ("x", "y", "z", "rx", "ry", "rz")
 # Pattern of a node with a direction, such as "12:+x"
 DIRECTION_PATTERN = re.compile(r"(\d+):([+-]?)(r?[xyz])")
 MAX_LISTED_NODES = 12  # largest number of nodes with directions that an error message lists

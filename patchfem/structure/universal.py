@@ -6,7 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import PatchfemError
-from ..inputs.universal import FunctionType, OrdinateType, read_datasets
+from ..inputs.units import CHANNEL_UNITS, normalize_unit
+from ..inputs.universal import FunctionType, OrdinateType, find_quantity, read_datasets
 from . import modal_fit
 from .places import DIRECTION_NAMES, MeasuredModes
 
@@ -19,10 +20,7 @@ DERIVATIVE_ORDERS = {
     OrdinateType.ACCELERATION: 2,
 }
 FORCE_TYPES = (OrdinateType.EXCITATION_FORCE, OrdinateType.FORCE)  # ordinate types of a force
-# Conversion factors to SI units, by axis label
-UNIT_FACTORS = {"g": 9.80665, "lbf": 4.4482216152605}
-# Axis labels of SI units
-SI_LABELS = {"", "none", "n", "m", "m/s", "m/s^2", "m/s2", "m/s**2", "mps2"}
+UNSTATED_LABELS = ("", "none")  # axis labels that state no unit; the values are in SI
 # Largest relative difference between the frequencies of two responses; it allows for single
 # precision
 MAX_FREQUENCY_CHANGE = 1e-6
@@ -194,8 +192,8 @@ def _fit_responses(datasets: list, factors: _UnitFactors) -> MeasuredModes:
         derivative = _check_response(dataset, name, frequency)
         sign_out, place = _find_direction(dataset["rsp_node"], dataset["rsp_dir"])
         sign_in, reference = _find_direction(dataset["ref_node"], dataset["ref_dir"])
-        unit_out = _find_unit_factor(dataset["ordinate_axis_units_lab"], notes)
-        unit_in = _find_unit_factor(dataset["orddenom_axis_units_lab"], notes)
+        unit_out = _find_unit_factor(dataset, "ordinate", notes)
+        unit_in = _find_unit_factor(dataset, "orddenom", notes)
         scale = sign_out * sign_in * (unit_out / unit_in) * (factors.force / factors.length)
         measured[place, reference] = (scale * np.asarray(dataset["data"]), derivative)
     return modal_fit.identify_modes(frequency, measured, notes)
@@ -225,14 +223,16 @@ def _check_response(dataset: dict, name: str, frequency) -> int:
     return DERIVATIVE_ORDERS[kind]
 
 
-def _find_unit_factor(label: str | None, notes: list) -> float:
-    """Return the SI units per unit of an axis label; append a note on an unknown unit to `notes`."""
-    label = (label or "").strip()
-    if label.lower() not in SI_LABELS and label not in UNIT_FACTORS:
+def _find_unit_factor(dataset: dict, axis: str, notes: list) -> float:
+    """Return the SI units per unit of an axis; append a note on an unknown label of the axis to `notes`."""
+    label = (dataset[f"{axis}_axis_units_lab"] or "").strip()
+    quantity = find_quantity(dataset[f"{axis}_spec_data_type"])
+    factor = CHANNEL_UNITS[quantity].get(normalize_unit(label))
+    if factor is None and label.lower() not in UNSTATED_LABELS:
         note = f"structure.file: the unit label '{label}' is not known; the values are taken as SI"
         if note not in notes:
             notes.append(note)
-    return UNIT_FACTORS.get(label, 1.0)
+    return factor or 1.0
 
 
 def _find_direction(node: int, direction: int) -> tuple:

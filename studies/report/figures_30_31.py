@@ -44,7 +44,7 @@ from patchfem.core import frozen_array
 from patchfem.surface import BAND, Profile, level, make_report
 from patchfem.surface.compare.compare import Options, compare_surfaces
 from patchfem.surface.compare.waves import compare_waves
-from patchfem.surface.roughness.spectrum import band_amplitude, estimate_spectrum
+from patchfem.surface.roughness.spectrum import estimate_spectrum
 
 FOLDER = Path(__file__).parent
 ANSWER = read_answer(__doc__)
@@ -132,7 +132,7 @@ def count_held(sets: list, row) -> int:
 
 def amplitude(trace: Profile) -> float:
     """Return the amplitude [m] of the waves in the band."""
-    return band_amplitude(estimate_spectrum(level(trace).z, bands.STEP), *BAND)
+    return estimate_spectrum(level(trace).z, bands.STEP).band_amplitude(*BAND)
 
 
 def heights(sets: list, when: int) -> np.ndarray:

@@ -35,7 +35,7 @@ from study_text import read_answer
 from patchfem.campaigns.rows.condition_models import FitRequest
 from patchfem.campaigns.rows.fit import RowsOptions, SearchSettings, fit_rows
 from patchfem.inputs import read_table
-from patchfem.scene import loads, read_ranges
+from patchfem.scene import BOUNDS, loads, read_assignments
 
 FOLDER = Path(__file__).parent
 ANSWER = read_answer(__doc__)
@@ -137,7 +137,7 @@ def steps(frequency: float, seen) -> list:
 def fit_gauge(gauge: bool):
     """Fit spring and yaw to 143 Hz, with or without a free gauge factor."""
     scene = loads(text(), SCENE, READING)
-    wanted, wrong = read_ranges((*FREE, *((GAUGE,) if gauge else ())))
+    wanted, wrong = read_assignments((*FREE, *((GAUGE,) if gauge else ())), BOUNDS)
     assert not wrong
     return fit_rows(
         FitRequest(scene, wanted, TABLE),

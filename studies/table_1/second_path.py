@@ -23,7 +23,7 @@ from patchfem.campaigns.rows.cells import compute_rms_scores, read_response_tabl
 from patchfem.campaigns.rows.condition_models import FitRequest
 from patchfem.campaigns.rows.fit import RowsOptions, SearchSettings, fit_rows
 from patchfem.campaigns.rows.model_readings import ModelReadings
-from patchfem.scene import load, loads, read_ranges
+from patchfem.scene import BOUNDS, load, loads, read_assignments
 
 FOLDER = Path(__file__).parent
 TABLE = FOLDER.parent / "rig" / "table1.csv"
@@ -45,7 +45,9 @@ def question(point: bool = False) -> FitRequest:
     text = path.read_text("utf-8")
     if point:
         text = POINT + text[text.index("static =") :]
-    return FitRequest(loads(text, path) if point else load(path), read_ranges(FREE)[0], TABLE)
+    return FitRequest(
+        loads(text, path) if point else load(path), read_assignments(FREE, BOUNDS)[0], TABLE
+    )
 
 
 def as_it_stands(point: bool = False) -> dict:

@@ -11,13 +11,13 @@ from scipy.integrate import solve_ivp
 from scipy.stats import t as student
 
 from patchfem import SceneError, build
-from patchfem.campaigns.fits.loop import LOAD_UNITS, fit_hysteresis_loop
+from patchfem.campaigns.fits.loop import fit_hysteresis_loop
 from patchfem.campaigns.fits.loop_model import BenchModel
 from patchfem.core import PatchfemError
 from patchfem.export.fits import format_fitted_scene
 from patchfem.inputs import read_loop
 from patchfem.runs.bench import bench
-from patchfem.scene import load, loads, read_ranges
+from patchfem.scene import BOUNDS, load, loads, read_assignments
 
 LOAD = 100.0
 POINT = '[normal]\nload = "100 N"\n'
@@ -234,13 +234,13 @@ def test_exact_loop_of_tilted_patch_is_independent_of_earlier_trials(tmp_path):
     A free tilt moves the contact but not the mesh.
     """
     time, slide = sine_path(8, 1)
-    loop = read_loop(write_loop(tmp_path / "loop.csv", time, slide, slide * 1e6), LOAD_UNITS)
+    loop = read_loop(write_loop(tmp_path / "loop.csv", time, slide, slide * 1e6))
     text = (
         '[contact]\nlength = "12.7 mm"\nwidth = "12.7 mm"\nheight = "6.35 mm"\nload = "80 N"\nsubstrate = '
         '"Ti-8Al-1Mo-1V"\n[contact.tilt]\nangle = "10 urad"\n[contact.shear]\n'
     )
     scene = loads(text + LAWS["elastic-plastic"] + SINE + "[accuracy]\ntolerance = 3e-2\n")
-    ranges, _ = read_ranges(["contact.tilt.angle=5 urad..200 urad"])
+    ranges, _ = read_assignments(["contact.tilt.angle=5 urad..200 urad"], BOUNDS)
     loops = []
     for values in ((5e-6, 4e-5, 2e-4), (2e-4, 4e-5)):
         model = BenchModel(scene, loop, ranges)
@@ -446,14 +446,13 @@ def test_always_unconverged_fit_exits_with_code_3(fit_command, monkeypatch, tmp_
 
 
 @pytest.mark.parametrize("free, message", [
-    ("friction.static=0.6..0.1", "friction.static: the low bound 0.6 must lie below the high bound 0.1"),
-    ("friction.static=0.1..nan", "a plain number is needed, not nan"),
+    ("friction.static=0.6..0.1", "friction.static: 0.6..0.1: the low bound must lie below the high bound"),
+    ("friction.static=0.1..nan", "both ends of this range must be plain numbers"),
     ("friction.static=-0.1..1", "friction.static: must be >= 0, not -0.1"), ("friction.law=1..2", "is not a number "
                                                                                                   "that can vary"),
     ("friction.bond_length=1..2", "a bare number without a unit"), ("friction.statc=0..1", "did you mean 'static'?"),
-    ("friction.static", "table.key=low..high is needed"),
-    ("x=1..2", "not a key of a "
-                                                                                                   "scene"),
+    ("friction.static", "write table.key=low..high"),
+    ("x=1..2", "unknown key; known here"), ("frction.static=0..1", "did you mean 'friction'?"),
     ("friction.static=0..1,friction.static=0..2", "friction.static: is given twice"),
     ("contact.load=1 N..2 N", "[contact] and [normal] exclude"),
 ])  # fmt: skip

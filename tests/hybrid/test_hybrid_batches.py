@@ -111,6 +111,22 @@ def test_cycles_that_are_not_computed_have_the_samples_of_all_cycles(late):
     assert short.rows[:, :n] == pytest.approx(full.rows[:, :n], rel=1e-6, abs=1e-7)
 
 
+@pytest.mark.parametrize("omega", [0.94, 1.23, 1.25, 1.88])
+def test_samples_at_ends_of_repeated_cycles_have_their_times(omega):
+    """A motion that repeats has a row at each time of a sample, also at the ends of cycles that are not computed, where
+    round-off may move the end of a step before the sample."""
+    period = 2 * np.pi / omega
+    samples = np.arange(0, 56 * period, period / 40)
+    case = make_oscillator(
+        coulomb(), cycles=60, zeta=0.2, rtol=1e-9, load=0.6, omega=omega, samples=samples
+    )
+    motion = runs.run_case(case, has_errors=False)
+    time = motion.rows[:, 0]
+    assert motion.repeats and time[-1] <= 60 * period * (1 + 1e-12)
+    assert np.abs(time[:, None] - samples).min(axis=0).max() < 1e-9 * period
+    assert time.size == samples.size + len(motion.event_rows)
+
+
 def test_drives_have_the_values_of_their_records():
     """Pieces of sweeps and records give the same motion as a finely sampled record of the drive."""
     modes = make_modes(zeta=0.05)

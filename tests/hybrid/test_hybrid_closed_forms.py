@@ -126,7 +126,7 @@ def test_bonds_heal_at_rest_and_restart():
     """Dwell of bonds (eq. 2.10): their length after a rest, and the force F = mu N z/eps_0 of the restart."""
     for dwell, length in ((0.05, 0.696735), (0.2, 0.932332), (1.0, 0.999977)):
         # mu = N = eps_0 = 1, eps_k = 0.5, a_s/v_h = 10/s; no weakening, long after a steady slide at eps = 0.5.
-        numbers = (1.0, 1.0, 0.5, 1e-3, 1e9, 1e-4)
+        numbers = (1.0, 1.0, 0.5, 1e-3, 1e9, 1e-4, 0.0)
         law = LawNumbers("bonds", numbers, (1.0, 0.5, 0.5, 0.5), (1.0, 1.0, 1.0, 1.0))
         time = np.array([0.0, dwell])
         motion = runs.run_case(make_bench(law, time, np.zeros(2)))
@@ -139,7 +139,7 @@ def test_bonds_heal_at_rest_and_restart():
 def test_bonds_have_the_loop_of_dahl():
     """Closed loop of bonds of constant length: areas and tip of the exact solution, F_end = tanh(A/eps)."""
     law = LawNumbers(
-        "bonds", (1.0, 1.0, 1.0, 0.0, 1.0, 1.0), (1.0, 0.0, 0.0, 1.0), (1.0, 1e-2, 1e-4, 1.0)
+        "bonds", (1.0, 1.0, 1.0, 0.0, 1.0, 1.0, 0.0), (1.0, 0.0, 0.0, 1.0), (1.0, 1e-2, 1e-4, 1.0)
     )
     for amplitude, area in ((0.1, 1.328022e-3), (1.0, 0.953623), (5.0, 16.000363), (10.0, 36.0)):
         count = 2 * int(20 / amplitude) + 9

@@ -82,7 +82,7 @@ def test_forty_modes():
     rng = np.random.default_rng(2)
     laws = [
         coulomb(), masing.from_elements([1.0], [0.1]), LawNumbers("bouc_wen", (1.0, 0.1, 1.5, 0.6), (0.0,), (0.01,)),
-        LawNumbers("bonds", (1.0, 0.1, 0.1, 0.0, 1.0, 1.0), (1.0, 0.0, 0.0, 0.1), (1.0, 1e-3, 1e-6, 0.1)),
+        LawNumbers("bonds", (1.0, 0.1, 0.1, 0.0, 1.0, 1.0, 0.0), (1.0, 0.0, 0.0, 0.1), (1.0, 1e-3, 1e-6, 0.1)),
     ]  # fmt: skip
     case = make_rig_case(
         laws, [0.1] * 4, rng.normal(size=(4, 40)), np.geomspace(1, 140, 40), cycles=10

@@ -24,6 +24,17 @@ def test_table_1_interface_force_at_onset():
     assert (row.acceleration - row.displacement * OMEGA**2) / G_N == pytest.approx(4.83, abs=0.01)
 
 
+@pytest.mark.parametrize(
+    "unit, factor", [("m/s2", 1.0), ("m s-2", 1.0), ("mm/s²", 1e-3), ("g", G_N)]
+)
+def test_exact_spellings_of_units_in_headers(tmp_path, unit, factor):
+    """A header may spell a unit as programs of measurement do."""
+    path = tmp_path / "t.csv"
+    path.write_text(f"frequency [Hz],input [{unit}],displacement [µm]\n1,2,3\n", "utf-8")
+    (row,) = read_table(path)
+    assert (row.input, row.displacement) == pytest.approx((2 * factor, 3e-6), rel=1e-15)
+
+
 def test_exact_table_units_are_converted(tmp_path):
     """Units of a table of measurements are converted to SI, and missing cells are None."""
     path = tmp_path / "t.csv"
@@ -45,7 +56,7 @@ def test_exact_table_units_are_converted(tmp_path):
 
 @pytest.mark.parametrize("text, message", [
     ("", ":1: {like}, not ''"),
-    ("frequency [Hz],input [lb]\n", ":1: input [lb]: unknown unit; use one of g, m/s^2"),
+    ("frequency [Hz],input [lb]\n", ":1: input [lb]: unknown unit; use one of m/s^2, mm/s^2, g"),
     ("frequency [Hz],speed [m/s]\n", ":1: {like}, not 'frequency [Hz],speed [m/s]' (columns with a unit: "),
     ("frequency [Hz],flag\n", ":1: {like}, not 'frequency [Hz],flag' (no column input)"),
     (HEAD + "143,5,6.0,,\n143,6\n", ":3: five cells are needed, frequency, input"),

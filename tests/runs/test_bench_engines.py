@@ -36,7 +36,7 @@ ROUND_OFF_LAWS = {
     "tanh": 'law = "tanh"\nreference_speed = "1 mm/s"\n',
     "elastic-plastic": 'law = "elastic-plastic"\nbond_length = "2 um"\n',
     "averaged": 'law = "convolution"\nbond_length = "0.8 mm"\n',
-    "bonds": BONDS + "initial_bonds = 0.4\n", "growing": BONDS + GROWTH, "loose": BONDS + GROWTH + "breakaway = 0.3\n",
+    "bonds": BONDS + "initial_bonds = 0.4\n", "growing": BONDS + GROWTH,
 }  # fmt: skip
 SUM_LAWS = (
     [("stretch", order, growth) for order in (0, 0.5, 2.5) for growth in ("", GROWTH)]
@@ -128,12 +128,11 @@ def test_exact_frames_of_patch_agree_with_numpy_law(law):
 # ---- choice of the engine and its name
 
 
-@pytest.mark.share(0, 1, 3, 4, 7)
+@pytest.mark.share(0, 1, 3, 4, 6)
 @pytest.mark.parametrize("law, contact, name", [
     (ROUND_OFF_LAWS["coulomb"], POINT, "closed form"), (ROUND_OFF_LAWS["elastic-plastic"], POINT, "parallel elements"),
     (BONDS, POINT, "recursion"), (BONDS + "order = 2\n", POINT, "merged bond list"),
     (BONDS + 'reading = "report"\n', POINT, "truncated bond list"),
-    (BONDS + "order = 2\nbreakaway = 0.2\n", POINT, "law step by step"),
     (BONDS, PATCH + 'on = "lower"\n', "law step by step"), (BONDS, PATCH + "[contact.shear]\n", "bond points"),
     (ROUND_OFF_LAWS["coulomb"], PATCH + "[contact.shear]\n", "parallel elements"),
 ])  # fmt: skip

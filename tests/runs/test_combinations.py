@@ -34,7 +34,6 @@ VARIANTS = {
         ["order=2"],
         ["order=0"],
         ["reading=report"],
-        ["breakaway=0.2"],
         ["rest_growth=1 m/s^2", "slip_growth=1 um"],
     ],
     "coulomb": [["kinetic=0.2"]],
@@ -213,12 +212,6 @@ def test_always_accepted_combinations_without_friction_run(effect):
 @pytest.mark.parametrize(
     "text, sets, key, reason",
     [
-        (
-            POINT + COULOMB_LAW + SHAKEN_MODE,
-            [*BONDS, "friction.breakaway=0.2", "accuracy.quadrature=direct"],
-            "accuracy.quadrature",
-            "'direct' with friction.breakaway is not supported yet; use 'recursion' or 'auto'",
-        ),
         (
             PATCH + COULOMB_LAW + SHAKEN_MODE,
             [*BONDS, *LOWER, "accuracy.quadrature=merged"],

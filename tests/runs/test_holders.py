@@ -125,5 +125,5 @@ ROTATION_TABLES = {
 @pytest.mark.parametrize("tables", ROTATION_TABLES.values(), ids=ROTATION_TABLES)
 def test_refuses_approach_of_piece_that_can_rotate(tables):
     """A prescribed approach of a piece that can rotate is refused with the remedy."""
-    with pytest.raises(PatchfemError, match=r"removed in patchfem 2\.0: give contact\.load"):
+    with pytest.raises(PatchfemError, match=r"removed in patchfem 2\.0; give contact\.load"):
         solve_patch("", tables + '[contact.approach]\ndistance = "1 um"\n')

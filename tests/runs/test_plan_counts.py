@@ -1,8 +1,11 @@
-"""Estimates of a plan agree with the run: the load of a prescribed approach, the steps and the
-strips of bonds."""
+"""Plans agree with the run: strips of bonds, sticking, and the measured probe."""
+
+import json
+from time import perf_counter
 
 import numpy as np
 import pytest
+from command_line import run_cli
 
 from patchfem import load, plan
 from patchfem.runs.run import run
@@ -116,3 +119,40 @@ def test_exact_kinetic_coefficient_decides_about_sticking(kinetic, sticks):
         "D_kinetic"
     ] == pytest.approx(kinetic)
     assert run_plan.groups["knee_force"] == pytest.approx(4 / np.pi * kinetic * 100)
+
+
+PROBED = """[contact]
+length = "10 mm"
+width = "10 mm"
+height = "5 mm"
+load = "100 N"
+substrate = "steel"
+element_size = "1 mm"
+[friction]
+law = "coulomb"
+static = 0.3
+[slide]
+kind = "sine"
+amplitude = "5 um"
+frequency = "50 Hz"
+cycles = 2
+"""
+
+
+def test_exact_probe_measures_what_the_plan_does_not_predict(tmp_path, monkeypatch):
+    """`plan` predicts no time; with `--probe` it states the measured time of a run, in all and by stage, the static
+    measures of this run, and what each setting multiplies."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a.toml").write_text(PROBED)
+    described = json.loads(run_cli("plan", "a.toml", "--json").out)
+    for name in ("seconds", "bytes", "compile_seconds", "steps"):
+        assert described[name] is None
+    begin = perf_counter()
+    probed = json.loads(run_cli("plan", "a.toml", "--probe", "--json").out)
+    elapsed = perf_counter() - begin
+    stages = probed["probe"]["seconds"]
+    assert 0 < stages["contact"] <= stages["total"] == probed["seconds"] <= elapsed
+    found = run(load(PROBED), estimate=False).measures["normal_stiffness"].value
+    assert probed["probe"]["normal_stiffness"] == pytest.approx(found, rel=1e-9)
+    text = " ".join(probed["probe"]["sentences"])
+    assert "slide.cycles" in text and "contact.element_size" in text and "drive.cycles" not in text

@@ -98,11 +98,11 @@ def test_always_last_two_cycles_have_hundred_samples_each(run_case, engine, driv
     ).max() <= sine.period / 100 * (1 + 1e-6)
 
 
-@pytest.mark.parametrize("engine", ["exact two modes", "march bonds", "smooth"])
+@pytest.mark.parametrize("engine", ["exact two modes", "march bonds", "hybrid"])
 def test_always_release_history_has_uniform_samples(run_case, engine):
     """The history of a release has at least 20 samples per cycle from its start; an earlier version
     stored only reversals before the last cycles."""
-    if engine == "smooth":
+    if engine == "hybrid":
         result = run(loads(TANH_POINT + MODE + RELEASE), estimate=False)
         assert result.extra["engine"] == "hybrid"
     else:

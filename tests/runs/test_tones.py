@@ -82,7 +82,7 @@ def test_exact_beat_is_shortest_common_period(frequencies, cycles):
     "changes, message",
     [
         ({"kind": "force"}, "can only shake the base"),
-        ({"phases": ["0 deg"] * 3}, "3 values for 2 frequencies"),
+        ({"phases": ["0 deg"] * 3}, "3 values for 2 values of `frequencies`"),
         ({"frequencies": None}, "waveform 'tones' needs this key"),
         ({"accelerations": ["0 g", "0 g"]}, "nothing moves"),
         ({"frequencies": [96.0, "1 um"]}, "frequency"),

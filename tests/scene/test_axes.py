@@ -10,21 +10,23 @@ import patchfem as pf
 from patchfem.core import PatchfemError
 from patchfem.model import build
 from patchfem.scene import (
-    SampledRange,
+    LISTS,
+    RANDOM,
+    Range,
     describe_ranges,
     format_values,
     loads,
     parse_quantity,
-    read_axes,
+    read_assignments,
 )
 
 RIG = KILOGRAM + DRIVE
 SWEPT = BENCH + '[sweep]\n"friction.static" = "0.1..0.6:6"\nnormal.load = "26 lbf, 100 N"\n'
 
 
-def read_axis(text, **how):
+def read_axis(text, form=LISTS):
     """Return the axis of a text that has no mistakes."""
-    (found,), wrong = read_axes([text], **how)
+    (found,), wrong = read_assignments([text], form)
     assert wrong == []
     return found
 
@@ -90,30 +92,37 @@ def test_exact_axis_texts_are_valid_in_scene():
         ("friction.static=0.1,,0.2", "no value between"),
         ("contact.tilt.angle=1 mrad,0.001 rad", "is given twice"),
         ("contact.tilt.angle", "table.key=v1,v2"),
+        ("frction.static=0.1,0.2", "did you mean 'friction'?"),
+        ("structure.mode.axial.freqency=100 Hz..120 Hz:3", "did you mean 'frequency'?"),
+        ("mode.frequency=100 Hz", "did you mean 'structure.mode'?"),
+        ("angle=1 mrad", "did you mean 'contact.tilt.angle'?"),
+        ("structure.mode.frequency=100 Hz", "structure.mode.NAME.frequency"),
+        ("friction.static.x=1", "friction.static is a value"),
+        ("accuracy.stick_speed=1", "was removed in patchfem 1.0"),
     ],
 )
 def test_refuses_invalid_axis(text, says):
     """An invalid list or range is refused with its key and the mistake."""
-    found, wrong = read_axes([text])
+    found, wrong = read_assignments([text])
     assert not found and len(wrong) == 1 and says in wrong[0] and text.partition("=")[0] in wrong[0]
 
 
 def test_refuses_axes_with_all_mistakes():
     """All mistakes in several axes are reported at once."""
-    _, wrong = read_axes(
+    _, wrong = read_assignments(
         ["contact.load=5 lb,3", "friction.static=a", "contact.pairs=1", "contact.pairs=2"]
     )
     assert [line.partition(":")[0] for line in wrong] == [
-        "contact.load",
-        "contact.load",
-        "friction.static",
-        "contact.pairs",
+        "--over contact.load",
+        "--over contact.load",
+        "--over friction.static",
+        "--over contact.pairs",
     ]
 
 
 def test_exact_sampled_axis_uses_16_bytes_per_value():
     """A sampled axis stores 16 bytes per value, and its texts are read as the same values."""
-    span = read_axis("contact.length=1 mm..9 mm", sampled=True)
+    span = read_axis("contact.length=1 mm..9 mm", RANDOM)
     drawn = span.make_axis(np.linspace(0, 1, 1001))
     assert drawn.texts[0] == "1 mm" and drawn.texts[-1] == "9 mm" and len(drawn.texts) == 1001
     assert drawn.texts[1:3] == [drawn.texts[1], drawn.texts[2]] == ["1.008 mm", "1.016 mm"]
@@ -123,31 +132,33 @@ def test_exact_sampled_axis_uses_16_bytes_per_value():
 
 def test_exact_sampled_values_lie_within_range():
     """Sampled values lie between the ends of a range, on a logarithmic or a linear scale."""
-    log_range = read_axis("contact.tilt.angle=1 mrad..100 mrad", sampled=True)
-    assert isinstance(log_range, SampledRange) and log_range.log
+    log_range = read_axis("contact.tilt.angle=1 mrad..100 mrad", RANDOM)
+    assert isinstance(log_range, Range) and log_range.interval.is_log
     np.testing.assert_allclose(
         log_range.make_axis([0, 0.25, 0.5, 1]).values, [1e-3, 10**-2.5, 1e-2, 1e-1], rtol=1e-14
     )
-    linear_range = read_axis("friction.static=0.2..0.6:lin", sampled=True)
+    linear_range = read_axis("friction.static=0.2..0.6:lin", RANDOM)
     np.testing.assert_allclose(
         linear_range.make_axis([0, 0.25, 1]).values, [0.2, 0.3, 0.6], rtol=1e-14
     )
     assert (
         "takes whole numbers takes no range"
-        in read_axes(["contact.pairs=1..4"], sampled=True)[1][0]
+        in read_assignments(["contact.pairs=1..4"], RANDOM)[1][0]
     )
-    assert "leave out :9" in read_axes(["friction.static=0.2..0.6:9"], sampled=True)[1][0]
+    assert "leave out :9" in read_assignments(["friction.static=0.2..0.6:9"], RANDOM)[1][0]
 
 
 def test_exact_python_values_become_axis_texts():
     """Python and NumPy values, and texts with commas or quotes, become texts that are read back unchanged."""
-    assert format_values("contact.load", [26.0, "26 lbf"]) == ["26.0 N", "26 lbf"]
-    assert format_values("friction.static", np.array([0.1, 0.2])) == ["0.1", "0.2"]
-    assert format_values("friction.law", ["tanh"]) == ["tanh"]
+    assert format_values("contact.load", [26.0, "26 lbf"]) == "26.0 N,26 lbf"
+    assert format_values("friction.static", np.array([0.1, 0.2]), "..") == "0.1..0.2"
+    assert (
+        format_values("friction.law", ["tanh"]) == format_values("friction.law", "tanh") == "tanh"
+    )
     for one in (26.0, np.float64(26), np.array(26.0)):
-        assert format_values("contact.load", one) == ["26.0 N"]
+        assert format_values("contact.load", one) == "26.0 N"
     names = ["plain", "a,b.csv", 'an "inch"', "it's,", "back\\slash,"]
-    found = read_axis(f"title={','.join(format_values('title', names))}")
+    found = read_axis(f"title={format_values('title', names)}")
     assert [loads(BENCH, "a.toml", [f"title={one}"]).title for one in found.texts] == names
 
 
@@ -156,7 +167,7 @@ def test_exact_sweep_table_equals_options():
     scene = loads(SWEPT, "a.toml")
     assert (
         list(scene.sweep)
-        == read_axes(["friction.static=0.1..0.6:6", "normal.load=26 lbf,100 N"])[0]
+        == read_assignments(["friction.static=0.1..0.6:6", "normal.load=26 lbf,100 N"])[0]
     )
     assert scene.effect_names()[-1] == "sweep" and loads(BENCH, "a.toml").sweep == ()
 
@@ -188,7 +199,7 @@ def test_refuses_sweep_table_with_lines_of_mistakes():
     found = list_mistakes(text)
     for start, says in (
         ('"friction.static"', "sweep.friction.static: a plain number"),
-        ('"normal.lod"', "sweep.normal.lod: not a key of a scene; did you mean 'load'?"),
+        ('"normal.lod"', "sweep.normal.lod: unknown key; did you mean 'load'?"),
         ('"normal.load"', "sweep.normal.load: the values must be a string"),
     ):
         line = find_line(text, start)
@@ -220,8 +231,9 @@ def test_always_values_of_all_axes_select_one_case():
 )
 def test_exact_value_with_tolerance_is_uniform_range(text, low, high, unit):
     """A value with a tolerance, such as 0.3 +- 15 %, is a uniform range, which is described in a note."""
-    (axis,), wrong = read_axes([text], sampled=True)
-    assert not wrong and (axis.low, axis.high, axis.unit, axis.log) == (low, high, unit, False)
+    (axis,), wrong = read_assignments([text], RANDOM)
+    assert not wrong and (axis.low, axis.high, axis.interval.unit) == (low, high, unit)
+    assert not axis.interval.is_log
     (note,) = describe_ranges([text])
     ends = note.partition(" is drawn evenly from ")[2].split("..")
     assert [float(end.removesuffix(unit)) for end in ends] == [low, high]
@@ -229,21 +241,21 @@ def test_exact_value_with_tolerance_is_uniform_range(text, low, high, unit):
 
 
 @pytest.mark.parametrize(
-    "text, sampled, says",
+    "text, form, says",
     [
         (
             "friction.static=0.3+-15%",
-            False,
+            LISTS,
             "write this range as 0.255..0.345:9 for 9 values in it",
         ),
         (
             "normal.load=115 N +- 10 kN",
-            True,
+            RANDOM,
             "write the width in % or in the unit of the value (N)",
         ),
     ],
 )
-def test_refuses_invalid_tolerance_of_value(text, sampled, says):
+def test_refuses_invalid_tolerance_of_value(text, form, says):
     """An invalid tolerance of a value is refused with its remedy."""
-    found, (wrong,) = read_axes([text], sampled=sampled)
+    found, (wrong,) = read_assignments([text], form)
     assert not found and says in wrong

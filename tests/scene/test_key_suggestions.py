@@ -32,7 +32,7 @@ def test_exact_unknown_key_gets_suggestion(kind, right, wrong, meant):
     with pytest.raises(SceneError) as error:
         loads(text.replace(right, wrong, 1))
     messages = [line for line in error.value.mistakes if "unknown" in line]
-    assert len(messages) == 1 and re.search(rf"; did you mean '{meant}'\?$", messages[0]), (
+    assert len(messages) == 1 and re.search(rf"; did you mean '{meant}'\?", messages[0]), (
         error.value.mistakes
     )
 
@@ -46,8 +46,35 @@ def test_exact_unknown_key_gets_suggestion(kind, right, wrong, meant):
 )
 def test_exact_setting_suggests_key_of_file(wrong, meant):
     """An unknown key in --set gets the suggestion of a key that the file has."""
-    with pytest.raises(SceneError, match=rf"^--set: \S+: unknown key; did you mean '{meant}'\?$"):
+    with pytest.raises(SceneError, match=rf"^--set: \S+: unknown key; did you mean '{meant}'\?"):
         loads(read_template("rig"), sets=[wrong])
+
+
+@pytest.mark.parametrize(
+    "wrong, says",
+    [
+        ("friction.amplitude=2 um", "[normal] and [slide] have a key of this name"),
+        ("structure.law=coulomb", "[friction] has a key of this name"),
+        ("structure.interface.0.load=1 N", "the scene has no [[structure.interface]]"),
+    ],
+)
+def test_exact_key_of_another_table_names_the_table(wrong, says):
+    """The message on a key in the wrong table, or of an item that the scene lacks, names the table."""
+    with pytest.raises(SceneError, match=re.escape(says)):
+        loads(read_template("bench"), sets=[wrong])
+
+
+def test_exact_mistake_in_first_value_of_sweep_has_line_of_sweep():
+    """A key that only [sweep] gives is reported at the line of [sweep], and a missing key says what it is."""
+    text = read_template("bench").replace("[friction]", "[frction]")
+    text += '[sweep]\n"friction.static" = "0.1..0.3:3"\n'
+    line = len(text.splitlines())
+    with pytest.raises(SceneError) as error:
+        loads(text, "a.toml")
+    assert any(
+        message.startswith(f"a.toml:{line}: friction.law: missing")
+        for message in error.value.mistakes
+    )
 
 
 def test_always_ambiguous_key_gets_no_suggestion():

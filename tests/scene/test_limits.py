@@ -30,12 +30,6 @@ REFUSED = [
     ),
     (
         PATCH_BENCH,
-        [SHEAR, *REPORT[:2], "friction.order=2", "friction.breakaway=0.1"],
-        "friction.breakaway",
-        "not supported yet with order = 2 and [contact.shear]; use order = 1",
-    ),
-    (
-        PATCH_BENCH,
         [SHEAR, "friction.kinetic=0.2"],
         "friction.kinetic",
         "is not supported yet; leave out the key kinetic",
@@ -57,12 +51,6 @@ REFUSED = [
         [SHEAR, COULOMB, LOWER],
         "contact.tilt.on",
         "a shape on the lower piece with law 'coulomb' is not",
-    ),
-    (
-        RIG,
-        [SHEAR, "friction.breakaway=0.1", LOWER],
-        "contact.tilt.on",
-        "a shape on the lower piece with friction.breakaway and",
     ),
     (
         RIG,
@@ -92,9 +80,21 @@ PLAIN = [
     (RIG, [SHEAR, "friction.static=0"], "friction.static", "static: must be > 0 with"),
     (
         RIG,
+        ["accuracy.method=exact"],
+        "accuracy.method",
+        "no exact solution exists for law 'nonlocal'; use 'march'",
+    ),
+    (
+        RIG,
+        ["accuracy.method=exact", PLASTIC, "structure.stiffening.cubic=1e12 N/m^3"],
+        "accuracy.method",
+        "no exact solution exists with [structure.stiffening]; use 'march' or leave",
+    ),
+    (
+        RIG,
         ["accuracy.method=exact", PLASTIC, SHEAR, "structure.mode.second.pitch=1 rad/m"],
         "accuracy.method",
-        "cannot be computed from event to event with a mode's pitch",
+        "no exact solution exists with a mode's pitch",
     ),
     (
         LINEAR,
@@ -121,14 +121,13 @@ def test_refuses_unsupported_combination(text, sets, key, says):
 
 def test_refuses_unsupported_keys_at_their_lines():
     """Unsupported keys in a file are refused at their lines."""
-    text = RIG.replace("[friction]", "[contact.shear]\n[friction]\nbreakaway = 0.1")
-    text = text.replace('angle = "0.1 mrad"', 'angle = "0.1 mrad"\non = "lower"')
+    text = RIG.replace("[friction]", "[contact.strips]\ncount = 4\n[contact.shear]\n[friction]")
     text += '[accuracy]\nmethod = "exact"\n'
     assert list_mistakes(text) == [
-        f"a.toml:{find_line(text, 'on =')}: contact.tilt.on: a shape on the lower piece with friction.breakaway and "
-        "[contact.shear] is not supported yet; put the shapes on the upper piece",
-        f"a.toml:{find_line(text, 'method')}: accuracy.method: the motion cannot be computed from event to event "
-        "for law 'nonlocal' with [contact.shear]; use 'march' or leave `method` out",
+        f"a.toml:{find_line(text, '[contact.strips]')}: contact.strips: not supported yet with [contact.shear]; leave "
+        "one of the two out",
+        f"a.toml:{find_line(text, 'method')}: accuracy.method: no exact solution exists for law 'nonlocal' with "
+        "[contact.shear]; use 'march' or leave `method` out",
     ]
 
 

@@ -7,17 +7,17 @@ from pathlib import Path
 import pytest
 from jsonschema import Draft202012Validator
 
-from patchfem.scene import TEMPLATE_DESCRIPTIONS as TEMPLATES
 from patchfem.scene import (
+    BOUNDS,
     UNIT_FACTORS,
     loads,
     make_schema,
     parse_modes,
     parse_quantity,
-    read_axes,
-    read_ranges,
+    read_assignments,
     read_template,
 )
+from patchfem.scene import TEMPLATE_DESCRIPTIONS as TEMPLATES
 from patchfem.scene.keys.quantities import EXAMPLE_QUANTITIES
 from patchfem.scene.scene import SceneError
 from patchfem.scene.schema import make_quantity_pattern
@@ -68,12 +68,12 @@ def test_exact_percentage_is_accepted_by_schema_and_program(schema_validator, te
     assert schema_validator.is_valid(tomllib.loads(scene))
     assert loads(scene).structure.mode[0].damping == value
     assert loads(RIG, sets=[f"{key}={text}"]).structure.mode[0].damping == value
-    assert [axis.values for axis in read_axes([f"{key}={text}, 1 %..2 %:2"])[0]] == [
+    assert [axis.values for axis in read_assignments([f"{key}={text}, 1 %..2 %:2"])[0]] == [
         (value, 0.01, 0.02)
     ]
-    assert [(free.low, free.high) for free in read_ranges([f"{key}={text}..50 %"])[0]] == [
-        (value, 0.5)
-    ]
+    assert [
+        (free.low, free.high) for free in read_assignments([f"{key}={text}..50 %"], BOUNDS)[0]
+    ] == [(value, 0.5)]
     assert [mode[:3] for mode in parse_modes(f"212 Hz:{text}:1 %")] == [(212.0, value, 0.01)]
 
 

@@ -174,20 +174,8 @@ def test_refuses_oversized_array_by_header(tmp_path):
     npy.write_array_header_1_0(
         header, {"descr": "|S1024", "fortran_order": False, "shape": (2000, 2000)}
     )
-    for key, message in (
-        ("M", "contains values of 1024 bytes"),
-        ("names", "contains 4000000 names; 2000 is the limit"),
-    ):
+    for key in ("M", "names"):
         with zipfile.ZipFile(tmp_path / "a.npz", "w") as file:
             file.writestr(f"{key}.npy", header.getvalue())
-        with pytest.raises(PatchfemError, match=message):
+        with pytest.raises(PatchfemError, match=f"{key} of shape 2000x2000 is larger than"):
             arrays.read_arrays(tmp_path / "a.npz")
-
-
-def test_refuses_oversized_member_list(tmp_path):
-    """An archive whose list of members is too long is refused."""
-    with zipfile.ZipFile(tmp_path / "a.npz", "w") as file:
-        for number in range(40):
-            file.writestr(f"{number}" * 30_000, b"")
-    with pytest.raises(PatchfemError, match=r"the list of members takes \d+ bytes"):
-        arrays.read_arrays(tmp_path / "a.npz")

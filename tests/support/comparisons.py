@@ -16,6 +16,7 @@ from patchfem.surface.compare.records import (
     name_unknown,
 )
 from patchfem.surface.profile import Profile
+from patchfem.surface.quantity import Quantity
 
 UM = 1e-6
 TRACK_NAMES = {
@@ -35,8 +36,12 @@ TRACE_VALUES = {
     "shift": (-50 * UM, 0.3 * UM),
     "tilt": (1e-3, 1e-6),
     "scale": (1.00001, 2e-6),
+    "offset": (2 * UM, 0.01 * UM),
+    "gain": (1.0, 0.002),
+    "common_length": (4000 * UM, 0.0),
     "worn_depth_mean": (0.6 * UM, 0.004 * UM),
     "worn_depth_max": (3.05 * UM, 0.04 * UM),
+    "worn_depth_max_at": (1500 * UM, 80 * UM),
     "worn_area": (2400 * UM**2, 12 * UM**2),
     "grown_area": (10 * UM**2, 2 * UM**2),
     "worn_depth_within": (2.4 * UM, 0.03 * UM),
@@ -53,6 +58,8 @@ SCAN_VALUES = {
     "worn_share": (0.32, 0.005),
     "worn_depth_mean": (0.3 * UM, 0.002 * UM),
     "worn_depth_max": (1.5 * UM, 0.01 * UM),
+    "worn_depth_max_x": (500 * UM, 0.0),
+    "worn_depth_max_y": (700 * UM, 0.0),
     "amplitude_ratio": (1.0, 0.08),
     "slope_ratio": (1.03, 0.04),
 }
@@ -126,6 +133,7 @@ def compare_traces(code: str = "worn", findings: dict | None = None, has_place=T
                 side: name_all({"Ra": (1e-7, 1e-8), "Rq": (1.2e-7, 1e-8), "slope": (0.1, 0.01)})
                 for side in ("before", "after")
             }
+            | {"ratio": dict.fromkeys(("Ra", "Rq", "slope"), Quantity(0.9, 0.85, 0.95, "1", ""))}
             for region in ("inside", "outside")
         }
         evidence = Evidence(

@@ -31,7 +31,7 @@ from patchfem.identify import UnitCubeResidual
 from patchfem.identify.least_squares import descend
 from patchfem.identify.space import make_search_space
 from patchfem.model import build
-from patchfem.scene import BaseScene, read_ranges
+from patchfem.scene import BOUNDS, BaseScene, read_assignments
 
 LOAD, MASS, OWN, SLIDERS, BETA = 100.0, 1.0, 2 * np.pi * 100.0, 400, 0.5
 STEPS, KEPT, PERIODS = 400, 8, 150
@@ -188,7 +188,9 @@ def compare_fit(seed: int, folder: Path, earlier: dict | None = None) -> dict:
         for key, (low, high) in case.free.items()
     ]
     min_chi_square = (
-        earlier["least"] if earlier else minimize_from_truth(case, path, read_ranges(free)[0])
+        earlier["least"]
+        if earlier
+        else minimize_from_truth(case, path, read_assignments(free, BOUNDS)[0])
     )
     sets = {
         key: f"{value!r}{UNITS[key]}" if key in UNITS else value

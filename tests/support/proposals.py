@@ -64,10 +64,7 @@ def parse_proposals(tables: dict, key: str, message: str) -> list:
         }.get(kind, [other_key[1]] if other_key else [key] if key.startswith("accuracy.") else [])
         out += [dict.fromkeys(keys, word[1:-1]) for word in re.findall(WORD, words) if keys]
     if 'use reading = "stretch" with order = 1' in message:
-        extra = {"breakaway": None} if "breakaway" in message else {}
-        out.append(
-            {f"{law}.{name}": value for law in laws for name, value in (PRINTED | extra).items()}
-        )
+        out.append({f"{law}.{name}": value for law in laws for name, value in PRINTED.items()})
     out += [{key: word} for words in ONE_OF.findall(message) for word in words.split(", ")]
     out += [{key: ("", word)} for word in MEANT.findall(message)]
     if re.search(r"leave (?:it|`?method`?) out", message):

@@ -46,6 +46,8 @@ RELATIVE_OF_ERRORS = 0.02
 # Difference that passes of all errors, and of checks that are zero but for round-off.
 MIN_ERROR = 1e-12
 MIN_CHECK = 1e-7
+# Difference that passes of the shares of a variance, which are sums of terms of order 1.
+MIN_SHARE = 1e-9
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 UNSTABLE_KEYS = re.compile(
     r"seconds|versions|\bpatchfem$|version|sha256|\bdate\b|\bcreated\b|\.motions$"
@@ -316,6 +318,8 @@ def is_equal(key: str, recorded: dict, found: dict) -> bool:
     is_check = re.search("energy_balance|work_check", key) is not None
     relative = RELATIVE_OF_ERRORS if is_error else RELATIVE
     smallest = MIN_CHECK if is_check else MIN_ERROR if is_error else 0.0
+    if ".ranking." in key:
+        smallest = MIN_SHARE
     if isinstance(old, list) and isinstance(new, list):
         margin = relative * max(map(abs, old[2:]), default=0.0) + smallest
         return len(old) == len(new) and np.allclose(old, new, rtol=relative, atol=margin)

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 from torture import grammar
+from torture.effort import estimate_seconds
 from torture.toml import to_toml
 from torture.trial import Trial
 
@@ -49,7 +50,7 @@ def draw_scene(seed: int) -> dict:
             planned = plan(loads(to_toml(tables)))
         except (PatchfemError, SceneError):
             continue
-        if planned.seconds < DEAR:
+        if estimate_seconds(planned) < DEAR:
             return tables
 
 
@@ -145,7 +146,7 @@ def run_tables(tables: dict):
     """Return the Result of a scene; None if it is refused, does not converge or is too expensive."""
     try:
         planned = plan(loads(to_toml(tables)))
-        return run(planned) if planned.seconds < LONG else None
+        return run(planned) if estimate_seconds(planned) < LONG else None
     except (NotConverged, PatchfemError, SceneError):
         return None
 
@@ -163,7 +164,7 @@ def try_remedy(tables: dict, found, remedy: Remedy) -> str:
     changed_tables = set_keys(tables, sets)
     try:
         planned = plan(loads(to_toml(changed_tables)))
-        if planned.seconds > LONG:
+        if estimate_seconds(planned) > LONG:
             return "dear"
         new_result = run(planned)
     except (NotConverged, PatchfemError, SceneError):

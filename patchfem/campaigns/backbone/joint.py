@@ -40,7 +40,7 @@ STUCK_FRACTION = 1e-5
 QUASI_STATIC_ADVICE = "; use --method quasi-static"
 NO_CLOSED_FORM = (
     "the friction loop of bonds has a closed form only with reading = "
-    '"stretch", order = 1, a constant bond length, breakaway = 0 and pieces that are rigid in shear'
+    '"stretch", order = 1, a constant bond length and pieces that are rigid in shear'
 )
 
 

@@ -17,8 +17,6 @@ from ...core import NotConverged, PatchfemError
 from ...effects import law_has_trait
 from ...identify.least_squares import Fit, Problem, SearchCounts
 from ...inputs.loops import Loop, read_loop
-from ...inputs.units import RATIO_UNITS
-from ...scene.keys.quantities import UNIT_FACTORS
 from ...scene.scene import Scene, SceneError
 from .loop_model import BenchModel
 from .loop_path import DEFAULT_OPTIONS, LoopOptions, make_offsets
@@ -35,12 +33,6 @@ MIN_INDEPENDENT = 0.6
 MIN_RMS = 1e-6
 # Largest ratio of the force in the first row to the peak force for a record that begins at rest.
 MAX_FIRST_FORCE = 0.2
-LOAD_UNITS = {
-    "time": UNIT_FACTORS["time"],
-    "displacement": UNIT_FACTORS["length"],
-    "force": UNIT_FACTORS["force"],
-    "friction_ratio": RATIO_UNITS,
-}
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -132,7 +124,7 @@ def fit_hysteresis_loop(
             ]
         )
     ranges = parse_ranges(free_parameters)
-    loop = read_loop(loop_file, LOAD_UNITS)
+    loop = read_loop(loop_file)
     held_out = np.zeros(loop.reading.size, bool)
     for selector in held_out_rows:
         held_out |= loop.select_rows(selector)

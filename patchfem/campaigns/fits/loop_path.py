@@ -8,7 +8,7 @@ import numpy as np
 
 from ...core import PatchfemError
 from ...inputs.loops import Loop
-from ...scene.ranges import Range
+from ...scene.assignments import Range
 
 OFFSETS = ("force", "displacement")
 # Largest difference of positions that count as equal, relative to the displacement range.

@@ -15,9 +15,8 @@ from ...identify.fit_sentences import describe_fit
 from ...identify.least_squares import Fit, Problem
 from ...model.model import Model, build
 from ...runs.patch import mesh_levels
-from ...scene.lines import split_key
-from ...scene.overrides import BaseScene
-from ...scene.ranges import Range, read_ranges
+from ...scene.assignments import BOUNDS, Range, read_assignments
+from ...scene.overrides import BaseScene, find_scene_value
 from ...scene.scene import Scene, SceneError, add_sets
 
 # Largest ratio high/low of a range whose middle is the arithmetic mean; the middle of a wider range
@@ -134,7 +133,7 @@ def parse_ranges(texts: Iterable) -> list:
 
     Raises SceneError with all validation errors.
     """
-    ranges, mistakes = read_ranges(texts)
+    ranges, mistakes = read_assignments(texts, BOUNDS)
     if mistakes:
         raise SceneError(mistakes)
     return ranges
@@ -191,21 +190,9 @@ def _find_initial_value(scene: Scene, bound: Range) -> float:
 
     It is the middle of the range if the scene does not set the parameter.
     """
-    value = scene
-    for part in split_key(bound.key):
-        value = _find_table(value, part) if isinstance(value, tuple) else getattr(value, part, None)
+    _, value = find_scene_value(scene, bound.key)
     if not isinstance(value, float):
         value = (bound.low + bound.high) / 2
         if bound.low > 0 and bound.high > MAX_LINEAR_RATIO * bound.low:
             value = np.sqrt(bound.low * bound.high)
     return float(np.clip(value, bound.low, bound.high))
-
-
-def _find_table(tables: tuple, name_or_index: str):
-    """Return the table of an array of tables by its name or its index; None if there is none."""
-    named = [item for item in tables if getattr(item, "name", None) == name_or_index]
-    if named:
-        return named[0]
-    if name_or_index.isdecimal() and int(name_or_index) < len(tables):
-        return tables[int(name_or_index)]
-    return None

@@ -20,8 +20,8 @@ from ...model.model import Model
 from ...runs.patch import mesh_levels
 from ...runs.patch.press import nodal_areas
 from ...runs.wear import evolve
+from ...scene.assignments import Range
 from ...scene.keys.quantities import parse_quantity
-from ...scene.ranges import Range
 from .problem import parse_ranges
 
 # Names of the wear depths in compare.json, the more accurate one first.

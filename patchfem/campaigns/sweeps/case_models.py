@@ -24,6 +24,7 @@ from ...model.model import Model, build
 from ...model.rig import JOINT_SCENES
 from ...model.similar_models import SimilarModels
 from ...scene.files import require_files
+from ...scene.lines import split_assignment
 from ...scene.overrides import BaseScene
 from ...scene.scene import Scene, SceneError, loads, read_sweep_axes, remember_written
 
@@ -169,7 +170,7 @@ class SweepScene:
 
         `keys` are the swept keys.
         """
-        set_keys = {*keys, *(text.partition("=")[0].strip() for text in self.sets)}
+        set_keys = {*keys, *(split_assignment(text)[0] for text in self.sets)}
         set_keys |= {f"contact.{key}" for key in tomllib.loads(self.text).get("contact", ())}
         has_contact = any(key.startswith("contact.") for key in set_keys)
         return has_contact and not {"contact.element_size", "contact.mesh"} & set_keys

@@ -13,7 +13,7 @@ from math import isfinite, prod
 import numpy as np
 
 from ...disk.file_hashes import hash_named_files
-from ...scene.axes import Axis
+from ...scene.assignments import Axis
 from .case_models import SweepScene
 
 MAX_CACHED_VALUES = 4096  # values of keys whose text is kept while the cases are named

@@ -15,9 +15,9 @@ from pathlib import Path
 
 from ...response import rows
 from ...runs.results import patch_rows
-from ...scene.axes import Axis, read_axes
+from ...scene.assignments import LISTS, RANDOM, Axis, read_assignments
 from ...scene.keys.quantities import NUMBER_PATTERN
-from ...scene.lines import split_key
+from ...scene.lines import split_assignment, split_key
 from ...scene.scene import SceneError
 from ...scene.toml_text import read_text
 from . import samples, table
@@ -84,7 +84,7 @@ def read_sweep(path: Path, sets: Sequence[str], request: Request) -> tuple[Sweep
     swept_keys = {sweep_scene.replace_mode_name(axis.key): axis.key for axis in cases.axes}
     errors = []
     for text in sets:
-        key = ".".join(split_key(text.partition("=")[0]))
+        key = ".".join(split_key(split_assignment(text)[0]))
         swept_key = swept_keys.get(sweep_scene.replace_mode_name(key))
         if swept_key:
             errors.append(
@@ -122,8 +122,8 @@ def read_cases(sweep_scene: SweepScene, request: Request) -> Cases:
             parts.append(listed)
             file_axes = listed.axes
     errors += _validate_measure_name(request.of)
-    axes, axis_errors = read_axes(request.over, sampled=request.count > 0)
-    errors += [f"--over {message.removeprefix('--over ')}" for message in axis_errors]
+    axes, axis_errors = read_assignments(request.over, RANDOM if request.count else LISTS)
+    errors += axis_errors
     if not request.over and request.file is None:
         axes, axis_errors = sweep_scene.read_axes()
         errors += axis_errors

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from ...core import PatchfemError
-from ...runs.plan import UPPER_LIMIT_NOTE, plan
+from ...runs.plan import SKIPPING_NOTE, plan
 from .case_models import SweepScene
 from .cases import Cases
 
 MAX_PLANNED_CASES = 9  # cases that are tried until one can be planned
-PREDICTIONS = ("seconds", "bytes", "compile_seconds", "steps")  # null in the plan of a sweep
 
 
 def plan_sweep(sweep_scene: SweepScene, cases: Cases) -> dict:
     """Return the plan of the first case that can be planned, as `Plan.as_json` does.
 
     In addition it has the keys and values of this `case`, the number of `cases`, and the number of
-    distinct `values` by key. It predicts no time and no memory.
+    distinct `values` by key.
 
     Raises
     ------
@@ -29,9 +28,8 @@ def plan_sweep(sweep_scene: SweepScene, cases: Cases) -> dict:
         except PatchfemError as error:
             first_error = first_error or error
             continue
-        verdict = [text for text in content["verdict"] if text != UPPER_LIMIT_NOTE]
+        verdict = [text for text in content["verdict"] if text != SKIPPING_NOTE]
         return content | {
-            **dict.fromkeys(PREDICTIONS),
             "verdict": verdict,
             "case": {axis.key: text for axis, text in zip(cases.axes, cases.texts(number))},
             "cases": len(cases),

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...scene.axes import Axis, SampledRange
+from ...scene.assignments import Axis, Range
 from .cases import Cases, take_values
 
 
 def draw_cases(
-    axes: Sequence[Axis | SampledRange], count: int, seed: int, *, sobol: bool = False
+    axes: Sequence[Axis | Range], count: int, seed: int, *, sobol: bool = False
 ) -> Cases:
     """Draw random cases from ranges and lists of values, reproducibly for a given seed.
 
@@ -21,7 +21,7 @@ def draw_cases(
 
     Parameters
     ----------
-    axes : sequence of Axis or SampledRange
+    axes : sequence of Axis or Range
     count : int
         Number of cases.
     seed : int
@@ -50,9 +50,9 @@ def _draw_sobol_points(n_axes: int, count: int, seed: int) -> np.ndarray:
         return qmc.Sobol(n_axes, scramble=True, rng=np.random.default_rng(seed)).random(count)
 
 
-def _map_to_values(axis: Axis | SampledRange, fractions: np.ndarray) -> Axis:
+def _map_to_values(axis: Axis | Range, fractions: np.ndarray) -> Axis:
     """Map uniform random numbers (n,) in [0, 1) to values of a swept key."""
-    if isinstance(axis, SampledRange):
+    if isinstance(axis, Range):
         return axis.make_axis(fractions.tolist())
     n_values = len(axis.texts)
     indices = np.minimum((fractions * n_values).astype(int), n_values - 1)

@@ -14,7 +14,8 @@ from pathlib import Path
 
 from ...disk.open_with_timeout import open_for_reading
 from ...inputs.cells import NUMBER_PATTERN
-from ...scene.axes import Axis, make_axis
+from ...scene.assignments import Axis, make_axis
+from ...scene.suggestions import require_key
 from .cases import Cases
 
 _HEAD = re.compile(r"\s*((?:[^\[\]]|\[[1-9][0-9]*\](?=\.))+?)\s*(?:\[\s*([^\[\]]*?)\s*\])?\s*")
@@ -90,6 +91,10 @@ def _parse_column(
         Axis, or None if there are errors, and a list of the row of each wrong cell with its error; the
         row is None if the key is wrong.
     """
+    try:
+        require_key(key)
+    except ValueError as error:
+        return None, [(None, str(error))]
     errors = []
     for row, cell in enumerate(cells):
         try:
@@ -99,8 +104,6 @@ def _parse_column(
                 )
             make_axis(key, [f"{cell} {unit}" if unit else cell])
         except ValueError as error:
-            if str(error).startswith("not a key"):
-                return None, [(None, str(error))]
             errors.append((row, str(error)))
     if errors:
         return None, errors

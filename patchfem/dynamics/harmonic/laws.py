@@ -515,6 +515,6 @@ def make_law(model):
         )
     raise PatchfemError(
         'accuracy.method: "harmonic" can treat bonds only with friction.reading = "stretch", '
-        "friction.order = 1, a constant bond length, friction.breakaway = 0 and pieces that are rigid "
+        "friction.order = 1, a constant bond length and pieces that are rigid "
         'in shear; use accuracy.method = "march"'
     )

@@ -514,7 +514,7 @@ COMPARE = (
         ("before_map",),
         "map",
         labels=("", "height"),
-        caption="Height, or gap between the pieces of a run, before wear.",
+        caption="Before wear; white: not measured.",
     ),
     Chart(
         "Surface after",
@@ -522,7 +522,7 @@ COMPARE = (
         ("after_map",),
         "map",
         labels=("", "height"),
-        caption="Height, aligned with the first surface, or gap between the pieces of a run, after wear.",
+        caption="After wear, aligned with the first surface; white: not measured.",
     ),
     Chart(
         "Mean section of the track",
@@ -787,7 +787,13 @@ TABLES: dict[str, tuple[Table, ...]] = {
         Table(
             title,
             source,
-            (Column("name", ""), Column("before", "before"), Column("after", "after")),
+            (
+                Column("name", ""),
+                Column("before", "before"),
+                Column("after", "after"),
+                Column("ratio", "after / before"),
+                Column("cutoff", "cut-off"),
+            ),
         )
         for title, source in (
             ("Roughness inside and outside of the track", "track_roughness"),

@@ -25,6 +25,16 @@ from .variables import band, make_variables, maps
 
 SIDES = ("before", "after")
 STATES = ("not used", "unworn", "worn", "grown")  # meanings of the codes of the variable `state`
+# Numbers of compare.json that the page and the screen show under another name: those of the longest track in both traces.
+SHOWN_ELSEWHERE = (
+    "worn_depth_within",
+    "worn_from_before",
+    "worn_from_after",
+    "worn_to_before",
+    "worn_to_after",
+    "track_pile_up",
+)
+MIN_BAND_FRACTION = 0.01  # width of a band relative to the axis, below which the line hides it
 MATERIAL_RATIOS = np.linspace(0.0, 1.0, 201)
 
 
@@ -119,6 +129,7 @@ def make_answer(comparison: Comparison) -> Answer:
             "other_tracks": [to_json(other.values) for other in comparison.tracks[1:]],
             "removed": dict(zip(SIDES, comparison.evidence.removed, strict=True)),
             **_compare_roughness(comparison),
+            **_caption_band(comparison),
             "notes": file_notes,
         },
     )
@@ -153,6 +164,9 @@ def build(
         Further content of compare.json.
     """
     values = values | {name_in_track(name): value for name, value in track.items()}
+    shown = [
+        name for name in values if name not in SHOWN_ELSEWHERE and not _is_repeated(name, values)
+    ]
     content = {
         "patchfem": __version__,
         "verdict": words.verdict[0],
@@ -166,12 +180,19 @@ def build(
         kind="compare",
         title=" and ".join(Path(source).name for source in sources),
         verdict=words.verdict,
-        quantities={name: sentences.to_answer(value) for name, value in values.items()},
+        quantities={name: sentences.to_answer(values[name]) for name in shown},
         data=data,
         remarks=Remarks(words.warnings, words.notes),
         details=content | details,
         origin={"patchfem": __version__},
     )
+
+
+def _is_repeated(name: str, values: dict[str, Quantity]) -> bool:
+    """Return whether a number of a track is that of the whole section, or does not apply to the shape of the track."""
+    area = values.get("worn_area")
+    is_whole = name == "track_area_gross" and area is not None and area[:3] == values[name][:3]
+    return is_whole or values[name].reason == "not_flat"
 
 
 def _describe_place(comparison: Comparison) -> dict:
@@ -187,6 +208,17 @@ def _describe_place(comparison: Comparison) -> dict:
     return {"reference": basis or None, "registration": registration}
 
 
+def _caption_band(comparison: Comparison) -> dict:
+    """Return the caption of the band around the depth of traces, if the band is wide enough to be seen."""
+    curves = comparison.evidence.curves
+    if curves is None or comparison.is_areal:
+        return {}
+    width = 2 * SIDE * float(np.median(curves.noise))
+    if width < MIN_BAND_FRACTION * float(np.ptp(curves.depth)):
+        return {}
+    return {"captions": {"Worn depth": "Band: 95 % noise of a single depth."}}
+
+
 def _compare_roughness(comparison: Comparison) -> dict:
     """Return the roughness inside and outside of the track: `roughness` of compare.json, and the rows of a table."""
     evidence = comparison.evidence
@@ -195,7 +227,8 @@ def _compare_roughness(comparison: Comparison) -> dict:
     for region, sides in evidence.roughness.items():
         content[region] = {side: to_json(values) for side, values in sides.items()}
         for name in content[region]["before"]:
-            rows[f"{name} {region}"] = {side: content[region][side][name] for side in SIDES}
+            row = {side: entries[name] for side, entries in content[region].items()}
+            rows[f"{name} {region}"] = row | {"cutoff": {"value": evidence.cutoff, "unit": "m"}}
     if not rows:
         content["reason"] = sentences.REASONS["no_track"]
     return {"roughness": content, "track_roughness": rows}

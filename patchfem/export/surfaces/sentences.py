@@ -89,6 +89,8 @@ REASONS = {
     "no_flanks": "the flanks of the track are not known",
     "noise": "the noise is as large as the roughness",
     "too_short": "the surface is too short",
+    "no_limit": "even or wedge-shaped wear of any size looks like an offset or tilt of the datum",
+    "not_flat": "the bottom of the track is not flat",
     "not_hidden": "unworn parts show where the datum is, so that no wear can hide",
     "identical": "both files hold the same heights",
     "no_datum": "too few heights agree to measure depths from",
@@ -197,6 +199,10 @@ def _describe_loss(comparison: Comparison) -> str:
     """Return the sentence on the lost volume, the track and the deepest place."""
     values = comparison.values
     parts = [f"{format_value('worn_depth_max', values['worn_depth_max'])} at the deepest place"]
+    for name in ("worn_depth_max_at", "worn_depth_max_x", "worn_depth_max_y"):
+        if is_known(values.get(name)):
+            axis = "y" if name.endswith("y") else "x"
+            parts[0] += f", {axis} = {format_rounded(values[name].value, 'm')}"
     if comparison.track is not None:
         parts.insert(0, _describe_track(comparison.track))
     if is_known(values.get("worn_volume")):

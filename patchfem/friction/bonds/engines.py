@@ -70,13 +70,10 @@ class EngineChoice:
         return cutoff_age(order, self.tail) if self.tail > 0 else inf
 
     def describe(self) -> str:
-        """Describe engine, list length, cost per step, settings and error bound in one line of text."""
+        """Describe engine, list length, settings and error bound in one line of text."""
         if self.engine == "recursion":
-            return f"recursion, exact, computing time {1e6 * self.seconds:.2g} us per time step"
-        parts = [
-            f"{self.engine}: about {self.strips:.0f} list entries, computing time {1e6 * self.seconds:.2g} us per "
-            "time step"
-        ]
+            return "recursion, exact"
+        parts = [f"{self.engine}: about {self.strips:.0f} list entries"]
         if self.tail > 0:
             parts.append(f"tail {self.tail:.1g}")
         if self.merge > 0:

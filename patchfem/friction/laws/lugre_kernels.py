@@ -27,9 +27,6 @@ from .exponential_kernels import exp_minus
 
 # Units of `numbers`, for batches that scale time and force
 NUMBER_UNITS = "N/m N N m/s N_s/m N_s/m"
-# Ratio of the velocity to v_s from which the limit is the kinetic force; exp(-36) is below
-# round-off
-MAX_STRIBECK_RATIO = 6.0
 # Smallest friction limit relative to the static force; z relaxes over limit/stiffness, which must
 # not be 0
 MIN_LIMIT_RATIO = 1e-9

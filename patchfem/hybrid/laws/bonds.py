@@ -106,10 +106,10 @@ def from_keys(friction, load, speed):
     speed : float
         Expected peak speed [m/s].
     """
-    if friction.reading != "stretch" or friction.order != 1 or friction.breakaway:
+    if friction.reading != "stretch" or friction.order != 1:
         raise PatchfemError(
-            "bonds with reading = 'report', an order other than 1 or a breakaway have no finite set of rates, so "
-            "their motion is not computed from event to event",
+            "bonds with reading = 'report' or an order other than 1 have no finite set of rates, so their motion is not "
+            "computed from event to event",
             "friction.reading",
         )
     length = friction.bond_length

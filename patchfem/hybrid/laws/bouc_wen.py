@@ -28,7 +28,8 @@ def force_and_rates(p, memory, point, s, rates):
     size = (side * s[0]) ** p[2] if side * s[0] > 0 else 0.0
     fraction = size * (p[3] * side * memory[Memory.DIRECTION] + 1 - p[3])
     rates[0] = point.velocity / p[1] * (1 - fraction)
-    force = p[0] * point.load * s[0]
+    # The curve through a long step of a stiff law may exceed the limit, which is 1.
+    force = p[0] * point.load * min(max(s[0], -1.0), 1.0)
     slip_rate = fraction * point.velocity
     return Friction(force, slip_rate, force * slip_rate)
 

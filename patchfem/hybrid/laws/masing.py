@@ -8,7 +8,8 @@ their slip forces.
 Numbers: chi, beta, slip force F_S [N], phi_max [m], number n of pieces of the curve, then n + 1 displacements and
 n + 1 forces. With beta >= 0 the curve is Segalman's (2005) power law below phi_max; otherwise it is linear between
 its n + 1 points. Beyond the last point the force is F_S. One piece is the elastic-plastic law (eq. 3.12).
-`memory[FLAG]` is the number of the piece.
+`memory[FLAG]` is the number of the piece. On the first piece of a linear curve no element slips, so that the motion may
+turn there without an event: the piece is left at its end, or at the reversal from which it started.
 """
 
 from ..records import Friction, LawNumbers, Margin, Memory
@@ -89,15 +90,22 @@ def write_margins(p, memory, point, s, margins):
     """
     direction = memory[Memory.DIRECTION]
     margins[Margin.CONTACT] = memory[Memory.CONTACT] * point.load / point.load_scale
-    margins[Margin.MOTION] = direction * point.velocity / point.speed_scale
     n = int(memory[Memory.COUNT])
     k = int(memory[Memory.FLAG])
-    if k >= int(p[4]):
-        return
     q = point.slide - memory[Memory.ORIGIN]
     half = 0.5 if n > 0 else 1.0
     start = memory[Memory.STACK + 2 * n - 2] if n > 0 else 0.0
-    margins[Margin.LIMIT] = (p[POINTS + k + 1] - half * direction * (q - start)) / p[3]
+    x = half * direction * (q - start)
+    if k == 0 and p[1] < 0:
+        # Without a reversal the elastic range extends to both sides of the origin.
+        before = p[POINTS + 1] if n == 0 else 0.0
+        margins[Margin.LIMIT] = (p[POINTS + 1] - x) / p[3]
+        margins[Margin.BRANCH] = (x + before) / p[3]
+        return
+    margins[Margin.MOTION] = direction * point.velocity / point.speed_scale
+    if k >= int(p[4]):
+        return
+    margins[Margin.LIMIT] = (p[POINTS + k + 1] - x) / p[3]
     if n > 2 or (n == 2 and memory[Memory.VIRGIN] > 0):
         end = memory[Memory.STACK + 2 * n - 4]
         margins[Margin.BRANCH] = direction * (end - q) / p[3]
@@ -130,7 +138,12 @@ def switch(p, memory, point, s, which):
         memory[Memory.FLAG] += 1
         return False
 
-    if which == Margin.BRANCH:
+    if which == Margin.BRANCH and int(memory[Memory.FLAG]) == 0 and p[1] < 0:
+        # No element has slipped since the last reversal, which is forgotten; the branch before it goes on.
+        n = max(n - 1, 0)
+        direction = -direction
+        memory[Memory.DIRECTION] = direction
+    elif which == Margin.BRANCH:
         # The two last reversals are forgotten (Madelung's rule).
         n = max(n - 2, 0)
     else:
@@ -185,7 +198,8 @@ def from_elements(stiffness, yield_displacement):
     for k, x in zip(stiffness, yield_displacement):
         pairs[float(x)] = pairs.get(float(x), 0.0) + float(k)
     points = sorted(pairs)
-    edges, forces = [0.0], [0.0]
+    edges = [0.0]
+    forces = [0.0]
     slope = sum(pairs.values())
     for x in points:
         forces.append(forces[-1] + slope * (x - edges[-1]))
@@ -209,7 +223,8 @@ def from_keys(friction, load, speed):
     """
     limit = friction.static * load
     if friction.law == "iwan":
-        chi, beta = friction.chi, friction.beta
+        chi = friction.chi
+        beta = friction.beta
         length = limit * (1 + beta) / (friction.stiffness * (beta + (chi + 1) / (chi + 2)))
         numbers = (chi, beta, limit, length, 1, 0.0, length, 0.0, limit)
         return LawNumbers("masing", numbers, length=limit / friction.stiffness)

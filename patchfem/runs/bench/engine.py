@@ -1,6 +1,6 @@
-"""Method and cost of a bench run.
+"""Method and sizes of a bench run.
 
-In: a model with [slide]. Out: `BenchEngine`, steps per cycle and `Cost`. A law without memory has a
+In: a model with [slide]. Out: `BenchEngine`, steps per cycle and `RunSizes`. A law without memory has a
 closed form. Recursion, bond lists and parallel elements use the compiled kernels of the rigs. If
 the pressure at a point changes during the motion, a NumPy law is evaluated sample by sample.
 """
@@ -11,14 +11,12 @@ from math import ceil
 
 import numpy as np
 
-from ... import cost_model
 from ...core import Missing
 from ...dynamics.march import capacity
 from ...effects import law_has_trait, needs_bond_list
 from ...friction.bonds import engines as bond_engines
 from ...friction.bonds import parameters
-from ...slip import shear_modes
-from ..cost import MARCH_CODE, NO_CODE, SHORT_CODE, Cost, MemoryPart
+from ..sizes import COMPILED_CODE, MemoryPart, RunSizes
 
 MAX_GROOVE_STEPS = 200_000  # Largest number of steps per cycle over grooves.
 N_SAMPLES_PER_RADIAN = 20  # Number of samples per radian of the groove phase.
@@ -48,15 +46,13 @@ LIST_METHODS = (Method.LIST, Method.LISTS)
 
 @dataclass(frozen=True, slots=True)
 class BenchEngine:
-    """Engine of a bench run: its computation method, settings and predicted cost.
+    """Engine of a bench run: its computation method and settings.
 
     - method: Method.
-    - seconds: predicted CPU time per sample [s].
     - choice: engine of bond summation with its settings; None for other methods.
     """
 
     method: Method
-    seconds: float
     choice: "bond_engines.EngineChoice | None" = None
 
     @property
@@ -65,15 +61,6 @@ class BenchEngine:
         if self.method in LIST_METHODS:
             return f"bench, {self.choice.engine} {self.method.value}"
         return f"bench, {self.method.value}"
-
-    @property
-    def compiled_code(self):
-        """Compiled code that the method uses."""
-        if self.method in (Method.ELEMENTS, Method.RECURSION):
-            return SHORT_CODE
-        if self.method in (Method.POINTS, *LIST_METHODS):
-            return MARCH_CODE
-        return NO_CODE
 
 
 def choose_bench_engine(
@@ -98,25 +85,20 @@ def choose_bench_engine(
     """
     f = model.friction
     if model.partial_slip and (law_has_trait(f.law, "bonds") or model.grooves is not None):
-        modes = model.accuracy.shear_modes or shear_modes.N_SHEAR_MODES
-        varies = model.grooves is not None or has_changing_pressure(model)
         if model.grooves is None and (
             needs_bond_list(f) or find_requested_engine(model) not in ("auto", "recursion")
         ):
             choice = choice or choose_bond_summation(model, slide)
             return _make_bond_sum_engine(model, slide, n_points, choice, n_points)
-        seconds = cost_model.predict_shear_mode_step(n_points, modes, load_varies=varies)
-        return BenchEngine(Method.POINTS, seconds)
+        return BenchEngine(Method.POINTS)
     if model.partial_slip:
-        return BenchEngine(
-            Method.ELEMENTS, cost_model.SLIP_NODE_SECONDS * n_points + cost_model.SAMPLE_SECONDS
-        )
+        return BenchEngine(Method.ELEMENTS)
     if has_changing_pressure(model) and model.grooves is None:
-        return _make_stepped_engine(model, slide, n_points)
+        return BenchEngine(Method.STEPPED)
     if law_has_trait(f.law, "memoryless"):
-        return BenchEngine(Method.CLOSED, cost_model.SAMPLE_SECONDS)
+        return BenchEngine(Method.CLOSED)
     if not law_has_trait(f.law, "bonds"):
-        return BenchEngine(Method.ELEMENTS, cost_model.SAMPLE_SECONDS)
+        return BenchEngine(Method.ELEMENTS)
     return _make_bond_sum_engine(
         model, slide, n_points, choice or choose_bond_summation(model, slide)
     )
@@ -208,15 +190,15 @@ def mean_stroke(slide) -> tuple:
 def _make_bond_sum_engine(
     model, slide, n_points: int, choice: "bond_engines.EngineChoice", n_lists: int = 1
 ) -> BenchEngine:
-    """Return the bench engine of a nonlocal law with its predicted CPU time.
+    """Return the bench engine of a nonlocal law.
 
-    `n_lists` is the number of bond n_lists: one per point with shear modes, otherwise 1.
+    `n_lists` is the number of bond lists: one per point with shear modes, otherwise 1.
     """
     law = model.bonds
     if choice.engine == "recursion":
-        return BenchEngine(Method.RECURSION, cost_model.RECURSION_STEP_SECONDS, choice)
+        return BenchEngine(Method.RECURSION, choice)
     if law.breakaway and n_lists == 1:  # A bond list cannot represent an elastic range.
-        return _make_stepped_engine(model, slide, n_points)
+        return BenchEngine(Method.STEPPED)
     size = slide.size
     max_move = float(np.abs(np.diff(slide)).max())
     strips = min(choice.strips, size * max(1.0, 4 * max_move / law.length))
@@ -230,30 +212,7 @@ def _make_bond_sum_engine(
             "accuracy.steps_per_cycle or slide.cycles, or raise accuracy.tail or accuracy.merge",
             "",
         )
-    return BenchEngine(Method.LIST if n_lists == 1 else Method.LISTS, seconds, choice)
-
-
-def _make_stepped_engine(model, slide, n_points: int) -> BenchEngine:
-    """Return the bench engine that evaluates a NumPy law sample by sample."""
-    return BenchEngine(Method.STEPPED, _predict_step_seconds(model, slide, n_points))
-
-
-def _predict_step_seconds(model, slide, n_points: int) -> float:
-    """Predict the CPU time [s] of one step of a NumPy law.
-
-    A law without bond list takes a constant time. The sum over bonds takes a time proportional to
-    the number of strips.
-    """
-    f = model.friction
-    if not needs_bond_list(f):
-        return cost_model.LAW_STEP_SECONDS
-    mean_step = max(float(np.abs(np.diff(slide)).mean()), 1e-300)
-    strips = min(slide.size / 2, 40 * f.bond_length / mean_step + 64)
-    return (3 if model.load_varies else 1) * (
-        cost_model.PATH_STEP_SECONDS
-        + cost_model.PATH_STRIP_SECONDS * strips
-        + cost_model.PATH_POINT_SECONDS * strips * n_points
-    )
+    return BenchEngine(Method.LIST if n_lists == 1 else Method.LISTS, choice)
 
 
 def uses_parallel_elements(model) -> bool:
@@ -265,8 +224,8 @@ def uses_parallel_elements(model) -> bool:
     )
 
 
-def predict_cost(model, n_points: int) -> Cost:
-    """Predict the CPU time and the memory of a bench run.
+def count_bench_sizes(model, n_points: int) -> RunSizes:
+    """Count the unknowns and the memory of a bench run.
 
     Parameters
     ----------
@@ -279,26 +238,22 @@ def predict_cost(model, n_points: int) -> Cost:
     if model.load_varies:
         time, slide = model.point.refine_samples(model.slide, time, slide, per_cycle)
     engine = choose_bench_engine(model, slide, n_points)
-    # The runs with half and with a quarter of the steps take about as long as the run itself. A
-    # nonlocal law or a cell density needs another run.
+    # The comparison runs keep their samples; a cell density needs one run more.
     has_cells = law_has_trait(model.friction.law, "cells") and engine.method is Method.ELEMENTS
-    passes = 3 if has_cells else 2
-    steps = passes * time.size
-    samples = MemoryPart(
-        BYTES_PER_SAMPLE * steps / 2,
-        f"{steps // 2} samples of the slide",
-        _find_sample_count_key(model),
-    )
-    sizes = {}
-    lists = ()
+    n_samples = (3 if has_cells else 2) * time.size // 2
+    parts = [
+        COMPILED_CODE,
+        MemoryPart(
+            BYTES_PER_SAMPLE * n_samples,
+            f"{n_samples} samples of the slide",
+            _find_sample_count_key(model),
+        ),
+    ]
+    unknowns = {}
     if engine.choice is not None and engine.choice.strips:
-        strips = int(engine.choice.strips)
-        sizes = {"bond_list_about": strips}
-        lists = (MemoryPart(capacity.list_bytes(strips), "the list of bonds", "accuracy.tail"),)
-    motion = Cost(
-        {"motion": steps * engine.seconds}, (samples, *lists), (), steps, sizes, engine.name
-    )
-    return motion + engine.compiled_code.cost()
+        unknowns["bond_list_about"] = strips = int(engine.choice.strips)
+        parts.append(MemoryPart(capacity.list_bytes(strips), "the list of bonds", "accuracy.tail"))
+    return RunSizes(unknowns, tuple(parts), engine=engine.name)
 
 
 def _find_sample_count_key(model) -> str:

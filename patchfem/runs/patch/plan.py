@@ -1,19 +1,17 @@
-"""Predicted mesh size, cost, stiffness and dimensionless groups of a patch.
+"""Mesh size, stiffness and dimensionless groups of a patch before it is solved.
 
-In: a `PatchModel` or a Model. Out: `GridSizes`, `Cost`, stiffnesses in series, and sentences for
+In: a `PatchModel` or a Model. Out: `GridSizes`, `RunSizes`, stiffnesses in series, and sentences for
 the plan.
 """
 
-from dataclasses import replace
 from math import sqrt
 from typing import NamedTuple
 
-from ... import cost_model
 from ...formatting import format_length
 from ...model.model import Model
 from ...model.pieces import make_piece_meshes
-from ..cost import Cost, MemoryPart
-from . import profile_points, skin, store
+from ..sizes import MemoryPart, RunSizes
+from . import skin, store
 from .grids import (
     MAX_CONDENSING_SECONDS,
     MIN_LEVELS,
@@ -35,18 +33,16 @@ MAX_FULL_CONTACT_TILT = 0.7
 
 
 class GridSizes(NamedTuple):
-    """Predicted number of nodes and CPU time of the nested grids of a patch.
+    """Expected number of nodes of the nested grids of a patch.
 
     - points: nodes of the interface.
     - nodes: nodes of the finest grids of both pieces; alike pieces share one grid.
     - levels: number of nested grids.
-    - seconds: predicted CPU time [s] of condensing all grids.
     """
 
     points: int
     nodes: int
     levels: int
-    seconds: float
 
 
 def predict_grid_sizes(patch_model, tolerance: float) -> GridSizes:
@@ -57,12 +53,7 @@ def predict_grid_sizes(patch_model, tolerance: float) -> GridSizes:
     """
     levels = _predict_mesh_levels(patch_model, tolerance)
     bodies = [body for body in levels[0] if body is not None]
-    return GridSizes(
-        bodies[0].x.size,
-        sum(body.n_nodes for body in bodies),
-        len(levels),
-        sum(map(predict_condensing_seconds, levels)),
-    )
+    return GridSizes(bodies[0].x.size, sum(body.n_nodes for body in bodies), len(levels))
 
 
 def _predict_mesh_levels(patch_model, tolerance: float) -> list:
@@ -87,71 +78,41 @@ def _predict_mesh_levels(patch_model, tolerance: float) -> list:
     return levels
 
 
-def predict_cost(model: Model) -> Cost:
-    """Predict the cost of solving the contact of all patches of a model.
+def count_patch_sizes(model: Model) -> RunSizes:
+    """Count the unknowns and the memory of all patches of a model.
 
     Equal patches of several interfaces are solved once.
     """
-    tolerance = model.accuracy.tolerance
-    total_cost = Cost()
-    if model.patch is not None:
-        total_cost = predict_contact_cost(model.patch, model.patch.mesh.tolerance or tolerance)
     interface_patches = {}
     if model.rig is not None:
         for interface in model.rig.friction.interfaces:
             if interface.patch is not None:
                 interface_patches[store.content_key(interface.patch)] = interface.patch
-    for patch in interface_patches.values():
-        total_cost += predict_contact_cost(patch, tolerance)
-    patches = [*interface_patches.values()] if model.patch is None else [model.patch]
+    patches = [*([] if model.patch is None else [model.patch]), *interface_patches.values()]
     if not patches:
-        return total_cost
-    seconds = sum(_predict_point_seconds(patch, model.kind) for patch in patches)
-    total_cost = replace(total_cost, times=total_cost.times | {"points": seconds})
-    points = total_cost.sizes["interface_points"]
+        return RunSizes()
+
+    points = 0
+    nodes = 0
+    n_bytes = 0.0
+    for patch in patches:
+        grids = predict_grid_sizes(patch, patch.mesh.tolerance or model.accuracy.tolerance)
+        points += grids.points
+        nodes += grids.nodes
+        n_bytes += PACKAGE_BYTES + BYTES_PER_NODE * grids.nodes
+        n_bytes += 0.0 if patch.mesh.is_static else FRAME_BYTES_PER_NODE * grids.nodes
     layers = [patch.interface.strips for patch in patches]
     strips = max(1 if layer is None else layer.count for layer in layers)
     key = "contact.mesh" if any(patch.mesh.file for patch in patches) else "contact.element_size"
     parts = (
-        MemoryPart(total_cost.bytes, f"{points} nodes of the interface", key),
+        MemoryPart(n_bytes, f"{points} nodes of the interface", key),
         MemoryPart(
             BYTES_PER_STRIP_NODE * strips * points,
             f"{strips} strips of them",
             "contact.strips.count",
         ),
     )
-    return replace(total_cost, parts=parts)
-
-
-def _predict_point_seconds(patch_model, kind: str) -> float:
-    """Predict the CPU time [s] of solving the contact of a patch on points of its profile.
-
-    A bench with partial slip does so twice: for the mesh of its motion and for that of its static measures.
-    """
-    if patch_model.gap.profile is None or not profile_points.can_use_points(patch_model):
-        return 0.0
-    n_solutions = 2 if kind == "bench" and patch_model.interface.partial_slip else 1
-    return n_solutions * profile_points.predict_seconds(patch_model)
-
-
-def predict_contact_cost(patch_model, tolerance: float) -> Cost:
-    """Predict the cost of solving a patch and computing its fields.
-
-    The work of condensing follows from the sizes of the grids. The CPU time per unit of work, and
-    that of the fields and files of the finest grid, were measured for random patches.
-    """
-    grids = predict_grid_sizes(patch_model, tolerance)
-    times = {
-        "pressing": cost_model.PATCH_SECONDS - cost_model.FIELDS_SECONDS,
-        "condensing": cost_model.CONDENSING_FACTOR * grids.seconds,
-        "fields": cost_model.FIELDS_SECONDS,
-    }
-    n_bytes = PACKAGE_BYTES + BYTES_PER_NODE * grids.nodes
-    if not patch_model.mesh.is_static:
-        times["fields"] += cost_model.FRAMES_SECONDS + cost_model.FRAME_NODE_SECONDS * grids.nodes
-        n_bytes += FRAME_BYTES_PER_NODE * grids.nodes
-    sizes = {"interface_points": grids.points, "elastic_unknowns_about": int(2 * grids.nodes)}
-    return Cost(times, (MemoryPart(n_bytes, "pieces"),), sizes=sizes)
+    return RunSizes({"interface_points": points, "elastic_unknowns_about": int(2 * nodes)}, parts)
 
 
 def stiffness_chain(patch_model) -> dict:

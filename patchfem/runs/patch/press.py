@@ -390,12 +390,6 @@ def solve_contact(
     """
     loading = patch_model.loading
     skin = patch_model.interface.skin
-    if loading.approach is not None and (loading.can_rotate or loading.rotational_stiffness > 0):
-        raise PatchfemError(
-            "an approach of a piece that can rotate was removed in patchfem 2.0: give contact.load, or leave out "
-            "[contact.load_line] and [contact.holder]",
-            "contact.approach.distance",
-        )
     if patch_model.interface.strips is not None:
         return SolvedContact(
             pieces, *strip_press.solve_strip_contact(patch_model, pieces, gap, added, warm_start)

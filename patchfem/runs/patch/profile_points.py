@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ... import cost_model
 from ...contact.active_set import patch_problem
 from ...contact.conjugate_gradients import solve_by_gradients
 from ...contact.half_space.layer import end_compliance, layer_compliance
@@ -172,16 +171,6 @@ def solve_on_points(patch_model, meets_tolerance) -> PointSolution | None:
         except (NotConverged, np.linalg.LinAlgError):
             pass
     return solution
-
-
-def predict_seconds(patch_model) -> float:
-    """Predict the CPU time [s] of `solve_on_points` if it refines up to MAX_POINTS."""
-    count = _count_first_level_points(patch_model)
-    points = [count] * MIN_LEVELS
-    while 2 * points[-1] <= MAX_POINTS:
-        points.append(2 * points[-1])
-    work = sum(number**1.5 for number in points)
-    return cost_model.POINT_ENDS_SECONDS + cost_model.POINT_LEVEL_SECONDS * work
 
 
 def _count_first_level_points(patch_model) -> int:

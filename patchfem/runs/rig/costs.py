@@ -1,6 +1,6 @@
-"""Predicted cost of the engines of a rig, for the choice of an engine, for plans and for refusals.
+"""Steps and CPU times of the engines of a rig, for the choice of an engine and for refusals, and memory of histories.
 
-In: a Model. Out: CPU times, numbers of steps, memory (`Cost`), and reasons for a time integration with constant steps
+In: a Model. Out: numbers of steps, CPU times, `MemoryPart`s, and reasons for a time integration with constant steps
 instead of steps from event to event.
 
 The steps of the engine `hybrid` follow from the fastest vibration of the modes, also with stuck interfaces, from the lengths
@@ -23,7 +23,7 @@ from ...structure.drive_sizes import (
     find_max_acceleration,
     find_max_frequency_ratio,
 )
-from ..cost import HYBRID_CODE, Cost, MemoryPart
+from ..sizes import MemoryPart
 
 # Largest CPU time [s] of a motion from event to event if a time integration, which has larger errors, takes less.
 MAX_HYBRID_SECONDS = 5.0
@@ -309,33 +309,14 @@ def refuse_long_hybrid_run(model: Model) -> None:
         )
 
 
-def predict_hybrid_cost(model: Model, numerics, n_points: int) -> Cost:
-    """Predict the cost of a run of the engine `hybrid` and its comparison run.
-
-    Parameters
-    ----------
-    model : Model
-    numerics : Numerics
-    n_points : int
-        Number of interface nodes; not used.
-    """
-    steps = HYBRID_RUNS * estimate_hybrid_steps(model) * model.rig.drive.cycles
-    times = {
-        "motion": estimate_hybrid_seconds(model),
-        "histories": cost_model.KEPT_SAMPLE_SECONDS * count_stored_samples(numerics),
-    }
-    memory = predict_history_memory(model, numerics, HYBRID_HISTORY)
-    return Cost(times, memory, (), int(steps)) + HYBRID_CODE.cost()
-
-
 def count_stored_samples(numerics) -> float:
     """Return the number of samples of the last cycles that a run stores."""
     each = SAMPLES_PER_CYCLE if numerics.engine in RESAMPLING_ENGINES else numerics.steps
     return float(max(2, numerics.window) * each)
 
 
-def predict_history_memory(model: Model, numerics, history: HistoryBytes) -> tuple[MemoryPart, ...]:
-    """Predict the contributions to the memory of the histories that a run stores.
+def count_history_memory(model: Model, numerics, history: HistoryBytes) -> tuple[MemoryPart, ...]:
+    """Return the contributions of the histories that a run stores to its memory.
 
     Parameters
     ----------
@@ -356,13 +337,3 @@ def predict_history_memory(model: Model, numerics, history: HistoryBytes) -> tup
         ),
         MemoryPart(early, f"the histories of {rig.drive.cycles:.3g} cycles", length_key),
     )
-
-
-def describe_element_engine(model: Model, engine: str) -> list:
-    """Describe the engine of friction elements and its CPU time in a sentence for a plan."""
-    count = estimate_element_count_and_stiffness(model)[0]
-    return [
-        f"{count} element{'s' * (count > 1)} by engine {engine}; computing time: about "
-        f"{estimate_hybrid_seconds(model):.2g} s from event to event, about {estimate_march_seconds(model):.2g} s with "
-        "time steps at this tolerance"
-    ]

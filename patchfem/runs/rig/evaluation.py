@@ -186,6 +186,16 @@ class RunEvaluator:
         """
         if not self.find_friction_loops(run, drive) and not hasattr(drive, "band"):
             return {}
+        return self.compare_with_half_the_samples(run, drive, values)
+
+    def compare_with_half_the_samples(self, run, drive, values: dict) -> dict:
+        """Estimate the errors of measures due to sampling by their changes without every second sample.
+
+        Parameters
+        ----------
+        run, drive, values
+            See `estimate_sampling_errors`.
+        """
         ledger = run.response.extra.get("ledger")
         coarse_values = self.evaluate_measures(self.thin_run(run), drive, ledger)
         errors = {}

@@ -32,7 +32,7 @@ NO_SMALLER_CYCLE_NOTE = (
 )
 UNSUPPORTED_LAW_REASON = (
     'with bonds limit cycles can be computed only for friction.reading = "stretch", order = 1, a constant '
-    "bond length, breakaway = 0 and pieces that are rigid in shear"
+    "bond length and pieces that are rigid in shear"
 )
 NO_SLIDING_NOTE = (
     "no motion was found in which the interface always slides and friction dissipates the energy that the mode "

@@ -1,41 +1,28 @@
-"""Predicted cost, stiffnesses, frequencies and dimensionless groups of a rig for a plan.
+"""Sizes, stiffnesses, frequencies and dimensionless groups of a rig for a plan.
 
-In: a Model. Out: `Cost` of its engine, the stiffness chain, natural frequencies with free and stuck
+In: a Model. Out: `RunSizes`, the stiffness chain, natural frequencies with free and stuck
 interfaces, dimensionless groups, and sentences for the plan.
 """
 
-from dataclasses import replace
 from math import inf, pi
 
 import numpy as np
 
-from ... import cost_model
 from ...dynamics.march import capacity
-from ...effects import LAWS, law_has_trait
+from ...effects import law_has_trait
 from ...friction.bonds import parameters
 from ...model.model import Model
 from ...response.rows import add_interface_number, remove_interface_number
 from ...slip import shear_modes
 from ...structure.drive_sizes import find_drive_omega, find_max_acceleration
-from ..cost import (
-    BALANCE_CODE,
-    HYBRID_CODE,
-    MARCH_CODE,
-    SHEAR_MARCH_CODE,
-    Cost,
-    EngineCode,
-    MemoryPart,
-)
+from ..sizes import COMPILED_CODE, MemoryPart, RunSizes
 from . import bond_lists
 from .costs import (
+    HYBRID_HISTORY,
     MARCH_HISTORY,
-    count_intervals_by_cause,
-    count_stored_samples,
-    describe_element_engine,
+    count_history_memory,
+    estimate_element_count_and_stiffness,
     find_interface_load,
-    predict_history_memory,
-    predict_hybrid_cost,
-    steps_per_cycle,
 )
 from .engines import ENGINES, choose_steady_method, find_obstacle_of_map
 from .numerics import choose_numerics
@@ -47,18 +34,6 @@ MODE_PAIR_BYTES = 125.0
 HARMONIC_PAIR_BYTES = 94.0
 MODE_NODE_BYTES = 24.0  # Memory per shear mode and interface node [bytes].
 DRIVE_ROW_BYTES = 400.0  # Memory per row of a recorded drive [bytes].
-STEADY_CODES = {
-    "exact": HYBRID_CODE,
-    "piecewise": HYBRID_CODE,
-    "hybrid": HYBRID_CODE,
-    "harmonic": BALANCE_CODE,
-    "march": None,
-}
-# Expected number of points of a response curve, including those near its peak and bends.
-N_MAPPED_POINTS = 160  # Number of points of a curve by event maps or time steps.
-# Number of points of a curve by harmonic balance, which follows its folds.
-N_BALANCE_POINTS = 250
-N_MARCHED_CYCLES = 400.0  # Expected number of integrated cycles until a motion is periodic.
 # Largest relative difference between the frequencies of drive and mode at which the mode counts as
 # resonant.
 RESONANCE_TOL = 0.02
@@ -138,8 +113,8 @@ def mode_frequencies(rig, chain: dict) -> list:
     return frequencies
 
 
-def predict_cost(model: Model, n_points: int) -> Cost:
-    """Predict the cost of a run of a rig.
+def count_rig_sizes(model: Model, n_points: int) -> RunSizes:
+    """Count the unknowns and the memory of a run of a rig, and describe its method.
 
     Parameters
     ----------
@@ -152,118 +127,54 @@ def predict_cost(model: Model, n_points: int) -> Cost:
     n_modes = len(rig.structure.frequencies)
     rows = len(getattr(rig.drive.signal, "breaks", ())) if not rig.drive.signal.segments else 0
     rows_key = "drive.file" if "file" in rig.drive.waveform.required_keys else "drive.duration"
-    structure = MemoryPart(MODE_PAIR_BYTES * n_modes**2, f"{n_modes} modes", "structure")
-    drive = MemoryPart(DRIVE_ROW_BYTES * rows, f"{rows} rows of the drive", rows_key)
-    sentences = ()
-    if model.friction is not None:
-        sentences = tuple(_describe_method(model, numerics))
-    rig_cost = Cost(
-        parts=(structure, drive), words=sentences, sizes={"modes": n_modes}, engine=numerics.engine
-    )
-    return rig_cost + COSTS[numerics.engine](model, numerics, n_points)
-
-
-def _describe_method(model: Model, numerics) -> list:
-    """Describe the method that computes the motion in sentences for a plan."""
-    if ENGINES[numerics.engine].finds_periodic_motion:
-        return [f"the steady motion is found by {choose_steady_method(model).words}"]
-    return describe_bond_summation(model, numerics)
-
-
-def predict_march_cost(model: Model, numerics, n_points: int) -> Cost:
-    """Predict the cost of a time integration and its coarse runs.
-
-    Parameters
-    ----------
-    model : Model
-    numerics : Numerics
-    n_points : int
-        Number of interface nodes.
-    """
-    rig = model.rig
-    f = model.friction
-    has_shear = bool(model.partial_slip)
-    steps = int(numerics.cycles * numerics.steps)
-    has_bonds = model.grooves is None and f is not None and law_has_trait(f.law, "bonds")
-    sizes = {}
-    parts = []
-    n_modes = 0
-    if has_bonds and bond_lists.has_bond_list(model, numerics):
-        entries, seconds = bond_lists.estimate_bond_list_cost(model, numerics)
-        step_seconds = seconds / steps
-        sizes["bond_list_about"] = int(entries)
-        parts.append(
-            MemoryPart(capacity.list_bytes(int(entries)), "the list of bonds", "accuracy.tail")
-        )
-    elif has_shear and (has_bonds or model.grooves is not None or rig.friction.load_varies):
-        sizes["shear_modes"] = n_modes = numerics.shear_modes or shear_modes.N_SHEAR_MODES
-        step_seconds = cost_model.predict_shear_mode_step(
-            n_points, n_modes, load_varies=rig.friction.load_varies or model.grooves is not None
-        )
-        step_seconds += _predict_point_step_seconds(rig, f) if has_bonds else 0.0
-        parts.append(
-            MemoryPart(
-                MODE_NODE_BYTES * n_modes * n_points,
-                f"{n_modes} shear modes",
-                "accuracy.shear_modes",
-            )
-        )
+    parts = [
+        COMPILED_CODE,
+        MemoryPart(MODE_PAIR_BYTES * n_modes**2, f"{n_modes} modes", "structure"),
+        MemoryPart(DRIVE_ROW_BYTES * rows, f"{rows} rows of the drive", rows_key),
+    ]
+    finds_periodic_motion = ENGINES[numerics.engine].finds_periodic_motion
+    if finds_periodic_motion:
+        parts.append(_count_balance_memory(model))
     else:
-        step_seconds = _predict_plain_step_seconds(model, numerics, n_points, has_bonds=has_bonds)
-    # The cost includes runs with half and a quarter of the steps, and one more run for each halving
-    # of the step.
-    passes = 0.75 + 2 ** (bond_lists.count_step_halvings(model) + 1) - 1
-    times = {
-        "motion": steps * passes * step_seconds,
-        "histories": cost_model.KEPT_SAMPLE_SECONDS * count_stored_samples(numerics),
-    }
-    parts += predict_history_memory(model, numerics, MARCH_HISTORY)
-    return (
-        Cost(times, tuple(parts), (), int(steps * passes), sizes) + choose_march_code(model).cost()
+        history = MARCH_HISTORY if numerics.engine == "march" else HYBRID_HISTORY
+        parts += count_history_memory(model, numerics, history)
+
+    sizes = RunSizes({"modes": n_modes}, tuple(parts), engine=numerics.engine)
+    if model.friction is not None:
+        sentences = describe_bond_summation(model, numerics)
+        if finds_periodic_motion:
+            sentences = [f"the steady motion is found by {choose_steady_method(model).words}"]
+        sizes += RunSizes(sentences=tuple(sentences))
+    return sizes + _count_march_sizes(model, numerics, n_points)
+
+
+def _count_balance_memory(model: Model) -> MemoryPart:
+    """Return the memory of the Jacobian of harmonic balance."""
+    harmonics = model.accuracy.harmonics or 0
+    n_unknowns = 2.0 * harmonics * max(1, len(model.rig.friction.interfaces))
+    return MemoryPart(
+        HARMONIC_PAIR_BYTES * n_unknowns**2, f"{harmonics} harmonics", "accuracy.harmonics"
     )
 
 
-def choose_march_code(model: Model) -> EngineCode:
-    """Return the compiled code of a time integration, with its memory and compile time."""
-    return SHEAR_MARCH_CODE if model.partial_slip else MARCH_CODE
-
-
-def _predict_plain_step_seconds(model: Model, numerics, n_points: int, *, has_bonds: bool) -> float:
-    """Predict the CPU time [s] of a time step without shear modes or bond list."""
-    rig = model.rig
-    step = _predict_point_step_seconds(model.rig, model.friction)
-    if model.grooves is not None:
-        return cost_model.GROOVE_STEP_SECONDS
-    if has_bonds:
-        return cost_model.BOND_NODE_SECONDS * n_points if numerics.per_point else step
-    if model.partial_slip:
-        return cost_model.SLIP_NODE_SECONDS * n_points + cost_model.LIST_STEP_SECONDS
-    if rig.friction.has_partial_slip:
-        return step + cost_model.SLIP_NODE_SECONDS * n_points
-    if rig.friction.load_varies and model.patch is not None:
-        return cost_model.PRESSING_STEP_SECONDS + cost_model.PRESSING_NODE_SECONDS * n_points
-    return step
-
-
-def _predict_point_step_seconds(rig, friction) -> float:
-    """Predict the CPU time [s] of a time step of interfaces without mesh.
-
-    It is larger for growing bonds, further modes and further interfaces.
-    """
-    n_interfaces = len(rig.friction.interfaces)
-    has_growing_bonds = (
-        friction is not None
-        and friction.slip_growth is not None
-        and law_has_trait(friction.law, "bonds")
-    )
-    return (
-        (
-            cost_model.BOND_STEP_SECONDS
-            + cost_model.STEP_MODE_SECONDS * (len(rig.structure.frequencies) - 1)
+def _count_march_sizes(model: Model, numerics, n_points: int) -> RunSizes:
+    """Return the length of the bond list or the number of shear modes of a time integration."""
+    f = model.friction
+    if numerics.engine != "march" or f is None:
+        return RunSizes()
+    has_bonds = model.grooves is None and law_has_trait(f.law, "bonds")
+    if has_bonds and bond_lists.has_bond_list(model, numerics):
+        entries = int(bond_lists.estimate_bond_list_cost(model, numerics).strips)
+        part = MemoryPart(capacity.list_bytes(entries), "the list of bonds", "accuracy.tail")
+        return RunSizes({"bond_list_about": entries}, (part,))
+    load_varies = model.rig.friction.load_varies
+    if model.partial_slip and (has_bonds or model.grooves is not None or load_varies):
+        n_modes = numerics.shear_modes or shear_modes.N_SHEAR_MODES
+        part = MemoryPart(
+            MODE_NODE_BYTES * n_modes * n_points, f"{n_modes} shear modes", "accuracy.shear_modes"
         )
-        * (cost_model.GROWING_BOND_STEP_FACTOR if has_growing_bonds else 1.0)
-        * (cost_model.INTERFACE_STEP_FACTOR * n_interfaces if n_interfaces > 1 else 1.0)
-    )
+        return RunSizes({"shear_modes": n_modes}, (part,))
+    return RunSizes()
 
 
 def compute_dimensionless_groups(model: Model) -> dict:
@@ -390,12 +301,13 @@ def _describe_sliding(friction_ratio: float) -> str:
     return f"D = {friction_ratio:.3g} is below pi/4: at resonance friction alone does not limit the amplitude"
 
 
-def describe_bond_summation(model: Model, numerics) -> list:
-    """Describe the bond summation or the engine of friction elements in sentences for a plan."""
+def describe_bond_summation(model: Model, numerics) -> list[str]:
+    """Describe the bond summation or the number of friction elements in sentences for a plan."""
     if not law_has_trait(model.friction.law, "bonds"):
         if find_obstacle_of_map("piecewise", model):
             return []
-        return describe_element_engine(model, numerics.engine)
+        count = estimate_element_count_and_stiffness(model)[0]
+        return [f"{count} friction element{'s' * (count > 1)} by engine {numerics.engine}"]
     choice = bond_lists.choose_bond_summation(model, numerics)
     sentences = ["method of the sum over bonds: " + choice.describe()]
     if choice.engine == "recursion":
@@ -404,13 +316,9 @@ def describe_bond_summation(model: Model, numerics) -> list:
         remedy = 'set friction.reading = "stretch" to give the block a finite stiffness'
         if bond_lists.is_stuck_without_stiffness(model):
             remedy = "set friction.order above 0 to give the block a stiffness"
-        sentences.append(
-            f"{_describe_stuck_block(model)}, so that the computing time is known within a factor of about 12 only; "
-            f"{remedy}"
-        )
-    elif (
-        seconds := bond_lists.estimate_bond_list_cost(model, numerics)[1]
-    ) > parameters.MAX_LIST_SECONDS:
+        return [*sentences, f"{_describe_stuck_block(model)}; {remedy}"]
+    seconds = bond_lists.estimate_bond_list_cost(model, numerics).seconds
+    if seconds > parameters.MAX_LIST_SECONDS:
         sentences.append(
             "`run` will refuse this scene: the sum over the list of bonds would need a computing time of about "
             f"{seconds:.0f} s, more than the limit of {parameters.MAX_LIST_SECONDS:.0f} s"
@@ -432,93 +340,3 @@ def _describe_stuck_block(model: Model) -> str:
         f"{motion}: it reverses its motion in almost every time step, and each reversal makes the list of bonds "
         "longer"
     )
-
-
-def predict_steady_cost(model: Model, numerics, n_nodes: int) -> Cost:
-    """Predict the cost of a response curve and its coarse runs.
-
-    Parameters
-    ----------
-    model : Model
-    numerics : Numerics
-    n_nodes : int
-        Number of interface nodes; not used.
-    """
-    rig = model.rig
-    method = choose_steady_method(model)
-    n_points = max(1, len(rig.drive.levels.amplitudes))
-    if rig.drive.waveform.is_swept:
-        n_points = N_BALANCE_POINTS if method.name == "balance" else N_MAPPED_POINTS
-    n_soft = 0
-    if method.name == "yields":
-        laws = rig.friction.interfaces
-        n_soft = sum(bool(law.partial_slip or model.partial_slip) for law in laws)
-    passes = (
-        1.0 + 0.5 * n_soft
-    )  # Each interface adds a run on a coarser mesh with half the elements.
-    seconds = n_points * passes * _estimate_point_seconds(model, method.name)
-    if rig.structure.richer_rig is not None:
-        seconds += n_points * _estimate_point_seconds(
-            replace(model, rig=rig.structure.richer_rig), method.name
-        )
-    harmonics = model.accuracy.harmonics or 0
-    balance = HARMONIC_PAIR_BYTES * (2.0 * harmonics * max(1, len(rig.friction.interfaces))) ** 2
-    parts = (MemoryPart(balance, f"{harmonics} harmonics", "accuracy.harmonics"),)
-    code = STEADY_CODES[method.engine] or choose_march_code(model)
-    return Cost({"motion": seconds}, parts, (), n_points) + code.cost()
-
-
-def _estimate_point_seconds(model: Model, method_name: str) -> float:
-    """Estimate the CPU time [s] per point of a response curve.
-
-    `method_name` is the name of the method that computes the steady motion.
-    """
-    rig = model.rig
-    if method_name == "balance":
-        size = 2.0 * (model.accuracy.harmonics or 0) * max(1, len(rig.friction.interfaces))
-        return (
-            cost_model.BALANCE_POINT_SECONDS
-            + cost_model.BALANCE_UNKNOWN_SECONDS * size**3
-            + _estimate_smooth_law_seconds(rig)
-        )
-    if method_name in ("march", "shooting"):
-        return N_MARCHED_CYCLES * steps_per_cycle(model) * cost_model.GROOVE_STEP_SECONDS
-    if not rig.friction.interfaces:
-        return cost_model.CLOSED_POINT_SECONDS
-    ringing, events = count_intervals_by_cause(model)
-    return (
-        cost_model.MAPPED_POINT_SECONDS
-        + cost_model.EVENT_SECONDS * len(rig.structure.frequencies) * events
-        + ringing
-        * (
-            cost_model.STICKING_PIECE_SECONDS
-            + cost_model.STICKING_MODES_SECONDS * len(rig.structure.frequencies) ** 2
-        )
-    )
-
-
-def _estimate_smooth_law_seconds(rig) -> float:
-    """Estimate the additional CPU time [s] per point of a response curve for a smooth law.
-
-    The slope of such a law changes during the whole cycle, whereas elements that stick and slip
-    have a constant slope for most of it.
-    """
-    laws = {interface.numbers.law for interface in rig.friction.interfaces}
-    with_memory = [law for law in laws if not law_has_trait(law, "memoryless")]
-    is_flowing = any("pieces" not in LAWS[law].supports.split() for law in with_memory)
-    is_smooth = (
-        is_flowing or rig.springs.is_nonlinear or any(law_has_trait(law, "creeps") for law in laws)
-    )
-    size = 2 * len(rig.structure.frequencies) + len(rig.friction.interfaces)
-    return (
-        is_flowing * cost_model.FLOWING_LAW_POINT_SECONDS
-        + is_smooth * cost_model.MULTIPLIER_SECONDS[is_flowing] * size**3
-    )
-
-
-# Function (model, numerics, points) -> Cost of each engine.
-COSTS = {
-    "hybrid": predict_hybrid_cost,
-    "march": predict_march_cost,
-    "harmonic": predict_steady_cost,
-}

@@ -25,7 +25,6 @@ from .engines import ENGINES
 from .fields import collect_interface_fields
 from .motion_warnings import collect_notes
 from .numerics import Numerics, choose_numerics
-from .plan import predict_march_cost
 from .postprocessing import CoupledRun
 from .runner import Runner
 from .solution import Solution, compute_peak_frequency
@@ -34,12 +33,13 @@ from .solve import refuse_long_run
 # Outcomes of runs that ended early; more steps do not change them.
 EARLY_OUTCOMES = (Outcome.EXCEEDS_TRAVEL, Outcome.LEAVES_GROOVES)
 MIN_STEP_ERROR = 1e-12  # Smallest relative error per step; below it round-off dominates.
-MIN_OWN_FRACTION = (
-    0.1  # Fraction of the error due to the steps of `hybrid` below which smaller steps are no use.
-)
-# Largest predicted CPU time [s] of a run that is repeated with more steps although its displacement
-# meets the tolerance.
-MAX_REFINED_SECONDS = 10.0
+# Fraction of the error due to the steps of `hybrid` below which smaller steps are no use.
+MIN_OWN_FRACTION = 0.1
+# Largest number of steps times nodes of a run that is repeated with twice the steps although its displacement meets the
+# tolerance; it takes some 10 s of CPU time. The entries of a list of bonds count as nodes.
+MAX_REFINED_WORK = 1e8
+# Work of a step in which the pressure of a patch is solved, relative to that of another step.
+PRESSING_WORK = 40.0
 
 
 class RefinedRun(NamedTuple):
@@ -237,8 +237,8 @@ def _find_step_excess(run: CoupledRun) -> float:
 def _meets_tolerance(run: CoupledRun, excesses: list) -> bool:
     """Return whether the measures meet the tolerance as far as more steps can help.
 
-    The displacement must meet it. Other measures are refined while the next run takes at most
-    MAX_REFINED_SECONDS, and while two doublings of the steps reduce the largest excess.
+    The displacement must meet it. Other measures are refined while the work of the run is at most
+    MAX_REFINED_WORK, and while two doublings of the steps reduce the largest excess.
 
     Parameters
     ----------
@@ -257,9 +257,11 @@ def _meets_tolerance(run: CoupledRun, excesses: list) -> bool:
     excesses.append(_find_step_excess(run))
     if excesses[-1] <= 1 or (len(excesses) > 2 and excesses[-1] >= excesses[-3]):
         return True
-    n_points = 1 if run.patch is None else run.patch.x.size
-    cost = predict_march_cost(run.model, run.numerics.finer(), n_points)
-    return cost.times["motion"] > MAX_REFINED_SECONDS
+    nodes = max(1 if run.patch is None else run.patch.x.size, run.solution.book.get("strips", 0.0))
+    work = run.numerics.steps * run.numerics.cycles * nodes
+    if run.model.rig.friction.load_varies and run.patch is not None:
+        work *= PRESSING_WORK
+    return work > MAX_REFINED_WORK
 
 
 def _is_finest(model, run: RefinedRun, displacement_errors: list) -> bool:

@@ -109,6 +109,10 @@ NEEDS = {  # keys that a key of a table needs
     tables.Friction: {"rest_growth": "slip_growth", "slip_growth": "rest_growth"},
     tables.Structure: {"output_mass": "masses/reduced", "interface": "masses/file/reduced"},
 }
+EQUAL_LENGTHS = {  # lists that need one value for each value of another list
+    tables.Drive: {"accelerations": "frequencies", "phases": "frequencies"},
+    tables.WornFriction: {"coefficient_factor": "depth", "bond_length_factor": "depth"},
+}
 REFUSED_KEYS = (
     "kinetic",
     "spread",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from functools import cache, lru_cache
 from typing import Any, Literal, NamedTuple, get_args, get_origin
@@ -17,6 +18,7 @@ from .types import (
     advise_on_name,
     attributes_by_key,
     find_inner_table,
+    find_key_record,
     find_quantity_kind,
     is_array_attribute,
     list_allowed_values,
@@ -27,6 +29,10 @@ MAX_SHOWN_CHARACTERS = 60  # largest number of characters of a wrong value in a 
 MATERIAL_REQUIREMENT = (
     'a material name or {young = "121 GPa", poisson = 0.32, density = "4370 kg/m^3"} is needed'
 )
+
+
+# Beginnings of requirements that do not tell what a key is.
+_UNSPECIFIC_REQUIREMENTS = ("a plain", "a whole", "a text", "plain", "whole", "two whole")
 
 
 class Limit(NamedTuple):
@@ -68,18 +74,6 @@ def find_key(key: str) -> KeyDefinition:
             return KeyDefinition(None, "")
         is_item = find_inner_table(model, name) is not None and is_array_attribute(model, name)
     return KeyDefinition(model, name)
-
-
-def require_key(key: str) -> KeyDefinition:
-    """Find a key as `find_key` does; raise ValueError, with the nearest known key, if no scene has it."""
-    definition = find_key(key)
-    if definition.model is not None:
-        return definition
-    table, _, last = key.rpartition(".")
-    owner = find_key(table) if table else KeyDefinition(None, "")
-    inner = find_inner_table(*owner) if owner.model is not None else None
-    advice = f"; {advise_on_name(last, attributes_by_key(inner))}" if inner is not None else ""
-    raise ValueError(f"not a key of a scene{advice}")
 
 
 def validate_value(key: str, value: Any, ignored: Iterable[str] = ()) -> dict[str, Any]:
@@ -148,6 +142,15 @@ def describe_requirement(model: type[Table] | None, name: str) -> str:
     if int in types:
         return "a whole number is needed"
     return "a text in quotes is needed"
+
+
+def describe_missing_key(model: type[Table] | None, name: str) -> str:
+    """Describe the value that a missing key needs; the meaning of the key follows where its type says too little."""
+    needed = describe_requirement(model, name)
+    if model is None or not needed.startswith(_UNSPECIFIC_REQUIREMENTS):
+        return needed
+    record = find_key_record(model, model.model_fields[name].alias or name)
+    return f"{needed} ({re.split('[;:]', record.meaning)[0]})" if record else needed
 
 
 def _describe_array_requirement(types: tuple) -> str:

@@ -23,6 +23,18 @@ REMOVED_NAMES = {
         "1.1",
         "no run could use it; leave it out: the patch slides along x alone",
     ),
+    "friction.breakaway": (
+        "2.0",
+        "leave it out; law 'iwan' or 'elastic-plastic' does not creep under an oscillating force",
+    ),
+    "structure.interface.breakaway": (
+        "2.0",
+        "leave it out; law 'iwan' or 'elastic-plastic' does not creep",
+    ),
+    "approach of a piece that can rotate": (
+        "2.0",
+        "give contact.load, or leave out [contact.load_line] and contact.holder.rotational_stiffness",
+    ),
     "files of Nastran": ("2.0", "convert the matrix, with pyNastran for example"),
     "profile --level": (
         "1.0",

@@ -6,7 +6,7 @@ and the reference of keys are made from it. `scene.rules` says which keys need o
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, field_validator
 
@@ -82,6 +82,9 @@ class Temperature(Table):
 
 class Friction(Table):
     """The friction law; `law` decides which of the other keys are needed."""
+
+    # Elastic part of the bond length. Its key was removed in 2.0; the engines that read it find 0.
+    breakaway: ClassVar[float] = 0.0
 
     law: key(LawName, "the friction law")
     static: key(NonNegative, "coefficient of static friction mu_s")
@@ -166,9 +169,6 @@ class Friction(Table):
     initial_bonds: key(
         Fraction, "fraction m_0 of all bonds that already exist when the run begins"
     ) = 1.0
-    breakaway: key(
-        number(ge=0, le=1), "fraction of the bond length over which a bond stretches without damage"
-    ) = 0.0
     spread: key(
         Length | None,
         "width rho of a bond perpendicular to the path (equation 2.15); default: this width is "

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -31,6 +30,8 @@ DIVISOR_KINDS = {
     "cubic stiffness",
     "sweep rate",
 }
+# Word of a JSON schema that names an inner table; `schema.make_schema` replaces it by a reference.
+TABLE_WORD = "$table"
 # Smallest similarity ratio (difflib) for which an unknown name is taken for a misspelling.
 MIN_NAME_SIMILARITY = 0.6
 
@@ -167,20 +168,8 @@ AbsoluteTemperature = quantity("temperature", gt=0)
 PerMetre = quantity("participation")
 
 
-# Value of _OUTER_TABLE while the validator of each table includes those of its inner tables.
-_NESTED_STATE = object()
 # Table whose validator is under construction.
 _OUTER_TABLE: ContextVar = ContextVar("outer", default=None)
-
-
-@contextmanager
-def nested_validators() -> Iterator[None]:
-    """Make the validator of each table include those of inner tables, for the JSON schema."""
-    token = _OUTER_TABLE.set(_NESTED_STATE)
-    try:
-        yield
-    finally:
-        _OUTER_TABLE.reset(token)
 
 
 class Table(BaseModel):
@@ -195,16 +184,18 @@ class Table(BaseModel):
 
     @classmethod
     def __get_pydantic_core_schema__(cls, source: Any, handler: Callable) -> Any:
-        outer = _OUTER_TABLE.get()
-        if outer is _NESTED_STATE:
-            return handler(source)
-        if outer is not None:
+        if _OUTER_TABLE.get() is not None:
             return core_schema.no_info_plain_validator_function(cls._validate_inner)
         token = _OUTER_TABLE.set(cls)
         try:
             return handler(source)
         finally:
             _OUTER_TABLE.reset(token)
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, schema: Any, handler: Callable) -> dict:
+        is_inner = schema["type"] == "function-plain"
+        return {TABLE_WORD: cls.__name__} if is_inner else handler(schema)
 
     @classmethod
     def _validate_inner(cls, value: Any) -> Any:

@@ -6,6 +6,7 @@ from typing import Any
 
 from ...effects import GAP_SHAPES
 from ..keys.contact import Contact, compute_outermost_strip_distance
+from ..keys.removed import describe_removed
 from .outlines import PIECE_NAMES, check_outlines, find_flat_length
 from .rule_table import MissingKeyRule, MistakeRule, RemarkRule, TableFacts, apply_rules
 from .scene_draft import SceneDraft
@@ -134,6 +135,13 @@ PATCH_RULES = (
         lambda p: p.has_free_roll and p.has("approach"),
         "{table_key}.strips.offset",
         "a load line needs a load: use contact.load in place of [contact.approach]",
+    ),
+    MistakeRule(
+        lambda p: p.approach and (p.has("load_line") or p.holder.rotational_stiffness),
+        "{table_key}.approach",
+        describe_removed(
+            "approach of a piece that can rotate", "an approach of a piece that can rotate"
+        ),
     ),
     MistakeRule(
         lambda p: p.has_free_roll and p.strips.count < 2,

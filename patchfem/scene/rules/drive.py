@@ -112,23 +112,9 @@ def check_drive(draft: SceneDraft) -> None:
     check_driven_mass(draft)
     if facts.is_driven:
         apply_rules(draft, WAVEFORM_RULES, facts)
-        _check_tones(facts)
 
 
 def check_length(draft: SceneDraft, kind: str) -> None:
     """Report a run that is shorter than a quarter of a cycle."""
     if kind in ("rig", "linear") and draft.tables.drive is not None:
         apply_rules(draft, LENGTH_RULES, DriveFacts(draft, "drive", draft.tables.drive))
-
-
-def _check_tones(drive: DriveFacts) -> None:
-    """Report drive lists whose length differs from the number of frequencies."""
-    for key in ("accelerations", "phases"):
-        values = drive[key]
-        if not (drive.wave.accepts_key("frequencies") and drive.wave.accepts_key(key)):
-            continue
-        if values and drive.frequencies and len(values) != len(drive.frequencies):
-            drive.draft.add_mistake(
-                f"drive.{key}",
-                f"{len(values)} values for {len(drive.frequencies)} frequencies; give one value for each frequency",
-            )

@@ -123,11 +123,6 @@ LAW_RULES = (
         "must be {order_requirement}, not {order}",
     ),
     MistakeRule(
-        lambda law: law.breakaway and law.reading == "report",
-        "{table_key}.breakaway",
-        "reading 'report' has no breakaway; use reading = 'stretch' or leave `breakaway` out",
-    ),
-    MistakeRule(
         lambda law: law.has_unknown_springs and law.load_change_description,
         "{table_key}.stiffness",
         "{load_change_description} changes the load, and the number of springs in contact changes "

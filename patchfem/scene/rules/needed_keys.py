@@ -3,7 +3,15 @@
 from __future__ import annotations
 
 from ...effects import name_laws_with_key
-from ..keys.choices import NEEDS, REFUSED_KEYS, Need, find_choices, iterate_tables, parse_needs
+from ..keys.choices import (
+    EQUAL_LENGTHS,
+    NEEDS,
+    REFUSED_KEYS,
+    Need,
+    find_choices,
+    iterate_tables,
+    parse_needs,
+)
 from .scene_draft import SceneDraft
 
 HINTS = {  # what else a user should know about a missing key
@@ -29,6 +37,11 @@ def check_needed_keys(draft: SceneDraft) -> None:
             for key, words in needed_by_key.items() if isinstance(table, model) else ():
                 for need in parse_needs(words) if key in written else ():
                     _check_need(draft, table_key, need, key, is_required=True)
+        for key, other in EQUAL_LENGTHS.get(type(table), {}).items():
+            lengths = [len(getattr(table, name) or ()) for name in (key, other)]
+            if key not in choices.unused and all(lengths) and lengths[0] != lengths[1]:
+                sentence = f"{lengths[0]} values for {lengths[1]} values of `{other}`; give one value for each"
+                draft.add_mistake(f"{table_key}.{key}", sentence)
         for key, reason in choices.unused.items():
             path = f"{table_key}.{key}"
             if key in written and key in REFUSED_KEYS:

@@ -8,10 +8,10 @@ from functools import lru_cache
 from typing import Any
 
 from ...exceptions import PatchfemError
-from ..keys.lookup import describe_requirement, find_key
+from ..keys.lookup import describe_missing_key, find_key
 from ..keys.tables import Tables
 from ..keys.types import build_table
-from ..lines import number_items_from_one, split_key
+from ..lines import find_item, number_items_from_one, split_key
 from .view import TableView
 
 # Sort order of mistakes in --set, which are listed after those of all lines of a file.
@@ -46,6 +46,7 @@ class SceneDraft:
         Plain values of the file. Values of --set are written into them.
 
     - sets: dotted keys that --set wrote.
+    - swept_key: key of [sweep] whose first value is being written; "" for values of --set.
     - tables: the tables as far as they could be read; a value that is missing or wrong is None.
     - remarks: sentences for the user that are not mistakes.
     - read_before: id of a plain table of `raw` -> the table that it gives, which need not be read again.
@@ -53,9 +54,10 @@ class SceneDraft:
 
     def __init__(self, path: str, lines: dict[str, int], raw: dict[str, Any]) -> None:
         self.path = path
-        self.lines = lines
+        self.lines = dict(lines)
         self.raw = raw
         self.sets: set[str] = set()
+        self.swept_key = ""
         self.tables = build_table(Tables, {})
         self._values = TableView(self.tables)
         self.remarks: list[str] = []
@@ -89,7 +91,10 @@ class SceneDraft:
         """Return whether the scene contains a key in the form of --set, with items by name or number."""
         value: Any = self.raw
         for piece in split_key(key):
-            value = find_item_or_value(value, piece)
+            if isinstance(value, list):
+                value = dict(enumerate(value)).get(find_item(list_item_names(value), piece))
+            else:
+                value = value.get(piece) if isinstance(value, dict) else None
         return value is not None
 
     def add_mistake(self, key: str, message: str) -> None:
@@ -99,7 +104,7 @@ class SceneDraft:
 
     def add_missing(self, key: str, reason: str) -> None:
         """Add a missing key as a mistake at the line of its table."""
-        needed = describe_requirement(*find_key(key))
+        needed = describe_missing_key(*find_key(key))
         clauses = dict.fromkeys(filter(None, ("missing", needed, reason)))
         self.add_mistake(key, "; ".join(clauses))
 
@@ -108,8 +113,18 @@ class SceneDraft:
         self._add(0, self.path, f"missing [{name}]: {reason}")
 
     def add_set_mistake(self, text: str) -> None:
-        """Add a mistake for a --set option that cannot be applied."""
-        self._add(SET_MISTAKE_ORDER, "--set", text)
+        """Add a mistake for a --set option, or a first value of [sweep], that cannot be applied."""
+        if self.swept_key:
+            self.add_mistake(self.swept_key, text)
+        else:
+            self._add(SET_MISTAKE_ORDER, "--set", text)
+
+    def record_set(self, key: str) -> None:
+        """Record that --set or [sweep] wrote a key, so that its mistakes are found there."""
+        if self.swept_key:
+            self.lines.setdefault(key, self.lines.get(self.swept_key, 0))
+        else:
+            self.sets.add(key)
 
     def add_remark(self, key: str, sentence: str) -> None:
         """Add a remark on a key whose value is no mistake; `sentence` follows the name of the key."""
@@ -163,16 +178,9 @@ def find_value(value: Any, key: str) -> Any:
     return value
 
 
-def find_item_or_value(holder: Any, piece: str) -> Any:
-    """Return the value at a key, name or number in a table or array read from TOML, or None if there is none."""
-    if isinstance(holder, dict):
-        return holder.get(piece)
-    if not isinstance(holder, list):
-        return None
-    for item in holder:
-        if isinstance(item, dict) and item.get("name") == piece:
-            return item
-    return holder[int(piece)] if piece.isdecimal() and int(piece) < len(holder) else None
+def list_item_names(items: list[Any]) -> list[Any]:
+    """Return the key `name` of each item of an array read from TOML, or None for an item without it."""
+    return [item.get("name") if isinstance(item, dict) else None for item in items]
 
 
 @lru_cache(4096)

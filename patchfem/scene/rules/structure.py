@@ -16,13 +16,11 @@ ARRAY_EXTENSIONS = (".npz", ".mat")
 UNIVERSAL_EXTENSIONS = (".uff", ".unv")
 # File extensions of matrices from finite-element programs, for [structure.reduced].
 NASTRAN_EXTENSIONS = (".op4", ".pch", ".bdf", ".dat")  # files that are no longer read
+MATRIX_KEYS = ("stiffness", "mass", "damping")  # keys of the files of [structure.reduced]
 MATRIX_EXTENSIONS = (".mtx", ".mat", ".npz")
 # Largest plausible damping ratio, at which a free oscillation decays to a few per cent within one
 # cycle; a larger value probably has a wrong unit, because 1 % is 0.01.
 MAX_USUAL_DAMPING = 0.5
-# Largest excess over 1 of the sum of squared base participations that
-# round-off of the mode shapes can cause.
-BASE_PARTICIPATION_TOL = 1e-9
 LOCATION_KEYS = ("slide_at", "output_at", "base_at", "force_at", "normal_at", "pitch_at")
 # Keys that describe a rig; a scene has one of them.
 DESCRIPTION_KEYS = ("mode", "masses", "file", "reduced")
@@ -297,7 +295,7 @@ def _check_base(draft: SceneDraft, modes: tuple) -> None:
         default = 0.0 if index else mode.slide
         base = mode.base if draft.has(f"structure.mode.{index}.base") else default
         squares.append((base or 0.0) ** 2)
-    if sum(squares) > 1 + BASE_PARTICIPATION_TOL:
+    if sum(squares) > 1 + 1e-9:  # round-off of the mode shapes can cause this excess
         table_key = f"structure.mode.{squares.index(max(squares))}"
         key = "base" if draft.has(f"{table_key}.base") else "slide"
         draft.add_mistake(
@@ -422,7 +420,7 @@ def check_driven_mass(draft: SceneDraft) -> None:
 def _check_matrix_files(draft: SceneDraft) -> None:
     """Report files of [structure.reduced] that cannot be read by their extension."""
     reduced = draft.tables.structure.reduced
-    for key in ("stiffness", "mass", "damping"):
+    for key in MATRIX_KEYS:
         file = getattr(reduced, key)
         if isinstance(file, str) and find_file_extension(file) not in MATRIX_EXTENSIONS:
             extension = find_file_extension(file)

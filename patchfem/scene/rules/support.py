@@ -109,9 +109,7 @@ class Joint(TableFacts):
     @property
     def key_preventing_recursion(self) -> str:
         """Key of the friction law that prevents computing the sum over bonds by recursion."""
-        if self.reading == "report":
-            return "reading"
-        return "breakaway" if self.breakaway else "order"
+        return "reading" if self.reading == "report" else "order"
 
     @cached_property
     def lower_shape(self) -> str:
@@ -230,8 +228,6 @@ FEATURES = {
     ),
     "spread": Feature(lambda j: j.spread and law_takes_key(j.law, "spread"), "{table_key}.spread"),
     # the sum over bonds
-    "breakaway": Feature(lambda j: j.has_trait("bonds") and j.breakaway, "{table_key}.breakaway"),
-    "order": Feature(lambda j: abs(j.order - 1) > 0, "{table_key}.order", "order = {order:g}"),
     "list": Feature(lambda j: j.needs_list, "{table_key}.{key_preventing_recursion}"),
     "stretched list": Feature(
         lambda j: j.needs_list and j.reading != "report", "{table_key}.{key_preventing_recursion}"
@@ -269,8 +265,6 @@ FEATURES = {
     ),
     "masses": Feature(lambda j: j.scene.structure.masses, "structure.masses"),
     "reduced": Feature(lambda j: j.scene.structure.reduced, "[structure.reduced]"),
-    "file": Feature(lambda j: j.scene.structure.file, "structure.file"),
-    "bonded": Feature(lambda j: j.scene.structure.bonded, "[structure.bonded]"),
     "patches": Feature(
         lambda j: any(face.contact for face in j.scene.structure.interface),
         "[structure.interface.contact]",
@@ -303,7 +297,6 @@ STEADY_ADVICE = "wear is computed from the last cycle of a steady motion: use"
 # mistake is reported at the key of the first feature.
 SUPPORT = (
     ("constant load, changing load", suggest_laws("varying-load")),
-    ("breakaway, changing load", "recursion"),
     ("stretched list, changing load", "recursion"),
     ("rigid stick, compliance, changing load", "stiff"),
     ("stiffening, changing load", "either"),
@@ -313,12 +306,8 @@ SUPPORT = (
     ("lower shape, changing load", "shapes"),
     ("oscillating load, bench, constant pressure", suggest_laws("varying-load")),
     ("named sum, rig, recursion, lower shape", "use 'recursion' or 'auto'"),
-    ("named sum, rig, recursion, breakaway", "use 'recursion' or 'auto'"),
     ("merged, bench, rigid patch, lower shape", SINGLE_SUMS),
-    ("merged, bench, rigid patch, breakaway", SINGLE_SUMS),
     ("merged, bench, rigid patch, oscillating load", SINGLE_SUMS),
-    ("breakaway, rig, order", "order"),
-    ("breakaway, order, compliance", "order"),
     ("yaw, strips, rig, one interface", "{joints_advice}"),
     ("strips, averaged", "out"),
     ("strips, joined strips, compliance", "either"),
@@ -327,10 +316,8 @@ SUPPORT = (
     ("lower shape, no bonds, rig", "shapes"),
     ("lower shape, no bonds, compliance", "shapes"),
     ("lower shape, bench, constant pressure", "shapes"),
-    ("lower shape, breakaway, compliance", "shapes"),
     ("lower shape, interface", "shapes"),
     ("list, grooves", "recursion"),
-    ("breakaway, grooves", "recursion"),
     ("flat faces, grooves", "{grooves_advice}"),
     ("named sum, grooves", "use 'recursion' or 'auto'"),
     (

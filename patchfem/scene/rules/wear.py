@@ -85,6 +85,15 @@ FRICTION_RULES = (
         "wear.friction.depth",
         'depths that rise from 0 are needed, such as ["0 um", "1 um", "5 um"]',
     ),
+    *(
+        MistakeRule(
+            lambda w, key=key: w.friction[key] and w.friction[key][0] != 1,
+            f"wear.friction.{key}",
+            f"the first factor must be 1, not {{friction.{key}[0]:g}}, because [friction] itself describes the contact at "
+            "depth 0",
+        )
+        for key in FACTOR_KEYS
+    ),
 )
 LAW_RULES = (
     MistakeRule(
@@ -147,26 +156,9 @@ def check_wear(draft: SceneDraft, kind: str) -> None:
     apply_rules(draft, MOTION_RULES, facts)
     if facts.friction:
         apply_rules(draft, FRICTION_RULES, facts)
-        _check_factors(facts)
     if facts.friction and draft.tables.friction is not None:
         apply_rules(draft, LAW_RULES, facts)
     apply_rules(draft, START_RULES, facts)
-
-
-def _check_factors(wear: WearFacts) -> None:
-    """Report lists of factors that differ in length from the depths or do not begin with 1."""
-    for key in FACTOR_KEYS:
-        factors = wear.friction[key]
-        if factors and wear.depths and len(factors) != len(wear.depths):
-            message = f"{len(factors)} factors for {len(wear.depths)} depths; give one factor for each depth"
-        elif factors and factors[0] != 1:
-            message = (
-                f"the first factor must be 1, not {factors[0]:g}, because [friction] itself describes the contact at "
-                "depth 0"
-            )
-        else:
-            continue
-        wear.draft.add_mistake(f"wear.friction.{key}", message)
 
 
 def _increases_from_zero(values: tuple) -> bool:

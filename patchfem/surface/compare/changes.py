@@ -91,7 +91,7 @@ def find_specks(x, first, second, worn, grown) -> np.ndarray:
 
     Such places are narrow and few. Where depth is lost there, the first trace stands above the surface
     around it and above all its other heights; in a scratch, the second trace stands below instead. Many
-    such places are worn or grown tops.
+    such places are worn or grown tops, and one directly beside a wide track is its ridge.
 
     Parameters
     ----------
@@ -101,10 +101,15 @@ def find_specks(x, first, second, worn, grown) -> np.ndarray:
     specks = np.zeros(x.size, bool)
     smooth = first - ndimage.median_filter(first, min(x.size // 10, 401))
     highest = SPECK_HEIGHT * smooth[~worn].max(initial=0.0)
-    for changed, is_loss in ((worn, True), (grown, False)):
+    for changed, other, is_loss in ((worn, grown, True), (grown, worn, False)):
         found = []
-        for start, last in find_runs(changed):
+        tracks = np.zeros(x.size + 2 * MIN_RUN, bool)
+        for start, last in find_runs(other):
             if x[last] - x[start] > MAX_SPECK_WIDTH:
+                tracks[start : last + 2 * MIN_RUN + 1] = True
+        for start, last in find_runs(changed):
+            is_ridge = tracks[start + MIN_RUN : last + MIN_RUN + 1].any()
+            if x[last] - x[start] > MAX_SPECK_WIDTH or is_ridge:
                 continue
             inside = slice(start, last + 1)
             margin = last - start + 3

@@ -5,6 +5,7 @@ Codes of the verdict: "worn", "no_wear", "grown", "worn_and_grown", "growth_at_e
 """
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -26,6 +27,7 @@ from .records import (
     Placement,
     TraceCurves,
     Track,
+    name_estimate,
     name_quantity,
     name_unknown,
 )
@@ -45,6 +47,19 @@ MIN_BOW = (
 MIN_DEPOSITS = 0.05  # smallest grown area that is reported, relative to the lost area
 MIN_OTHER_LENGTH = 5e-4  # smallest error of length that is reported
 MAX_STEP_RATIO = 1.01  # ratio of two sampling intervals that counts as equal
+# Quantities of the place of the second trace, and of a comparison of traces.
+PLACEMENT_NAMES = ("shift", "tilt", "scale", "offset", "gain")
+END_NAMES = ("worn_from_before", "worn_from_after", "worn_to_before", "worn_to_after")
+NAMES = (
+    *PLACEMENT_NAMES,
+    "worn_depth_mean",
+    "worn_depth_max",
+    "worn_depth_max_at",
+    "worn_area",
+    "grown_area",
+    "worn_depth_within",
+    *END_NAMES,
+)
 MIN_TOPS_FRACTION = 0.6  # fraction of worn heights in a track below which it consists of worn tops
 
 
@@ -123,53 +138,50 @@ def compare_surfaces(
     for is_wrong, message in rules:
         if is_wrong:
             raise PatchfemError(f"compare: {message}")
+    clean = clean_trace
+    measure = partial(_measure_traces, options=options)
+    names = NAMES
     if n_scans:
-        from .scans import compare_scans
+        from . import scans
 
-        return compare_scans(before, after, options.direction, keep_spikes=options.keep_spikes)
-    return replace(_compare_traces(before, after, options), direction=options.direction)
+        clean = scans.clean_scan
+        measure = partial(scans.measure_scans, direction=options.direction)
+        names = scans.NAMES
 
-
-def _compare_traces(before: Profile, after: Profile, options: Options) -> Comparison:
-    cleaned = [clean_trace(trace, keep_spikes=options.keep_spikes) for trace in (before, after)]
+    cleaned = [clean(each, keep_spikes=options.keep_spikes) for each in (before, after)]
+    counts = [(~each.missing).sum() for each in (before, after, *cleaned)]
+    removed = (int(counts[0] - counts[2]), int(counts[1] - counts[3]))
     first, second = cleaned
-    removed = (
-        int((~before.missing).sum() - first.x.size),
-        int((~after.missing).sum() - second.x.size),
-    )
-    if np.array_equal(first.z, second.z) and np.array_equal(first.x, second.x):
-        evidence = Evidence(removed=removed)
-        values = _name_unknowns("identical") | {
-            "hidden_wear": name_unknown("hidden_wear", "identical")
-        }
+    if np.array_equal(first.z, second.z, equal_nan=True) and np.array_equal(first.x, second.x):
+        values = {name: name_unknown(name, "identical") for name in (*names, "hidden_wear")}
         findings = (Finding("identical_files", {}),)
-        return Comparison(before, after, Finding("identical", {}), values, (), findings, evidence)
+        result = Comparison(first, second, Finding("identical", {}), values, (), findings)
+    else:
+        result = measure(first, second)
+    evidence = replace(result.evidence, removed=removed)
+    direction = options.direction
+    return replace(result, before=before, after=after, evidence=evidence, direction=direction)
 
+
+def _measure_traces(first: Profile, second: Profile, options: Options) -> Comparison:
+    """Compare two clean traces."""
     aligned = align_traces(first, second, options.shift, is_straight=bool(options.datum))
     if aligned.reason:
-        section = find_flanked_track(first, second)
-        result = _compose_unplaced(cleaned, aligned, section)
+        result = _compose_unplaced([first, second], aligned, find_flanked_track(first, second))
         noise = np.sqrt(2) * result.verdict.numbers.get("noise", 0.0)
-        lines = [resample_evenly(trace) for trace in cleaned]
+        lines = [resample_evenly(trace) for trace in (first, second)]
         step = max(line.step for line in lines)
-        lines = [_resample(line, step) for line in lines]
     else:
-        result = _compose_placed(cleaned, aligned)
+        result = _compose_placed([first, second], aligned)
         curves = result.evidence.curves
         noise = result.evidence.datum.noise
         step = float(np.median(np.diff(curves.x)))
-        lines = [_resample(Profile(curves.x, z, ""), step) for z in (curves.before, curves.after)]
-    count = min(line.z.size for line in lines)
-    heights = [line.z[None, :count] for line in lines]
-    values = result.values | waves.compare_waves(heights, step, noise)
-    return replace(
-        result,
-        before=before,
-        after=after,
-        values=values,
-        findings=(*result.findings, *_note_steps(before, after)),
-        evidence=replace(result.evidence, removed=removed),
-    )
+        lines = [Profile(curves.x, z, "") for z in (curves.before, curves.after)]
+    heights = [_resample(line, step).z for line in lines]
+    count = min(z.size for z in heights)
+    ratios = waves.compare_waves([z[None, :count] for z in heights], step, noise)
+    findings = (*result.findings, *_note_steps(first, second))
+    return replace(result, values=result.values | ratios, findings=findings)
 
 
 def _resample(trace: Profile, step: float) -> Profile:
@@ -187,10 +199,7 @@ def _note_steps(before: Profile, after: Profile) -> tuple[Finding, ...]:
 
 
 def _name_unknowns(reason: str) -> dict[str, Quantity]:
-    names = ("shift", "tilt", "scale", "worn_depth_mean", "worn_depth_max", "worn_area")
-    names += ("grown_area", "worn_depth_within")
-    names += tuple(f"worn_{end}_{side}" for end in ("from", "to") for side in ("before", "after"))
-    return {name: name_unknown(name, reason) for name in names}
+    return {name: name_unknown(name, reason) for name in NAMES}
 
 
 def _compose_placed(traces: list[Profile], aligned: Aligned) -> Comparison:
@@ -203,10 +212,10 @@ def _compose_placed(traces: list[Profile], aligned: Aligned) -> Comparison:
         "shift": (fit.state[0], errors[0]),
         "scale": (1 + fit.state[1], errors[1]),
         "tilt": (fit.state[3] / model.half, errors[3] / model.half),
+        "offset": (fit.state[2], errors[2]),
+        "gain": (aligned.gain, aligned.gain_error),
     }
-    placement = {}
-    for name, (value, error) in placed.items():
-        placement[name] = name_quantity(name, value, value - SIDE * error, value + SIDE * error)
+    placement = {name: name_estimate(name, *estimate) for name, estimate in placed.items()}
     bend = float(fit.state[4])
     datum = Datum(
         unworn=float(fit.unworn.mean()),
@@ -238,7 +247,7 @@ def _compose_placed(traces: list[Profile], aligned: Aligned) -> Comparison:
     if section.drift_height > datum.noise:
         findings.append(Finding("drift", {"height": section.drift_height}))
     result = _compose(traces, section, Evidence(place, datum, curves), findings)
-    hidden = name_quantity("hidden_wear", 0.0, 0.0, None)
+    hidden = name_unknown("hidden_wear", "no_limit")._replace(low=0.0)
     return replace(result, values=result.values | {"hidden_wear": hidden})
 
 
@@ -255,7 +264,7 @@ def _compose_unplaced(
         if aligned.reason == "mirror_finish":
             numbers = find_mirror_finish([trace.z for trace in traces])
         return Comparison(*traces, Finding(aligned.reason, numbers), values)
-    placement = {name: name_unknown(name, "elsewhere") for name in ("shift", "scale", "tilt")}
+    placement = {name: name_unknown(name, "elsewhere") for name in PLACEMENT_NAMES}
     noise = float(section.noise[0])
     datum = Datum(float(section.unworn.mean()), noise, 0.0, section.correlation)
     curves = _draw_curves(section, traces[1].z + section.depth)
@@ -287,11 +296,13 @@ def _compose(
     """Measure a section, and find the verdict."""
     placement = evidence.placement
     length = float(section.widths.sum())
+    placed = placement.values | {
+        "common_length": name_quantity("common_length", length, None, None)
+    }
     spans = find_spans(section)
     # New roughness that stands above the first surface is no loss.
     is_loss = section.depth > -UNWORN_LIMIT * section.noise
     area, error = section.integrate(cover_spans(section, spans) & is_loss & ~section.grown)
-    error = float(np.hypot(error, section.model_error * area))
     hidden = measure_hidden_area(section)
     bounds = (area, max(area - SIDE * error, 0.0), area + SIDE * error + hidden)
     lost = section.integrate(section.worn)
@@ -305,12 +316,13 @@ def _compose(
     bow = 2 / 3 * max(evidence.datum.bend, 0.0) * length
     waves_height = robust_deviation(remove_long_waves(section.after))
     is_bow_large = bow > area and evidence.datum.bend > MIN_BOW * waves_height
-    values = _name_unknowns("no_wear") | placement.values
-    low = max(grown - SIDE * grown_error, 0.0)
-    values["grown_area"] = name_quantity("grown_area", grown, low, grown + SIDE * grown_error)
+    values = _name_unknowns("no_wear") | placed
+    values["grown_area"] = name_estimate("grown_area", grown, grown_error, 0.0)
     tracks = ()
     if code.startswith("worn"):
-        tracks = tuple(measure_track(section, span) for span in spans)
+        # The area of a single track is that of the common part.
+        whole = bounds if len(spans) == 1 else None
+        tracks = tuple(measure_track(section, span, whole) for span in spans)
         if _may_be_growth(section, spans, tracks):
             code = "growth_at_ends"
             numbers |= {
@@ -318,7 +330,7 @@ def _compose(
                 "growth_height": tracks[0].values["depth_mean"].value,
             }
             tracks = ()
-            values = _name_unknowns("growth_at_ends") | placement.values
+            values = _name_unknowns("growth_at_ends") | placed
         elif is_bow_large and (not tracks or any(tracks[0].cut)):
             code = "scar_or_bow"
     elif code == "no_wear" and is_bow_large:
@@ -332,12 +344,12 @@ def _compose(
     if code == "scar_or_bow":
         numbers["scar_depth"] = (bow + area) / length
         tracks = ()
-        values = _name_unknowns("scar_or_bow") | placement.values
+        values = _name_unknowns("scar_or_bow") | placed
     if code.startswith("worn"):
         values["worn_area"] = name_quantity("worn_area", *bounds)
         means = (bound / length for bound in bounds)
         values["worn_depth_mean"] = name_quantity("worn_depth_mean", *means)
-        values["worn_depth_max"] = measure_largest(section, "worn_depth_max")
+        values["worn_depth_max"], values["worn_depth_max_at"] = measure_largest(section)
         values |= _name_ends(tracks, placement, traces[1])
         findings += _describe_tracks(section, spans, tracks)
         if grown > MIN_DEPOSITS * area:
@@ -377,23 +389,19 @@ def _name_ends(
 ) -> dict[str, Quantity]:
     """Return the mean depth within the longest track, and its ends in both traces."""
     if not tracks:
-        names = ["worn_depth_within"]
-        names += [f"worn_{end}_{side}" for end in ("from", "to") for side in ("before", "after")]
-        return {name: name_unknown(name, "no_track") for name in names}
+        return {name: name_unknown(name, "no_track") for name in ("worn_depth_within", *END_NAMES)}
     track = tracks[0].values
     values = {"worn_depth_within": name_quantity("worn_depth_within", *track["depth_mean"][:3])}
     shift = placement.values["shift"].value
     middle = float(after.x.mean())
-    for end in ("from", "to"):
-        for side in ("before", "after"):
-            name = f"worn_{end}_{side}"
-            places = track[end][:3]
-            if places[0] is None or (side == "before" and shift is None):
-                reason = "cut_off" if places[0] is None else "elsewhere"
-                values[name] = name_unknown(name, reason)
-                continue
-            if side == "before":
-                scale = placement.values["scale"].value
-                places = [middle + (x - middle) / scale - shift for x in places]
-            values[name] = name_quantity(name, *places)
+    for name in END_NAMES:
+        end, side = name.split("_")[1:]
+        places = track[end][:3]
+        if places[0] is None or (side == "before" and shift is None):
+            values[name] = name_unknown(name, "cut_off" if places[0] is None else "elsewhere")
+            continue
+        if side == "before":
+            scale = placement.values["scale"].value
+            places = [middle + (x - middle) / scale - shift for x in places]
+        values[name] = name_quantity(name, *places)
     return values

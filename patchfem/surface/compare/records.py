@@ -11,15 +11,28 @@ import numpy as np
 
 from ..areal import Areal
 from ..profile import Profile
-from ..quantity import Quantity
+from ..quantity import SIDE, Quantity
 
 # Unit and definition of each quantity of a comparison.
 DEFINITIONS = {
     "shift": ("m", "x of a feature in the second trace minus its x in the first"),
     "tilt": ("rad", "slope of the second trace relative to the first"),
     "scale": ("1", "length of the second trace divided by that of the first"),
+    "offset": (
+        "m",
+        "height of the second surface above the first where neither is worn, in the middle",
+    ),
+    "gain": (
+        "1",
+        "factor by which the heights of the second surface were divided; 1 if no other gain of the instrument shows",
+    ),
+    "common_length": ("m", "length that both traces show"),
+    "common_area": ("m2", "area that both scans show"),
     "worn_depth_mean": ("m", "lost area or volume divided by the size of the common part"),
     "worn_depth_max": ("m", "largest depth"),
+    "worn_depth_max_at": ("m", "x in the second trace of the largest depth"),
+    "worn_depth_max_x": ("m", "x in the first scan of the largest depth"),
+    "worn_depth_max_y": ("m", "y in the first scan of the largest depth"),
     "worn_area": ("m2", "area lost in the common part, per unit of width"),
     "grown_area": ("m2", "area above the first trace in the common part"),
     "worn_depth_within": ("m", "mean depth of the longest track: lost area divided by its width"),
@@ -36,12 +49,15 @@ DEFINITIONS = {
     "shift_x": ("m", "x of a feature in the second scan minus its x in the first"),
     "shift_y": ("m", "y of a feature in the second scan minus its y in the first"),
     "rotation": ("rad", "rotation of the second scan about the middle of the first, anticlockwise"),
-    "from": ("m", "x in the second trace at which the track begins"),
-    "to": ("m", "x in the second trace at which the track ends"),
+    "from": ("m", "x in the second trace, or place across the track in a scan, at which it begins"),
+    "to": ("m", "x in the second trace, or place across the track in a scan, at which it ends"),
     "width": ("m", "width of the track"),
     "depth_mean": ("m", "lost area divided by width"),
     "depth_floor": ("m", "mean depth of the deepest fifth of the width"),
-    "step": ("m", "mean depth over the middle third of the width (ISO 5436-1, type A1)"),
+    "step": (
+        "m",
+        "mean depth over the middle third of a track with a flat bottom (ISO 5436-1, type A1)",
+    ),
     "area_gross": ("m2", "area lost in the track"),
     "pile_up": ("m2", "area above the first trace within one width of the track on both sides"),
     "pile_up_left": ("m2", "area above the first trace within one width before the track"),
@@ -52,7 +68,7 @@ DEFINITIONS = {
     "direction": ("rad", "direction of the track from the x axis, anticlockwise"),
     "Ra": ("m", "mean of the absolute heights of the roughness profile"),
     "Rq": ("m", "root mean square of the heights of the roughness profile"),
-    "slope": ("1", "root mean square slope of the roughness profile"),
+    "slope": ("m m-1", "root mean square slope of the roughness profile"),
 }
 
 
@@ -161,8 +177,8 @@ class Evidence:
 
     - placement, datum: how the second surface was laid on the first.
     - curves: of traces, or maps of scans.
-    - roughness: {"inside", "outside": {"before", "after": {"Ra", "Rq", "slope": Quantity}}} of the
-      track; {} without a track. `cutoff` [m] is that of these values.
+    - roughness: {"inside", "outside": {"before", "after", "ratio": {"Ra", "Rq", "slope": Quantity}}}
+      of the track, with the ratio after/before; {} without a track. `cutoff` [m] is that of these values.
     - removed: heights left out before and after as spikes, dropouts or dust.
     """
 
@@ -211,6 +227,20 @@ def name_quantity(name: str, value: float, low: float | None, high: float | None
     """Return the quantity of this name with its interval."""
     bounds = [None if number is None else float(number) for number in (value, low, high)]
     return Quantity(*bounds, *DEFINITIONS[name], name=name)
+
+
+def name_estimate(name: str, value: float, error: float, least: float = -np.inf) -> Quantity:
+    """Return the quantity of this name with its 95 % interval, which ends at the least possible value.
+
+    Parameters
+    ----------
+    name : str
+    value, error : float
+        Value and its standard deviation.
+    least : float, optional
+        0 for a quantity that cannot be negative.
+    """
+    return name_quantity(name, value, max(value - SIDE * error, least), value + SIDE * error)
 
 
 def name_unknown(name: str, reason: str) -> Quantity:

@@ -5,7 +5,7 @@ of the first. The depth there is z1 + plane - z2.
 """
 
 from functools import cached_property
-from itertools import combinations, pairwise
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -13,11 +13,10 @@ from scipy import ndimage
 
 from ..areal import Areal, fill_nearest
 from ..profile import robust_deviation
+from .search import correlate, find_datum, whiten
 from .statistics import (
-    TINY,
     compute_threshold,
     estimate_one_sided_scale,
-    find_mode,
     remove_long_waves,
     solve_biweight_step,
 )
@@ -35,8 +34,6 @@ BORDER_POINTS = (
 )
 KINK_POINTS = 5  # side of the square over which an error of interpolation at a kink spreads
 N_TILES = 8  # number of tiles along each side, whose modes span the planes
-MAX_PLANES = 3000  # number of planes through three tiles that are compared
-MIN_TILE_POINTS = 20  # smallest number of known heights in a tile
 SQUARES = (1, 3, 9, 25)  # sides of the squares whose mean depth is tested
 UNCHANGED_FRACTION = 0.25  # fraction of the squares above or below zero that are unchanged at least
 MAX_PULL = 8.0  # standard deviations to which a single depth counts in a mean
@@ -67,28 +64,17 @@ def find_scan_place(before: Areal, after: Areal) -> ScanPlace:
         max(np.ptp(before.x), np.ptp(before.y), np.ptp(after.x), np.ptp(after.y)) / SEARCH_PIXELS
     )
     first, second = (_make_image(scan, pixel) for scan in (before, after))
-    size = [a + b for a, b in zip(first.shape, second.shape)]
-    transform = np.fft.rfft2(first, size)
-    ones = [np.fft.rfft2(np.ones(image.shape), size) for image in (first, second)]
-    count = np.fft.irfft2(ones[0] * ones[1].conj(), size)
-    usable = count > MIN_OVERLAP * min(first.size, second.size)
-    power = np.fft.irfft2(np.fft.rfft2(first**2, size) * ones[1].conj(), size)
     best = ScanPlace(0.0, 0.0, 0.0, -np.inf)
     for angle in np.concatenate((ANGLES, ANGLES + np.pi)):
         # Turning the image of the second scan back by its rotation; row numbers increase with y.
         turned = ndimage.rotate(second, np.degrees(angle), reshape=False, order=1)
-        product = np.fft.irfft2(transform * np.fft.rfft2(turned, size).conj(), size)
-        norm = np.fft.irfft2(ones[0] * np.fft.rfft2(turned**2, size).conj(), size)
-        norm = np.sqrt(np.maximum(power * norm, 1e-12 * power.max() ** 2))
-        score = np.where(usable, product / (norm + TINY), 0.0) * np.sqrt(np.maximum(count, 0.0))
-        scatter = max(robust_deviation(score[usable]), 1e-12)
-        at = np.unravel_index(np.argmax(score), size)
-        significance = float(score[at] / scatter)
-        if significance > best.significance:
-            lag = [k if k < n / 2 else k - n for k, n in zip(at, size)]
-            best = _locate(
-                before, after, pixel, (first.shape, second.shape), lag, float(angle), significance
-            )
+        significance = correlate(first, turned, MIN_OVERLAP)
+        at = np.unravel_index(np.argmax(significance), significance.shape)
+        if significance[at] > best.significance:
+            lag = [k if k < n / 2 else k - n for k, n in zip(at, significance.shape)]
+            shapes = (first.shape, second.shape)
+            found = (float(angle), float(significance[at]))
+            best = _locate(before, after, pixel, shapes, lag, *found)
     return best
 
 
@@ -98,11 +84,7 @@ def _make_image(scan: Areal, pixel: float) -> np.ndarray:
     z = ndimage.gaussian_filter(fill_nearest(scan.z), 0.4 * pixel / steps)
     z = remove_long_waves(ndimage.zoom(z, np.minimum(steps / pixel, 1.0), order=1), 12)
     z = np.clip(z, -3 * z.std(), np.median(z))
-    spectrum = np.fft.rfft2(z - z.mean())
-    # A periodic lay must not hide the valleys.
-    return np.fft.irfft2(
-        spectrum / (np.abs(spectrum) + np.median(np.abs(spectrum)) + 1e-300), z.shape
-    )
+    return whiten(z - z.mean())
 
 
 def _locate(before, after, pixel, shapes, lag, angle: float, significance: float) -> ScanPlace:
@@ -236,34 +218,14 @@ class ScanModel:
         return tiles
 
     def find_plane(self, state) -> np.ndarray:
-        """Return the state with the plane through three tile modes that has much on it and little above."""
-        depth = self.compute_map(state)
-        random = np.random.default_rng(0)
-        modes = []
-        centers = []
-        for tile in self.tiles:
-            values = depth[tile][self.known[tile]]
-            if values.size > MIN_TILE_POINTS:
-                modes.append(find_mode(values))
-                centers.append([part[tile][self.known[tile]].mean() for part in self.plane])
-        if len(modes) < 3:
-            return state
-        subsets = np.array(list(combinations(range(len(modes)), 3)))
-        subsets = subsets[random.permutation(len(subsets))[:MAX_PLANES]]
-        matrices = np.array(centers)[subsets]
-        good = np.abs(np.linalg.det(matrices)) > 0.05
-        right = -np.array(modes)[subsets[good]][..., None]
-        planes = np.linalg.solve(matrices[good], right)[..., 0]
-
-        values = depth[self.known]
-        sample = random.permutation(values.size)[:2000]
-        residual = values[sample] + planes @ self.plane[:, self.known][:, sample]
-        scale = np.quantile(np.abs(residual), 0.2, axis=1)
-        near = np.flatnonzero(scale <= 3 * scale.min())
-        residual = residual[near] / max(scale.min(), 1e-15)
-        gain = (np.abs(residual) < 5).mean(axis=1) - 0.5 * (residual < -10).mean(axis=1)
+        """Return the state with the plane on which the unworn heights lie."""
+        numbers = np.full(self.shape, -1)
+        numbers[self.known] = np.arange(self.known.sum())
+        tiles = [numbers[tile] for tile in self.tiles]
+        tiles = [tile[tile >= 0] for tile in tiles]
+        base = self.plane[:, self.known].T
         state = state.copy()
-        state[3:] += planes[near[np.argmax(gain)]]
+        state[3:] += find_datum(base, self.compute_depth(state), tiles, [])
         return state
 
 

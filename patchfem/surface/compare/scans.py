@@ -19,6 +19,7 @@ from .records import (
     Placement,
     ScanMaps,
     Track,
+    name_estimate,
     name_quantity,
     name_unknown,
 )
@@ -29,7 +30,7 @@ from .scan_model import (
     find_changed_points,
     find_scan_place,
 )
-from .section import make_section
+from .section import find_largest, make_section
 from .statistics import (
     MAX_GAINS,
     UNWORN_LIMIT,
@@ -56,60 +57,43 @@ MIN_TILE_FRACTION = 0.3  # fraction of unworn points in a tile whose mean shows 
 MIN_TILES = 6  # smallest number of such tiles
 MIN_ELONGATION = 2.0  # length of a worn place relative to its width, from which on it is a track
 MIN_GROWN_BORDER = 0.5  # fraction of a line near a border that grew, from which on the border grew
+MEDIAN_ERROR = (
+    0.5  # error of a median of nine heights relative to that of one, with their correlation
+)
 MIN_SECTIONS = 8  # smallest number of sections across a track
 MODEL_ERROR = 0.01  # relative standard deviation of a volume: gain of two calibrated instruments
 VARIANTS = (("", False), ("x", False), ("", True), ("x", True))  # mirrored along, heights inverted
 NAMES = ("worn_volume", "grown_volume", "worn_share", "worn_depth_mean", "worn_depth_max")
-PLACEMENT_NAMES = ("shift_x", "shift_y", "rotation")
+PLACEMENT_NAMES = ("shift_x", "shift_y", "rotation", "offset")
 
 
-def compare_scans(
-    before: Areal, after: Areal, direction: str = "", *, keep_spikes: bool = False
-) -> Comparison:
-    """Compare two scans of the same region.
+def measure_scans(before: Areal, after: Areal, direction: str = "") -> Comparison:
+    """Compare two clean scans.
 
     Parameters
     ----------
     before, after : Areal
         Scans before and after wear.
-    direction : str
-        "x" or "y", along which the waves are compared; "" is x.
-    keep_spikes : bool
-        Whether single heights far off their neighbours count.
+    direction : str, optional
+        "x" or "y", along which the waves are compared; x by default.
     """
-    cleaned = [_clean(scan, keep_spikes=keep_spikes) for scan in (before, after)]
-    counts = [
-        int((~a.missing).sum() - (~b.missing).sum()) for a, b in zip((before, after), cleaned)
-    ]
-    if before.z.shape == after.z.shape and np.array_equal(before.z, after.z, equal_nan=True):
-        verdict = Finding("identical", {})
-        values = {name: name_unknown(name, "identical") for name in (*NAMES, "hidden_wear")}
-        findings = (Finding("identical_files", {}),)
-        return Comparison(before, after, verdict, values, (), findings, direction=direction)
-
-    model, fit, variant, gain = _align_calibrated(*cleaned)
-    ratios = _compare_lines(*cleaned, direction, fit)
+    model, fit, variant, gains = _align_calibrated(before, after)
+    ratios = _compare_lines(before, after, direction, fit)
     if fit is None:
-        finish = find_mirror_finish([fill_nearest(scan.z) for scan in cleaned])
+        finish = find_mirror_finish([fill_nearest(scan.z) for scan in (before, after)])
         verdict = Finding("mirror_finish" if finish else "elsewhere", finish)
         values = {name: name_unknown(name, verdict.code) for name in (*NAMES, "hidden_wear")}
-        evidence = Evidence(removed=tuple(counts))
-        return Comparison(before, after, verdict, values | ratios, (), (), evidence, direction)
-    result = _measure(cleaned, model, fit, variant)
-    evidence = replace(result.evidence, removed=tuple(counts))
-    if gain != 1.0:
-        result = replace(result, findings=(*result.findings, Finding("other_gain", {"gain": gain})))
-    return replace(
-        result,
-        before=before,
-        after=after,
-        values=result.values | ratios,
-        evidence=evidence,
-        direction=direction,
-    )
+        return Comparison(before, after, verdict, values | ratios)
+    result = _measure([before, after], model, fit, variant)
+    ratios["gain"] = name_estimate("gain", *gains)
+    findings = result.findings
+    if gains[0] != 1.0:
+        findings += (Finding("other_gain", {"gain": gains[0]}),)
+    return replace(result, values=result.values | ratios, findings=findings)
 
 
-def _clean(scan: Areal, *, keep_spikes: bool) -> Areal:
+def clean_scan(scan: Areal, *, keep_spikes: bool) -> Areal:
+    """Return a scan without spikes."""
     if min(scan.z.shape) < MIN_SIDE:
         rows, columns = scan.z.shape
         raise PatchfemError(
@@ -197,16 +181,16 @@ def _measure(
         code = "growth_at_ends"
     region = float(inside.sum()) * cell
     values: dict[str, Quantity] = {name: name_unknown(name, "no_wear") for name in NAMES}
-    low = max(grown - SIDE * grown_error, 0.0)
-    values["grown_volume"] = name_quantity("grown_volume", grown, low, grown + SIDE * grown_error)
-    values["hidden_wear"] = name_quantity("hidden_wear", 0.0, 0.0, None)
+    values["grown_volume"] = name_estimate("grown_volume", grown, grown_error, 0.0)
+    values["hidden_wear"] = name_unknown("hidden_wear", "no_limit")._replace(low=0.0)
+    values["common_area"] = name_quantity("common_area", region, None, None)
     tracks: tuple[Track, ...] = ()
     findings = [Finding("hidden_even_wear", {"limit": None})]
     findings += [Finding("mirrored", {})] * bool(variant[0]) + [Finding("turned", {})] * variant[1]
     if code.startswith("worn"):
         values["worn_volume"] = name_quantity("worn_volume", *bounds)
         values["worn_depth_mean"] = name_quantity("worn_depth_mean", *(b / region for b in bounds))
-        values["worn_depth_max"] = _measure_largest(maps)
+        values |= _measure_largest(maps)
         share = float(maps.worn.sum()) * cell / region
         edge = float(ndimage.binary_dilation(maps.worn).sum()) * cell / region - share
         values["worn_share"] = name_quantity(
@@ -224,9 +208,10 @@ def _measure(
     covariance = np.linalg.pinv((weighted / scale).T @ (weighted / scale), rcond=1e-10)
     errors = np.sqrt(np.diag(covariance)) / scale
     placed = {
-        name: name_quantity(name, value, value - SIDE * deviation, value + SIDE * deviation)
-        for name, value, deviation in zip(PLACEMENT_NAMES, fit.state, errors)
+        name: name_estimate(name, value, error)
+        for name, value, error in zip(PLACEMENT_NAMES, fit.state, errors)
     }
+    values |= placed
     noise = float(np.median(fit.noise))
     limit = noise * find_changed_points(maps.depth / maps.noise, model.known).limit
     datum = Datum(float(fit.unworn.mean()), noise, 0.0, 1.0, limit)
@@ -241,9 +226,10 @@ def _measure(
 
 def _align_calibrated(
     before: Areal, after: Areal
-) -> tuple[ScanModel | None, Fit | None, tuple[str, bool], float]:
-    """Align two scans; returns the gain of the instrument too, by which the heights of the second one are divided."""
+) -> tuple[ScanModel | None, Fit | None, tuple[str, bool], tuple[float, float]]:
+    """Align two scans; returns the gain by which the heights of the second one are divided, and its error, too."""
     total = 1.0
+    error = MODEL_ERROR
     for _ in range(MAX_GAINS):
         model, fit, variant = _align(before, replace(after, z=after.z / total))
         if fit is None:
@@ -252,7 +238,7 @@ def _align_calibrated(
         if not is_other_gain(gain, error):
             break
         total *= gain
-    return model, fit, variant, total
+    return model, fit, variant, (total, min(error, MODEL_ERROR))
 
 
 def _measure_gain(model: ScanModel, fit: Fit) -> tuple[float, float]:
@@ -322,18 +308,18 @@ def _estimate_error(model: ScanModel, maps: ScanMaps, part) -> float:
     return float(np.sqrt(variance * (plane + part.sum() * tile_size) + noise**2))
 
 
-def _measure_largest(maps: ScanMaps) -> Quantity:
-    """Return the largest median of 3 x 3 depths, without the bias of a maximum."""
+def _measure_largest(maps: ScanMaps) -> dict[str, Quantity]:
+    """Return the largest depth by medians of 3 x 3 depths, and its place."""
     smooth = np.where(maps.worn, ndimage.median_filter(maps.depth, 3), -np.inf)
-    at = np.unravel_index(np.argmax(smooth), smooth.shape)
-    noise = maps.noise[at] if np.isfinite(maps.noise[at]) else float(np.nanmedian(maps.noise))
-    sigma = 0.5 * noise  # of a median of nine heights, with their correlation
-    near = max(int((smooth > smooth[at] - 2 * sigma).sum()), 1)
-    bias = float(np.sqrt(2 * np.log(near)) / 2 * sigma)
-    value = float(smooth[at]) - bias
-    window = maps.depth[max(at[0] - 1, 0) : at[0] + 2, max(at[1] - 1, 0) : at[1] + 2]
-    high = max(float(window.max()), value) + SIDE * sigma
-    return name_quantity("worn_depth_max", value, max(value - bias - SIDE * sigma, 0.0), high)
+    noise = np.where(np.isfinite(maps.noise), maps.noise, np.nanmedian(maps.noise))
+    depth = np.where(maps.worn, maps.depth, -np.inf)
+    largest, _ = find_largest(depth, smooth, MEDIAN_ERROR * noise, (1.0, MODEL_ERROR))
+    row, column = np.unravel_index(np.argmax(smooth), smooth.shape)
+    return {
+        "worn_depth_max": largest,
+        "worn_depth_max_x": name_quantity("worn_depth_max_x", maps.x[column], None, None),
+        "worn_depth_max_y": name_quantity("worn_depth_max_y", maps.y[row], None, None),
+    }
 
 
 def _measure_track(before: Areal, model: ScanModel, maps: ScanMaps) -> Track | None:

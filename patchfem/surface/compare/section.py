@@ -5,9 +5,10 @@ A trace is one section; a scan gives the mean of several across its track.
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 
 import numpy as np
-from scipy import signal
+from scipy import ndimage, signal
 
 from ..quantity import SIDE, Quantity
 from .fit import Fit
@@ -80,13 +81,14 @@ class Section:
         return np.where(bend > MIN_WALL * self.noise, WALL_ERROR * self.widths * bend, 0.0)
 
     def integrate(self, inside, sign: float = 1.0) -> tuple[float, float]:
-        """Integrate the depth over samples (n,) bool; return the area [m2] and its standard deviation."""
+        """Integrate the depth over samples (n,) bool; return the area [m2] and its standard deviation, gain included."""
         weights = np.where(inside, self.widths, 0.0)
         gaps = self.gap_errors[inside[1:] & inside[:-1]]
         walls = self.wall_errors[inside]
         variance = np.var(self.draws @ weights) + gaps @ gaps + walls @ walls
         error = SCATTER_FACTOR * np.sqrt(variance + self.drift * weights.sum())
-        return sign * float(weights @ self.depth), float(error)
+        area = float(weights @ self.depth)
+        return sign * area, float(np.hypot(error, self.model_error * area))
 
 
 def make_section(x, second, fit: Fit, gain_error: float = 0.0) -> Section:
@@ -171,22 +173,65 @@ def measure_hidden_area(section: Section) -> float:
     return excess * UNWORN_LIMIT * float(np.median(section.noise)) * float(section.widths.sum())
 
 
-def measure_largest(section: Section, name: str) -> Quantity:
-    """Measure the largest depth of short parabolas, without the bias of the maximum of noisy depths.
-
-    The largest of n values with normal errors is too large by about sigma sqrt(2 log n). The upper end
-    of the interval contains every single depth there, because a crest may be worn as deep.
-    """
+def measure_largest(section: Section) -> tuple[Quantity, Quantity]:
+    """Measure the largest depth of the worn parts, by short parabolas, and its place."""
     depth = section.depth
-    size = min(PARABOLA_SAMPLES, depth.size)
-    smooth = signal.savgol_filter(depth, size, 2)
     is_sure = section.noise < MAX_NOISE_RATIO * np.median(section.noise)
-    top = int(np.argmax(np.where(is_sure, smooth, -np.inf)))
-    sigma = float(np.hypot(section.draws[:, top].std(), PARABOLA_ERROR * section.noise[top]))
-    near = max((smooth > smooth[top] - 2 * sigma).sum() / section.correlation, 1.0)
-    bias = float(np.sqrt(2 * np.log(near)) / 2 * sigma)
-    value = smooth[top] - bias
-    sigma = float(np.hypot(SCATTER_FACTOR * sigma, section.model_error * abs(value)))
-    raw = depth[max(top - 2, 0) : top + 3].max()
-    low = value - bias - SIDE * sigma
-    return name_quantity(name, value, max(low, 0.0), max(raw, value) + SIDE * sigma)
+    if (is_sure & section.worn).any():
+        is_sure &= section.worn
+    smooth = signal.savgol_filter(depth, min(PARABOLA_SAMPLES, depth.size), 2)
+    # A parabola across a wall overshoots the depths on both sides of it.
+    smooth = np.minimum(smooth, ndimage.maximum_filter1d(depth, PARABOLA_SAMPLES))
+    errors = np.hypot(section.draws.std(axis=0), PARABOLA_ERROR * section.noise)
+    largest, near = find_largest(
+        np.where(is_sure, depth, -np.inf),
+        np.where(is_sure, smooth, -np.inf),
+        errors,
+        (section.correlation, section.model_error),
+    )
+    places = (
+        section.x[int(np.argmax(np.where(is_sure, smooth, -np.inf)))],
+        *section.x[near][[0, -1]],
+    )
+    return largest, name_quantity("worn_depth_max_at", *places)
+
+
+def find_largest(
+    depth, smooth, errors, scatter: tuple[float, float]
+) -> tuple[Quantity, np.ndarray]:
+    """Measure the largest depth without the bias of the maximum of noisy depths.
+
+    The largest of n smooth depths with normal errors is too large by about sigma sqrt(2 log n). The upper end of the
+    interval contains every single depth, because a crest may be worn as deep, and both ends what the samples do not
+    resolve: the part of the largest depth that every second sample does not show.
+
+    Parameters
+    ----------
+    depth, smooth : (n,) or (m, n) array [m]
+        Single and smooth depths of the worn parts; -inf elsewhere.
+    errors : (n,) or (m, n) array [m]
+        Standard deviations of the smooth depths.
+    scatter : tuple of float
+        Number of neighbouring depths that share an error, and relative standard deviation of all depths.
+
+    Returns
+    -------
+    Quantity
+        Largest depth [m].
+    array
+        Mask (n,) or (m, n) of the places that are as deep but for the noise.
+    """
+    correlation, model_error = scatter
+    top = np.unravel_index(np.argmax(smooth), smooth.shape)
+    sigma = float(errors[top])
+    near = smooth > smooth[top] - 2 * sigma
+    bias = float(np.sqrt(2 * np.log(max(near.sum() / correlation, 1.0))) / 2 * sigma)
+    value = float(smooth[top]) - bias
+
+    crest = float(depth.max())
+    halves = product((slice(0, None, 2), slice(1, None, 2)), repeat=depth.ndim)
+    coarser = float(np.mean([depth[part].max() for part in halves]))
+    unresolved = crest - coarser if np.isfinite(coarser) else 0.0
+    error = SIDE * float(np.hypot(SCATTER_FACTOR * sigma, model_error * abs(value))) + unresolved
+    low = max(value - bias - error, 0.0)
+    return name_quantity("worn_depth_max", value, low, max(crest, value) + error), near

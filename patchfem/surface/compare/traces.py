@@ -6,7 +6,6 @@ parabolic datum.
 """
 
 from functools import cached_property
-from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -15,11 +14,10 @@ from scipy.interpolate import CubicSpline
 
 from ..profile import Profile, robust_deviation
 from . import changes
+from .search import correlate, find_datum, whiten
 from .statistics import (
-    TINY,
     UNWORN_LIMIT,
     estimate_correlation,
-    find_mode,
     remove_long_waves,
     solve_biweight_step,
 )
@@ -39,9 +37,6 @@ MAX_SEARCH_SAMPLES = 4000  # number of samples of the longer trace in the search
 CLEAR_SIGNIFICANCE = 20.0  # significance of a place beyond which no other one is tried
 MIN_SIGNIFICANCE = 8.0  # significance of a place that no unrelated traces have
 CLEAR_LEAD = 1.3  # significance of a place relative to that of the next one, which makes it clear
-MAX_SCALE = 4.0  # scale of a datum relative to the smallest one, up to which it is compared
-N_LINES = 300  # number of datums that are improved by concentration steps
-MAX_DATUM_SAMPLES = 2000  # number of samples from which the datum is found
 
 
 class Place(NamedTuple):
@@ -120,7 +115,7 @@ def _search_shift(first: Waves, second: Waves, stretch: float, *, is_mirrored: b
     """Return the best shifts of the second trace with a given stretch, for each version of the waves."""
     places = []
     for versions in zip(first.versions, second.versions):
-        for lag, significance in _correlate(*versions):
+        for lag, significance in _find_peaks(*versions):
             shift = second.start - first.start - lag * first.step
             places.append(Place(float(shift), float(stretch), is_mirrored, significance))
     return places
@@ -134,36 +129,23 @@ def _filter_waves(x, z, step: float) -> Waves:
     whole = np.clip(z, -3 * sigma, 3 * sigma)
     valleys = np.minimum(whole, np.median(z))
     # Without their periods, turned surfaces differ from one feed to the next.
-    spectrum = np.fft.rfft(whole * signal.windows.tukey(z.size, 0.1))
-    size = np.abs(spectrum)
-    white = np.fft.irfft(spectrum / (size + np.median(size) + TINY), z.size)
+    white = whiten(whole * signal.windows.tukey(z.size, 0.1))
     versions = (whole, valleys, white)
     return Waves(places[0], step, tuple(version - version.mean() for version in versions))
 
 
-def _correlate(first, second) -> list[tuple[float, float]]:
+def _find_peaks(first, second) -> list[tuple[float, float]]:
     """Return the lags (in samples) of the highest peaks of the correlation, and their significance."""
-    size = first.size + second.size
-    transforms = [np.fft.rfft(values, size) for values in (first, first**2, np.ones(first.size))]
-    others = [
-        np.fft.rfft(values, size).conj() for values in (second, second**2, np.ones(second.size))
-    ]
-    product, count, power1, power2 = (
-        np.fft.irfft(transforms[i] * others[k], size) for i, k in ((0, 0), (2, 2), (1, 2), (2, 1))
-    )
-    usable = np.flatnonzero(count > MIN_OVERLAP * min(first.size, second.size))
-    norm = np.sqrt(np.maximum(power1[usable] * power2[usable], 1e-12 * power1.max() * power2.max()))
-    fisher = np.arctanh(np.clip(product[usable] / (norm + TINY), -0.9999, 0.9999)) * np.sqrt(
-        count[usable]
-    )
-    scatter = max(robust_deviation(fisher - np.median(fisher)), 1e-12)
+    significance = correlate(first, second, MIN_OVERLAP)
     peaks = []
     for _ in range(N_PEAKS):
-        best = int(np.argmax(fisher))
-        lag = usable[best] if usable[best] < first.size else usable[best] - size
-        peaks.append((float(lag), float(fisher[best] / scatter)))
+        best = int(np.argmax(significance))
+        lag = best if best < first.size else best - significance.size
+        peaks.append((float(lag), float(significance[best])))
         # The neighbourhood of a peak belongs to it, on a periodic surface up to the next period.
-        fisher[max(best - int(MAX_LAG / 2), 0) : best + int(MAX_LAG / 2)] = -np.inf
+        significance[
+            (best + np.arange(-MAX_LAG / 2, MAX_LAG / 2)).astype(int) % significance.size
+        ] = -np.inf
     return peaks
 
 
@@ -266,45 +248,10 @@ class TraceModel:
         return values - ndimage.gaussian_filter1d(values, self.smoothing, axis=0)
 
     def find_datum(self, state, degree: int) -> np.ndarray:
-        """Return the state with the polynomial datum on which the unworn heights lie.
-
-        Polynomials through the modes of some blocks are improved by concentration steps of least trimmed
-        squares (Rousseeuw and Van Driessen 1999). Among those with a small scale, the best one has an
-        unworn end of the trace, few heights above it, as wear does not raise a surface, and many on it.
-        """
-        thin = slice(None, None, max(self.x.size // MAX_DATUM_SAMPLES, 1))
-        u = self.u[thin]
-        depth = self.compute_depth(state)[thin]
-        blocks = np.array_split(np.arange(u.size), N_BLOCKS)
-        centers = np.array([u[block].mean() for block in blocks])
-        modes = np.array([find_mode(depth[block]) for block in blocks])
-        subsets = np.array(list(combinations(range(N_BLOCKS), degree + 1)))
-        vander = np.vander(centers, degree + 1, increasing=True)
-        datums = np.linalg.solve(vander[subsets], -modes[subsets][..., None])[..., 0]
-        base = np.vander(u, degree + 1, increasing=True)
-        datums = datums[np.argsort(_scale_datums(datums, base, depth))[:N_LINES]]
-
-        for _ in range(2):
-            residual = np.abs(depth + datums @ base.T)
-            nearest = np.argpartition(residual, u.size // 5, axis=1)[:, : u.size // 5]
-            rows = base[nearest]
-            normal = np.einsum("kni,knj->kij", rows, rows)
-            right = -np.einsum("kni,kn->ki", rows, depth[nearest])
-            datums = np.linalg.solve(normal, right[..., None])[..., 0]
-        scales = _scale_datums(datums, base, depth)
-        known = np.flatnonzero(scales <= MAX_SCALE * scales.min())
-        relative = (depth + datums[known] @ base.T) / max(scales.min(), 1e-15)
-        agrees = np.abs(relative) < 5
-        end = max(u.size // 20, 4)
-        has_end = np.maximum(agrees[:, :end].mean(axis=1), agrees[:, -end:].mean(axis=1)) > 0.7
-        grown = np.round((relative < -10).mean(axis=1), 1)
-        best = known[np.lexsort((-agrees.mean(axis=1), grown, ~has_end))[0]]
-
+        """Return the state with the polynomial datum on which the unworn heights lie."""
+        base = np.vander(self.u, degree + 1, increasing=True)
+        parts = np.array_split(np.arange(self.u.size), N_BLOCKS)
         state = state.copy()
-        state[2 : 3 + degree] += datums[best]
+        depth = self.compute_depth(state)
+        state[2 : 3 + degree] += find_datum(base, depth, parts, [parts[0], parts[-1]])
         return state
-
-
-def _scale_datums(datums, base, depth) -> np.ndarray:
-    """Return the distance (k,) [m] within which a fifth of the depths lie, for each datum (k, degree + 1)."""
-    return np.quantile(np.abs(depth + datums @ base.T), 0.2, axis=1)

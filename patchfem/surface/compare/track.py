@@ -10,7 +10,7 @@ import numpy as np
 
 from ..profile import find_runs
 from ..quantity import SIDE, Quantity
-from .records import Track, name_quantity, name_unknown
+from .records import Track, name_estimate, name_quantity, name_unknown
 from .section import Section
 from .statistics import UNWORN_LIMIT
 
@@ -38,6 +38,9 @@ SHALLOW_SAMPLES = 60  # number of samples of a flank that stays below FLANK_HEIG
 MAX_CANDIDATES = 80  # number of places that are tried as an end
 END_STEPS = 2  # number of samples beyond the likely places that belong to the interval of an end
 MAX_SQUARE = 16.0  # squared residual of a single depth beyond which it counts no more
+RIDGE_TAIL = 0.5  # length of the low outer flank of a ridge relative to what is found as grown
+N_STEP_PARTS = 3  # parts of the middle third of a track, which a flat bottom has equally deep
+MAX_UNEVENNESS = 0.02  # largest difference of their depths, relative to the depth, on a flat bottom
 N_FIFTHS = 5  # number of parts of a track, of which the deepest is the floor
 
 
@@ -211,8 +214,19 @@ def _fit_flanks(x, depths, places, correlation: float) -> np.ndarray:
     return deviance / max(correlation, float(deviance[0].min()) / x.size)
 
 
-def measure_track(section: Section, span: tuple[int, int]) -> Track:
-    """Measure a track: its ends, width, depths, areas and the material beside it."""
+def measure_track(
+    section: Section, span: tuple[int, int], lost: tuple[float, float, float] | None = None
+) -> Track:
+    """Measure a track: its ends, width, depths, areas and the material beside it.
+
+    Parameters
+    ----------
+    section : Section
+    span : tuple of int
+        First and last worn sample.
+    lost : tuple of float, optional
+        Area lost in the track [m2] and its interval; by default, what is lost between its ends.
+    """
     start, end = find_ends(section, span)
     x = section.x
     width = max(end.value - start.value, float(np.median(section.widths)))
@@ -221,36 +235,37 @@ def measure_track(section: Section, span: tuple[int, int]) -> Track:
     longer = start.value - start.low + end.high - end.value
     widths = name_quantity("width", width, max(width - shorter, 0.0), width + longer)
 
-    # The ends are uncertain by the area between the bounds of their intervals.
-    area, error = section.integrate((x >= start.value) & (x <= end.value) & ~section.grown)
-    for place in (start, end):
-        near = section.integrate((x >= place.low) & (x <= place.high))[0]
-        error = float(np.hypot(error, near / (2 * SIDE)))
+    if lost is None:
+        area, error = section.integrate((x >= start.value) & (x <= end.value) & ~section.grown)
+        # The ends are uncertain by the area between the bounds of their intervals.
+        for place in (start, end):
+            near = section.integrate((x >= place.low) & (x <= place.high))[0]
+            error = float(np.hypot(error, near / (2 * SIDE)))
+        gross = name_estimate("area_gross", area, error, 0.0)
+    else:
+        area = lost[0]
+        error = (lost[2] - area) / SIDE
+        gross = name_quantity("area_gross", *lost)
     mean = area / width
     mean_error = float(np.hypot(error / width, mean * max(shorter, longer) / SIDE / width))
     values = {
         "from": name_quantity("from", *start),
         "to": name_quantity("to", *end),
         "width": widths,
-        "depth_mean": _bound("depth_mean", mean, mean_error),
+        "depth_mean": name_estimate("depth_mean", mean, mean_error, 0.0),
         "depth_floor": _measure_floor(section, start.value, width),
-        "step": _average(section, "step", start.value + width / 3, end.value - width / 3),
-        "area_gross": _bound("area_gross", area, error),
+        "step": _measure_step(section, start.value, width),
+        "area_gross": gross,
     }
-    left = _measure_pile_up(section, "pile_up_left", start.value, -width)
-    right = _measure_pile_up(section, "pile_up_right", end.value, width)
+    left = _measure_pile_up(section, "pile_up_left", start, -width)
+    right = _measure_pile_up(section, "pile_up_right", end, width)
     piled = left.value + right.value
     piled_error = float(np.hypot(left.high - left.value, right.high - right.value)) / SIDE
     values |= {
-        "pile_up": _bound("pile_up", piled, piled_error),
+        "pile_up": name_estimate("pile_up", piled, piled_error, 0.0),
         "pile_up_left": left,
         "pile_up_right": right,
-        "area_net": name_quantity(
-            "area_net",
-            area - piled,
-            area - piled - SIDE * np.hypot(error, piled_error),
-            area - piled + SIDE * np.hypot(error, piled_error),
-        ),
+        "area_net": name_estimate("area_net", area - piled, float(np.hypot(error, piled_error))),
     }
 
     # Where the section cuts the track off, its end and what lies beyond are unknown.
@@ -265,11 +280,6 @@ def measure_track(section: Section, span: tuple[int, int]) -> Track:
     return Track(values, cut)
 
 
-def _bound(name: str, value: float, error: float) -> Quantity:
-    """Return a quantity that cannot be negative with the interval of a standard deviation."""
-    return name_quantity(name, value, max(value - SIDE * error, 0.0), value + SIDE * error)
-
-
 def _average(section: Section, name: str, first: float, last: float) -> Quantity:
     """Return the mean depth between two places."""
     inside = (section.x >= first) & (section.x <= last)
@@ -277,7 +287,19 @@ def _average(section: Section, name: str, first: float, last: float) -> Quantity
         inside[int(np.argmin(np.abs(section.x - (first + last) / 2)))] = True
     area, error = section.integrate(inside)
     length = float(section.widths[inside].sum())
-    return _bound(name, area / length, error / length)
+    return name_estimate(name, area / length, error / length, 0.0)
+
+
+def _measure_step(section: Section, start: float, width: float) -> Quantity:
+    """Return the mean depth of the middle third of the width, if its three parts are equally deep."""
+    edges = start + width * np.arange(N_STEP_PARTS, 2 * N_STEP_PARTS + 1) / 3 / N_STEP_PARTS
+    parts = [_average(section, "step", *ends) for ends in pairwise(edges)]
+    depths = [part.value for part in parts]
+    step = _average(section, "step", edges[0], edges[-1])
+    error = max(part.high - part.value for part in parts)
+    if max(depths) - min(depths) > MAX_UNEVENNESS * step.value + error:
+        return name_unknown("step", "not_flat")
+    return step
 
 
 def _measure_floor(section: Section, start: float, width: float) -> Quantity:
@@ -287,27 +309,33 @@ def _measure_floor(section: Section, start: float, width: float) -> Quantity:
     return max(parts, key=lambda part: part.value)
 
 
-def _measure_pile_up(section: Section, name: str, end: float, width: float) -> Quantity:
+def _measure_pile_up(section: Section, name: str, end: End, width: float) -> Quantity:
     """Return the area above the first surface beside a track.
 
-    The flanks of the ridge, which are too low to be found as grown, count as well: the one towards the track, and one of
-    the same length behind the ridge.
+    It reaches from the end of the track to behind the ridge, whose low flanks are not found as grown. Where nothing is
+    found as grown, the upper limit is what the noise may hide beside the track.
 
     Parameters
     ----------
     section : Section
     name : str
-    end : float
-        End of the track [m].
+    end : End
+        End of the track.
     width : float
         Length [m] beside the track that is searched, negative before the track.
     """
-    low, high = sorted((end, end + width))
-    side = (section.x >= low) & (section.x <= high)
-    grown = section.x[side & section.grown]
+    distance = (section.x - end.value) * np.sign(width)
+    is_beside = (distance >= 0) & (distance <= abs(width))
+    grown = distance[is_beside & section.grown]
     if not grown.size:
-        return _bound(name, 0.0, 0.0)
-    flank = float(np.abs(grown - end).min())
-    inside = side & (section.x >= grown.min() - flank) & (section.x <= grown.max() + flank)
-    area, error = section.integrate(inside, -1.0)
-    return _bound(name, area, error)
+        near = is_beside & (distance <= FLANK_FRACTION * abs(width))
+        area, error = section.integrate(near, -1.0)
+        return name_quantity(name, 0.0, 0.0, max(area, 0.0) + SIDE * error)
+
+    tail = max(float(grown.min()), RIDGE_TAIL * float(np.ptp(grown)))
+    inside = is_beside & (distance <= grown.max() + tail)
+    # A ridge may begin anywhere in the interval of the end.
+    is_end = (section.x >= end.low) & (section.x <= end.high) & (section.depth < 0)
+    area, error = section.integrate(inside | is_end, -1.0)
+    beginning = section.integrate(is_end, -1.0)[0]
+    return name_estimate(name, area, float(np.hypot(error, beginning / (2 * SIDE))), 0.0)

@@ -11,7 +11,7 @@ from ..quantity import SIDE, Quantity
 from ..roughness.filter import filter_trace
 from ..roughness.report import fitting_cutoff
 from ..roughness.spectrum import BAND
-from .records import TraceCurves, name_quantity, name_unknown
+from .records import DEFINITIONS, TraceCurves, name_quantity, name_unknown
 
 MAX_BLOCKS = 12  # largest number of blocks whose ratios show the scatter of a ratio
 MIN_BLOCKS = 4  # smallest number of blocks
@@ -23,6 +23,8 @@ RATIO_ERROR = 0.004  # standard deviation of a ratio due to tip, interpolation a
 MAX_NOISE_FRACTION = 0.5  # noise relative to the size of the surface above which a ratio is unknown
 MIN_CUTOFFS = 2.0  # smallest length of a piece in cut-offs, half of one is trimmed at each end
 MIN_WAVES = 3.0  # smallest length of a trace relative to the longest wave of the band
+# Sizes of the roughness in a track.
+ROUGHNESS_NAMES = ("Ra", "Rq", "slope")
 MIN_STEPS = 4.0  # smallest length of the shortest wave of the band in steps
 
 
@@ -51,7 +53,6 @@ def compare_waves(lines: list[np.ndarray], step: float, noise: float) -> dict[st
     count = int(np.clip(length / (BLOCK_WAVES * BAND[1]), MIN_BLOCKS, MAX_BLOCKS))
     if min(len(line) for line in lines) >= MAX_BLOCKS:
         count = MAX_BLOCKS  # groups of lines
-    student = float(special.stdtrit(count - 1, 0.975))
     values = {}
     for name, sizes, error in (
         ("amplitude_ratio", passed, band_noise),
@@ -62,13 +63,28 @@ def compare_waves(lines: list[np.ndarray], step: float, noise: float) -> dict[st
         if not totals.min() > 0 or error**2 > MAX_NOISE_FRACTION * totals.min():
             values[name] = name_unknown(name, "noise")
             continue
-        ratio = float(np.sqrt(totals[1] / totals[0]))
-        # Linearised ratio of two means: the scatter of its numerator and denominator together.
-        influence = blocks[1] / totals[1] - blocks[0] / totals[0]
-        scatter = influence.std(ddof=1) / np.sqrt(count) / 2
-        width = student * float(np.hypot(scatter, RATIO_ERROR))
-        values[name] = name_quantity(name, ratio, ratio * np.exp(-width), ratio * np.exp(width))
+        ratio = _divide_means(*blocks, 0.5, DEFINITIONS[name][1])
+        values[name] = ratio._replace(name=name)
     return values
+
+
+def _divide_means(before, after, power: float, text: str) -> Quantity:
+    """Return the ratio of the means of blocks (k,), after divided by before, to a power; text: its definition.
+
+    Both surfaces have the same blocks, so the scatter of the ratio does not contain that of the surface.
+    """
+    first = before.mean()
+    second = after.mean()
+    ratio = float((second / first) ** power)
+    if len(before) < 2:
+        return Quantity(ratio, None, None, "1", text)
+    # Linearised ratio of two means: the scatter of its numerator and denominator together.
+    influence = after / second - before / first
+    scatter = power * influence.std(ddof=1) / np.sqrt(len(before))
+    student = float(special.stdtrit(len(before) - 1, 0.975))
+    width = student * float(np.hypot(scatter, RATIO_ERROR))
+    ends = ratio * np.exp(np.array([-width, width]))
+    return Quantity(ratio, *ends.tolist(), "1", text)
 
 
 def _pass_band(z, step: float) -> np.ndarray:
@@ -89,7 +105,7 @@ def measure_roughness(curves: TraceCurves, spans) -> tuple[dict, float | None]:
     Returns
     -------
     regions : dict
-        {"inside", "outside": {"before", "after": {name: Quantity}}}; {} if a region is too short.
+        {"inside", "outside": {"before", "after", "ratio": {name: Quantity}}}; {} if a region is too short.
     cutoff : float or None
         Cut-off [m] that fits both regions.
     """
@@ -107,18 +123,21 @@ def measure_roughness(curves: TraceCurves, spans) -> tuple[dict, float | None]:
         return {}, None
     regions = {}
     for region, group in groups.items():
-        sides = {
-            side: _pool(curves.x, z, group, cutoff)
-            for side, z in (("before", curves.before), ("after", curves.after))
-        }
-        if not all(sides.values()):
+        tables = [
+            _tabulate_sections(curves.x, z, group, cutoff) for z in (curves.before, curves.after)
+        ]
+        if not all(table.size for table in tables):
             return {}, None
-        regions[region] = sides
+        regions[region] = {
+            "before": _pool(tables[0]),
+            "after": _pool(tables[1]),
+            "ratio": _divide(*tables),
+        }
     return regions, cutoff
 
 
-def _pool(x, z, pieces, cutoff: float) -> dict[str, Quantity]:
-    """Pool the sizes of pieces of a trace; their scatter over sections of one cut-off gives the interval."""
+def _tabulate_sections(x, z, pieces, cutoff: float) -> np.ndarray:
+    """Return Ra [m], mean square height [m2] and mean square slope (k, 3) of the sections of one cut-off."""
     step = float(np.median(np.diff(x)))
     sections = []
     for first, last in pieces:
@@ -134,15 +153,27 @@ def _pool(x, z, pieces, cutoff: float) -> dict[str, Quantity]:
         for part in np.array_split(rough, count):
             slope = np.mean(np.diff(part) ** 2) / step**2
             sections.append((np.abs(part).mean(), np.mean(part**2), slope))
-    if not sections:
-        return {}
-    table = np.array(sections)
+    return np.array(sections)
+
+
+def _pool(table) -> dict[str, Quantity]:
+    """Return the sizes of sections (k, 3) together; their scatter gives the intervals."""
     means = table.mean(axis=0)
     errors = SIDE * table.std(axis=0, ddof=1) / np.sqrt(len(table)) if len(table) > 1 else means
     out = {}
-    for k, name in enumerate(("Ra", "Rq", "slope")):
+    for k, name in enumerate(ROUGHNESS_NAMES):
         bounds = np.array([means[k], max(means[k] - errors[k], 0.0), means[k] + errors[k]])
         if name != "Ra":
             bounds = np.sqrt(bounds)
         out[name] = name_quantity(name, *bounds)
+    return out
+
+
+def _divide(before, after) -> dict[str, Quantity]:
+    """Return the ratios of the sizes of sections (k, 3), after divided by before, with their intervals."""
+    out = {}
+    for k, name in enumerate(ROUGHNESS_NAMES):
+        text = f"{DEFINITIONS[name][1]}, after wear divided by before"
+        power = 1.0 if name == "Ra" else 0.5
+        out[name] = _divide_means(before[:, k], after[:, k], power, text)
     return out

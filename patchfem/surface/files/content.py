@@ -31,7 +31,7 @@ _FIRST_BYTES = {  # format of a file by its first bytes
     b"\xff\xfe": "text",
     b"\xfe\xff": "text",
 }
-TEXT_SUFFIXES = (".txt", ".csv", ".tsv", ".dat", ".prn", ".asc", ".xyz", ".prf")
+TEXT_SUFFIXES = (".txt", ".csv", ".tsv", ".dat", ".prn", ".xyz", ".prf")
 DAMAGED = "the file is cut off or damaged; save or export it anew"
 
 

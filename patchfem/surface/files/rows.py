@@ -89,8 +89,8 @@ def read_rows(
 
 def _find_delimiter(line: str, expected: str | None, width: int) -> str | None:
     """Return the delimiter of the first row, which may differ from that of the header."""
-    found = split_cells(line)
-    return found.delimiter if len(found.cells) == width else expected
+    cells, delimiter = split_cells(line)
+    return delimiter if len(cells) == width else expected
 
 
 def _parse_cells(

@@ -1,4 +1,4 @@
-"""Units, names of columns and facts of a header, as files, instruments and users write them."""
+"""Units and names of columns, as files and users write them."""
 
 import math
 import re
@@ -32,39 +32,11 @@ _COLUMN_NAMES = {
     "y": "y, y axis, y-achse, position y",
     "z": "z, z axis, z-achse, height, heights, höhe, hoehe, profile, profil",
     "index": "index, no, no., nr, nr., number, nummer, sample, point, punkt, #",
-    "valid": "valid, gültig",
 }
 ROLES = {name: role for role, names in _COLUMN_NAMES.items() for name in names.split(", ")}
 # Cells that stand for a column without a unit in a line of units.
-NO_UNIT = ("", "-", "[-]", "1", "[1/0]")
+NO_UNIT = ("", "-", "[-]", "1")
 MISSING = re.compile(r"(?:[+-]?nan|\*+|bad)?", re.IGNORECASE)  # height that was not measured
-
-# Facts about a matrix of heights, and the words for each of them before a colon or an equals sign, in
-# texts of Gwyddion, SPIP, Attocube and Nova.
-_FACT_WORDS = {
-    "width": "width|breite|x[- ]length|x[- ]länge",
-    "height": "height|höhe|y[- ]length|y[- ]länge",
-    "columns": "x-pixels|nx|w",
-    "rows": "y-pixels|ny|h",
-    "step_x": "pixel[ _]size(?: x)?|pixelgröße(?: x)?|scale x|x[- ]step|step x|x[- ]spacing|spacing x|x-schrittweite",
-    "step_y": "pixel[ _]size y|pixelgröße y|scale y|y[- ]step|step y|y[- ]spacing|spacing y|y-schrittweite",
-    "lateral": "lateral units?|laterale einheit(?:en)?|x[- ]unit|unit x|x-einheit",
-    "lateral_y": "y[- ]unit|unit y|y-einheit",
-    "value": "value units?|einheiten|wert-?einheit(?:en)?|z[- ]unit|unit (?:z|data)|z-einheit",
-    "bit2nm": "bit2nm",
-    "format": "file format",
-    "scale": "scale data",
-    "is_scaled": "datascaleneeded",
-    "factor": r"height\s+conversion\s+factor",
-}
-FACTS = {
-    name: re.compile(
-        rf"(?<![\w-])(?:{words})\s*(?:\(->\s*(?P<unit>\w+)\s*\))?\s*[:=：](?P<value>.*)",
-        re.IGNORECASE,
-    )
-    for name, words in _FACT_WORDS.items()
-}
-GERMAN = re.compile("breite|höhe|länge|größe|schritt", re.IGNORECASE)
 
 GIVE_UNITS = 'state the units of x and z by --units "mm,um" (in Python, by units=("mm", "um"))'
 GIVE_PIXEL_SIZE = 'give the pixel size in place of the unit of x, as in --units "0.8 um,um"'

@@ -19,7 +19,7 @@ import numpy as np
 from ...core import PatchfemError
 from ...formatting import format_length
 from .content import Content
-from .header import Fact, Header, has_column_names, parse_column, read_facts, read_header
+from .header import Column, Header, parse_fact, read_header
 from .rows import read_rows
 from .spellings import HEADER_EXAMPLE, SIZE_LINES, parse_length_unit, shorten
 from .table import Table, find_printed_digit
@@ -30,7 +30,6 @@ MAX_UNEVEN = 1e-6
 MIN_DIGIT = 1e-5  # smallest printed digit of x of a Dektak export, in the unit of the file
 # Largest distance of a rounded position from the true one, in printed digits: a half, and round-off.
 MAX_STEP_ERROR = 0.6
-UNKNOWN = Fact()
 _QUOTED_NUMBER = re.compile(r'"\s*([+-]?[0-9]*),([0-9]+(?:[eE][+-]?[0-9]+)?)\s*"')
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
 _DEKTAK_START = "Scan Parameters"
@@ -49,10 +48,12 @@ def read_text(content: Content, units: tuple[str, str] | None = None) -> Table:
     if text.startswith(_DEKTAK_START):
         text, length = _translate_dektak(path, text)
     header, lines = read_header(path, enumerate(io.StringIO(text), 1))
-    facts = read_facts(path, header) if header.row else {}
-    if header.row and _is_matrix(len(header.row), header.names, facts):
-        return _read_matrix(path, header, facts, lines)
-    table = _read_columns(path, header, facts, lines, has_units=units is not None)
+    is_sized = {"width", "height"} <= header.facts.keys() or (
+        header.count == 1 and "width" in header.facts
+    )
+    if not header.columns and (header.count > 3 or is_sized):
+        return _read_matrix(path, header, lines)
+    table = _read_columns(path, header, lines, has_units=units is not None)
     return table if length is None else _restore_step(table, length)
 
 
@@ -75,63 +76,45 @@ def _decode(content: Content) -> str:
 
 
 def _read_columns(
-    path,
-    header: Header,
-    facts: dict[str, Fact],
-    lines: Iterator[tuple[int, str]],
-    *,
-    has_units: bool,
+    path, header: Header, lines: Iterator[tuple[int, str]], *, has_units: bool
 ) -> Table:
-    """Read columns x, (y) and z."""
-    names = header.names
-    width = len(names or header.row)
+    """Read the columns x and z of a trace, or x, y and z of points of a surface."""
     place = f"{path}:{header.number}"
-    if width < 2:
-        raise PatchfemError(
-            f"{place}: only one column, '{shorten(header.row[0])}', but x and z are needed; {HEADER_EXAMPLE}"
-        )
-    names = names or (["x", "z"] if width == 2 else ["x", "y", "z"])
-    roles, notes = _find_roles(place, names, has_units=has_units)
+    if (header.count or len(header.columns)) < 2:
+        raise PatchfemError(f"{place}: only one column, but x and z are needed; {HEADER_EXAMPLE}")
+    unnamed = [Column(role) for role in ("xz" if header.count == 2 else "xyz")]
+    columns, notes = _find_roles(place, header.columns or unnamed, has_units=has_units)
+    roles = [column.role for column in columns]
     numbers, row_lines = read_rows(path, lines, roles, header.delimiter)
 
-    columns = {}
+    values = {}
     units = {}
-    for k, role in enumerate(roles):
-        columns[role] = numbers[:, k]
-        units[role] = parse_column(names[k]).unit
-        if units[role] is None:
-            fact = facts.get("value" if role == "z" else "lateral", UNKNOWN).word or None
-            units[role] = header.units[k] if header.units else fact
-    columns = {role: columns[role] for role in ("x", "y", "z", "valid") if role in columns}
-    if "valid" in columns:
-        columns["z"] = np.where(columns.pop("valid") == 0, np.nan, columns["z"])
-    named = {parse_column(name).role for name in header.names}
-    if "y" in columns and not named >= {"x", "y"} and _is_sample_count(columns["x"], columns["y"]):
-        columns["x"] = columns.pop("y")
-        units["x"] = units["y"]
-        notes += (
-            f"{path}: the first column numbers the samples; x and z are taken from the other columns",
-        )
-    return Table(path, columns, units, place, row_lines, notes)
+    for role in ("x", "y", "z"):
+        if role not in roles:
+            continue
+        k = roles.index(role)
+        values[role] = numbers[:, k]
+        fact = header.facts.get("value units" if role == "z" else "lateral units")
+        units[role] = fact if columns[k].unit is None else columns[k].unit
+    return Table(path, values, units, place, row_lines, notes)
 
 
 def _find_roles(
-    place: str, names: list[str], *, has_units: bool
-) -> tuple[list[str], tuple[str, ...]]:
-    """Find the role of each column by its name, or by order if units are given and names are unknown."""
-    roles = [parse_column(name).role for name in names]
-    data = [k for k, role in enumerate(roles) if role not in ("valid", "index")]
+    place: str, columns: list[Column], *, has_units: bool
+) -> tuple[list[Column], tuple[str, ...]]:
+    """Return the columns with their roles, by order if units are given and names are unknown, and a note on that."""
+    data = [k for k, column in enumerate(columns) if column.role != "index"]
     known = ("x", "z") if len(data) == 2 else ("x", "y", "z")
     if len(data) != len(known):
-        listed = f"{len(names)} columns" if len(data) == len(names) else ", ".join(names)
         raise PatchfemError(
-            f"{place}: {shorten(listed)}, but x and z, or x, y and z, are needed; keep one trace of two "
+            f"{place}: {len(data)} columns of numbers, but x and z, or x, y and z, are needed; keep one trace of two "
             f"columns and {HEADER_EXAMPLE}"
         )
-    if sorted(roles[k] for k in data) == ["x", "y"]:
+    roles = [columns[k].role for k in data]
+    if sorted(roles) == ["x", "y"]:
         # Columns x and y are a trace whose heights are named y.
         roles = [role.replace("y", "z") for role in roles]
-    strange = next((names[k] for k in data if roles[k] not in known), None)
+    strange = next((columns[k].name for k, role in zip(data, roles) if role not in known), None)
     notes = ()
     if strange is not None and not has_units:
         raise PatchfemError(
@@ -139,46 +122,23 @@ def _find_roles(
             f"{' and '.join(', '.join(known).rsplit(', ', 1))} are needed; {HEADER_EXAMPLE}"
         )
     if strange is not None:
-        listed = ", ".join(f"'{shorten(names[k])}'" for k in data)
+        listed = ", ".join(f"'{shorten(columns[k].name)}'" for k in data)
         notes = (f"{place}: columns {listed} are taken as {', '.join(known)} in this order",)
-        for k, role in zip(data, known):
-            roles[k] = role
+        roles = list(known)
     for role in known:
         if roles.count(role) != 1:
             raise PatchfemError(f"{place}: two columns are named {role}; {HEADER_EXAMPLE}")
-    return roles, notes
+    columns = list(columns)
+    for k, role in zip(data, roles):
+        columns[k] = columns[k]._replace(role=role)
+    return columns, notes
 
 
-def _is_sample_count(first, second) -> bool:
-    """Return whether the first column of a file only numbers the samples, whose places the second one gives."""
-    steps = np.diff(second)
-    is_count = first.size > 2 and first[0] in (0, 1) and (np.diff(first) == 1).all()
-    return bool(is_count and ((steps > 0).all() or (steps < 0).all()))
-
-
-def _is_matrix(count: int, names: list[str], facts: dict[str, Fact]) -> bool:
-    """Return whether rows of `count` numbers are a matrix of heights instead of columns of points."""
-    if has_column_names(names):
-        return False
-    has_size = {"width", "height"} <= facts.keys()
-    is_column = count == 1 and ("width" in facts or "step_x" in facts)
-    return count > 3 or has_size or is_column or facts.get("columns", UNKNOWN).number == count
-
-
-def _read_matrix(
-    path, header: Header, facts: dict[str, Fact], lines: Iterator[tuple[int, str]]
-) -> Table:
-    """Read a matrix of heights, with the steps and units that its header states."""
-    z = read_rows(path, lines, ["z"] * len(header.row), header.delimiter).numbers
-    if z.shape[1] == 1 and not {"height", "step_y"} & facts.keys():
+def _read_matrix(path, header: Header, lines: Iterator[tuple[int, str]]) -> Table:
+    """Read a matrix of heights, with the size and the units that its header states."""
+    z = read_rows(path, lines, ["z"] * header.count, header.delimiter).numbers
+    if z.shape[1] == 1 and "height" not in header.facts:
         z = z.T  # a trace with one height in each line
-    for name, axis, count in zip(("rows", "columns"), ("rows", "numbers per row"), z.shape):
-        stated = facts.get(name, UNKNOWN).number
-        if stated is not None and stated != count:
-            raise PatchfemError(
-                f"{path}: {count} {axis}, but the header says {stated:g}; the file is cut off or joined from "
-                "parts: export the scan anew"
-            )
     has_axes = min(z.shape) > 3 and _is_even(z[0, 1:]) and _is_even(z[1:, 0])
     if has_axes and not _is_even(z[1, 1:]):
         raise PatchfemError(
@@ -188,50 +148,18 @@ def _read_matrix(
 
     columns = {}
     units = {}
-    for role, size, step, count in (
-        ("x", "width", "step_x", z.shape[1]),
-        ("y", "height", "step_y", z.shape[0]),
-    ):
-        if role == "y" and not {size, step} & facts.keys():
-            step = (
-                "step_x"  # a single pixel size holds for both axes, because the pixels are square
-            )
-        number, word = facts.get(step, facts.get(size, UNKNOWN))
-        if number is None or not 0 < number < math.inf:
-            continue
-        columns[role] = np.arange(count) * (number if step in facts else number / count)
-        word = word or (role == "y" and facts.get("lateral_y", UNKNOWN).word)
-        word = word or facts.get("lateral", UNKNOWN).word
-        if not word and facts.get("format", UNKNOWN).word.lower() == "ascii":
-            word = "nm"  # SPIP writes coordinates in nanometres
-        units[role] = word or None
-    factor, units["z"] = _find_scale(path, facts)
-    columns["z"] = z * factor
+    for role, name, count in (("x", "width", z.shape[1]), ("y", "height", z.shape[0])):
+        size, units[role] = parse_fact(path, header.facts.get(name, ""))
+        if size is not None and 0 < size < math.inf:
+            columns[role] = np.arange(count) * size / count
+    columns["z"] = z
+    units["z"] = header.facts.get("value units")
     remedy = f"write {SIZE_LINES} and `# Value units: um` above its rows"
     return Table(path, columns, units, str(path), remedy=remedy)
 
 
-def _find_scale(path, facts: dict[str, Fact]) -> tuple[float, str | None]:
-    """Return the factor and the unit of the heights of a matrix."""
-    unit = facts.get("value", UNKNOWN).word or facts.get("factor", UNKNOWN).word or None
-    scale = facts.get("factor", UNKNOWN).number
-    if facts.get("is_scaled", UNKNOWN).word.lower() == "yes":
-        scale = facts.get("scale", UNKNOWN).number
-    bit = facts.get("bit2nm", UNKNOWN).number
-    if unit is None and bit:
-        unit = "nm"
-        scale = bit
-    scale = 1.0 if scale is None else scale
-    if not 0 < abs(scale) < math.inf:
-        raise PatchfemError(
-            f"{path}: the factor of the heights in the header is {scale:g}, which is not possible; export the "
-            "scan anew"
-        )
-    return scale, unit
-
-
 def _is_even(values) -> bool:
-    """Return whether numbers (n,) increase by equal steps."""
+    """Return whether numbers (n,) increase by equal steps, within MAX_UNEVEN of the first step."""
     steps = np.diff(values)
     return bool(steps[0] > 0 and np.ptp(steps) < MAX_UNEVEN * steps[0])
 

@@ -1,13 +1,11 @@
-"""X3P files (ISO 5436-2, ISO 25178-72): a zip file with main.xml and heights, in metres.
+"""X3P files (ISO 5436-2, ISO 25178-72): a zip file with main.xml and a matrix of heights in a binary file, in metres.
 
-x and y are incremental, or absolute and then stored with each point; every value of an axis is raw *
-Increment + Offset. Heights are binary data or a list in the XML. Missing: NaN, infinite, an empty
-datum, or what the file of valid points leaves out, one bit each.
+The axes x and y are incremental, and every value is raw * Increment + Offset. A height is missing if it is not finite,
+or if the file of valid points, one bit each, leaves it out.
 """
 
 import io
 import posixpath
-from dataclasses import dataclass
 from xml.etree import ElementTree
 from zipfile import ZipFile
 
@@ -18,13 +16,13 @@ from .content import MAX_BYTES, MIB, Content, refuse_damage
 from .spellings import shorten
 from .table import MAX_POINTS, Table
 
-MAX_XML_BYTES = 16 * MIB  # largest size of main.xml; heights stored there take 30 bytes each
+MAX_XML_BYTES = 16 * MIB  # largest size of main.xml
 _TYPES = {"I": "<i2", "L": "<i4", "F": "<f4", "D": "<f8"}
-_ANEW = "export the surface anew"
+_ANEW = "export the surface anew, as a matrix with incremental axes"
 
 
 def read_x3p(content: Content, _units=None) -> Table:
-    """Read the points or the matrix of an X3P file."""
+    """Read the matrix of an X3P file."""
     path = content.path
     with refuse_damage(path), ZipFile(io.BytesIO(content.data)) as archive:
         names = [name for name in archive.namelist() if posixpath.basename(name) == "main.xml"]
@@ -32,151 +30,64 @@ def read_x3p(content: Content, _units=None) -> Table:
             raise PatchfemError(
                 f"{path}: contains {len(names)} files main.xml, but exactly one is needed"
             )
-        folder = posixpath.dirname(names[0])
         # The parser itself limits the size of entities.
-        root = ElementTree.fromstring(_read_member(path, archive, names[0], MAX_XML_BYTES))
-        columns = _Surface(path, archive, folder, root).read_columns()
-    units = dict.fromkeys(columns, "m")
-    return Table(path, columns, units, str(path), are_units_fixed=True)
+        root = ElementTree.fromstring(_read_member(archive, names[0], MAX_XML_BYTES))
+        places = {}
+        for link in ("PointDataLink", "ValidPointsLink"):
+            name = _find_text(root, f"Record3/DataLink/{link}").removeprefix("./")
+            places[link] = posixpath.join(posixpath.dirname(names[0]), name) if name else ""
+        columns = _read_matrix(path, archive, root, places)
+    return Table(path, columns, dict.fromkeys(columns, "m"), str(path), are_units_fixed=True)
 
 
-def _read_member(path, archive: ZipFile, name: str, max_bytes: int) -> bytes:
+def _read_member(archive: ZipFile, name: str, max_bytes: int) -> bytes:
     """Read a member of a zip file up to a limit."""
-    if name not in archive.namelist():
-        raise PatchfemError(f"{path}: no {shorten(name)} inside it; {_ANEW}")
     with archive.open(name) as file:
         data = file.read(max_bytes + 1)
     if len(data) > max_bytes:
-        raise PatchfemError(f"{path}: {shorten(name)} inside it has more than {max_bytes} bytes")
+        raise ValueError(f"{shorten(name)} has more than {max_bytes} bytes")
     return data
 
 
-@dataclass(frozen=True, eq=False)
-class _Surface:
-    """Open X3P file with the folder and the root element of its main.xml."""
+def _find_text(root, place: str, default: str = "") -> str:
+    """Return the text of an element of any namespace, or a default."""
+    text = root.findtext("/".join(f"{{*}}{name}" for name in place.split("/")))
+    return (text or "").strip() or default
 
-    path: object
-    archive: ZipFile
-    folder: str
-    root: ElementTree.Element
 
-    def find_text(self, place: str, default: str = "") -> str:
-        """Return the text of an element of any namespace, or a default."""
-        text = self.root.findtext("/".join(f"{{*}}{name}" for name in place.split("/")))
-        return (text or "").strip() or default
-
-    def read_number(self, place: str, default: str) -> float:
-        """Read a finite number."""
-        text = self.find_text(place, default)
-        try:
-            value = float(text.replace("_", "?"))
-        except ValueError:
-            value = np.nan
-        if not np.isfinite(value):
-            *_, axis, name = place.split("/")
-            raise PatchfemError(
-                f"{self.path}: {name} of {axis} is '{shorten(text)}'; a number is needed"
-            )
-        return value
-
-    def read_size(self, place: str, default: str = "") -> int:
-        """Read a number of points."""
-        text = self.find_text(f"Record3/{place}", default)
+def _read_matrix(path, archive: ZipFile, root, places: dict[str, str]) -> dict[str, np.ndarray]:
+    """Return x (n,), y (m,) and the heights z (m, n) [m]; places: names of the binary files."""
+    types = [_find_text(root, f"Record1/Axes/C{axis}/AxisType", "I") for axis in "XYZ"]
+    if types != ["I", "I", "A"] or not places["PointDataLink"]:
+        raise PatchfemError(
+            f"{path}: the heights stand in main.xml or have places of their own; {_ANEW}"
+        )
+    sizes = {}
+    for axis, default in (("X", ""), ("Y", "1"), ("Z", "1")):
+        text = _find_text(root, f"Record3/MatrixDimension/Size{axis}", default)
         if not text.isdecimal() or not 1 <= float(text) <= MAX_POINTS:
-            raise PatchfemError(
-                f"{self.path}: {place.rpartition('/')[2]} is '{shorten(text)}'; a whole number from 1 to "
-                f"{MAX_POINTS:.0e} is needed"
-            )
-        return int(text)
-
-    def read_columns(self) -> dict[str, np.ndarray]:
-        """Read axes, sizes and heights; returns the columns of points, or a matrix z with its axes."""
-        stored = {}  # type of each coordinate that is stored with each point
-        for axis in "XYZ":
-            place = f"Record1/Axes/C{axis}"
-            if axis != "Y" and self.root.find("{*}Record1/{*}Axes/{*}C" + axis) is None:
-                raise PatchfemError(f"{self.path}: main.xml lacks {place}; {_ANEW}")
-            kind = self.find_text(f"{place}/DataType", "D")
-            if kind not in _TYPES:
-                raise PatchfemError(
-                    f"{self.path}: DataType of C{axis} is '{shorten(kind)}'; one of {', '.join(_TYPES)} is needed"
-                )
-            if self.find_text(f"{place}/AxisType", "A" if axis == "Z" else "I") == "A":
-                stored[axis] = _TYPES[kind]
-        if "Z" not in stored:
-            raise PatchfemError(f"{self.path}: the heights (CZ) are incremental; {_ANEW}")
-
-        rows = 1
-        is_list = self.root.find("{*}Record3/{*}MatrixDimension") is None
-        if is_list:
-            count = self.read_size("ListDimension")
-        else:
-            count = self.read_size("MatrixDimension/SizeX")
-            rows = self.read_size("MatrixDimension/SizeY", "1")
-            if self.find_text("Record3/MatrixDimension/SizeZ", "1") != "1":
-                raise PatchfemError(
-                    f"{self.path}: SizeZ is not 1; a surface must have one layer: export each layer to its own file"
-                )
-        if rows * count > MAX_POINTS:
-            raise PatchfemError(
-                f"{self.path}: more than {MAX_POINTS:.0e} heights; export a part of the scan"
-            )
-
-        increments = {a: self.read_number(f"Record1/Axes/C{a}/Increment", "1") for a in "XYZ"}
-        offsets = {a: self.read_number(f"Record1/Axes/C{a}/Offset", "0") for a in "XYZ"}
-        index = np.arange(rows * count)
-        raw = {"X": index % count, "Y": index // count}
-        is_binary = self.root.find("{*}Record3/{*}DataLink") is not None
-        raw |= (self._read_binary if is_binary else self._read_list)(stored, index.size)
-        columns = {a.lower(): raw[a] * increments[a] + offsets[a] for a in "XYZ"}
-        columns["z"][np.isinf(columns["z"])] = np.nan
-        if is_list or len(stored) > 1:
-            known = np.isfinite(columns["x"]) & np.isfinite(columns["y"])
-            return {name: values[known] for name, values in columns.items()}
-        matrix = {name: values.reshape(rows, count) for name, values in columns.items()}
-        return {"x": matrix["x"][0], "y": matrix["y"][:, 0], "z": matrix["z"]}
-
-    def _read_binary(self, stored: dict[str, str], count: int) -> dict[str, np.ndarray]:
-        """Read the stored coordinates of all points from the binary file."""
-        record = np.dtype(list(stored.items()))
-        data = self._read_linked("PointDataLink")
-        if len(data) != count * record.itemsize:
-            raise PatchfemError(
-                f"{self.path}: {len(data)} bytes of heights, but {count} heights of {record.itemsize} bytes are "
-                f"needed; {_ANEW}"
-            )
-        points = np.frombuffer(data, record)
-        raw = {axis: points[axis].astype(float) for axis in stored}
-        if self.find_text("Record3/DataLink/ValidPointsLink"):
-            valid = self._read_linked("ValidPointsLink")
-            bits = np.unpackbits(np.frombuffer(valid, np.uint8), bitorder="little")
-            if bits.size < count:
-                raise PatchfemError(
-                    f"{self.path}: {bits.size} valid points, but {count} are needed"
-                )
-            raw["Z"][bits[:count] == 0] = np.nan
-        return raw
-
-    def _read_list(self, stored: dict[str, str], count: int) -> dict[str, np.ndarray]:
-        """Read the stored coordinates of all points from main.xml."""
-        datums = [
-            (node.text or "").strip()
-            for node in self.root.findall("{*}Record3/{*}DataList/{*}Datum")
+            raise ValueError(f"Size{axis} is '{shorten(text)}'; a whole number is needed; {_ANEW}")
+        sizes[axis] = int(text)
+    if sizes["Z"] != 1 or sizes["X"] * sizes["Y"] > MAX_POINTS:
+        raise ValueError(f"a single layer of at most {MAX_POINTS:.0e} heights is needed")
+    scales = {}
+    for axis in "XYZ":
+        numbers = [
+            float(_find_text(root, f"Record1/Axes/C{axis}/{name}", default))
+            for name, default in (("Increment", "1"), ("Offset", "0"))
         ]
-        if len(datums) != count:
-            raise PatchfemError(
-                f"{self.path}: {len(datums)} heights in main.xml, but {count} are needed; {_ANEW}"
-            )
-        table = np.full((count, len(stored)), np.nan)
-        for k, text in enumerate(datums):
-            # Incremental coordinates are left out or empty.
-            cells = [cell.strip() for cell in text.split(";")][-len(stored) :]
-            if any(cells):
-                table[k] = [float(cell or "nan") for cell in cells]
-        return dict(zip(stored, table.T))
-
-    def _read_linked(self, link: str) -> bytes:
-        """Read a binary file by its name in main.xml."""
-        name = self.find_text(f"Record3/DataLink/{link}").removeprefix("./")
-        place = posixpath.join(self.folder, name)
-        return _read_member(self.path, self.archive, place, MAX_BYTES)
+        if not np.isfinite(numbers).all():
+            raise ValueError(f"the numbers of axis {axis} are not finite")
+        scales[axis] = numbers
+    kind = _find_text(root, "Record1/Axes/CZ/DataType", "D")
+    raw = np.frombuffer(_read_member(archive, places["PointDataLink"], MAX_BYTES), _TYPES[kind])
+    if raw.size != sizes["X"] * sizes["Y"]:
+        raise ValueError(f"{raw.size} heights, but {sizes['X'] * sizes['Y']} are needed")
+    z = raw * scales["Z"][0] + scales["Z"][1]
+    z[~np.isfinite(z)] = np.nan
+    if places["ValidPointsLink"]:
+        valid = _read_member(archive, places["ValidPointsLink"], MAX_BYTES)
+        bits = np.unpackbits(np.frombuffer(valid, np.uint8), bitorder="little")
+        z[bits[: z.size] == 0] = np.nan
+    x, y = (scales[axis][1] + scales[axis][0] * np.arange(sizes[axis]) for axis in "XY")
+    return {"x": x, "y": y, "z": z.reshape(y.size, x.size)}

@@ -5,8 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...core import PatchfemError, frozen_array
-from ...formatting import format_length
+from ...core import frozen_array
 
 MIN_TAPERS = 3  # smallest number of averaged spectra; fewer are too noisy to show the dominant wave
 # Largest number of averaged spectra; more blur the dominant wave and do not narrow the intervals.
@@ -34,11 +33,6 @@ class Spectrum:
     tapers: int
     length: float
 
-    @property
-    def step(self) -> float:
-        """Spacing of the frequencies [1/m]."""
-        return float(self.frequency[1] - self.frequency[0])
-
     @cached_property
     def dominant_wavelength(self) -> float | None:
         """Wavelength [m] whose octave contains most of the mean square, or None for a flat trace.
@@ -62,16 +56,16 @@ class Spectrum:
             centre = float(np.clip(centroid, start - width, start + width))
         return float(1 / centre)
 
-    def power(self, low: float, high: float) -> float:
-        """Integrate the mean square [m2] of the waves from `low` to `high` [m] long."""
-        means = (self.density[1:] + self.density[:-1]) / 2
-        total = np.concatenate([[0.0], np.cumsum(means * self.step)])
+    def band_amplitude(self, low: float, high: float) -> float:
+        """Return the amplitude [m] of the sine that has the mean square of the waves from `low` to `high` [m]."""
+        steps = np.diff(self.frequency)
+        total = np.cumsum(np.append(0.0, (self.density[1:] + self.density[:-1]) / 2 * steps))
         ends = np.interp([1 / high, 1 / low], self.frequency, total)
-        return float(ends[1] - ends[0])
+        return float(np.sqrt(2 * (ends[1] - ends[0])))
 
 
 def estimate_spectrum(z: np.ndarray, step: float, tapers: int | None = None) -> Spectrum:
-    """Estimate the power spectral density of heights by the multitaper method.
+    """Estimate the power spectral density of heights with sine tapers.
 
     Method: Riedel and Sidorenko, IEEE Trans. Signal Process. 43, 188, 1995.
 
@@ -84,86 +78,30 @@ def estimate_spectrum(z: np.ndarray, step: float, tapers: int | None = None) -> 
     tapers : int, optional
         Spectra that are averaged; by default as many as smooth over 15 % of the dominant frequency
         to either side.
-
-    Returns
-    -------
-    Spectrum
-        A million samples take 0.3 s.
     """
-    from scipy.fft import prev_fast_len, rfft
+    from scipy.fft import prev_fast_len
 
     n = z.size if z.size <= MAX_UNTRIMMED else prev_fast_len(z.size + 1, real=True) - 1
-    z = z[:n]
-    length = n * step
-    transform = rfft(np.concatenate([[0.0], z - z.mean()]), 2 * (n + 1))
-    density = _average_tapers(transform, n, step, min(MIN_TAPERS, max(n // 4, 1)))
-    frequency = np.arange(1, density.size + 1) / ((n + 1) * step) / 2
-    first = Spectrum(frozen_array(frequency), frozen_array(density), MIN_TAPERS, length)
+    z = z[:n] - z[:n].mean()
     if tapers is None:
+        first = _average_tapers(z, step, min(MIN_TAPERS, max(n // 4, 1)))
         wave = first.dominant_wavelength
-        n_tapers = MIN_TAPERS if wave is None else np.floor(2 * BLUR_FRACTION * length / wave) - 1
+        if wave is None:
+            return first
+        n_tapers = np.floor(2 * BLUR_FRACTION * n * step / wave) - 1
         tapers = int(np.clip(n_tapers, MIN_TAPERS, MAX_TAPERS))
-    if tapers == MIN_TAPERS:
-        return first
-    return Spectrum(
-        first.frequency, frozen_array(_average_tapers(transform, n, step, tapers)), tapers, length
-    )
+    return _average_tapers(z, step, tapers)
 
 
-def _average_tapers(transform, n: int, step: float, tapers: int) -> np.ndarray:
-    """Average the densities of sine tapers at j = 1, 2, ... half-steps 1 / (2 (n + 1) step).
+def _average_tapers(z, step: float, tapers: int) -> Spectrum:
+    """Return the mean of the spectra under the sine tapers 1, 2, ... of heights without their mean."""
+    from scipy.fft import rfft
 
-    The transform under taper k is half the difference of the transforms k half-steps below and
-    above.
-    """
-    size = transform.size
-    below = np.conj(transform[tapers:0:-1])
-    above = np.conj(transform[-2 : -2 - tapers : -1])
-    extended = np.concatenate([below, transform, above])
-    total = np.zeros(2 * (size - 1))
+    n = z.size
+    total = np.zeros(n + 1)
     for k in range(1, tapers + 1):
-        start = 1 + tapers
-        part = (
-            extended[start - k : start - k + size - 1] - extended[start + k : start + k + size - 1]
-        )
-        total += part.view(float) ** 2
-    return (total[::2] + total[1::2]) * (step / (n + 1) / tapers)
-
-
-def band_amplitude(spectrum: Spectrum, low: float, high: float) -> float:
-    """Return the amplitude [m] of the sine that has the mean square of a wavelength band.
-
-    Parameters
-    ----------
-    spectrum : Spectrum
-    low, high : float [m]
-
-    Returns
-    -------
-    float
-    """
-    return float(np.sqrt(2 * spectrum.power(low, high)))
-
-
-def refuse_band(source: str, low: float, high: float, length: float, step: float) -> None:
-    """Raise PatchfemError if a trace cannot show the waves from `low` to `high`.
-
-    Parameters
-    ----------
-    source : str
-        Name of the trace in the message.
-    low, high : float [m]
-    length, step : float [m]
-        Of the trace and between its samples.
-    """
-    if not 0 < low < high:
-        raise PatchfemError(
-            f"{source}: a band from {format_length(low)} to {format_length(high)}; a band must be given from the "
-            "shorter to the longer wavelength"
-        )
-    if 2 * high > length or low < 2 * step:
-        raise PatchfemError(
-            f"{source}: the trace, {format_length(length)} long with a step of {format_length(step)}, can show waves "
-            f"of {format_length(2 * step)} to {format_length(length / 2)}, but not the whole band {format_length(low)} to "
-            f"{format_length(high)}"
-        )
+        taper = np.sin(np.pi * k * np.arange(1, n + 1) / (n + 1))
+        total += np.abs(rfft(z * taper, 2 * (n + 1))[1:]) ** 2
+    density = total * (4 * step / (n + 1) / tapers)
+    frequency = np.arange(1, n + 2) / ((n + 1) * step) / 2
+    return Spectrum(frozen_array(frequency), frozen_array(density), tapers, n * step)

@@ -17,7 +17,7 @@ from patchfem.campaigns.rows.model_readings import ModelReadings
 from patchfem.campaigns.rows.search import make_residual
 from patchfem.core import G_N, PatchfemError
 from patchfem.export.fits import describe_rows_fit
-from patchfem.scene import load, loads, read_ranges
+from patchfem.scene import BOUNDS, load, loads, read_assignments
 
 MIL = 25.4e-6
 LINEAR = """
@@ -93,7 +93,7 @@ def linear_response(f, level, own=141.0, zeta=0.03):
 
 def read_free_keys(*texts):
     """Return the ranges of the free keys."""
-    found, wrong = read_ranges(texts)
+    found, wrong = read_assignments(texts, BOUNDS)
     assert not wrong
     return found
 

@@ -10,14 +10,14 @@ from scene_texts import BENCH, PATCH, SMALL_PATCH
 from patchfem import SceneError
 from patchfem.campaigns import Cases, Request, SweepScene, read_cases
 from patchfem.campaigns.sweeps.cases import combine_cases
-from patchfem.scene import read_axes
+from patchfem.scene import read_assignments
 
 THREE = ["normal.load=1 N,2 N", "friction.static=0.1,0.2,0.3", "slide.speed=1 mm/s,2 mm/s"]
 
 
 def make_cases(*texts) -> Cases:
     """Return the cases of axes given as texts."""
-    axes, wrong = read_axes(texts)
+    axes, wrong = read_assignments(texts)
     assert wrong == []
     return Cases(tuple(axes))
 

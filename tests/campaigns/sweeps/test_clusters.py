@@ -20,7 +20,7 @@ from patchfem.campaigns.sweeps.executors.cluster import (
 )
 from patchfem.campaigns.sweeps.sweep import compute_chunk
 from patchfem.core import Missing
-from patchfem.scene import read_axes
+from patchfem.scene import read_assignments
 
 pytest.importorskip("distributed")
 BY_FILE = BENCH[: BENCH.index("[slide]")] + '[slide]\nkind = "file"\nfile = "path.csv"\n'
@@ -37,7 +37,7 @@ time.sleep(100)
 def make_work(place: Path, text=BENCH, values="0.2,0.3,-1") -> WorkerData:
     """Return the work of a sweep over the friction coefficient."""
     return WorkerData(
-        SweepScene(place, text), Cases(tuple(read_axes([f"friction.static={values}"])[0]))
+        SweepScene(place, text), Cases(tuple(read_assignments([f"friction.static={values}"])[0]))
     )
 
 

@@ -34,12 +34,14 @@ UNITS = {
     "moving_mass": "kg",
 }
 UNITS |= {"angle": "rad", "reference_speed": "m/s", "stiffness": "N/m", "stribeck_speed": "m/s"}
-KEYS = [
-    key.replace("mode.", f"mode.{mode}.")
-    for key in PLAIN_KEYS
-    if not key.startswith("contact.")
-    for mode in ("axial", "1")
-]
+KEYS = list(
+    dict.fromkeys(
+        key.replace("mode.", f"mode.{mode}.")
+        for key in PLAIN_KEYS
+        if not key.startswith("contact.")
+        for mode in ("axial", "1")
+    )
+)
 RIG = MODE + SECOND + DRIVE
 TILTED = COATED + '[contact.tilt]\nangle = "0.1 mrad"\n'
 SCENES = {

@@ -30,7 +30,7 @@ from patchfem.core import Missing, PatchfemError
 from patchfem.export.sweeps.run import SweepTarget, sweep_into
 from patchfem.runs import FAILED_OUTCOME, CaseResults
 from patchfem.runs.batch.case_results import join_case_results
-from patchfem.scene import read_axes
+from patchfem.scene import read_assignments
 
 SUPPORT = Path(__file__).parents[2] / "support"
 RIG = POINT + COULOMB + SHORT
@@ -38,7 +38,7 @@ RIG = POINT + COULOMB + SHORT
 
 def make_work(text=BENCH, count=8, tell=None) -> WorkerData:
     """Return the work of a sweep over the friction coefficient."""
-    axes, _ = read_axes([f"friction.static=0.05..0.6:{count}lin"])
+    axes, _ = read_assignments([f"friction.static=0.05..0.6:{count}lin"])
     return WorkerData(SweepScene(Path("a.toml"), text), Cases(tuple(axes)), tell)
 
 

@@ -11,11 +11,15 @@ from patchfem.campaigns.sweeps.executors import LocalExecutor
 from patchfem.campaigns.sweeps.executors.pool import Pool
 from patchfem.campaigns.sweeps.sweep import choose_shared_meshes
 from patchfem.runs.batch.case_results import join_case_results
-from patchfem.scene import read_axes
+from patchfem.scene import read_assignments
 
 WORK = WorkerData(
     SweepScene(Path("a.toml"), PATCH),
-    Cases(tuple(read_axes(["contact.tilt.angle=2e-5 rad,2e-4 rad", "contact.load=50 N,100 N"])[0])),
+    Cases(
+        tuple(
+            read_assignments(["contact.tilt.angle=2e-5 rad,2e-4 rad", "contact.load=50 N,100 N"])[0]
+        )
+    ),
 )
 
 

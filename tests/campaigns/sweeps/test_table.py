@@ -76,7 +76,7 @@ def test_exact_result_columns_of_a_sweep_are_ignored(tmp_path):
         ),
         (
             "contact.lod [N]\n1\n2\n",
-            ["cases.csv:1: contact.lod: not a key of a scene; did you mean 'load'"],
+            ["cases.csv:1: contact.lod: unknown key; did you mean 'load'"],
         ),
         (
             "contact.load [N],contact.load\n1,2 N\n",

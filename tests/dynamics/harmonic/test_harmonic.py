@@ -349,12 +349,12 @@ def test_exact_balance_satisfies_equation_of_motion(law):
 
 
 def test_refuses_laws_that_cannot_be_balanced():
-    """Rigid friction, breakaway friction, missing interfaces and invalid elements are refused with
+    """Rigid friction, bonds without a closed form, missing interfaces and invalid elements are refused with
     a message."""
     modes = make_sdof()
     with pytest.raises(PatchfemError, match="rigid friction"):
         find_steady_motion(modes, DRIVE, coulomb_model(1.0, 1.0))
-    with pytest.raises(PatchfemError, match="breakaway"):
+    with pytest.raises(PatchfemError, match="a constant bond length"):
         find_steady_motion(
             modes, DRIVE, points_model(Bonds(0.3, 1e-6, breakaway=0.1), [1.0], [1.0])
         )

@@ -3,6 +3,7 @@
 import csv
 import json
 import re
+from dataclasses import replace
 
 import comparisons
 import numpy as np
@@ -222,8 +223,43 @@ def test_exact_page_draws_traces_depth_and_maps(written):
     else:
         assert titles == ["Both traces", "Worn depth", "Abbott curves"]
         assert "Roughness inside and outside of the track" in text and "100 nm (90 to 110)" in text
+        table = text[text.index("Roughness inside and outside of the track") :]
+        for cell in ("100 um/mm (90 to 110)", "0.900 (0.850 to 0.950)", "80 um", "after / before"):
+            assert f">{cell}<" in table, cell
     labels = re.findall(r'aria-label="(.*?)"', text)
     assert len(labels) == len(titles) and all("[" in label for label in labels)
+
+
+def test_always_page_states_each_fact_once_and_in_words_of_surfaces(written):
+    """The page has no number of the track twice, no words of runs, and states place, length, offset and gain."""
+    answer, folder = written
+    text = (folder / "report.html").read_text("utf-8")
+    for words in ("folder of the scene", "area of the patch", "along the interface", "of a run"):
+        assert words not in text, words
+    values = [
+        (quantity.value, quantity.low, quantity.high, quantity.unit)
+        for quantity in answer.quantities.values()
+        if quantity.value is not None
+    ]
+    assert len(values) == len(set(values))
+    if "depth_map" in answer.data:
+        assert "x = 500 um, y = 700 um" in answer.verdict[1]
+    else:
+        assert "x = 1.5 mm" in answer.verdict[1]
+        for name in ("worn_depth_max_at", "common_length", "offset", "gain"):
+            assert f'id="measure-{name}"' in text, name
+        assert "worn_from_before" in answer.details and "track_pile_up" in answer.details
+
+
+def test_always_band_is_named_only_where_it_is_seen():
+    """The caption names the band of the depth if it is wider than a line."""
+    for scale, is_seen in ((0.1, False), (1.0, True)):
+        comparison = compare_traces()
+        noise = scale * comparison.evidence.curves.noise
+        curves = replace(comparison.evidence.curves, noise=noise)
+        comparison = replace(comparison, evidence=replace(comparison.evidence, curves=curves))
+        captions = compare.make_answer(comparison).details.get("captions", {})
+        assert ("Band" in captions.get("Worn depth", "")) == is_seen
 
 
 def test_always_every_quantity_has_a_definition():

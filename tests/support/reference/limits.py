@@ -33,7 +33,7 @@ SIZES = {  # Constant -> description of the quantity that it bounds.
     "scene.rules.contact.MAX_ELEMENTS": "number of elements along an interface that has element_size",
     "scene.keys.tables.MAX_MASS_NUMBER": "number of masses in structure.masses",
     "effects.MAX_COORDINATES": "number of masses or modes of a rig",
-    "scene.axes.MAX_RANGE_VALUES": "number of values in one range of a sweep",
+    "scene.assignments.MAX_RANGE_VALUES": "number of values in one range of a sweep",
     "campaigns.sweeps.parse_request.MAX_CASES": "number of cases of a sweep",
     "inputs.cells.MAX_BYTES": "bytes of a text file with a table",
     "inputs.records.MAX_BYTES": "bytes of a laboratory file",
@@ -45,7 +45,8 @@ SIZES = {  # Constant -> description of the quantity that it bounds.
     "runs.rig.costs.MAX_MARCH_STEPS": "steps per cycle of a time integration, if the tolerance determines the steps",
     "dynamics.march.capacity.MAX_ENTRIES": "number of entries in a list of bonds",
     "friction.bonds.parameters.MAX_LIST_SECONDS": "estimated computing time of a run with a list of bonds [s]",
-    "runs.rig.costs.MAX_EXACT_SECONDS": "estimated time to compute a whole motion by the event-to-event method [s]",
+    "runs.rig.costs.MAX_EXACT_SECONDS": "estimated time to compute a whole motion from event to event, with "
+    "method `exact` or by engine `hybrid` [s]",
     "structure.drive_sizes.MAX_STORED_SAMPLES": "number of samples at equal spacing that are stored of a whole release, at "
     "least 20 per cycle; of a longer release turning points and the last cycles",
     "dynamics.checkpoint.MAX_EARLY_SAMPLES": "number of samples stored before the last cycles; longer records are "
@@ -139,7 +140,7 @@ def text() -> str:
         _format_bounds(),
         "## Sizes",
         _format_sizes(),
-        "A run is refused if the memory that `patchfem plan` estimates for this run exceeds the memory limit of "
+        "A run is refused if the memory that its unknowns and histories need exceeds the memory limit of "
         "the process. The message names the key whose value requires so much memory.",
         "## What the models leave out",
         LEFT_OUT.strip(),

@@ -60,7 +60,6 @@ FORMS = {
         "nonlocal": "",
         "nonlocal, order 2": "order = 2\n",
         "nonlocal, reading 'report'": 'reading = "report"\n',
-        "nonlocal, breakaway": "breakaway = 0.2\n",
     }
 }
 METHODS = ("auto", "exact", "march", "harmonic")

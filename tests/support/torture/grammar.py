@@ -23,7 +23,6 @@ OF_LAWS = {  # Key -> (low, high, unit) for a rig with a motion of about 50 um a
     "slip_growth": (1e-8, 1e-6, "m"),
     "rest_speed": (1e-6, 1e-4, "m/s"),
     "initial_bonds": (0.1, 1.0, ""),
-    "breakaway": (0.01, 0.9, ""),
     "spread": (1e-6, 1e-4, "m"),
 }
 LENGTH, WIDTH, HEIGHT = (5e-3, 3e-2), (5e-3, 3e-2), (2e-3, 1e-2)

@@ -1,6 +1,7 @@
 """Random scenes whose energy must balance: in every engine, for the dissipation of every law, and with wear."""
 
 from . import grammar
+from .effort import estimate_seconds
 from .results import BALANCE
 from .toml import to_toml
 from .trial import Trial, TrialFailure
@@ -78,7 +79,7 @@ def check_passivity(result, tables: dict) -> None:
 
 
 def solve_tables(trial: Trial, tables: dict, max_seconds: float = 3.0, valid: bool = False):
-    """Return the Result of a scene; None if it is refused, does not converge or is planned above `max_seconds` seconds.
+    """Return the Result of a scene; None if it is refused, does not converge or takes more than about `max_seconds` s.
 
     valid: raise TrialFailure if it is refused.
     """
@@ -88,12 +89,12 @@ def solve_tables(trial: Trial, tables: dict, max_seconds: float = 3.0, valid: bo
     (trial.folder / "scene.toml").write_text(text, "utf-8")
     trial.tell("patchfem run scene.toml")
     try:
-        scene = load(trial.folder / "scene.toml")
-        seconds = plan(scene).seconds
+        scene_plan = plan(load(trial.folder / "scene.toml"))
+        seconds = estimate_seconds(scene_plan)
         if seconds > max_seconds:
             return None
-        trial.limit(seconds + 10.0)
-        return run(scene, say=lambda text: None)
+        trial.limit(seconds + 20.0)
+        return run(scene_plan, say=lambda text: None)
     except NotConverged:
         return None
     except Exception as error:

@@ -73,11 +73,11 @@ def check_no_remnants(folder: Path) -> None:
 def run_scene(trial: Trial, file, *words, max_seconds: float = 3.0) -> dict | None:
     """Check, plan and run a scene, compare the outcomes, and return the summary.
 
-    None if it is refused, ends without results (exit code 3 or 4) or is planned above `max_seconds`
-    seconds.
+    None if it is refused, ends without results (exit code 3 or 4) or would take more than about
+    `max_seconds` seconds.
     """
     checked = trial.run("check", file, *words)
-    seconds = trial.planned_seconds(file, *words)
+    seconds = trial.planned_seconds(file)
     if checked.code == 0 and seconds is None:
         raise TrialFailure("check ends with 0, plan refuses")
     if seconds is None or seconds > max_seconds:

@@ -100,10 +100,15 @@ class Trial:
         )
         return check_result(ended, allowed)
 
-    def planned_seconds(self, file, *words) -> float | None:
-        """Return the seconds that `plan` estimates for a scene; None if it is refused."""
-        result = self.run("plan", file, "--json", *words)
-        return float(parse_strict_json(result.out)["seconds"]) if result.code == 0 else None
+    def planned_seconds(self, file) -> float | None:
+        """Return the rough CPU time [s] of a scene; None if `plan` refuses it."""
+        from patchfem.api import load, plan
+
+        from .effort import estimate_seconds
+
+        if self.run("plan", file, "--json").code != 0:
+            return None
+        return estimate_seconds(plan(load(self.folder / file)))
 
     def draw(self, *choices):
         """Return one of the choices at random."""

@@ -25,13 +25,6 @@ AXES = (
     + write.format_axis("CY", increment=7.5e-7)
     + write.format_axis("CZ", "A")
 )
-LISTED = write.make_main_xml(
-    AXES,
-    write.format_matrix(6, 4)
-    + "<DataList>"
-    + "".join("<Datum/>" if np.isnan(v) else f"<Datum>{float(v)!r}</Datum>" for v in Z.ravel())
-    + "</DataList>",
-)
 LINES = "".join(f"{x:.2f},{y:.2f},{float(z)!r}\n" for x, y, z in POINTS)
 
 ROWS = "".join(f"{k}.5,0.{k * 37 % 500:03d}\n" for k in range(40))
@@ -41,7 +34,7 @@ SEEDS = {
     "text": ("a.csv", f"# tip 2 um\nx [um],z [um]\n{ROWS}".encode(), bytes),
     "decimal comma": ("a.csv", f"x_um;z_um\n{ROWS}".replace(",", ";").replace(".", ",").encode(), bytes),
     "raster": ("a.txt", f"x [um],y [um],z [um]\n{LINES}".encode(), bytes),
-    "matrix": ("a.txt", ("# Width: 3,0 µm\n# Height: 3,0 µm\n# Value units: um\n" + "\n".join("\t".join(
+    "matrix": ("a.txt", ("# Width: 3.0 µm\n# Height: 3.0 µm\n# Value units: um\n" + "\n".join("\t".join(
         f"{float(z) * 1e6!r}".replace(".", ",") for z in row) for row in Z)).encode(), bytes),
     "names and units": ("a.txt", ("Nr.;Position;Höhe\n;mm;µm\n" + "".join(
         f"{k};{row.replace(',', ';')}\n" for k, row in enumerate(ROWS.split()))).encode(), bytes),
@@ -54,7 +47,6 @@ SEEDS = {
     "x3p": ("a.x3p", write.heights_to_x3p(Z, "I", 1e-10), bytes),
     "x3p main.xml": ("a.x3p", write.make_main_xml(AXES, write.format_matrix(6, 4) + write.format_link(RAW)),
                      lambda xml: write.make_x3p(xml, RAW)),
-    "x3p list": ("a.x3p", LISTED, write.make_x3p),
     "x3p heights": ("a.x3p", RAW, lambda raw: write.make_x3p(
         write.make_main_xml(AXES, write.format_matrix(6, 4) + write.format_link(raw)), raw)),
     "zip": ("a.zip", write.make_zip({"a.csv": f"x [um],y [um],z [um]\n{LINES}".encode()}), bytes),

@@ -47,7 +47,6 @@ SPELLINGS = {
     "from the far end": format_trace(X[::-1], Z[::-1]),
     "underscores": format_trace(X, Z, "x_um,z_um"),
     "strokes": format_trace(X, Z, "x/µm;z / um", ";"),
-    "underscores in a comment that goes on": format_trace(X, Z, "# x_um,z_um  derived from (a, b), by hand"),
     "bars": format_trace(X, Z, "x [um]|z [um]", "|"),
     "decimal comma": format_trace(X, Z, "x [um];z [um]", ";").replace(".", ","),
     "decimal comma and tabs": "# 2.5 um tip\n" + format_trace(X, Z, "x [um]\tz [um]", "\t").replace(".", ",") + "# 1.5\n",
@@ -158,9 +157,9 @@ REFUSED = {
         f"{GIVE}"),
     "\nx [um],z []\n0,1\n": "{path}:2: unknown unit '' of z; use one of m, km, cm, mm, um, nm, in, ft, mil",
     "x [um],z [furlong]\n0,1\n": "{path}:1: unknown unit 'furlong' of z; use one of m, km, cm, mm, um, nm, in, ft, mil",
-    "x [um]\n0\n": "{path}:1: only one column, '0', but x and z are needed; write the header as `x [um],z [um]`",
-    "x [um],y [um],z [um],w [um]\n0,0,1,1\n": "{path}:1: 4 columns, but x and z, or x, y and z, are needed; keep one "
-                                               "trace of two columns and write the header as `x [um],z [um]`",
+    "x [um]\n0\n": "{path}:2: only one column, but x and z are needed; write the header as `x [um],z [um]`",
+    "x [um],y [um],z [um],w [um]\n0,0,1,1\n": "{path}:1: 4 columns of numbers, but x and z, or x, y and z, are needed; keep "
+                                               "one trace of two columns and write the header as `x [um],z [um]`",
     "x [um],x [um]\n0,1\n": "{path}:1: two columns are named x; write the header as `x [um],z [um]`",
     "t [s],z [um]\n0,1\n": "{path}:1: column 't' is not known; the columns x and z are needed; write the header as `x "
                            "[um],z [um]`",

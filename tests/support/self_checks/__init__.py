@@ -3,8 +3,7 @@
 A wrong factor anywhere between the mesh and the summary does not disturb the energy balance,
 because both sides of the balance use the same wrong number. Each check therefore recomputes a
 number from the values of the scene by a short formula, and compares it with the result of the run.
-The threshold is the largest difference that is possible in a correct run. If a check fails, the
-outcome becomes `not_converged`, and a warning gives both numbers.
+The threshold is the largest difference that is possible in a correct run.
 
 Notation: z, v modal coordinates and their rates, m the moving mass, s the slide participations, F
 the friction force (positive against positive slip), a(t) the drive, T the length of the window of

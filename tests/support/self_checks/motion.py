@@ -7,8 +7,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...core import Outcome
-from ..rig import engines
+from patchfem.core import Outcome
+from patchfem.runs.rig import engines
+
 from .evidence import Evidence, parse_scene_number
 from .finding import (
     CONTACT_RESIDUAL_TOL,

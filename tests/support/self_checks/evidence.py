@@ -9,9 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import Outcome
-from ..results.result import Result
-from ..rig import engines
+from patchfem.core import Outcome
+from patchfem.runs.results.result import Result
+from patchfem.runs.rig import engines
+
 from .finding import CUBIC_QUADRATURE_TOL
 
 MIN_CYCLE_SAMPLES = 40  # Smallest number of samples per cycle at which the checks use a window.

@@ -5,9 +5,10 @@ In: `Evidence`. Out: Findings.
 
 from collections.abc import Iterator
 
-from ...core import Outcome
-from ..patch import values
-from ..results.patch_rows import HALF_SPACE_SOURCE
+from patchfem.core import Outcome
+from patchfem.runs.patch import values
+from patchfem.runs.results.patch_rows import HALF_SPACE_SOURCE
+
 from .evidence import Evidence
 from .finding import (
     CONTACT_RESIDUAL_TOL,

@@ -1,0 +1,83 @@
+"""Checks of the matrices of a structure, full or sparse: real, square, finite and symmetric."""
+
+import numpy as np
+from scipy import sparse
+
+from ..core import PatchfemError
+
+MAX_SKEW = 1e-8  # largest skew part |A - A^T| / |A| of a matrix that counts as symmetric
+SKEW_REFUSAL = "gyroscopic and follower terms are not supported"
+
+
+def to_real(values, subject: str):
+    """Return the real parts of an array, full or sparse, that is stored as complex numbers.
+
+    Hysteretic damping K (1 + i eta) is refused, because it describes a single frequency. C = eta K/omega
+    has the same loss at omega, and a mode there has the damping ratio eta/2.
+
+    Parameters
+    ----------
+    values : array_like or sparse array
+    subject : str
+        Name of the array, at the beginning of the message.
+
+    Raises
+    ------
+    PatchfemError
+        If an imaginary part is not 0.
+    """
+    values = numbers = values if sparse.issparse(values) else np.asarray(values)
+    if sparse.issparse(values):
+        numbers = values.data
+    if not np.iscomplexobj(numbers):
+        return values
+    largest = max(float(np.abs(numbers.real).max(initial=0.0)), 1e-300)
+    ratio = float(np.abs(numbers.imag).max(initial=0.0)) / largest
+    if ratio == 0.0:
+        return values.real
+    remedy = ""
+    if subject.endswith(("K", "stiffness")):
+        remedy = (
+            f"; for a loss factor eta (here about {ratio:.3g}) give K without the loss factor, and the damping "
+            "matrix C = eta K/omega [N s/m] at the frequency of the drive"
+        )
+    raise PatchfemError(
+        f"{subject} is complex (imaginary parts are up to {ratio:.2g} times the real parts); "
+        f"motion in time needs real matrices{remedy}"
+    )
+
+
+def symmetrize(values, subject: str):
+    """Check that a matrix, full or sparse, is square, real, finite and nearly symmetric; make it exactly symmetric.
+
+    Parameters
+    ----------
+    values : (n, n) array_like or sparse array
+    subject : str
+        Name of the matrix, at the beginning of messages.
+
+    Returns
+    -------
+    (n, n) ndarray or sparse array of float
+
+    Raises
+    ------
+    PatchfemError
+        If the matrix is not such a matrix.
+    """
+    try:
+        values = to_real(values, subject).astype(float)
+    except (TypeError, ValueError):
+        raise PatchfemError(f"{subject} is not a matrix of real numbers") from None
+    if values.ndim != 2 or values.shape[0] != values.shape[1] or not values.shape[0]:
+        raise PatchfemError(f"{subject} must be square, not of shape {values.shape}")
+    if not np.isfinite(values.data if sparse.issparse(values) else values).all():
+        raise PatchfemError(f"{subject} contains values that are not finite")
+    skew = abs(values - values.T).max()
+    largest = abs(values).max()
+    if skew > MAX_SKEW * largest:
+        raise PatchfemError(
+            f"{subject} is not symmetric: entries differ from the transpose by {skew:.3g}, "
+            f"which is {skew / largest:.2g} of the largest entry; {SKEW_REFUSAL}"
+        )
+    return (values + values.T) / 2

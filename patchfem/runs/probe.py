@@ -1,0 +1,68 @@
+"""Probe of a plan: one run without error estimates, with its measured time.
+
+In: a Plan. Out: a `Probe`, whose sentences say how the time grows with each setting.
+"""
+
+from typing import NamedTuple
+
+from .patch import faces
+from .plan import Plan
+from .run import run
+
+# Ratio of the times of the contact on a mesh with half the element size and on the mesh itself (measured: 3.2 to 5.8).
+ELEMENT_FACTOR = 5
+
+
+class Probe(NamedTuple):
+    """Measured time of a run without error estimates.
+
+    - seconds: elapsed seconds by stage, and "total".
+    - static: static measures of the patches by name; {} without a patch.
+    - sentences: the time, and what each setting multiplies.
+    """
+
+    seconds: dict[str, float]
+    static: dict[str, float]
+    sentences: tuple[str, ...]
+
+    def as_json(self) -> dict:
+        """Return the static measures with the times and sentences, as `plan --probe --json` prints them."""
+        return self.static | {"seconds": self.seconds, "sentences": list(self.sentences)}
+
+
+def run_probe(plan: Plan) -> Probe:
+    """Run a plan once without error estimates and measure the time of its stages.
+
+    Raises
+    ------
+    PatchfemError
+        If the scene cannot be run.
+    """
+    result = run(plan, estimate=False)
+    seconds = {name: round(float(value), 3) for name, value in result.seconds.items()}
+    motion = seconds.get("march", seconds.get("bench", 0.0))
+    stages = [f"{motion:.2g} s of it for the motion"] * bool(motion)
+    if contact := seconds.get("contact"):
+        stages.append(f"{contact:.2g} s for the contact")
+    sentences = [
+        ", ".join([f"a run without error estimates took {seconds['total']:.2g} s", *stages])
+    ]
+    sentences += _describe_factors(plan, has_motion=bool(motion), has_contact=bool(contact))
+    return Probe(seconds, faces.static_measures_without_errors(plan.model), tuple(sentences))
+
+
+def _describe_factors(plan: Plan, *, has_motion: bool, has_contact: bool) -> list[str]:
+    """Describe what each setting multiplies."""
+    factors = []
+    if has_motion:
+        key = "slide.cycles" if plan.kind == "bench" else "drive.cycles"
+        factors.append(f"twice {key} takes up to twice the time of the motion")
+        if plan.engine == "march" or plan.kind == "bench":
+            factors.append("twice accuracy.steps_per_cycle takes twice the time of the motion")
+    if has_contact:
+        factors.append(
+            f"half contact.element_size takes about {ELEMENT_FACTOR} times the time of the contact"
+        )
+    if plan.model.wear is not None:
+        factors.append("each jump over cycles of wear solves the contact about 20 times")
+    return factors

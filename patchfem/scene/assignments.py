@@ -1,0 +1,578 @@
+"""Values that are given to keys beside the tables of a scene: the only parser of ``table.key=values``.
+
+--over, --free, the table [sweep] and the arguments of Python give a key a list of values, ``26 lbf, 100 N``, or a range.
+A range with a number of values, ``1 mm..9 mm:5``, stands for these values. A range without it, ``1 mm..9 mm`` or
+``5 mm +- 4 mm``, is one from which random values are drawn, or in which a fit varies the key.
+"""
+
+from __future__ import annotations
+
+import re
+from array import array
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import chain
+from typing import Any, NamedTuple, get_origin
+
+from ..core import PatchfemError
+from .keys import quantities
+from .keys.lookup import (
+    LIMITS_BY_ERROR_TYPE,
+    find_key,
+    is_table_or_value,
+    validate_value,
+)
+from .keys.types import (
+    attributes_by_key,
+    find_inner_table,
+    find_quantity_kind,
+    is_array_attribute,
+    list_key_types,
+    list_required_keys,
+)
+from .lines import split_assignment, split_key
+from .reader import read_set_value
+from .suggestions import require_key
+
+LENGTH_KEY = "drive.displacement"  # key of a length whose values `read_lengths` reads
+# Largest number of values in one range; the cases of a larger sweep would exhaust the memory.
+MAX_RANGE_VALUES = 10_000_000
+# Ratio of the ends of a range of positive numbers; at and above it the range is logarithmic by default.
+MIN_LOG_RATIO = 10
+# Number of significant digits of a value, so that a tenth of a range is
+# 0.1 and not 0.1000000000000001.
+SIGNIFICANT_DIGITS = 15
+_NUMBER_PATTERN = r"[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?"
+_RANGE_PATTERN = re.compile(r"(.*?)\s*\.\.\s*(.*?)\s*(?::\s*([0-9]*)\s*(log|lin)?)?")
+_QUANTITY_PATTERN = re.compile(rf"{_NUMBER_PATTERN}\s*(.*)")
+_TOLERANCE_PATTERN = re.compile(
+    rf"({_NUMBER_PATTERN})\s*(.*?)\s*(?:\+/?-|±)\s*([0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(.*)"
+)
+_OPENING_BRACKETS = {"]": "[", "}": "{"}
+
+
+class Form(NamedTuple):
+    """What an option accepts after ``table.key=``.
+
+    - option: name of the option in messages.
+    - usage: what messages say is needed, with an example.
+    - has_lists: whether a list of values is accepted.
+    - has_ranges: whether a range without a number of values is accepted.
+    """
+
+    option: str
+    usage: str
+    has_lists: bool
+    has_ranges: bool
+
+
+LISTS = Form(
+    "--over",
+    "table.key=v1,v2,... or table.key=low..high:n, such as contact.tilt.angle=1e-6 rad..1e-2 rad:9",
+    has_lists=True,
+    has_ranges=False,
+)
+RANDOM = LISTS._replace(has_ranges=True)
+BOUNDS = Form(
+    "--free",
+    "table.key=low..high, such as friction.bond_length=0.2 um..20 um",
+    has_lists=False,
+    has_ranges=True,
+)
+
+
+class FormattedNumbers(Sequence):
+    """Sequence of numbers, each formatted as text only when it is accessed.
+
+    Parameters
+    ----------
+    numbers : array of float64
+        Numbers in this unit.
+    unit : str
+        Unit of the scene; "" for plain numbers.
+    """
+
+    __slots__ = "numbers", "unit"
+
+    def __init__(self, numbers: array, unit: str):
+        self.numbers = numbers
+        self.unit = unit
+
+    def __len__(self) -> int:
+        return len(self.numbers)
+
+    def __getitem__(self, index: int | slice) -> str | list[str]:
+        if isinstance(index, slice):
+            return [_format_with_unit(number, self.unit) for number in self.numbers[index]]
+        return _format_with_unit(self.numbers[index], self.unit)
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """Swept key with its values.
+
+    - key: dotted key of the scene.
+    - texts: values as a scene writes them.
+    - values: floats in SI; the strings if they are not numbers.
+    - unit: SI unit of the values; "1" for plain numbers, "" for strings.
+    """
+
+    key: str
+    texts: Sequence[str]
+    values: Sequence[float | str]
+    unit: str
+
+    @property
+    def name(self) -> str:
+        """Name of the variable for the key, with underscores in place of dots."""
+        return re.sub(r"\W", "_", self.key)
+
+
+class Interval(NamedTuple):
+    """Range of values as it is written.
+
+    - text: both ends.
+    - low, high: ends in `unit`; `low` is the first one.
+    - unit: unit of the scene; "" for a plain number.
+    - count: number of values; 0 if none is given.
+    - is_log: whether the values are spaced logarithmically.
+    """
+
+    text: str
+    low: Fraction
+    high: Fraction
+    unit: str
+    count: int
+    is_log: bool
+
+    def interpolate(self, fraction: Fraction | float) -> float:
+        """Return the value at a given fraction of the range."""
+        if not self.is_log:
+            return float(self.low + (self.high - self.low) * fraction)
+        if fraction in (0, 1):
+            return float(self.high if fraction else self.low)
+        return float(self.low) * (float(self.high) / float(self.low)) ** float(fraction)
+
+    def list_texts(self) -> list[str]:
+        """Return the values of the range as a scene writes them."""
+        if not 2 <= self.count <= MAX_RANGE_VALUES:
+            raise ValueError(
+                f"{self.text}: give the number of values after a colon, from 2 to {MAX_RANGE_VALUES}, such as :9"
+            )
+        fractions = (Fraction(k, self.count - 1) for k in range(self.count))
+        return [_format_with_unit(self.interpolate(part), self.unit) for part in fractions]
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """Key with the range in which its value is drawn or fitted.
+
+    - key: dotted key of the scene.
+    - low, high: ends in SI.
+    - kind: kind of quantity; None for a plain number.
+    - interval: the range as it is written, from which random values are drawn; None if none are.
+    """
+
+    key: str
+    low: float
+    high: float
+    kind: str | None
+    interval: Interval | None = None
+
+    @property
+    def unit(self) -> str:
+        """SI unit of the key, or "1" for a number without unit."""
+        return quantities.find_si_unit(self.kind)
+
+    def format_assignment(self, value: float) -> str:
+        """Return the assignment that sets the key to a value in SI units."""
+        text = quantities.format_si(value, self.kind) if self.kind else repr(float(value))
+        return f"{self.key}={text}"
+
+    def make_axis(self, fractions: Iterable[float]) -> Axis:
+        """Return the key with the values at the given fractions of its range."""
+        numbers = array("d", map(self.interval.interpolate, fractions))
+        texts = FormattedNumbers(numbers, self.interval.unit)
+        return Axis(
+            self.key, texts, array("d", map(_make_value_reader(self.key), texts)), self.unit
+        )
+
+
+def read_assignments(
+    texts: Iterable[str], form: Form = LISTS
+) -> tuple[list[Axis | Range], list[str]]:
+    """Read strings ``table.key=values``; without lists, commas separate several of them in one string.
+
+    Returns
+    -------
+    tuple
+        The keys with their values, and the sentences about mistakes.
+    """
+    given: list[Axis | Range] = []
+    mistakes = []
+    texts = list(texts)
+    if texts and not form.has_lists:
+        texts = ",".join(texts).split(",")
+    for text in texts:
+        key, values = split_assignment(text)
+        if key and values:
+            _append_values(given, mistakes, f"{form.option} {key}", (key, values), form)
+        else:
+            mistakes.append(f"{form.option} {text}: write {form.usage}")
+    if not (texts or form.has_lists):
+        mistakes.append(f"{form.option}: at least one range is needed, {form.usage}")
+    counts = Counter(item.key for item in given)
+    mistakes += [f"{form.option} {key}: is given twice" for key in counts if counts[key] > 1]
+    return given, mistakes
+
+
+def read_table(table: Any) -> tuple[list[Axis], list[tuple[str, str]]]:
+    """Return the axes of a table [sweep] read from TOML, and (key, sentence) for each of its mistakes."""
+    if not isinstance(table, dict) or not table:
+        example = '"contact.tilt.angle" = "1e-6 rad..1e-2 rad:9"'
+        return [], [("sweep", f"keys with their values are needed, such as {example}")]
+    axes: list[Axis] = []
+    mistakes = []
+    for key, values in _flatten_table(table):
+        sentences: list[str] = []
+        if isinstance(values, list):
+            values = ",".join(map(str, values))
+        if isinstance(values, str):
+            _append_values(axes, sentences, "", (key, values), LISTS)
+        else:
+            sentences.append('the values must be a string, such as "0.1..0.6:6"')
+        mistakes += [(f"sweep.{key}", sentence) for sentence in sentences]
+    return axes, mistakes
+
+
+def read_lengths(text: str, name: str) -> list[float]:
+    """Return the lengths [m] of a range ``a..b:n`` or a list in rising order; all are above 0.
+
+    Raises PatchfemError, whose message begins with `name`, for any other text.
+    """
+    axes: list[Axis] = []
+    mistakes: list[str] = []
+    _append_values(axes, mistakes, name, (LENGTH_KEY, text), LISTS)
+    if mistakes:
+        raise PatchfemError("; ".join(mistakes))
+    lengths = sorted(axes[0].values)
+    if lengths[0] <= 0:
+        raise PatchfemError(
+            f"{name}: {lengths[0]:g} m; lengths above 0 are needed, such as 1 um..1 mm:9"
+        )
+    return lengths
+
+
+def describe_ranges(texts: Iterable[str]) -> list[str]:
+    """Return a sentence on the range given by each string ``table.key=value +- tolerance``."""
+    sentences = []
+    for text in texts:
+        key, values = split_assignment(text)
+        try:
+            ends = _range_about(values)
+        except ValueError:  # `read_assignments` reports this mistake
+            continue
+        if ends:
+            sentences.append(f"{key}: {values} is drawn evenly from {ends}")
+    return sentences
+
+
+def make_axis(key: str, texts: Iterable[str], *, distinct: bool = True) -> Axis:
+    """Return a swept key with a given list of values.
+
+    Parameters
+    ----------
+    key : str
+        Dotted key of a scene.
+    texts : iterable of str
+        Values as a scene writes them. A value beyond the limits of the key is accepted here and refused by its case.
+    distinct : bool
+        Whether no value may stand twice.
+
+    Raises
+    ------
+    ValueError
+        With one line for each value that the key does not accept.
+    """
+    texts = tuple(texts)
+    _require_value_key(key, texts)
+    values, mistakes = _collect(_make_value_reader(key), texts)
+    if not mistakes and distinct and len(set(values)) < len(values):
+        twice = next(k for k, value in enumerate(values) if values.index(value) < k)
+        mistakes.append(f"{texts[twice]} is given twice")
+    if mistakes:
+        raise ValueError("\n".join(mistakes))
+    if all(isinstance(value, float) for value in values):
+        kind = find_quantity_kind(*find_key(key))
+        return Axis(key, texts, tuple(values), quantities.find_si_unit(kind))
+    return Axis(key, texts, texts, "")
+
+
+def read_values(key: str, text: str, form: Form = LISTS) -> Axis | Range:
+    """Parse the values of a key.
+
+    Parameters
+    ----------
+    key : str
+        Dotted key of a scene.
+    text : str
+        The values as an option writes them.
+    form : Form
+        What the option accepts.
+
+    Raises
+    ------
+    ValueError
+        With one line for each mistake.
+    """
+    pieces = _split_at_commas(text)
+    _require_value_key(key, pieces)
+    if not (form.has_lists or _holds_number(key)):
+        raise ValueError(
+            "is not a number that can vary; only quantities and plain numbers can be free"
+        )
+    if form.has_ranges and len(pieces) == 1:
+        interval = _parse_interval(key, text.strip())
+        if interval is not None:
+            return _make_range(key, interval, form)
+    if not form.has_lists:
+        raise ValueError(f"{text}: a range is needed, {form.usage}")
+    groups, mistakes = _collect(lambda piece: _list_texts(key, piece), pieces)
+    if mistakes:
+        raise ValueError("\n".join(mistakes))
+    return make_axis(key, chain.from_iterable(groups))
+
+
+def _append_values(
+    given: list, mistakes: list[str], name: str, assignment: tuple[str, str], form: Form
+) -> None:
+    """Read the values of a key, and append them to `given`, or their mistakes after `name` to `mistakes`."""
+    try:
+        given.append(read_values(*assignment, form))
+    except ValueError as error:
+        mistakes += [f"{name}: {line}" if name else line for line in str(error).split("\n")]
+
+
+def _collect(read: Callable, texts: Iterable[str]) -> tuple[list, list[str]]:
+    """Apply a function to texts; return its results and the sentences of its ValueErrors."""
+    values = []
+    mistakes = []
+    for text in texts:
+        try:
+            values.append(read(text))
+        except ValueError as error:
+            mistakes.append(str(error))
+    return values, mistakes
+
+
+def _list_texts(key: str, piece: str) -> list[str]:
+    """Return the values of one part of a list: those of a range, or a single value."""
+    if not piece:
+        raise ValueError("there is no value between two commas")
+    if about := _range_about(piece) if _holds_number(key) else "":
+        raise ValueError(
+            f"{piece}: write this range as {about}:9 for 9 values in it, or as {about} with --random"
+        )
+    interval = _parse_interval(key, piece)
+    return [piece] if interval is None else interval.list_texts()
+
+
+def _parse_interval(key: str, piece: str) -> Interval | None:
+    """Parse a range such as ``1..9 mm:5`` or ``5 mm +- 1 mm``; return None for any other text."""
+    if not _holds_number(key):
+        return None
+    if about := _range_about(piece):
+        piece = f"{about}:lin"
+    match = _RANGE_PATTERN.fullmatch(piece)
+    if match is None:
+        return None
+    low, high, count, spacing = match.groups()
+    text = f"{low}..{high}"
+    # A bare number before the dots has the unit of the number after them, as in 1..9 mm.
+    units = [_QUANTITY_PATTERN.fullmatch(end) for end in (low, high)]
+    if all(units) and units[1][1] and not units[0][1]:
+        low = f"{low} {units[1][1]}"
+
+    kind = find_quantity_kind(*find_key(key))
+    if kind is None:
+        low, high = (str(quantities.read_percentage(end)) for end in (low, high))
+        if any(re.fullmatch(quantities.NUMBER_PATTERN, end) is None for end in (low, high)):
+            raise ValueError(f"{text}: both ends of this range must be plain numbers")
+        ends = Fraction(low), Fraction(high)
+        unit = ""
+    else:
+        for end in (low, high):
+            quantities.parse_quantity(end, kind)
+        (low, unit), (high, high_unit) = map(quantities.split_quantity, (low, high))
+        factor = Fraction(_find_factor(high_unit, kind)) / Fraction(_find_factor(unit, kind))
+        ends = Fraction(low), Fraction(high) * factor
+    if ends[0] == ends[1]:
+        raise ValueError(f"{text}: both ends are the same value")
+    return Interval(text, *ends, unit, int(count or 0), _is_log(*ends, spacing))
+
+
+def _find_factor(unit: str, kind: str) -> str:
+    return repr(quantities.UNIT_FACTORS[kind][quantities.normalize_unit(unit)])
+
+
+def _is_log(low: Fraction, high: Fraction, spacing: str | None) -> bool:
+    """Return whether the values of a range are spaced logarithmically."""
+    is_positive = low > 0 and high > 0
+    if spacing is None and is_positive:
+        return max(low / high, high / low) >= MIN_LOG_RATIO
+    if spacing == "log" and not is_positive:
+        raise ValueError("a logarithmic range needs both ends > 0")
+    return spacing == "log"
+
+
+def _range_about(text: str) -> str:
+    """Convert a value with tolerance such as "5 mm +- 1 mm" to a range, or return "" if there is no tolerance.
+
+    Raises ValueError if the tolerance has another unit than the value.
+    """
+    match = _TOLERANCE_PATTERN.fullmatch(text)
+    if match is None:
+        return ""
+    number, unit, width, width_unit = match.groups()
+    try:
+        middle = Fraction(number)
+        half = Fraction(width)
+    except ValueError:  # the string is not a number, such as 1.2.3
+        return ""
+    if width_unit not in ("%", "", unit):
+        unit_of_value = f" ({unit})" if unit else ""
+        raise ValueError(
+            f"{text}: write the width in % or in the unit of the value{unit_of_value}, or the range as low..high"
+        )
+    if width_unit == "%":
+        half = abs(middle) * half / 100
+    return "..".join(_format_with_unit(float(end), unit) for end in (middle - half, middle + half))
+
+
+def _make_range(key: str, interval: Interval, form: Form) -> Range:
+    """Return the range in which a key varies; raise ValueError if the key does not accept it."""
+    definition = find_key(key)
+    if float not in list_key_types(*definition):
+        raise ValueError(
+            f"{interval.text}: a key that takes whole numbers takes no range; list the values, such as 1,2,3"
+        )
+    if interval.count:
+        raise ValueError(
+            f"{interval.text}:{interval.count}: the values lie anywhere between the ends; leave out :{interval.count}"
+        )
+    texts = [_format_with_unit(float(end), interval.unit) for end in interval[1:3]]
+    low, high = map(_make_value_reader(key), texts)
+    if not form.has_lists:
+        if not low < high:
+            raise ValueError(f"{interval.text}: the low bound must lie below the high bound")
+        for text, value in zip(texts, (low, high)):
+            validate_value(key, text if interval.unit else value)
+    return Range(key, low, high, find_quantity_kind(*definition), interval)
+
+
+def _flatten_table(table: dict, table_key: str = "") -> list[tuple[str, Any]]:
+    """Return (dotted key, value) for a table whose keys may be dotted or quoted."""
+    pairs = []
+    for key, value in table.items():
+        path = f"{table_key}.{key}" if table_key else key
+        pairs += _flatten_table(value, path) if isinstance(value, dict) else [(path, value)]
+    return pairs
+
+
+def _require_value_key(key: str, texts: Sequence[str]) -> None:
+    """Raise ValueError for an unknown key, or for values that are assigned to a table; suggest keys."""
+    first = re.split(r"\.\.", texts[0])[0] if texts else ""
+    model, name = require_key(key, read_set_value("", first))
+    inner = find_inner_table(model, name)
+    if inner is None or is_table_or_value(model, name):
+        return
+    if texts and all(text.startswith(("{", "[", '"', "'")) for text in texts):
+        return
+    required = list_required_keys(inner)
+    suggested = [
+        *required,
+        *(inner_key for inner_key in attributes_by_key(inner) if inner_key not in required),
+    ]
+    pieces = split_key(key)
+    if is_array_attribute(model, name):
+        # The last piece names the array, an item of it, or a key for which no item is named.
+        if pieces[-1] in suggested:
+            suggested = [pieces.pop()]
+        if pieces[-1] == name:
+            pieces.append("NAME")
+    table = ".".join(pieces)
+    raise ValueError(
+        "is a table without a value of its own; choose a key of this table: "
+        f"{', '.join(f'{table}.{inner_key}' for inner_key in suggested[:4])}"
+    )
+
+
+def _holds_number(key: str) -> bool:
+    """Return whether the value of a key is a single number, with or without unit."""
+    place = find_key(key)
+    types = list_key_types(*place)
+    is_single = find_inner_table(*place) is None and tuple not in map(get_origin, types)
+    return is_single and (float in types or int in types)
+
+
+def _split_at_commas(text: str) -> list[str]:
+    """Split a text at commas outside brackets and quotes.
+
+    A quote opens at the start of a value or inside brackets; anywhere else it is a character like others.
+    """
+    pieces = []
+    brackets = []
+    quote = ""
+    start = 0
+    is_escaped = False
+    for index, sign in enumerate(text):
+        if quote:
+            quote = "" if sign == quote and not is_escaped else quote
+            is_escaped = sign == "\\" and quote == '"' and not is_escaped
+        elif sign in "\"'" and (brackets or not text[start:index].strip()):
+            quote = sign
+        elif sign in "[{":
+            brackets.append(sign)
+        elif sign in _OPENING_BRACKETS and brackets and brackets[-1] == _OPENING_BRACKETS[sign]:
+            brackets.pop()
+        elif sign == "," and not brackets:
+            pieces.append(text[start:index].strip())
+            start = index + 1
+    return [*pieces, text[start:].strip()]
+
+
+def _make_value_reader(key: str) -> Callable[[str], float | str]:
+    """Return a function that converts the string of a value to SI; a string that is not a number is unchanged.
+
+    The function raises ValueError if the key does not accept the text.
+    """
+    place = find_key(key)
+    kind = find_quantity_kind(*place)
+    is_number = _holds_number(key)
+    takes_float = float in list_key_types(*place)
+
+    def read_value(text: str) -> float | str:
+        if is_number and kind is not None:
+            return quantities.parse_quantity(text, kind)
+        # Most drawn values are plain numbers; `read_set_value` is slow for thousands of them.
+        if is_number and takes_float and re.fullmatch(quantities.NUMBER_PATTERN, text):
+            return float(text)
+        value = quantities.read_percentage(read_set_value(key, text))
+        if isinstance(value, dict) and find_inner_table(*place) is not None:
+            return text
+        has_number = isinstance(value, int | float) and not isinstance(value, bool)
+        validate_value(
+            key, float(value) if has_number and takes_float else value, LIMITS_BY_ERROR_TYPE
+        )
+        return float(value) if has_number else text
+
+    return read_value
+
+
+def _format_with_unit(value: float, unit: str) -> str:
+    """Format a value of a swept key with its unit."""
+    number = float(f"{value:.{SIGNIFICANT_DIGITS}g}")
+    # repr writes whole numbers below 1e16 without an exponent.
+    return f"{repr(number).removesuffix('.0')} {unit}".rstrip()

@@ -1,0 +1,33 @@
+"""Rough computing time of a scene, by which expensive random scenes are left out."""
+
+from patchfem.runs import choose_numerics
+from patchfem.runs.rig.costs import estimate_hybrid_seconds
+
+NODE_SECONDS = 4e-5  # CPU time [s] per elastic unknown of the finest mesh
+STEP_SECONDS = 1.5e-6  # CPU time [s] of a time step of a point
+POINT_STEP_SECONDS = 2e-7  # additional CPU time [s] of a time step per node of the interface
+N_JUMPS = 40  # jumps of wear if the run chooses their number
+JUMP_SECONDS = 0.05  # CPU time [s] of a jump besides the motion
+MARCH_PASSES = (
+    4  # steps of a time integration with its coarser and finer runs, relative to the first one
+)
+
+
+def estimate_seconds(plan) -> float:
+    """Return the rough CPU time [s] of a Plan."""
+    unknowns = plan.unknowns
+    model = plan.model
+    seconds = 0.5 + NODE_SECONDS * unknowns.get("elastic_unknowns_about", 0)
+    n_points = max(unknowns.get("interface_points", 0), unknowns.get("bond_list_about", 0))
+    motion = 0.0
+    if plan.engine == "hybrid":
+        motion = estimate_hybrid_seconds(model)
+    elif plan.engine == "harmonic":
+        motion = 2.0
+    elif model.rig is not None:
+        numerics = choose_numerics(model)
+        step = STEP_SECONDS + POINT_STEP_SECONDS * n_points
+        motion = MARCH_PASSES * numerics.cycles * numerics.steps * step
+    if model.wear is not None:
+        seconds += (model.wear.jumps or N_JUMPS) * (JUMP_SECONDS + motion)
+    return seconds + motion
