@@ -29,6 +29,10 @@ N_MARGINS = 4
 LAST_MARGINS = 4  # row of `State.margins` of the last evaluation
 MARGIN_TOL = 1e-11  # margins are relative; above minus this they count as positive
 MAX_PIVOTS = 100
+N_ORDERED_PIVOTS = (
+    20  # pivots by the order in which limits are reached; then by number, which always ends
+)
+N_HALVINGS = 40  # halvings of the change of the forces
 MAX_OVERLOAD = 1e-9  # relative excess over the static friction that is attributed to round-off
 SAME_SPEED_TOL = 1e-12  # relative velocity below which an interface stops together with another one
 VERTEX_FRACTION = (
@@ -289,20 +293,62 @@ def hold_or_release(rig, state):
     """Find which rigid interfaces without velocity rest and which slip (Murty's principal pivoting).
 
     Rest must not need more than the static friction, and an interface that begins to slip must accelerate in the
-    direction of its slip. The first interface that violates its condition changes sides, until none does.
+    direction of its slip. An interface that violates its condition changes sides, until none does.
+
+    With kinetic below static friction several states may be possible. Among interfaces at rest, the one is released
+    whose limit is reached first while the forces change from those before the event; afterwards those are held again that
+    can rest while the others slip.
     """
-    for _ in range(MAX_PIVOTS):
+    n_faces = rig.faces.shape[0]
+    for i in range(n_faces):
+        state.memory[i, Memory.BEFORE] = state.memory[i, Memory.FORCE]
+    n_released = 0
+    for pivot in range(MAX_PIVOTS):
         update_grip(rig, state)
         write_margins(rig, state, state.clock[Clock.TIME], state.y, state.margins[LAST_MARGINS])
         i = find_violation(rig, state)
         if i < 0:
             break
+        if pivot < N_ORDERED_PIVOTS and rests(state.memory[i]):
+            i = find_first_overload(rig, state, i)
         memory = state.memory[i]
+        memory[Memory.RELEASED] = 0.0
         if rests(memory):
+            n_released += 1
+            memory[Memory.RELEASED] = 1.0
             memory[Memory.DIRECTION] = 1.0 if memory[Memory.FORCE] > 0 else -1.0
         else:
             memory[Memory.DIRECTION] = 0.0
+    if n_released > 1:
+        hold_again(rig, state)
+    for i in range(n_faces):
+        state.memory[i, Memory.RELEASED] = 0.0
     copy_margins(state, LAST_MARGINS)
+
+
+@njit(**NJIT_KERNEL)
+def hold_again(rig, state):
+    """Hold the interfaces that were released and can rest while the others slip.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion, which is updated.
+    """
+    for i in range(rig.faces.shape[0]):
+        memory = state.memory[i]
+        if memory[Memory.RELEASED] == 0:
+            continue
+        direction = memory[Memory.DIRECTION]
+        memory[Memory.DIRECTION] = 0.0
+        update_grip(rig, state)
+        write_margins(rig, state, state.clock[Clock.TIME], state.y, state.margins[LAST_MARGINS])
+        if find_violation(rig, state) >= 0:
+            memory[Memory.DIRECTION] = direction
+    update_grip(rig, state)
+    write_margins(rig, state, state.clock[Clock.TIME], state.y, state.margins[LAST_MARGINS])
 
 
 @njit(**NJIT_KERNEL)
@@ -325,6 +371,66 @@ def find_violation(rig, state):
             if is_still and push < -MAX_OVERLOAD * rig.faces[i, Face.LOAD]:
                 return i
     return -1
+
+
+@njit(**NJIT_KERNEL)
+def find_overload(rig, state, fraction):
+    """Return the first interface at rest that is beyond its static friction at a fraction of the change of forces, or -1.
+
+    The forces change from those before the event to those that hold the interfaces.
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion, whose forces are kept.
+    fraction : float
+        From 0 to 1.
+    """
+    n = rig.modes.shape[1]
+    for i in range(rig.faces.shape[0]):
+        face = rig.faces[i]
+        memory = state.memory[i]
+        if not face[Face.RIGID] or not rests(memory):
+            continue
+        held = memory[Memory.FORCE]
+        memory[Memory.FORCE] = memory[Memory.BEFORE] + fraction * (held - memory[Memory.BEFORE])
+        point = look(rig, state, i, state.clock[Clock.TIME], state.y)
+        memory[Memory.FORCE] = held
+        first = 2 * n + int(face[Face.FIRST_STATE])
+        states = state.y[first : first + int(face[Face.N_STATES])]
+        margins = state.margins[0, i]
+        write_law_margins(int(face[Face.LAW]), face[Face.NUMBERS :], memory, point, states, margins)
+        if margins[Margin.MOTION] < -MAX_OVERLOAD:
+            return i
+    return -1
+
+
+@njit(**NJIT_KERNEL)
+def find_first_overload(rig, state, last):
+    """Return the interface at rest whose static friction is reached first while the forces change (bisection).
+
+    Parameters
+    ----------
+    rig : Rig
+        Arrays of the rig.
+    state : State
+        Motion.
+    last : int
+        An interface that is beyond its static friction in the end.
+    """
+    left = 0.0
+    right = 1.0
+    for _ in range(N_HALVINGS):
+        middle = 0.5 * (left + right)
+        i = find_overload(rig, state, middle)
+        if i < 0:
+            left = middle
+        else:
+            right = middle
+            last = i
+    return last
 
 
 @njit(**NJIT_KERNEL)

@@ -123,6 +123,7 @@ class Memory(IntEnum):
     - VIRGIN: 1 until an interface has slipped as a whole, then -1
     - ORIGIN: slide at the start [m]
     - SIZE, SPEED: largest magnitudes of slide [m] and velocity [m/s] so far
+    - BEFORE, RELEASED: friction force [N] before the last event, and whether this event released the interface
     - STACK: first column of pairs of displacement [m] and force [N] at the reversal points
     """
 
@@ -137,7 +138,9 @@ class Memory(IntEnum):
     ORIGIN = 8
     SIZE = 9
     SPEED = 10
-    STACK = 11
+    BEFORE = 11
+    RELEASED = 12
+    STACK = 13
 
 
 class Margin(IntEnum):

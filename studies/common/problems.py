@@ -1,6 +1,5 @@
 """The two problems with exact answers: stick-slip at resonance and the two masses of Fig 16."""
 
-from types import SimpleNamespace
 
 import numpy as np
 
@@ -68,7 +67,7 @@ def run_motion(modes, drive, laws, cycles: float, times=(), start=None, window: 
     interfaces = [
         cases.Interface(law, cases.Load(1.0), row) for law, row in zip(laws, modes.interfaces)
     ]
-    sizes = cases.find_sizes(SimpleNamespace(modes=modes, start=start), signal, drive)
+    sizes = cases.find_sizes(modes, signal, drive, start)
     options = cases.Options(drive.moving, rtol=cases.EXACT_RTOL)
     rig = cases.make_rig(modes, signal, interfaces, sizes, options)
     case = cases.Case(

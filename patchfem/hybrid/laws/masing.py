@@ -39,6 +39,12 @@ def force_and_rates(p, memory, point, s, rates):
     if memory[Memory.CONTACT] < 0:
         return Friction(0.0, point.velocity, 0.0)
 
+    # All elements slip, whatever the reversals before were.
+    pieces = int(p[4])
+    k = int(memory[Memory.FLAG])
+    if k >= pieces:
+        return Friction(direction * p[2], point.velocity, p[2] * direction * point.velocity)
+
     # Displacement x on the curve of first loading, from the last reversal at half the scale.
     n = int(memory[Memory.COUNT])
     half = 1.0
@@ -50,16 +56,12 @@ def force_and_rates(p, memory, point, s, rates):
     x = half * direction * (point.slide - memory[Memory.ORIGIN] - start)
 
     # Force and slope of first loading.
-    pieces = int(p[4])
-    k = int(memory[Memory.FLAG])
-    force = p[2]
-    slope = 0.0
-    if k < pieces and p[1] >= 0:
+    if p[1] >= 0:
         scale = p[2] / (p[1] + (p[0] + 1) / (p[0] + 2)) / p[3]
         power = max(x / p[3], 0.0) ** (p[0] + 1)
         slope = scale * (p[1] + 1 - power)
         force = scale * x * (p[1] + 1 - power / (p[0] + 2))
-    elif k < pieces:
+    else:
         first = POINTS + k
         values = first + pieces + 1
         slope = (p[values + 1] - p[values]) / (p[first + 1] - p[first])

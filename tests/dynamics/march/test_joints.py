@@ -271,12 +271,7 @@ def test_always_difficult_random_chains_converge(seed):
     "seed, n_interfaces, n_modes, coupled",
     [
         (3, 2, 3, False),
-        pytest.param(
-            *(1, 3, 3, True),
-            marks=pytest.mark.xfail(
-                reason="hybrid releases an interface at rest when another one reverses, although it could rest on"
-            ),
-        ),
+        (1, 3, 3, True),
     ],
     ids=["two faces", "three faces"],
 )

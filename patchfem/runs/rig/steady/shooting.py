@@ -145,10 +145,15 @@ class ShootingFinder(TracedCurve):
             name: errors.get(name, abs(value)) + relative * abs(value)
             for name, value in solution.values.items()
         }
+        # A periodic motion does not drift, and friction without slip does no work over a period.
+        zeros = {"drift_per_cycle": 0.0}
+        if is_stuck:
+            zeros |= dict.fromkeys(("friction_work", "energy_dissipated", "loop_area"), 0.0)
+            errors |= {name: 0.0 for name in zeros if name in errors}
         extra = {"multipliers": motion.multipliers, "residual": motion.change, "map": "shooting"}
         return replace(
             solution,
-            values=solution.values | {"drift_per_cycle": 0.0},
+            values=solution.values | zeros,
             outcome=outcome,
             errors=errors,
             extra=solution.extra | extra,
