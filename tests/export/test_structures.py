@@ -200,7 +200,7 @@ def test_always_export_states_omitted_features(tmp_path, text, message):
         (
             POINT + WAVE + PLASTIC + STRUCTURE,
             ".mat",
-            "cannot be written under a load that changes; remove this feature",
+            "cannot be written with normal.amplitude; remove this feature",
         ),
         (
             POINT
