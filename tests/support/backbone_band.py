@@ -33,7 +33,7 @@ from campaigns import Row
 from decay_fits import make_sliders
 
 import patchfem as pf
-from patchfem.campaigns import compute_backbone
+from patchfem.campaigns.backbone.curves import compute_backbone
 from patchfem.core import PatchfemError
 
 LAWS = ("elastic-plastic", "iwan", "bouc-wen", "lugre", "tanh", "coulomb")

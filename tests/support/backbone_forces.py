@@ -40,19 +40,25 @@ FRACTIONS = (0.35, 0.55, 0.7, 0.85)  # places of the amplitudes in the logarithm
 N_HARMONICS = 31  # largest odd harmonic of the own balance
 N_SAMPLES = 4096  # of a cycle; twice as many give the doubt
 MARCH_DOUBT = 3e-4  # relative: steps of the march, and the change at which it counts as steady
+MAX_CYCLES = 200  # laws with a memory need many cycles in micro-slip
 N_FREQUENCY_STEPS = 6  # secant steps of the stepped sine
 
 
 @njit
 def trace_cycle(kind, numbers, limits, slides, speeds):
-    """Return the friction force (N,) of the second cycle of sampled slides (N,), with speeds (N,)."""
+    """Return the friction force (N,) of the first repeated cycle of sampled slides (N,), with speeds (N,)."""
     state = np.zeros(numbers.size)
     force = np.zeros(slides.size)
     last = 0.0
-    for _ in range(2):
+    for _ in range(MAX_CYCLES):
+        change = 0.0
         for k in range(slides.size):
-            force[k] = step_law(kind, numbers, limits, state, slides[k] - last, speeds[k])
+            new = step_law(kind, numbers, limits, state, slides[k] - last, speeds[k])
+            change = max(change, abs(new - force[k]))
+            force[k] = new
             last = slides[k]
+        if change < 1e-10 * limits[0]:
+            break
     return force
 
 

@@ -23,7 +23,7 @@ import numpy as np
 from campaigns import Row
 
 import patchfem as pf
-from patchfem.campaigns import compute_backbone
+from patchfem.campaigns.backbone.curves import compute_backbone
 from patchfem.campaigns.fits.curve import fit_curve, read_damping_curve
 from patchfem.core import PatchfemError
 from patchfem.export.lab import imported

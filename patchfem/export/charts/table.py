@@ -339,7 +339,7 @@ _METHOD_CURVES = {
     name: tuple(
         f"{method}_{name}@{method}_amplitude".replace("-", "_") for method in BACKBONE_METHODS
     )
-    for name in ("frequency", "damping")
+    for name in ("frequency", "damping", "force")
 }
 BACKBONE = (
     Chart(
@@ -358,6 +358,14 @@ BACKBONE = (
         log="x auto",
         labels=("amplitude at the output", "damping ratio"),
         caption="Structure and friction together. Use the first curve; its band contains what other kinds of test read.",
+    ),
+    Chart(
+        "Force of the phase resonance",
+        "balance_amplitude quasi_static_amplitude decay_amplitude",
+        _METHOD_CURVES["force"],
+        log="x y",
+        labels=("amplitude at the output", "force at the output"),
+        caption="Amplitude of a sinusoidal force at the output, in phase with the velocity there, that holds the amplitude.",
     ),
 )
 FIT = (
@@ -690,7 +698,20 @@ CURVES: dict[str, dict[str, dict[str, str] | Stack | Rows | Entries]] = {
         "backbone.csv": Stack(
             "method",
             BACKBONE_METHODS,
-            ("amplitude", "frequency", "frequency_error", "damping", "damping_error", "force"),
+            (
+                "amplitude",
+                "frequency",
+                "frequency_error",
+                "damping",
+                "damping_error",
+                "force",
+                "force_error",
+                "force_frequency",
+                "frequency_low",
+                "frequency_high",
+                "damping_low",
+                "damping_high",
+            ),
         )
     },
     "fit": {
@@ -783,6 +804,18 @@ SWEEP_TABLES = (
 TABLES: dict[str, tuple[Table, ...]] = {
     **dict.fromkeys(("patch", "bench", "rig", "linear"), RUN_TABLES),
     "sweep": SWEEP_TABLES,
+    "backbone": (
+        Table(
+            "Values of the key",
+            "table",
+            (
+                Column("value", "value"),
+                Column("stuck_frequency", "frequency with a sticking contact"),
+                Column("largest_damping", "largest damping ratio"),
+                Column("amplitude_of_largest_damping", "at"),
+            ),
+        ),
+    ),
     "compare": tuple(
         Table(
             title,
