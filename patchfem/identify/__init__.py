@@ -9,12 +9,11 @@ parameters that the data do not determine; frequencies, damping ratios and shape
 PUBLIC = {
     "least_squares": (
         "Descent",
-        "DescentStorage",
+        "Descents",
         "Fit",
         "Problem",
+        "Search",
         "SearchCounts",
-        "assemble_fit",
-        "run_descents",
     ),
     "measured_modes": (
         "SHAPE_QUANTITIES",
