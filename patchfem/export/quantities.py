@@ -33,6 +33,8 @@ KEY = (
     "frequency_at_largest_amplitude",
     "damping_at_smallest_amplitude",
     "damping_at_largest_amplitude",
+    "force_at_smallest_amplitude",
+    "force_at_largest_amplitude",
     "largest_damping",
     "amplitude_of_largest_damping",
     "compared_amplitude",

@@ -56,6 +56,9 @@ MAX_LISTED_AMPLITUDES = 6  # Largest number of amplitudes that a message lists.
 # Number of cached curves; each step of the search evaluates some of the last ones again.
 N_CACHED_CURVES = 8
 N_CURVE_POINTS = 25  # number of amplitudes of the fitted curve
+BAND_STEP = (
+    0.1  # change of a parameter in half-widths of its interval, for the slope of the fitted curve
+)
 EXTENT = 3.0  # ratio by which the fitted curve goes beyond the measured amplitudes on both sides
 NO_MODE_ERROR = "the intervals do not contain the error of the modes left out of the structure"
 
@@ -103,8 +106,9 @@ class FittedCurve:
         Notes about assumed errors, about the compared quantities and about neglected modes of a reduced structure.
     n_computed : int
         Number of computed curves of the model.
-    beyond : (3, j) array
-        Amplitude [m], frequency [Hz] and damping ratio of the fitted model beyond the measured amplitudes.
+    beyond : (5, j) array
+        Amplitude [m], frequency [Hz] and damping ratio of the fitted model from below to beyond the measured amplitudes,
+        and the half-widths of their 95 % bands; NaN if a parameter is not determined.
     """
 
     keys: FittedKeys
@@ -354,22 +358,43 @@ def fit_curve(
             *widened.notes,
         ),
         n_computed=curves.n_computed,
-        beyond=_extrapolate_curve(curves, fit.values),
+        beyond=_extrapolate_curve(curves, widened.fit),
     )
 
 
-def _extrapolate_curve(curves: CurveModel, values) -> np.ndarray:
-    """Compute amplitude, frequency and damping (3, j) of the fitted model beyond the measured amplitudes.
+def _extrapolate_curve(curves: CurveModel, fit: Fit) -> np.ndarray:
+    """Compute the fitted curve with its band (5, j) beyond the measured amplitudes, as in `FittedCurve.beyond`.
 
-    Amplitudes at which the mode does not oscillate are left out.
+    The band is the linear propagation of the intervals and of the correlation of the parameters. Amplitudes at which the
+    mode does not oscillate are left out.
     """
     ends = curves.amplitude[[0, -1]] * [1 / EXTENT, EXTENT]
     amplitudes = np.geomspace(*ends, N_CURVE_POINTS)
+
+    def compute(values) -> np.ndarray:
+        """Return frequency [Hz] and damping ratio (2, k) for values of the parameters."""
+        return _compute_backbone_curve(curves.build_model(values), amplitudes, curves.methods[0])
+
+    half_widths = np.ptp(fit.intervals.ends, axis=1) / 2
+    band = np.full((2, amplitudes.size), np.nan)
     try:
-        curve = _compute_backbone_curve(curves.build_model(values), amplitudes, curves.methods[0])
+        curve = compute(fit.values)
+        if np.isfinite(half_widths).all():
+            slopes = []
+            for k, half_width in enumerate(half_widths):
+                values = np.array(fit.values)
+                # a step towards the middle of the range stays within it
+                middle = (curves.ranges[k].low + curves.ranges[k].high) / 2
+                step = np.copysign(BAND_STEP * half_width, middle - values[k])
+                values[k] += step
+                slopes.append((compute(values) - curve) / step * half_width if step else 0 * curve)
+            correlation = fit.intervals.correlation
+            correlation = np.where(np.isfinite(correlation), correlation, np.eye(len(slopes)))
+            variance = np.einsum("iqk,ij,jqk->qk", slopes, correlation, slopes)
+            band = np.sqrt(np.maximum(variance, 0.0))
     except PatchfemError:
-        return np.zeros((3, 0))
-    return np.array([amplitudes, *curve])[:, np.isfinite(curve).all(axis=0)]
+        return np.zeros((5, 0))
+    return np.array([amplitudes, *curve, *band])[:, np.isfinite(curve).all(axis=0)]
 
 
 def _search_two_models(models: TwoModels, start, starts: int, amplitude) -> tuple:

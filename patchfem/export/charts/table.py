@@ -393,7 +393,7 @@ FIT = (
         "points",
         log="x",
         lines=("curve_frequency@curve_amplitude",),
-        caption="Measured values with 95 % intervals, and the fitted curve beyond them.",
+        caption="Measured values with 95 % intervals, and the fitted curve with its 95 % band beyond them.",
     ),
     Chart(
         "Damping ratio",
@@ -403,7 +403,7 @@ FIT = (
         log="x auto",
         lines=("curve_damping@curve_amplitude",),
         labels=("", "damping ratio"),
-        caption="Measured values with 95 % intervals, and the fitted curve beyond them.",
+        caption="Measured values with 95 % intervals, and the fitted curve with its 95 % band beyond them.",
     ),
     Chart(
         "Residuals of the frequency",
@@ -715,6 +715,13 @@ CURVES: dict[str, dict[str, dict[str, str] | Stack | Rows | Entries]] = {
         )
     },
     "fit": {
+        "fitted_curve.csv": {
+            "amplitude": "curve_amplitude",
+            "frequency": "curve_frequency",
+            "frequency_error": "curve_frequency_error",
+            "damping": "curve_damping",
+            "damping_error": "curve_damping_error",
+        },
         "fit.csv": {
             # of a loop
             "time": "time",
@@ -738,7 +745,7 @@ CURVES: dict[str, dict[str, dict[str, str] | Stack | Rows | Entries]] = {
             "computed acceleration [g]": "computed_acceleration",
             "computed displacement [mil]": "computed_displacement",
             "held": "held",
-        }
+        },
     },
     "cost": {"cost.csv": Rows("run", has_units=False)},
 }
