@@ -124,19 +124,17 @@ def find_forces(
         Force [N] and its frequency [Hz]; NaN if no force holds the motion.
     """
     modes = joint.modes
-    solver = FreeMotionSolver(group, joint, amplitudes[-1], harmonics)
-    # With one mode a force at the output is the negative damping of the first harmonic.
-    if modes.omega.size > 1:
-        excitation = np.outer(modes.output, modes.output) / solver.reach**2
-        solver = FreeMotionSolver(group, joint, amplitudes[-1], harmonics, excitation)
-        motions = solver.solve(amplitudes, motions)
+    reach = abs(float(modes.output @ joint.shape))
+    excitation = np.outer(modes.output, modes.output) / reach**2
+    solver = FreeMotionSolver(group, joint, amplitudes[-1], harmonics, excitation)
+    motions = solver.solve(amplitudes, motions)
     out = np.full((2, len(amplitudes)), np.nan)
     for column, motion in enumerate(motions):
         if motion is not None:
             # the excitation 2 zeta omega m E z' with E = output output^T/reach^2, as a force at the output
             free = motion.free
             output = abs(free.modal[1] @ modes.output)
-            force = 2 * free.zeta * free.omega**2 * modes.mass * output / solver.reach**2
+            force = 2 * free.zeta * free.omega**2 * modes.mass * output / reach**2
             out[:, column] = force, free.omega / (2 * np.pi)
     return out
 
