@@ -97,7 +97,8 @@ def backbone_axes(dataset, ax=None):
     """
     data = {}
     for name, array in getattr(dataset, "variables", {}).items():
-        data[name] = Variable(array.dims, array.values, array.attrs.get("units", "1"))
+        texts = (array.attrs.get("units", "1"), array.attrs.get("long_name", ""))
+        data[name] = Variable(array.dims, array.values, *texts)
     drawn = panels.make_panels({"": Answer("backbone", "", (), data=data)}, CHARTS["backbone"])
     if not drawn:
         raise PatchfemError(
