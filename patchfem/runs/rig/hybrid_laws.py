@@ -8,13 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...dynamics.grooves.climbing import check_lifted_mass
+from ...dynamics.grooves import climbing
 from ...effects import law_has_trait
 from ...friction import record
 from ...hybrid.cases import Load
 from ...hybrid.laws import make_law, smooth_grooves
 from ...hybrid.laws.grooves import make_grooves
-from ...hybrid.laws.masing import from_elements
+from ...hybrid.laws.masing import from_elements, with_all_reversals
 from ...hybrid.records import LawNumbers
 from ...model.model import Model
 from ..bench import averaged_law
@@ -62,7 +62,12 @@ def make_joints(model: Model, numerics: Numerics, patch) -> Joints:
     if friction is None:
         return Joints()
     if model.partial_slip or rig.friction.has_partial_slip:
-        return _make_soft_joints(model, numerics, patch)
+        joints = _make_soft_joints(model, numerics, patch)
+        if rig.drive.kind == "free":
+            # Decay curves are measured at the extremes of the output.
+            laws = tuple((with_all_reversals(law), load) for law, load in joints.laws)
+            joints = joints._replace(laws=laws)
+        return joints
     laws = _list_laws(model, patch)
     return Joints(
         tuple(laws),
@@ -87,7 +92,7 @@ def _list_laws(model: Model, patch) -> list[tuple[LawNumbers, Load]]:
 
     load = _make_load(model, patch)
     if model.grooves is not None:
-        check_lifted_mass(model.grooves, friction.static, rig.modes)
+        climbing.check_lifted_mass(model.grooves, friction.static, rig.modes)
         is_rigid = law_has_trait(friction.law, "set-valued")
         make = make_grooves if is_rigid else smooth_grooves.make_grooves
         return [(make(friction, model.grooves), load)]

@@ -32,7 +32,7 @@ from .curves import (
 
 # Cycles from rest within which a lifted mass leaves its grooves, if it leaves them at all.
 N_CYCLES_IN_GROOVES = 30
-RTOL = 1e-10  # tolerance of a step, so that the change over a period is far below the motion
+RTOL = 1e-11  # tolerance of a step, so that the change over a period is far below the motion
 STEPS_ERROR = 100.0  # error of a periodic motion that is due to its steps, relative to RTOL
 N_CYCLES = 2.0  # computed cycles of a periodic motion, so that each stick is complete
 MIN_STOP = 1e-9  # shortest stop that is counted, in periods
@@ -142,7 +142,7 @@ class ShootingFinder(TracedCurve):
         errors = hybrid_runs.estimate_errors(shared, coarse_values, RTOL)
         relative = find_relative_error(motion)
         errors = {
-            name: errors.get(name, abs(value)) + relative * abs(value)
+            name: errors.get(name, solution.errors.get(name, abs(value))) + relative * abs(value)
             for name, value in solution.values.items()
         }
         # A periodic motion does not drift, and friction without slip does no work over a period.
@@ -182,6 +182,7 @@ class ShootingFinder(TracedCurve):
         """Return the Solution of a run with a regime."""
         solution = self.evaluator.make_solution(run, perf_counter() - begin, drive)
         errors = {name: RTOL * abs(value) for name, value in solution.values.items()}
+        errors |= solution.errors or {}
         extra = {"regime": regime, "multipliers": np.zeros(0)}
         return replace(solution, steady=(None, None), errors=errors, extra=extra)
 
