@@ -24,7 +24,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from .campaigns import cost as cost_curves
-from .campaigns.backbone.request import BackboneRequest
+from .campaigns.backbone import request as backbone_requests
 from .campaigns.fits import request as fit_requests
 from .campaigns.fits.request import FitOptions
 from .campaigns.sweeps import case_models as case_models
@@ -566,7 +566,7 @@ def backbone(
             raise PatchfemError("backbone: the list of amplitudes or forces is empty")
     if len(over or {}) > 1:
         raise PatchfemError("backbone: `over` must have one key with its values")
-    request = BackboneRequest(
+    request = backbone_requests.BackboneRequest(
         _require_string(mode, "backbone: mode"),
         *texts,
         _require_string(method, "backbone: method"),

@@ -8,7 +8,7 @@ from cyclopts import Parameter
 
 from ..campaigns import cost as cost_curves
 from ..campaigns import numerical_settings
-from ..campaigns.backbone.request import BackboneRequest
+from ..campaigns.backbone import request as backbone_requests
 from ..campaigns.fits import request as fit_requests
 from ..export import backbones, costs, fits
 from ..model import model
@@ -133,7 +133,7 @@ def backbone(
     target = choose_folder(out, f"{scene.stem}-backbone")
     output = Output(target, json_, quiet, not no_page, plot, verbose)
     report = output.report and (lambda name: print_message(f"{name} ..."))
-    request = BackboneRequest(mode, amplitudes, forces, method, modes, over)
+    request = backbone_requests.BackboneRequest(mode, amplitudes, forces, method, modes, over)
 
     def compute_curves(_):
         """Compute the curves of all methods and values of the key."""
