@@ -23,10 +23,7 @@ PUBLIC = {
         "identify_driven_modes",
         "list_shape_modes",
     ),
-    "space": (
-        "UnitCubeResidual",
-        "make_space_filling_points",
-    ),
+    "space": ("make_space_filling_points",),
     "two_models": ("TwoModels",),
     "fit_sentences": ("describe_fit",),
 }

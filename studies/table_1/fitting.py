@@ -27,9 +27,8 @@ from patchfem.campaigns.rows.cells import compute_rms_scores, read_response_tabl
 from patchfem.campaigns.rows.model_readings import ModelReadings
 from patchfem.campaigns.rows.search import make_residual
 from patchfem.core import G_N
-from patchfem.identify import UnitCubeResidual
 from patchfem.identify.least_squares import NEAR_BOUND_FRACTION, Descent, descend
-from patchfem.identify.space import make_search_space
+from patchfem.identify.space import UnitCubeResidual, make_search_space
 
 MIL = 25.4e-6
 SCORES = FOLDER / "scores.json"
